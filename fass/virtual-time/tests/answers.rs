@@ -1,249 +1,147 @@
-//! What the commit answers about deadlines, and that runs keep to it.
+//! What the commit answers about deadlines and clusters, and that runs keep to it.
 
 mod support;
 
 use std::time::Duration;
 
 use fass::{
-    Answer, Dag, Fault, OverheadSource, Overheads, Policy, Preemption, Reason, SubtaskAttributes,
-    Test, Untyped, Verdict, create_dag, finish_create_dags,
+    Answer, Commit, ConstructionPolicy, Dag, Fault, OverheadSource, Overheads, Policy, Preemption,
+    create_dag, finish_create_dags, finish_create_dags_with,
 };
-use support::sharing::every;
-use support::{execute, ms, named};
-use virtual_time::VirtualTime;
+use support::{every, ms, named, taking, ticking, work};
+use virtual_time::{Report, VirtualTime};
 
-/// A chain of two subtasks that execute for their WCETs.
-fn chain(name: &str, period: Duration, deadline: Duration, wcets: [Duration; 2]) -> Dag {
-    let attributes = |subtask: &str, wcet| named(subtask).wcet(wcet);
-    build(name, period, deadline, wcets, attributes)
-}
-
-/// The same with priorities.
-fn ranked(name: &str, priority: u32, period: Duration, wcets: [Duration; 2]) -> Dag {
-    let attributes = |subtask: &str, wcet| named(subtask).wcet(wcet).priority(priority);
-    build(name, period, period, wcets, attributes)
-}
-
-fn build(
-    name: &str,
-    period: Duration,
-    deadline: Duration,
-    [first, second]: [Duration; 2],
-    attributes: impl Fn(&str, Duration) -> SubtaskAttributes,
-) -> Dag {
+/// A chain of two subtasks that execute for their WCETs, of one priority; all in milliseconds.
+fn chain(name: &str, priority: u32, [period, deadline]: [u64; 2], wcets: [u64; 2]) -> Dag {
     let dag = create_dag();
     dag.name(name).jobs(50);
-    let source = move || {
-        execute(first);
-        (1,)
-    };
-    dag.register_periodic_subtask(source, vec![name], period, attributes("source", first));
-    let sink = move |_: (i32,)| execute(second);
-    dag.register_sink_subtask(sink, vec![name], deadline, attributes("sink", second));
+    dag.period(ms(period)).relative_deadline(ms(deadline));
+    let [source, sink] = ["source", "sink"].map(|of| taking(of, 0).priority(priority));
+    let [first, second] = wcets;
+    let source = dag.register_untyped_subtask(move |_job| work(first), source.wcet(ms(first)));
+    let sink = dag.register_untyped_subtask(move |_job| work(second), sink.wcet(ms(second)));
+    dag.precede(&source, &sink);
     dag
 }
 
-fn reason(answer: &Answer) -> Option<Reason> {
-    answer.verdict.unproven().map(fass::Unproven::reason)
-}
-
-/// Compares what answers say: for each its beginning, and a part of the rest.
+/// Commits DAGs and runs them; no job takes longer than its DAG's bound. Of each answer the
+/// beginning is compared, and a part of the rest.
 #[track_caller]
-fn assert_said(answers: &[Answer], expected: &[[&str; 2]]) {
-    assert_eq!(answers.len(), expected.len());
-    for (answer, [start, part]) in answers.iter().zip(expected) {
+fn answered(machine: &VirtualTime, dags: &[Dag], expected: &[[&str; 2]]) -> (Commit, Report) {
+    let commit = finish_create_dags(dags).expect("nothing is wrong");
+    assert_eq!(commit.answers().len(), expected.len());
+    for (answer, [start, part]) in commit.answers().iter().zip(expected) {
         let text = answer.to_string();
         assert!(text.starts_with(start) && text.contains(part), "{text}");
     }
-}
-
-#[test]
-fn a_proven_dag_has_a_bound_that_runs_keep() {
-    let machine = VirtualTime::new().policy(Policy::StaticPriority);
-    let dags = [
-        ranked("high", 0, ms(10), [ms(1), ms(2)]),
-        ranked("low", 1, ms(20), [ms(2), ms(3)]),
-    ];
-    let commit = finish_create_dags(&dags).expect("nothing is wrong");
-    assert!(commit.first_unproven().is_none());
     let report = machine.run();
-    let bounds: Vec<Duration> = (commit.answers().iter())
-        .map(|answer| answer.verdict.bound().expect("it is proven"))
-        .collect();
+    assert_eq!(report.violations(), []);
     for job in &report.jobs {
         let taken = Duration::from_nanos(job.response_time_ns().expect("it has ended"));
-        assert!(taken <= bounds[job.dag.index()]);
+        let bound = commit.answers()[job.dag.index()].verdict.bound();
+        assert!(bound.is_none_or(|bound| taken <= bound));
     }
-    assert_eq!(bounds[0], ms(3));
-    let tests = commit.answers().iter().map(|answer| match answer.verdict {
-        Verdict::Proven { test, .. } => Some(test),
-        Verdict::NotProven(_) => None,
-    });
-    let tests: Vec<_> = tests.flatten().collect();
-    assert!(matches!(tests[0], Test::Alone | Test::IntraTask));
-    assert_eq!(tests[1], Test::OneCore);
+    (commit, report)
+}
+
+fn codes(dags: &[Dag]) -> Vec<&'static str> {
+    let error = finish_create_dags(dags).expect_err("it is refused");
+    error.faults().iter().map(Fault::code).collect()
+}
+
+fn late_and_busy() -> [Dag; 2] {
+    let late = chain("late", 0, [10, 4], [2, 1]);
+    let busy = chain("busy", 0, [10, 7], [3, 3]);
+    busy.offset(ms(4)); // of which the bound knows nothing
+    [late, busy]
 }
 
 #[test]
-fn the_answer_is_for_the_preemption_and_the_cores_of_the_platform() {
-    let answers = |preemption, cores| {
-        let machine = VirtualTime::new().policy(Policy::StaticPriority);
-        let _machine = machine.preemption(preemption).cores(cores);
-        let urgent = ranked("urgent", 0, ms(10), [ms(2), ms(2)]);
-        let long = ranked("long", 1, ms(100), [ms(8), ms(1)]);
-        let commit = finish_create_dags(&[urgent, long]).expect("nothing is wrong");
-        commit.answers()[0].verdict.clone()
+fn the_answer_is_for_the_policy_the_preemption_and_the_cores_of_the_platform() {
+    let two = || {
+        let urgent = chain("urgent", 0, [10, 10], [2, 2]);
+        [urgent, chain("long", 1, [100, 100], [8, 1])]
     };
-    // A started subtask of `long` keeps the only core for 8 ms: 12 > 10.
-    let blocked = answers(Preemption::Disabled, 1);
-    assert_eq!(
-        blocked.unproven().map(fass::Unproven::reason),
-        Some(Reason::NoBound)
-    );
-    assert_eq!(
-        answers(Preemption::Enabled, 1).bound(),
-        Some(ms(4)),
-        "it is preempted"
-    );
-    // Four cores are rarely all kept.
-    let Verdict::Proven { bound, test } = answers(Preemption::Disabled, 4) else {
-        panic!("four cores are enough");
-    };
-    assert_eq!(test, Test::NonPreemptive);
-    assert!(bound <= ms(10));
+    let (preempts, keeps) = (Preemption::Enabled, Preemption::Disabled);
+    let (ranked, edf) = (Policy::StaticPriority, Policy::Edf);
+    let unproven = "dag `urgent` is not proven";
+    for (policy, preemption, cores, said) in [
+        (ranked, preempts, 1, "dag `urgent` takes at most 4ms"),
+        // A started subtask of `long` keeps the only core for 8 ms: 12 > 10.
+        (ranked, keeps, 1, unproven),
+        // Four cores are rarely all kept.
+        (ranked, keeps, 4, "dag `urgent` takes at most"),
+        (edf, preempts, 1, "dag `urgent` takes at most"),
+    ] {
+        let machine = VirtualTime::new().policy(policy).preemption(preemption);
+        let expected = [[said, ""], ["dag `long`", ""]];
+        answered(&machine.cores(cores), &two(), &expected);
+    }
 }
 
 #[test]
 fn not_proven_is_accepted_and_says_why() {
     let machine = VirtualTime::new().policy(Policy::Edf);
-    let late = chain("late", ms(10), ms(4), [ms(2), ms(1)]);
-    let busy = chain("busy", ms(10), ms(7), [ms(3), ms(3)]);
-    busy.offset(ms(4)); // of which the bound knows nothing
-    let commit = finish_create_dags(&[late, busy]).expect("a proof is not demanded");
     let expected = [
         ["dag `late` is not proven", ""],
         ["dag `busy` is not proven", "`late`"],
     ];
-    assert_said(commit.answers(), &expected);
-    assert_eq!(reason(&commit.answers()[0]), Some(Reason::NoBound));
+    let (commit, report) = answered(&machine, &late_and_busy(), &expected);
     let first = commit.first_unproven().expect("one fails first");
     assert_eq!(first.dag.name, "late");
     assert!(commit.warnings().is_empty(), "nothing is certain");
     // It does meet them: not proven is not infeasible.
-    let report = machine.run();
     assert!(report.dags().all(|dag| dag.statistics().misses == 0));
 }
 
 #[test]
 fn a_demanded_proof_that_is_missing_refuses_the_commit() {
-    let machine = VirtualTime::new().policy(Policy::Edf);
-    let late = chain("late", ms(10), ms(4), [ms(2), ms(1)]);
-    let busy = chain("busy", ms(10), ms(7), [ms(3), ms(3)]);
-    busy.offset(ms(4));
+    let _machine = VirtualTime::new().policy(Policy::Edf);
+    let [late, busy] = late_and_busy();
     busy.demand_proof();
-    let error = finish_create_dags(&[late.clone(), busy.clone()]).expect_err("it is demanded");
-    let codes: Vec<_> = error.faults().iter().map(Fault::code).collect();
-    assert_eq!(codes, ["not_proven"], "of `late` nothing is demanded");
-    let text = error.to_string();
-    assert!(
-        text.starts_with("dag `busy` ") && text.contains("dag `late`"),
-        "{text}"
+    let both = [late.clone(), busy];
+    assert_eq!(
+        codes(&both),
+        ["not_proven"],
+        "of `late` nothing is demanded"
     );
     late.demand_proof();
-    let error = finish_create_dags(&[late.clone(), busy]).expect_err("both demand it");
-    assert_eq!(error.faults().len(), 2);
-    // The handles are as they were: alone it is proven, and runs.
+    assert_eq!(codes(&both), ["not_proven"; 2]);
+    // Other faults come before that question.
+    let none = chain("none", 0, [10, 4], [3, 3]);
+    none.demand_proof().jobs(0);
+    assert_eq!(codes(&[none]), ["zero_jobs"]);
+    // The handles are as they were: alone it is proven.
     let commit = finish_create_dags(&[late]).expect("nothing delays it");
     assert_eq!(commit.answers()[0].verdict.bound(), Some(ms(3)));
-    assert_eq!(machine.run().dag("late").statistics().completed, 50);
-}
-
-#[test]
-fn other_faults_come_before_the_question_of_a_proof() {
-    let _machine = VirtualTime::new();
-    let dag = chain("none", ms(10), ms(4), [ms(3), ms(3)]);
-    dag.demand_proof().jobs(0);
-    let error = finish_create_dags(&[dag]).expect_err("no jobs");
-    let codes: Vec<_> = error.faults().iter().map(Fault::code).collect();
-    assert_eq!(codes, ["zero_jobs"]);
 }
 
 #[test]
 fn dags_without_all_wcets_say_so() {
-    let _machine = VirtualTime::new().policy(Policy::StaticPriority);
-    let unknown = create_dag();
-    unknown.name("unknown");
-    let known = named("source").wcet(ms(1)).priority(1);
-    unknown.register_periodic_subtask(|| (1,), vec!["unknown"], ms(10), known);
-    let sink = named("sink").priority(1);
-    unknown.register_sink_subtask(|_: (i32,)| (), vec!["unknown"], ms(10), sink);
-    let urgent = ranked("urgent", 0, ms(10), [ms(1), ms(1)]);
-    let lax = ranked("lax", 2, ms(10), [ms(1), ms(1)]);
-    let commit = finish_create_dags(&[unknown, urgent, lax]).expect("WCETs are optional");
+    let machine = VirtualTime::new().policy(Policy::StaticPriority);
+    let unknown = every(10, "unknown");
+    let source = unknown.register_untyped_subtask(|_| (), taking("source", 1).priority(1));
+    let sink = unknown.register_untyped_subtask(|_| (), named("sink").priority(1));
+    unknown.precede(&source, &sink).jobs(50);
+    let urgent = chain("urgent", 0, [10, 10], [1, 1]);
+    let lax = chain("lax", 2, [10, 10], [1, 1]);
+    let reason = "no WCET above 0 is given for subtask `sink`";
     let expected = [
-        [
-            "dag `unknown` is not proven",
-            "no WCET above 0 is given for subtask `sink`",
-        ],
+        ["dag `unknown` is not proven", reason],
         ["dag `urgent` takes at most 2ms", ""],
         ["dag `lax` is not proven", "dag `unknown`"],
     ];
-    assert_said(commit.answers(), &expected);
-    assert_eq!(
-        commit
-            .first_unproven()
-            .map(|answer| answer.dag.name.as_str()),
-        Some("unknown")
-    );
-}
-
-#[test]
-fn an_answer_says_which_wcets_are_observed_ones() {
-    let said_and_hash = |machine: VirtualTime| {
-        let dag = chain("seen", ms(10), ms(9), [ms(3), ms(3)]);
-        let commit = finish_create_dags(&[dag]).expect("the DAG is right");
-        let hash = machine.run().task_set().dags()[0].graph_hash();
-        (commit.answers()[0].to_string(), hash)
-    };
-    let (stated, hash) = said_and_hash(VirtualTime::new());
-    assert_eq!(stated, "dag `seen` takes at most 6ms, by multiple paths");
-    let file = format!("margin 20\ndag {hash} seen\nwcet 1200000 1 sink\nend\n");
-    let (observed, _) = said_and_hash(VirtualTime::new().wcets(&file));
-    assert_eq!(
-        observed,
-        "dag `seen` takes at most 4.2ms, by multiple paths; 1 of 2 WCETs are observed ones and 20 %"
-    );
-}
-
-#[test]
-fn an_answer_says_that_overheads_are_measured_ones() {
-    let _machine = VirtualTime::new();
-    let dag = chain("two", ms(10), ms(9), [ms(3), ms(3)]);
-    let commit = finish_create_dags(&[dag]).expect("the DAG is right");
-    let mut answer = commit.answers()[0].clone();
-    assert_eq!(answer.overheads, OverheadSource::Stated);
-    answer.overheads = OverheadSource::Measured {
-        dispatches: 500,
-        margin_percent: 20,
-    };
-    assert_eq!(
-        answer.to_string(),
-        "dag `two` takes at most 6ms, by multiple paths; overheads are the longest of 500 measured \
-         and 20 %"
-    );
+    let (commit, _) = answered(&machine, &[unknown, urgent, lax], &expected);
+    let first = commit.first_unproven().expect("one fails first");
+    assert_eq!(first.dag.name, "unknown");
 }
 
 #[test]
 fn what_is_certain_to_miss_is_accepted_with_a_warning() {
-    let machine = VirtualTime::new();
-    let dag = chain("long", ms(10), ms(9), [ms(5), ms(5)]);
-    let commit = finish_create_dags(&[dag]).expect("WCETs need not be reached");
-    let answer = &commit.answers()[0];
-    let length_ns = 10_000_000;
-    assert_eq!(
-        reason(answer),
-        Some(Reason::LengthBeyondDeadline { length_ns })
-    );
+    let machine = VirtualTime::new().policy(Policy::Edf);
+    let long = chain("long", 0, [10, 9], [5, 5]);
+    let expected = ["dag `long` is not proven", "its longest path alone"];
+    let (commit, report) = answered(&machine, &[long], &[expected]);
     let codes: Vec<_> = commit.warnings().iter().map(|w| w.code()).collect();
     assert_eq!(codes, ["certain_miss"]);
     assert_eq!(
@@ -251,90 +149,157 @@ fn what_is_certain_to_miss_is_accepted_with_a_warning() {
         "dag `long` cannot keep its deadlines at its WCETs: its longest path alone takes 10ms, \
          which is more than its relative deadline; shorten the path or relax the deadline"
     );
-    assert_eq!(machine.run().dag("long").statistics().misses, 50);
+    assert_eq!(report.dag("long").statistics().misses, 50);
 }
 
 #[test]
-fn measured_overheads_are_added_to_every_wcet() {
+fn overheads_are_added_to_every_wcet() {
     let overheads = Overheads {
         context_switch_ns: 100,
         dispatch_ns: 300,
         interrupt_ns: 1_000,
         ready_ns: 0,
     };
-    let bound = |machine: VirtualTime| {
-        let dag = chain("two", ms(10), ms(10), [ms(2), ms(3)]);
-        let commit = finish_create_dags(&[dag]).expect("nothing is wrong");
+    let (preempts, keeps, none) = (
+        Preemption::Enabled,
+        Preemption::Disabled,
+        Overheads::default(),
+    );
+    for (preemption, overheads, said) in [
+        (preempts, none, "dag `two` takes at most 5ms"),
+        (preempts, overheads, "dag `two` takes at most 5.003ms"),
+        (keeps, overheads, "dag `two` takes at most 5.001ms"),
+    ] {
+        let machine = VirtualTime::new().preemption(preemption);
+        let machine = machine.overheads(overheads);
+        let two = chain("two", 0, [10, 10], [2, 3]);
+        let (commit, report) = answered(&machine, &[two], &[[said, ""]]);
         // They are no part of the run in virtual time.
-        let report = machine.run();
         assert_eq!(report.jobs[0].response_time_ns(), Some(5_000_000));
-        commit.answers()[0].verdict.bound()
-    };
-    let ns = |ns| Some(ms(5) + Duration::from_nanos(ns));
-    assert_eq!(bound(VirtualTime::new()), ns(0));
-    assert_eq!(bound(VirtualTime::new().overheads(overheads)), ns(3_000));
-    let cooperative = VirtualTime::new().preemption(Preemption::Disabled);
-    assert_eq!(bound(cooperative.overheads(overheads)), ns(1_000));
-
+        let mut answer: Answer = commit.answers()[0].clone();
+        assert_eq!(answer.overheads, OverheadSource::Stated);
+        answer.overheads = OverheadSource::Measured {
+            dispatches: 500,
+            margin_percent: 20,
+        };
+        let said = "; overheads are the longest of 500 measured and 20 %";
+        assert!(answer.to_string().ends_with(said), "{answer}");
+    }
     // What they make too long is not proven any more.
     let _machine = VirtualTime::new().overheads(overheads);
-    let tight = chain("tight", ms(10), ms(5), [ms(2), ms(3)]);
+    let tight = chain("tight", 0, [10, 5], [2, 3]);
     tight.demand_proof();
-    let error = finish_create_dags(&[tight]).expect_err("5.003 ms are more than 5 ms");
-    assert_eq!(error.faults()[0].code(), "not_proven");
+    assert_eq!(codes(&[tight]), ["not_proven"]);
 }
 
-/// One core without preemption, a source of 2 ms, seven branches and a sink that takes
-/// no time, all in all the period: counting work alone, each job is complete after 13
-/// ms. By priorities the next job's source comes before that sink.
+/// A source of 2 ms, seven branches and a sink, on one core without preemption, all in all the
+/// period: counting work alone, each job is complete after 13 ms.
 #[test]
 fn a_wcet_of_zero_proves_nothing() {
-    for policy in [Policy::StaticPriority, Policy::Edf] {
-        let machine = VirtualTime::new()
-            .policy(policy)
-            .preemption(Preemption::Disabled);
-        let commit = finish_create_dags(&[star([2, 2, 2, 1, 1, 1, 2], 0)]).expect("accepted");
-        assert_said(
-            commit.answers(),
-            &[["dag `star` is not proven", "subtask `sink`"]],
-        );
-        assert_eq!(commit.warnings()[0].code(), "zero_wcet");
-        let report = machine.run();
-        let responses = report.jobs.iter().filter_map(|job| job.response_time_ns());
-        let observed_ns = match policy {
-            Policy::StaticPriority => 26_000_000,
-            Policy::Edf => 13_000_000,
+    let star = |last_branch: u64, sink: u64| {
+        let dag = every(13, "star");
+        dag.jobs(20);
+        let subtask = |name: &str, priority, time| {
+            let attributes = taking(name, time).priority(priority);
+            dag.register_untyped_subtask(move |_job| work(time), attributes)
         };
-        assert_eq!(responses.max(), Some(observed_ns));
-        drop(machine);
-        // With what a subtask takes at least, the bound holds.
-        let machine = VirtualTime::new()
-            .policy(policy)
-            .preemption(Preemption::Disabled);
-        let commit = finish_create_dags(&[star([2, 2, 2, 1, 1, 1, 1], 1)]).expect("accepted");
-        let bound = commit.answers()[0].verdict.bound();
-        assert_eq!(bound, Some(ms(13)));
-        assert_eq!(machine.run().dag("star").statistics().misses, 0);
+        let (source, sink) = (subtask("source", 0, 2), subtask("sink", 2, sink));
+        for (name, time) in
+            ["a", "b", "c", "d", "e", "f", "g"]
+                .iter()
+                .zip([2, 2, 2, 1, 1, 1, last_branch])
+        {
+            let branch = subtask(name, 1, time);
+            dag.precede(&source, &branch).precede(&branch, &sink);
+        }
+        [dag]
+    };
+    let machine = || VirtualTime::new().preemption(Preemption::Disabled);
+    let expected = ["dag `star` is not proven", "subtask `sink`"];
+    let (commit, report) = answered(&machine(), &star(2, 0), &[expected]);
+    assert_eq!(commit.warnings()[0].code(), "zero_wcet");
+    // The next job's source comes before the sink that takes no time.
+    let responses = report.jobs.iter().filter_map(|job| job.response_time_ns());
+    assert_eq!(responses.max(), Some(26_000_000));
+    // With what a subtask takes at least, the bound holds.
+    let expected = ["dag `star` takes at most 13ms", ""];
+    answered(&machine(), &star(1, 1), &[expected]);
+}
+
+#[test]
+fn the_bound_counts_the_precedence_of_a_state() {
+    for (shares, said) in [
+        (false, "dag `map` takes at most 11ms"),
+        (true, "dag `map` takes at most 21ms"),
+    ] {
+        let machine = VirtualTime::new().cores(3);
+        let dag = every(100, "map");
+        dag.jobs(1);
+        let source = dag.register_untyped_subtask(|_| work(1), taking("source", 1));
+        let state = shares.then(|| dag.state("state", 0));
+        for name in ["left", "right"] {
+            let attributes = taking(name, 10);
+            let branch = match &state {
+                Some(state) => (dag.using(state.update()))
+                    .register_untyped_subtask(|_: &mut i32, _| work(10), attributes),
+                None => dag.register_untyped_subtask(|_| work(10), attributes),
+            };
+            dag.precede(&source, &branch);
+        }
+        let any_graph = ConstructionPolicy::any_graph();
+        let commit = finish_create_dags_with(&[dag], any_graph).expect("nothing is wrong");
+        let text = commit.answers()[0].to_string();
+        assert!(text.starts_with(said), "{text}");
+        assert_eq!(machine.run().violations(), []);
     }
 }
 
-fn star(branches: [u64; 7], sink: u64) -> Dag {
-    let dag = every(13, "star");
-    dag.jobs(20);
-    let subtask = |name: &str, priority, time| {
-        let time = ms(time);
-        let attributes = named(name).wcet(time).priority(priority);
-        dag.register_untyped_subtask(move |_job| execute(time), attributes)
-    };
-    let source = subtask("source", 0, 2);
-    let names = ["a", "b", "c", "d", "e", "f", "g"];
-    let branches = names.iter().zip(branches);
-    let branches: Vec<Untyped> = branches
-        .map(|(name, time)| subtask(name, 1, time))
-        .collect();
-    let sink = subtask("sink", 2, sink);
-    for branch in &branches {
-        dag.precede(&source, branch).precede(branch, &sink);
+#[test]
+fn the_commit_divides_the_cores_and_says_why() {
+    let machine = VirtualTime::new().cores(4).assign_clusters();
+    let heavy = every(10, "heavy");
+    for name in ["left", "middle", "right"] {
+        heavy.register_untyped_subtask(|_job| work(4), taking(name, 4));
     }
-    dag
+    let [a, b, c] = [("a", 7), ("b", 5), ("c", 4)].map(|(name, time)| ticking(name, time));
+    let dags = [a, heavy, b, c];
+    dags.iter().for_each(|dag| _ = dag.jobs(5));
+    let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph());
+    let commit = commit.expect("nothing is wrong");
+    let place = |answer: &Answer| answer.cluster.as_ref().map(ToString::to_string);
+    let places: Vec<String> = commit.answers().iter().filter_map(place).collect();
+    assert_eq!(
+        places,
+        [
+            "in cluster 1, on 1 core from core 2 on: the emptiest one",
+            "in cluster 0, on 2 cores from core 0 on: its own, as a job is 12ms of work within 10ms",
+            "in cluster 2, on 1 core from core 3 on: the emptiest one",
+            "in cluster 2, on 1 core from core 3 on: the emptiest one",
+        ]
+    );
+    assert!(commit.first_unproven().is_none());
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert!(report.dags().all(|dag| dag.statistics().misses == 0));
+}
+
+#[test]
+fn cores_are_divided_by_the_app_or_by_the_commit_and_the_last_word_counts() {
+    let calm = || {
+        let dag = ticking("calm", 6);
+        dag.cluster(0).jobs(1);
+        [dag]
+    };
+    let machine = VirtualTime::new().clusters(&[1]).assign_clusters();
+    let error = finish_create_dags(&calm()).expect_err("the commit divides them");
+    assert_eq!(
+        error.to_string(),
+        "dag `calm` gets no cores: it states a cluster, and the commit is to make them; leave its \
+         cluster out"
+    );
+    drop(machine);
+    let _machine = VirtualTime::new().assign_clusters().clusters(&[1]);
+    let commit = finish_create_dags(&calm()).expect("the app divides them");
+    let place = commit.answers()[0].cluster.as_ref();
+    assert_eq!(place.map(|place| &place.why), Some(&None));
 }

@@ -7,119 +7,81 @@
 mod random;
 mod support;
 
-use fass::{
-    ConstructionPolicy, Count, Dag, EndToEnd, Latest, Policy, Sample, create_dag,
-    finish_create_dags_with,
-};
+use fass::{ConstructionPolicy, Dag, EndToEnd, Latest, Policy, Sample, finish_create_dags_with};
 use random::Random;
-use support::sharing::{Seen, ms, named, work};
+use support::{Seen, every, ms, taking, work};
 use virtual_time::{InstanceRecord, Report, VirtualTime};
 
 /// The job of the first DAG that a value goes back to.
 type Origin = Option<u64>;
 
-/// A DAG that is drawn: its times are in milliseconds.
-struct Drawn {
-    period: u64,
-    offset: u64,
-    /// Of its two subtasks: at most, and least.
-    wcets: [u64; 2],
-    least: [u64; 2],
-    seed: u64,
+/// Draws a WCET, and what takes up to it.
+fn times(random: &mut Random) -> (u64, impl FnMut() + Send + use<>) {
+    let wcet = random.between(1, 4);
+    let least = random.between(0, wcet);
+    let mut random = Random::new(random.next());
+    (wcet, move || work(random.between(least, wcet)))
 }
 
-impl Drawn {
-    fn draw(random: &mut Random) -> Self {
-        let wcets = [random.between(1, 4), random.between(1, 4)];
-        Self {
-            period: random.between(20, 60),
-            offset: random.between(0, 30),
-            wcets,
-            least: wcets.map(|wcet| random.between(0, wcet)),
-            seed: random.next(),
-        }
-    }
-
-    /// Builds it: the first subtask samples, or begins the chain; the second one ends it.
-    fn build(&self, name: &str, from: Option<&Latest<Origin>>, seen: &Seen<Origin>) -> Dag {
-        let dag = create_dag();
-        dag.name(name)
-            .offset(ms(self.offset))
-            .jobs(3000 / self.period);
-        let mut random = Random::new(self.seed);
-        let (least, wcets) = (self.least, self.wcets);
-        let mut take = move |at: usize| work(random.between(least[at], wcets[at]));
-        let mut take_later = take.clone();
-        let attributes = |name, at: usize| named(name).wcet(ms(wcets[at]));
-        let period = ms(self.period);
-        let (into, out_of) = (format!("into {name}"), format!("out of {name}"));
-        match from {
-            Some(latest) => dag
-                .period(period)
-                .using(latest.sample())
-                .source(move |sample: Option<Sample<'_, Origin>>| {
-                    let origin = sample.and_then(|sample| *sample.value);
-                    take(0);
-                    (origin,)
-                })
-                .writes(&[&*into])
-                .register(attributes("enter", 0)),
-            None => {
-                let mut job = 0_u64..;
-                dag.register_periodic_subtask(
-                    move || {
-                        take(0);
-                        (job.next(),)
-                    },
-                    vec![&*into],
-                    period,
-                    attributes("enter", 0),
-                )
-            }
+/// Draws a DAG, of which the first subtask samples, or begins the chain; the second one ends it.
+fn draw(
+    random: &mut Random,
+    name: &str,
+    from: Option<&Latest<Origin>>,
+    seen: &Seen<Origin>,
+) -> (Dag, Latest<Origin>) {
+    let period = random.between(20, 60);
+    let dag = every(period, name);
+    dag.offset(ms(random.between(0, 30))).jobs(3000 / period);
+    let (into, out_of) = (format!("into {name}"), format!("out of {name}"));
+    let (wcet, mut enter) = times(random);
+    let attributes = taking("enter", wcet);
+    if let Some(latest) = from {
+        let pass = move |sample: Option<Sample<'_, Origin>>| {
+            let origin = sample.and_then(|sample| *sample.value);
+            enter();
+            (origin,)
         };
-        let keep = seen.clone();
-        dag.register_subtask(
-            move |(origin,): (Origin,)| {
-                take_later(1);
-                keep.add(origin);
-                (origin,)
-            },
-            vec![&*into],
-            vec![&*out_of],
-            attributes("leave", 1),
-        );
-        dag.relative_deadline(period);
-        dag
+        let source = dag.using(latest.sample()).source(pass);
+        source.writes(&[&into]).register(attributes);
+    } else {
+        let mut jobs = 0_u64..;
+        let begin = move || {
+            enter();
+            (jobs.next(),)
+        };
+        dag.source(begin).writes(&[&into]).register(attributes);
     }
+    let (wcet, mut leave) = times(random);
+    let keep = seen.clone();
+    let pass = move |(origin,): (Origin,)| {
+        leave();
+        keep.add(origin);
+        (origin,)
+    };
+    dag.register_subtask(pass, vec![&into], vec![&out_of], taking("leave", wcet));
+    let latest = dag.latest(&out_of);
+    (dag, latest)
 }
 
 /// Runs three DAGs in a chain, and returns what its last subtask saw, too.
 fn run(random: &mut Random) -> (Report, EndToEnd, Vec<Origin>) {
     let policy = [Policy::StaticPriority, Policy::Edf][random.below(2)];
-    let machine = VirtualTime::new()
-        .cores(u32::try_from(random.between(1, 2)).expect("small"))
-        .policy(policy);
-    let construction = ConstructionPolicy {
-        sinks: Count::Several,
-        ..ConstructionPolicy::paper()
-    };
+    let cores = [1, 2][random.below(2)];
+    let machine = VirtualTime::new().cores(cores).policy(policy);
     let (seen, ignored) = (Seen::default(), Seen::default());
-    let [first, second, third] = [(); 3].map(|()| Drawn::draw(random));
-    let camera = first.build("camera", None, &ignored);
-    let out = camera.latest("out of camera");
-    let plan = second.build("plan", Some(&out), &ignored);
-    let out = plan.latest("out of plan");
-    let motor = third.build("motor", Some(&out), &seen);
-    let end = motor.latest("out of motor");
-    let last = create_dag();
-    last.name("log").jobs(1).relative_deadline(ms(4000));
-    last.period(ms(4000))
-        .using(end.sample())
-        .source(|_: Option<Sample<'_, Origin>>| ())
-        .register(named("log").wcet(ms(0)));
+    let (camera, out) = draw(random, "camera", None, &ignored);
+    let (plan, out) = draw(random, "plan", Some(&out), &ignored);
+    let (motor, end) = draw(random, "motor", Some(&out), &seen);
+    let last = every(4000, "log");
+    let log = last.jobs(1).using(end.sample());
+    let log = log.source(|_: Option<Sample<'_, Origin>>| ());
+    log.register(taking("log", 0));
     let dags = [camera, plan, motor, last];
-    let commit = finish_create_dags_with(&dags, construction).expect("a sound set");
-    let chains = commit.chains_between("camera/enter", "motor/leave");
+    let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph());
+    let chains = commit
+        .expect("a sound set")
+        .chains_between("camera/enter", "motor/leave");
     let [chain] = &chains[..] else {
         panic!("{chains:?}");
     };

@@ -1,22 +1,28 @@
-//! The rules L1 to L6: what functions change of a run, in virtual time.
+//! What functions change of a run besides their outputs: switches, states, signals.
 
 mod support;
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-use fass::{Dag, Switch, create_dag, finish_create_dags};
-use support::lifecycle::{asking, events, ticking};
-use support::run;
-use support::sharing::{every, ms, named, work};
+use fass::{Dag, Switch, create_dag};
+use support::{Seen, every, job_numbers, named, run, ticking, work};
 use virtual_time::{VirtualTime, What};
+
+/// A DAG of one subtask that asks for something of another DAG in each job, every 20 ms.
+fn asking(of: &Dag, mut ask: impl FnMut(Switch<'_>, u64) + Send + 'static) -> Dag {
+    let dag = every(20, "asks");
+    let function = move |switch: Switch<'_>, job| {
+        ask(switch, job);
+        work(1);
+    };
+    let using = dag.using(of.switching());
+    using.register_untyped_subtask(function, named("ask"));
+    dag
+}
 
 #[test]
 fn l2_requests_are_served_in_the_order_in_which_the_uses_are_stated() {
-    for resumes_last in [false, true] {
+    for (resumes_last, skips) in [(false, 2), (true, 0)] {
         let machine = VirtualTime::new().cores(2);
-        let ticks = ticking("ticks", 3);
-        let asks = every(20, "asks");
-        asks.jobs(1);
+        let (ticks, asks) = (ticking("ticks", 1), every(20, "asks"));
         let function = move |(mut one, mut other): (Switch<'_>, Switch<'_>), _job| {
             if resumes_last {
                 one.pause();
@@ -27,43 +33,31 @@ fn l2_requests_are_served_in_the_order_in_which_the_uses_are_stated() {
             }
             work(5);
         };
-        asks.using((ticks.switching(), ticks.switching()))
-            .register_untyped_subtask(function, named("ask"));
+        let using = asks.using((ticks.switching(), ticks.switching()));
+        using.register_untyped_subtask(function, named("ask"));
+        let _ = (ticks.jobs(3), asks.jobs(1));
         let report = run(&machine, &[ticks, asks]);
-        let expected = if resumes_last { 0 } else { 2 };
-        assert_eq!(report.dag("ticks").statistics().skips, expected);
+        assert_eq!(report.dag("ticks").statistics().skips, skips);
     }
-}
-
-#[test]
-fn l5_a_run_without_end_is_refused_unless_a_function_may_end_it() {
-    let machine = VirtualTime::new();
-    finish_create_dags(&[ticking("ticks", 0)]).unwrap();
-    let refused = machine.try_run().unwrap_err().to_string();
-    assert!(refused.contains("`ticks`"), "{refused}");
 }
 
 /// A DAG whose sensor is recorded, and one that pauses it from job 1 on.
 fn recorded() -> [Dag; 2] {
-    let sensor = create_dag();
+    let sensor = every(10, "sensor");
     sensor
-        .name("sensor")
         .jobs(6)
         .record::<u64>("value")
         .record::<u64>("double");
-    let mut value = 0_u64;
-    let measure = move || {
-        value += 1;
-        (value,)
-    };
-    sensor.register_periodic_subtask(measure, vec!["value"], ms(10), named("measure"));
+    let measure = sensor.source(job_numbers(0)).writes(&["value"]);
+    measure.register(named("measure"));
     let double = |(value,): (u64,)| (2 * value,);
     sensor.register_subtask(double, vec!["value"], vec!["double"], named("double"));
-    sensor.register_sink_subtask(|_: (u64,)| (), vec!["double"], ms(10), named("use"));
-    let asks = asking(&sensor, 1, 2, |mut switch, job| match job {
+    sensor.register_subtask(|_: (u64,)| (), vec!["double"], vec![], named("use"));
+    let asks = asking(&sensor, |mut switch, job| match job {
         0 => switch.pause(),
         _ => switch.resume(),
     });
+    asks.jobs(2);
     [sensor, asks]
 }
 
@@ -71,64 +65,90 @@ fn recorded() -> [Dag; 2] {
 fn l6_a_replay_passes_over_what_was_skipped_whatever_is_asked_for() {
     let machine = VirtualTime::new().cores(2);
     let report = run(&machine, &recorded());
-    assert_eq!(
-        (
-            report.dag("sensor").statistics().skips,
-            report.dag("sensor").statistics().completed
-        ),
-        (2, 4)
-    );
+    let counts = report.dag("sensor").statistics();
+    assert_eq!((counts.skips, counts.completed), (2, 4));
     let recording = machine.recording();
-
     for cores in [1, 2] {
         let machine = VirtualTime::new().cores(cores).replay(&recording).unwrap();
         let report = run(&machine, &recorded());
         assert_eq!(report.divergence, None);
         assert_eq!((report.compared, report.uncompared), (4, 0));
-        assert_eq!(
-            report.dag("sensor").statistics().skips,
-            0,
-            "they are passed over"
-        );
-        assert_eq!(events(&report, &["off", "on"]), [""; 0]);
+        let skips = report.dag("sensor").statistics().skips;
+        assert_eq!(skips, 0, "they are passed over");
+        let is_switch = |what| [What::Off, What::On].contains(&what);
+        assert!(!report.events.iter().any(|event| is_switch(event.what)));
     }
 }
 
 #[test]
 fn a_release_of_a_dag_that_is_off_is_a_breach() {
-    for (off, on) in [(What::Off, What::On), (What::Closed, What::Closed)] {
+    for off in [What::Off, What::Closed] {
         let machine = VirtualTime::new().cores(2);
-        let ticks = ticking("ticks", 4);
-        let asks = asking(&ticks, 1, 1, |mut switch, _| switch.pause());
+        let ticks = ticking("ticks", 1);
+        let asks = asking(&ticks, |mut switch, _| switch.pause());
+        let _ = (ticks.jobs(2), asks.jobs(1));
         let mut report = run(&machine, &[ticks, asks]);
-        let mut releases = 0;
         for event in &mut report.events {
-            match event.what {
-                What::Off => event.what = off,
-                What::Skipped => {
-                    // One that the pause should have kept from coming.
-                    event.what = if releases == 0 { What::Released } else { on };
-                    releases += 1;
-                }
-                _ => {}
-            }
+            event.what = match event.what {
+                What::Off => off,
+                // The pause should have kept it from coming.
+                What::Skipped => What::Released,
+                what => what,
+            };
         }
-        let texts: Vec<String> = report
+        let found: Vec<_> = report
             .violations()
             .iter()
-            .map(|it| it.to_string())
+            .map(ToString::to_string)
             .collect();
         let text = "at 10000000 ns, R1 release: dag 0 job 1 is released although its DAG is paused \
                     or closed";
-        assert!(texts.contains(&text.to_owned()), "{texts:?}");
+        assert!(found.iter().any(|it| it == text), "{found:?}");
     }
 }
+
 #[test]
-fn what_is_committed_is_not_paused_at_the_start_any_more() {
+fn several_states_are_used_as_a_tuple_and_last_from_job_to_job() {
     let machine = VirtualTime::new();
-    let dag = ticking("ticks", 1);
-    finish_create_dags(std::slice::from_ref(&dag)).unwrap();
-    let late = catch_unwind(AssertUnwindSafe(|| _ = dag.starts_paused()));
-    assert!(late.is_err());
-    assert_eq!(machine.run().dag("ticks").statistics().completed, 1);
+    let dag = every(10, "sums");
+    dag.jobs(3);
+    let (sum, count) = (dag.state("sum", 0_u64), dag.state("count", 0_u64));
+    let add = |(sum, count): (&mut u64, &mut u64)| {
+        *count += 1;
+        *sum += *count;
+        (*sum,)
+    };
+    let add = dag.using((sum.update(), count.update())).source(add);
+    add.writes(&["sum"]).register(named("add"));
+    let (seen, keep) = Seen::shared();
+    let check = move |(sum, count): (&u64, &u64), (sent,): (u64,)| {
+        keep.add((*sum, *count, sent));
+    };
+    let check = dag.using((sum.read(), count.read())).subtask(check);
+    check.reads(&["sum"]).register(named("check"));
+    run(&machine, &[dag]);
+    assert_eq!(seen.all(), [(1, 1, 1), (3, 2, 3), (6, 3, 6)]);
+}
+
+#[test]
+#[should_panic(expected = "a state of another DAG is used")]
+fn a_state_stays_in_its_dag() {
+    let state = create_dag().state("state", 0);
+    let _ = create_dag().using(state.update());
+}
+
+#[test]
+fn a_subtask_cannot_raise_a_signal_behind_the_models_back() {
+    let machine = VirtualTime::new().contain_panics();
+    let answers = create_dag();
+    let event = answers
+        .relative_deadline(support::ms(5))
+        .sporadic(support::ms(15));
+    answers.source(|| ()).register(named("answer"));
+    let asks = every(10, "asks");
+    let ask = asks.jobs(1).source(move || event.raise());
+    ask.register(named("ask"));
+    let report = run(&machine, &[answers, asks]);
+    let said = &report.panics[0].message;
+    assert!(said.contains("dag.using(signal.raising())"), "{said}");
 }

@@ -3,11 +3,12 @@
 mod support;
 
 use std::fmt::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use fass::{
     Dag, Framing, Packet, Received, Sender, Wire, WireOptions, create_dag, finish_create_dags,
 };
-use support::{ms, named, run};
+use support::{commit, every, job_numbers, ms, named, run, taking};
 use virtual_time::{Silent, VirtualTime};
 
 fn number(packet: &[u8]) -> Option<u32> {
@@ -15,7 +16,7 @@ fn number(packet: &[u8]) -> Option<u32> {
 }
 
 /// Each job's packets, as numbers and the time of each in ms.
-type Seen = support::sharing::Seen<Vec<(u32, u64)>>;
+type Seen = support::Seen<Vec<(u32, u64)>>;
 
 fn look(seen: &Seen) -> impl FnMut(Received<'_, u32>) + Send + use<> {
     let seen = seen.clone();
@@ -26,24 +27,32 @@ fn look(seen: &Seen) -> impl FnMut(Received<'_, u32>) + Send + use<> {
 }
 
 /// A DAG of one subtask that receives every 10 ms, for `jobs` jobs.
-fn periodic(wire: &Wire, jobs: u64, seen: &Seen) -> Dag {
-    let dag = create_dag();
-    dag.jobs(jobs).relative_deadline(ms(10));
-    dag.period(ms(10))
-        .using(wire.receiving(number))
-        .source(look(seen))
-        .register(named("receive").wcet(ms(1)));
+fn periodic(
+    wire: &Wire,
+    jobs: u64,
+    receive: impl FnMut(Received<'_, u32>) + Send + 'static,
+) -> Dag {
+    let dag = every(10, "periodic");
+    let using = dag.jobs(jobs).using(wire.receiving(number));
+    using.source(receive).register(taking("receive", 1));
     dag
+}
+
+/// Lets bytes arrive at these milliseconds.
+fn arrive(machine: &VirtualTime, wire: &Wire, arrivals: &[(u64, &[u8])]) {
+    for (time_ms, bytes) in arrivals {
+        machine.arrive_at(wire, ms(*time_ms), bytes);
+    }
 }
 
 #[test]
 fn a_periodic_source_takes_all_that_came_since_its_last_job() {
     let (wire, seen) = (Wire::new("numbers"), Seen::default());
     let machine = VirtualTime::new();
-    finish_create_dags(&[periodic(&wire, 4, &seen)]).unwrap();
-    machine.arrive_at(&wire, ms(1), b"1\n2");
-    machine.arrive_at(&wire, ms(4), b"3\nnone\n4\n");
-    machine.arrive_at(&wire, ms(20), b"5\n"); // at a release: that job has it
+    commit(&[periodic(&wire, 4, look(&seen))]);
+    // The last one at a release: that job has it.
+    let arrivals: [(u64, &[u8]); 3] = [(1, b"1\n2"), (4, b"3\nnone\n4\n"), (20, b"5\n")];
+    arrive(&machine, &wire, &arrivals);
     machine.run();
     let jobs = [vec![], vec![(1, 1), (23, 4), (4, 4)], vec![(5, 20)], vec![]];
     assert_eq!(seen.all(), jobs);
@@ -52,128 +61,91 @@ fn a_periodic_source_takes_all_that_came_since_its_last_job() {
 }
 
 #[test]
-fn a_packet_raises_the_sporadic_dag_that_receives_it() {
-    let (wire, seen) = (Wire::new("numbers"), Seen::default());
-    let dag = create_dag();
-    dag.relative_deadline(ms(5));
-    let attributes = named("receive").wcet(ms(1));
-    dag.sporadic(ms(10));
-    let receiving = dag.using(wire.receiving(number));
-    receiving.source(look(&seen)).register(attributes);
-    let machine = VirtualTime::new().silent(Silent::Wcet);
-    finish_create_dags(&[dag]).unwrap();
-    machine.arrive_at(&wire, ms(3), b"7");
-    machine.arrive_at(&wire, ms(5), b"\n"); // whole now
-    machine.arrive_at(&wire, ms(6), b"8\n"); // early: at 15 ms
-    machine.arrive_at(&wire, ms(9), b"9\n10\n"); // no signal is kept besides, no packet is lost
-    machine.arrive_at(&wire, ms(40), b"\n\n"); // no packet
-    machine.arrive_at(&wire, ms(50), b"11\n");
-    let report = machine.run();
-    let releases: Vec<_> = report
-        .jobs
-        .iter()
-        .map(|job| job.release_ns / 1_000_000)
-        .collect();
-    assert_eq!(releases, [5, 15, 50]);
-    assert_eq!(
-        seen.all(),
-        [vec![(7, 5)], vec![(8, 6), (9, 9), (10, 9)], vec![(11, 50)]]
-    );
-    assert_eq!(report.violations(), []);
-}
-
-#[test]
-fn a_wire_without_room_loses_the_newest_packets_and_counts_them() {
-    let (room_bytes, seen) = (64, Seen::default());
-    let options = WireOptions {
-        longest_bytes: 4,
-        room_bytes,
-        ..WireOptions::default()
-    };
-    let wire = Wire::with("numbers", options);
-    let machine = VirtualTime::new();
-    finish_create_dags(&[periodic(&wire, 3, &seen)]).unwrap();
-    // 14 bytes each, so there is room for four; and one that is too long.
-    machine.arrive_at(&wire, ms(1), b"11\n12\n13\n14\n15\n16\n54321\n");
-    machine.arrive_at(&wire, ms(11), b"17\n");
-    machine.run();
-    let jobs = [
-        vec![],
-        vec![(11, 1), (12, 1), (13, 1), (14, 1)],
-        vec![(17, 11)],
-    ];
-    assert_eq!(seen.all(), jobs);
-    let counts = wire.counts();
-    assert_eq!(
-        (counts.packets, counts.lost_packets, counts.lost_bytes),
-        (5, 2, 4)
-    );
-    assert_eq!(counts.malformed, 1);
-}
-
-#[test]
 fn what_is_not_taken_stays_for_the_next_job() {
     let (wire, seen) = (Wire::new("numbers"), Seen::default());
     let mut look = look(&seen);
-    let dag = create_dag();
-    dag.jobs(3).relative_deadline(ms(10));
     let one_by_one = move |mut packets: Received<'_, u32>| {
         let _first = packets.next();
         if packets.next().is_some() {
             look(packets);
         }
     };
-    let attributes = named("receive");
-    (dag.period(ms(10)).using(wire.receiving(number)))
-        .source(one_by_one)
-        .register(attributes);
     let machine = VirtualTime::new();
-    finish_create_dags(&[dag]).unwrap();
-    machine.arrive_at(&wire, ms(1), b"1\n");
-    machine.arrive_at(&wire, ms(11), b"2\n3\n4\n");
+    commit(&[periodic(&wire, 3, one_by_one)]);
+    arrive(&machine, &wire, &[(1, b"1\n"), (11, b"2\n3\n4\n")]);
     machine.run();
     assert_eq!(seen.all(), [[(4, 11)]]);
 }
 
-/// A DAG whose sink sends each job's number, and panics in job 1 before it is complete.
-fn sending(wire: &Wire, jobs: u64, panics: bool) -> Dag {
-    let (mut job, dag) = (0_u32.., create_dag());
-    dag.jobs(jobs);
-    let source = move || (job.next().expect("it has no end"),);
-    dag.register_periodic_subtask(source, vec!["job"], ms(10), named("count"));
-    dag.using(wire.sending())
-        .subtask(move |mut wire: Sender<'_>, (job,): (u32,)| {
-            wire.send(format!("job {job}").as_bytes());
-            assert!(!panics || job != 1, "job 1");
-            wire.send(b"\n");
-        })
-        .reads(&["job"])
-        .due(ms(10))
-        .register(named("send").wcet(ms(3)));
-    dag
+#[test]
+fn a_packet_raises_the_sporadic_dag_that_receives_it() {
+    let (wire, seen) = (Wire::new("numbers"), Seen::default());
+    let dag = create_dag();
+    dag.relative_deadline(ms(5)).sporadic(ms(10));
+    let receiving = dag.using(wire.receiving(number)).source(look(&seen));
+    receiving.register(taking("receive", 1));
+    let machine = VirtualTime::new().silent(Silent::Wcet);
+    commit(&[dag]);
+    let arrivals: [(u64, &[u8]); 6] = [
+        (3, b"7"),
+        (5, b"\n"),      // whole now
+        (6, b"8\n"),     // early: at 15 ms
+        (9, b"9\n10\n"), // no signal is kept besides, no packet is lost
+        (40, b"\n\n"),   // no packet
+        (50, b"11\n"),
+    ];
+    arrive(&machine, &wire, &arrivals);
+    let report = machine.run();
+    let releases = report.jobs.iter().map(|job| job.release_ns / 1_000_000);
+    assert_eq!(releases.collect::<Vec<_>>(), [5, 15, 50]);
+    let jobs = [vec![(7, 5)], vec![(8, 6), (9, 9), (10, 9)], vec![(11, 50)]];
+    assert_eq!(seen.all(), jobs);
+    assert_eq!(report.violations(), []);
 }
 
 #[test]
-fn r3_bytes_go_when_their_instance_is_complete() {
+fn a_wire_without_room_loses_the_newest_packets_and_counts_them() {
+    let options = WireOptions {
+        longest_bytes: 4,
+        room_bytes: 64,
+        ..WireOptions::default()
+    };
+    let (wire, seen) = (Wire::with("numbers", options), Seen::default());
+    let machine = VirtualTime::new();
+    commit(&[periodic(&wire, 3, look(&seen))]);
+    // 14 bytes each, so there is room for four; and one that is too long.
+    let many = b"11\n12\n13\n14\n15\n16\n54321\n";
+    arrive(&machine, &wire, &[(1, many), (11, b"17\n")]);
+    machine.run();
+    let four = (11..=14).map(|packet| (packet, 1)).collect();
+    assert_eq!(seen.all(), [vec![], four, vec![(17, 11)]]);
+    let counts = wire.counts();
+    let lost = (counts.lost_packets, counts.lost_bytes, counts.malformed);
+    assert_eq!((counts.packets, lost), (5, (2, 4, 1)));
+}
+
+#[test]
+fn r3_bytes_go_when_their_instance_is_complete_and_not_if_it_fails() {
     let wire = Wire::new("out");
-    let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
-    finish_create_dags(&[sending(&wire, 2, false)]).unwrap();
+    let machine = VirtualTime::new().connect(&wire).contain_panics();
+    let dag = every(10, "sending");
+    let count = dag.jobs(3).source(job_numbers(0)).writes(&["job"]);
+    count.register(named("count"));
+    let send = |mut wire: Sender<'_>, (job,): (u64,)| {
+        wire.send(format!("job {job}").as_bytes());
+        assert!(job != 2, "before it is complete");
+        wire.send(b"\n");
+    };
+    let sink = dag.using(wire.sending()).subtask(send).reads(&["job"]);
+    sink.register(taking("send", 3));
+    commit(&[dag]);
     machine.run_for(ms(2));
     assert_eq!(machine.sent(&wire), b"");
     machine.run_for(ms(1));
     assert_eq!(machine.sent(&wire), b"job 0\n");
-    machine.run();
+    assert_eq!(machine.run().panics.len(), 1);
     assert_eq!(machine.sent(&wire), b"job 0\njob 1\n");
     assert_eq!(wire.counts().sent_bytes, 12);
-}
-
-#[test]
-fn an_instance_that_fails_sends_nothing() {
-    let wire = Wire::new("out");
-    let machine = VirtualTime::new().connect(&wire).contain_panics();
-    finish_create_dags(&[sending(&wire, 3, true)]).unwrap();
-    assert_eq!(machine.run().panics.len(), 1);
-    assert_eq!(machine.sent(&wire), b"job 0\n");
 }
 
 #[test]
@@ -184,13 +156,10 @@ fn an_instance_that_sends_too_much_sends_nothing_and_that_is_counted() {
     };
     let wire = Wire::with("out", options);
     let mut lengths = [16, 17, 5].into_iter();
-    let dag = create_dag();
-    dag.jobs(3).relative_deadline(ms(10));
+    let dag = every(10, "sending");
     let send = move |mut wire: Sender<'_>| wire.send(&vec![b'x'; lengths.next().unwrap()]);
-    let attributes = named("send");
-    (dag.period(ms(10)).using(wire.sending()))
-        .source(send)
-        .register(attributes);
+    let source = dag.jobs(3).using(wire.sending()).source(send);
+    source.register(named("send"));
     let machine = VirtualTime::new().connect(&wire);
     run(&machine, &[dag]);
     assert_eq!(machine.sent(&wire).len(), 21);
@@ -200,32 +169,21 @@ fn an_instance_that_sends_too_much_sends_nothing_and_that_is_counted() {
 
 #[test]
 fn a_decoder_that_panics_is_contained_like_a_function() {
-    fn hostile(packet: &[u8]) -> Option<u32> {
-        Some(packet.first().map_or(0, |byte| 10 / u32::from(byte - b'0')))
-    }
+    let hostile = |packet: &[u8]| Some(10 / u32::from(packet[0] - b'0'));
     let (bad, good, seen) = (Wire::new("bad"), Wire::new("good"), Seen::default());
-    let dag = create_dag();
-    dag.jobs(3).relative_deadline(ms(10));
-    let attributes = named("receive");
+    let dag = every(10, "hostile");
     let count = |packets: Received<'_, u32>| assert_eq!(packets.count(), 0);
-    (dag.period(ms(10)).using(bad.receiving(hostile)))
-        .source(count)
-        .register(attributes);
+    let using = dag.jobs(3).using(bad.receiving(hostile));
+    using.source(count).register(named("receive"));
     let machine = VirtualTime::new().contain_panics();
-    let healthy = periodic(&good, 3, &seen);
-    finish_create_dags(&[dag.clone(), healthy.clone()]).unwrap();
-    machine.arrive_at(&bad, ms(1), b"0\n");
-    machine.arrive_at(&good, ms(1), b"1\n");
+    commit(&[dag, periodic(&good, 3, look(&seen))]);
+    arrive(&machine, &bad, &[(1, b"0\n")]);
+    arrive(&machine, &good, &[(1, b"1\n")]);
     let report = machine.run();
     assert_eq!(report.panics.len(), 1);
     assert_eq!(report.panics[0].message, "attempt to divide by zero");
-    assert_eq!(
-        (
-            report.dag(&dag).statistics().completed,
-            report.dag(&healthy).statistics().completed
-        ),
-        (1, 3)
-    );
+    let completed = report.dags().map(|dag| dag.statistics().completed);
+    assert_eq!(completed.collect::<Vec<_>>(), [1, 3]);
     assert_eq!(seen.all(), [vec![], vec![(1, 1)], vec![]]);
 }
 
@@ -233,26 +191,20 @@ fn a_decoder_that_panics_is_contained_like_a_function() {
 fn a_replay_takes_what_the_receiver_wrote_and_no_bytes() {
     let build = |wire: &Wire| {
         let dag = create_dag();
-        dag.name("sum").record::<u32>("sum");
+        dag.name("sum").relative_deadline(ms(10));
+        dag.record::<u32>("sum").sporadic(ms(10));
         let sum = |packets: Received<'_, u32>| (packets.map(|packet| packet.value).sum::<u32>(),);
-        let attributes = named("receive");
-        dag.sporadic(ms(10));
-        dag.using(wire.receiving(number))
-            .source(sum)
-            .writes(&["sum"])
-            .register(attributes);
-        dag.using(wire.sending())
-            .subtask(|mut wire: Sender<'_>, (sum,): (u32,)| writeln!(wire, "{sum}").unwrap())
-            .reads(&["sum"])
-            .due(ms(10))
-            .register(named("send"));
-        dag
+        let source = dag.using(wire.receiving(number)).source(sum);
+        source.writes(&["sum"]).register(named("receive"));
+        let send = |mut wire: Sender<'_>, (sum,): (u32,)| writeln!(wire, "{sum}").unwrap();
+        let sink = dag.using(wire.sending()).subtask(send).reads(&["sum"]);
+        sink.register(named("send"));
+        commit(&[dag]);
     };
     let wire = Wire::new("numbers");
     let machine = VirtualTime::new().connect(&wire);
-    finish_create_dags(&[build(&wire)]).unwrap();
-    machine.arrive_at(&wire, ms(3), b"1\n2\n");
-    machine.arrive_at(&wire, ms(4), b"5\n");
+    build(&wire);
+    arrive(&machine, &wire, &[(3, b"1\n2\n"), (4, b"5\n")]);
     machine.run();
     assert_eq!(machine.sent(&wire), b"3\n5\n");
     let recording = machine.recording();
@@ -262,8 +214,8 @@ fn a_replay_takes_what_the_receiver_wrote_and_no_bytes() {
         .connect(&wire)
         .replay(&recording)
         .unwrap();
-    finish_create_dags(&[build(&wire)]).unwrap();
-    machine.arrive_at(&wire, ms(1), b"77\n"); // raises nothing
+    build(&wire);
+    arrive(&machine, &wire, &[(1, b"77\n")]); // raises nothing
     let report = machine.run();
     assert_eq!(machine.sent(&wire), b"3\n5\n");
     assert_eq!((report.jobs.len(), report.divergence), (2, None));
@@ -278,7 +230,7 @@ fn each_end_of_a_wire_has_one_subtask_and_a_source_receives() {
     let wire = Wire::with("radio", options);
     let (_receiving, _sending) = (wire.receiving(number), wire.sending());
     let message = |claim: &dyn Fn()| {
-        let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(claim)).unwrap_err();
+        let panic = catch_unwind(AssertUnwindSafe(claim)).unwrap_err();
         panic.downcast::<String>().unwrap()
     };
     assert_eq!(
@@ -287,17 +239,12 @@ fn each_end_of_a_wire_has_one_subtask_and_a_source_receives() {
     );
     assert!(message(&|| _ = wire.sending()).starts_with("another subtask sends on wire"));
     let dag = create_dag();
-    dag.name("far");
     let receive = |_: Received<'_, u32>, _: (u32,)| ();
-    let attributes = named("late");
-    (dag.using(Wire::new("radio").receiving(number)))
-        .subtask(receive)
-        .reads(&["x"])
-        .due(ms(10))
-        .register(attributes);
+    let using = dag.name("far").using(Wire::new("radio").receiving(number));
+    let subtask = using.subtask(receive).reads(&["x"]).due(ms(10));
+    subtask.register(named("late"));
     let _machine = VirtualTime::new();
     let refused = finish_create_dags(&[dag]).unwrap_err().to_string();
-    assert!(
-        refused.contains("subtask `late` of dag `far` is no source and receives on wire `radio`; ")
-    );
+    let said = "subtask `late` of dag `far` is no source and receives on wire `radio`; ";
+    assert!(refused.contains(said), "{refused}");
 }

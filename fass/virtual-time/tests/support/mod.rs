@@ -1,14 +1,14 @@
-//! DAGs whose subtasks execute for given times and check their jobs' numbers.
+//! DAGs of few words, and a look at what their functions saw.
 
-#![allow(dead_code, reason = "not every test program uses every helper")]
+#![allow(dead_code, reason = "each test uses a part of this")]
 
-pub(crate) mod lifecycle;
-pub(crate) mod sharing;
-
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
 use virtual_time::{Report, VirtualTime};
+
+pub(crate) const MS: u64 = 1_000_000;
 
 pub(crate) const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
@@ -18,8 +18,12 @@ pub(crate) fn named(name: &str) -> SubtaskAttributes {
     SubtaskAttributes::named(name)
 }
 
-pub(crate) fn execute(duration: Duration) {
-    execute_for(duration, Occupation::Spin);
+pub(crate) fn taking(name: &str, wcet_ms: u64) -> SubtaskAttributes {
+    named(name).wcet(ms(wcet_ms))
+}
+
+pub(crate) fn work(time_ms: u64) {
+    execute_for(ms(time_ms), Occupation::Spin);
 }
 
 #[track_caller]
@@ -38,63 +42,68 @@ pub(crate) fn run(machine: &VirtualTime, dags: &[Dag]) -> Report {
     report
 }
 
-/// Source and sink of the given execution times; the sink insists on receiving
-/// the values in their order. Topics carry the DAG's name.
-pub(crate) fn pair(name: &str, period: Duration, deadline: Duration, times: [Duration; 2]) -> Dag {
-    let dag = create_dag();
-    dag.name(name);
-    let mut written = 0_u64;
-    let source = move || {
-        execute(times[0]);
-        written += 1;
-        (written,)
-    };
-    dag.register_periodic_subtask(source, vec![name], period, named("source"));
-    let mut last = 0;
-    let sink = move |(number,): (u64,)| {
-        execute(times[1]);
-        assert!(number > last, "{number} after {last}");
-        last = number;
-    };
-    dag.register_sink_subtask(sink, vec![name], deadline, named("sink"));
+/// Makes a DAG that is due every so many milliseconds, each job before the next one.
+pub(crate) fn every(period_ms: u64, name: &str) -> Dag {
+    let (dag, period) = (create_dag(), ms(period_ms));
+    dag.name(name).period(period).relative_deadline(period);
     dag
 }
 
-/// One source, two branches and a join, which insists on one job's values.
-pub(crate) fn diamond(period: Duration, deadline: Duration, times: [Duration; 4]) -> Dag {
-    let [source, left, right, join] = times;
-    let dag = create_dag();
-    dag.name("diamond");
-    let mut job = 0_u64;
-    dag.register_periodic_subtask(
-        move || {
-            execute(source);
-            job += 1;
-            (job - 1,)
-        },
-        vec!["job"],
-        period,
-        named("source"),
-    );
-    for (branch, time) in [("left", left), ("right", right)] {
-        dag.register_subtask(
-            move |(job,): (u64,)| {
-                execute(time);
-                (job,)
-            },
-            vec!["job"],
-            vec![branch],
-            named(branch),
-        );
-    }
-    dag.register_sink_subtask(
-        move |(left, right): (u64, u64)| {
-            execute(join);
-            assert_eq!(left, right, "values of two jobs meet");
-        },
-        vec!["left", "right"],
-        deadline,
-        named("join"),
-    );
+/// A DAG of one subtask that executes for so many milliseconds, every 10 ms.
+pub(crate) fn ticking(name: &str, time_ms: u64) -> Dag {
+    let dag = every(10, name);
+    dag.register_untyped_subtask(move |_job| work(time_ms), taking("tick", time_ms));
     dag
+}
+
+/// Source and sink of these execution times, every 10 ms; the sink insists on receiving the values
+/// in their order. The topic has the DAG's name.
+pub(crate) fn pair(name: &str, times_ms: [u64; 2]) -> Dag {
+    let dag = every(10, name);
+    let source = dag.source(job_numbers(times_ms[0]));
+    source.writes(&[name]).register(named("source"));
+    let mut next = 0..;
+    let sink = move |(number,): (u64,)| {
+        work(times_ms[1]);
+        assert_eq!(Some(number), next.next());
+    };
+    dag.subtask(sink).reads(&[name]).register(named("sink"));
+    dag
+}
+
+/// A source that works for so long, and writes the number of its job.
+pub(crate) fn job_numbers(takes_ms: u64) -> impl FnMut() -> (u64,) + Send + 'static {
+    let mut jobs = 0_u64..;
+    move || {
+        work(takes_ms);
+        (jobs.next().expect("it has no end"),)
+    }
+}
+
+/// What functions saw, kept for the test.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen<T>(Arc<Mutex<Vec<T>>>);
+
+impl<T> Default for Seen<T> {
+    fn default() -> Self {
+        Self(Arc::default())
+    }
+}
+
+impl<T: Clone> Seen<T> {
+    /// Makes an end for the test, and one for a function.
+    pub(crate) fn shared() -> (Self, Self) {
+        let seen = Self::default();
+        (seen.clone(), seen)
+    }
+
+    pub(crate) fn add(&self, seen: T) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.push(seen);
+    }
+
+    pub(crate) fn all(&self) -> Vec<T> {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.clone()
+    }
 }
