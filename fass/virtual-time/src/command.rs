@@ -7,8 +7,7 @@ use std::{env, fs, panic};
 
 use fass::Policy;
 
-use crate::job::JobShown;
-use crate::platform;
+use crate::VirtualTime;
 use crate::report::Report;
 
 const USAGE: &str = "\
@@ -112,32 +111,27 @@ fn replay(
     let bytes = fs::read(&words.file).map_err(|error| format!("{place}: {error}"))?;
     // An app keeps what it reads for as long as it runs, as on its machine.
     let bytes: &'static [u8] = bytes.leak();
-    let machine = platform::make_current();
-    machine.cores.set(words.cores);
-    machine.policy.set(words.policy);
-    let surroundings = &machine.surroundings;
-    surroundings.contains_panics.set(true);
+    let machine = VirtualTime::new().cores(words.cores).policy(words.policy);
     if cfg!(panic = "abort") {
         name_remedy();
     }
-    let replay = surroundings.edge.replay(bytes);
-    replay.map_err(|malformed| format!("{place}: {malformed}"))?;
+    let machine = machine.contain_panics().replay(bytes);
+    let machine = machine.map_err(|malformed| format!("{place}: {malformed}"))?;
     commit(bytes).map_err(|error| error.to_string())?;
     if let Some((dag, job)) = &words.until {
-        let shown = machine
-            .until(dag, *job)
-            .map_err(|error| error.to_string())?;
+        let shown = machine.until(dag, *job);
+        let shown = shown.map_err(|error| error.to_string())?;
         println!("{shown}");
         let is_right = shown.times.is_some() && shown.unmet_fault.is_none();
         return Ok(ExitCode::from(u8::from(!is_right)));
     }
-    let report = machine.run(None).map_err(|error| error.to_string())?;
+    let report = machine.try_run().map_err(|error| error.to_string())?;
     println!("{}", summary(&report));
     let Some(panic) = report.panics.first() else {
         return Ok(ExitCode::from(u8::from(report.divergence.is_some())));
     };
     let (dag, job) = (panic.instance.dag, panic.instance.job);
-    println!("{}", JobShown::new(&report, &surroundings.edge, dag, job));
+    println!("{}", machine.machine.show(&report, dag, job));
     Ok(ExitCode::FAILURE)
 }
 

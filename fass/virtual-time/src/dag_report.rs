@@ -46,7 +46,7 @@ impl Report {
     pub fn dag(&self, dag: impl DagKey) -> DagReport<'_> {
         DagReport {
             report: self,
-            id: self.task_set.find(dag),
+            id: self.task_set().find(dag),
         }
     }
 
@@ -54,7 +54,7 @@ impl Report {
     ///
     /// See [`dag`](Self::dag).
     pub fn dags(&self) -> impl Iterator<Item = DagReport<'_>> {
-        let ids = (0..).map(DagId).take(self.task_set.dags().len());
+        let ids = (0..).map(DagId).take(self.task_set().dags().len());
         ids.map(|id| DagReport { report: self, id })
     }
 }
@@ -65,7 +65,7 @@ impl<'r> DagReport<'r> {
     /// See [`Report::dag`].
     #[must_use]
     pub fn statistics(&self) -> &'r DagStatistics {
-        &self.report.statistics[self.id.index()]
+        self.report.statistics(self.id)
     }
 
     /// Returns in how many jobs a sink was late.
@@ -78,9 +78,7 @@ impl<'r> DagReport<'r> {
     #[must_use]
     #[track_caller]
     pub fn sink_misses(&self, sink: impl SubtaskKey) -> u64 {
-        let dag = self.report.task_set.dag(self.id);
-        let place = dag.sinks().binary_search(&dag.find(sink));
-        self.report.sink_misses[self.id.index()][place.expect("it is a sink of the DAG")]
+        self.report.sink_misses(self.id, sink)
     }
 
     /// Reports whether a subtask of the DAG has fallen back on its second function.
@@ -109,7 +107,7 @@ impl<'r> DagReport<'r> {
     #[must_use]
     #[track_caller]
     pub fn subtask(&self, subtask: impl SubtaskKey) -> Vec<InstanceRecord> {
-        let subtask = self.report.task_set.dag(self.id).find(subtask);
+        let subtask = self.report.task_set().dag(self.id).find(subtask);
         let all = self.report.instances.iter();
         let is_of = |record: &&InstanceRecord| {
             (record.instance.dag, record.instance.subtask) == (self.id, subtask)

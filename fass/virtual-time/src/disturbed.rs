@@ -5,10 +5,10 @@
 
 use std::time::Duration;
 
-use sched_dag::{Instance, TaskSet};
+use sched_dag::{Dag, Instance, Subtask, TaskSet};
 
-use crate::VirtualTime;
 use crate::silent::{mix, share};
+use crate::{VirtualTime, nanoseconds};
 
 /// How late a timer's interrupt is.
 #[derive(Clone, Copy, Debug, Default)]
@@ -18,7 +18,7 @@ pub(crate) struct Late {
 }
 
 /// A call that fails.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Fault {
     dag: String,
     subtask: String,
@@ -50,9 +50,8 @@ impl VirtualTime {
     /// ```
     #[must_use = "the machine itself is returned"]
     pub fn late(self, most: Duration, seed: u64) -> Self {
-        let most_ns = u64::try_from(most.as_nanos()).unwrap_or(u64::MAX);
-        self.machine.surroundings.late.set(Late { most_ns, seed });
-        self
+        let most_ns = nanoseconds(most);
+        self.set(|settings| settings.late = Late { most_ns, seed })
     }
 
     /// Lets one call fail: in place of its function it executes as long as
@@ -78,12 +77,13 @@ impl VirtualTime {
     /// ```
     #[must_use = "the machine itself is returned"]
     pub fn fault(self, dag: &str, subtask: &str, job: u64) -> Self {
-        self.machine.surroundings.faults.borrow_mut().push(Fault {
+        let fault = Fault {
             dag: dag.into(),
             subtask: subtask.into(),
             job,
-        });
-        self.contain_panics()
+        };
+        self.set(|settings| settings.faults.push(fault))
+            .contain_panics()
     }
 }
 
@@ -95,22 +95,25 @@ impl Late {
     }
 }
 
-/// Reports whether a call has to fail.
-pub(crate) fn fails(faults: &[Fault], instance: Instance, task_set: &TaskSet) -> bool {
-    let dag = task_set.dag(instance.dag);
-    let subtask = dag.subtask(instance.subtask).name();
-    faults.iter().any(|fault| {
-        fault.job == instance.job && fault.dag == dag.name() && fault.subtask == subtask
-    })
-}
+impl Fault {
+    fn is_of(&self, dag: &Dag, subtask: &Subtask) -> bool {
+        self.dag == dag.name() && self.subtask == subtask.name()
+    }
 
-/// Returns names of DAG and subtask of a call that is to fail and cannot be there.
-pub(crate) fn absent(faults: &[Fault], task_set: &TaskSet) -> Option<(String, String)> {
-    let is_there = |fault: &&Fault| {
-        let mut dags = task_set.dags().iter().filter(|dag| dag.name() == fault.dag);
-        let names = |name: &str| name == fault.subtask;
-        dags.any(|dag| dag.subtasks().iter().any(|subtask| names(subtask.name())))
-    };
-    let absent = faults.iter().find(|fault| !is_there(fault))?;
-    Some((absent.dag.clone(), absent.subtask.clone()))
+    /// Reports whether it is this call that has to fail.
+    pub(crate) fn is(&self, instance: Instance, task_set: &TaskSet) -> bool {
+        let dag = task_set.dag(instance.dag);
+        self.job == instance.job && self.is_of(dag, dag.subtask(instance.subtask))
+    }
+
+    /// Returns the names of DAG and subtask if there is no such call.
+    pub(crate) fn absent(&self, task_set: &TaskSet) -> Option<(&str, &str)> {
+        let is_in = |dag: &Dag| {
+            dag.subtasks()
+                .iter()
+                .any(|subtask| self.is_of(dag, subtask))
+        };
+        let is_there = task_set.dags().iter().any(is_in);
+        (!is_there).then_some((&self.dag, &self.subtask))
+    }
 }

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use recording::Role;
-use sched_dag::{DagId, Instance, JobOutcome, SubtaskId};
+use recording::{Channel, Entry, Recordable, Recording, Shown, What};
+use sched_dag::{DagId, Instance, JobOutcome, SubtaskId, Topic};
 
-use crate::edge::{Crossed, Divergence, Edge};
+use crate::edge::Divergence;
 use crate::record::{InstanceRecord, JobRecord};
 use crate::report::Report;
 
@@ -68,66 +68,75 @@ pub enum Value {
 }
 
 impl JobShown {
-    pub(crate) fn new(report: &Report, edge: &Edge, dag: DagId, job: u64) -> Self {
-        let model = report.task_set().dag(dag);
-        let mut crossed = edge.crossed(dag, job);
-        // Samples before times.
-        crossed.sort_by_key(|crossed| crossed.role.is_none());
-        let mut times = report.jobs.iter();
-        let subtask = |subtask: &SubtaskId| {
-            let instance = Instance {
-                dag,
-                subtask: *subtask,
-                job,
+    /// Shows a job of a run, of which the recording so far says what is known of values.
+    pub(crate) fn new(report: &Report, recording: &[u8], dag: DagId, job: u64) -> Self {
+        let recording = Recording::read(recording).expect("it is what this machine has written");
+        let channels = &recording.header().channels;
+        let times = Vec::<u64>::schema();
+        // What passed on a channel, or, without one, what the subtask was told that asked.
+        let passed = |entry: Entry<'_>| {
+            let is_of_job = (u32::from(entry.dag), entry.job) == (dag.0, job);
+            let channel = match entry.what {
+                What::Value | What::Lost if is_of_job => Some(&channels[usize::from(entry.place)]),
+                What::Clock if is_of_job => None,
+                _ => return None,
             };
+            let subtask = channel.map_or(entry.place, |channel| channel.subtask);
+            let (schema, bytes) = (channel.map_or(&times, |it| &it.schema), entry.value);
+            let value = match entry.what {
+                What::Lost => Value::None,
+                _ => Value::Json(Shown { schema, bytes }.to_string()),
+            };
+            Some((channel, SubtaskId(subtask.into()), value))
+        };
+        let mut crossed: Vec<_> = recording.entries().filter_map(passed).collect();
+        // Samples before times.
+        crossed.sort_by_key(|(channel, ..)| channel.is_none());
+        let on_topic = |topic: &Topic| {
+            let is_it = |channel: &Channel| {
+                let is_of = channel.role.is_written() && u32::from(channel.dag) == dag.0;
+                is_of && channel.topic == topic.name
+            };
+            let mut crossed = crossed.iter();
+            let value = match crossed.find(|(channel, ..)| channel.is_some_and(is_it)) {
+                Some((.., value)) => value.clone(),
+                None if channels.iter().any(is_it) => Value::None,
+                None => Value::NotRecorded(topic.type_name),
+            };
+            let what = topic.name.clone();
+            Passed { what, value }
+        };
+        let model = report.task_set().dag(dag);
+        let subtask = |subtask: SubtaskId| {
+            let instance = Instance { dag, subtask, job };
             let (mut panics, topics) = (report.panics.iter(), model.topics().iter());
             let panic = panics.find(|panic| panic.instance == instance);
-            let value = |topic: &sched_dag::Topic| Passed {
-                what: topic.name.clone(),
-                value: value(edge, &crossed, dag, topic),
-            };
-            let reads = topics
-                .clone()
-                .filter(|topic| topic.readers.contains(subtask));
-            let entered = crossed.iter().filter(|crossed| {
-                crossed.subtask == *subtask && crossed.role.is_none_or(|role| !role.is_written())
+            let reads = (topics.clone()).filter(|topic| topic.readers.contains(&subtask));
+            let entered = crossed.iter().filter(|(channel, of, _)| {
+                *of == subtask && channel.is_none_or(|channel| !channel.role.is_written())
             });
-            let entered = entered.map(|crossed| Passed {
-                what: crossed.topic.clone(),
-                value: crossed.json.clone().map_or(Value::None, Value::Json),
+            let entered = entered.map(|(channel, _, value)| Passed {
+                what: channel.map_or("the time", |channel| &channel.topic).into(),
+                value: value.clone(),
             });
+            let writes = topics.filter(|topic| topic.writer == subtask);
             SubtaskShown {
-                name: model.subtask(*subtask).name().into(),
+                name: model.subtask(subtask).name().into(),
                 times: report.instance(instance).copied(),
                 panic: panic.map(|panic| panic.message.clone()),
-                takes: reads.map(value).chain(entered).collect(),
-                gives: topics
-                    .filter(|topic| topic.writer == *subtask)
-                    .map(value)
-                    .collect(),
+                takes: reads.map(on_topic).chain(entered).collect(),
+                gives: writes.map(on_topic).collect(),
             }
         };
+        let mut times = report.jobs.iter();
+        let order = model.topological_order().iter().copied();
         Self {
             dag: model.name().into(),
             job,
-            times: times
-                .find(|times| times.dag == dag && times.job == job)
-                .copied(),
-            subtasks: model.topological_order().iter().map(subtask).collect(),
-            unmet_fault: edge.unmet_fault(dag, job),
+            times: times.find(|of| (of.dag, of.job) == (dag, job)).copied(),
+            subtasks: order.map(subtask).collect(),
+            unmet_fault: None,
         }
-    }
-}
-
-/// Returns the value of a topic of the DAG.
-fn value(edge: &Edge, crossed: &[Crossed], dag: DagId, topic: &sched_dag::Topic) -> Value {
-    let is_it = |crossed: &&Crossed| {
-        crossed.role.is_some_and(Role::is_written) && crossed.topic == topic.name
-    };
-    match crossed.iter().find(is_it) {
-        Some(crossed) => crossed.json.clone().map_or(Value::None, Value::Json),
-        None if edge.records(dag, &topic.name) => Value::None,
-        None => Value::NotRecorded(topic.type_name),
     }
 }
 

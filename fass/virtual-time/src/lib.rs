@@ -4,8 +4,9 @@
 //! words are in `docs/glossary.md`). The real functions run, with real values on real topics,
 //! under the very scheduler that the kernel uses; only the passing of time is made up: a
 //! function takes as long as it says with `fass::execute_for`, else its subtask's WCET, or what
-//! [`VirtualTime::silent`] says in place of that. Where neither says anything it takes no time. A second of a DAG's life takes about a millisecond, and
-//! every run of the same DAGs gives the same events at the same nanosecond.
+//! [`VirtualTime::silent`] says in place of that. Where neither says anything it takes no time. A
+//! second of a DAG's life takes about a millisecond, and every run of the same DAGs gives the same
+//! events at the same nanosecond.
 //!
 //! It is the place to test an app: build the DAGs with the app's own code,
 //! commit them, [`run`](VirtualTime::run), and look into the [`Report`].
@@ -31,7 +32,7 @@
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
-mod arrival;
+mod calls;
 mod command;
 mod dag_report;
 mod disturbed;
@@ -42,6 +43,7 @@ mod platform;
 mod record;
 mod report;
 mod session;
+mod settings;
 mod silent;
 mod surroundings;
 mod wires;
@@ -66,13 +68,14 @@ use platform::Machine;
 pub use record::{InstanceRecord, JobRecord, PanicRecord};
 pub use report::Report;
 pub use sched_dag::journal::{Event, What};
+use settings::Settings;
 pub use silent::Silent;
 
 /// A machine in virtual time, belonging to the thread that makes it.
 ///
 /// Made with the machine's defaults, static priorities and preemption, but one core; the
-/// builder's methods change that and are to be called before the commit. A thread's newest machine is the one
-/// that `fass::finish_create_dags` commits to; dropping it removes it.
+/// builder's methods change that and are to be called before the commit. A thread's newest machine
+/// is the one that `fass::finish_create_dags` commits to; dropping it removes it.
 ///
 /// # Examples
 ///
@@ -112,6 +115,11 @@ pub struct VirtualTime {
     machine: Rc<Machine>,
 }
 
+/// Returns a duration as a number, the last one if it is beyond that.
+fn nanoseconds(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
+
 impl VirtualTime {
     /// Makes a machine for this thread, and installs virtual time as the
     /// program's platform if that has not happened yet.
@@ -129,45 +137,42 @@ impl VirtualTime {
         }
     }
 
-    /// Sets the number of cores.
-    ///
-    /// See [`VirtualTime`].
+    fn set(self, change: impl FnOnce(&mut Settings)) -> Self {
+        change(&mut self.machine.surroundings.settings.borrow_mut());
+        self
+    }
+
+    /// Sets the number of cores. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn cores(self, cores: u32) -> Self {
-        self.machine.cores.set(cores);
-        self
+        self.set(|settings| settings.scheduler.cores = cores)
     }
 
     /// Divides the cores into clusters of so many each, from core 0 on. Each schedules its own
     /// DAGs; all have one clock. See [`fass::Dag::cluster`].
     #[must_use = "the machine itself is returned"]
     pub fn clusters(self, sizes: &[u32]) -> Self {
-        self.machine.divide(Clusters::Of(sizes.to_vec()), false);
-        self
+        let clusters = Clusters::Of(sizes.to_vec());
+        self.set(|settings| (settings.clusters, settings.assigns) = (clusters, false))
     }
 
     /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
     /// others share clusters of one core each. All subtasks need WCETs. See [`fass::Placement`].
     #[must_use = "the machine itself is returned"]
     pub fn assign_clusters(self) -> Self {
-        self.machine.divide(Clusters::Undivided, true);
-        self
+        self.set(|settings| (settings.clusters, settings.assigns) = (Clusters::Undivided, true))
     }
 
-    /// Sets the scheduling policy.
-    ///
-    /// See [`VirtualTime`].
+    /// Sets the scheduling policy. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn policy(self, policy: Policy) -> Self {
-        self.machine.policy.set(policy);
-        self
+        self.set(|settings| settings.scheduler.policy = policy)
     }
 
     /// Sets whether a started instance may lose its core. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn preemption(self, preemption: Preemption) -> Self {
-        self.machine.preemption.set(preemption);
-        self
+        self.set(|settings| settings.scheduler.preemption = preemption)
     }
 
     /// Sets the costs that the commit adds to each WCET before it answers about
@@ -175,8 +180,7 @@ impl VirtualTime {
     /// itself stays without overheads. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn overheads(self, overheads: Overheads) -> Self {
-        self.machine.overheads.set(overheads);
-        self
+        self.set(|settings| settings.overheads = overheads)
     }
 
     /// Gives the commit a file of WCETs that were observed, as `./scripts/run --observe`
@@ -200,8 +204,7 @@ impl VirtualTime {
     /// ```
     #[must_use = "the machine itself is returned"]
     pub fn wcets(self, file: &str) -> Self {
-        self.machine.wcets.replace(Some(file.into()));
-        self
+        self.set(|settings| settings.wcets = Some(file.into()))
     }
 
     /// Contains panics: one in a function ends its DAG only, or costs a job of it
@@ -239,19 +242,18 @@ impl VirtualTime {
     /// ```
     #[must_use = "the machine itself is returned"]
     pub fn contain_panics(self) -> Self {
-        self.machine.surroundings.contains_panics.set(true);
-        self
+        self.set(|settings| settings.contains_panics = true)
     }
 
     /// Replays a recording: what [`Dag::record`](fass::Dag::record) says of sources is taken
     /// from it in place of calling them, and so are samples and times; jobs of which it has no
-    /// values are passed over, and signals come when they came, from nowhere else. To be called before the commit, which
-    /// is refused if the recording is of another graph or of other types, has a source that is
-    /// not recorded now, or has lost a source's value.
+    /// values are passed over, and signals come when they came, from nowhere else. To be called
+    /// before the commit, which is refused if the recording is of another graph or of other types,
+    /// has a source that is not recorded now, or has lost a source's value.
     ///
     /// What other subtasks write to recorded topics is compared: [`Report::compared`] says how
-    /// many values were, [`Report::uncompared`] how many not, as the run is not
-    /// over or the topic is recorded no more, and [`Report::divergence`] which is the first that differs.
+    /// many values were, [`Report::uncompared`] how many not, as the run is not over or the topic
+    /// is recorded no more, and [`Report::divergence`] which is the first that differs.
     ///
     /// # Errors
     ///
@@ -275,8 +277,7 @@ impl VirtualTime {
     /// ```
     #[must_use = "the machine itself is returned"]
     pub fn keep_latest(self, jobs: u32) -> Self {
-        self.machine.surroundings.edge.most_jobs.set(Some(jobs));
-        self
+        self.set(|settings| settings.most_jobs = Some(jobs))
     }
 
     /// Returns the recording of all that was run since the commit: the values of the topics
@@ -319,8 +320,7 @@ impl VirtualTime {
         let Some(target) = signal.target() else {
             panic!("a signal is raised before its DAG is committed; commit that first");
         };
-        let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-        self.machine.raise_at(ns, target);
+        self.machine.raise_at(nanoseconds(time), target);
     }
 
     /// Runs until every job of every DAG has ended, and reports all that

@@ -17,29 +17,21 @@ use fass::{
 };
 
 use recording::Channel;
-use sched_dag::{DagId, SchedulerOptions, TaskSet};
+use sched_dag::{DagId, TaskSet};
 
-use crate::disturbed;
 use crate::error::RunError;
 use crate::job::JobShown;
+use crate::nanoseconds;
 use crate::report::Report;
 use crate::session::Session;
+use crate::settings::Settings;
 use crate::surroundings::Surroundings;
 
 /// What one thread's virtual machine is and does.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Machine {
-    pub(crate) cores: Cell<u32>,
-    pub(crate) clusters: RefCell<Clusters>,
-    /// Whether the commit divides the cores.
-    pub(crate) assigns: Cell<bool>,
-    pub(crate) policy: Cell<Policy>,
-    pub(crate) preemption: Cell<Preemption>,
-    pub(crate) overheads: Cell<Overheads>,
-    /// A file of observed WCETs.
-    pub(crate) wcets: RefCell<Option<String>>,
     /// What it shares with its run.
-    pub(crate) surroundings: Surroundings,
+    pub(crate) surroundings: Rc<Surroundings>,
     session: RefCell<Option<Session>>,
     /// The number of the launched plan.
     plan: Cell<Option<u64>>,
@@ -57,30 +49,12 @@ pub(crate) fn make_current() -> Rc<Machine> {
         IS_OURS.get_or_init(|| fass::install(&HostPlatform).is_ok()),
         "another platform is installed; virtual time must be the program's only platform"
     );
-    let machine = Rc::new(Machine {
-        cores: Cell::new(1),
-        clusters: RefCell::default(),
-        assigns: Cell::new(false),
-        policy: Cell::new(Policy::StaticPriority),
-        preemption: Cell::new(Preemption::Enabled),
-        overheads: Cell::new(Overheads::default()),
-        wcets: RefCell::new(None),
-        surroundings: Surroundings::default(),
-        session: RefCell::new(None),
-        plan: Cell::new(None),
-        has_launched: Cell::new(false),
-    });
+    let machine = Rc::new(Machine::default());
     CURRENT.set(Rc::downgrade(&machine));
     machine
 }
 
 impl Machine {
-    /// Sets how the cores are divided, or that the commit does it: the last call counts.
-    pub(crate) fn divide(&self, clusters: Clusters, by_commit: bool) {
-        self.clusters.replace(clusters);
-        self.assigns.set(by_commit);
-    }
-
     /// Notes a signal of a plan; one of another plan does nothing.
     pub(crate) fn raise_at(&self, time_ns: u64, (plan, dag): (u64, DagId)) {
         if self.plan.get() == Some(plan) {
@@ -91,32 +65,40 @@ impl Machine {
     /// Returns the recording of the run so far.
     pub(crate) fn recording(&self) -> Vec<u8> {
         let session = self.session.borrow();
-        let edge = &self.surroundings.edge;
-        session
-            .as_ref()
-            .map_or(Vec::new(), |session| session.recording(edge))
+        session.as_ref().map_or(Vec::new(), Session::recording)
     }
 
     /// Runs until a job of a DAG has ended, and returns what its subtasks got and gave.
     pub(crate) fn until(self: &Rc<Self>, dag: &str, job: u64) -> Result<JobShown, RunError> {
-        let session = self.session.borrow();
-        let dag = session.as_ref().ok_or(RunError::NothingToRun)?.find(dag)?;
-        drop(session);
-        self.surroundings.until.set(Some((dag, job)));
-        let report = self.run(None);
-        self.surroundings.until.set(None);
-        Ok(JobShown::new(&report?, &self.surroundings.edge, dag, job))
+        let report = self.step(|session| session.run(None, Some((dag, job))))?;
+        Ok(self.show(&report, report.task_set().find(dag), job))
     }
 
-    /// Steps the session to its end or for a duration. Meanwhile this machine
-    /// is the thread's, whichever was made last.
+    /// Returns what the subtasks of a job got and gave.
+    pub(crate) fn show(&self, report: &Report, dag: DagId, job: u64) -> JobShown {
+        let edge = &self.surroundings.edge;
+        JobShown {
+            unmet_fault: edge.of_replay(|replay| replay.unmet_fault(Some((dag, job)))),
+            ..JobShown::new(report, &self.recording(), dag, job)
+        }
+    }
+
+    /// Runs to the end or for a duration.
     pub(crate) fn run(self: &Rc<Self>, duration: Option<Duration>) -> Result<Report, RunError> {
+        self.step(|session| session.run(duration, None))
+    }
+
+    /// Steps the session. Meanwhile this machine is the thread's, whichever was made last.
+    fn step(
+        self: &Rc<Self>,
+        run: impl FnOnce(&mut Session) -> Result<Report, RunError>,
+    ) -> Result<Report, RunError> {
         let mut session = self.session.take().ok_or(RunError::NothingToRun)?;
         let newest = CURRENT.replace(Rc::downgrade(self));
-        let result = session.run(&self.surroundings, duration);
+        let result = run(&mut session);
         CURRENT.set(newest);
         // A failed session is not put back: its functions cannot continue.
-        if matches!(result, Ok(_) | Err(RunError::Endless { .. })) {
+        if let Ok(_) | Err(RunError::Endless { .. } | RunError::NoSuchDag { .. }) = result {
             self.session.replace(Some(session));
         }
         result
@@ -128,54 +110,49 @@ struct HostPlatform;
 
 impl Platform for HostPlatform {
     fn policy(&self) -> Policy {
-        current().map_or(Policy::StaticPriority, |machine| machine.policy.get())
+        settings().scheduler.policy
     }
 
     fn preemption(&self) -> Preemption {
-        current().map_or(Preemption::Enabled, |machine| machine.preemption.get())
+        settings().scheduler.preemption
     }
 
     fn cores(&self) -> u32 {
-        current().map_or(1, |machine| machine.cores.get())
+        settings().scheduler.cores
     }
 
     fn clusters(&self) -> Clusters {
-        let machine = current();
-        machine.map_or_else(Clusters::default, |machine| {
-            machine.clusters.borrow().clone()
-        })
+        settings().clusters
     }
 
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-        if !current().is_some_and(|machine| machine.assigns.get()) {
-            return Ok(());
+        match settings().assigns {
+            true => fass::assign_clusters(self, task_set),
+            false => Ok(()),
         }
-        fass::assign_clusters(self, task_set)
     }
 
     fn overheads(&self) -> Overheads {
-        current().map_or_else(Overheads::default, |machine| machine.overheads.get())
+        settings().overheads
     }
 
     fn wcets(&self) -> Option<Cow<'static, str>> {
-        current()?.wcets.borrow().clone().map(Cow::Owned)
+        settings().wcets.map(Cow::Owned)
     }
 
     fn now_ns(&self) -> u64 {
-        let machine = expect_current();
-        let surroundings = &machine.surroundings;
+        let surroundings = surroundings();
         surroundings.edge.answer_ns(surroundings.now_ns.get())
     }
 
     fn execute_for(&self, duration: Duration, _how: Occupation) {
-        let machine = expect_current();
-        let surroundings = &machine.surroundings;
+        let surroundings = surroundings();
         let Some(executed_ns) = surroundings.executed_ns.get() else {
             panic!("`execute_for` is called outside a subtask; call it in a subtask's function");
         };
         // A sum that does not fit is reported by the driver as a finish beyond
         // the last time there is.
-        let ns = u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX);
+        let ns = nanoseconds(duration);
         let executed_ns = Some(executed_ns.saturating_add(ns));
         surroundings.executed_ns.set(executed_ns);
         let now_ns = &surroundings.now_ns;
@@ -206,7 +183,7 @@ impl Platform for HostPlatform {
     }
 
     fn record(&self, value: &Recorded<'_>) {
-        expect_current().surroundings.edge.record(value);
+        surroundings().edge.record(value);
     }
 
     fn replays(&self) -> bool {
@@ -214,7 +191,7 @@ impl Platform for HostPlatform {
     }
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        expect_current().surroundings.edge.lend(channel, job, take);
+        surroundings().edge.lend(channel, job, take);
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
@@ -230,28 +207,20 @@ impl Platform for HostPlatform {
             ));
         }
         let surroundings = &machine.surroundings;
-        if let Some((dag, subtask)) =
-            disturbed::absent(&surroundings.faults.borrow(), &plan.task_set)
-        {
+        let settings = surroundings.settings.borrow();
+        let faults = settings.faults.iter();
+        let mut absent = faults.filter_map(|fault| fault.absent(&plan.task_set));
+        if let Some((dag, subtask)) = absent.next() {
             return Err(LaunchError::new(format!(
                 "subtask `{subtask}` of dag `{dag}`, which is to fail, is not in the commit; \
                  name one that is"
             )));
         }
-        let signals = surroundings
-            .edge
-            .launch(&mut plan)
-            .map_err(LaunchError::new)?;
-        for (dag, time_ns) in signals {
-            surroundings.signal_of_replay_at(time_ns, dag);
-        }
+        let edge = &surroundings.edge;
+        let launched = edge.launch(&mut plan, settings.most_jobs);
+        launched.map_err(LaunchError::new)?;
         machine.plan.set(Some(plan.number));
-        let options = SchedulerOptions {
-            policy: machine.policy.get(),
-            preemption: machine.preemption.get(),
-            cores: machine.cores.get(),
-        };
-        let session = Session::new(plan, options);
+        let session = Session::new(plan, settings.scheduler, surroundings);
         machine.session.replace(Some(session));
         Ok(())
     }
@@ -263,4 +232,16 @@ fn current() -> Option<Rc<Machine>> {
 
 fn expect_current() -> Rc<Machine> {
     current().expect("this thread has no `VirtualTime`; make one on the thread that commits")
+}
+
+fn surroundings() -> Rc<Surroundings> {
+    Rc::clone(&expect_current().surroundings)
+}
+
+/// Returns the settings of this thread's machine, or those that one has at first.
+fn settings() -> Settings {
+    let machine = current();
+    machine.map_or_else(Settings::default, |machine| {
+        machine.surroundings.settings.borrow().clone()
+    })
 }

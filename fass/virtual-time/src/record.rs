@@ -2,6 +2,8 @@
 
 use std::ops::Deref;
 
+use sched_dag::engine::Run;
+use sched_dag::journal::Event;
 use sched_dag::{DagId, Instance, law};
 
 /// An instance that became ready, with its [times](law::InstanceRecord).
@@ -49,6 +51,21 @@ impl Deref for JobRecord {
 }
 
 impl JobRecord {
+    /// Takes the job of a release.
+    pub(crate) fn new(run: &Run, release: &Event) -> Option<Self> {
+        let Event { dag, job, .. } = *release;
+        let times = *run.record().job(dag, job)?;
+        let release_ns = times.release_ns.unwrap_or(release.time_ns);
+        let deadline_ns = run.task_set().dag(dag).relative_deadline_ns();
+        Some(Self {
+            dag,
+            job,
+            release_ns,
+            deadline_ns: release_ns.saturating_add(deadline_ns),
+            times,
+        })
+    }
+
     /// Returns the time from the nominal release to the end, if there was one.
     ///
     /// See [`Report`](crate::Report).

@@ -1,17 +1,19 @@
 //! What a run leaves behind.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::ops::Deref;
 
-use sched_dag::chains::{Chain, Latencies};
+use fass::edge::Outcome;
+use sched_dag::Instance;
+use sched_dag::engine::Run;
 use sched_dag::journal::{Event, What};
-use sched_dag::law::{self, Record, Terms, Violation};
-use sched_dag::{DagStatistics, Instance, SchedulerOptions, TaskSet};
+use sched_dag::law::{self, Terms, Violation};
 
+use crate::calls::Calls;
 use crate::edge::Divergence;
 use crate::record::{InstanceRecord, JobRecord, PanicRecord};
 
-/// Everything that happened from the commit to the end of a run.
+/// Everything that happened from the commit to the end of a run: the engine's [`Run`], and what
+/// only virtual time knows.
 ///
 /// ```
 /// use std::time::Duration;
@@ -30,6 +32,7 @@ use crate::record::{InstanceRecord, JobRecord, PanicRecord};
 /// let ticks = report.dag("clock").subtask("tick");
 /// assert_eq!(report.instance(ticks[1].instance), Some(&ticks[1]));
 /// assert_eq!(report.jobs[1].response_time_ns(), Some(1_000_000));
+/// assert_eq!(report.statistics("clock").completed, 2); // as of any run
 /// assert_eq!(report.task_set().dags().len(), 1);
 /// assert_eq!(report.record().jobs(ticks[0].instance.dag).len(), 2);
 /// assert!(report.event_lines().contains(&"10000000 start tick[1] core 0".to_string()));
@@ -49,11 +52,6 @@ pub struct Report {
     pub(crate) degraded: Vec<bool>,
     /// All events in the order in which they happened.
     pub events: Vec<Event>,
-    /// The scheduler's counters, one set for each DAG.
-    pub(crate) statistics: Vec<DagStatistics>,
-    /// For each DAG, in how many jobs each of its sinks was late, in the order of
-    /// [`Dag::sinks`](sched_dag::Dag::sinks).
-    pub(crate) sink_misses: Vec<Vec<u64>>,
     /// The time of the last event.
     pub end_ns: u64,
     /// In a replay, how many values were compared with recorded ones.
@@ -65,13 +63,56 @@ pub struct Report {
     /// In a replay, a DAG and its first job that is recorded, if that is not the first one it had:
     /// what its functions remember of jobs before is lacking.
     pub lacking: Option<(String, u64)>,
-    pub(crate) task_set: Arc<TaskSet>,
-    pub(crate) options: SchedulerOptions,
+    run: Run,
     /// Whether interrupts may have been late.
-    pub(crate) is_late: bool,
+    is_late: bool,
+}
+
+impl Deref for Report {
+    type Target = Run;
+
+    fn deref(&self) -> &Run {
+        &self.run
+    }
 }
 
 impl Report {
+    /// Adds what is known of the calls to a run, which has come to `end_ns`.
+    pub(crate) fn new(
+        run: Run,
+        end_ns: u64,
+        calls: &Calls,
+        outcome: Outcome,
+        is_late: bool,
+    ) -> Self {
+        let events: Vec<Event> = run.journal().events().collect();
+        let of = |what| events.iter().filter(move |event| event.what == what);
+        let ready = of(What::Ready).filter_map(Event::instance);
+        let instances = ready.filter_map(|instance| {
+            let execution_ns = calls.executed_ns.get(&instance).copied();
+            Some(InstanceRecord {
+                instance,
+                execution_ns: execution_ns.unwrap_or(0),
+                times: *run.record().instance(instance)?,
+            })
+        });
+        let jobs = of(What::Released).filter_map(|event| JobRecord::new(&run, event));
+        Self {
+            instances: instances.collect(),
+            jobs: jobs.collect(),
+            panics: calls.panics.clone(),
+            degraded: calls.degraded.clone(),
+            end_ns,
+            compared: outcome.compared,
+            uncompared: outcome.uncompared,
+            divergence: outcome.divergence,
+            lacking: outcome.lacking,
+            events,
+            run,
+            is_late,
+        }
+    }
+
     /// Returns the record of one instance, if it became ready.
     ///
     /// See [`Report`].
@@ -100,38 +141,6 @@ impl Report {
         })
     }
 
-    /// Returns the verified model that ran.
-    ///
-    /// See [`Report`].
-    #[must_use]
-    pub fn task_set(&self) -> &TaskSet {
-        &self.task_set
-    }
-
-    /// Returns the times in the form in which the kernel has them after a run,
-    /// so that the same code can evaluate both.
-    ///
-    /// # Panics
-    ///
-    /// If there is no memory for another copy of all times.
-    ///
-    /// See [`Report`].
-    #[must_use]
-    pub fn record(&self) -> Record {
-        let events = self.events.iter().copied();
-        let record = Record::of_events(&self.task_set, true, events);
-        record.expect("the report's jobs fit into memory")
-    }
-
-    /// Measures a chain that crosses DAGs: how old its outputs are, and how long it takes to
-    /// react. [`fass::EndToEnd`] has an example.
-    ///
-    /// See [`Report`].
-    #[must_use]
-    pub fn latencies(&self, chain: &Chain) -> Latencies {
-        chain.latencies(&self.task_set, self.events.iter().copied())
-    }
-
     /// Checks rules R1 to R5 of the task model over what was recorded, and
     /// returns what breaks them: nothing, unless the scheduler is wrong.
     ///
@@ -146,9 +155,9 @@ impl Report {
         events.sort_by_key(|event| event.time_ns);
         let events = events.iter().copied();
         // With any tolerance it is not judged how late a timer is.
-        let (task_set, terms) = (&self.task_set, Terms::whole(self.is_late.into()));
+        let (task_set, terms) = (self.task_set(), Terms::whole(self.is_late.into()));
         let mut found = law::violations(task_set, terms, events.clone());
-        let of_dispatch = law::dispatch_violations(task_set, &self.options, terms, events);
+        let of_dispatch = law::dispatch_violations(task_set, &self.options(), terms, events);
         found.extend(of_dispatch);
         found
     }
@@ -167,66 +176,30 @@ impl Report {
 
     fn line(&self, event: &Event) -> String {
         let Event {
-            time_ns, what, job, ..
-        } = event;
-        let dag = self.task_set.label(event.dag);
-        let or_number = |name: String, number: String| match name.is_empty() {
-            true => number,
-            false => name,
+            time_ns,
+            what,
+            dag,
+            job,
+            ..
+        } = *event;
+        let or_number = |name: &str, kind, number| match name {
+            "" => format!("{kind} {number}"),
+            _ => name.into(),
         };
-        let dag = or_number(dag.name, format!("dag {}", dag.id.0));
-        let name = match event.instance() {
-            Some(instance) => {
-                let subtask = self.task_set.subtask_label(instance.dag, instance.subtask);
-                or_number(subtask.name, format!("subtask {}", subtask.id.0))
-            }
-            None if *what == What::Entered => return format!("{time_ns} entered mode {job}"),
-            None if what.is_of_dag() => return format!("{time_ns} {what} {dag}"),
-            None => dag,
+        let model = self.task_set().dag(dag);
+        let name = match event.subtask {
+            Some(subtask) => or_number(model.subtask(subtask).name(), "subtask", subtask.0),
+            None => or_number(model.name(), "dag", dag.0),
         };
+        let outcome = || self.record().job(dag, job)?.outcome;
         let more = match what {
+            What::Entered => return format!("{time_ns} entered mode {job}"),
+            _ if what.is_of_dag() => return format!("{time_ns} {what} {name}"),
             _ if what.is_of_machine() => format!(" core {}", event.core.0),
-            What::Completed => {
-                let mut jobs = self.jobs.iter();
-                let of_job = jobs.find(|of_job| (of_job.dag, of_job.job) == (event.dag, *job));
-                let outcome = of_job.and_then(|of_job| of_job.outcome);
-                let outcome = outcome.map_or(String::new(), |outcome| format!(" {outcome:?}"));
-                outcome.to_lowercase()
-            }
+            What::Completed => outcome().map_or(String::new(), |outcome| format!(" {outcome:?}")),
             _ => String::new(),
         };
-        format!("{time_ns} {what} {name}[{job}]{more}")
-    }
-
-    /// Fills in what the events say about instances and jobs.
-    pub(crate) fn look_at_events(&mut self, executed_ns: &BTreeMap<Instance, u64>) {
-        let record = self.record();
-        for event in &self.events {
-            let Event { dag, job, .. } = *event;
-            match (event.what, event.instance()) {
-                (What::Released, _) => self.jobs.extend(record.job(dag, job).map(|times| {
-                    let release_ns = times.release_ns.unwrap_or(event.time_ns);
-                    let deadline_ns = self.task_set.dag(dag).relative_deadline_ns();
-                    JobRecord {
-                        dag,
-                        job,
-                        release_ns,
-                        deadline_ns: release_ns.saturating_add(deadline_ns),
-                        times: *times,
-                    }
-                })),
-                (What::Ready, Some(instance)) => {
-                    let execution_ns = executed_ns.get(&instance).copied().unwrap_or(0);
-                    let times = record.instance(instance).copied();
-                    self.instances.extend(times.map(|times| InstanceRecord {
-                        instance,
-                        execution_ns,
-                        times,
-                    }));
-                }
-                _ => {}
-            }
-        }
+        format!("{time_ns} {what} {name}[{job}]{}", more.to_lowercase())
     }
 }
 

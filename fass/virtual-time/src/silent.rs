@@ -50,14 +50,9 @@ impl Silent {
             Self::NoTime => 0,
             Self::Wcet => wcet_ns,
             Self::Drawn { seed } => {
-                let numbers = [
-                    instance.dag.0.into(),
-                    instance.subtask.0.into(),
-                    instance.job,
-                ];
-                let drawn = numbers
-                    .into_iter()
-                    .fold(mix(seed), |drawn, n| mix(drawn ^ n));
+                let Instance { dag, subtask, job } = instance;
+                let numbers = [dag.0.into(), subtask.0.into(), job].into_iter();
+                let drawn = numbers.fold(mix(seed), |drawn, n| mix(drawn ^ n));
                 (share(drawn, wcet_ns) + 1).min(wcet_ns)
             }
         }
@@ -72,8 +67,7 @@ impl VirtualTime {
     /// See [`Silent`].
     #[must_use = "the machine itself is returned"]
     pub fn silent(self, silent: Silent) -> Self {
-        self.machine.surroundings.silent.set(silent);
-        self
+        self.set(|settings| settings.silent = silent)
     }
 }
 

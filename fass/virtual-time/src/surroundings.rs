@@ -3,69 +3,62 @@
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
+use fass::Wire;
 use sched_dag::DagId;
 use sched_dag::lifecycle::Request;
 
-use crate::arrival::Arrival;
-use crate::disturbed::{Fault, Late};
 use crate::edge::Edge;
-use crate::silent::Silent;
-use crate::wires::Wires;
+use crate::settings::Settings;
 
-/// The time, the requests to come, and what is to become of a panic.
+/// The time, what crosses the edge of the run, and what is to come.
 #[derive(Debug, Default)]
 pub(crate) struct Surroundings {
-    /// How long calls take that do not say.
-    pub(crate) silent: Cell<Silent>,
-    /// How late interrupts are.
-    pub(crate) late: Cell<Late>,
-    /// The calls that fail.
-    pub(crate) faults: RefCell<Vec<Fault>>,
+    pub(crate) settings: RefCell<Settings>,
     /// What is recorded and replayed.
     pub(crate) edge: Edge,
-    /// Bytes on their way in and out.
-    pub(crate) wires: Wires,
-    /// The job with whose end the run stops.
-    pub(crate) until: Cell<Option<(DagId, u64)>>,
-    /// Whether a panic of a function ends its DAG only.
-    pub(crate) contains_panics: Cell<bool>,
+    /// The wires that are connected, and what has been sent on each.
+    pub(crate) connected: RefCell<Vec<(Wire, Vec<u8>)>>,
     /// The time that functions are told: the start of the instance and what it
     /// has executed.
     pub(crate) now_ns: Cell<u64>,
     /// What the running function has executed; `None` outside functions.
     pub(crate) executed_ns: Cell<Option<u64>>,
     /// What is to come, by time and in the order in which it was made.
-    arrivals: RefCell<BTreeMap<(u64, usize), Arrival>>,
+    arrivals: RefCell<BTreeMap<(u64, u64), Arrival>>,
+    /// How much of that there has been.
+    count: Cell<u64>,
+}
+
+/// Something that comes from outside of the scheduler at an instant.
+#[derive(Debug)]
+pub(crate) enum Arrival {
+    Request(Request),
+    Bytes(Wire, Vec<u8>),
 }
 
 impl Surroundings {
     /// Notes a signal to a DAG of the launched plan; in a replay all signals are recorded ones.
     pub(crate) fn signal_at(&self, time_ns: u64, dag: DagId) {
         if !self.edge.is_replay() {
-            self.signal_of_replay_at(time_ns, dag);
+            self.keep(time_ns, Arrival::Request(Request::Signal(dag)));
         }
     }
 
-    /// Notes a signal that is recorded, or one of a run that is no replay.
-    pub(crate) fn signal_of_replay_at(&self, time_ns: u64, dag: DagId) {
-        self.keep(time_ns, Arrival::Request(Request::Signal(dag)));
-    }
-
-    /// Notes what a completion asks for.
-    pub(crate) fn request_at(&self, time_ns: u64, request: Request) {
-        match request {
-            Request::Signal(dag) => self.signal_at(time_ns, dag),
-            _ => self.keep(time_ns, Arrival::Request(request)),
+    /// Notes the next signal of a replay, which comes not before `now_ns`. One follows when the one
+    /// before it has led to something, for else it would be dropped where functions take longer
+    /// than they took.
+    pub(crate) fn follow_signal(&self, dag: DagId, now_ns: u64) {
+        let next_ns = self.edge.of_replay(|replay| replay.next_signal_ns(dag));
+        if let Some(time_ns) = next_ns {
+            self.keep(time_ns.max(now_ns), Arrival::Request(Request::Signal(dag)));
         }
     }
 
     /// Notes what comes at a time.
     pub(crate) fn keep(&self, time_ns: u64, arrival: Arrival) {
-        let mut arrivals = self.arrivals.borrow_mut();
-        let mut of_this_time = arrivals.range((time_ns, 0)..=(time_ns, usize::MAX));
-        let last = of_this_time.next_back();
-        let place = last.map_or(0, |(&(_, last), _)| last + 1);
-        arrivals.insert((time_ns, place), arrival);
+        let place = self.count.get();
+        self.count.set(place + 1);
+        self.arrivals.borrow_mut().insert((time_ns, place), arrival);
     }
 
     /// Returns the time of the next request, or of bytes that may raise a signal.
@@ -87,6 +80,13 @@ impl Surroundings {
                     }
                 }
             }
+        }
+    }
+
+    /// Takes what has been sent on wires.
+    pub(crate) fn collect(&self) {
+        for (wire, sent) in self.connected.borrow_mut().iter_mut() {
+            sent.extend(std::iter::from_fn(|| wire.depart()));
         }
     }
 }

@@ -4,34 +4,12 @@
 //! signals do. What an instance sends is gone at its completion: no device is slow here, so only
 //! an instance that sends more than its wire has room for loses bytes.
 
-use std::cell::RefCell;
 use std::time::Duration;
 
 use fass::Wire;
 
-use crate::VirtualTime;
-use crate::arrival::Arrival;
-
-/// The wires of a machine.
-#[derive(Debug, Default)]
-pub(crate) struct Wires {
-    connected: RefCell<Vec<Connected>>,
-}
-
-#[derive(Debug)]
-struct Connected {
-    wire: Wire,
-    sent: Vec<u8>,
-}
-
-impl Wires {
-    /// Takes what has been sent.
-    pub(crate) fn collect(&self) {
-        for Connected { wire, sent } in self.connected.borrow_mut().iter_mut() {
-            sent.extend(std::iter::from_fn(|| wire.depart()));
-        }
-    }
-}
+use crate::surroundings::Arrival;
+use crate::{VirtualTime, nanoseconds};
 
 impl VirtualTime {
     /// Connects a wire: what is sent on it can be had by [`sent`](Self::sent).
@@ -39,9 +17,9 @@ impl VirtualTime {
     /// See [`Wire`].
     #[must_use = "the machine itself is returned"]
     pub fn connect(self, wire: &Wire) -> Self {
-        let (wire, sent) = (wire.clone(), Vec::new());
-        let wires = &self.machine.surroundings.wires;
-        wires.connected.borrow_mut().push(Connected { wire, sent });
+        let mut connected = self.machine.surroundings.connected.borrow_mut();
+        connected.push((wire.clone(), Vec::new()));
+        drop(connected);
         self
     }
 
@@ -50,10 +28,9 @@ impl VirtualTime {
     ///
     /// See [`Wire`].
     pub fn arrive_at(&self, wire: &Wire, time: Duration, bytes: &[u8]) {
-        let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-        let at_ns = ns.max(self.machine.surroundings.now_ns.get());
-        let arrival = Arrival::Bytes(wire.clone(), bytes.to_vec());
-        self.machine.surroundings.keep(at_ns, arrival);
+        let surroundings = &self.machine.surroundings;
+        let at_ns = nanoseconds(time).max(surroundings.now_ns.get());
+        surroundings.keep(at_ns, Arrival::Bytes(wire.clone(), bytes.to_vec()));
     }
 
     /// Returns all that complete instances have sent so far on a wire that is connected.
@@ -65,10 +42,9 @@ impl VirtualTime {
     /// If the wire is not connected.
     #[must_use]
     pub fn sent(&self, wire: &Wire) -> Vec<u8> {
-        let connected = self.machine.surroundings.wires.connected.borrow();
-        let mut connected = connected.iter();
-        match connected.find(|connected| connected.wire == *wire) {
-            Some(connected) => connected.sent.clone(),
+        let connected = self.machine.surroundings.connected.borrow();
+        match connected.iter().find(|(of, _)| of == wire) {
+            Some((_, sent)) => sent.clone(),
             None => panic!(
                 "wire `{}` is not connected; call `connect` before the run",
                 wire.name()

@@ -31,7 +31,7 @@ use crate::task_set::TaskSet;
 ///     println!("{} allocations", run.allocations());
 /// }
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Run {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
@@ -67,7 +67,7 @@ pub struct Counts {
     pub lock_acquisitions: u32,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct OfDag {
     snapshot: Snapshot,
     /// By sink.
@@ -90,17 +90,24 @@ impl Run {
     /// See [`Run`].
     #[must_use]
     pub fn of<B: Body, P>(engine: &mut Engine<B, P>, proven: Proven, cores: u32) -> Self {
-        let scheduler = &mut engine.scheduler;
-        let journal = core::mem::replace(&mut scheduler.log.journal, Journal::none());
+        let journal = core::mem::replace(&mut engine.scheduler.log.journal, Journal::none());
+        Self {
+            proven,
+            ..Self::so_far(engine, journal, cores)
+        }
+    }
+
+    /// Makes one of an engine that may go on, and of a copy of its journal.
+    pub(crate) fn so_far<B: Body, P>(engine: &Engine<B, P>, journal: Journal, cores: u32) -> Self {
         let ids = (0..).map(DagId).take(engine.task_set.dags().len());
         Self {
             task_set: Arc::clone(&engine.task_set),
             options: SchedulerOptions {
                 cores,
-                ..scheduler.options()
+                ..engine.scheduler.options()
             },
-            proven,
-            dags: ids.map(|dag| OfDag::new(scheduler, dag)).collect(),
+            proven: Proven::default(),
+            dags: ids.map(|dag| OfDag::new(&engine.scheduler, dag)).collect(),
             journal,
             record: OnceCell::new(),
             times: OnceCell::new(),
@@ -112,13 +119,18 @@ impl Run {
     ///
     /// See [`Run`].
     pub fn absorb<B: Body, P>(&mut self, other: &mut Engine<B, P>) {
+        let journal = core::mem::replace(&mut other.scheduler.log.journal, Journal::none());
+        self.add(other, journal);
+    }
+
+    /// Does so with an engine that may go on, and with a copy of its journal.
+    pub(crate) fn add<B: Body, P>(&mut self, other: &Engine<B, P>, journal: Journal) {
         let (task_set, cluster) = (&self.task_set, other.cluster);
         let ids = (0..).map(DagId).zip(&mut self.dags);
         for (dag, of_dag) in ids.filter(|(dag, _)| task_set.dag(*dag).cluster() == cluster) {
             *of_dag = OfDag::new(&other.scheduler, dag);
         }
         let first_core = task_set.cores_of(cluster, self.options.cores).start;
-        let journal = core::mem::replace(&mut other.scheduler.log.journal, Journal::none());
         self.journal.absorb(journal, cluster, first_core);
     }
 

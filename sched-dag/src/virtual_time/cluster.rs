@@ -16,8 +16,6 @@ use crate::scheduler::{Decision, Moment, Notice, Scheduler};
 pub(super) struct Cluster<B: Body> {
     /// Parked is a body, behind the time that its instance has left.
     pub(super) engine: Engine<B, (u64, B)>,
-    /// How many cores other clusters have before.
-    pub(super) first: u32,
     /// By core, the body of its instance, and when that finishes if nothing intervenes.
     running: Box<[Option<(u64, B)>]>,
 }
@@ -66,7 +64,7 @@ impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
 impl<B: Body> Cluster<B> {
     pub(super) fn new(
         scheduler: Scheduler,
-        (cluster, first): (ClusterId, u32),
+        cluster: ClusterId,
         after_fault: Vec<Option<DagId>>,
     ) -> Self {
         type Any<'a> = Now<'a, ExecutionTimes<fn(Instance) -> u64>>;
@@ -74,7 +72,6 @@ impl<B: Body> Cluster<B> {
         let (journal, none) = (Journal::none(), Requests::new(0, None));
         Self {
             engine: Engine::new::<Any<'_>>(cluster, scheduler, journal, none, after_fault),
-            first,
             running: (0..cores).map(|_| None).collect(),
         }
     }

@@ -49,7 +49,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 
-use crate::engine::Body;
+use crate::engine::{Body, Run};
 use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
 use crate::journal::Event;
 use crate::kept::Journal;
@@ -94,7 +94,7 @@ impl VirtualTime {
     #[must_use]
     pub fn new(scheduler: Scheduler) -> Self {
         let task_set = Arc::clone(scheduler.task_set());
-        let cluster = Cluster::new(scheduler, (ClusterId(0), 0), Vec::new());
+        let cluster = Cluster::new(scheduler, ClusterId(0), Vec::new());
         Self::with(Box::from([cluster]), instances(&task_set))
     }
 
@@ -125,9 +125,8 @@ impl<B: Body> VirtualTime<B> {
         after_fault: &[Option<DagId>],
     ) -> Self {
         let clusters = task_set.clusters().map(|cluster| {
-            let first = task_set.cores_of(cluster, options.cores).start;
             let scheduler = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
-            Cluster::new(scheduler, (cluster, first), after_fault.to_vec())
+            Cluster::new(scheduler, cluster, after_fault.to_vec())
         });
         Self::with(clusters.collect(), bodies)
     }
@@ -165,18 +164,24 @@ impl<B: Body> VirtualTime<B> {
         self
     }
 
+    /// Returns the run so far, of all clusters, as if it were over.
+    #[must_use]
+    pub fn run_so_far(&self) -> Run {
+        let journal = |cluster: &Cluster<B>| cluster.engine.scheduler.log.journal.clone();
+        let cores = |cluster: &Cluster<B>| cluster.engine.scheduler.options().cores;
+        let cores = self.clusters.iter().map(cores).sum();
+        let first = &self.clusters[0];
+        let mut run = Run::so_far(&first.engine, journal(first), cores);
+        for cluster in &self.clusters[1..] {
+            run.add(&cluster.engine, journal(cluster));
+        }
+        run
+    }
+
     /// Returns what was written down so far, of all clusters.
     #[must_use]
     pub fn events(&self) -> Vec<Event> {
-        let mut clusters = self.clusters.iter();
-        let mut all = clusters.next().map_or_else(Journal::growing, |first| {
-            first.engine.scheduler.log.journal.clone()
-        });
-        for (id, cluster) in (1..).map(ClusterId).zip(clusters) {
-            let first = cluster.first;
-            all.absorb(cluster.engine.scheduler.log.journal.clone(), id, first);
-        }
-        all.events().collect()
+        self.run_so_far().journal().events().collect()
     }
 
     /// Runs until every job has ended.

@@ -2,44 +2,57 @@
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::rc::Rc;
+use std::sync::Arc;
 
 use fass::Runner;
+use fass::edge::Replay;
 use sched_dag::engine::{Alternate, Cost};
 use sched_dag::journal::What;
 use sched_dag::lifecycle::Request;
 use sched_dag::virtual_time::Workload;
-use sched_dag::{Instance, Notice, TaskSet};
+use sched_dag::{DagId, Instance, Notice, TaskSet};
 
-use crate::disturbed;
 use crate::record::PanicRecord;
-use crate::surroundings::Surroundings;
+use crate::surroundings::{Arrival, Surroundings};
 
 /// The message of a fault that a test asked for.
 const FAULT: &str = "a fault that was asked for";
 
-/// What is known of the calls of a run, besides the events.
+/// The workload of the driver: the functions of the bodies, and what is known of their calls
+/// besides the events.
 #[derive(Debug)]
-pub(super) struct Called {
+pub(crate) struct Calls {
+    pub(crate) task_set: Arc<TaskSet>,
+    pub(crate) machine: Rc<Surroundings>,
     /// How long each instance executes in all.
-    pub(super) executed_ns: BTreeMap<Instance, u64>,
+    pub(crate) executed_ns: BTreeMap<Instance, u64>,
     /// The contained panics.
-    pub(super) panics: Vec<PanicRecord>,
+    pub(crate) panics: Vec<PanicRecord>,
     /// For each DAG whether a subtask of it has fallen back.
-    pub(super) degraded: Vec<bool>,
-}
-
-/// The workload of the driver: the functions of the bodies.
-pub(super) struct Calls<'s> {
-    pub(super) task_set: &'s TaskSet,
-    pub(super) machine: &'s Surroundings,
-    pub(super) called: &'s mut Called,
+    pub(crate) degraded: Vec<bool>,
     /// The panic that fails the run and stops it.
-    pub(super) panic: Option<PanicRecord>,
-    /// Whether the job has ended at which the run shall stop.
-    pub(super) has_arrived: bool,
+    pub(crate) panic: Option<PanicRecord>,
+    /// The job with whose end the run stops.
+    pub(crate) until: Option<(DagId, u64)>,
+    /// Whether it has ended.
+    pub(crate) has_arrived: bool,
 }
 
-impl Calls<'_> {
+impl Calls {
+    pub(crate) fn new(task_set: &Arc<TaskSet>, machine: &Rc<Surroundings>) -> Self {
+        Self {
+            task_set: Arc::clone(task_set),
+            machine: Rc::clone(machine),
+            executed_ns: BTreeMap::new(),
+            panics: Vec::new(),
+            degraded: vec![false; task_set.dags().len()],
+            panic: None,
+            until: None,
+            has_arrived: false,
+        }
+    }
+
     /// Calls a function, or fails in its place. The error is the message of its panic.
     fn call(&self, runner: &mut Runner, fails: bool) -> Result<(), String> {
         // Unwind safety: a body that panicked is never run again, and the
@@ -59,76 +72,82 @@ impl Calls<'_> {
     }
 }
 
-impl Workload<Runner> for Calls<'_> {
+impl Workload<Runner> for Calls {
     fn execute(&mut self, runner: &mut Runner, now_ns: u64) -> Option<u64> {
-        let (machine, instance) = (self.machine, runner.instance);
-        if machine.edge.passes_over(instance) {
+        let (machine, instance) = (Rc::clone(&self.machine), runner.instance);
+        let passes_over = |replay: &mut Replay| replay.passes_over(instance);
+        if machine.edge.of_replay(passes_over) {
             runner.body.discard(instance.job);
             return Some(0);
         }
         machine.now_ns.set(now_ns);
         machine.executed_ns.set(Some(0));
         machine.edge.begin(instance);
-        let fails = disturbed::fails(&machine.faults.borrow(), instance, self.task_set);
+        let settings = machine.settings.borrow();
+        let mut faults = settings.faults.iter();
+        let fails = faults.any(|fault| fault.is(instance, &self.task_set));
         let result = self.call(runner, fails);
         machine.edge.end(instance, now_ns);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
         if executed_ns == 0 && (result.is_ok() || fails) {
             let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
-            executed_ns = machine.silent.get().of_call_ns(instance, subtask.wcet_ns());
+            executed_ns = settings.silent.of_call_ns(instance, subtask.wcet_ns());
         }
         if let Err(message) = result {
             runner.body.failed(now_ns);
             let panic = PanicRecord { instance, message };
-            if !machine.contains_panics.get() {
+            if !settings.contains_panics {
                 self.panic = Some(panic);
                 return None;
             }
-            self.called.panics.push(panic);
+            self.panics.push(panic);
             if machine.edge.is_replayed(instance.dag) {
                 // What it cuts is recorded, and is passed over.
                 if let Some(next) = runner.body.replacement().filter(Alternate::is_there) {
-                    self.called.degraded[instance.dag.index()] |= next.is_fallback();
+                    self.degraded[instance.dag.index()] |= next.is_fallback();
                     runner.body.replace();
                 }
-                machine.edge.failed(instance, self.task_set);
+                let task_set = &self.task_set;
+                let cut = |replay: &mut Replay| replay.cut_behind(instance, task_set);
+                machine.edge.of_replay(cut);
             }
         }
-        self.called.executed_ns.insert(instance, executed_ns);
+        self.executed_ns.insert(instance, executed_ns);
         Some(executed_ns)
     }
 
     fn fails(&mut self, instance: Instance) -> bool {
-        let mut panics = self.called.panics.iter();
+        let mut panics = self.panics.iter();
         !self.machine.edge.is_replayed(instance.dag)
             && panics.any(|panic| panic.instance == instance)
     }
 
     fn ended(&mut self, instance: Instance, fault: Option<Cost>) {
-        self.called.degraded[instance.dag.index()] |= fault == Some(Cost::Degraded);
-        self.machine.wires.collect();
+        self.degraded[instance.dag.index()] |= fault == Some(Cost::Degraded);
+        self.machine.collect();
     }
 
     fn hear(&mut self, notice: &Notice) {
-        let (event, machine) = (&notice.event, self.machine);
+        let event = &notice.event;
         let ended = match event.what {
             What::Released => None,
             // All jobs of it.
             What::Stopped => Some(u64::MAX),
             _ => Some(event.job),
         };
-        let until = machine.until.get();
-        self.has_arrived |= until.is_some_and(|(dag, job)| dag == event.dag && Some(job) <= ended);
+        self.has_arrived |=
+            (self.until).is_some_and(|(dag, job)| dag == event.dag && Some(job) <= ended);
         // In a replay, a signal follows when the one before it has led to something.
-        if let What::Released | What::Skipped = event.what
-            && let Some(time_ns) = machine.edge.next_signal_ns(event.dag)
-        {
-            machine.signal_of_replay_at(time_ns.max(event.time_ns), event.dag);
+        if let What::Released | What::Skipped = event.what {
+            self.machine.follow_signal(event.dag, event.time_ns);
         }
     }
 
     fn request(&mut self, request: Request, now_ns: u64) {
-        self.machine.request_at(now_ns, request);
+        match request {
+            Request::Signal(dag) => self.machine.signal_at(now_ns, dag),
+            _ => self.machine.keep(now_ns, Arrival::Request(request)),
+        }
     }
 
     fn next_request_ns(&self) -> Option<u64> {
@@ -140,7 +159,7 @@ impl Workload<Runner> for Calls<'_> {
     }
 
     fn late_ns(&self, due_ns: u64) -> u64 {
-        self.machine.late.get().of_interrupt_ns(due_ns)
+        self.machine.settings.borrow().late.of_interrupt_ns(due_ns)
     }
 
     fn stops(&self) -> bool {

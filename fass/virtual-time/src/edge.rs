@@ -1,0 +1,231 @@
+//! What crosses the edge of a run: written down, or taken from a recording.
+//!
+//! A *replay* does not call sources that are recorded, and takes their values; it gives subtasks
+//! what they sampled and the time that they were told; signals come when they came. No job is
+//! lost on the way: releases queue, and a fault cuts what it cut. A job that the recording has no
+//! values of, and an instance that was cut, is passed over: its function is not called. What else
+//! is recorded is compared.
+
+use std::cell::RefCell;
+
+use fass::edge::{self, Replay};
+use fass::{LatestJobs, Plan, Recorded};
+use recording::{Channel, Entry, Header, Malformed, What, Writer};
+use sched_dag::engine::Run;
+use sched_dag::journal::{self, Event};
+use sched_dag::{DagId, Instance, TaskSet};
+
+pub use fass::edge::Divergence;
+
+/// The edge of one machine.
+#[derive(Debug, Default)]
+pub(crate) struct Edge {
+    /// What the recordings of this machine say of themselves.
+    header: RefCell<Header>,
+    /// The values so far, in the order in which they were complete.
+    values: RefCell<Vec<Kept>>,
+    /// What the running instance is told that asks for the time, if that is noted.
+    told: RefCell<Option<Told>>,
+    /// The inputs of the last jobs, if not all is kept.
+    latest: RefCell<Option<LatestJobs>>,
+    replay: RefCell<Option<Replay>>,
+}
+
+/// An entry of the recording to be, without its value, and the value.
+#[derive(Debug)]
+struct Kept {
+    entry: Entry<'static>,
+    bytes: Vec<u8>,
+}
+
+/// Answers to an instance that asks for the time.
+#[derive(Debug)]
+struct Told {
+    /// Those of this run.
+    answers: Vec<u64>,
+    /// Those of the recorded run.
+    recorded: Vec<u64>,
+}
+
+/// Returns an entry without its value, of a job whose release is not known yet.
+fn entry(what: What, [dag, place]: [u16; 2], job: u64, at_ns: u64) -> Entry<'static> {
+    Entry {
+        what,
+        dag,
+        place,
+        job,
+        release_ns: at_ns,
+        at_ns,
+        value: &[],
+    }
+}
+
+impl Kept {
+    fn new(header: &Header, value: &Recorded<'_>) -> Self {
+        let Recorded { channel, job, .. } = *value;
+        let what = value.bytes.map_or(What::Lost, |_| What::Value);
+        let of = [header.channels[usize::from(channel)].dag, channel];
+        Self {
+            entry: entry(what, of, job, value.completed_ns),
+            bytes: value.bytes.unwrap_or_default().to_vec(),
+        }
+    }
+}
+
+fn narrow(number: u32) -> u16 {
+    u16::try_from(number).unwrap_or(u16::MAX)
+}
+
+impl Edge {
+    /// Makes the machine replay a recording.
+    pub(crate) fn replay(&self, bytes: &[u8]) -> Result<(), Malformed> {
+        self.replay.replace(Some(Replay::read(bytes.to_vec())?));
+        Ok(())
+    }
+
+    pub(crate) fn is_replay(&self) -> bool {
+        self.replay.borrow().is_some()
+    }
+
+    /// Asks the replay, if this is one.
+    pub(crate) fn of_replay<T: Default>(&self, ask: impl FnOnce(&mut Replay) -> T) -> T {
+        let mut replay = self.replay.borrow_mut();
+        replay.as_mut().map(ask).unwrap_or_default()
+    }
+
+    /// Reports whether faults of a DAG are those of a replay: what they cut is recorded.
+    pub(crate) fn is_replayed(&self, dag: DagId) -> bool {
+        self.of_replay(|replay| replay.is_of(dag))
+    }
+
+    /// Takes the recorded topics of a DAG.
+    pub(crate) fn open(&self, dag: DagId, graph: u64, channels: &[Channel]) {
+        edge::open(&mut self.header.borrow_mut(), dag, graph, channels);
+    }
+
+    /// Takes a plan, which has to fit to what is replayed, and keeps the inputs of so many jobs, or
+    /// all.
+    pub(crate) fn launch(&self, plan: &mut Plan, most_jobs: Option<u32>) -> Result<(), String> {
+        let mut header = self.header.borrow_mut();
+        edge::name(&mut header, "virtual time", &plan.task_set);
+        if let Some(replay) = self.replay.borrow_mut().as_mut() {
+            replay.fit(&header, &plan.task_set)?;
+            replay.prepare(plan);
+        }
+        if let Some(jobs) = most_jobs {
+            let latest = LatestJobs::new(&header.channels, jobs);
+            let latest = latest.ok_or("there is no memory for the inputs of so many jobs")?;
+            self.latest.replace(Some(latest));
+        }
+        Ok(())
+    }
+
+    /// Begins an instance.
+    pub(crate) fn begin(&self, instance: Instance) {
+        let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
+        let is_noted = self.header.borrow().channels.iter().any(of_dag);
+        let recorded = self.of_replay(|replay| replay.clock(instance).map(<[u64]>::to_vec));
+        self.told.replace(is_noted.then(|| Told {
+            answers: Vec::new(),
+            recorded: recorded.unwrap_or_default(),
+        }));
+    }
+
+    /// Answers a function that asks for the time: with what was answered then, if it is
+    /// recorded.
+    pub(crate) fn answer_ns(&self, now_ns: u64) -> u64 {
+        let mut told = self.told.borrow_mut();
+        let Some(Told { answers, recorded }) = &mut *told else {
+            return now_ns;
+        };
+        let answer_ns = recorded.get(answers.len()).copied().unwrap_or(now_ns);
+        answers.push(answer_ns);
+        answer_ns
+    }
+
+    /// Ends an instance, which began then.
+    pub(crate) fn end(&self, instance: Instance, start_ns: u64) {
+        let told = self.told.take().map(|told| told.answers);
+        let Some(answers) = told.filter(|answers| !answers.is_empty()) else {
+            return;
+        };
+        let mut values = self.values.borrow_mut();
+        if let Some(latest) = self.latest.borrow().as_ref() {
+            values.retain(|Kept { entry, .. }| latest.has(entry.dag.into(), entry.job));
+        }
+        let of = [instance.dag.0, instance.subtask.0].map(narrow);
+        values.push(Kept {
+            entry: entry(What::Clock, of, instance.job, start_ns),
+            bytes: recording::to_bytes(&answers),
+        });
+    }
+
+    /// Takes a value of this run, and compares it with the recorded one.
+    pub(crate) fn record(&self, value: &Recorded<'_>) {
+        self.of_replay(|replay| replay.compare(value));
+        match self.latest.borrow_mut().as_mut() {
+            Some(latest) => latest.take(value),
+            None => {
+                let kept = Kept::new(&self.header.borrow(), value);
+                self.values.borrow_mut().push(kept);
+            }
+        }
+    }
+
+    /// Lends the recorded value of a channel of the plan.
+    pub(crate) fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        let replay = self.replay.borrow();
+        let value = replay
+            .as_ref()
+            .and_then(|replay| replay.value(channel, job));
+        value.into_iter().for_each(take);
+    }
+
+    /// Returns the recording of the run so far.
+    pub(crate) fn recording(&self, run: &Run) -> Vec<u8> {
+        let (header, values) = (self.header.borrow(), self.values.borrow());
+        let latest = self.latest.borrow();
+        let is_kept = |entry: &Entry<'_>| {
+            let latest = latest.as_ref();
+            latest.is_none_or(|latest| latest.has(entry.dag.into(), entry.job))
+        };
+        let inputs = latest.iter().flat_map(LatestJobs::values);
+        let inputs: Vec<Kept> = inputs.map(|value| Kept::new(&header, &value)).collect();
+        let values = values
+            .iter()
+            .chain(&inputs)
+            .map(|Kept { entry, bytes }| Entry {
+                value: bytes,
+                ..*entry
+            });
+        let events = run.journal().events();
+        let events = events.filter_map(|event| self.recorded(&event, run.task_set()));
+        let mut entries: Vec<Entry<'_>> = values.chain(events).filter(is_kept).collect();
+        for entry in &mut entries {
+            let job = run.record().job(DagId(entry.dag.into()), entry.job);
+            let release_ns = job.and_then(|job| job.release_ns);
+            entry.release_ns = release_ns.unwrap_or(entry.at_ns);
+        }
+        let replay = self.replay.borrow();
+        entries.extend(replay.iter().flat_map(Replay::events));
+        entries.sort_by_key(|entry| entry.at_ns);
+        let mut writer = Writer::new(&header);
+        entries.iter().for_each(|entry| writer.write(entry));
+        writer.finish()
+    }
+
+    /// Returns what a recording says of an event, if anything; what was skipped or cut in the
+    /// recorded run is not so here.
+    fn recorded(&self, event: &Event, task_set: &TaskSet) -> Option<Entry<'static>> {
+        let what = match event.what {
+            // A signal is one at the instant of the release.
+            journal::What::Due => return None,
+            journal::What::Released if task_set.dag(event.dag).is_sporadic() => journal::What::Due,
+            what => what,
+        };
+        let what = edge::recorded(what).filter(|_| !self.is_replayed(event.dag))?;
+        let subtask = event.subtask.map_or(0, |subtask| subtask.0);
+        let of = [event.dag.0, subtask].map(narrow);
+        Some(entry(what, of, event.job, event.time_ns))
+    }
+}
