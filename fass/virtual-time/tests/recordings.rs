@@ -57,6 +57,16 @@ fn altered<'e>(bytes: &'e [u8], alter: impl Fn(Entry<'e>, Role) -> Vec<Entry<'e>
     writer.finish()
 }
 
+/// A signal at the place of an entry.
+fn signal(entry: Entry<'_>) -> Entry<'_> {
+    let (what, value) = (What::Signal, &[][..]);
+    Entry {
+        what,
+        value,
+        ..entry
+    }
+}
+
 #[test]
 fn signals_come_when_they_came_and_from_nowhere_else() {
     let build = |from: u64| {
@@ -209,12 +219,8 @@ fn a_machine_that_keeps_the_last_jobs_keeps_times_of_no_others() {
     ask.writes(&["time"]).register(named("ask"));
     let bytes = record(&VirtualTime::new().keep_latest(4), &[dag]);
     let recording = Recording::read(&bytes).expect("whole");
-    let count = |what| {
-        recording
-            .entries()
-            .filter(|entry| entry.what == what)
-            .count()
-    };
+    let entries = || recording.entries();
+    let count = |what| entries().filter(|entry| entry.what == what).count();
     assert_eq!([What::Value, What::Clock].map(count), [4, 4]);
 }
 
@@ -310,48 +316,33 @@ fn a_recording_that_does_not_fit_is_refused() {
     let read = Recording::read(&lost).expect("whole");
     assert_eq!((read.count(), read.lost()), (3, 2));
     let whole = recorded();
-    let far = |what| {
-        altered(&whole, |entry, _| match entry.job {
-            0 if what == What::Signal => vec![Entry {
-                what,
-                job: 1 << 40,
-                value: &[],
-                ..entry
-            }],
-            0 => vec![Entry {
-                job: 1 << 40,
-                ..entry
-            }],
-            _ => vec![],
-        })
-    };
+    let job = 1 << 40;
+    let far_value = altered(&whole, |entry, _| match entry.job {
+        0 => vec![Entry { job, ..entry }],
+        _ => vec![],
+    });
+    let far_signal = altered(&whole, |entry, _| match entry.job {
+        0 => vec![Entry {
+            job,
+            ..signal(entry)
+        }],
+        _ => vec![],
+    });
+    let other_name = "the recording's dag 0 is `demo`, and here it is `other`";
+    let other_graph = "the recording is of another graph of dag `demo`";
+    let fewer = "the recording's dag 1 is `slow`, and here there is none";
     let forgotten = "topic `in` of a source is in the recording, and is not recorded here";
+    let has_lost = "the recording has lost topic `list` of job 1";
     let too_far = "the recording has job 1099511627776 of dag `demo`";
     for (recording, dag, words) in [
-        (
-            &whole,
-            demo("other", both),
-            "the recording's dag 0 is `demo`, and here it is `other`",
-        ),
-        (
-            &whole,
-            graph,
-            "the recording is of another graph of dag `demo`",
-        ),
-        (
-            &of_two,
-            demo("demo", both),
-            "the recording's dag 1 is `slow`, and here there is none",
-        ),
+        (&whole, demo("other", both), other_name),
+        (&whole, graph, other_graph),
+        (&of_two, demo("demo", both), fewer),
         (&whole, demo("demo", &["out"]), forgotten),
         (&whole, demo("demo", &[]), forgotten),
-        (
-            &lost,
-            list(),
-            "the recording has lost topic `list` of job 1",
-        ),
-        (&far(What::Value), demo("demo", both), too_far),
-        (&far(What::Signal), demo("demo", both), too_far),
+        (&lost, list(), has_lost),
+        (&far_value, demo("demo", both), too_far),
+        (&far_signal, demo("demo", both), too_far),
     ] {
         let _machine = VirtualTime::new().replay(recording).expect("whole");
         let said = finish_create_dags(&[dag]).expect_err(words).to_string();
@@ -365,15 +356,7 @@ fn a_recording_that_does_not_fit_is_refused() {
 #[test]
 fn a_recorded_signal_to_a_periodic_dag_is_none() {
     let recorded = recorded();
-    let with_signals = altered(&recorded, |entry, _| {
-        let (what, value) = (What::Signal, &[][..]);
-        let signal = Entry {
-            what,
-            value,
-            ..entry
-        };
-        vec![entry, signal]
-    });
+    let with_signals = altered(&recorded, |entry, _| vec![entry, signal(entry)]);
     let report = replay(&with_signals, &[demo("demo", &["in", "out"])]);
     assert_eq!((report.compared, report.divergence), (3, None));
 }
