@@ -54,7 +54,7 @@ pub(crate) fn run() -> Result<String, CommitError> {
     dag.register_sink_subtask(fuse, vec!["edges", "colours"], ms(25), taking("fuse", 2));
     let commit = fass::finish_create_dags(&[dag])?;
 
-    let mut text = format!("{}\n", commit.answers()[0]);
+    let mut text = format!("{}\n", commit.answer("vision"));
     let report = machine.run();
     let lines = report.event_lines();
     // The first job: from its release, the first event, to its completion.

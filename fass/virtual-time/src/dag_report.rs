@@ -92,7 +92,7 @@ impl<'r> DagReport<'r> {
     /// Returns the jobs that were released, in that order.
     ///
     /// See [`Report::dag`].
-    pub fn jobs(&self) -> impl Iterator<Item = &'r JobRecord> {
+    pub fn jobs(&self) -> impl Iterator<Item = &'r JobRecord> + use<'r> {
         let id = self.id;
         self.report.jobs.iter().filter(move |job| job.dag == id)
     }

@@ -198,7 +198,7 @@ impl VirtualTime {
     /// dag.register_untyped_subtask(|_| (), SubtaskAttributes::named("count"));
     /// let commit = finish_create_dags(&[dag]).unwrap();
     /// assert_eq!(
-    ///     commit.answers()[0].to_string(),
+    ///     commit.answer("tick").to_string(),
     ///     "dag `tick` takes at most 1.2ms, by multiple paths; 1 of 1 WCETs are observed ones and 20 %"
     /// );
     /// ```

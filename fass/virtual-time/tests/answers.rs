@@ -38,7 +38,7 @@ fn answered(machine: &VirtualTime, dags: &[Dag], expected: &[[&str; 2]]) -> (Com
     assert_eq!(report.violations(), []);
     for job in &report.jobs {
         let taken = Duration::from_nanos(job.response_time_ns().expect("it has ended"));
-        let bound = commit.answers()[job.dag.index()].verdict.bound();
+        let bound = commit.answer(job.dag).verdict.bound();
         assert!(bound.is_none_or(|bound| taken <= bound));
     }
     (commit, report)
@@ -113,7 +113,7 @@ fn a_demanded_proof_that_is_missing_refuses_the_commit() {
     assert_eq!(codes(&[none]), ["zero_jobs"]);
     // The handles are as they were: alone it is proven.
     let commit = finish_create_dags(&[late]).expect("nothing delays it");
-    assert_eq!(commit.answers()[0].verdict.bound(), Some(ms(3)));
+    assert_eq!(commit.answer("late").verdict.bound(), Some(ms(3)));
 }
 
 #[test]
@@ -175,8 +175,9 @@ fn overheads_are_added_to_every_wcet() {
         let two = chain("two", 0, [10, 10], [2, 3]);
         let (commit, report) = answered(&machine, &[two], &[[said, ""]]);
         // They are no part of the run in virtual time.
-        assert_eq!(report.jobs[0].response_time_ns(), Some(5_000_000));
-        let mut answer: Answer = commit.answers()[0].clone();
+        let mut jobs = report.dag("two").jobs();
+        assert!(jobs.all(|job| job.response_time_ns() == Some(5_000_000)));
+        let mut answer: Answer = commit.answer("two").clone();
         assert_eq!(answer.overheads, OverheadSource::Stated);
         answer.overheads = OverheadSource::Measured {
             dispatches: 500,
@@ -248,7 +249,7 @@ fn the_bound_counts_the_precedence_of_a_state() {
         }
         let any_graph = ConstructionPolicy::any_graph();
         let commit = finish_create_dags_with(&[dag], any_graph).expect("nothing is wrong");
-        let text = commit.answers()[0].to_string();
+        let text = commit.answer("map").to_string();
         assert!(text.starts_with(said), "{text}");
         assert_eq!(machine.run().violations(), []);
     }
@@ -300,6 +301,6 @@ fn cores_are_divided_by_the_app_or_by_the_commit_and_the_last_word_counts() {
     drop(machine);
     let _machine = VirtualTime::new().assign_clusters().clusters(&[1]);
     let commit = finish_create_dags(&calm()).expect("the app divides them");
-    let place = commit.answers()[0].cluster.as_ref();
+    let place = commit.answer("calm").cluster.as_ref();
     assert_eq!(place.map(|place| &place.why), Some(&None));
 }

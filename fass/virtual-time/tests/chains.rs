@@ -102,7 +102,8 @@ fn ages_are_those_that_the_values_tell_and_stay_below_the_bounds() {
         assert_eq!(report.violations(), [], "seed {seed}");
         let latencies = report.latencies(&chain.chain);
         // The last output may come after a DAG of the chain has ended, and does not count then.
-        let camera = report.task_set().dag(sched_dag::DagId(0));
+        let task_set = report.task_set();
+        let camera = task_set.dag(task_set.find("camera"));
         let outputs = report.dag("motor").subtask("leave");
         let of_output = |(output, origin): (&InstanceRecord, &Origin)| {
             Some(output.finish_ns? - camera.grid_ns((*origin)?))

@@ -8,7 +8,7 @@ use std::ops::AddAssign;
 use fass::{Dag, Raiser, Sample, create_dag, finish_create_dags};
 use recording::{Entry, Recording, Role, What, Writer};
 use support::{commit, every, job_numbers, ms, named, run, ticking};
-use virtual_time::{Report, RunError, Value, VirtualTime};
+use virtual_time::{JobShown, Passed, Report, RunError, SubtaskShown, Value, VirtualTime};
 
 /// A source that counts on.
 fn counting<T: Copy + AddAssign + From<u8>>(from: T) -> impl FnMut() -> (T,) {
@@ -67,6 +67,18 @@ fn signal(entry: Entry<'_>) -> Entry<'_> {
     }
 }
 
+/// Returns what a subtask got and gave.
+fn of<'j>(job: &'j JobShown, subtask: &str) -> &'j SubtaskShown {
+    let mut subtasks = job.subtasks.iter();
+    subtasks.find(|of| of.name == subtask).expect("it is one")
+}
+
+/// Returns one of the values that passed.
+fn value<'p>(passed: &'p [Passed], what: &str) -> &'p Value {
+    let found = passed.iter().find(|passed| passed.what == what);
+    &found.expect("it passed").value
+}
+
 #[test]
 fn signals_come_when_they_came_and_from_nowhere_else() {
     let build = |from: u64| {
@@ -96,7 +108,7 @@ fn signals_come_when_they_came_and_from_nowhere_else() {
 }
 
 /// A DAG, one that samples it and fails at what it finds in a job, and one that this one releases
-/// and that fails, too. Their sources count from `from`.
+/// and that fails, too. Their sources count from `from`, or ask for the time.
 fn failing(from: u64) -> [Dag; 3] {
     let teller = every(1, "teller");
     let tell = teller.jobs(1_000).source(counting(from));
@@ -114,11 +126,11 @@ fn failing(from: u64) -> [Dag; 3] {
     let frail = every(2, "frail");
     frail
         .jobs(1_000)
-        .record::<u8>("start")
+        .record::<u64>("start")
         .record::<u64>("seen");
-    let start = frail.source(|| (1_u8,)).writes(&["start"]);
+    let start = frail.source(|| (fass::now_ns(),)).writes(&["start"]);
     start.register(named("start"));
-    let see = |told: Option<Sample<'_, u64>>, (_,): (u8,)| {
+    let see = |told: Option<Sample<'_, u64>>, (_,): (u64,)| {
         let told = told.map_or(0, |told| *told.value);
         assert!(told != 701, "found 701");
         (told,)
@@ -145,6 +157,8 @@ fn the_inputs_of_the_last_jobs_lead_to_the_same_faults() {
         jobs[usize::from(channel.dag)] += usize::from(channel.role == Role::Source);
     }
     assert_eq!(jobs, [16, 16, 16]);
+    let clocks = recording.entries().filter(|it| it.what == What::Clock);
+    assert_eq!(clocks.count(), 16, "times of the last jobs only");
 
     // What a fault cuts need not be recorded, for nothing behind it can run.
     let without_cuts = altered(&bytes, |entry, _| match entry.what {
@@ -158,16 +172,18 @@ fn the_inputs_of_the_last_jobs_lead_to_the_same_faults() {
         let report = run(&machine, &failing(5_000));
         let panics = report.panics.iter().map(|panic| {
             let instance = panic.instance;
-            (instance.dag.0, instance.job, &*panic.message)
+            let dag = report.task_set().dag(instance.dag);
+            (dag.name(), instance.job, &*panic.message)
         });
         let mut panics: Vec<_> = panics.collect();
         panics.sort_unstable();
-        assert_eq!(panics, [(1, 340, "odd"), (2, 350, "found 701")]);
+        assert_eq!(panics, [("frail", 350, "found 701"), ("last", 340, "odd")]);
         assert_eq!(report.divergence, None);
         let job = machine.until("frail", 350).expect("it is there");
-        assert_eq!(job.subtasks[1].panic.as_deref(), Some("found 701"));
+        let see = of(&job, "see");
+        assert_eq!(see.panic.as_deref(), Some("found 701"));
         let sampled = Value::Json("[700,700000000,701]".into());
-        assert_eq!(job.subtasks[1].takes[1].value, sampled);
+        assert_eq!(value(&see.takes, "told"), &sampled);
     }
 }
 
@@ -207,21 +223,6 @@ fn a_fault_that_does_not_come_again_is_told() {
     let report = run(&machine().replay(&bytes).expect("whole"), &build());
     let found = (report.panics.len(), report.divergence, report.lacking);
     assert_eq!(found, (1, None, None));
-}
-
-#[test]
-fn a_machine_that_keeps_the_last_jobs_keeps_times_of_no_others() {
-    let dag = every(1, "asks");
-    let ask = dag
-        .jobs(100)
-        .record::<u64>("time")
-        .source(|| (fass::now_ns(),));
-    ask.writes(&["time"]).register(named("ask"));
-    let bytes = record(&VirtualTime::new().keep_latest(4), &[dag]);
-    let recording = Recording::read(&bytes).expect("whole");
-    let entries = || recording.entries();
-    let count = |what| entries().filter(|entry| entry.what == what).count();
-    assert_eq!([What::Value, What::Clock].map(count), [4, 4]);
 }
 
 /// A DAG that tells, and one that samples it, asks for the time, and fails in job 3.
@@ -278,14 +279,16 @@ fn a_replay_stops_at_a_job_and_shows_what_its_subtasks_got_and_gave() {
 
     // The next one fails, and has what it failed with.
     let job = machine.until("asker", 3).expect("it is there");
-    let pair = &job.subtasks[1];
+    let pair = of(&job, "pair");
     assert_eq!(pair.panic.as_deref(), Some("at 45 ms"));
-    assert_eq!(pair.takes[1].value, Value::Json("[4,40000000,35]".into()));
-    assert_eq!(pair.gives[0].value, Value::None);
+    let told = Value::Json("[4,40000000,35]".into());
+    assert_eq!(value(&pair.takes, "told"), &told);
+    assert_eq!(value(&pair.gives, "pair"), &Value::None);
 
     // A job that is over is shown without a step.
     let again = machine.until("asker", 2).expect("it is over");
-    assert_eq!(again.subtasks[1].takes[2].what, "the time");
+    let asked = Value::Json("[30000000]".into());
+    assert_eq!(value(&of(&again, "pair").takes, "the time"), &asked);
     let refused = machine.until("nobody", 2).expect_err("there is none");
     assert!(matches!(refused, RunError::NoSuchDag { .. }));
     let said = "there is no dag `nobody`; there are `teller`, `asker`";
