@@ -174,11 +174,7 @@ impl Edge {
 
     /// Lends the recorded value of a channel of the plan.
     pub(crate) fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        let replay = self.replay.borrow();
-        let value = replay
-            .as_ref()
-            .and_then(|replay| replay.value(channel, job));
-        value.into_iter().for_each(take);
+        self.of_replay(|replay| replay.value(channel, job).into_iter().for_each(take));
     }
 
     /// Returns the recording of the run so far.

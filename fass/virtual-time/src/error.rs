@@ -90,12 +90,3 @@ impl fmt::Display for RunError {
 }
 
 impl Error for RunError {}
-
-/// Returns the report, or panics with the error's message.
-#[track_caller]
-pub(crate) fn or_panic(result: Result<Report, RunError>) -> Report {
-    match result {
-        Ok(report) => report,
-        Err(error) => panic!("{error}"),
-    }
-}

@@ -62,7 +62,6 @@ pub use command::replay_command;
 pub use dag_report::DagReport;
 pub use edge::Divergence;
 pub use error::RunError;
-use error::or_panic;
 pub use job::{JobShown, Passed, SubtaskShown, Value};
 use platform::Machine;
 pub use record::{InstanceRecord, JobRecord, PanicRecord};
@@ -334,7 +333,7 @@ impl VirtualTime {
     ///
     /// See [`VirtualTime`].
     pub fn run(&self) -> Report {
-        let report = or_panic(self.try_run());
+        let report = self.try_run().unwrap_or_else(|error| panic!("{error}"));
         if let Some(warning) = report.warning() {
             eprintln!("{warning}");
         }
@@ -364,7 +363,8 @@ impl VirtualTime {
     /// assert_eq!(machine.run_for(ms(10)).jobs.len(), 4); // and at 30 ms
     /// ```
     pub fn run_for(&self, duration: Duration) -> Report {
-        or_panic(self.try_run_for(duration))
+        let result = self.try_run_for(duration);
+        result.unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// Runs until a job has ended, or one after it, and returns what its subtasks got and gave:
@@ -383,7 +383,7 @@ impl VirtualTime {
     ///
     /// See [`RunError`]. The run is over then.
     pub fn try_run(&self) -> Result<Report, RunError> {
-        self.machine.run(None)
+        self.machine.run(None, None)
     }
 
     /// Runs as [`run_for`](Self::run_for) does.
@@ -392,6 +392,6 @@ impl VirtualTime {
     ///
     /// See [`RunError`]. The run is over then.
     pub fn try_run_for(&self, duration: Duration) -> Result<Report, RunError> {
-        self.machine.run(Some(duration))
+        self.machine.run(Some(duration), None)
     }
 }

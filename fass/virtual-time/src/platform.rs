@@ -70,7 +70,7 @@ impl Machine {
 
     /// Runs until a job of a DAG has ended, and returns what its subtasks got and gave.
     pub(crate) fn until(self: &Rc<Self>, dag: &str, job: u64) -> Result<JobShown, RunError> {
-        let report = self.step(|session| session.run(None, Some((dag, job))))?;
+        let report = self.run(None, Some((dag, job)))?;
         Ok(self.show(&report, report.task_set().find(dag), job))
     }
 
@@ -83,19 +83,16 @@ impl Machine {
         }
     }
 
-    /// Runs to the end or for a duration.
-    pub(crate) fn run(self: &Rc<Self>, duration: Option<Duration>) -> Result<Report, RunError> {
-        self.step(|session| session.run(duration, None))
-    }
-
-    /// Steps the session. Meanwhile this machine is the thread's, whichever was made last.
-    fn step(
+    /// Runs to the end, for a duration, or until a job has ended. Meanwhile this machine is the
+    /// thread's, whichever was made last.
+    pub(crate) fn run(
         self: &Rc<Self>,
-        run: impl FnOnce(&mut Session) -> Result<Report, RunError>,
+        duration: Option<Duration>,
+        until: Option<(&str, u64)>,
     ) -> Result<Report, RunError> {
         let mut session = self.session.take().ok_or(RunError::NothingToRun)?;
         let newest = CURRENT.replace(Rc::downgrade(self));
-        let result = run(&mut session);
+        let result = session.run(duration, until);
         CURRENT.set(newest);
         // A failed session is not put back: its functions cannot continue.
         if let Ok(_) | Err(RunError::Endless { .. } | RunError::NoSuchDag { .. }) = result {

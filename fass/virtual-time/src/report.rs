@@ -78,13 +78,7 @@ impl Deref for Report {
 
 impl Report {
     /// Adds what is known of the calls to a run, which has come to `end_ns`.
-    pub(crate) fn new(
-        run: Run,
-        end_ns: u64,
-        calls: &Calls,
-        outcome: Outcome,
-        is_late: bool,
-    ) -> Self {
+    pub(crate) fn new(run: Run, end_ns: u64, calls: &Calls, outcome: Outcome) -> Self {
         let events: Vec<Event> = run.journal().events().collect();
         let of = |what| events.iter().filter(move |event| event.what == what);
         let ready = of(What::Ready).filter_map(Event::instance);
@@ -109,7 +103,7 @@ impl Report {
             lacking: outcome.lacking,
             events,
             run,
-            is_late,
+            is_late: calls.machine.settings.borrow().late.most_ns > 0,
         }
     }
 

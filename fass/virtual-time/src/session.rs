@@ -26,8 +26,6 @@ pub(crate) struct Session {
     calls: Calls,
     /// Whether a function may end the run.
     may_shut_down: bool,
-    /// Whether interrupts may be late.
-    is_late: bool,
     /// Up to when it has run.
     until_ns: u64,
 }
@@ -48,7 +46,6 @@ impl Session {
             may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
             driver: driver.with_lifecycle(plan.lifecycle).recording(),
             calls: Calls::new(&task_set, machine),
-            is_late: false,
             until_ns: 0,
         }
     }
@@ -73,7 +70,6 @@ impl Session {
         until: Option<(&str, u64)>,
     ) -> Result<Report, RunError> {
         let machine = Rc::clone(&self.calls.machine);
-        self.is_late |= machine.settings.borrow().late.most_ns > 0;
         let until_ns = match duration {
             Some(duration) => self.until_ns.saturating_add(nanoseconds(duration)),
             None => u64::MAX,
@@ -91,15 +87,17 @@ impl Session {
         });
         let end = self.driver.run_until(until_ns, &mut self.calls);
         let now_ns = self.driver.now_ns();
-        self.until_ns = match end {
-            End::Stopped => now_ns,
-            _ => until_ns,
+        // What has no event any more has run as far as it was asked to.
+        let (clock_ns, reached_ns) = match end {
+            End::TimeReached => (until_ns, until_ns),
+            End::Finished | End::TimeOverflow(_) => (now_ns, until_ns),
+            End::Stopped => (now_ns, now_ns),
         };
-        machine.now_ns.set(match end {
-            End::TimeReached => until_ns,
-            End::Finished | End::TimeOverflow(_) | End::Stopped => now_ns,
-        });
-        let report = self.report(end == End::Finished);
+        machine.now_ns.set(clock_ns);
+        self.until_ns = reached_ns;
+        let is_over = end == End::Finished;
+        let outcome = (machine.edge).of_replay(|replay| replay.outcome(is_over));
+        let report = Report::new(self.driver.run_so_far(), now_ns, &self.calls, outcome);
         if let Some(PanicRecord { instance, message }) = self.calls.panic.take() {
             let (dag, subtask) = self.labels(instance);
             return Err(RunError::Panicked {
@@ -137,12 +135,5 @@ impl Session {
     pub(crate) fn recording(&self) -> Vec<u8> {
         let edge = &self.calls.machine.edge;
         edge.recording(&self.driver.run_so_far())
-    }
-
-    fn report(&self, is_over: bool) -> Report {
-        let edge = &self.calls.machine.edge;
-        let outcome = edge.of_replay(|replay| replay.outcome(is_over));
-        let (run, end_ns) = (self.driver.run_so_far(), self.driver.now_ns());
-        Report::new(run, end_ns, &self.calls, outcome, self.is_late)
     }
 }
