@@ -1,9 +1,9 @@
-//! What functions change of a run besides their outputs: switches, states, signals.
+//! What functions change of a run besides their outputs: switches, signals; and what they may not.
 
 mod support;
 
 use fass::{Dag, Switch, create_dag};
-use support::{Seen, every, job_numbers, named, run, ticking, work};
+use support::{every, job_numbers, named, run, ticking, work};
 use virtual_time::{VirtualTime, What};
 
 /// A DAG of one subtask that asks for something of another DAG in each job, every 20 ms.
@@ -105,29 +105,6 @@ fn a_release_of_a_dag_that_is_off_is_a_breach() {
                     or closed";
         assert!(found.iter().any(|it| it == text), "{found:?}");
     }
-}
-
-#[test]
-fn several_states_are_used_as_a_tuple_and_last_from_job_to_job() {
-    let machine = VirtualTime::new();
-    let dag = every(10, "sums");
-    dag.jobs(3);
-    let (sum, count) = (dag.state("sum", 0_u64), dag.state("count", 0_u64));
-    let add = |(sum, count): (&mut u64, &mut u64)| {
-        *count += 1;
-        *sum += *count;
-        (*sum,)
-    };
-    let add = dag.using((sum.update(), count.update())).source(add);
-    add.writes(&["sum"]).register(named("add"));
-    let (seen, keep) = Seen::shared();
-    let check = move |(sum, count): (&u64, &u64), (sent,): (u64,)| {
-        keep.add((*sum, *count, sent));
-    };
-    let check = dag.using((sum.read(), count.read())).subtask(check);
-    check.reads(&["sum"]).register(named("check"));
-    run(&machine, &[dag]);
-    assert_eq!(seen.all(), [(1, 1, 1), (3, 2, 3), (6, 3, 6)]);
 }
 
 #[test]
