@@ -1,9 +1,9 @@
 //! The platform that `fass` sees: one for the program, one machine a thread.
 //!
 //! The installed platform itself has no state. Everything it is asked, it asks
-//! the calling thread's current machine. A machine without a run in progress
-//! keeps its run in `run`; while a run steps, the run is taken out of there, so
-//! that a function's calls into the platform meet nothing borrowed.
+//! the calling thread's current machine. A machine keeps its session; while that
+//! runs, it is taken out of there, so that a function's calls into the platform
+//! meet nothing borrowed but the settings, which no function changes.
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
@@ -150,8 +150,7 @@ impl Platform for HostPlatform {
         // A sum that does not fit is reported by the driver as a finish beyond
         // the last time there is.
         let ns = nanoseconds(duration);
-        let executed_ns = Some(executed_ns.saturating_add(ns));
-        surroundings.executed_ns.set(executed_ns);
+        (surroundings.executed_ns).set(Some(executed_ns.saturating_add(ns)));
         let now_ns = &surroundings.now_ns;
         now_ns.set(now_ns.get().saturating_add(ns));
     }
@@ -213,8 +212,7 @@ impl Platform for HostPlatform {
                  name one that is"
             )));
         }
-        let edge = &surroundings.edge;
-        let launched = edge.launch(&mut plan, settings.most_jobs);
+        let launched = surroundings.edge.launch(&mut plan, settings.most_jobs);
         launched.map_err(LaunchError::new)?;
         machine.plan.set(Some(plan.number));
         let session = Session::new(plan, settings.scheduler, surroundings);
@@ -237,8 +235,6 @@ fn surroundings() -> Rc<Surroundings> {
 
 /// Returns the settings of this thread's machine, or those that one has at first.
 fn settings() -> Settings {
-    let machine = current();
-    machine.map_or_else(Settings::default, |machine| {
-        machine.surroundings.settings.borrow().clone()
-    })
+    let settings = |machine: Rc<Machine>| machine.surroundings.settings.borrow().clone();
+    current().map(settings).unwrap_or_default()
 }
