@@ -91,10 +91,8 @@ impl Run {
     #[must_use]
     pub fn of<B: Body, P>(engine: &mut Engine<B, P>, proven: Proven, cores: u32) -> Self {
         let journal = core::mem::replace(&mut engine.scheduler.log.journal, Journal::none());
-        Self {
-            proven,
-            ..Self::so_far(engine, journal, cores)
-        }
+        let run = Self::so_far(engine, journal, cores);
+        Self { proven, ..run }
     }
 
     /// Makes one of an engine that may go on, and of a copy of its journal.
@@ -235,9 +233,7 @@ impl Run {
     #[must_use]
     #[track_caller]
     pub fn statistics(&self, dag: impl DagKey) -> &DagStatistics {
-        &self.dags[self.task_set.find(dag).index()]
-            .snapshot
-            .statistics
+        &self.snapshot(dag).statistics
     }
 
     /// Returns how a DAG has ended.
