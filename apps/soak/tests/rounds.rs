@@ -45,7 +45,7 @@ fn judged(case: Case, plans: &[DagPlan], trouble: &Trouble) -> Account {
     let statistics = |dag: sched_dag::DagId| report.dag(dag).statistics();
     let (account, discrepancies) = Account::of_run(
         report.task_set(),
-        &report.record(),
+        report.record(),
         statistics,
         trouble,
         &executed,

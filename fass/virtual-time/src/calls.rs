@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::Rc;
 use std::sync::Arc;
+use std::time::Duration;
 
 use fass::Runner;
 use fass::edge::Replay;
@@ -86,12 +87,19 @@ impl Workload<Runner> for Calls {
         let settings = machine.settings.borrow();
         let mut faults = settings.faults.iter();
         let fails = faults.any(|fault| fault.is(instance, &self.task_set));
-        let result = self.call(runner, fails);
+        let mut result = self.call(runner, fails);
         machine.edge.end(instance, now_ns);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
+        let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
         if executed_ns == 0 && (result.is_ok() || fails) {
-            let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
             executed_ns = settings.silent.of_call_ns(instance, subtask.wcet_ns());
+        }
+        // The function has run to its end, but nobody may see what it did beyond its budget.
+        let budget_ns = subtask.most_execution_ns(0);
+        if executed_ns > budget_ns {
+            executed_ns = budget_ns;
+            let budget = Duration::from_nanos(budget_ns);
+            result = Err(format!("executed for more than its budget of {budget:?}"));
         }
         if let Err(message) = result {
             runner.body.failed(now_ns);

@@ -213,7 +213,8 @@ impl VirtualTime {
     /// panic; then its DAG starts nothing, or goes on with the next job, and the other
     /// DAGs go on.
     /// [`Report::panics`] has every panic: a test that means none has to look
-    /// there, because an assertion inside a function panics, too.
+    /// there, because an assertion inside a function panics, too. A call that takes longer
+    /// than its subtask's budget counts as a panic when the budget is used up.
     ///
     /// ```
     /// use std::time::Duration;

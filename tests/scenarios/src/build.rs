@@ -60,6 +60,8 @@ inputs!(()(a)(a b)(a b c)(a b c d));
 /// What a subtask's functions do in a call; one follows another that has failed.
 struct Step {
     takes: Vec<u64>,
+    /// A budget is one of processor time, so it is exceeded only by what computes.
+    how: Occupation,
     fails: Vec<u64>,
     when: Vec<u64>,
     /// How often they have been called.
@@ -73,6 +75,10 @@ impl Step {
         let sources = dag.subtasks.iter().filter(|of| of.after.is_empty());
         Arc::new(Self {
             takes: subtask.takes.clone(),
+            how: match subtask.budget {
+                Some(_) => Occupation::Spin,
+                None => Occupation::Hold,
+            },
             fails: subtask.fails.clone(),
             when: subtask.when.clone(),
             calls: AtomicU64::new(0),
@@ -87,7 +93,7 @@ impl Step {
             .ok()
             .and_then(|call| self.takes.get(call));
         let takes = takes.or(self.takes.last()).copied().unwrap_or(0);
-        execute_for(Duration::from_nanos(takes * UNIT_NS), Occupation::Hold);
+        execute_for(Duration::from_nanos(takes * UNIT_NS), self.how);
         act(call, self.when.contains(&call));
         assert!(
             !self.fails.contains(&call),
