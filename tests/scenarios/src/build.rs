@@ -35,9 +35,21 @@ impl Outputs for () {
     fn of(_: u64) -> Self {}
 }
 
-impl Outputs for (u64,) {
+impl Outputs for (Whole,) {
     fn of(value: u64) -> Self {
-        (value,)
+        (Whole([value; 16]),)
+    }
+}
+
+/// A number that cannot be half written, or read while it is written, without showing it.
+#[derive(Clone, Copy)]
+struct Whole([u64; 16]);
+
+impl Whole {
+    fn number(&self) -> u64 {
+        let [first, rest @ ..] = self.0;
+        assert!(rest.iter().all(|word| *word == first), "a half value");
+        first
     }
 }
 
@@ -46,13 +58,13 @@ macro_rules! inputs {
         impl Inputs for ($(inputs!(@ $value),)*) {
             fn first(self) -> Option<(u64, bool)> {
                 let ($($value,)*) = self;
-                let all: &[u64] = &[$($value),*];
+                let all: &[u64] = &[$($value.number()),*];
                 let first = *all.first()?;
                 Some((first, all.iter().all(|value| *value == first)))
             }
         }
     )*};
-    (@ $value:ident) => { u64 };
+    (@ $value:ident) => { Whole };
 }
 
 inputs!(()(a)(a b)(a b c)(a b c d));
@@ -115,7 +127,7 @@ struct Building<'a> {
     signals: &'a BTreeMap<String, Signal>,
     dags: &'a BTreeMap<String, Dag>,
     modes: &'a BTreeMap<String, Mode>,
-    latest: &'a BTreeMap<String, Latest<u64>>,
+    latest: &'a BTreeMap<String, Latest<Whole>>,
     states: BTreeMap<String, State<u64>>,
 }
 
@@ -166,6 +178,7 @@ impl Building<'_> {
                 using::<_, I, O>(dag, latest, place, step, move |sample, _, _| {
                     let Some(sample) = sample else { return };
                     assert!(sample.completed_ns <= fass::now_ns(), "it is complete");
+                    sample.value.number();
                     let before = last.fetch_max(sample.job, Relaxed);
                     assert!(before <= sample.job, "job {} after {before}", sample.job);
                 });
@@ -346,7 +359,7 @@ impl Scenario {
 
 impl Building<'_> {
     fn register_shaped(&mut self, subtask: &SubtaskText, inputs: usize, writes: bool) {
-        type One = u64;
+        type One = Whole;
         match (inputs, writes) {
             (0, false) => self.register::<(), ()>(subtask, false),
             (0, true) => self.register::<(), (One,)>(subtask, true),
