@@ -6,12 +6,10 @@
 //! as an indented line, a remedy, and a block of Rust, in this order.
 
 use std::collections::BTreeMap;
-use std::fs;
 
 use tool::golden::Golden;
-use tool::system;
 
-use crate::markdown::blocks;
+use crate::markdown::{blocks, page};
 
 const PAGE: &str = "docs/errors.md";
 
@@ -26,28 +24,29 @@ pub struct Entry {
 
 /// Reads the page: the entry of each fault by the fault's name.
 ///
-/// # Errors
+/// # Panics
 ///
-/// In words: the page cannot be read or has no entries, or one lacks a part.
-pub fn documented_faults() -> Result<BTreeMap<String, Entry>, String> {
-    read(&page()?)
+/// Panics if the page has no entries, or if one lacks a part.
+#[must_use]
+pub fn documented_faults() -> BTreeMap<String, Entry> {
+    read(&page(PAGE)).unwrap_or_else(|why| panic!("{PAGE}: {why}"))
 }
 
 /// Reads the first column of one of the page's tables, which is found by the head of
 /// that column and the columns behind it; `...` stands for what varies.
 ///
-/// # Errors
+/// # Panics
 ///
-/// In words: the page cannot be read or has no such table.
-pub fn table(head: &str) -> Result<Vec<String>, String> {
-    let page = page()?;
-    let mut parts = page.split(head).skip(1);
-    let rows = parts.next().ok_or_else(|| format!("no table `{head}`"))?;
+/// Panics if the page has no such table.
+#[must_use]
+pub fn table(head: &str) -> Vec<String> {
+    let page = page(PAGE);
+    let rows = page.split(head).nth(1).expect(head);
     let rows = rows.trim_start().lines().skip(1);
     let texts = rows
         .take_while(|row| row.starts_with("| "))
         .filter_map(|row| row.split('|').nth(1));
-    Ok(texts.map(|text| text.trim().to_string()).collect())
+    texts.map(|text| text.trim().to_string()).collect()
 }
 
 /// Whether a text is what a pattern with `...` says.
@@ -116,11 +115,6 @@ pub fn with_names_of(other: &str, text: &str) -> String {
             _ => names.next().unwrap_or(part),
         });
     parts.collect::<Vec<_>>().join("`")
-}
-
-fn page() -> Result<String, String> {
-    let path = system::workspace().join(PAGE);
-    fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))
 }
 
 fn read(page: &str) -> Result<BTreeMap<String, Entry>, String> {

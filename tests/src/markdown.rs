@@ -3,6 +3,10 @@
 //! A *block* is what stands between two fences; its *info* is what the first fence
 //! says of it, such as `rust` or `text output-new-app`.
 
+use std::fs;
+
+use tool::system::workspace;
+
 /// A block of a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
@@ -10,6 +14,18 @@ pub struct Block {
     pub info: String,
     /// Its lines, each with its newline.
     pub text: String,
+}
+
+/// Reads a file of the workspace: a page, or a source.
+///
+/// # Panics
+///
+/// Panics if it cannot be read.
+#[must_use]
+#[track_caller]
+pub fn page(path: &str) -> String {
+    let text = fs::read_to_string(workspace().join(path));
+    text.unwrap_or_else(|why| panic!("{path}: {why}"))
 }
 
 /// Takes the blocks out of a page.

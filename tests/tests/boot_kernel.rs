@@ -265,7 +265,7 @@ fn every_commit_fault_is_printed_as_documented() {
     let cases = guest_tests::faults::CASES.iter().map(|(fault, _)| *fault);
     let names: BTreeSet<&str> = printed.keys().map(String::as_str).collect();
     assert_eq!(names, cases.collect());
-    let documented = documented_faults().expect("the page");
+    let documented = documented_faults();
     for (fault, text) in &printed {
         fault_page::assert_is(fault, &documented[fault].text, text);
     }

@@ -8,11 +8,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use std::sync::OnceLock;
 
 use harness::guide::{documented_output, without_numbers};
-use harness::markdown::blocks;
+use harness::markdown::{blocks, page};
 use tool::golden::{Golden, excerpt};
 use tool::new_app::{self, Source};
 use tool::system::{self, workspace};
@@ -45,23 +45,36 @@ fn repository(folder: &str, name: &str) -> PathBuf {
     out
 }
 
-fn try_cargo(folder: &Path, words: &str) -> Output {
+/// Runs cargo in a folder, and returns its exit code, what it prints, and of what it complains.
+fn try_cargo(folder: &Path, words: &str) -> (Option<i32>, String, String) {
     let (command, options) = words.split_once(' ').unwrap_or((words, ""));
-    system::cargo()
+    let output = system::cargo()
         .current_dir(folder)
         .args([command, "--offline", "--target-dir"])
         .arg(ours().join("target"))
         .args(options.split_whitespace())
         .output()
-        .expect("cargo can be started")
+        .expect("cargo can be started");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let code = output.status.code();
+    (code, text(&output.stdout), text(&output.stderr))
 }
 
-/// Runs cargo in a folder, where it must succeed, and returns what it says there.
+/// Runs cargo in a folder, where it must succeed, and returns what it prints.
+#[track_caller]
 fn cargo(folder: &Path, words: &str) -> String {
-    let output = try_cargo(folder, words);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "cargo {words}:\n{said}");
-    String::from_utf8_lossy(&output.stdout).into_owned()
+    let (code, printed, complaints) = try_cargo(folder, words);
+    assert_eq!(code, Some(0), "cargo {words}:\n{complaints}");
+    printed
+}
+
+/// Runs cargo in a folder, where it must end with this code, and say this.
+#[track_caller]
+fn cargo_refuses(folder: &Path, words: &str, code: i32, says: &str) {
+    let (found, printed, complaints) = try_cargo(folder, words);
+    let said = printed + &complaints;
+    assert_eq!(found, Some(code), "cargo {words}:\n{said}");
+    assert!(said.contains(says), "cargo {words}:\n{said}");
 }
 
 /// Boots the app of a repository, as a person does.
@@ -79,7 +92,7 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
     assert!(said.contains(PASSES), "{said}");
 
     let said = boot(&app);
-    let documented = documented_output("new-app").expect("the guide shows it");
+    let documented = documented_output("new-app");
     // The bound does not depend on the kernel's speed, so it is exact.
     let shown = |line: &str| match line.contains("takes at most") {
         true => line.into(),
@@ -94,13 +107,13 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
 
     // The same lines on Linux, whatever it takes there. Without preemption the bound is another.
     let said = cargo(&app, "run --quiet -- --on linux --jobs 20");
-    assert!(said.contains("takes at most"), "{said}");
-    let complete = "20 jobs complete, ";
-    assert!(said.lines().any(|line| line.contains(complete)), "{said}");
-    assert!(
-        said.contains("{\"kind\":\"verdict\",\"status\":\"success\"}\n"),
-        "{said}"
-    );
+    for part in [
+        "takes at most",
+        "20 jobs complete, ",
+        "{\"kind\":\"verdict\",\"status\":\"success\"}\n",
+    ] {
+        assert!(said.contains(part), "{said}");
+    }
 
     // Started on the host by mistake, the image says what to do.
     let image = ours().join("target/debug").join(NAME);
@@ -140,24 +153,14 @@ fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
         ("", 1, "`cargo run --profile host --example replay -- "),
         (" --prove --seeds 2", 1, "leave `--seeds` out"),
     ] {
-        let output = try_cargo(&app, &format!("run -- --mode deterministic{words}"));
-        let said = [output.stdout, output.stderr].concat();
-        let said = String::from_utf8_lossy(&said);
-        assert_eq!(output.status.code(), Some(code), "{words}: {said}");
-        assert!(said.contains(says), "{words}: {said}");
+        let words = format!("run -- --mode deterministic{words}");
+        cargo_refuses(&app, &words, code, says);
     }
 }
 
 #[test]
 fn what_its_repository_lacks_is_named_with_the_remedy() {
     let app = repository("lacking", "brake-assist");
-    let put = |file: &str, text: &str| fs::write(app.join(file), text).expect("it is ours");
-    let without = |file: &str, line: &str| {
-        let text = fs::read_to_string(app.join(file)).expect("it is there");
-        assert!(text.contains(line), "{file} has no `{line}`");
-        put(file, &text.replace(line, ""));
-        text
-    };
     cargo(&app, "clippy --all-targets -- -D warnings");
     for (file, line, command, remedy) in [
         (
@@ -191,19 +194,19 @@ fn what_its_repository_lacks_is_named_with_the_remedy() {
             "write `panic = \"abort\"` below `[profile.dev]`",
         ),
     ] {
-        let whole = without(file, line);
-        let output = try_cargo(&app, command);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(!output.status.success(), "without `{line}`:\n{said}");
-        assert!(said.contains(remedy), "without `{line}`:\n{said}");
-        put(file, &whole);
+        let path = app.join(file);
+        let whole = fs::read_to_string(&path).expect("it is there");
+        assert!(whole.contains(line), "{file} has no `{line}`");
+        fs::write(&path, whole.replace(line, "")).expect("it is ours");
+        cargo_refuses(&app, command, 101, remedy);
+        fs::write(&path, whole).expect("it is ours");
     }
 }
 
 #[test]
 fn under_apps_cargo_finds_it_and_the_linters_are_content() {
     // A workspace that has our crates and no app but the new one, so that nothing is copied.
-    let manifest = fs::read_to_string(workspace().join("Cargo.toml")).expect("the manifest");
+    let manifest = page("Cargo.toml");
     let (manifest, _) = manifest.split_once("[profile.dev]").expect("the profiles");
     let (_, manifest) = manifest.split_once("\n]\n").expect("the members");
     let paths = format!("path = \"{}/", workspace().display());
@@ -231,7 +234,7 @@ fn under_apps_cargo_finds_it_and_the_linters_are_content() {
 
 #[test]
 fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
-    let readme = fs::read_to_string(workspace().join("README.md")).expect("the page");
+    let readme = page("README.md");
     let blocks = blocks(&readme);
     let code = blocks.iter().find(|block| block.info.starts_with("rust"));
     let code = &code.expect("the app's code").text;
@@ -252,10 +255,7 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
     let wrong = code.replace("frame * 100", "frame * 101");
     assert_ne!(&wrong, code);
     put(&wrong);
-    let output = try_cargo(&app, "test");
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(!output.status.success(), "{said}");
-    assert!(said.contains("assertion `left == right` failed"), "{said}");
+    cargo_refuses(&app, "test", 101, "assertion `left == right` failed");
 
     put(code);
     let said = cargo(&app, "test");

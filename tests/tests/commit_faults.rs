@@ -7,17 +7,16 @@
 
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 
 use fass::finish_create_dags;
 use harness::fault_page::{self, documented_faults, function_bodies, is_said_by, table};
+use harness::markdown::page;
 use sched_dag::analysis::{Reason, TaskError};
 use sched_dag::{
     CommitOptions, DagId, DagLabel, DagSpec, Fault, Policy, SubtaskId, SubtaskSpec, TopicPort,
     verify,
 };
 use tool::golden::Golden;
-use tool::system::workspace;
 
 /// The files whose functions the page shows, each named as its fault.
 const EXAMPLES: [&str; 6] = [
@@ -150,28 +149,25 @@ fn faults(dags: &[DagSpec], options: &CommitOptions) -> Vec<Fault> {
 
 #[test]
 fn every_fault_is_found_and_said_as_documented() {
-    let documented = documented_faults().expect("the page");
-    let mut said = BTreeMap::new();
-    for (code, faults) in [
-        ("no_cores", no_cores()),
-        ("edge_out_of_range", edge_out_of_range()),
-        ("arity_too_large", arity_too_large()),
-        ("too_many_dags", too_many_dags()),
-        ("too_many_subtasks", too_many_subtasks()),
+    let documented = documented_faults();
+    let mut said = BTreeMap::<String, String>::new();
+    for faults in [
+        no_cores(),
+        edge_out_of_range(),
+        arity_too_large(),
+        too_many_dags(),
+        too_many_subtasks(),
     ] {
-        let fault = faults.iter().find(|fault| fault.code() == code);
-        let fault = fault.unwrap_or_else(|| panic!("{code} is not found, but {faults:?}"));
-        said.insert(code.to_string(), fault.to_string());
+        said.extend(faults.iter().map(|it| (it.code().into(), it.to_string())));
     }
-    let of_platforms = [
+    for refused in [
         not_launched(),
         wcets_refused(),
         cluster_without_cores(),
         clusters_beyond_cores(),
         no_cluster(),
         not_assigned(),
-    ];
-    for refused in of_platforms {
+    ] {
         said.insert(refused.faults()[0].code().into(), refused.to_string());
     }
 
@@ -195,7 +191,7 @@ fn every_fault_is_found_and_said_as_documented() {
 
 #[test]
 fn every_kind_of_fault_has_an_entry() {
-    let documented: BTreeSet<String> = documented_faults().expect("the page").into_keys().collect();
+    let documented: BTreeSet<String> = documented_faults().into_keys().collect();
     let tables = [sched_dag::Fault::CODES, fass::Fault::CODES];
     let mut codes: BTreeSet<String> = tables.concat().into_iter().map(String::from).collect();
     // Others are named where they are found.
@@ -204,7 +200,7 @@ fn every_kind_of_fault_has_an_entry() {
     let found = others.split("add(\"").skip(1);
     codes.extend(found.filter_map(|call| Some(call.split('"').next()?.to_string())));
     assert_eq!(documented, codes);
-    let page = fs::read_to_string(workspace().join("docs/errors.md")).expect("the page");
+    let page = page("docs/errors.md");
     for code in codes {
         let link = format!("[`{code}`](#{code})");
         assert!(page.contains(&link), "the page's index lacks `{code}`");
@@ -215,10 +211,9 @@ fn every_kind_of_fault_has_an_entry() {
 fn every_example_is_the_code_that_is_tested() {
     let mut bodies = BTreeMap::new();
     for file in EXAMPLES {
-        let source = fs::read_to_string(workspace().join(file)).expect("the source");
-        bodies.extend(function_bodies(&source));
+        bodies.extend(function_bodies(&page(file)));
     }
-    for (code, entry) in documented_faults().expect("the page") {
+    for (code, entry) in documented_faults() {
         let body = bodies.get(&code);
         let body = body.unwrap_or_else(|| panic!("no function `{code}` has the fault"));
         fault_page::assert_is(&code, &entry.example, body);
@@ -227,7 +222,7 @@ fn every_example_is_the_code_that_is_tested() {
 
 #[test]
 fn every_text_is_one_line_and_ends_in_a_remedy() {
-    for (fault, entry) in documented_faults().expect("the page") {
+    for (fault, entry) in documented_faults() {
         let text = entry.text;
         assert_eq!(text.lines().count(), 1, "{fault}");
         assert!(
@@ -239,7 +234,7 @@ fn every_text_is_one_line_and_ends_in_a_remedy() {
 
 #[test]
 fn every_reason_of_a_platform_is_listed() {
-    let documented = table("| text | platform |").expect("the page");
+    let documented = table("| text | platform |");
     let sources = sources(&[
         "kernel/executive/src/run/execution/mod.rs",
         "kernel/executive/src/run/execution/stacks.rs",
@@ -255,7 +250,7 @@ fn every_reason_of_a_platform_is_listed() {
 
 #[test]
 fn every_panic_of_a_wrong_program_is_one() {
-    let documented = table("| text | remedy |").expect("the page");
+    let documented = table("| text | remedy |");
     assert!(documented.len() >= 5, "{documented:?}");
     let sources = sources(&[
         "fass/src/api/dag.rs",
@@ -270,7 +265,7 @@ fn every_panic_of_a_wrong_program_is_one() {
 
 #[test]
 fn every_warning_is_listed() {
-    let documented = table("| warning | cause | remedy |").expect("the page");
+    let documented = table("| warning | cause | remedy |");
     let codes = sched_dag::Warning::CODES.iter();
     let codes: Vec<String> = codes.map(|code| format!("`{code}`")).collect();
     assert_eq!(documented, codes);
@@ -278,46 +273,36 @@ fn every_warning_is_listed() {
 
 #[test]
 fn every_reason_against_a_proof_is_listed() {
-    let documented = table("| text | what to do |").expect("the page");
+    let documented = table("| text | what to do |");
     let machine = virtual_time::VirtualTime::new();
     let commit = finish_create_dags(&[starting("lidar")]).expect("the DAG is sound");
     let unproven = commit.answers()[0].verdict.unproven();
     let mut texts = vec![unproven.expect("it has no WCET").to_string()];
     drop(machine);
 
+    // Each leads to the next one: a new reason does not compile here until it is among them.
     let subtask = SubtaskId(0);
-    let reasons = [
-        Reason::LengthBeyondDeadline { length_ns: 5 },
-        Reason::PathBeyondDeadline {
-            sink: subtask,
-            length_ns: 5,
-        },
-        Reason::NoSinkBound { sink: subtask },
-        Reason::SubtaskBeyondPeriod { subtask },
-        Reason::Overload,
-        Reason::DelayedBy { dag: DagId(1) },
-        Reason::NoBound,
-        Reason::InFlightTooFew { in_flight: 2 },
-        Reason::Limit,
-        Reason::NoCores,
-        Reason::Unknown(TaskError::VolumeOverflow),
-    ];
-    for reason in &reasons {
-        // A new reason does not compile here until it is listed above.
-        match reason {
-            Reason::LengthBeyondDeadline { .. }
-            | Reason::PathBeyondDeadline { .. }
-            | Reason::NoSinkBound { .. }
-            | Reason::SubtaskBeyondPeriod { .. }
-            | Reason::Overload
-            | Reason::DelayedBy { .. }
-            | Reason::NoBound
-            | Reason::InFlightTooFew { .. }
-            | Reason::Limit
-            | Reason::NoCores
-            | Reason::Unknown(_) => texts.push(reason.to_string()),
-        }
-    }
+    let next = |reason: &Reason| {
+        Some(match reason {
+            Reason::LengthBeyondDeadline { length_ns } => Reason::PathBeyondDeadline {
+                sink: subtask,
+                length_ns: *length_ns,
+            },
+            Reason::PathBeyondDeadline { sink, .. } => Reason::NoSinkBound { sink: *sink },
+            Reason::NoSinkBound { .. } => Reason::SubtaskBeyondPeriod { subtask },
+            Reason::SubtaskBeyondPeriod { .. } => Reason::Overload,
+            Reason::Overload => Reason::DelayedBy { dag: DagId(1) },
+            Reason::DelayedBy { .. } => Reason::NoBound,
+            Reason::NoBound => Reason::InFlightTooFew { in_flight: 2 },
+            Reason::InFlightTooFew { .. } => Reason::Limit,
+            Reason::Limit => Reason::NoCores,
+            Reason::NoCores => Reason::Unknown(TaskError::VolumeOverflow),
+            Reason::Unknown(_) => return None,
+        })
+    };
+    let first = Reason::LengthBeyondDeadline { length_ns: 5 };
+    let reasons = std::iter::successors(Some(first), next);
+    texts.extend(reasons.map(|reason| reason.to_string()));
     assert_eq!(texts.len(), documented.len());
     let (file, below) = ("docs/errors.md", "| text | what to do |");
     for (said, text) in texts.iter().zip(&documented) {
@@ -339,10 +324,7 @@ fn with_dots(text: &str) -> String {
 
 /// Returns sources, with texts that go on in the next line behind a backslash joined.
 fn sources(files: &[&str]) -> String {
-    let mut sources = String::new();
-    for file in files {
-        sources += &fs::read_to_string(workspace().join(file)).expect("a source");
-    }
+    let sources: String = files.iter().map(|file| page(file)).collect();
     let lines = sources.split("\\\n").enumerate();
     let joined = lines.map(|(index, line)| match index {
         0 => line,

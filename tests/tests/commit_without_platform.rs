@@ -22,7 +22,7 @@ fn no_platform() -> Result<fass::Commit, CommitError> {
 fn a_commit_without_platform_is_refused_as_documented() {
     let error = no_platform().expect_err("there is none");
     assert_eq!(error.faults()[0].code(), "no_platform");
-    let documented = documented_faults().expect("the page");
+    let documented = documented_faults();
     let entry = &documented["no_platform"];
     fault_page::assert_is("no_platform", &entry.text, &error.to_string());
 }

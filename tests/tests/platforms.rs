@@ -1,10 +1,9 @@
 //! The table of platforms names tests that exist.
 
 use std::collections::BTreeSet;
-use std::fs;
 
+use harness::markdown::page;
 use scenarios::Scenario;
-use tool::system::workspace;
 
 /// Returns what stands between backquotes.
 fn quoted(text: &str) -> impl Iterator<Item = &str> {
@@ -13,15 +12,15 @@ fn quoted(text: &str) -> impl Iterator<Item = &str> {
 
 #[test]
 fn each_cell_names_a_test_that_is_there_or_a_reason() {
-    let page = fs::read_to_string(workspace().join("docs/platforms.md")).expect("the page");
+    let text = page("docs/platforms.md");
     let mut keys = BTreeSet::from(["S".to_owned()]);
-    for line in page.lines() {
+    for line in text.lines() {
         if let Some((number, test)) = line.split_once(". `") {
             let (file, name) = test.split_once("`: `").expect("a file and a test");
-            let text = fs::read_to_string(workspace().join(file)).expect(file);
+            let test = page(file);
             let name = name.trim_end_matches('`');
             let head = format!("#[test]\nfn {name}() {{");
-            assert!(text.contains(&head), "{file} has no test `{name}`");
+            assert!(test.contains(&head), "{file} has no test `{name}`");
             keys.insert(number.into());
         }
         let reason = line
@@ -30,7 +29,7 @@ fn each_cell_names_a_test_that_is_there_or_a_reason() {
         keys.extend(reason.map(|(letter, _)| letter.to_owned()));
     }
     let suite = Scenario::suite().expect("scenarios");
-    let rows = page.lines().filter(|line| line.starts_with("| "));
+    let rows = text.lines().filter(|line| line.starts_with("| "));
     let rows: Vec<Vec<&str>> = rows
         .map(|row| row.trim_matches('|').split('|').map(str::trim).collect())
         .collect();

@@ -8,39 +8,22 @@
 //! - what the guide says a new app prints is compared with a boot of one;
 //! - a block of any other kind is refused, as is Rust that would not be tested.
 
-use std::fs;
-
-use crate::markdown::blocks;
-use tool::system;
+use crate::markdown::{blocks, page};
 
 /// The tutorials.
 pub const PAGES: [&str; 2] = ["docs/guide.md", "docs/from-ros-2.md"];
 
-/// Reads the tutorials, one behind the other.
-///
-/// # Errors
-///
-/// In words: a page cannot be read.
-pub fn read() -> Result<String, String> {
-    let page = |name: &&str| {
-        let path = system::workspace().join(name);
-        fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))
-    };
-    PAGES.iter().map(page).collect()
-}
-
 /// Returns the output that the guide shows under a name.
 ///
-/// # Errors
+/// # Panics
 ///
-/// In words: a page cannot be read, or none has such a block.
-pub fn documented_output(name: &str) -> Result<String, String> {
+/// Panics if there is no such block.
+#[must_use]
+pub fn documented_output(name: &str) -> String {
     let info = format!("text output-{name}");
-    let mut blocks = blocks(&read()?).into_iter();
+    let mut blocks = blocks(&page(PAGES[0])).into_iter();
     let found = blocks.find(|block| block.info == info);
-    found
-        .map(|block| block.text)
-        .ok_or_else(|| format!("docs/guide.md has no block `{info}`"))
+    found.expect("the guide shows it").text
 }
 
 /// Replaces each number by `N`: what stays the same when the code becomes faster.

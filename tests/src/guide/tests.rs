@@ -2,11 +2,10 @@
 
 use std::ffi::OsString;
 use std::fs;
-use std::path::PathBuf;
 
-use super::{PAGES, read, without_numbers};
+use super::{PAGES, without_numbers};
 use crate::fault_page::{documented_faults, with_names_of};
-use crate::markdown::{Block, blocks};
+use crate::markdown::{Block, blocks, page};
 use tool::golden::Golden;
 use tool::new_app::NEW_APP;
 use tool::options::{Command, Request};
@@ -23,7 +22,24 @@ mod vision;
 const COMMANDS: [&Command; 5] = [&RUN, &TEST, &NEW_APP, &CHECK_TRACE, &TRACE];
 
 fn guide() -> Vec<Block> {
-    blocks(&read().expect("the page"))
+    PAGES.iter().flat_map(|it| blocks(&page(it))).collect()
+}
+
+/// Returns the lines of all blocks of a kind.
+fn lines_of(info: &str) -> Vec<String> {
+    let blocks = guide().into_iter().filter(|block| block.info == info);
+    let texts: Vec<String> = blocks.map(|block| block.text).collect();
+    texts.concat().lines().map(String::from).collect()
+}
+
+/// Returns the names of the files in a folder, in their order.
+fn files(folder: &str) -> Vec<String> {
+    let entries = fs::read_dir(workspace().join(folder)).expect(folder);
+    let entries = entries.flatten().filter(|entry| entry.path().is_file());
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
 }
 
 #[test]
@@ -40,25 +56,20 @@ fn every_block_is_of_a_kind_that_is_checked() {
     }
     assert!(examples >= 9, "{examples} examples are left");
     // The lines by which the examples become tests.
-    let library = fs::read_to_string(workspace().join("tests/src/lib.rs")).expect("the library");
+    let library = page("tests/src/lib.rs");
     for page in PAGES {
         assert!(library.contains(&format!("#[doc = include_str!(\"../../{page}\")]")));
     }
-    let manifest = fs::read_to_string(workspace().join("tests/Cargo.toml")).expect("the manifest");
+    let manifest = page("tests/Cargo.toml");
     assert!(!manifest.contains("doctest"), "doctests are left out");
 }
 
 #[test]
 fn every_command_is_one_that_its_script_accepts() {
     let mut commands = 0;
-    let consoles = guide().into_iter().filter(|block| block.info == "console");
-    for line in consoles.flat_map(|block| {
-        let lines = block.text.lines().map(String::from);
-        lines.collect::<Vec<_>>()
-    }) {
-        let words = line
-            .strip_prefix("$ ")
-            .expect("a console shows commands only");
+    for line in lines_of("console") {
+        let words = line.strip_prefix("$ ");
+        let words = words.expect("a console shows commands only");
         if words.starts_with("cd ") {
             continue;
         }
@@ -66,10 +77,9 @@ fn every_command_is_one_that_its_script_accepts() {
         let words = words.replace("cargo run --", "./scripts/run");
         let mut words = words.split(' ');
         let script = words.next().unwrap_or_default();
-        let command = COMMANDS
-            .iter()
-            .find(|command| command.invocation == script)
-            .unwrap_or_else(|| panic!("`{script}` is no script that the guide may name"));
+        let command = COMMANDS.iter().find(|it| it.invocation == script);
+        let command =
+            command.unwrap_or_else(|| panic!("`{script}` is no script that the guide may name"));
         assert!(workspace().join(script).is_file(), "{script}");
         let parsed = command.parse(&words.map(OsString::from).collect::<Vec<_>>());
         assert!(matches!(parsed, Ok(Request::Work(_))), "{line}: {parsed:?}");
@@ -80,78 +90,55 @@ fn every_command_is_one_that_its_script_accepts() {
 
 #[test]
 fn what_it_says_of_the_compiler_is_what_the_compilers_test_expects() {
-    let test = workspace().join("fass/tests/diagnostics.rs");
-    let test = fs::read_to_string(test).expect("the test");
-    let said = guide()
-        .into_iter()
-        .filter(|block| block.info == "text diagnostic");
-    let mut lines = 0;
-    for line in said.flat_map(|block| {
-        let lines = block.text.lines().map(String::from);
-        lines.collect::<Vec<_>>()
-    }) {
+    let test = page("fass/tests/diagnostics.rs");
+    let lines = lines_of("text diagnostic");
+    assert!(lines.len() >= 5, "{lines:?}");
+    for line in lines {
         assert!(test.contains(&line), "no test expects `{line}`");
-        lines += 1;
     }
-    assert!(lines >= 5, "{lines} lines are left");
 }
 
 #[test]
 fn what_they_say_of_a_fault_is_its_entrys_text_with_names_of_their_own() {
-    let faults = documented_faults().expect("the page");
+    let faults = documented_faults();
     for file in ["README.md", "docs/guide.md"] {
-        let page = fs::read_to_string(workspace().join(file)).expect("the page");
-        let mut blocks = blocks(&page).into_iter();
+        let mut blocks = blocks(&page(file)).into_iter();
         let quoted = |block: &Block| block.info.starts_with("text fault-");
         let Block { info, text } = blocks.find(quoted).expect("it shows a fault");
         let fault = &faults[info.trim_start_matches("text fault-")];
         let said = with_names_of(&text, &fault.text) + "\n";
-        let below = &info;
-        Golden {
-            file,
-            below,
-            text: &text,
-        }
-        .assert_is(&said);
+        let (below, text) = (&*info, &*text);
+        Golden { file, below, text }.assert_is(&said);
     }
 }
 
 #[test]
 fn the_readme_shows_what_the_first_command_prints() {
-    let readme = fs::read_to_string(workspace().join("README.md")).expect("the page");
-    let mut blocks = blocks(&readme).into_iter();
-    let shown = blocks
-        .find(|block| block.info == "text")
-        .expect("it is there");
+    let mut blocks = blocks(&page("README.md")).into_iter();
+    let shown = blocks.find(|block| block.info == "text");
     let golden = Golden {
         file: "README.md",
         below: "The first command prints",
-        text: &shown.text,
+        text: &shown.expect("it is there").text,
     };
     golden.assert_is(&vision::run().expect("the DAG is sound"));
 }
 
 #[test]
 fn the_readme_lists_every_page() {
-    let readme = fs::read_to_string(workspace().join("README.md")).expect("the page");
+    let readme = page("README.md");
     let index = readme.split("\n## More\n").nth(1).expect("the index");
-    let pages = fs::read_dir(workspace().join("docs")).expect("the pages");
-    let mut found = 0;
-    for page in pages.flatten() {
-        let name = page.file_name().to_string_lossy().into_owned();
-        assert!(
-            index.contains(&format!("(docs/{name})")),
-            "the README's list of pages lacks docs/{name}"
-        );
-        found += 1;
+    let pages = files("docs");
+    assert!(pages.len() > 5);
+    for name in pages {
+        let link = format!("(docs/{name})");
+        assert!(index.contains(&link), "the README's list lacks {link}");
     }
-    assert!(found > 5);
+    assert!(index.contains("(docs/decisions)"), "it lacks the decisions");
 }
 
 /// Returns the entries of the decisions' index: number, file, and the last column.
 fn listed_decisions() -> Vec<(usize, String, String)> {
-    let index = workspace().join("docs/decisions/README.md");
-    let index = fs::read_to_string(index).expect("the index");
     let entry = |row: &str| {
         let (number, rest) = row.strip_prefix("| [")?.split_once("](")?;
         let (file, rest) = rest.split_once(") | ")?;
@@ -159,53 +146,38 @@ fn listed_decisions() -> Vec<(usize, String, String)> {
         let number = number.parse().ok()?;
         Some((number, file.to_string(), successor.trim().to_string()))
     };
+    let index = page("docs/decisions/README.md");
     index.lines().filter_map(entry).collect()
 }
 
 #[test]
 fn the_index_lists_every_decision() {
     let listed = listed_decisions();
-    let folder = fs::read_dir(workspace().join("docs/decisions")).expect("the decisions");
-    let names = folder
-        .flatten()
-        .map(|page| page.file_name().to_string_lossy().into_owned());
-    let mut pages: Vec<String> = names.filter(|name| name != "README.md").collect();
-    pages.sort();
+    let mut pages = files("docs/decisions");
+    pages.retain(|name| name != "README.md");
     assert!(pages.len() >= 19, "{pages:?}");
-    let files: Vec<&String> = listed.iter().map(|(_, file, _)| file).collect();
-    assert_eq!(files, pages.iter().collect::<Vec<_>>());
+    let listed_files: Vec<&String> = listed.iter().map(|(_, file, _)| file).collect();
+    assert_eq!(listed_files, pages.iter().collect::<Vec<_>>());
     for (number, file, successor) in &listed {
-        let page = fs::read_to_string(workspace().join("docs/decisions").join(file));
-        let page = page.expect("the decision");
+        let page = page(&format!("docs/decisions/{file}"));
         assert!(page.starts_with(&format!("# {number}. ")), "{file}");
         assert!(file.starts_with(&format!("{number:04}-")), "{file}");
         let is_there = |of: &str| pages.iter().any(|page| page == of);
-        let link = successor
-            .split("](")
-            .nth(1)
-            .and_then(|rest| rest.split(')').next());
-        assert!(
-            successor.is_empty() || link.is_some_and(is_there),
-            "{file}: {successor}"
-        );
+        let link = successor.split("](").nth(1);
+        let link = link.and_then(|rest| rest.split(')').next());
+        let is_right = successor.is_empty() || link.is_some_and(is_there);
+        assert!(is_right, "{file}: {successor}");
     }
 }
 
-/// Returns the README, CONTRIBUTING.md and all pages of `docs/`, with their texts.
-fn pages() -> Vec<(PathBuf, String)> {
-    let docs = workspace().join("docs");
-    let mut paths = ["README.md", "CONTRIBUTING.md"]
-        .map(|page| workspace().join(page))
-        .to_vec();
-    for folder in [docs.clone(), docs.join("decisions")] {
-        let entries = fs::read_dir(folder).expect("the pages").flatten();
-        paths.extend(entries.map(|entry| entry.path()));
+/// Returns the README, CONTRIBUTING.md and all pages of `docs/`: their paths and texts.
+fn pages() -> Vec<(String, String)> {
+    let mut paths = vec!["README.md".to_string(), "CONTRIBUTING.md".to_string()];
+    for folder in ["docs", "docs/decisions"] {
+        let names = files(folder).into_iter();
+        paths.extend(names.map(|name| format!("{folder}/{name}")));
     }
-    paths.retain(|path| path.is_file());
-    let read = |path: PathBuf| {
-        let text = fs::read_to_string(&path).expect("the page");
-        (path, text)
-    };
+    let read = |path: String| (path.clone(), page(&path));
     paths.into_iter().map(read).collect()
 }
 
@@ -216,8 +188,7 @@ fn the_architecture_lists_every_lock() {
     let names = statics.filter_map(|rest| rest.split_once(": SpinLock<"));
     let is_name = |name: &&str| name.chars().all(|c| c.is_ascii_uppercase() || c == '_');
     let mut locks: Vec<_> = names.map(|(name, _)| name).filter(is_name).collect();
-    let page = workspace().join("docs/architecture.md");
-    let page = fs::read_to_string(page).expect("the page");
+    let page = page("docs/architecture.md");
     let table = page.split("| lock | protects |").nth(1).expect("the table");
     let rows = table.lines().skip(2).take_while(|row| row.starts_with('|'));
     let listed = rows.filter_map(|row| row.split('`').nth(1));
@@ -250,20 +221,16 @@ fn sources_below(folder: &str) -> String {
 
 #[test]
 fn the_glossary_names_types_that_there_are() {
-    let page = workspace().join("docs/glossary.md");
-    let page = fs::read_to_string(page).expect("the page");
     let sources = ["sched-dag/src", "fass/src"].map(sources_below).concat();
     let mut found = 0;
+    let page = page("docs/glossary.md");
     for row in page.lines().filter(|row| row.starts_with("| **")) {
         let word = row.split(" | ").next().expect("the word");
         for name in word.split('`').skip(1).step_by(2) {
-            let is_there = ["struct", "enum", "trait"]
-                .iter()
-                .any(|kind| sources.contains(&format!("pub {kind} {name}")));
-            assert!(
-                is_there,
-                "the glossary names `{name}`, which is no public type"
-            );
+            let kinds = ["struct", "enum", "trait"];
+            let mut items = kinds.map(|kind| format!("pub {kind} {name}")).into_iter();
+            let is_there = items.any(|item| sources.contains(&item));
+            assert!(is_there, "`{name}` of the glossary is no public type");
             found += 1;
         }
     }
@@ -279,8 +246,11 @@ fn every_link_between_pages_leads_somewhere() {
             if target.is_empty() || target.contains("://") || target.contains(' ') {
                 continue;
             }
-            let path = page.parent().expect("a folder").join(target);
-            assert!(path.exists(), "{}: `{link}` leads nowhere", page.display());
+            let folder = workspace().join(&page).with_file_name("");
+            assert!(
+                folder.join(target).exists(),
+                "{page}: `{link}` leads nowhere"
+            );
         }
     }
 }
@@ -307,8 +277,8 @@ fn every_file_that_a_page_names_is_there() {
             });
             let is_of_new_app = NEW_APPS.iter().any(|app| word.starts_with(app));
             if is_path && !is_of_new_app {
-                let path = workspace().join(word);
-                assert!(path.exists(), "{}: there is no `{word}`", page.display());
+                let is_there = workspace().join(word).exists();
+                assert!(is_there, "{page}: there is no `{word}`");
                 named += 1;
             }
         }

@@ -16,7 +16,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::{Dag, FaultLimit, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::{Dag, FaultLimit, SubtaskAttributes, Uses, create_dag, finish_create_dags};
 
 /// A fault's name and what builds the DAGs with that fault.
 type Case = (&'static str, fn() -> Vec<Dag>);
@@ -153,6 +153,29 @@ fn sink(dag: &Dag, name: &str, topic: &str) {
 fn joining_sink(dag: &Dag, name: &str, inputs: [&str; 2]) {
     let attributes = SubtaskAttributes::named(name);
     dag.register_sink_subtask(|(_, _): (u32, u32)| (), inputs.to_vec(), PERIOD, attributes);
+}
+
+/// Registers the source `plan`, which uses something.
+fn planning<U: Uses + 'static>(
+    dag: &Dag,
+    uses: U,
+    mut plan: impl for<'a> FnMut(U::Borrowed<'a>) + Send + 'static,
+) {
+    dag.period(PERIOD).relative_deadline(PERIOD);
+    let source = move |used: U::Borrowed<'_>| plan(used);
+    let source = dag.using(uses).source(source);
+    source.register(SubtaskAttributes::named("plan"));
+}
+
+/// Registers the sink `store`, which reads the topic `points` and uses something.
+fn storing<U: Uses + 'static>(
+    dag: &Dag,
+    uses: U,
+    mut store: impl for<'a> FnMut(U::Borrowed<'a>) + Send + 'static,
+) {
+    let sink = move |used: U::Borrowed<'_>, (_,): (u32,)| store(used);
+    let sink = dag.using(uses).subtask(sink).reads(&["points"]).due(PERIOD);
+    sink.register(SubtaskAttributes::named("store"));
 }
 
 /// A DAG without fault: a source, a topic, a sink.

@@ -3,9 +3,9 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use fass::{Dag, Latest, Parameter, Raiser, Sample, SubtaskAttributes, Switch, Unique, create_dag};
+use fass::{Dag, Latest, Parameter, Sample, SubtaskAttributes, Unique, create_dag};
 
-use super::{FAULT_LIMIT, PERIOD, joining_sink, named, sound, source};
+use super::{FAULT_LIMIT, PERIOD, joining_sink, named, planning, sound, source, storing};
 
 pub(super) fn activations_differ() -> Vec<Dag> {
     let dag = sound("lidar", "points");
@@ -31,13 +31,7 @@ pub(super) fn state_never_updated() -> Vec<Dag> {
     let dag = named("lidar");
     source(&dag, "read", "points");
     let map = dag.state("map", 0_u32);
-    let attributes = SubtaskAttributes::named("store");
-    let store = |_: &u32, (_,): (u32,)| ();
-    dag.using(map.read())
-        .subtask(store)
-        .reads(&["points"])
-        .due(PERIOD)
-        .register(attributes);
+    storing(&dag, map.read(), |_| ());
     vec![dag]
 }
 
@@ -45,13 +39,7 @@ pub(super) fn state_used_twice() -> Vec<Dag> {
     let dag = named("lidar");
     source(&dag, "read", "points");
     let map = dag.state("map", 0_u32);
-    let attributes = SubtaskAttributes::named("store");
-    let store = |(_, _): (&mut u32, &u32), (_,): (u32,)| ();
-    dag.using((map.update(), map.read()))
-        .subtask(store)
-        .reads(&["points"])
-        .due(PERIOD)
-        .register(attributes);
+    storing(&dag, (map.update(), map.read()), |(_, _)| ());
     vec![dag]
 }
 
@@ -98,13 +86,7 @@ pub(super) fn state_over_jobs() -> Vec<Dag> {
         .source(read)
         .writes(&["points"])
         .register(attributes);
-    let attributes = SubtaskAttributes::named("store");
-    let store = |_: &u32, (_,): (u32,)| ();
-    dag.using(map.read())
-        .subtask(store)
-        .reads(&["points"])
-        .due(PERIOD)
-        .register(attributes);
+    storing(&dag, map.read(), |_| ());
     vec![dag]
 }
 
@@ -125,19 +107,9 @@ pub(super) fn latest_type_mismatch() -> Vec<Dag> {
     let lidar = sound("lidar", "points");
     let points = lidar.latest::<f64>("points");
     let planner = named("planner");
-    planner.relative_deadline(PERIOD);
-    let plan = |_: Option<Sample<'_, f64>>| ();
-    let attributes = SubtaskAttributes::named("plan");
-    planner
-        .period(PERIOD)
-        .using(points.sample())
-        .source(plan)
-        .register(attributes);
+    planning(&planner, points.sample(), |_| ());
     vec![lidar, planner]
 }
-
-/// A sample of what can only be moved.
-type Key<'a> = Option<Sample<'a, Unique<u32>>>;
 
 pub(super) fn latest_of_moved() -> Vec<Dag> {
     let lidar = named("lidar");
@@ -147,14 +119,7 @@ pub(super) fn latest_of_moved() -> Vec<Dag> {
     lidar.register_periodic_subtask(read, vec!["points"], PERIOD, attributes);
     let points = lidar.latest::<Unique<u32>>("points");
     let planner = named("planner");
-    planner.relative_deadline(PERIOD);
-    let plan = |(_, _): (Key<'_>, Key<'_>)| ();
-    let attributes = SubtaskAttributes::named("plan");
-    planner
-        .period(PERIOD)
-        .using((points.sample(), points.sample()))
-        .source(plan)
-        .register(attributes);
+    planning(&planner, (points.sample(), points.sample()), |(_, _)| ());
     vec![lidar, planner]
 }
 
@@ -168,13 +133,7 @@ pub(super) fn signal_not_committed() -> Vec<Dag> {
     let dag = named("lidar");
     source(&dag, "read", "points");
     let alarm = create_dag().sporadic(PERIOD);
-    let attributes = SubtaskAttributes::named("store");
-    let store = |mut alarm: Raiser<'_>, (_,): (u32,)| alarm.raise();
-    dag.using(alarm.raising())
-        .subtask(store)
-        .reads(&["points"])
-        .due(PERIOD)
-        .register(attributes);
+    storing(&dag, alarm.raising(), |mut alarm| alarm.raise());
     vec![dag]
 }
 
@@ -182,13 +141,7 @@ pub(super) fn switched_not_committed() -> Vec<Dag> {
     let dag = named("lidar");
     source(&dag, "read", "points");
     let camera = sound("camera", "frames");
-    let attributes = SubtaskAttributes::named("store");
-    let store = |mut camera: Switch<'_>, (_,): (u32,)| camera.pause();
-    dag.using(camera.switching())
-        .subtask(store)
-        .reads(&["points"])
-        .due(PERIOD)
-        .register(attributes);
+    storing(&dag, camera.switching(), |mut camera| camera.pause());
     vec![dag] // without `camera`
 }
 
@@ -196,13 +149,7 @@ pub(super) fn taken_by_no_source() -> Vec<Dag> {
     let dag = named("lidar");
     source(&dag, "read", "points");
     let nearest = Parameter::new("nearest", 0.5, 0.0..=2.0);
-    let attributes = SubtaskAttributes::named("store");
-    let store = |_nearest: f64, (_,): (u32,)| ();
-    dag.using(nearest.reading())
-        .subtask(store)
-        .reads(&["points"])
-        .due(PERIOD)
-        .register(attributes);
+    storing(&dag, nearest.reading(), |_nearest| ());
     vec![dag]
 }
 
@@ -251,13 +198,6 @@ pub(super) fn sample_not_recorded() -> Vec<Dag> {
 /// A DAG of one subtask, which samples.
 fn planner(latest: &Latest<u32>) -> Dag {
     let planner = named("planner");
-    planner.relative_deadline(PERIOD);
-    let plan = |_: Option<Sample<'_, u32>>| ();
-    let attributes = SubtaskAttributes::named("plan");
-    planner
-        .period(PERIOD)
-        .using(latest.sample())
-        .source(plan)
-        .register(attributes);
+    planning(&planner, latest.sample(), |_| ());
     planner
 }
