@@ -22,33 +22,23 @@ use tool::system::{find_program, host_load, new_log};
 
 use crate::guest::built;
 
+/// Files of a boot: the PC, what it prints, and what Bochs says.
+const SETTINGS: &str = "settings";
+const SERIAL: &str = "serial";
+const SAID: &str = "said";
+
 /// How long a boot may take in wall time: many times what any takes.
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// Boots the image of a package from an ISO, in a PC with so many processors of Bochs' model
-/// `model`, and returns what it has printed, which must be success.
+/// Boots the image of a package from an ISO, after a command of GRUB's if there is one, in a PC
+/// with so many processors of Bochs' model `model`, and returns what it has printed, which must be
+/// success.
 ///
 /// # Panics
 ///
 /// Panics with what is missing, or with the serial log if it does not succeed.
 #[must_use]
-pub fn succeed(package: &str, words: &str, model: &str, cores: u64) -> Transcript {
-    succeed_after("", package, words, model, cores)
-}
-
-/// As [`succeed`], with a command of GRUB's before it loads the image.
-///
-/// # Panics
-///
-/// As [`succeed`].
-#[must_use]
-pub fn succeed_after(
-    command: &str,
-    package: &str,
-    words: &str,
-    model: &str,
-    cores: u64,
-) -> Transcript {
+pub fn succeed(command: &str, package: &str, words: &str, model: &str, cores: u64) -> Transcript {
     let run = || -> Result<(String, String), String> {
         install::ensure(&install::BOCHS)?;
         let program = find_program("bochs").ok_or("there is no program `bochs`")?;
@@ -57,17 +47,15 @@ pub fn succeed_after(
         if !command.is_empty() {
             put_before(command, iso.path())?;
         }
-        let log = new_log("bochs")?;
-        let (settings, said) = (log.with_extension("bochs"), log.with_extension("said"));
-        let text = settings_text(model, cores, iso.path(), &log, &said);
-        let written = fs::write(&settings, text);
-        written.map_err(|why| format!("cannot write `{}`: {why}", settings.display()))?;
-        let booted = boot(&program, &settings, &said);
-        let serial = fs::read(&log).unwrap_or_default();
-        for file in [&settings, &said, &log] {
-            // They are ours, and in the way of no one if they cannot be removed.
-            let _ = fs::remove_file(file);
-        }
+        let folder = new_log("bochs")?.with_extension("files");
+        let cannot = |why| format!("`{}`: {why}", folder.display());
+        fs::create_dir(&folder).map_err(cannot)?;
+        let text = settings_text(model, cores, iso.path(), &folder);
+        fs::write(folder.join(SETTINGS), text).map_err(cannot)?;
+        let booted = boot(&program, &folder);
+        let serial = fs::read(folder.join(SERIAL)).unwrap_or_default();
+        // It is ours, and in the way of no one if it cannot be removed.
+        let _ = fs::remove_dir_all(&folder);
         Ok((String::from_utf8_lossy(&serial).into_owned(), booted?))
     };
     let booted = run().unwrap_or_else(|why| panic!("`{package}` did not boot in Bochs: {why}"));
@@ -106,30 +94,24 @@ fn put_before(command: &str, iso: &Path) -> Result<(), String> {
     fs::write(iso, bytes).map_err(|why| format!("`{}`: {why}", iso.display()))
 }
 
-/// Runs Bochs until it ends, at most for the limit, and returns how it ended and its last words,
-/// which are in the file `said` and in its standard error.
-fn boot(program: &Path, settings: &Path, said: &Path) -> Result<String, String> {
+/// Runs Bochs with the settings in a folder until it ends, at most for the limit, and returns how
+/// it ended and its last words, which are in its log and in its standard error.
+fn boot(program: &Path, folder: &Path) -> Result<String, String> {
+    let cannot = |why| format!("cannot write in `{}`: {why}", folder.display());
     let mut command = bound_to_us(program);
     // Debian's Bochs has a debugger, which has to be told to begin; its commands are a file.
-    let commands = settings.with_extension("commands");
-    let cannot = |why| format!("cannot write next to `{}`: {why}", settings.display());
+    let commands = folder.join("commands");
     fs::write(&commands, "c\n").map_err(cannot)?;
-    command.arg("-q").arg("-f").arg(settings);
+    command.arg("-q").arg("-f").arg(folder.join(SETTINGS));
     command.arg("-rc").arg(&commands);
     command.env("SDL_VIDEODRIVER", "dummy");
-    let errors = settings.with_extension("errors");
-    let file = fs::File::create(&errors).map_err(cannot)?;
-    command
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(file);
-    let started = Child::start(&mut command);
+    let errors = fs::File::create(folder.join("errors")).map_err(cannot)?;
+    command.stdin(Stdio::null()).stdout(Stdio::null());
+    let started = Child::start(command.stderr(errors));
     let mut child = started.map_err(|why| format!("cannot start Bochs: {why}"))?;
     let waited = child.wait(LIMIT, || true);
-    let words = [last_words(said), last_words(&errors)].concat();
-    for file in [&commands, &errors] {
-        let _ = fs::remove_file(file);
-    }
+    let words = [SAID, "errors"].map(|file| last_words(&folder.join(file)));
+    let words = words.concat();
     match waited {
         Waited::Ended(status) => Ok(format!("Bochs ended with {status} and said:\n{words}")),
         _ => Err(format!("it was not powered off; {}\n{words}", host_load())),
@@ -150,7 +132,8 @@ fn last_words(file: &Path) -> String {
 
 /// Returns the settings of the PC. It has no sound: Bochs would end itself where the host has no
 /// sound card.
-fn settings_text(model: &str, cores: u64, iso: &Path, log: &Path, said: &Path) -> String {
+fn settings_text(model: &str, cores: u64, iso: &Path, folder: &Path) -> String {
+    let [log, said] = [SERIAL, SAID].map(|file| folder.join(file));
     let (iso, log, said) = (iso.display(), log.display(), said.display());
     format!(
         "\
@@ -182,14 +165,15 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("bochs-{}", std::process::id()));
         fs::create_dir_all(&folder).expect("a folder");
         let program = folder.join("bochs");
-        let script = "#!/bin/sh\necho no mixer > said\necho buffer overflow >&2\nexit 134\n";
-        let script = script.replace("> said", &format!("> {}", folder.join("said").display()));
+        // `$3` are its settings.
+        let script = "#!/bin/sh\necho no mixer > ${3%settings}said\n\
+                      echo buffer overflow >&2\nexit 134\n";
         fs::write(&program, script).expect("a script");
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is ours");
-        let end = boot(&program, &folder.join("settings"), &folder.join("said"));
-        let end = end.expect("it has ended");
-        assert!(end.contains("134") && end.contains("no mixer"), "{end}");
-        assert!(end.contains("buffer overflow"), "{end}");
+        let end = boot(&program, &folder).expect("it has ended");
+        for part in ["134", "no mixer", "buffer overflow"] {
+            assert!(end.contains(part), "{end}");
+        }
         fs::remove_dir_all(&folder).expect("it was made");
     }
 }

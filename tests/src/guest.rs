@@ -19,8 +19,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ChildStdin;
-use std::rc::Rc;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use tool::image::{self, Image};
@@ -29,6 +28,9 @@ use tool::outcome::{Outcome, boot_with_input};
 use tool::protocol::Status;
 use tool::qemu::{Loader, Machine, Mode, Qemu, Second};
 use tool::{system, wire_script};
+
+use crate::Said;
+use crate::altered::Altered;
 
 /// How long a guest may take in wall time if the test does not say: many times what
 /// any takes, so that it ends what hangs and nothing that a busy host makes slow.
@@ -41,6 +43,8 @@ pub struct Guest {
     /// A file to boot instead of what the package is built into.
     image: Option<PathBuf>,
     qemu: Qemu,
+    /// The program in QEMU's place, if there is one.
+    altered: Option<Arc<Altered>>,
     words: Vec<String>,
     limit: Duration,
     /// What to say at the console, each once a line with such a text has come.
@@ -56,10 +60,17 @@ impl Guest {
             package: package.into(),
             image: None,
             qemu: Qemu::default(),
+            altered: None,
             words: Vec::new(),
             limit: LIMIT,
             conversation: Vec::new(),
         }
+    }
+
+    /// Describes a guest that runs a test of `tests/guest`.
+    #[must_use]
+    pub fn test(name: &str) -> Guest {
+        Guest::new("guest-tests").word(&format!("test={name}"))
     }
 
     /// Sets the number of processors.
@@ -107,7 +118,7 @@ impl Guest {
         guest.memory_mib(loader.least_memory_mib().max(32))
     }
 
-    /// Adds words to the guest's command line, such as `jobs=20`.
+    /// Adds words to the guest's command line, such as `jobs=20` or `jobs=20 seed=7`.
     #[must_use]
     pub fn word(mut self, word: &str) -> Guest {
         self.words.push(word.into());
@@ -121,11 +132,20 @@ impl Guest {
         self
     }
 
-    /// Boots by this program in QEMU's place.
+    /// Boots by a QEMU with other words in place of ours, each given with its place, and with
+    /// these added.
     #[must_use]
-    pub fn program(mut self, program: &Path) -> Guest {
-        self.qemu.program = program.into();
+    pub fn altered(mut self, changes: &[(&str, &str)], more: &str) -> Guest {
+        let program = Altered::new(changes, more);
+        self.qemu.program.clone_from(&program.0);
+        self.altered = Some(Arc::new(program));
         self
+    }
+
+    /// Boots on a processor of this model, which may lack or have things: `max,-nx`.
+    #[must_use]
+    pub fn model(self, model: &str) -> Guest {
+        self.altered(&[("#max", model)], "")
     }
 
     /// Leaves a file in the guest's memory.
@@ -251,11 +271,20 @@ impl Guest {
             let mode = format!("mode={}", qemu.mode);
             let words = std::iter::once(&mode).chain(&self.words);
             qemu.guest_words = words.cloned().collect::<Vec<_>>().join(" ");
-            let mut talk = Talk::new(&self.conversation);
-            let input = talk.input.clone();
-            let connect = |pipe| *input.borrow_mut() = pipe;
-            let show = |line: &str| talk.hear(line);
-            boot_with_input(&qemu, &image, &log, self.limit, connect, show)
+            let pipe: RefCell<Option<ChildStdin>> = RefCell::new(None);
+            let mut left = self.conversation.iter().peekable();
+            let hear = |line: &str| {
+                let mut pipe = pipe.borrow_mut();
+                let answers = |(text, _): &&(String, String)| line.contains(text);
+                if let Some(pipe) = pipe.as_mut()
+                    && let Some((_, answer)) = left.next_if(answers)
+                {
+                    // If the guest is gone, its outcome says so.
+                    let _ = writeln!(pipe, "{answer}");
+                }
+            };
+            let connect = |input| *pipe.borrow_mut() = input;
+            boot_with_input(&qemu, &image, &log, self.limit, connect, hear)
         };
         run().unwrap_or_else(|error: String| panic!("`{}` did not boot: {error}", self.package))
     }
@@ -293,34 +322,15 @@ impl Guest {
         let _ = fs::remove_file(&outcome.log);
         outcome
     }
-}
 
-/// A conversation that goes on.
-struct Talk<'g> {
-    left: std::slice::Iter<'g, (String, String)>,
-    input: Rc<RefCell<Option<ChildStdin>>>,
-}
-
-impl<'g> Talk<'g> {
-    fn new(conversation: &'g [(String, String)]) -> Talk<'g> {
-        Talk {
-            left: conversation.iter(),
-            input: Rc::default(),
-        }
-    }
-
-    /// Says what is to be said after such a line.
-    fn hear(&mut self, line: &str) {
-        let Some((text, answer)) = self.left.as_slice().first() else {
-            return;
-        };
-        if let Some(pipe) = self.input.borrow_mut().as_mut()
-            && line.contains(text)
-        {
-            self.left.next();
-            // If the guest is gone, its outcome says so.
-            let _ = writeln!(pipe, "{answer}");
-        }
+    /// Boots the guest, which must refuse its words or its file, and returns why.
+    ///
+    /// # Panics
+    ///
+    /// As [`end_in`](Self::end_in).
+    #[must_use]
+    pub fn refusal(&self) -> String {
+        self.end_in(Status::Usage).reason()
     }
 }
 

@@ -1,17 +1,18 @@
 //! What the boot tests share, above the host tool's library: a [`Guest`] that a test
-//! describes and boots, [`stick`] for what it boots from as a PC does, [`altered`] for other
-//! processors and boards, [`bochs`], where it is not QEMU that boots it, [`markdown`] and
+//! describes and boots, [`said`] for what it says, [`stick`] for what it boots from as a PC does,
+//! [`bochs`], where it is not QEMU that boots it, [`markdown`] and
 //! [`fault_page`] for pages that are held to their word, and the tutorials, whose examples are
 //! this crate's doctests.
 
 #![forbid(unsafe_code)]
 
-pub mod altered;
+mod altered;
 pub mod bochs;
 pub mod fault_page;
 pub mod guest;
 pub mod guide;
 pub mod markdown;
+pub mod said;
 pub mod stick;
 
 use std::process::Command;
@@ -20,6 +21,7 @@ use tool::protocol::Transcript;
 use tool::system;
 
 pub use guest::Guest;
+pub use said::{Members, Said, lawful_runs};
 
 /// Runs an app by `./scripts/run` with these words, wherever they say, and returns what it said.
 ///

@@ -1,154 +1,139 @@
 //! What safe code cannot do to others: use up what all share, keep the serial line, forge
 //! what a run is judged by, misuse a lock. The guest is the image `guest-tests`, which
-//! commits one attack in a boot, next to a healthy DAG (`attack=NAME`).
+//! commits attacks next to a healthy DAG that must meet every deadline.
 
-use harness::Guest;
+use harness::{Guest, Members, Said};
 use tool::Outcome;
 use tool::places::Places;
 use tool::protocol::{MachineLine, Status};
 
-/// Commits the attack on 1 and 4 cores. The healthy DAG must meet every deadline, and the
-/// doomed one end by so many faults. Hands over what came of it, and the fault if any.
-fn attacked(name: &str, faults: u64, judge: impl Fn(&Outcome, Option<&MachineLine>)) {
-    for cores in [1, 4] {
-        let guest = Guest::new("guest-tests").word("test=attack");
-        let outcome = guest.word(&format!("attack={name}")).cores(cores).succeed();
-        let tail = || format!("{name} on {cores} cores\n{}", outcome.tail());
-        let line = outcome.transcript.of_kind("attack").next();
-        let line = line.unwrap_or_else(|| panic!("no line of kind `attack`: {}", tail()));
-        let number = |member| line.number_at(member);
-        assert_eq!(number("healthy_jobs"), number("jobs"), "{}", tail());
-        assert_eq!(number("healthy_misses"), Some(0), "{}", tail());
-        assert_eq!(number("healthy_faults"), Some(0), "{}", tail());
-        assert_eq!(number("doomed_faults"), Some(faults), "{}", tail());
-        let reported: Vec<_> = outcome.transcript.of_kind("fault").collect();
-        assert_eq!(reported.len() as u64, faults, "{}", tail());
-        for fault in &reported {
-            assert_eq!(fault.text_at("dag_name"), Some("doomed"), "{}", tail());
-            assert_eq!(fault.text_at("subtask_name"), Some("process"), "{}", tail());
-            assert_eq!(fault.number_at("job"), Some(10), "{}", tail());
+/// Boots one attack, or those that can be one after the other, on so many cores.
+fn attacks(word: &str, cores: u64) -> Guest {
+    Guest::test("attack").word(word).cores(cores)
+}
+
+/// Holds each attack to its number of faults, 0 or 1, and each fault to what it says: an attack's
+/// name, the fault's cause and a part of its message.
+#[track_caller]
+fn harm_nobody(outcome: &Outcome, expected: &[(&str, &str, &str)]) {
+    let attacks = outcome.lines("attack");
+    assert_eq!(attacks.len(), expected.len(), "{}", outcome.tail());
+    let mut faults = outcome.lines("fault").into_iter();
+    for (attack, (name, cause, message)) in attacks.iter().zip(expected) {
+        attack.reads([("name", name)]);
+        let is_fault = !cause.is_empty();
+        attack.has([
+            ("lost_jobs", 0),
+            ("misses", 0),
+            ("faults", u64::from(is_fault)),
+        ]);
+        if is_fault {
+            let fault = faults.next().expect("a fault");
+            fault.reads([
+                ("cause", cause),
+                ("dag_name", "doomed"),
+                ("subtask_name", "process"),
+            ]);
+            fault.has([("job", 10)]);
+            let said = fault.member("message");
+            assert!(said.contains(message), "{said:?} lacks {message:?}");
         }
-        judge(&outcome, reported.first().copied());
+    }
+    assert_eq!(faults.next(), None, "{}", outcome.tail());
+}
+
+#[test]
+fn attacks_harm_their_own_dag_alone() {
+    for cores in [1, 4] {
+        let outcome = attacks("", cores).memory_mib(64).succeed();
+        harm_nobody(
+            &outcome,
+            &[
+                (
+                    "allocator_stack",
+                    "page fault",
+                    "a stack overflow (the stack has 64 KiB)",
+                ),
+                ("display_panics", "panic", "a panic in a `Display`"),
+                ("display_prints", "", ""),
+                ("display_loops", "budget overrun", "budget of 6ms"),
+                ("message_1_mb", "panic", " ... and 999600 more bytes"),
+                ("message_10_mb", "panic", " ... and 9999600 more bytes"),
+                ("forge_lines", "", ""),
+                ("forge_message", "panic", "a message"),
+                (
+                    "forge_kind",
+                    "panic",
+                    "a machine line of kind `verdict` is the kernel's to print",
+                ),
+                ("lock_twice", "panic", "taken by its holder"),
+                ("lock_loop", "budget overrun", "budget of 6ms"),
+                ("flood", "", ""),
+            ],
+        );
+        let told = &calls_told(&outcome)[0];
+        assert!(told.contains("overflow_in_the_allocator"), "{told}");
+        assert!(told.lines().count() > 3, "{told}");
+        let lines: Vec<&str> = outcome.serial.lines().collect();
+        let texts = lines.iter().filter(|line| line.ends_with("er text"));
+        let texts: Vec<&str> = texts.copied().collect();
+        assert_eq!(texts, ["the inner text", "the outer text"]);
+        forged_is_text(&outcome);
+        // Of the flood, which is last, whatever was printed is shown or counted.
+        let is_last = |line: &&&str| !line.contains("\"name\":\"lock_loop\"");
+        let dropped = lines.iter().rev().take_while(is_last).filter_map(|line| {
+            let count = line.strip_suffix(" bytes of output did not fit in the buffer)")?;
+            count.strip_prefix('(')?.parse::<usize>().ok()
+        });
+        let shown = lines.iter().filter(|line| line.ends_with(" of a flood"));
+        let shown: usize = shown.map(|line| line.len() + 1).sum();
+        let printed = 100_000 * "drop no  of a flood\n".len() + 100_000 * 87;
+        let told = dropped.sum::<usize>() + shown;
+        // A line of another's may have found no room either.
+        assert!((printed..printed + 1000).contains(&told), "{told}");
     }
 }
 
-/// The fault must be of this cause, and say this.
-fn says(cause: &str, message: &str) -> impl Fn(&Outcome, Option<&MachineLine>) {
-    move |outcome, fault| {
-        let text = |member| fault.and_then(|fault| fault.text_at(member));
-        let said = text("message").unwrap_or_default();
-        assert_eq!(text("cause"), Some(cause), "{}", outcome.tail());
-        assert!(said.contains(message), "{said:?} lacks {message:?}");
-    }
+/// No machine line is forged: what was to be one is there as text, four times of one attack and
+/// twice of a message. A line of the kernel's own quotes that, which is how it should be.
+fn forged_is_text(outcome: &Outcome) {
+    let is_forged = |line: &&MachineLine| line.text.contains("forged") && line.kind != "fault";
+    assert_eq!(outcome.transcript.machine.iter().find(is_forged), None);
+    let is_text = |line: &&str| line.starts_with(" {") && line.contains("\"forged\"");
+    let found = outcome.serial.lines().filter(is_text).count();
+    assert_eq!(found, 6, "{}", outcome.tail());
+}
+
+/// Returns the calls that led to the faults, with names.
+fn calls_told(outcome: &Outcome) -> Vec<String> {
+    let lines = outcome.lines("backtrace").into_iter();
+    let places = Places::new(&outcome.image);
+    let told = lines.map(|line| places.explain(&line.text).expect("names"));
+    told.collect()
 }
 
 #[test]
 fn a_dag_that_uses_up_the_heap_in_small_pieces_ends_alone() {
-    let no_memory = |function: &'static str| {
-        move |outcome: &Outcome, fault: Option<&MachineLine>| {
-            says("panic", "memory allocation of ")(outcome, fault);
-            let told = calls_told(outcome);
-            let line = told.lines().find(|line| line.contains(function));
-            assert!(
-                line.is_some_and(|line| line.contains(", tests/guest/src/attacks/heap.rs:")),
-                "{told}"
-            );
+    for attack in ["leak_strings", "keep_boxes"] {
+        for cores in [1, 4] {
+            let outcome = attacks(&format!("attack={attack}"), cores).succeed();
+            harm_nobody(&outcome, &[(attack, "panic", "memory allocation of ")]);
+            let told = calls_told(&outcome);
+            let [told] = &told[..] else {
+                panic!("not one fault: {told:?}");
+            };
+            let line = told.lines().find(|line| line.contains(attack));
+            let place = ", tests/guest/src/attacks/heap.rs:";
+            assert!(line.is_some_and(|line| line.contains(place)), "{told}");
         }
-    };
-    attacked("leak_strings", 1, no_memory("leak_strings"));
-    attacked("keep_boxes", 1, no_memory("keep_boxes"));
-}
-
-/// Returns the calls that led to the only fault, with names.
-fn calls_told(outcome: &Outcome) -> String {
-    let lines: Vec<_> = outcome.transcript.of_kind("backtrace").collect();
-    assert_eq!(lines.len(), 1, "{}", outcome.tail());
-    let told = Places::new(&outcome.image).explain(&lines[0].text);
-    told.unwrap_or_else(|| panic!("nothing is told of {}", lines[0].text))
-}
-
-#[test]
-fn a_stack_that_overflows_in_the_allocator_is_its_owners() {
-    let overflow = says("page fault", "a stack overflow (the stack has 64 KiB)");
-    attacked("allocator_stack", 1, |outcome, fault| {
-        overflow(outcome, fault);
-        let told = calls_told(outcome);
-        assert!(told.contains("overflow_in_the_allocator"), "{told}");
-        assert!(told.lines().count() > 3, "{told}");
-    });
-}
-
-#[test]
-fn a_display_that_panics_or_loops_is_the_printers_own_fault() {
-    attacked("display_panics", 1, says("panic", "a panic in a `Display`"));
-    attacked("display_loops", 1, says("budget overrun", "budget of 6ms"));
-}
-
-#[test]
-fn a_display_may_print() {
-    attacked("display_prints", 0, |outcome, _| {
-        let texts: Vec<&str> = outcome
-            .serial
-            .lines()
-            .filter(|line| line.contains("the "))
-            .collect();
-        assert_eq!(texts, ["the inner text", "the outer text"]);
-    });
-}
-
-#[test]
-fn a_long_message_is_cut_and_delays_nobody() {
-    for (name, bytes) in [("message_1_mb", 1_000_000), ("message_10_mb", 10_000_000)] {
-        let left_out = format!(" ... and {} more bytes", bytes - 400);
-        attacked(name, 1, says("panic", &left_out));
-    }
-}
-
-#[test]
-fn a_flood_of_text_delays_nobody_and_is_counted() {
-    attacked("flood", 0, |outcome, _| {
-        let counted = outcome
-            .serial
-            .contains(" bytes of output did not fit in the buffer");
-        assert!(counted, "{}", outcome.tail());
-    });
-}
-
-/// No machine line of the log is forged, and `texts` is how often what was to be one is
-/// there as text.
-fn forged_is_text(texts: usize) -> impl Fn(&Outcome, Option<&MachineLine>) {
-    move |outcome, _| {
-        let forged = |line: &&MachineLine| line.text.contains("forged");
-        assert_eq!(outcome.transcript.machine.iter().find(forged), None);
-        let is_text = |line: &&str| line.starts_with(" {") && line.contains("\"forged\"");
-        let found = outcome.serial.lines().filter(is_text).count();
-        assert_eq!(found, texts, "{}", outcome.tail());
-    }
-}
-
-#[test]
-fn forged_machine_lines_are_text() {
-    attacked("forge_lines", 0, forged_is_text(4));
-}
-
-#[test]
-fn forged_lines_in_a_message_are_text() {
-    for cores in [1, 4] {
-        let guest = Guest::new("guest-tests").word("test=attack").cores(cores);
-        let outcome = guest.word("attack=forge_message").succeed();
-        // The kernel's own line quotes the message, which is how it should be.
-        let forged = |line: &&MachineLine| line.text.contains("forged") && line.kind != "fault";
-        assert_eq!(outcome.transcript.machine.iter().find(forged), None);
-        assert_eq!(outcome.transcript.of_kind("fault").count(), 1);
     }
 }
 
 #[test]
 fn a_machine_line_cannot_hold_another_one() {
     for cores in [1, 4] {
-        let guest = Guest::new("guest-tests").word("test=attack").cores(cores);
-        let outcome = guest.word("attack=forge_list").boot();
-        assert_eq!(outcome.transcript.of_kind("verdict").count(), 1);
+        let outcome = attacks("attack=forge_list", cores).boot();
+        outcome.only("verdict");
         // It is damaged, and that is what the run fails for.
         let fault = outcome.judge().expect_err("a damaged line");
         assert!(fault.reason.starts_with("serial line "), "{}", fault.reason);
@@ -156,20 +141,8 @@ fn a_machine_line_cannot_hold_another_one() {
 }
 
 #[test]
-fn the_kinds_of_the_kernel_are_refused() {
-    let refusal = "a machine line of kind `verdict` is the kernel's to print";
-    attacked("forge_kind", 1, says("panic", refusal));
-}
-
-#[test]
-fn a_lock_misused_is_its_holders_fault() {
-    attacked("lock_twice", 1, says("panic", "taken by its holder"));
-    attacked("lock_loop", 1, says("budget overrun", "budget of 6ms"));
-}
-
-#[test]
 fn an_app_that_ends_the_machine_itself_has_not_succeeded() {
-    let outcome = Guest::new("guest-tests").word("test=exit_port").boot();
+    let outcome = Guest::test("crime").word("crime=exit_port").boot();
     let fault = outcome.judge().expect_err("no verdict");
     assert_eq!(fault.status, Status::Failure);
     let said = "the guest ended in success, but the kernel gave no verdict: the app has written to \
@@ -179,26 +152,17 @@ fn an_app_that_ends_the_machine_itself_has_not_succeeded() {
 
 #[test]
 fn a_core_that_takes_no_interrupts_is_noticed_by_another() {
-    let cores = ["deaf_alone", "deaf_beside"].map(|test| {
-        let guest = Guest::new("guest-tests").word(&format!("test={test}"));
-        let outcome = guest.cores(2).end_in(Status::Failure);
-        let line = outcome.transcript.of_kind("exception").next();
-        let line = line.unwrap_or_else(|| panic!("no exception\n{}", outcome.tail()));
-        let message = line.text_at("message").unwrap_or_default();
-        assert!(
-            message.starts_with("interrupts disabled for seconds"),
-            "{message}"
-        );
-        assert!(
-            outcome
-                .serial
-                .contains("that is subtask `deaf` of dag `deaf`")
-        );
-        assert_eq!(line.number_at("job"), Some(0), "{}", line.text);
-        line.number_at("cpu")
+    let mut cores = ["deaf_alone", "deaf_beside"].map(|test| {
+        let outcome = Guest::test(test).cores(2).end_in(Status::Failure);
+        let line = outcome.line("exception");
+        line.has([("job", 0)]);
+        let message = line.member("message");
+        let begins = "interrupts disabled for seconds";
+        assert!(message.starts_with(begins), "{message}");
+        let whose = "that is subtask `deaf` of dag `deaf`";
+        assert!(outcome.serial.contains(whose), "{}", outcome.tail());
+        line.number("cpu")
     });
-    assert!(
-        cores.contains(&Some(0)) && cores.contains(&Some(1)),
-        "{cores:?}"
-    );
+    cores.sort_unstable();
+    assert_eq!(cores, [0, 1]);
 }

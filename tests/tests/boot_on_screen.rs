@@ -5,32 +5,16 @@
 use std::fs;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use boot::screen::font::{HEIGHT, WIDTH, is_lit};
 use harness::Guest;
-use harness::altered::qemu_and;
 use tool::qemu::{Ending, Loader};
 use tool::system;
 
 const VERDICT: &str = "{\"kind\":\"verdict\",\"status\":\"";
-
-/// Makes a program that is QEMU with a screen, without a serial port and without an end, which
-/// listens at `monitor`, and with another word in place of one of ours.
-fn qemu_with_a_screen(monitor: &Path, other: &str, word: &str) -> PathBuf {
-    let more = format!(
-        "-vga std -monitor unix:{},server=on,wait=off",
-        monitor.display()
-    );
-    let changes = [
-        ("file:*", "none"),
-        ("iobase=0xf4", "iobase=0xf8"),
-        (other, word),
-    ];
-    qemu_and(&changes, &more)
-}
 
 /// Returns the rows of a picture in the format PPM that has letters as the kernel draws them.
 fn rows(picture: &[u8]) -> Vec<String> {
@@ -105,90 +89,82 @@ fn watch(monitor: &Path, cores: u64) -> (Vec<String>, String) {
     (rows, pages)
 }
 
-/// Boots what the guest describes, with another word in place of one of ours, and returns the
-/// rows of the screen, and how pages are mapped.
-fn rows_of(guest: &Guest, cores: u64, other: &str, word: &str) -> (Vec<String>, String) {
+/// Boots the demo from a stick on so many cores, with a screen, without a serial port and without
+/// an end, on a processor of this model, and returns the rows of the screen, and how pages are
+/// mapped.
+fn rows_of(guest: &Guest, cores: u64, model: &str) -> (Vec<String>, String) {
     let monitor = system::new_log("monitor").expect("a folder for logs");
-    let program = qemu_with_a_screen(&monitor, other, word);
-    let guest = guest.clone().cores(cores).program(&program);
+    let changes = [
+        ("file:*", "none"),
+        ("iobase=0xf4", "iobase=0xf8"),
+        ("#max", model),
+    ];
+    let listens = format!("unix:{},server=on,wait=off", monitor.display());
+    let guest = guest.clone().cores(cores);
+    let guest = guest.altered(&changes, &format!("-vga std -monitor {listens}"));
     let watcher = thread::spawn(move || watch(&monitor, cores));
     let outcome = guest.boot();
     let (rows, pages) = watcher.join().expect("it does not panic");
-    let _ = fs::remove_file(&program);
     assert_eq!(outcome.ending, Ending::Status(0), "{}", rows.join("\n"));
     assert_eq!(outcome.serial, "", "there is no serial port");
     (rows, pages)
 }
 
-/// Boots the demo and reads its table on the screen.
-fn shows(loader: Loader) {
-    let guest = Guest::new("fork-join").from_stick(loader);
-    let guest = guest.word("jobs=3").word("subtasks=2");
-    let (rows, pages) = rows_of(&guest, 2, "none", "none");
-    // Written through (T), and not uncached (C) as a device's: so the kernel marks the screen's.
-    assert!(pages.contains("-T-W"), "{pages}");
-    let all = rows.join("\n");
-    let at = |text: &str| rows.iter().position(|row| row.starts_with(text));
-    let head = at("N = 2: 3 jobs, 3 joins, 0 semantic violations").expect(&all);
-    for (row, name) in [
-        "min",
-        "join latency",
-        "join to start",
-        "response time",
-        "release jitter",
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        assert!(rows[head + 1 + row].trim_start().starts_with(name), "{all}");
+/// The demo's table, of UEFI without GRUB, and of GRUB under a BIOS.
+#[test]
+fn what_a_run_says() {
+    for loader in [Loader::Efi, Loader::Bios] {
+        let guest = Guest::new("fork-join").from_stick(loader);
+        let (rows, pages) = rows_of(&guest.word("jobs=3 subtasks=2"), 2, "max");
+        // Written through (T), and not uncached (C) as a device's: so the kernel marks the
+        // screen's.
+        assert!(pages.contains("-T-W"), "{pages}");
+        let all = rows.join("\n");
+        let head = "N = 2: 3 jobs, 3 joins, 0 semantic violations";
+        let mut table = rows.iter().skip_while(|row| !row.starts_with(head)).skip(1);
+        for name in [
+            "min",
+            "join latency",
+            "join to start",
+            "response time",
+            "release jitter",
+        ] {
+            let is_there = table.next().map(|row| row.trim_start().starts_with(name));
+            assert_eq!(is_there, Some(true), "{name}\n{all}");
+        }
+        let last = rows.iter().rfind(|row| !row.is_empty());
+        let success = format!("{VERDICT}success\"}}");
+        assert_eq!(last, Some(&success), "{all}");
+        assert!(!all.contains('\u{fffd}'), "{all}");
     }
-    let last = rows.iter().rfind(|row| !row.is_empty());
-    let success = format!("{VERDICT}success\"}}");
-    assert_eq!(last, Some(&success), "{all}");
-    assert!(!all.contains('\u{fffd}'), "{all}");
 }
 
 #[test]
-fn of_uefi_without_grub() {
-    shows(Loader::Efi);
-}
-
-#[test]
-fn of_grub_under_a_bios() {
-    shows(Loader::Bios);
-}
-
-/// Boots what cannot run, and reads on the screen why not.
-fn refuses(guest: &Guest, cores: u64, other: &str, word: &str, why: &str) {
-    let (rows, _) = rows_of(guest, cores, other, word);
-    let all = rows.join("\n");
-    let says_why = |row: &String| row.trim_start().starts_with(why);
-    assert!(rows.iter().any(says_why), "{all}");
-    let is_success = |row: &String| row.starts_with(&format!("{VERDICT}success"));
-    assert!(!rows.iter().any(is_success), "{all}");
-}
-
-#[test]
-fn why_a_machine_is_refused() {
-    let guest = Guest::new("fork-join").from_stick(Loader::Bios);
-    let why =
-        "the processor has no no-execute pages (NX, XD); turn it on in the firmware's settings";
-    refuses(&guest, 2, "#max", "max,-nx", why);
-    let small = guest.memory_mib(8);
-    refuses(
-        &small,
-        32,
-        "none",
-        "none",
-        "each core needs 144 KiB of memory",
-    );
-}
-
-#[test]
-fn why_a_word_is_refused() {
-    for loader in [Loader::Bios, Loader::Efi] {
-        let guest = Guest::new("fork-join").from_stick(loader).word("avx=512");
-        let why = "`avx=512`: allowed are on, off";
-        refuses(&guest, 2, "none", "none", why);
+fn why_a_machine_or_a_word_is_refused() {
+    let guest = |loader| Guest::new("fork-join").from_stick(loader);
+    let (bios, efi) = (guest(Loader::Bios), guest(Loader::Efi));
+    let word = "`avx=512`: allowed are on, off";
+    for (guest, cores, model, why) in [
+        (
+            bios.clone(),
+            2,
+            "max,-nx",
+            "the processor has no no-execute pages (NX, XD); turn it on in the firmware's settings",
+        ),
+        (
+            bios.clone().memory_mib(8),
+            32,
+            "max",
+            "each core needs 144 KiB of memory",
+        ),
+        (bios.word("avx=512"), 2, "max", word),
+        (efi.word("avx=512"), 2, "max", word),
+    ] {
+        let (rows, _) = rows_of(&guest, cores, model);
+        let all = rows.join("\n");
+        let says_why = |row: &String| row.trim_start().starts_with(why);
+        assert!(rows.iter().any(says_why), "{all}");
+        let success = format!("{VERDICT}success");
+        assert!(!rows.iter().any(|row| row.starts_with(&success)), "{all}");
     }
 }

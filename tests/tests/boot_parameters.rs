@@ -1,20 +1,6 @@
 //! Parameters on the machine: set by a word at boot, and by a person while it runs.
 
-use harness::Guest;
-use tool::Outcome;
-use tool::protocol::Status;
-
-fn tuned() -> Guest {
-    Guest::new("guest-tests").word("test=tuned")
-}
-
-/// What jobs have found, each value once.
-fn found(outcome: &Outcome) -> Vec<(String, u64)> {
-    let lines = outcome.transcript.of_kind("tuned");
-    let found = lines
-        .filter_map(|line| Some((line.text_at("gain")?.to_string(), line.number_at("steps")?)));
-    found.collect()
-}
+use harness::{Guest, Members, Said};
 
 #[test]
 fn a_person_sets_what_the_next_jobs_find() {
@@ -28,15 +14,18 @@ fn a_person_sets_what_the_next_jobs_find() {
         (said, "set gain"),
         (said, "help"),
         (said, "hlep"),
+        (said, "stop nothing"),
+        (said, "stats +1"),
         (said, "shutdown"),
     ];
-    let guest = tuned().word("set=steps=4").cores(2);
+    let guest = Guest::test("endless").word("set=steps=4").cores(2);
     for guest in [guest.clone(), guest.word("clusters=1,1")] {
         let outcome = guest.conversation(&conversation).succeed();
-        let found = found(&outcome);
+        // What jobs have found, each value once.
+        let found = outcome.lines("tuned").into_iter();
+        let found = found.map(|line| (line.member("gain"), line.number("steps")));
         let expected = [("0.5", 4), ("1.25", 4), ("1.25", 9)];
-        let expected = expected.map(|(gain, steps)| (gain.to_string(), steps));
-        assert_eq!(found, expected, "{}", outcome.tail());
+        assert_eq!(found.collect::<Vec<_>>(), expected, "{}", outcome.tail());
         for line in [
             "  gain = 0.5 (f64 from 0 to 2, at first 0.5)",
             "  steps = 4 (u32 from 1 to 9, at first 3)",
@@ -44,51 +33,50 @@ fn a_person_sets_what_the_next_jobs_find() {
             "there is no parameter `gian`; did you mean `gain`?",
             "`set` wants a name and a value; `params` lists them",
             "  set NAME VALUE set a parameter, for the jobs to come",
+            "there is no dag `nothing`; `dags` lists them",
         ] {
             let mut lines = outcome.serial.lines();
-            assert!(
-                lines.any(|found| found == line),
-                "{line}\n{}",
-                outcome.serial
-            );
+            let is_said = lines.any(|found| found == line);
+            assert!(is_said, "{line}\n{}", outcome.serial);
         }
-        assert!(outcome.serial.contains("shutdown, params, set NAME VALUE"));
-        let lines = outcome.transcript.of_kind("console");
-        let accepted = lines.map(|line| line.value.get("accepted").and_then(|it| it.as_bool()));
-        let accepted: Vec<bool> = accepted.map(|it| it.expect("a truth value")).collect();
-        let expected = [true, true, true, false, false, false, true, false, true];
-        assert_eq!(accepted, expected);
+        for part in [
+            "`hlep` is no command; there are help, dags, stats [DAG]",
+            "shutdown, params, set NAME VALUE",
+        ] {
+            assert!(outcome.serial.contains(part), "{}", outcome.serial);
+        }
+        let answers = outcome.lines("console").into_iter();
+        let accepted = answers.map(|line| line.text.contains("\"accepted\":true"));
+        let expected = [(true, 3), (false, 3), (true, 1), (false, 3), (true, 1)];
+        let expected = expected.map(|(accepted, count)| vec![accepted; count]);
+        assert_eq!(accepted.collect::<Vec<_>>(), expected.concat());
     }
 }
 
 #[test]
 fn a_bad_word_is_refused_in_one_line_with_type_and_range() {
-    for (word, why) in [
+    let tuned = || Guest::test("endless");
+    for (guest, word, why) in [
         (
-            "set=gain=2.5",
+            tuned(),
+            "gain=2.5",
             "`gain=2.5`: parameter `gain` takes f64 from 0 to 2",
         ),
         (
-            "set=gain=1,steps=x",
+            tuned(),
+            "gain=1,steps=x",
             "`steps=x`: parameter `steps` takes u32 from 1 to 9",
         ),
         (
-            "set=stesp=1",
+            tuned(),
+            "stesp=1",
             "there is no parameter `stesp`; did you mean `steps`?",
         ),
-        ("set=gain", "`set=gain`: give it as NAME=VALUE"),
+        (tuned(), "gain", "`set=gain`: give it as NAME=VALUE"),
+        // An app without parameters knows no such word.
+        (Guest::new("fork-join"), "gain=1", "`set` is no option"),
     ] {
-        let outcome = tuned().word(word).end_in(Status::Usage);
-        assert!(outcome.serial.contains(why), "{why}\n{}", outcome.serial);
+        let said = guest.word(&format!("set={word}")).refusal();
+        assert!(said.contains(why), "{why}\n{said}");
     }
-    // An app without parameters knows no such word.
-    let outcome = Guest::new("guest-tests")
-        .word("test=endless")
-        .word("set=gain=1");
-    let outcome = outcome.end_in(Status::Usage);
-    assert!(
-        outcome.serial.contains("`set` is no option"),
-        "{}",
-        outcome.serial
-    );
 }

@@ -2,13 +2,12 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use harness::Guest;
-use recording::{Entry, Recordable, Recording, Role, What};
-use tool::json::Value;
+use harness::{Guest, Members, Said};
+use recording::{Entry, Recordable, Recording, What};
 use tool::protocol::Status;
-use tool::{Machine, Outcome, recordings, system};
+use tool::{Machine, recordings, system};
 
 /// A file for a recording, removed with this value.
 struct File(PathBuf);
@@ -30,47 +29,41 @@ impl Drop for File {
     }
 }
 
-fn guest(words: &[&str]) -> Guest {
-    (words.iter()).fold(Guest::new("guest-tests"), |guest, word| guest.word(word))
+fn guest(words: &str) -> Guest {
+    Guest::test("recorded").word(words)
 }
 
-/// Records the fork and join.
-fn record(guest: Guest, file: &File) -> Outcome {
+/// Records the fork and join, and returns how many entries there are. None is lost.
+fn record(guest: Guest, file: &File) -> u64 {
     let outcome = guest.records(&file.0, 64).succeed();
     // A PC's firmware has said something there, too.
     fs::write(&file.0, file.bytes()).expect("it is our file");
-    outcome
+    let line = outcome.line("recorded");
+    line.has([("lost", 0)]);
+    line.number("entries")
 }
 
-fn line(outcome: &Outcome, kind: &str) -> Value {
-    let line = outcome.transcript.of_kind(kind).next();
-    line.expect("it says what came of it").value.clone()
+/// Replays it on so many cores, and returns how many values were compared, and how many were not
+/// computed. The step is another one: sources are not called, or all values would be others.
+fn replay(cores: u64, words: &str, file: &File) -> [u64; 2] {
+    let guest = guest("step=7").word(words).cores(cores);
+    let outcome = guest.replays(&file.0).succeed();
+    let line = outcome.line("replayed");
+    ["compared", "uncompared"].map(|member| line.number(member))
 }
 
-fn numbers<const N: usize>(line: &Value, names: [&str; N]) -> [u64; N] {
-    names.map(|name| line.get(name).and_then(Value::as_u64).expect(name))
-}
-
-/// Replays it, and returns how many values were compared, and how many were not computed.
-fn replay(cores: u64, policy: &str, file: &Path) -> [u64; 2] {
-    replay_with(&[], cores, policy, file)
-}
-
-fn replay_with(words: &[&str], cores: u64, policy: &str, file: &Path) -> [u64; 2] {
-    let policy = format!("policy={policy}");
-    let words = [&["test=recorded", "step=7", &policy], words].concat();
-    let guest = guest(&words);
-    let outcome = guest.cores(cores).replays(file).succeed();
-    numbers(&line(&outcome, "replayed"), ["compared", "uncompared"])
-}
+/// Cores and policies that are not those of the recording.
+const OTHERS: [(u64, &str); 3] = [
+    (1, "policy=static"),
+    (2, "policy=edf"),
+    (4, "policy=static"),
+];
 
 #[test]
 fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
     let file = File::new("recorded");
     for machine in [Machine::Microvm, Machine::Q35] {
-        let recorded = record(guest(&["test=recorded"]).cores(2).machine(machine), &file);
-        let said = line(&recorded, "recorded");
-        assert_eq!(numbers(&said, ["entries", "lost"]), [150, 0]);
+        assert_eq!(record(guest("").cores(2).machine(machine), &file), 150);
     }
     let bytes = file.bytes();
     let recording = Recording::read(&bytes).expect("it is whole");
@@ -85,25 +78,21 @@ fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
     assert!(releases.clone().all(|(ns, job)| ns == 20_000_000 * job));
     assert!((recording.entries()).all(|entry| entry.at_ns >= entry.release_ns));
 
-    // The step is another one: sources are not called, or all values would be others.
-    for (cores, policy) in [(1, "static"), (2, "edf"), (4, "static")] {
-        assert_eq!(replay(cores, policy, &file.0), [100, 0], "{cores} {policy}");
+    for (cores, words) in OTHERS {
+        assert_eq!(replay(cores, words, &file), [100, 0], "{cores} {words}");
     }
 
     // A cluster records and replays the same.
-    let divided = guest(&["test=recorded", "clusters=2,2"]).cores(4);
-    record(divided, &file);
-    assert_eq!(replay(1, "static", &file.0), [100, 0]);
-    let divided = replay_with(&["clusters=2,2"], 4, "edf", &file.0);
+    record(guest("clusters=2,2").cores(4), &file);
+    assert_eq!(replay(1, "policy=static", &file), [100, 0]);
+    let divided = replay(4, "clusters=2,2 policy=edf", &file);
     assert_eq!(divided, [100, 0]);
 }
 
 #[test]
 fn functions_are_told_the_time_again_that_they_were_told() {
     let file = File::new("told");
-    let recorded = record(guest(&["test=recorded", "asks=yes"]).cores(2), &file);
-    let said = line(&recorded, "recorded");
-    assert_eq!(numbers(&said, ["entries", "lost"]), [250, 0]);
+    assert_eq!(record(guest("asks=yes").cores(2), &file), 250);
     let bytes = file.bytes();
     let recording = Recording::read(&bytes).expect("it is whole");
     let told = recording
@@ -115,31 +104,30 @@ fn functions_are_told_the_time_again_that_they_were_told() {
         // From the kernel's entry on, and not from the first release.
         assert!(times[0] > entry.at_ns && entry.at_ns > entry.release_ns);
     }
-    for (cores, policy) in [(1, "static"), (2, "edf"), (4, "static")] {
-        let compared = replay_with(&["asks=yes"], cores, policy, &file.0);
-        assert_eq!(compared, [100, 0], "{cores} {policy}");
+    for (cores, words) in OTHERS {
+        let compared = replay(cores, &format!("asks=yes {words}"), &file);
+        assert_eq!(compared, [100, 0], "{cores} {words}");
     }
 }
 
 #[test]
 fn what_shares_behind_the_schedulers_back_is_found_by_a_replay() {
     let file = File::new("cheats");
-    let words = ["test=recorded", "cheats=yes"];
-    record(guest(&words).cores(2), &file);
-    let outcome = guest(&words).replays(&file.0).end_in(Status::Failure);
-    let reason = outcome.transcript.verdict().expect("a verdict").reason;
+    record(guest("cheats=yes").cores(2), &file);
+    let guest = guest("cheats=yes").replays(&file.0);
+    let outcome = guest.end_in(Status::Failure);
+    let reason = outcome.reason();
     let wanted =
         "topic `first` of dag `counts` diverges in job 0: 2 is recorded, and 1 is computed";
     assert!(reason.starts_with(wanted), "{reason}");
-    let said = line(&outcome, "replayed");
-    assert_eq!(said.get("topic").and_then(Value::as_text), Some("first"));
+    outcome.line("replayed").reads([("topic", "first")]);
 }
 
 #[test]
 fn what_does_not_fit_is_named_job_by_job() {
     let file = File::new("long");
-    let guest = guest(&["test=recorded_long"]).cores(1);
-    let outcome = guest.records(&file.0, 16).succeed();
+    let guest = Guest::test("recorded_long").records(&file.0, 16);
+    let outcome = guest.succeed();
     let bytes = file.bytes();
     let recording = Recording::read(&bytes).expect("it is whole");
     assert!(!recording.is_cut() && recording.lost() > 0);
@@ -155,71 +143,38 @@ fn what_does_not_fit_is_named_job_by_job() {
     let all = (0..8).flat_map(|link| (0..20).map(move |job| (link, job)));
     assert_eq!(&kept | &lost, all.collect());
     assert_eq!(recording.count(), 8 * 20, "each once");
-    let said = line(&outcome, "recorded");
-    assert_eq!(said.get("complete").and_then(Value::as_bool), Some(false));
-    assert_eq!(numbers(&said, ["lost"]), [recording.lost()]);
+    let said = outcome.line("recorded");
+    assert!(said.text.contains("\"complete\":false"), "{}", said.text);
+    said.has([("lost", recording.lost())]);
 }
 
 #[test]
 fn of_a_run_that_dies_there_is_what_came_before() {
     let file = File::new("dies");
-    let words = ["test=recorded", "dies_in=20"];
-    assert!(guest(&words).records(&file.0, 64).boot().judge().is_err());
+    let dies = guest("dies_in=20").records(&file.0, 64).boot();
+    assert!(dies.judge().is_err());
     assert!(Recording::read(&file.bytes()).is_err());
     let mended = recording::mended(&file.bytes()).expect("the header");
     let recording = Recording::read(&mended).expect("it is mended");
     assert!(recording.is_cut());
-    assert!(
-        (40..=63).contains(&recording.count()),
-        "{}",
-        recording.count()
-    );
+    let count = recording.count();
+    assert!((40..=63).contains(&count), "{count}");
     fs::write(&file.0, &mended).expect("it is our file");
-    let [compared, _] = replay(1, "static", &file.0);
+    let [compared, _] = replay(1, "policy=static", &file);
     assert!((30..=42).contains(&compared), "{compared}");
-}
-
-#[test]
-fn what_a_failed_instance_had_sampled_is_there() {
-    let file = File::new("crash");
-    for guest in [
-        guest(&["test=recorded_crash"]).keeps(&file.0),
-        guest(&["test=recorded_crash"]).records(&file.0, 64),
-    ] {
-        let outcome = guest.cores(2).end_in(Status::Failure);
-        let fault = line(&outcome, "fault");
-        let [job] = numbers(&fault, ["job"]);
-        let message = fault.get("message").and_then(Value::as_text);
-        let bytes = file.bytes();
-        let recording = Recording::read(&bytes).expect("it is whole");
-        let channels = recording.header().channels.iter();
-        let samples = (0_u16..).zip(channels);
-        let mut samples = samples.filter(|(_, channel)| channel.role == Role::Sample);
-        let (place, _) = samples.next().expect("one subtask samples");
-        let entries =
-            (recording.entries()).filter(|entry| (entry.what, entry.place) == (What::Value, place));
-        let last = entries.max_by_key(|entry| entry.job);
-        let last = last.expect("it has sampled");
-        assert_eq!(last.job, job);
-        let sample = <Option<(u64, u64, u64)>>::from_bytes(last.value).expect("a sample");
-        let found = sample.map(|(_, _, told)| format!("found {told}"));
-        assert_eq!(found.as_deref(), message);
-    }
 }
 
 #[test]
 fn a_recording_that_does_not_fit_is_refused() {
     let file = File::new("other");
-    let recorded = Guest::new("guest-tests").word("test=recorded_long");
-    let _ = recorded.records(&file.0, 1024).succeed();
+    let recorded = Guest::test("recorded_long").records(&file.0, 1024);
+    let _ = recorded.succeed();
     let refused = |guest: Guest, reason: &str| {
-        let outcome = guest.end_in(Status::Usage);
-        let said = outcome.transcript.verdict().expect("a verdict").reason;
+        let said = guest.refusal();
         assert!(said.contains(reason), "{said}");
     };
-    let counts = || guest(&["test=recorded"]);
     refused(
-        counts().replays(&file.0),
+        guest("").replays(&file.0),
         "the recording's dag 0 is `chain`, and here it is `counts`",
     );
     let bytes = file.bytes();
@@ -228,13 +183,10 @@ fn a_recording_that_does_not_fit_is_refused() {
         "the recording, at byte {}: expected 4 bytes of a checksum",
         bytes.len() - 4
     );
-    refused(counts().replays(&file.0), &reason);
+    refused(guest("").replays(&file.0), &reason);
     refused(
-        guest(&["test=overrun"]).replays(&file.0),
+        Guest::test("overrun").replays(&file.0),
         "`replay`: no topic of the app is recorded",
     );
-    refused(
-        counts().word("record=64"),
-        "there is no debug port at 0x402",
-    );
+    refused(guest("record=64"), "there is no debug port at 0x402");
 }

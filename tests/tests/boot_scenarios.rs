@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use harness::Guest;
+use harness::{Guest, lawful_runs};
 use scenarios::Scenario;
 use tool::image;
 use tool::protocol::Transcript;
+use tool::trace::bound::COUNTED_NS;
 
 /// Runs those for 1 to 5 cores, which are all.
 fn run(mut run: impl FnMut(u64) -> Transcript) {
@@ -22,11 +23,15 @@ fn run(mut run: impl FnMut(u64) -> Transcript) {
     assert_eq!(ran, stated);
 }
 
+/// By their traces, too, no instance waits for longer than cores take turns.
 #[test]
 fn each_scenario_is_as_it_says() {
     run(|cores| {
-        let guest = Guest::new("guest-tests").word("test=scenarios");
-        guest.cores(cores).succeed().transcript
+        let guest = Guest::test("scenarios").word("trace=dump").cores(cores);
+        let outcome = guest.succeed();
+        let runs = lawful_runs(&outcome, COUNTED_NS);
+        assert!(runs.iter().all(|run| run.complete && run.lost == 0));
+        outcome.transcript
     });
 }
 
@@ -34,7 +39,7 @@ fn each_scenario_is_as_it_says() {
 fn each_scenario_is_as_it_says_where_cores_run_side_by_side() {
     for idle in ["idle=halt", "idle=poll"] {
         run(|cores| {
-            let guest = Guest::new("guest-tests").word("test=scenarios").word(idle);
+            let guest = Guest::test("scenarios").word(idle);
             guest.in_real_time().cores(cores).succeed().transcript
         });
     }

@@ -1,25 +1,17 @@
 //! Stacks that are larger than usual, and what of each is used.
 
-use harness::Guest;
-
-fn guest(test: &str) -> Guest {
-    Guest::new("guest-tests").word(&format!("test={test}"))
-}
+use harness::{Guest, Members, Said};
 
 #[test]
 fn a_stated_stack_is_there_on_any_core_and_its_use_is_measured() {
     for cores in [1, 2, 4] {
-        let outcome = guest("stacks")
-            .cores(cores)
-            .word("measure=stacks")
-            .succeed();
-        let lines = outcome.transcript.of_kind("stack");
-        let used: Vec<u64> = lines
-            .map(|line| {
-                assert_eq!(line.number_at("stack_bytes"), Some(256 << 10));
-                line.number_at("used_bytes").expect("a number")
-            })
-            .collect();
+        let guest = Guest::test("stacks").cores(cores);
+        let outcome = guest.word("measure=stacks").succeed();
+        let used = outcome.lines("stack").into_iter().map(|line| {
+            line.has([("stack_bytes", 256 << 10)]);
+            line.number("used_bytes")
+        });
+        let used: Vec<u64> = used.collect();
         let [shallow, deep, sink] = used[..] else {
             panic!("three subtasks: {used:?}");
         };
@@ -29,19 +21,16 @@ fn a_stated_stack_is_there_on_any_core_and_its_use_is_measured() {
             assert!((1..8 << 10).contains(&little), "{used:?}");
         }
     }
-}
-
-#[test]
-fn without_the_word_nothing_is_measured() {
-    let outcome = guest("stacks").succeed();
-    assert_eq!(outcome.transcript.of_kind("stack").count(), 0);
+    // Without the word nothing is measured.
+    let outcome = Guest::test("stacks").succeed();
+    assert_eq!(outcome.lines("stack").len(), 0);
 }
 
 #[test]
 fn a_chain_of_ten_thousand_subtasks_takes_a_few_stacks() {
-    let outcome = guest("stacks_of_chain").cores(2).memory_mib(128).succeed();
-    let line = outcome.transcript.of_kind("chain").next().expect("a line");
+    let guest = Guest::test("stacks_of_chain").cores(2);
+    let outcome = guest.memory_mib(128).succeed();
     // One for each job in flight, and two for each core.
-    assert_eq!(line.number_at("contexts"), Some(6), "{}", line.text);
-    assert_eq!(line.number_at("violations"), Some(0), "{}", line.text);
+    let line = outcome.line("chain");
+    line.has([("contexts", 6), ("violations", 0)]);
 }

@@ -2,18 +2,16 @@
 
 use std::fs;
 
-use harness::Guest;
+use harness::{Guest, Members, Said};
 use recording::Recording;
-use tool::protocol::MachineLine;
 use tool::{Outcome, recordings, system};
 
 #[test]
 fn values_are_echoed_and_what_is_left_out_is_counted() {
     let said = "console\",\"command\"";
-    let echoed = "\"kind\":\"echo\"";
     let conversation = [
         ("\"kind\":\"tuned\"", "echo gain"),
-        (echoed, "set gain 1.5"),
+        ("\"kind\":\"echo\"", "set gain 1.5"),
         ("\"value\":\"1.5\"", "echo off"),
         ("\"command\":\"echo off\"", "hz steps"),
         (said, "hz gain"),
@@ -23,7 +21,7 @@ fn values_are_echoed_and_what_is_left_out_is_counted() {
         (said, "echo"),
         (said, "shutdown"),
     ];
-    let guest = Guest::new("guest-tests").word("test=tuned").cores(2);
+    let guest = Guest::test("endless").cores(2);
     let divided = guest.clone().word("clusters=1,1");
     for guest in [guest, divided] {
         is_echoed(&guest.conversation(&conversation).succeed());
@@ -31,51 +29,35 @@ fn values_are_echoed_and_what_is_left_out_is_counted() {
 }
 
 fn is_echoed(outcome: &Outcome) {
-    let echoed = "\"kind\":\"echo\"";
-    let lines = |kind: &'static str| outcome.transcript.of_kind(kind).collect::<Vec<_>>();
-    let number = |line: &MachineLine, name| line.number_at(name).expect(name);
-
-    let echoes = lines("echo");
-    assert!(echoes.len() >= 2, "{}", outcome.serial);
-    assert_eq!(echoes[0].text_at("value"), Some("0.5"));
-    assert_eq!(
-        echoes.last().expect("there are some").text_at("value"),
-        Some("1.5")
-    );
+    let echoes = outcome.lines("echo");
+    let values: Vec<&str> = echoes.iter().map(|line| line.member("value")).collect();
+    let ends = (values.first(), values.last());
+    assert_eq!(ends, (Some(&"0.5"), Some(&"1.5")), "{}", outcome.serial);
     for pair in echoes.windows(2) {
         // None is lost but those that are counted.
-        let between = number(pair[1], "left_out") + 1;
-        assert_eq!(number(pair[1], "job") - number(pair[0], "job"), between);
+        let between = pair[1].number("left_out") + 1;
+        assert_eq!(pair[1].number("job") - pair[0].number("job"), between);
     }
-    for line in lines("hz") {
-        let of = |name| number(line, name);
-        assert!(
-            of("values") > 2 && of("least_ns") <= of("mean_ns"),
-            "{}",
-            line.text
-        );
-        assert!(of("mean_ns") <= of("most_ns"), "{}", line.text);
+    let rates = outcome.lines("hz");
+    assert_eq!(rates.len(), 2);
+    for line in rates {
+        let times = ["least_ns", "mean_ns", "most_ns"].map(|name| line.number(name));
+        assert!(line.number("values") > 2, "{}", line.text);
+        assert!(times.is_sorted(), "{}", line.text);
     }
-    assert_eq!(lines("hz").len(), 2);
     for line in [
         "topic `steps` is not recorded; let the app name it by `Dag::record`",
         "there is no topic `gian`; did you mean `gain`?",
-        "there is no topic `velocity`; there are `both` `gain` `steps`",
+        "there is no topic `velocity`; there are `l` `l-a` `l-b` `both` `gain` `steps`",
         "`echo` wants the name of a topic, or `off`",
     ] {
         let mut found = outcome.serial.lines();
-        assert!(
-            found.any(|found| found == line),
-            "{line}\n{}",
-            outcome.serial
-        );
+        let is_said = found.any(|found| found == line);
+        assert!(is_said, "{line}\n{}", outcome.serial);
     }
     let quiet = outcome.serial.split("\"command\":\"echo off\"").nth(1);
-    assert!(
-        quiet.is_some_and(|rest| !rest.contains(echoed)),
-        "{}",
-        outcome.serial
-    );
+    let is_quiet = quiet.is_some_and(|rest| !rest.contains("\"kind\":\"echo\""));
+    assert!(is_quiet, "{}", outcome.serial);
 }
 
 #[test]
@@ -88,9 +70,8 @@ fn what_is_echoed_while_a_run_is_recorded_is_in_the_recording() {
         ("\"kind\":\"echo\",\"topic\":\"gain\"", "echo off"),
         ("\"command\":\"echo off\"", "shutdown"),
     ];
-    let guest = Guest::new("guest-tests").word("test=tuned").cores(2);
-    let outcome = guest.records(&file, 64).conversation(&conversation);
-    let outcome = outcome.succeed();
+    let guest = Guest::test("endless").cores(2).records(&file, 64);
+    let outcome = guest.conversation(&conversation).succeed();
     let bytes = recordings::received(&file).expect("the guest has sent it");
     let _ = fs::remove_file(&file);
 
@@ -99,12 +80,11 @@ fn what_is_echoed_while_a_run_is_recorded_is_in_the_recording() {
     let values = recording.values::<f64>("loop", "gain").expect("there are");
     let values = values.collect::<Vec<_>>();
     assert!((0..).zip(&values).all(|(job, value)| job == value.0));
-    let echoes = outcome.transcript.of_kind("echo").collect::<Vec<_>>();
+    let echoes = outcome.lines("echo");
     assert!(echoes.len() >= 2, "{}", outcome.serial);
     for echo in echoes {
-        let job = echo.number_at("job").expect("a job");
-        let recorded = values.iter().find(|(of, _)| *of == job);
+        let recorded = values.iter().find(|(of, _)| *of == echo.number("job"));
         let recorded = recorded.map(|(_, value)| value.to_string());
-        assert_eq!(recorded.as_deref(), echo.text_at("value"));
+        assert_eq!(recorded.as_deref(), Some(echo.member("value")));
     }
 }

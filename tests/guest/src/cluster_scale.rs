@@ -9,13 +9,16 @@ use core::time::Duration;
 
 use fass::{ConstructionPolicy, finish_create_dags_with};
 use hand_off::{Shape, Stamping, Stamps, Workload, build};
-use kernel::report::Distribution;
-use kernel::{Ending, Machine, json};
+use kernel::{Ending, Machine};
+
+use crate::values::emit;
 
 /// Room for a job.
 const PERIOD: Duration = Duration::from_millis(4);
 
 const SUBTASKS: usize = 100;
+
+const WORKLOAD: &str = "layered-100";
 
 /// Layered graphs, one in each cluster: the instructions of all cores from a release to the
 /// sink, for each instance.
@@ -57,20 +60,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         stamps.iter().zip(0..).filter_map(of_cluster).sum::<u64>()
     };
     let instances = u64::from(count) * SUBTASKS as u64;
-    show("instance", instances, (0..jobs).map(of_job));
+    emit(WORKLOAD, "instance", instances, (0..jobs).map(of_job));
     let locks = u64::from(run.lock_acquisitions());
-    show("locks", jobs * instances, [locks]);
+    emit(WORKLOAD, "locks", jobs * instances, [locks]);
     Ok(())
-}
-
-/// Prints a figure as the app `hand-off` does.
-fn show(figure: &str, per: u64, samples: impl IntoIterator<Item = u64>) {
-    let samples = Distribution::new(samples);
-    json::emit("hand_off", |line| {
-        line.text("workload", "layered-100")
-            .text("figure", figure)
-            .number("per", per)
-            .number("samples", samples.count() as u64)
-            .object("value", |object| samples.describe(object));
-    });
 }

@@ -1,22 +1,29 @@
-//! Two DAGs without a limit of jobs, for a person at the console to end.
+//! DAGs without a limit of jobs, for a person at the console to look at, to set and to end.
 //!
-//! `left` is a fork-join every 5 ms, `right` a chain every 7 ms. Each source
-//! hands on how often it has run, and each sink checks that this only grows: a
-//! DAG may rest, and no value of before may come after.
+//! `left` is a fork-join each millisecond. Its source hands on how often it has run, and its sink
+//! checks that this only grows: a DAG may rest, and no value of before may come after. `loop` is
+//! a chain every 5 ms, whose source reads parameters. `ten` has ten jobs.
 
 use alloc::vec;
 use core::time::Duration;
 
-use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
-use kernel::{Ending, Machine};
+use fass::{Dag, Occupation, Parameter, create_dag, execute_for, finish_create_dags};
+use kernel::{Ending, Machine, json};
 
-const EXECUTION: Duration = Duration::from_micros(300);
+use crate::single::{named, single};
 
-/// Runs both until the console ends them.
+const EXECUTION: Duration = Duration::from_micros(100);
+
+/// Runs them until the console ends the run.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+    let gain = Parameter::new("gain", 0.5, 0.0..=2.0);
+    let steps = Parameter::new("steps", 3_u32, 1..=9);
+    machine.offer(&[&gain, &steps])?;
+    machine.show_topics();
     machine.offer_clusters()?;
     machine.options().finish(&["test", "clusters"])?;
-    let dags = [left(), right()];
+    let ten = single("ten", 10, named("ten"), || ());
+    let dags = [left(), tuned(&gain, &steps), ten];
     machine.spread(&dags);
     finish_create_dags(&dags)?;
     machine.run()?;
@@ -24,58 +31,51 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
 }
 
 fn left() -> Dag {
-    let (dag, period) = (create_dag(), Duration::from_millis(5));
+    let (dag, period) = (create_dag(), Duration::from_millis(1));
     dag.name("left");
-    let named = SubtaskAttributes::named;
-    dag.register_periodic_subtask(counter(), vec!["l"], period, named("source"));
-    let execute = |(count,): (u64,)| {
-        execute_for(EXECUTION, Occupation::Hold);
+    let mut count = 0_u64;
+    let counts = move || {
+        count += 1;
         (count,)
     };
-    dag.register_subtask(
-        execute,
-        vec!["l"],
-        vec!["l-a"],
-        named("a").wcet(2 * EXECUTION),
-    );
-    dag.register_subtask(
-        execute,
-        vec!["l"],
-        vec!["l-b"],
-        named("b").wcet(2 * EXECUTION),
-    );
-    let mut check = growing();
+    dag.register_periodic_subtask(counts, vec!["l"], period, named("source"));
+    for (name, output) in [("a", "l-a"), ("b", "l-b")] {
+        let execute = |(count,): (u64,)| {
+            execute_for(EXECUTION, Occupation::Hold);
+            (count,)
+        };
+        let attributes = named(name).wcet(2 * EXECUTION);
+        dag.register_subtask(execute, vec!["l"], vec![output], attributes);
+    }
+    let mut last = 0;
     let join = move |(a, b): (u64, u64)| {
-        assert_eq!(a, b, "a join of values of one job");
-        check(a);
+        assert_eq!((a, b), (last + 1, a), "each value comes once, to its job");
+        last = a;
     };
     dag.register_sink_subtask(join, vec!["l-a", "l-b"], period, named("sink"));
     dag
 }
 
-fn right() -> Dag {
-    let (dag, period) = (create_dag(), Duration::from_millis(7));
-    dag.name("right");
-    let named = SubtaskAttributes::named;
-    dag.register_periodic_subtask(counter(), vec!["r"], period, named("source"));
-    let mut check = growing();
-    let sink = move |(count,): (u64,)| check(count);
-    dag.register_sink_subtask(sink, vec!["r"], period, named("sink"));
+/// Prints each pair of values that a job has found for the first time.
+fn tuned(gain: &Parameter<f64>, steps: &Parameter<u32>) -> Dag {
+    let (dag, period) = (create_dag(), Duration::from_millis(5));
+    dag.name("loop").record::<f64>("gain");
+    let read = |both: (f64, u32)| (both,);
+    dag.period(period)
+        .using((gain.reading(), steps.reading()))
+        .source(read)
+        .writes(&["both"])
+        .register(named("read"));
+    let part = |(both,): ((f64, u32),)| both;
+    dag.register_subtask(part, vec!["both"], vec!["gain", "steps"], named("part"));
+    let mut last = None;
+    let show = move |now: (f64, u32)| {
+        if last.replace(now) != Some(now) {
+            json::emit("tuned", |line| {
+                line.text("gain", now.0).number("steps", now.1);
+            });
+        }
+    };
+    dag.register_sink_subtask(show, vec!["gain", "steps"], period, named("show"));
     dag
-}
-
-fn counter() -> impl FnMut() -> (u64,) + Send {
-    let mut count = 0u64;
-    move || {
-        count += 1;
-        (count,)
-    }
-}
-
-fn growing() -> impl FnMut(u64) + Send {
-    let mut last = 0;
-    move |count| {
-        assert_eq!(count, last + 1, "each value comes once");
-        last = count;
-    }
 }

@@ -2,31 +2,40 @@
 
 use core::arch::asm;
 
-use faults::crimes::Unpunished;
+use faults::crimes::{Crime, Unpunished};
+
+/// Every one, by name.
+pub(crate) const CRIMES: [(&str, Crime); 5] = [
+    ("avx", use_avx),
+    ("nmi", raise_nmi),
+    ("machine_check", raise_machine_check),
+    ("double_fault", fault_doubly),
+    ("exit_port", end_the_machine),
+];
 
 /// Uses a register of AVX, which the word `avx=off` has left off.
-pub(crate) fn use_avx() -> Unpunished {
+fn use_avx() -> Unpunished {
     // SAFETY: none; the kernel has to report it (see the module).
     unsafe { asm!("vxorps ymm0, ymm0, ymm0", out("xmm0") _) };
     Unpunished
 }
 
 /// Raises the non-maskable interrupt that no core has sent.
-pub(crate) fn raise_nmi() -> Unpunished {
+fn raise_nmi() -> Unpunished {
     // SAFETY: none; the kernel has to report it (see the module).
     unsafe { asm!("int 2") };
     Unpunished
 }
 
 /// Raises a machine check.
-pub(crate) fn raise_machine_check() -> Unpunished {
+fn raise_machine_check() -> Unpunished {
     // SAFETY: none; the kernel has to report it (see the module).
     unsafe { asm!("int 18") };
     Unpunished
 }
 
 /// Takes away the stack of exceptions, and causes one: delivering it faults, too.
-pub(crate) fn fault_doubly() -> Unpunished {
+fn fault_doubly() -> Unpunished {
     // The task state segment's base is spread over its descriptor, at offset
     // 0x18 of the table; its IST 2 is at offset 44 (Intel SDM 3, 7.2.3, 7.7).
     // SAFETY: none; the kernel has to report it (see the module).

@@ -5,23 +5,21 @@
 //! preempted it, has to be what it asked for. Times differ a little from job to job,
 //! so that the preemptions come at all places of the loop that looks at the clock.
 
-use alloc::vec;
 use core::hint::black_box;
 use core::time::Duration;
 
-use fass::{Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags};
+use fass::{Occupation, execute_for, finish_create_dags};
 use kernel::{Ending, Machine, json};
 
+use crate::single::{named, single_every};
+
 const LONG_NS: u64 = 1_200_000;
-const STEP_NS: u64 = 3_001;
+const STEP_NS: usize = 3_001;
 const JOBS: u64 = 40;
 
 /// Runs both, and counts the jobs whose time was too short.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
-    let (short, long) = (create_dag(), create_dag());
-    let period = Duration::from_millis(1);
-    short.name("short").jobs(5 * JOBS).relative_deadline(period);
     let mut job = 0_u64;
     let interrupt = move || {
         job += 1;
@@ -31,19 +29,14 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
             black_box(step);
         });
     };
-    let attributes = SubtaskAttributes::named("short").priority(0);
-    short.register_periodic_subtask(interrupt, vec![], period, attributes);
-
-    let period = Duration::from_millis(5);
-    long.name("long").jobs(JOBS).relative_deadline(period);
-    let mut job = 0;
+    let (urgent, ms) = (named("short").priority(0), Duration::from_millis(1));
+    let short = single_every(ms, "short", 5 * JOBS, urgent, interrupt);
+    let mut times_ns = (LONG_NS..).step_by(STEP_NS);
     let compute = move || {
-        let time = Duration::from_nanos(LONG_NS + job * STEP_NS);
-        job += 1;
+        let time = Duration::from_nanos(times_ns.next().unwrap_or_default());
         execute_for(time, Occupation::Spin);
     };
-    let attributes = SubtaskAttributes::named("long").priority(1);
-    long.register_periodic_subtask(compute, vec![], period, attributes);
+    let long = single_every(5 * ms, "long", JOBS, named("long").priority(1), compute);
     finish_create_dags(&[short, long])?;
     let run = machine.run()?;
 
@@ -59,7 +52,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         let others = times("short").filter(|(_, start, end)| start_ns < *start && *end < finish_ns);
         let others_ns: u64 = others.map(|(_, start, end)| end - start).sum();
         let own_ns = finish_ns - start_ns - others_ns;
-        too_short += u64::from(own_ns < LONG_NS + job * STEP_NS);
+        too_short += u64::from(own_ns < LONG_NS + job * STEP_NS as u64);
     }
     json::emit("occupation", |line| {
         line.number("jobs", JOBS).number("too_short", too_short);

@@ -3,8 +3,10 @@
 //! Six fork-join DAGs of different rates share the cores, the faster ones with
 //! the higher priorities. Each instance repeats work whose result it knows: a
 //! register or a byte that a preemption, or a move to another core, does not
-//! restore shows as a difference. With `work=halves` the registers are those of AVX, where
-//! there are any.
+//! restore shows as a difference. Where there is AVX, its registers are among them.
+//!
+//! With `budgets=yes` each of them has a budget of half as much again as it takes alone: it would
+//! not do if it had to answer for the time in which it is suspended, or others compute.
 
 use alloc::format;
 use alloc::string::String;
@@ -20,14 +22,6 @@ use kernel::{Ending, Machine, json};
 use crate::checksum::checksum;
 use crate::upper_halves;
 
-/// Reports whether work was right whose result is this checksum.
-type Check = fn(expected: u64) -> bool;
-
-const WORKS: [(&str, Check); 2] = [
-    ("checksum", |expected| checksum() == expected),
-    ("halves", upper_halves::are_kept_besides_others),
-];
-
 /// The periods in milliseconds; the shortest gets the highest priority.
 const PERIODS_MS: [u64; 6] = [2, 3, 5, 7, 11, 13];
 
@@ -37,24 +31,29 @@ const ROUNDS: u64 = 12;
 
 /// What each instance does.
 struct Work {
-    check: Check,
     rounds: u64,
     diverged: AtomicU64,
+    budget: Option<Duration>,
 }
 
 /// Runs the DAGs for `ms` milliseconds of releases.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
     let ms = options.number("ms", 1..=3_600_000, 500)?;
-    let check = options.choice("work", &WORKS)?;
     let rounds = options.number("rounds", 1..=1_000_000, ROUNDS)?;
-    options.finish(&["test", "ms", "work", "rounds"])?;
+    let has_budgets = options.choice("budgets", &[("no", false), ("yes", true)])?;
+    options.finish(&["test", "ms", "rounds", "budgets"])?;
 
-    let work = Arc::new(Work {
-        check,
+    let mut work = Work {
         rounds,
         diverged: AtomicU64::new(0),
-    });
+        budget: None,
+    };
+    let start_ns = fass::now_ns();
+    work.compute();
+    let alone = Duration::from_nanos(fass::now_ns() - start_ns);
+    work.budget = has_budgets.then(|| alone * 3 / 2);
+    let work = Arc::new(work);
     let dags: Vec<Dag> = (0..)
         .zip(PERIODS_MS)
         .map(|(priority, period_ms)| fork_join(priority, period_ms, ms, &work))
@@ -77,6 +76,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
             )
             .number("diverged", diverged)
             .number("violations", violations)
+            .number("allocations", run.allocations())
             .number("passed_over", passed_over.len() as u64)
             .flag("avx", kernel::has_avx())
             .number("cpus", machine.cores());
@@ -96,6 +96,10 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, work: &Arc<Work>) -> Dag {
         .jobs(ms.div_ceil(period_ms))
         .in_flight(8);
     let attributes = |name: &str| SubtaskAttributes::named(name).priority(priority);
+    let computing = |name: &str| match work.budget {
+        Some(budget) => attributes(name).budget(budget),
+        None => attributes(name),
+    };
     let topic = |name: &str| format!("{period_ms}-{name}");
     let (start, parts) = (topic("start"), [topic("a"), topic("b"), topic("c")]);
 
@@ -111,7 +115,7 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, work: &Arc<Work>) -> Dag {
             work.compute();
             (job,)
         };
-        dag.register_subtask(pass, vec![&start], vec![part], attributes(part));
+        dag.register_subtask(pass, vec![&start], vec![part], computing(part));
     }
     let work = work.clone();
     let join = move |(a, b, c): (u64, u64, u64)| {
@@ -119,7 +123,7 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, work: &Arc<Work>) -> Dag {
         assert!(a == b && b == c, "a join of the jobs {a}, {b} and {c}");
     };
     let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
-    dag.register_sink_subtask(join, parts, period, attributes("sink"));
+    dag.register_sink_subtask(join, parts, period, computing("sink"));
     dag
 }
 
@@ -127,7 +131,7 @@ impl Work {
     fn compute(&self) {
         let expected = checksum();
         for _ in 0..self.rounds {
-            if !(self.check)(expected) {
+            if !upper_halves::are_kept_besides_others(expected) {
                 self.diverged.fetch_add(1, Ordering::Relaxed);
             }
         }

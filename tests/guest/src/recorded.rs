@@ -1,5 +1,4 @@
-//! A DAG whose topics are recorded: honest, cheating, too much for the buffer, ended midway, or
-//! failing at what it samples.
+//! A DAG whose topics are recorded: honest, cheating, too much for the buffer, or ended midway.
 
 use alloc::string::ToString;
 use alloc::sync::Arc;
@@ -8,7 +7,7 @@ use core::slice;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{Occupation, OverrunPolicy, Sample, SubtaskAttributes};
+use fass::{Occupation, OverrunPolicy, SubtaskAttributes};
 use fass::{create_dag, execute_for, finish_create_dags};
 use kernel::{Ending, Machine};
 
@@ -100,30 +99,4 @@ pub(crate) fn long(machine: &Machine) -> Result<(), Ending> {
         0 => Ok(()),
         count => Err(Ending::Failure(format!("{count} allocations"))),
     }
-}
-
-/// Runs a DAG that counts, and one that fails at what it samples of that.
-pub(crate) fn crash(machine: &Machine) -> Result<(), Ending> {
-    machine.options().finish(&["test"])?;
-    let named = SubtaskAttributes::named;
-    let teller = create_dag();
-    teller.name("teller").jobs(100).relative_deadline(PERIOD);
-    let mut told = 0_u64;
-    let tell = move || {
-        told += 1;
-        (told,)
-    };
-    teller.register_periodic_subtask(tell, vec!["told"], PERIOD, named("tell"));
-    let latest = teller.record::<u64>("told").latest::<u64>("told");
-    let frail = create_dag();
-    frail.name("frail").jobs(100).record::<u8>("start");
-    frail.register_periodic_subtask(|| (1_u8,), vec!["start"], PERIOD, named("start"));
-    let see = |told: Option<Sample<'_, u64>>, (_,): (u8,)| {
-        let told = told.map_or(0, |told| *told.value);
-        assert!(told < 30, "found {told}");
-    };
-    let see = frail.using(latest.sample()).subtask(see);
-    see.reads(&["start"]).due(PERIOD).register(named("see"));
-    finish_create_dags(&[teller, frail])?;
-    machine.run().map(drop)
 }

@@ -1,22 +1,20 @@
 //! A million timer interrupts while every core computes.
 //!
-//! One DAG has as many parallel subtasks as there are cores. Each of them
-//! repeats the same floating-point and memory work and compares the result with
-//! the first one's: a register or a byte that an interrupt does not restore
-//! shows as a difference.
+//! There is a DAG for each core. Each repeats the same floating-point and memory work and
+//! compares the result with the first one's: a register or a byte that an interrupt does not
+//! restore shows as a difference.
 
 use alloc::format;
-use alloc::string::String;
 use alloc::sync::Arc;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::finish_create_dags;
 use kernel::{Ending, Machine, json};
 
 use crate::checksum::checksum;
+use crate::single::{named, single_every};
 
 /// The time between two interrupts of one core.
 const INTERRUPT_PERIOD: Duration = Duration::from_micros(5);
@@ -38,7 +36,14 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
 
     let findings = Arc::new(Findings::default());
     let first = kernel::timer_interrupts();
-    finish_create_dags(&[storm_dag(machine.cores(), first + interrupts, &findings)])?;
+    let until = first + interrupts;
+    let dags = (0..machine.cores()).map(|core| {
+        let findings = Arc::clone(&findings);
+        let compute = move || findings.compute_until(until);
+        let name = format!("storm-{core}");
+        single_every(PERIOD, &name, 1, named("compute"), compute)
+    });
+    finish_create_dags(&dags.collect::<Vec<_>>())?;
     kernel::set_heartbeat(INTERRUPT_PERIOD);
     let run = machine.run()?;
     kernel::set_heartbeat(Duration::ZERO);
@@ -57,44 +62,14 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     Ok(())
 }
 
-/// Builds source -> a worker for each core -> a chain of collectors -> sink.
-fn storm_dag(cores: u32, until: u64, findings: &Arc<Findings>) -> Dag {
-    let dag = create_dag();
-    dag.name("storm").jobs(1);
-    let source = SubtaskAttributes::named("start");
-    dag.register_periodic_subtask(|| (0u64,), vec!["collected-0"], PERIOD, source);
-    // Every worker reads the start; the collectors then wait for one after the
-    // other, so any number of cores will do.
-    for core in 0..cores {
-        let findings = findings.clone();
-        let work = move |(start,): (u64,)| (start + compute_until(until, &findings),);
-        let output = format!("work-{core}");
-        let attributes = SubtaskAttributes::named(&format!("worker-{core}"));
-        dag.register_subtask(work, vec!["collected-0"], vec![&output], attributes);
-    }
-    for core in 0..cores {
-        let inputs = [format!("collected-{core}"), format!("work-{core}")];
-        let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
-        let output = format!("collected-{}", core + 1);
-        let attributes = SubtaskAttributes::named(&format!("collector-{core}"));
-        let add = |(sum, work): (u64, u64)| (sum + work,);
-        dag.register_subtask(add, inputs, vec![&output], attributes);
-    }
-    let last = format!("collected-{cores}");
-    let sink = SubtaskAttributes::named("end");
-    dag.register_sink_subtask(|(_,): (u64,)| (), vec![&last], PERIOD, sink);
-    dag
-}
-
-fn compute_until(interrupts: u64, findings: &Findings) -> u64 {
-    let expected = checksum();
-    let mut rounds = 0;
-    while kernel::timer_interrupts() < interrupts {
-        rounds += 1;
-        if checksum() != expected {
-            findings.diverged.fetch_add(1, Ordering::Relaxed);
+impl Findings {
+    fn compute_until(&self, interrupts: u64) {
+        let expected = checksum();
+        while kernel::timer_interrupts() < interrupts {
+            self.rounds.fetch_add(1, Ordering::Relaxed);
+            let is_other = checksum() != expected;
+            self.diverged
+                .fetch_add(u64::from(is_other), Ordering::Relaxed);
         }
     }
-    findings.rounds.fetch_add(rounds, Ordering::Relaxed);
-    rounds
 }

@@ -49,18 +49,20 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         let plain = hop((job, from + 1))?;
         Some(hop((job, from))?.saturating_sub(plain))
     });
-    emit("recording", 1, differences);
-    emit("return_to_start", 1, plain.filter_map(hop));
-    emit("return_to_start_recorded", 1, recorded.filter_map(hop));
-    emit("allocations", jobs, [run.allocations()]);
+    let workload = "64-byte values";
+    emit(workload, "recording", 1, differences);
+    emit(workload, "return_to_start", 1, plain.filter_map(hop));
+    let recorded = recorded.filter_map(hop);
+    emit(workload, "return_to_start_recorded", 1, recorded);
+    emit(workload, "allocations", jobs, [run.allocations()]);
     Ok(())
 }
 
 /// Prints a figure as the app `hand-off` does.
-fn emit(figure: &str, per: u64, samples: impl IntoIterator<Item = u64>) {
+pub(crate) fn emit(workload: &str, figure: &str, per: u64, samples: impl IntoIterator<Item = u64>) {
     let samples = Distribution::new(samples);
     json::emit("hand_off", |line| {
-        line.text("workload", "64-byte values")
+        line.text("workload", workload)
             .text("figure", figure)
             .number("per", per)
             .number("samples", samples.count() as u64)

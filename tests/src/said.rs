@@ -1,0 +1,127 @@
+//! What a guest has said, as a test looks for it: what is not there ends in a panic that shows
+//! the end of the log.
+
+use tool::Outcome;
+use tool::protocol::{MachineLine, Transcript};
+use tool::trace::{self, model::Run};
+
+/// What a run has to tell.
+pub trait Said {
+    /// Returns what it has said, taken apart.
+    fn transcript(&self) -> &Transcript;
+
+    /// Returns the end of it, for a person.
+    fn end(&self) -> String;
+
+    /// Returns all lines of a kind.
+    fn lines(&self, kind: &str) -> Vec<&MachineLine> {
+        let all = self.transcript().machine.iter();
+        all.filter(|line| line.kind == kind).collect()
+    }
+
+    /// Returns the first line of a kind.
+    #[track_caller]
+    fn line(&self, kind: &str) -> &MachineLine {
+        let first = self.lines(kind).into_iter().next();
+        first.unwrap_or_else(|| panic!("no line of kind `{kind}`\n{}", self.end()))
+    }
+
+    /// Returns the only line of a kind.
+    #[track_caller]
+    fn only(&self, kind: &str) -> &MachineLine {
+        let count = self.lines(kind).len();
+        assert_eq!(count, 1, "lines of kind `{kind}`\n{}", self.end());
+        self.line(kind)
+    }
+
+    /// Returns the reason that its verdict gives.
+    #[track_caller]
+    fn reason(&self) -> String {
+        let verdict = self.transcript().verdict();
+        verdict.expect("it gives a verdict").reason
+    }
+}
+
+impl Said for Transcript {
+    fn transcript(&self) -> &Transcript {
+        self
+    }
+
+    fn end(&self) -> String {
+        let last = self.machine.iter().rev().take(20).rev();
+        last.map(|line| format!("{}\n", line.text)).collect()
+    }
+}
+
+impl Said for Outcome {
+    fn transcript(&self) -> &Transcript {
+        &self.transcript
+    }
+
+    fn end(&self) -> String {
+        self.tail()
+    }
+}
+
+/// What a machine line has to tell.
+pub trait Members {
+    /// Returns the number at a path such as `join_latency_ns.max`.
+    fn number(&self, path: &str) -> u64;
+
+    /// Returns a text.
+    fn member(&self, name: &str) -> &str;
+
+    /// Holds numbers to what they must be.
+    fn has<const COUNT: usize>(&self, numbers: [(&str, u64); COUNT]);
+
+    /// Holds texts to what they must be.
+    fn reads<const COUNT: usize>(&self, texts: [(&str, &str); COUNT]);
+}
+
+impl Members for MachineLine {
+    #[track_caller]
+    fn number(&self, path: &str) -> u64 {
+        let number = self.number_at(path);
+        number.unwrap_or_else(|| panic!("no number `{path}` in {}", self.text))
+    }
+
+    #[track_caller]
+    fn member(&self, name: &str) -> &str {
+        let text = self.text_at(name);
+        text.unwrap_or_else(|| panic!("no text `{name}` in {}", self.text))
+    }
+
+    #[track_caller]
+    fn has<const COUNT: usize>(&self, numbers: [(&str, u64); COUNT]) {
+        for (path, number) in numbers {
+            assert_eq!(self.number(path), number, "`{path}` in {}", self.text);
+        }
+    }
+
+    #[track_caller]
+    fn reads<const COUNT: usize>(&self, texts: [(&str, &str); COUNT]) {
+        for (name, text) in texts {
+            assert_eq!(self.member(name), text, "`{name}` in {}", self.text);
+        }
+    }
+}
+
+/// Reads the traces of a log, and holds each run to the rules: nothing waits longer than
+/// `bound_ns` for what it is owed.
+///
+/// # Panics
+///
+/// Panics with what breaks a rule, or if there is no trace.
+#[must_use]
+#[track_caller]
+pub fn lawful_runs(outcome: &Outcome, bound_ns: u64) -> Vec<Run> {
+    let runs = trace::read(&outcome.serial);
+    let runs = runs.unwrap_or_else(|fault| panic!("line {}: {}", fault.line, fault.reason));
+    assert!(!runs.is_empty(), "no trace\n{}", outcome.tail());
+    for run in &runs {
+        let breaches = trace::check(run, bound_ns).breaches;
+        let breaches: Vec<String> = breaches.iter().map(ToString::to_string).collect();
+        assert!(breaches.is_empty(), "run {}: {breaches:#?}", run.number);
+    }
+    runs
+}

@@ -1,0 +1,30 @@
+//! Bytes from the serial port release a DAG.
+
+use harness::{Guest, Members, Said};
+
+// A text ends its line: two bytes. The second comes early and is kept. Both come while jobs run:
+// before time 0 one of them would be dropped.
+#[test]
+fn bytes_release_a_dag() {
+    let typed = [("\"kind\":\"progress\"", "a")];
+    let guest = Guest::test("input").cores(2).word("policy=edf");
+    let outcome = guest.typing(&typed).succeed();
+    outcome
+        .line("input")
+        .has([("answers", 2), ("violations", 0)]);
+}
+
+#[test]
+fn what_comes_before_time_0_releases_nothing_yet() {
+    let typed = [("\"kind\":\"listening\"", "a")];
+    let guest = Guest::test("input")
+        .cores(2)
+        .word("later_ms=400 trace=dump");
+    let outcome = guest.typing(&typed).succeed();
+    outcome
+        .line("input")
+        .has([("answers", 1), ("violations", 0)]);
+    assert_eq!(outcome.lines("fault").len(), 0);
+    let before_time_0 = "[0,\"signalled\",0,1,0,-1]";
+    assert!(outcome.serial.contains(before_time_0), "the byte came late");
+}

@@ -1,0 +1,118 @@
+//! Functions that compute and are preempted: they lose nothing, nothing waits long for them, and
+//! none answers for the time in which it is suspended or others compute. Where the processor has
+//! AVX they use it; where it is off they are told so, by the same image.
+
+use harness::{Guest, Members, Said, lawful_runs};
+use sched_dag::journal::{Event, What};
+use sched_dag::{DagId, SubtaskId};
+use tool::protocol::{MachineLine, Status};
+use tool::trace::model::Run;
+use tool::{Mode, Outcome};
+
+/// For how long a core waits for others' turns, and for what the kernel executes meanwhile
+/// (`docs/decisions/0021-turns.md`).
+const TURN_NS: u64 = 20_000;
+
+/// Describes DAGs that preempt one another, of instances that keep values in all registers and
+/// compare them.
+fn preemption(mode: Mode, cores: u64) -> Guest {
+    let guest = Guest::test("preemption").mode(mode).cores(cores);
+    guest.memory_mib(64)
+}
+
+/// Holds what it says to it that nothing is lost, though there are so many preemptions.
+#[track_caller]
+fn keeps_all(outcome: &Outcome, has_avx: bool, least_preemptions: u64) {
+    let line = outcome.line("preemption");
+    line.has([("diverged", 0), ("violations", 0)]);
+    let preemptions = line.number("preemptions");
+    assert!(preemptions >= least_preemptions, "{}", line.text);
+    let flag = format!("\"avx\":{has_avx}");
+    let is_told = |line: &MachineLine| line.text.contains(&flag);
+    assert!(is_told(line) && is_told(outcome.line("boot")), "{flag}");
+}
+
+/// Returns the longest time from an instance's start to its end, of the most urgent DAG's source,
+/// which has next to nothing to do, and which no other preempts by static priorities.
+fn longest_of_the_source(run: &Run) -> u64 {
+    let is_of = |event: &&Event| (event.dag, event.subtask) == (DagId(0), Some(SubtaskId(0)));
+    let mut started_ns = 0;
+    let mut longest_ns = 0;
+    for event in run.events.iter().filter(is_of) {
+        match event.what {
+            What::Start => started_ns = event.time_ns,
+            What::Finish => longest_ns = longest_ns.max(event.time_ns - started_ns),
+            _ => {}
+        }
+    }
+    longest_ns
+}
+
+/// With budgets that an instance would not keep if it were suspended by another one and had to
+/// answer for that, or for others' turns.
+#[test]
+fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
+    for cores in [1, 2, 4, 8] {
+        for policy in ["static", "edf"] {
+            let words = format!("ms=500 rounds=6 budgets=yes trace=dump policy={policy}");
+            let guest = preemption(Mode::Deterministic, cores).word(&words);
+            let outcome = guest.succeed();
+            keeps_all(&outcome, true, 100);
+            let line = outcome.line("preemption");
+            line.has([("passed_over", 0), ("allocations", 0)]);
+            let runs = lawful_runs(&outcome, TURN_NS);
+            assert_eq!((runs.len(), runs[0].lost), (1, 0));
+            if policy == "static" {
+                // A first short turn of each that is released at the same time, and a turn of
+                // each if the function is not done in its own first one.
+                let longest_ns = longest_of_the_source(&runs[0]);
+                assert!(longest_ns <= (2_000 + 8_000) * cores, "{longest_ns}");
+            }
+            if (cores, policy) == (4, "edf") {
+                assert!(guest.succeed().serial == outcome.serial, "two runs differ");
+            }
+        }
+    }
+}
+
+#[test]
+fn preempted_instances_lose_nothing_in_real_time() {
+    for (cores, policy) in [(2, "static"), (4, "edf")] {
+        // Emulated AVX is slow: where too much is to be done, only the most urgent DAG runs.
+        let words = format!("ms=500 rounds=4 policy={policy}");
+        let outcome = preemption(Mode::Threads, cores).word(&words).succeed();
+        keeps_all(&outcome, true, 1);
+    }
+}
+
+/// One has no AVX, the next not the instruction that leaves out what is not in use.
+#[test]
+fn the_same_image_runs_where_avx_is_missing_or_off() {
+    for (model, words) in [
+        ("Nehalem", ""),
+        ("max,-xsaveopt", ""),
+        ("max,-avx", ""),
+        ("max", "avx=off"),
+    ] {
+        let guest = preemption(Mode::Deterministic, 2).model(model);
+        keeps_all(&guest.word("ms=200").word(words).succeed(), false, 10);
+    }
+}
+
+#[test]
+fn avx_that_is_off_is_an_undefined_instruction() {
+    let guest = Guest::test("crime").word("crime=avx avx=off");
+    let outcome = guest.end_in(Status::Failure);
+    let exception = &outcome.line("exception").text;
+    assert!(exception.contains("invalid opcode"), "{exception}");
+    let reason = Guest::new("fork-join").word("avx=512").refusal();
+    assert_eq!(reason, "`avx=512`: allowed are on, off");
+}
+
+#[test]
+fn an_instance_that_computes_for_a_time_does_so_for_all_of_it() {
+    for mode in [Mode::Deterministic, Mode::Threads] {
+        let outcome = Guest::test("occupation").mode(mode).succeed();
+        outcome.line("occupation").has([("too_short", 0)]);
+    }
+}
