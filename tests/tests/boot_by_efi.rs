@@ -10,12 +10,8 @@ use tool::system;
 use tool::tiny::{TinyEnd, tiny_image};
 
 #[test]
-fn two_processors() {
+fn two_processors_and_four_with_memory_beyond_4_gib() {
     boots(Loader::Efi, 2, 128);
-}
-
-#[test]
-fn four_processors_with_memory_beyond_4_gib() {
     boots(Loader::Efi, 4, 6 << 10);
 }
 

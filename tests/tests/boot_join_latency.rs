@@ -1,60 +1,51 @@
 //! The evaluation on the machine: what joins every job does, what matches stamps does
 //! what its rules say of the same execution times, and a run is the same every time.
 
-use fork_join::ExecutionTimes;
-use harness::Guest;
-use pub_sub::workload::{self, Stamping};
-use pub_sub::{ApproximateTime, Parameters};
 use std::num::NonZeroUsize;
 use std::thread;
-use tool::Outcome;
+
+use fork_join::ExecutionTimes;
+use harness::{Guest, Members, Said};
+use pub_sub::workload::{self, Stamping};
+use pub_sub::{ApproximateTime, Parameters};
 use tool::protocol::{MachineLine, Status};
 
 const JOBS: u64 = 150;
 
 fn guest(words: &str) -> Guest {
     let guest = Guest::new("join-latency").cores(8).memory_mib(64);
-    guest.word(&format!("jobs={JOBS}")).word(words)
+    guest.word(words)
 }
 
-fn summary(outcome: &Outcome) -> &MachineLine {
-    let mut lines = outcome.transcript.of_kind("join_latency");
-    lines
-        .next()
-        .unwrap_or_else(|| panic!("no summary\n{}", outcome.tail()))
-}
-
-/// Checks the counts of joins: of one job, across jobs, missing.
-fn counts_are(outcome: &Outcome, expected: [u64; 3]) {
-    let line = summary(outcome);
-    let names = ["same_index", "cross_index", "missing"];
-    let counts = names.map(|name| line.number_at(name).expect(name));
-    assert_eq!(counts, expected, "{}", line.text);
-    assert_eq!(line.number_at("allocations"), Some(0), "{}", line.text);
+/// Boots it for so many jobs, and returns its summary.
+fn summary(words: &str) -> MachineLine {
+    let outcome = guest(&format!("jobs={JOBS} {words}")).succeed();
+    let line = outcome.line("join_latency").clone();
+    line.has([("allocations", 0)]);
+    line
 }
 
 #[test]
 fn a_dag_and_equal_stamps_join_every_job() {
     for policy in ["fass", "exact"] {
-        let outcome = guest(&format!("policy_under_test={policy} subtasks=6")).succeed();
-        counts_are(&outcome, [JOBS, 0, 0]);
+        let line = summary(&format!("policy_under_test={policy} subtasks=6"));
+        line.has([("same_index", JOBS), ("cross_index", 0), ("missing", 0)]);
     }
 }
 
 #[test]
 fn a_dag_joins_within_microseconds() {
-    let outcome = guest("policy_under_test=fass subtasks=4").succeed();
-    let most_ns = summary(&outcome).number_at("join_latency_ns.max");
-    assert!(most_ns.is_some_and(|ns| ns < 50_000), "{most_ns:?}");
+    let line = summary("policy_under_test=fass subtasks=4");
+    let most_ns = line.number("join_latency_ns.max");
+    assert!(most_ns < 50_000, "{most_ns}");
 }
 
 #[test]
 fn close_stamps_join_as_the_policy_does_in_virtual_time() {
     for (parallel, ms) in [(2, 10), (2, 50), (4, 30)] {
         let words = format!("max_interval_ms={ms} subtasks={parallel}");
-        let outcome = guest(&format!("policy_under_test=approximate {words}")).succeed();
-        let line = summary(&outcome);
-        let joins = line.number_at("joins").expect("checked by the reader");
+        let line = summary(&format!("policy_under_test=approximate {words}"));
+        let joins = line.number("joins");
 
         let jobs = usize::try_from(JOBS).expect("small");
         let queue = NonZeroUsize::new(1000).expect("not 0");
@@ -85,16 +76,17 @@ fn close_stamps_join_as_the_policy_does_in_virtual_time() {
 
 #[test]
 fn a_queue_that_is_too_short_loses_joins_by_equal_stamps() {
-    let outcome = guest("policy_under_test=exact subtasks=4 queue=1").succeed();
-    let missing = summary(&outcome).number_at("missing");
-    assert!(missing > Some(0), "{missing:?}");
+    let line = summary("policy_under_test=exact subtasks=4 queue=1");
+    assert!(line.number("missing") > 0, "{}", line.text);
 }
 
 #[test]
 fn lost_inputs_make_a_condition_worthless() {
-    let outcome = guest("policy_under_test=exact subtasks=2 depth=1").end_in(Status::Failure);
-    let verdict = outcome.transcript.verdict().expect("checked before");
-    assert!(verdict.reason.contains("`depth`"), "{}", verdict.reason);
+    let guest = guest(&format!(
+        "jobs={JOBS} policy_under_test=exact subtasks=2 depth=1"
+    ));
+    let reason = guest.end_in(Status::Failure).reason();
+    assert!(reason.contains("`depth`"), "{reason}");
 }
 
 /// Long runs, and several boots, since what the host does to a boot is rare: without
@@ -105,9 +97,8 @@ fn lost_inputs_make_a_condition_worthless() {
 #[test]
 fn long_runs_print_the_same_bytes() {
     let boot = |policy| {
-        let guest = Guest::new("join-latency").cores(8).memory_mib(64);
         let words = format!("policy_under_test={policy} subtasks=6 jobs=2000");
-        guest.word(&words).succeed().serial
+        guest(&words).succeed().serial
     };
     let boots = |policy| {
         let boots: Vec<String> = (0..4).map(|_| boot(policy)).collect();
@@ -127,7 +118,6 @@ fn long_runs_print_the_same_bytes() {
 
 #[test]
 fn too_few_cores_are_refused() {
-    let outcome = guest("subtasks=7").end_in(Status::Usage);
-    let reason = outcome.transcript.verdict().expect("checked before").reason;
+    let reason = guest("subtasks=7").refusal();
     assert!(reason.contains("need 9 cores"), "{reason}");
 }

@@ -2,41 +2,33 @@
 
 use std::fs;
 
-use harness::Guest;
+use harness::{Guest, Members, Said};
 use tool::protocol::Status;
 use tool::{Machine, Outcome, system};
 
 const MIB: usize = 1 << 20;
 
-/// Boots the app `replay` with a file of `content`, which it refuses by quoting
+/// Boots the app `replay` with a file of so many bytes, which it refuses by quoting
 /// how it begins.
-fn refused(guest: Guest, content: &[u8]) -> Outcome {
+fn refused(guest: Guest, bytes: usize) -> Outcome {
+    let mut content = vec![b'z'; bytes];
+    content[..2].copy_from_slice(b"xy");
     let file = system::new_log("module").expect("a folder for logs");
     fs::write(&file, content).expect("a file in it");
     let outcome = guest.module(&file).end_in(Status::Usage);
     let _ = fs::remove_file(&file);
-    let reason = outcome.transcript.verdict().expect("checked before").reason;
+    let reason = outcome.reason();
     assert!(reason.contains("found `xyz"), "{reason}");
     outcome
 }
 
-fn content(bytes: usize) -> Vec<u8> {
-    let mut content = vec![b'z'; bytes];
-    content[..2].copy_from_slice(b"xy");
-    content
-}
-
-/// Returns the time from the kernel's entry to its first line.
-fn ready_ns(outcome: &Outcome) -> u64 {
-    let boot = outcome.transcript.of_kind("boot").next();
-    let ready_ns = boot.and_then(|line| line.number_at("ready_ns"));
-    ready_ns.expect("the protocol has it")
-}
-
+/// From the kernel's entry to its first line.
 #[test]
 fn the_boot_takes_no_longer_with_a_large_file() {
-    let small = ready_ns(&refused(Guest::new("replay"), &content(3)));
-    let large = ready_ns(&refused(Guest::new("replay"), &content(20 * MIB + 1)));
+    let [small, large] = [3, 20 * MIB + 1].map(|bytes| {
+        let outcome = refused(Guest::new("replay"), bytes);
+        outcome.line("boot").number("ready_ns")
+    });
     let difference = small.abs_diff(large);
     assert!(difference < small / 100, "{small} ns, {large} ns");
 }
@@ -45,7 +37,7 @@ fn the_boot_takes_no_longer_with_a_large_file() {
 fn a_file_reaches_the_app_on_both_boards() {
     for machine in [Machine::Microvm, Machine::Q35] {
         for bytes in [4095, 4096, 4097, 3 * MIB + 5] {
-            refused(Guest::new("replay").machine(machine), &content(bytes));
+            refused(Guest::new("replay").machine(machine), bytes);
         }
     }
 }
@@ -54,9 +46,11 @@ fn a_file_reaches_the_app_on_both_boards() {
 fn an_app_that_takes_no_file_is_warned_of() {
     let file = system::new_log("module").expect("a folder for logs");
     fs::write(&file, "a recording").expect("a file in it");
-    let few = || Guest::new("fork-join").word("jobs=1");
-    let said = |outcome: Outcome| outcome.serial.contains("warning: the app takes no file");
-    assert!(said(few().module(&file).succeed()));
-    assert!(!said(few().succeed()));
+    let few = Guest::new("fork-join").word("jobs=1");
+    for (guest, is_warned) in [(few.clone().module(&file), true), (few, false)] {
+        let said = guest.succeed().serial;
+        let warning = "warning: the app takes no file";
+        assert_eq!(said.contains(warning), is_warned, "{said}");
+    }
     let _ = fs::remove_file(&file);
 }

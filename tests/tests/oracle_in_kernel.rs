@@ -28,24 +28,28 @@ fn cases(keep: impl Fn(&Case) -> bool) -> (Vec<Case>, Vec<String>) {
         .unzip()
 }
 
+/// Runs cases on the machine, and holds each to its schedule.
+#[track_caller]
+fn are_reproduced(cases: &[Case], texts: &[String], settings: &Settings) {
+    let judged = run(cases, texts, settings).expect("QEMU and an image");
+    assert_eq!(judged.len(), cases.len());
+    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
 #[test]
 fn the_machine_reproduces_the_public_schedules() {
     let (cases, texts) = cases(|case| case.cores <= 4);
     assert_eq!(cases.len(), 24);
-    let judged = run(&cases, &texts, &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
-    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
-    assert_eq!(judged.len(), 24);
-    assert!(failed.is_empty(), "{failed:#?}");
+    are_reproduced(&cases, &texts, &Settings::for_unit(UNIT_US));
 }
 
 #[test]
 fn the_machine_reproduces_the_schedules_of_clusters_and_sink_deadlines() {
     let cases = parse(CLUSTERS).expect("the file is well formed");
+    assert_eq!(cases.len(), 30);
     let settings = Settings::for_unit(UNIT_US);
-    let judged = run(&cases, &texts_of_cases(CLUSTERS), &settings).expect("QEMU and an image");
-    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
-    assert_eq!(judged.len(), 30);
-    assert!(failed.is_empty(), "{failed:#?}");
+    are_reproduced(&cases, &texts_of_cases(CLUSTERS), &settings);
 }
 
 #[test]
@@ -62,16 +66,13 @@ fn the_machine_reproduces_schedules_of_functions_that_compute() {
     let preempted = cases.iter().filter(|case| has_preemptions(case));
     let preempted: Vec<u32> = preempted.map(|case| case.cores).collect();
     assert_eq!(preempted, [1, 4, 8, 2]);
-    let settings = Settings::for_unit(2000).computing();
-    let judged = run(&cases, &texts, &settings).expect("QEMU and an image");
-    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
-    assert_eq!(judged.len(), 15);
-    assert!(failed.is_empty(), "{failed:#?}");
+    are_reproduced(&cases, &texts, &Settings::for_unit(2000).computing());
 }
 
 #[test]
 fn events_apart_need_no_window() {
     let cases = parse(DISTINCT).expect("the file is well formed");
+    assert_eq!(cases.len(), 10);
     for case in &cases {
         assert_eq!(check(case), Ok(()), "{} in virtual time", case.name);
     }
@@ -81,10 +82,7 @@ fn events_apart_need_no_window() {
         tolerance_percent: 5,
         ..Settings::for_unit(1000)
     };
-    let judged = run(&cases, &texts_of_cases(DISTINCT), &settings).expect("QEMU and an image");
-    let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
-    assert_eq!(judged.len(), 10);
-    assert!(failed.is_empty(), "{failed:#?}");
+    are_reproduced(&cases, &texts_of_cases(DISTINCT), &settings);
 }
 
 #[test]
@@ -102,11 +100,6 @@ fn a_schedule_that_is_not_the_reference_s_is_found_out() {
 
 #[test]
 fn a_guest_without_cases_is_refused() {
-    let outcome = harness::Guest::new("replay").end_in(tool::protocol::Status::Usage);
-    let verdict = outcome.transcript.verdict().expect("checked before");
-    assert!(
-        verdict.reason.contains("-initrd FILE"),
-        "{}",
-        verdict.reason
-    );
+    let reason = harness::Guest::new("replay").refusal();
+    assert!(reason.contains("-initrd FILE"), "{reason}");
 }
