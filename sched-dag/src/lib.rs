@@ -45,8 +45,8 @@
 //!   first, then all releases, then one dispatch.
 //!
 //! A *sporadic* DAG's jobs are released by signals instead of the clock, at least
-//! T apart: the rules S1 to S4 stand in `scheduler/signals.rs`, their tests in
-//! `tests/sporadic.rs`. From its release on its job is a job like others.
+//! T apart: the rules S1 to S4 stand in `scheduler/signals.rs`, their scenarios in
+//! `tests/scenarios/sharing.txt`. From its release on its job is a job like others.
 //!
 //! What happens to a release that finds as many jobs in flight as the DAG may
 //! have is the DAG's [`OverrunPolicy`]; its scenarios are in `tests/scenarios/overrun.txt`.

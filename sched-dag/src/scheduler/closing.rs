@@ -1,7 +1,7 @@
 //! Closing a DAG: its last jobs come to their end.
 //!
 //! This is how a machine is stopped in order: nothing more begins, and what has begun is
-//! finished. The rules, whose tests in `tests/closing.rs` bear their numbers:
+//! finished. The rules, whose scenarios in `tests/scenarios/lifecycle.txt` bear their numbers:
 //!
 //! - **C1, no release.** A closed DAG releases no job any more, at the very instant of the
 //!   closing neither, since closings come before releases. No further job is due, so none is

@@ -1,7 +1,7 @@
 //! Pausing a DAG: no releases for a while, on the same grid afterwards.
 //!
 //! A person, or a mode of the system, wants a DAG to rest and to go on later. The
-//! rules, whose tests in `tests/pausing.rs` bear their numbers:
+//! rules, whose scenarios in `tests/scenarios/lifecycle.txt` bear their numbers:
 //!
 //! - **P1, no release.** A paused DAG releases no job. Each job that becomes due
 //!   is skipped at that instant, whatever the overrun policy; at the instant of

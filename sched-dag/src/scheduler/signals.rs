@@ -2,7 +2,7 @@
 //!
 //! Words: a *signal* is an event that wants one job of a sporadic DAG. The DAG's
 //! *minimum inter-arrival time* T is its period in the model. The rules, whose
-//! tests in `tests/sporadic.rs` bear their numbers:
+//! scenarios in `tests/scenarios/sharing.txt` bear their numbers:
 //!
 //! - **S1, release.** A signal at time a lets the next job k be due at its
 //!   nominal release time r(k) = max(a, r(k-1) + T), job 0 at max(a, O). A signal

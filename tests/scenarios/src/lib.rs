@@ -59,6 +59,7 @@ pub const SUITE: &[(&str, &str)] = &[
     ("ending", include_str!("../ending.txt")),
     ("faults", include_str!("../faults.txt")),
     ("lifecycle", include_str!("../lifecycle.txt")),
+    ("modes", include_str!("../modes.txt")),
     ("overrun", include_str!("../overrun.txt")),
     ("rules", include_str!("../rules.txt")),
     ("sharing", include_str!("../sharing.txt")),

@@ -1,15 +1,45 @@
-//! Random sets of DAGs, modes and requests, against a second reading of the rules: sets of bits,
-//! told what is released and completed.
+//! Modes, in virtual time: random sets of DAGs, modes and requests, against a second reading of the
+//! rules M1 to M5: sets of bits, told what is released and completed. `tests/scenarios/modes.txt`
+//! tells each of M1 to M6 apart.
+
+mod support;
 
 use std::collections::VecDeque;
 
 use sched_dag::journal::What;
-use sched_dag::lifecycle::{Changes, Entry, Request};
-use sched_dag::{DagId, DagSpec};
+use sched_dag::lifecycle::{Changes, Entry, Lifecycle, Request};
+use sched_dag::virtual_time::VirtualTime;
+use sched_dag::{DagId, DagSpec, ModeId};
+use support::random::Random;
+use support::{Run, Script, TWO_CORES, Takes, dag, number, scheduler};
 
-use super::support::random::Random;
-use super::support::{dag, number};
-use super::{Run, Script, enter, run};
+/// Runs all jobs of DAGs on two cores.
+fn run(specs: &[DagSpec], lifecycle: Changes, script: Script<'_, impl Takes>) -> Run {
+    let driver = VirtualTime::new(scheduler(specs, TWO_CORES));
+    let run = script.run(driver.with_lifecycle(Some(Box::new(lifecycle))));
+    assert!(run.driver.is_finished());
+    run
+}
+
+fn enter(mode: u32, entry: Entry) -> Request {
+    Request::Enter(ModeId(mode), entry)
+}
+
+#[test]
+fn m7_a_dag_that_is_left_alone_is_neither_paused_nor_waited_for() {
+    let ticking = || dag(100, 300, 4, &[1], &[]);
+    let modes = vec![vec![DagId(0)], vec![DagId(1)]];
+    let mut lifecycle = Changes::new(2, true).with_modes(modes);
+    lifecycle.leave_alone(DagId(0));
+    let requests = [(110, enter(1, Entry::WhenIdle)), (250, Request::ShutDown)];
+    let script = Script::new(50).asking(requests);
+    run(&[ticking(), ticking()], lifecycle, script).must_be(
+        "0 off 1, entered 0, skipped 1.0
+         100 skipped 1.1
+         110 on 1, entered 1
+         released=4, released@1=1",
+    );
+}
 
 /// A change, and of which DAG or to which mode.
 type Change = (What, u32);
