@@ -1,10 +1,13 @@
 //! Chains on a journal by hand: which there are, and their times as they are computed by hand.
 
+#[path = "support/events.rs"]
+mod events;
+
+use events::events;
 use sched_dag::chains::{Chain, Latencies, SampledJobs, Sampling};
-use sched_dag::journal::{Event, What};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, Instance, Policy, SubtaskId,
-    SubtaskSpec, TaskSet, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, SubtaskId, SubtaskSpec,
+    TaskSet, verify,
 };
 
 /// `camera` (period 100, `expose` before `detect`), `plan` (period 60), `motor` (period 20):
@@ -32,67 +35,39 @@ fn model() -> (TaskSet, [Sampling; 2]) {
         .with_construction(ConstructionPolicy::any_graph())
         .with_instance_limit(u32::MAX);
     let samplings = [
-        Sampling {
-            writer: place(0, 1),
-            reader: place(1, 0),
-        },
-        Sampling {
-            writer: place(1, 0),
-            reader: place(2, 0),
-        },
+        sampling(place(0, 1), place(1, 0)),
+        sampling(place(1, 0), place(2, 0)),
     ];
     let verified = verify(&dags, &options).expect("a sound set");
     (verified.task_set, samplings)
+}
+
+fn sampling(writer: (DagId, SubtaskId), reader: (DagId, SubtaskId)) -> Sampling {
+    Sampling { writer, reader }
 }
 
 fn place(dag: u32, subtask: u32) -> (DagId, SubtaskId) {
     (DagId(dag), SubtaskId(subtask))
 }
 
-fn events(lines: &str) -> Vec<Event> {
-    let event = |line: &str| {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let number = |at: usize| words[at].parse().expect("a number");
-        let small = |at: usize| u32::try_from(number(at)).expect("small");
-        Event {
-            time_ns: number(0),
-            what: words[1].parse().expect("an event's word"),
-            core: CoreId(0),
-            dag: DagId(small(2)),
-            job: number(3),
-            subtask: (words.len() > 4).then(|| SubtaskId(small(4))),
-        }
-    };
-    lines
-        .lines()
-        .filter(|line| !line.is_empty())
-        .map(event)
-        .collect()
-}
-
-/// Time, event, DAG, job, subtask. `detect` finishes at 30 and 145; `plan` starts at 5, 65, 125,
+/// `detect` finishes at 30 and 145; `plan` starts at 5, 65, 125,
 /// 185 and so finds nothing, job 0, job 0 and job 1; it finishes at 15, 75, 135 and 195.
-const RUN: &str = "
-0 released 0 0
-0 released 1 0
-0 released 2 0
+const RUN: &str = "\
+0 released 0 0, released 1 0, released 2 0
 5 start 1 0 0
 10 start 2 0 0
 12 finish 2 0 0
 15 finish 1 0 0
 20 finish 0 0 0
 30 finish 0 0 1
-60 released 1 1
-60 released 2 3
+60 released 1 1, released 2 3
 62 start 2 3 0
 64 finish 2 3 0
 65 start 1 1 0
-75 finish 1 1 0
-75 start 2 4 0
+75 finish 1 1 0, start 2 4 0
 80 released 2 4
 82 finish 2 4 0
-100 released 0 1
-100 released 2 5
+100 released 0 1, released 2 5
 101 start 2 5 0
 103 finish 2 5 0
 120 released 1 2
@@ -102,15 +77,12 @@ const RUN: &str = "
 141 start 2 7 0
 143 finish 2 7 0
 145 finish 0 1 1
-180 released 1 3
-180 released 2 9
+180 released 1 3, released 2 9
 185 start 1 3 0
 195 finish 1 3 0
-200 released 0 2
-200 released 2 10
+200 released 0 2, released 2 10
 201 start 2 10 0
-204 finish 2 10 0
-";
+204 finish 2 10 0";
 
 #[test]
 fn the_times_of_a_small_run_are_those_computed_by_hand() {
@@ -119,10 +91,8 @@ fn the_times_of_a_small_run_are_those_computed_by_hand() {
     let [chain] = &chains[..] else {
         panic!("{chains:?}");
     };
-    let names: Vec<String> = chain
-        .names(&task_set)
-        .map(|name| name.to_string())
-        .collect();
+    let names = chain.names(&task_set);
+    let names: Vec<String> = names.map(|name| name.to_string()).collect();
     let expected = ["camera/expose", "camera/detect", "plan/plan", "motor/drive"];
     assert_eq!(names, expected);
     let latencies = chain.latencies(&task_set, events(RUN).iter().copied());
@@ -149,13 +119,9 @@ fn the_times_of_a_small_run_are_those_computed_by_hand() {
 #[test]
 fn what_finishes_at_the_very_start_counts_by_its_place_in_the_journal() {
     let (task_set, samplings) = model();
-    let mut swapped = events(RUN);
-    let at = swapped.iter().position(|event| event.time_ns == 75);
-    let at = at.expect("a finish of `plan`");
-    assert_eq!(swapped[at + 1].what, What::Start);
-    swapped.swap(at, at + 1);
+    let swapped = RUN.replace("finish 1 1 0, start 2 4 0", "start 2 4 0, finish 1 1 0");
     let chain = &Chain::all(&task_set, &samplings)[0];
-    let latencies = chain.latencies(&task_set, swapped.into_iter());
+    let latencies = chain.latencies(&task_set, events(&swapped).into_iter());
     assert_eq!(latencies.output_age_ns, [103, 143, 104]);
 }
 
@@ -176,14 +142,9 @@ fn bounds_are_sums_and_name_the_dag_that_has_none() {
     let (task_set, samplings) = model();
     let chain = &Chain::all(&task_set, &samplings)[0];
     let responses_ns = [Some(50), Some(20), Some(5)];
-    assert_eq!(
-        chain.output_age_bound_ns(&task_set, &responses_ns),
-        Ok(150 + 80 + 5)
-    );
-    assert_eq!(
-        chain.reaction_bound_ns(&task_set, &responses_ns),
-        Ok(150 + 80 + 25)
-    );
+    let age = chain.output_age_bound_ns(&task_set, &responses_ns);
+    let reaction = chain.reaction_bound_ns(&task_set, &responses_ns);
+    assert_eq!((age, reaction), (Ok(150 + 80 + 5), Ok(150 + 80 + 25)));
     let lacking = [Some(50), None, Some(5)];
     assert_eq!(chain.reaction_bound_ns(&task_set, &lacking), Err(DagId(1)));
 }
@@ -201,10 +162,7 @@ fn chains_between_two_subtasks_are_found_by_name_and_pass_no_dag_twice() {
     assert_eq!(ways(&samplings, "camera/expose", "camera/detect"), 1);
     assert_eq!(ways(&samplings, "motor/drive", "camera/detect"), 0);
     // The plan also depends on what the motor does: a circle of DAGs.
-    samplings[0] = Sampling {
-        writer: place(2, 0),
-        reader: place(1, 0),
-    };
+    samplings[0] = sampling(place(2, 0), place(1, 0));
     assert_eq!(ways(&samplings, "motor/drive", "plan/plan"), 1);
     assert_eq!(Chain::all(&task_set, &samplings), []);
 }

@@ -1,9 +1,11 @@
-//! The law on journals of random sets, whole ones and those that have lost their
-//! oldest events.
+//! The law on journals: of random sets, whole ones and those that have lost their oldest events,
+//! and of small ones that are wrong in what random sets do not have.
 //!
 //! More or other sets: `JOURNALS=100000 JOURNAL_SEED=7 cargo test -p sched-dag --test
 //! journal`.
 
+#[path = "support/events.rs"]
+mod events;
 #[allow(dead_code, reason = "its own test uses all of it")]
 #[path = "properties/set.rs"]
 mod set;
@@ -11,13 +13,17 @@ mod support;
 
 pub(crate) use support::random;
 
+use events::events;
 use random::Random;
 use sched_dag::journal::{Event, What};
-use sched_dag::law::{Record, Tally, Terms, Violation, dispatch_violations, violations};
+use sched_dag::law::{
+    Histogram, InstanceRecord, JobRecord, Record, Tally, Terms, Violation, dispatch_violations,
+    violations,
+};
 use sched_dag::virtual_time::VirtualTime;
-use sched_dag::{DagId, Instance, JobOutcome};
+use sched_dag::{DagId, Instance, JobOutcome, SubtaskId};
 use set::{Overruns, Set};
-use support::{Run, Script, number, scheduler};
+use support::{PREEMPTIVE, Run, Script, Spec, commit, number, scheduler};
 
 fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
     let (count, first_seed) = (number("JOURNALS", 500), number("JOURNAL_SEED", 1));
@@ -53,13 +59,6 @@ fn judged(run: &Run, set: &Set, terms: Terms, events: &[Event]) -> Vec<Violation
 fn record(run: &Run, is_whole: bool, from: usize) -> Record {
     let events = run.events[from..].iter().copied();
     Record::of_events(&run.task_set, is_whole, events).expect("it fits")
-}
-
-#[test]
-fn a_whole_journal_keeps_all_rules() {
-    for_each_run(|seed, _, set, run| {
-        assert_eq!(judged(run, set, COMPLETE, &run.events), [], "seed {seed}");
-    });
 }
 
 #[test]
@@ -111,49 +110,37 @@ fn a_journal_with_one_event_changed_breaks_a_rule() {
         if seed > few {
             return;
         }
-        let objects = |change: &str, event: &Event, mut events: Vec<Event>| {
+        let mut objects = |kind: usize, event: &Event, change: &dyn Fn(&mut Vec<Event>)| {
+            let mut events = run.events.clone();
+            change(&mut events);
             events.sort_by_key(|event| event.time_ns);
             let found = judged(run, set, COMPLETE, &events);
-            assert!(!found.is_empty(), "seed {seed}: {change} {event:?}");
+            assert!(!found.is_empty(), "seed {seed}: change {kind} of {event:?}");
+            counts[kind] += 1;
         };
-        for (place, event) in run.events.iter().enumerate() {
-            if !NEEDED.contains(&event.what) {
-                continue;
-            }
-            let is_next = |other: &&Event| other.instance() == event.instance();
-            let next = run.events[place + 1..].iter().position(|it| is_next(&it));
+        let events = run.events.iter().enumerate();
+        for (place, event) in events.filter(|(_, event)| NEEDED.contains(&event.what)) {
+            let is_next = |other: &Event| other.instance() == event.instance();
+            let next = run.events[place + 1..].iter().position(is_next);
             let next = next.filter(|_| event.instance().is_some());
             let next = next.map(|next| place + 1 + next);
             let next_is = |what: What| next.is_some_and(|next| run.events[next].what == what);
             // An instance may be cancelled without having been ready.
             if event.what != What::Ready || !next_is(What::Cancelled) {
-                let mut deleted = run.events.clone();
-                deleted.remove(place);
-                objects("deleted", event, deleted);
+                objects(0, event, &|events| _ = events.remove(place));
             }
-            let mut doubled = run.events.clone();
-            doubled.insert(place, *event);
-            objects("doubled", event, doubled);
-            counts[0] += 1;
-            counts[1] += 1;
+            objects(1, event, &|events| events.insert(place, *event));
             // How long an instance executes, no rule says.
             if !matches!(event.what, What::Cancelled | What::Finish) {
-                let mut later = run.events.clone();
-                later[place].time_ns += 1;
-                objects("later", event, later);
-                counts[2] += 1;
+                objects(2, event, &|events| events[place].time_ns += 1);
                 if event.time_ns > 0 {
-                    let mut earlier = run.events.clone();
-                    earlier[place].time_ns -= 1;
-                    objects("earlier", event, earlier);
-                    counts[3] += 1;
+                    objects(3, event, &|events| events[place].time_ns -= 1);
                 }
             }
             if let Some(next) = next {
-                let mut swapped = run.events.clone();
-                (swapped[place].what, swapped[next].what) = (swapped[next].what, event.what);
-                objects("swapped", event, swapped);
-                counts[4] += 1;
+                objects(4, event, &|events| {
+                    (events[place].what, events[next].what) = (events[next].what, event.what);
+                });
             }
         }
     });
@@ -162,43 +149,103 @@ fn a_journal_with_one_event_changed_breaks_a_rule() {
 }
 
 #[test]
-fn statistics_are_those_of_the_record() {
-    for_each_run(|seed, _, _, run| {
+fn a_whole_journal_keeps_all_rules_and_its_record_has_the_statistics() {
+    for_each_run(|seed, _, set, run| {
+        assert_eq!(judged(run, set, COMPLETE, &run.events), [], "seed {seed}");
         let record = record(run, true, 0);
         let mut tally = Tally::new(&run.task_set, 5);
         run.events.iter().for_each(|event| tally.take(event));
+        let same = |counted: &Histogram, times: Vec<u64>| {
+            assert_eq!(counted.count(), times.len() as u64, "seed {seed}");
+            let longest = times.into_iter().max().unwrap_or(0);
+            assert_eq!(counted.max(), longest, "seed {seed}");
+        };
         for (dag, model) in (0..).map(DagId).zip(run.task_set.dags()) {
-            let complete = record.numbered(dag).filter_map(|(job, times)| {
+            let of_complete = |(job, times): (u64, &JobRecord)| {
                 let is_complete =
                     matches!(times.outcome, Some(JobOutcome::Met | JobOutcome::Missed));
                 let response_ns = record.completion_ns(dag, job)? - times.release_ns?;
                 is_complete.then_some(response_ns)
-            });
-            let responses: Vec<u64> = complete.collect();
-            let counted = &tally.dag(dag).response_time;
-            assert_eq!(counted.count(), responses.len() as u64, "seed {seed}");
-            let longest = responses.iter().max().copied().unwrap_or(0);
-            assert_eq!(counted.max(), longest, "seed {seed}");
-            for (subtask, _) in (0..).map(sched_dag::SubtaskId).zip(model.subtasks()) {
-                let instance = |job| Instance { dag, job, subtask };
-                let times = || {
-                    record.numbered(dag).filter_map(|(job, _)| {
-                        let instance = instance(job);
-                        record.instance(instance).map(|times| (instance, *times))
-                    })
+            };
+            let responses = record.numbered(dag).filter_map(of_complete);
+            same(&tally.dag(dag).response_time, responses.collect());
+            for (subtask, _) in (0..).map(SubtaskId).zip(model.subtasks()) {
+                let of_job = |(job, _)| {
+                    let instance = Instance { dag, job, subtask };
+                    Some((instance, *record.instance(instance)?))
                 };
-                let statistics = tally.subtask(run.task_set.vertex(instance(0)));
-                let joins = times().filter_map(|(instance, times)| {
+                let times: Vec<_> = record.numbered(dag).filter_map(of_job).collect();
+                let vertex = run.task_set.vertex(Instance {
+                    dag,
+                    job: 0,
+                    subtask,
+                });
+                let statistics = tally.subtask(vertex);
+                let join_ns = |&(instance, times): &(Instance, InstanceRecord)| {
                     let join_ns = record.join_ns(&run.task_set, instance)?;
                     Some(times.start_ns? - join_ns)
-                });
-                let joins: Vec<u64> = joins.collect();
-                let counted = &statistics.join_latency;
-                assert_eq!(counted.count(), joins.len() as u64, "seed {seed}");
-                assert_eq!(counted.max(), joins.into_iter().max().unwrap_or(0));
-                let finished = times().filter(|(_, times)| times.finish_ns.is_some());
+                };
+                same(
+                    &statistics.join_latency,
+                    times.iter().filter_map(join_ns).collect(),
+                );
+                let finished = times.iter().filter(|(_, times)| times.finish_ns.is_some());
                 assert_eq!(statistics.execution_time.count(), finished.count() as u64);
             }
         }
     });
+}
+
+#[test]
+fn the_law_accepts_what_is_survived_and_nothing_else() {
+    let chain = || support::dag(10, 10, 9, &[0, 0, 0], &[(0, 1), (1, 2)]);
+    let right = chain().surviving(1, 3, 3);
+    let run = Script::new(3)
+        .failing(|instance| instance.job % 3 == 2 && instance.subtask.0 == 1)
+        .run(VirtualTime::new(scheduler(
+            std::slice::from_ref(&right),
+            PREEMPTIVE,
+        )));
+    let breaches = |spec, events: &[Event]| {
+        let events = events.iter().copied();
+        violations(&commit(&[spec], PREEMPTIVE), Terms::EXACT, events)
+    };
+    assert_eq!(breaches(right.clone(), &run.events), []);
+    let record = record(&run, true, 0);
+    let failed = record.jobs(DagId(0)).iter().filter(|job| job.has_failed);
+    assert_eq!(failed.count(), 3);
+    // Held against models that survive less.
+    let less = [
+        (chain().surviving(1, 4, 3), 2),
+        (chain().surviving(1, 3, 2), 1),
+        (chain(), 3),
+    ];
+    for (spec, count) in less {
+        let found = breaches(spec, &run.events);
+        assert_eq!(found.len(), count, "{found:?}");
+        let words = found[0].to_string();
+        let said = "although its DAG does not survive that fault";
+        assert!(words.contains(said), "{words}");
+    }
+    // A subtask goes on without having failed.
+    let mut lie = run.events.clone();
+    lie.retain(|event| event.what != What::Ended);
+    assert!(!breaches(right, &lie).is_empty());
+}
+
+#[test]
+fn the_law_finds_releases_that_are_too_close_and_those_of_no_signal() {
+    let spec = support::dag(10, 10, 2, &[0], &[]).sporadic();
+    let task_set = commit(&[spec], PREEMPTIVE);
+    let found = |text| violations(&task_set, Terms::whole(u64::MAX), events(text));
+    let expected = Violation::TooSoon {
+        dag: DagId(0),
+        job: 1,
+        release_ns: 14,
+        earliest_ns: 15,
+    };
+    let close = "5 due 0 0, released 0 0\n14 due 0 1, released 0 1";
+    assert_eq!(found(close), [expected]);
+    let no_signal = found("5 released 0 0\n15 due 0 1, released 0 1");
+    assert!(matches!(no_signal[..], [Violation::NotDue { .. }, ..]));
 }
