@@ -9,10 +9,10 @@ use std::sync::Arc;
 
 use counting::allocated;
 use random::Random;
-use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime, Workload};
+use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, OverrunPolicy, Policy, Preemption,
-    Scheduler, SchedulerOptions, SubtaskSpec, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, DagStatistics, Instance, OverrunPolicy,
+    Policy, Preemption, Scheduler, SchedulerOptions, SubtaskSpec, verify,
 };
 
 /// A layered DAG of 40 subtasks that overruns now and then.
@@ -32,87 +32,66 @@ fn dag(random: &mut Random, overrun: OverrunPolicy) -> DagSpec {
     }
 }
 
+/// Random execution times, and perhaps a fault now and then.
+struct Work {
+    random: Random,
+    may_fail: bool,
+}
+
+impl Workload for Work {
+    fn execute(&mut self, _instance: &mut Instance, _now_ns: u64) -> Option<u64> {
+        Some(self.random.between(0, 50))
+    }
+
+    fn fails(&mut self, _instance: Instance) -> bool {
+        self.may_fail && self.random.between(0, 2_999) == 0
+    }
+}
+
+/// Runs a DAG of each overrun policy, and returns what they did.
+fn run(seed: u64, policy: Policy, preemption: Preemption, may_fail: bool) -> [DagStatistics; 3] {
+    let mut random = Random::new(seed);
+    let overruns = [
+        OverrunPolicy::Queue,
+        OverrunPolicy::Skip,
+        OverrunPolicy::Abort,
+    ];
+    let specs = overruns.map(|overrun| dag(&mut random, overrun));
+    let options = CommitOptions::new(policy, 4).with_construction(ConstructionPolicy::any_graph());
+    let verified = verify(&specs, &options).expect("right DAGs");
+    let options = SchedulerOptions {
+        policy,
+        preemption,
+        cores: 4,
+    };
+    let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
+    let mut work = Work { random, may_fail };
+
+    let before = allocated().0;
+    let end = run.run(&mut work);
+    let allocated = allocated().0 - before;
+
+    assert_eq!(end, End::Finished);
+    assert_eq!(allocated, 0, "seed {seed}, {policy:?} {preemption:?}");
+    [0, 1, 2].map(|dag| *run.scheduler_of(DagId(dag)).statistics(DagId(dag)))
+}
+
 #[test]
 fn nothing_is_allocated_from_first_release_to_last_completion() {
     for policy in [Policy::StaticPriority, Policy::Edf] {
         for preemption in [Preemption::Enabled, Preemption::Disabled] {
-            let mut random = Random::new(1);
-            let specs = [
-                OverrunPolicy::Queue,
-                OverrunPolicy::Skip,
-                OverrunPolicy::Abort,
-            ]
-            .map(|overrun| dag(&mut random, overrun));
-            let commit_options =
-                CommitOptions::new(policy, 4).with_construction(ConstructionPolicy::any_graph());
-            let verified = verify(&specs, &commit_options).expect("right DAGs");
-            let options = SchedulerOptions {
-                policy,
-                preemption,
-                cores: 4,
-            };
-            let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
-
-            let before = allocated().0;
-            let end = run.run(&mut ExecutionTimes(|_| random.between(0, 50)));
-            let allocated = allocated().0 - before;
-
-            assert_eq!(end, End::Finished);
-            assert_eq!(allocated, 0, "{policy:?} {preemption:?}");
+            let [queue, skip, abort] = run(1, policy, preemption, false);
             // The run was worth counting: all policies had something to do.
-            let counted = [0, 1, 2].map(|dag| *run.scheduler_of(DagId(dag)).statistics(DagId(dag)));
-            assert!(counted[0].queued > 0 && counted[1].skips > 0 && counted[2].aborts > 0);
+            assert!(queue.queued > 0 && skip.skips > 0 && abort.aborts > 0);
         }
-    }
-}
-
-/// Random execution times, and a fault now and then.
-struct Failing(Random);
-
-impl Workload for Failing {
-    fn execute(&mut self, _instance: &mut Instance, _now_ns: u64) -> Option<u64> {
-        Some(self.0.between(0, 50))
-    }
-
-    fn fails(&mut self, _instance: Instance) -> bool {
-        self.0.between(0, 2_999) == 0
     }
 }
 
 #[test]
 fn nothing_is_allocated_when_dags_are_ended() {
-    let mut faults = 0;
-    let mut dropped = 0;
-    for seed in 1..=20 {
-        let mut random = Random::new(seed);
-        let specs = [
-            OverrunPolicy::Queue,
-            OverrunPolicy::Queue,
-            OverrunPolicy::Abort,
-        ]
-        .map(|overrun| dag(&mut random, overrun));
-        let commit_options =
-            CommitOptions::new(Policy::Edf, 4).with_construction(ConstructionPolicy::any_graph());
-        let verified = verify(&specs, &commit_options).expect("right DAGs");
-        let options = SchedulerOptions {
-            policy: Policy::Edf,
-            preemption: Preemption::Enabled,
-            cores: 4,
-        };
-        let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
-
-        let before = allocated().0;
-        let end = run.run(&mut Failing(random));
-        let allocated = allocated().0 - before;
-
-        assert_eq!(end, End::Finished);
-        assert!(run.is_finished(), "seed {seed}");
-        assert_eq!(allocated, 0, "seed {seed}");
-        for counted in [0, 1, 2].map(|dag| run.scheduler_of(DagId(dag)).statistics(DagId(dag))) {
-            faults += counted.faults;
-            dropped += counted.dropped;
-        }
-    }
+    let runs = (1..=20).flat_map(|seed| run(seed, Policy::Edf, Preemption::Enabled, true));
+    let sum = |(faults, dropped), of: DagStatistics| (faults + of.faults, dropped + of.dropped);
+    let (faults, dropped) = runs.fold((0, 0), sum);
     assert!(faults > 20 && dropped > 0, "{faults} {dropped}");
 }
 

@@ -2,76 +2,65 @@
 
 mod support;
 
-use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SubtaskSpec, TaskSet, verify};
+use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SubtaskSpec, verify};
 
 /// 0 -> {1, 2, 3} -> 4 without priorities.
 fn fork(deadline_ns: u64, wcets_ns: [Option<u64>; 5]) -> DagSpec {
+    let subtask = |wcet_ns| SubtaskSpec {
+        wcet_ns,
+        ..SubtaskSpec::default()
+    };
     DagSpec {
         period_ns: Some(100),
         relative_deadline_ns: Some(deadline_ns),
-        subtasks: wcets_ns
-            .map(|wcet_ns| SubtaskSpec {
-                wcet_ns,
-                ..SubtaskSpec::default()
-            })
-            .to_vec(),
+        subtasks: wcets_ns.map(subtask).to_vec(),
         edges: vec![(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)],
         ..DagSpec::default()
     }
 }
 
-fn commit(specs: &[DagSpec]) -> TaskSet {
+/// Returns the priorities of each DAG's subtasks, or the codes of the faults.
+fn priorities(specs: &[DagSpec]) -> Result<Vec<Vec<u32>>, Vec<&'static str>> {
     let options = CommitOptions::new(Policy::StaticPriority, 2);
-    verify(specs, &options).expect("right DAGs").task_set
-}
-
-fn priorities(task_set: &TaskSet, dag: usize) -> Vec<u32> {
-    task_set.dags()[dag]
-        .subtasks()
-        .iter()
-        .map(|subtask| subtask.priority().0)
-        .collect()
+    let verified = verify(specs, &options);
+    let verified =
+        verified.map_err(|it| it.faults().iter().map(Fault::code).collect::<Vec<_>>())?;
+    let dags = verified.task_set.dags().iter();
+    let of_dag = dags.map(|dag| dag.subtasks().iter().map(|it| it.priority().0).collect());
+    Ok(of_dag.collect())
 }
 
 #[test]
 fn the_longest_remaining_path_comes_first_and_ties_by_registration() {
-    let task_set = commit(&[fork(90, [2, 3, 5, 3, 1].map(Some))]);
-    assert_eq!(priorities(&task_set, 0), [0, 2, 1, 3, 4]);
+    let of = |wcets_ns| priorities(&[fork(90, wcets_ns)]);
+    let known = [2, 3, 5, 3, 1].map(Some);
+    assert_eq!(of(known), Ok(vec![vec![0, 2, 1, 3, 4]]));
+    // Without all WCETs the number of subtasks on the path decides.
+    let unknown = [Some(2), None, Some(5), Some(3), Some(1)];
+    assert_eq!(of(unknown), Ok(vec![vec![0, 1, 2, 3, 4]]));
 }
 
 #[test]
-fn without_all_wcets_the_number_of_subtasks_on_the_path_decides() {
-    let task_set = commit(&[fork(90, [Some(2), None, Some(5), Some(3), Some(1)])]);
-    assert_eq!(priorities(&task_set, 0), [0, 1, 2, 3, 4]);
-}
-
-#[test]
-fn between_dags_derived_priorities_are_deadline_monotonic() {
-    let equal = [None; 5];
-    let task_set = commit(&[fork(90, equal), fork(30, equal), fork(90, equal)]);
-    assert_eq!(priorities(&task_set, 1), [0, 1, 2, 3, 4]);
-    assert_eq!(priorities(&task_set, 0), [5, 6, 7, 8, 9]);
-    assert_eq!(priorities(&task_set, 2), [10, 11, 12, 13, 14]);
-}
-
-#[test]
-fn derived_priorities_come_after_given_ones() {
+fn derived_priorities_are_deadline_monotonic_and_come_after_given_ones() {
+    let specs = [
+        fork(90, [None; 5]),
+        fork(30, [None; 5]),
+        fork(90, [None; 5]),
+    ];
+    let from = |first| (first..first + 5).collect::<Vec<u32>>();
+    assert_eq!(priorities(&specs), Ok(vec![from(5), from(0), from(10)]));
     let given = support::dag(100, 100, 1, &[3, 1], &[(0, 1)]);
-    let task_set = commit(&[fork(90, [None; 5]), given]);
-    assert_eq!(priorities(&task_set, 1), [3, 1]);
-    assert_eq!(priorities(&task_set, 0), [4, 5, 6, 7, 8]);
+    let specs = [fork(90, [None; 5]), given];
+    assert_eq!(priorities(&specs), Ok(vec![from(4), vec![3, 1]]));
 }
 
 #[test]
 fn derived_priorities_never_wrap() {
-    let given = support::dag(100, 100, 1, &[u32::MAX - 4], &[]);
-    let options = CommitOptions::new(Policy::StaticPriority, 2);
-    let rejected = verify(&[fork(90, [None; 5]), given], &options).expect_err("4 numbers are left");
-    assert_eq!(rejected.faults().len(), 1);
-    assert!(matches!(
-        rejected.faults()[0],
-        Fault::PrioritiesExhausted { .. }
-    ));
-    let given = support::dag(100, 100, 1, &[u32::MAX - 5], &[]);
-    assert!(verify(&[fork(90, [None; 5]), given], &options).is_ok());
+    let behind = |given| {
+        let given = support::dag(100, 100, 1, &[given], &[]);
+        priorities(&[fork(90, [None; 5]), given])
+    };
+    // 4 numbers are left, and 5.
+    assert_eq!(behind(u32::MAX - 4), Err(vec!["priorities_exhausted"]));
+    assert!(behind(u32::MAX - 5).is_ok());
 }
