@@ -106,27 +106,11 @@ impl fmt::Display for Costs {
 
 #[cfg(test)]
 mod tests {
-    use alloc::vec;
-
     use super::*;
     use crate::ids::{CoreId, DagId, SubtaskId};
+    use crate::law;
+    use crate::law::dispatch::tests::dags;
     use crate::policy::{Policy, Preemption, SchedulerOptions};
-    use crate::{CommitOptions, DagSpec, Priority, SubtaskSpec, law, verify};
-
-    /// Two DAGs of one subtask each, the first one more urgent.
-    fn two_dags() -> TaskSet {
-        let specs = [0, 1].map(|dag| DagSpec {
-            period_ns: Some(100),
-            relative_deadline_ns: Some(100),
-            subtasks: vec![SubtaskSpec {
-                priority: Some(Priority(dag)),
-                ..SubtaskSpec::default()
-            }],
-            ..DagSpec::default()
-        });
-        let options = CommitOptions::new(Policy::StaticPriority, 1);
-        verify(&specs, &options).unwrap().task_set
-    }
 
     fn events(happened: &[(u64, What, u32, u64)]) -> Vec<Event> {
         let event = |&(time_ns, what, dag, job): &(u64, What, u32, u64)| Event {
@@ -143,7 +127,7 @@ mod tests {
     #[test]
     fn a_core_owes_from_its_last_finish_and_from_what_waits() {
         use What::{Finish, Ready, Released, Resume, Start, Suspend};
-        let task_set = two_dags();
+        let task_set = dags(&[0, 0], false);
         let events = events(&[
             (2, Released, 1, 0),
             (2, Ready, 1, 0),
@@ -181,7 +165,7 @@ mod tests {
     #[test]
     fn a_release_that_waited_for_an_older_job_is_not_late() {
         use What::{Queued, Released};
-        let task_set = two_dags();
+        let task_set = dags(&[0, 0], false);
         let happened = [
             (0, Released, 0, 0),
             (104, Queued, 0, 1),

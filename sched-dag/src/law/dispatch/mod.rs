@@ -252,4 +252,4 @@ fn wrong_cores(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Vi
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
