@@ -13,15 +13,15 @@ pub(crate) use support::random;
 use std::sync::Arc;
 
 use random::Random;
-use sched_dag::analysis::{self, Overheads, Reason, Settings};
+use sched_dag::analysis::{self, Answer, Overheads, Reason, Settings};
 use sched_dag::journal::Event;
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
     ClusterId, Clusters, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, Instance,
-    Policy, Preemption, SchedulerOptions, SubtaskId, TaskSet, verify,
+    Policy, SchedulerOptions, SubtaskId, TaskSet, verify,
 };
 use set::Set;
-use support::{Script, Spec, number};
+use support::{Script, Spec, TWO_CORES, number};
 
 fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: Clusters) -> Arc<TaskSet> {
     let options = CommitOptions::new(options.policy, options.cores)
@@ -110,49 +110,43 @@ fn three() -> [DagSpec; 3] {
     })
 }
 
-const EDF: Settings = Settings {
+const EDF: SchedulerOptions = SchedulerOptions {
     policy: Policy::Edf,
-    preemption: Preemption::Enabled,
-    cores: 2,
-    overheads: Overheads {
-        context_switch_ns: 0,
-        dispatch_ns: 0,
-        interrupt_ns: 0,
-        ready_ns: 0,
-    },
+    ..TWO_CORES
 };
 
-const OPTIONS: SchedulerOptions = SchedulerOptions {
-    policy: EDF.policy,
-    preemption: EDF.preemption,
-    cores: EDF.cores,
-};
+/// Analyses DAGs in two clusters of one core.
+fn answer(specs: &[DagSpec]) -> (Answer, String) {
+    let settings = Settings {
+        policy: EDF.policy,
+        preemption: EDF.preemption,
+        cores: EDF.cores,
+        overheads: Overheads::default(),
+    };
+    let task_set = commit(specs, EDF, Clusters::Of(vec![1, 1]));
+    let answer = analysis::answer(&task_set, &settings);
+    (answer, analysis::witness(&task_set, &settings))
+}
 
 #[test]
 fn each_cluster_is_analysed_on_its_own_cores() {
-    let one_each = commit(&three()[..2], OPTIONS, Clusters::Of(vec![1, 1]));
-    let answer = analysis::answer(&one_each, &EDF);
-    let bounds = answer.bounds.iter().map(|bound| bound.unwrap().bound_ns);
+    let (one_each, _) = answer(&three()[..2]);
+    let bounds = one_each.bounds.iter().map(|bound| bound.unwrap().bound_ns);
     assert_eq!(bounds.collect::<Vec<_>>(), [6, 6]);
-    assert_eq!(answer.sinks_ns, [[Some(6)], [Some(6)]]);
+    assert_eq!(one_each.sinks_ns, [[Some(6)], [Some(6)]]);
     // Both on one core: that is too much for it, and the other cluster's core is no help.
-    let mut dags = three();
-    dags[0].cluster = Some(ClusterId(1));
-    let one_for_both = commit(&dags[..2], OPTIONS, Clusters::Of(vec![1, 1]));
-    let answer = analysis::answer(&one_for_both, &EDF);
-    assert!(answer.reasons.contains(&Some(Reason::Overload)));
+    let (one_for_both, _) = answer(&[three()[1].clone(), three()[1].clone()]);
+    assert!(one_for_both.reasons.contains(&Some(Reason::Overload)));
 }
 
 #[test]
 fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
-    let task_set = commit(&three(), OPTIONS, Clusters::Of(vec![1, 1]));
-    let answer = analysis::answer(&task_set, &EDF);
+    let (answer, witness) = answer(&three());
     assert_eq!(answer.bounds[0].unwrap().bound_ns, 6);
     assert_eq!(answer.reasons[1], Some(Reason::DelayedBy { dag: DagId(2) }));
     let unknown = answer.first_failing.unwrap();
     assert_eq!(unknown.dag, DagId(2));
     assert!(matches!(unknown.reason, Reason::Unknown(_)), "{unknown:?}");
-    let witness = analysis::witness(&task_set, &EDF);
     let begins = |line: &&str| line.starts_with("machine 1 ");
     assert_eq!(witness.lines().filter(begins).count(), 2, "one for each");
 }
@@ -161,7 +155,7 @@ fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
 fn an_undivided_machine_is_cluster_0() {
     let mut dag = support::dag(10, 10, 1, &[1], &[]);
     dag.cluster = Some(ClusterId(0));
-    let task_set = commit(&[dag], OPTIONS, Clusters::Undivided);
+    let task_set = commit(&[dag], EDF, Clusters::Undivided);
     assert!(!task_set.is_divided());
     assert_eq!(task_set.clusters().collect::<Vec<_>>(), [ClusterId(0)]);
     assert_eq!(task_set.cores_of(ClusterId(0), 2), 0..2);

@@ -11,7 +11,7 @@ use sched_dag::lifecycle::{Changes, Entry, Lifecycle, Request};
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{DagId, DagSpec, ModeId};
 use support::random::Random;
-use support::{Run, Script, TWO_CORES, Takes, dag, number, scheduler};
+use support::{Run, Script, Spec, TWO_CORES, Takes, dag, number, scheduler};
 
 /// Runs all jobs of DAGs on two cores.
 fn run(specs: &[DagSpec], lifecycle: Changes, script: Script<'_, impl Takes>) -> Run {
@@ -56,16 +56,14 @@ impl Rules {
         self.modes.iter().fold(0, |all, mode| all | mode)
     }
 
-    fn off(&mut self, dags: u32, said: &mut Vec<Change>) {
-        let news = (0..8).filter(|dag| dags & !self.is_off & (1 << dag) != 0);
-        said.extend(news.map(|dag| (What::Off, dag)));
-        self.is_off |= dags;
-    }
-
-    fn on(&mut self, dags: u32, said: &mut Vec<Change>) {
-        let news = (0..8).filter(|dag| dags & self.is_off & (1 << dag) != 0);
-        said.extend(news.map(|dag| (What::On, dag)));
-        self.is_off &= !dags;
+    /// Turns those DAGs on or off that are not, and says so.
+    fn turn(&mut self, what: What, dags: u32, said: &mut Vec<Change>) {
+        let turning = match what {
+            What::Off => dags & !self.is_off,
+            _ => dags & self.is_off,
+        };
+        self.is_off ^= turning;
+        said.extend(listed(turning).into_iter().map(|dag| (what, dag.0)));
     }
 
     fn look(&mut self, at_once: bool, said: &mut Vec<Change>) {
@@ -73,8 +71,8 @@ impl Rules {
         let leaving = self.all() & !self.modes[mode];
         let is_idle = (0..8).all(|dag| leaving & (1 << dag) == 0 || self.in_flight[dag] == 0);
         if at_once || is_idle {
-            self.off(leaving, said);
-            self.on(self.modes[mode], said);
+            self.turn(What::Off, leaving, said);
+            self.turn(What::On, self.modes[mode], said);
             said.push((What::Entered, u32::try_from(mode).expect("few modes")));
             self.pending = None;
         }
@@ -84,11 +82,11 @@ impl Rules {
         match request {
             Request::Enter(mode, entry) => {
                 self.pending = Some(mode.index());
-                self.off(self.all() & !self.modes[mode.index()], said);
+                self.turn(What::Off, self.all() & !self.modes[mode.index()], said);
                 self.look(entry == Entry::AtOnce, said);
             }
-            Request::Pause(dag) => self.off(1 << dag.0, said),
-            Request::Resume(dag) => self.on(1 << dag.0, said),
+            Request::Pause(dag) => self.turn(What::Off, 1 << dag.0, said),
+            Request::Resume(dag) => self.turn(What::On, 1 << dag.0, said),
             _ => unreachable!("not asked for"),
         }
     }
@@ -120,14 +118,12 @@ fn steps(run: &Run, requests: &[(u64, Request)]) -> Vec<(u64, Step)> {
         steps.push((event.time_ns, step));
     }
     steps.extend(asked);
-    steps.sort_by_key(|(time_ns, step)| {
-        let rank = match step {
-            Step::Completed(_) => 0,
-            Step::Asked(_) => 1,
-            Step::Said(..) => 2,
-        };
-        (*time_ns, rank)
-    });
+    let rank = |step: &Step| match step {
+        Step::Completed(_) => 0,
+        Step::Asked(_) => 1,
+        Step::Said(..) => 2,
+    };
+    steps.sort_by_key(|(time_ns, step)| (*time_ns, rank(step)));
     steps
 }
 
@@ -190,16 +186,9 @@ fn random_modes_are_entered_as_the_rules_say() {
         println!("SCHED_DAG_SEED={seed}");
         let mut random = Random::new(seed);
         let dags = u32::try_from(random.between(1, 5)).expect("few");
-        let specs = (0..dags).map(|_| DagSpec {
-            offset_ns: random.between(0, 40),
-            in_flight: Some(40),
-            ..dag(
-                random.between(20, 60),
-                1000,
-                random.between(1, 20),
-                &[1],
-                &[],
-            )
+        let specs = (0..dags).map(|_| {
+            let (period_ns, jobs) = (random.between(20, 60), random.between(1, 20));
+            dag(period_ns, 1000, jobs, &[1], &[]).offset(random.between(0, 40))
         });
         let specs: Vec<DagSpec> = specs.collect();
         let modes: Vec<u32> = (0..random.between(1, 4))
@@ -210,11 +199,8 @@ fn random_modes_are_entered_as_the_rules_say() {
         let lifecycle = Changes::new(dags, false).with_modes(lists);
         let script = Script::new(|_| random.between(1, 70)).asking(requests.iter().copied());
         let run = run(&specs, lifecycle, script);
-        let of_modes = run
-            .events
-            .iter()
-            .filter(|event| event.what == What::Entered);
-        entered += of_modes.count();
+        let events = run.events.iter();
+        entered += events.filter(|event| event.what == What::Entered).count();
         let rules = Rules {
             modes,
             is_off: 0,
@@ -223,8 +209,5 @@ fn random_modes_are_entered_as_the_rules_say() {
         };
         compare(steps(&run, &requests), rules);
     }
-    assert!(
-        entered > 2 * usize::try_from(sets).expect("few"),
-        "{entered}"
-    );
+    assert!(entered as u64 > 2 * sets, "{entered}");
 }
