@@ -191,77 +191,65 @@ mod tests {
     use super::*;
     use crate::spec::SubtaskSpec;
 
-    fn spec(names: &[&str], edges: &[(usize, usize)]) -> DagSpec {
-        let subtask = |name: &&str| SubtaskSpec {
-            name: (*name).into(),
+    fn spec(names: &str, edges: &[(usize, usize)]) -> DagSpec {
+        let subtask = |name: &str| SubtaskSpec {
+            name: name.into(),
             wcet_ns: Some(5),
             ..SubtaskSpec::default()
         };
         DagSpec {
             name: "a b".into(),
-            subtasks: names.iter().map(subtask).collect(),
+            subtasks: names.split(',').map(subtask).collect(),
             edges: edges.into(),
             ..DagSpec::default()
         }
     }
 
     fn file(of: &DagSpec, lines: &str) -> String {
-        format!(
-            "# made\n\nmargin 20\ndag {} a b\n{lines}end\n",
-            graph_hash(of)
-        )
+        let hash = graph_hash(of);
+        format!("# made\n\nmargin 20\ndag {hash} a b\n{lines}end\n")
     }
 
     #[test]
     fn a_dag_takes_what_its_own_graph_was_observed_to_need() {
-        let mut own = spec(&["x", "y z"], &[(0, 1)]);
-        let text = file(&own, "wcet 12 1 y z\n");
+        let (mut own, mut other) = (spec("x,y z", &[(0, 1)]), spec("x", &[]));
+        let text = file(&own, "wcet 12 1 y z\n") + &file(&other, "wcet 8 0 x\n");
         assert_eq!(apply(&text, &mut own), Ok(()));
-        let found: Vec<_> = (own.subtasks.iter())
-            .map(|subtask| (subtask.wcet_ns, subtask.wcet_margin_percent))
-            .collect();
-        assert_eq!(found, [(Some(5), None), (Some(12), Some(20))]);
-        // One of another name is not spoken of.
-        let mut other = spec(&["x"], &[]);
-        other.name = "b".into();
+        let subtasks = own.subtasks.iter();
+        let found = subtasks.map(|subtask| (subtask.wcet_ns, subtask.wcet_margin_percent));
+        assert!(found.eq([(Some(5), None), (Some(12), Some(20))]));
+        // Of two graphs of one name each takes its own.
         assert_eq!(apply(&text, &mut other), Ok(()));
-        assert_eq!(other.subtasks[0].wcet_ns, Some(5));
+        assert_eq!(other.subtasks[0].wcet_ns, Some(8));
+        // One of another name is not spoken of.
+        let mut unnamed = spec("x", &[]);
+        unnamed.name = "b".into();
+        assert_eq!(apply(&text, &mut unnamed), Ok(()));
+        assert_eq!(unnamed.subtasks[0].wcet_ns, Some(5));
     }
 
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
-        let own = spec(&["x", "y"], &[(0, 1)]);
+        let own = spec("x,y", &[(0, 1)]);
         let refused = |text: &str| {
             let fault = apply(text, &mut own.clone()).unwrap_err();
             (fault.line, fault.problem)
         };
-        for line in ["wcet 12 2 z\n", "wcet 12 1 x\n"] {
-            assert_eq!(refused(&file(&own, line)), (5, UNKNOWN), "{line}");
-        }
-        assert_eq!(refused(&file(&own, "wcet 0 1 y\n")), (5, ZERO));
-        for line in [
-            "wcet 1\n",
-            "wcet -1 0 x\n",
-            "wcet 99999999999999999999 0 x\n",
-            "dag x\n",
-            "else\n",
+        for (line, problem) in [
+            ("wcet 12 2 z", UNKNOWN),
+            ("wcet 12 1 x", UNKNOWN),
+            ("wcet 0 1 y", ZERO),
+            ("wcet 1", NO_RECORD),
+            ("wcet -1 0 x", NO_RECORD),
+            ("wcet 99999999999999999999 0 x", NO_RECORD),
+            ("dag x", NO_RECORD),
+            ("else", NO_RECORD),
         ] {
-            assert_eq!(refused(&file(&own, line)), (5, NO_RECORD), "{line}");
+            let text = file(&own, &format!("{line}\n"));
+            assert_eq!(refused(&text), (5, problem), "{line}");
         }
-        for other in [
-            spec(&["x", "y"], &[]),
-            spec(&["x", "z"], &[(0, 1)]),
-            spec(&["x"], &[]),
-        ] {
+        for other in [spec("x,y", &[]), spec("x,z", &[(0, 1)]), spec("x", &[])] {
             assert_eq!(refused(&file(&other, "")), (4, FOREIGN));
         }
-    }
-
-    #[test]
-    fn of_two_graphs_of_one_name_each_takes_its_own() {
-        let (mut one, other) = (spec(&["x"], &[]), spec(&["x", "y"], &[]));
-        let text = file(&other, "wcet 7 1 y\n") + &file(&one, "wcet 8 0 x\n");
-        assert_eq!(apply(&text, &mut one), Ok(()));
-        assert_eq!(one.subtasks[0].wcet_ns, Some(8));
     }
 }

@@ -1,6 +1,6 @@
 //! What drivers of a real machine may do and virtual time does not: mistakes, clocks that go back,
 //! cores that are preferred. (That they come late, or end what has lost its core meanwhile,
-//! `properties` and `worlds` tell.)
+//! random walks tell: `properties`.)
 
 mod support;
 

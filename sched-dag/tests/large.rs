@@ -3,32 +3,26 @@
 mod support;
 
 use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SubtaskSpec, verify};
-use support::{PREEMPTIVE, cores, run};
+use support::{PREEMPTIVE, Spec, cores, dag, run};
 
 const LARGE: usize = 200_000;
 
-fn large(edges: Vec<(usize, usize)>) -> DagSpec {
-    DagSpec {
-        period_ns: Some(1_000_000),
-        relative_deadline_ns: Some(1_000_000),
-        jobs: Some(1),
-        subtasks: vec![SubtaskSpec::default(); LARGE],
-        edges,
-        ..DagSpec::default()
-    }
+fn large(edges: &[(usize, usize)]) -> DagSpec {
+    let spec = dag(1_000_000, 1_000_000, 1, &[], edges);
+    spec.with(|spec| spec.subtasks = vec![SubtaskSpec::default(); LARGE])
 }
 
 #[test]
 fn a_long_chain_is_committed_and_run() {
-    let chain = large((1..LARGE).map(|to| (to - 1, to)).collect());
-    run(&[chain], PREEMPTIVE, 1).must_be("200000 completed 0.0 Met");
+    let chain: Vec<_> = (1..LARGE).map(|to| (to - 1, to)).collect();
+    run(&[large(&chain)], PREEMPTIVE, 1).must_be("200000 completed 0.0 Met");
 }
 
 #[test]
 fn a_wide_fork_is_committed_and_run() {
     let fork = (1..LARGE - 1).flat_map(|branch| [(0, branch), (branch, LARGE - 1)]);
     // 199,998 branches on 300 cores take 667 rounds.
-    run(&[large(fork.collect())], cores(300), 1).must_be("669 completed 0.0 Met");
+    run(&[large(&fork.collect::<Vec<_>>())], cores(300), 1).must_be("669 completed 0.0 Met");
 }
 
 #[test]
@@ -41,7 +35,7 @@ fn a_huge_cycle_or_knot_is_refused_in_bounded_time() {
         (knot.collect::<Vec<_>>(), None),
     ] {
         let options = CommitOptions::new(Policy::Edf, 1);
-        let rejected = verify(&[large(edges)], &options).expect_err("a cycle");
+        let rejected = verify(&[large(&edges)], &options).expect_err("a cycle");
         let cycles = rejected.faults().iter().filter_map(|fault| match fault {
             Fault::Cycle { hops, .. } => Some(hops.len()),
             _ => None,

@@ -4,9 +4,9 @@
 
 mod support;
 
-use std::collections::VecDeque;
+use std::collections::BTreeSet;
 
-use sched_dag::journal::What;
+use sched_dag::journal::{Event, What};
 use sched_dag::lifecycle::{Changes, Entry, Lifecycle, Request};
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{DagId, DagSpec, ModeId};
@@ -92,66 +92,40 @@ impl Rules {
     }
 }
 
-/// Something in a run that the rules are about: it is completed, it is asked for, or the rest.
-enum Step {
-    Completed(u32),
-    Asked(Request),
-    Said(What, u32),
-}
-
-/// Returns what happens in a run, with what is asked there: at each instant that is after all that
-/// completes.
-fn steps(run: &Run, requests: &[(u64, Request)]) -> Vec<(u64, Step)> {
-    let mut steps: Vec<(u64, Step)> = Vec::new();
-    let asked = requests
-        .iter()
-        .map(|(at_ns, request)| (*at_ns, Step::Asked(*request)));
-    for event in &run.events {
-        let step = match event.what {
-            What::Completed => Step::Completed(event.dag.0),
-            What::Entered => Step::Said(event.what, u32::try_from(event.job).expect("few modes")),
-            What::Off | What::On | What::Released | What::Skipped => {
-                Step::Said(event.what, event.dag.0)
-            }
-            _ => continue,
-        };
-        steps.push((event.time_ns, step));
-    }
-    steps.extend(asked);
-    let rank = |step: &Step| match step {
-        Step::Completed(_) => 0,
-        Step::Asked(_) => 1,
-        Step::Said(..) => 2,
-    };
-    steps.sort_by_key(|(time_ns, step)| (*time_ns, rank(step)));
-    steps
-}
-
-/// Holds what happened against the rules.
-fn compare(steps: Vec<(u64, Step)>, mut rules: Rules) {
-    let (mut news, mut expected) = (Vec::new(), VecDeque::new());
-    rules.ask(enter(0, Entry::AtOnce), &mut news);
-    for (time_ns, step) in steps {
-        expected.extend(news.drain(..));
-        match step {
-            Step::Asked(request) => rules.ask(request, &mut news),
-            Step::Completed(dag) => {
-                rules.in_flight[dag as usize] -= 1;
-                rules.look(false, &mut news);
-            }
-            Step::Said(what @ (What::Off | What::On | What::Entered), whom) => {
-                assert_eq!(expected.pop_front(), Some((what, whom)), "at {time_ns}");
-            }
-            Step::Said(what, dag) => {
-                assert_eq!(expected, [], "before the releases at {time_ns}");
-                let is_off = rules.is_off & (1 << dag) != 0;
-                assert_eq!(is_off, what == What::Skipped, "DAG {dag} at {time_ns}");
-                rules.in_flight[dag as usize] += u32::from(!is_off);
-            }
+/// Holds a run against the rules, instant by instant: what completes comes first, then what is
+/// asked for, then what is released.
+fn compare(run: &Run, requests: &[(u64, Request)], mut rules: Rules) {
+    let is_change = |what| matches!(what, What::Off | What::On | What::Entered);
+    let is_release = |what| matches!(what, What::Released | What::Skipped);
+    let of_events = run.events.iter().map(|event| event.time_ns);
+    let times_ns = of_events.chain(requests.iter().map(|(at_ns, _)| *at_ns));
+    let times_ns: BTreeSet<u64> = times_ns.collect();
+    let mut expected = Vec::new();
+    rules.ask(enter(0, Entry::AtOnce), &mut expected);
+    for now_ns in times_ns {
+        let here = run.events.iter().filter(|event| event.time_ns == now_ns);
+        let completed = here.clone().filter(|event| event.what == What::Completed);
+        completed.for_each(|event| rules.in_flight[event.dag.index()] -= 1);
+        rules.look(false, &mut expected);
+        for (_, request) in requests.iter().filter(|(at_ns, _)| *at_ns == now_ns) {
+            rules.ask(*request, &mut expected);
+        }
+        let told = here.filter(|event| is_change(event.what) || is_release(event.what));
+        let (changes, releases): (Vec<&Event>, Vec<&Event>) =
+            told.clone().partition(|event| is_change(event.what));
+        assert!(told.is_sorted_by_key(|event| is_release(event.what)));
+        let changed = changes.iter().map(|event| match event.what {
+            What::Entered => (event.what, u32::try_from(event.job).expect("few modes")),
+            what => (what, event.dag.0),
+        });
+        let changed: Vec<Change> = changed.collect();
+        assert_eq!(changed, std::mem::take(&mut expected), "at {now_ns}");
+        for event in releases {
+            let is_off = rules.is_off & (1 << event.dag.0) != 0;
+            assert_eq!(is_off, event.what == What::Skipped, "{event:?}");
+            rules.in_flight[event.dag.index()] += u32::from(!is_off);
         }
     }
-    expected.extend(news);
-    assert_eq!(expected, []);
 }
 
 /// Returns the DAGs whose bits are set.
@@ -207,7 +181,7 @@ fn random_modes_are_entered_as_the_rules_say() {
             in_flight: [0; 8],
             pending: None,
         };
-        compare(steps(&run, &requests), rules);
+        compare(&run, &requests, rules);
     }
     assert!(entered as u64 > 2 * sets, "{entered}");
 }

@@ -2,21 +2,17 @@
 
 mod support;
 
-use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SubtaskSpec, verify};
+use sched_dag::{CommitOptions, DagSpec, Fault, Policy, verify};
+use support::{Spec, dag};
 
 /// 0 -> {1, 2, 3} -> 4 without priorities.
 fn fork(deadline_ns: u64, wcets_ns: [Option<u64>; 5]) -> DagSpec {
-    let subtask = |wcet_ns| SubtaskSpec {
-        wcet_ns,
-        ..SubtaskSpec::default()
-    };
-    DagSpec {
-        period_ns: Some(100),
-        relative_deadline_ns: Some(deadline_ns),
-        subtasks: wcets_ns.map(subtask).to_vec(),
-        edges: vec![(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)],
-        ..DagSpec::default()
-    }
+    let edges = [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)];
+    dag(100, deadline_ns, 1, &[0; 5], &edges).with(|spec| {
+        for (subtask, wcet_ns) in spec.subtasks.iter_mut().zip(wcets_ns) {
+            (subtask.priority, subtask.wcet_ns) = (None, wcet_ns);
+        }
+    })
 }
 
 /// Returns the priorities of each DAG's subtasks, or the codes of the faults.
@@ -49,7 +45,7 @@ fn derived_priorities_are_deadline_monotonic_and_come_after_given_ones() {
     ];
     let from = |first| (first..first + 5).collect::<Vec<u32>>();
     assert_eq!(priorities(&specs), Ok(vec![from(5), from(0), from(10)]));
-    let given = support::dag(100, 100, 1, &[3, 1], &[(0, 1)]);
+    let given = dag(100, 100, 1, &[3, 1], &[(0, 1)]);
     let specs = [fork(90, [None; 5]), given];
     assert_eq!(priorities(&specs), Ok(vec![from(4), vec![3, 1]]));
 }
@@ -57,7 +53,7 @@ fn derived_priorities_are_deadline_monotonic_and_come_after_given_ones() {
 #[test]
 fn derived_priorities_never_wrap() {
     let behind = |given| {
-        let given = support::dag(100, 100, 1, &[given], &[]);
+        let given = dag(100, 100, 1, &[given], &[]);
         priorities(&[fork(90, [None; 5]), given])
     };
     // 4 numbers are left, and 5.

@@ -1,5 +1,5 @@
 //! The analysis takes a sporadic DAG for a periodic one: its bounds hold for any signals. (The
-//! rules S1 to S4 are told by `tests/scenarios/sharing.txt`, `properties` and `worlds`.)
+//! rules S1 to S4 are told by `tests/scenarios/sharing.txt` and `properties`.)
 
 mod support;
 

@@ -97,14 +97,6 @@ fn a_core_exchanges_what_it_has_finished_for_what_it_should_have() {
 }
 
 #[test]
-fn an_instance_that_finishes_before_its_preemption_makes_way() {
-    let mut cores = about_to_preempt();
-    cores.finish(0, X, 'x');
-    assert!(!cores.must_suspend(0));
-    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
-}
-
-#[test]
 fn a_core_waits_for_an_instance_that_another_still_has() {
     let mut cores = about_to_preempt();
     cores.decide(1, Some(X));
@@ -114,12 +106,15 @@ fn a_core_waits_for_an_instance_that_another_still_has() {
 }
 
 #[test]
-fn an_instance_wanted_elsewhere_may_finish_where_it_is() {
-    let mut cores = about_to_preempt();
-    cores.decide(1, Some(X));
-    cores.finish(0, X, 'x');
-    assert_eq!(cores.next(1), Next::Nothing);
-    assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+fn an_instance_that_is_to_make_way_or_wanted_elsewhere_may_finish_where_it_is() {
+    for is_wanted_elsewhere in [false, true] {
+        let mut cores = about_to_preempt();
+        cores.decide(1, is_wanted_elsewhere.then_some(X));
+        cores.finish(0, X, 'x');
+        assert!(!cores.must_suspend(0));
+        assert_eq!(cores.next(1), Next::Nothing);
+        assert_eq!(cores.next(0), Next::Start(Y, 'y'));
+    }
 }
 
 #[test]

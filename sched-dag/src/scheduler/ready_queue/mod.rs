@@ -324,6 +324,7 @@ mod tests {
                     queue.insert(popped);
                 }
             }
+            // The front, too.
             for vertex in (0..count).step_by(4) {
                 queue.remove(key(vertex));
             }
@@ -332,17 +333,6 @@ mod tests {
             assert_eq!(popped.len(), left.count());
             assert!(popped.iter().all(|&popped| popped == key(popped.vertex())));
             assert!(popped.is_sorted());
-        }
-    }
-
-    #[test]
-    fn the_front_may_be_removed() {
-        for (mut queue, _) in queues() {
-            queue.insert(key(7));
-            queue.insert(key(3));
-            queue.remove(key(3));
-            assert_eq!(queue.pop(), Some(key(7)));
-            assert_eq!(queue.pop(), None);
         }
     }
 }
