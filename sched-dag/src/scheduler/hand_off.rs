@@ -18,7 +18,7 @@
 //!
 //! [`decide`](Scheduler::decide) would come to the same: the core that has become
 //! idle last is taken first. Virtual time goes either way, the short one where
-//! exactly one instance finishes; so its tests compare both with one reference.
+//! exactly one instance finishes; so its tests hold both to one law.
 
 use super::instances::line_up;
 use super::vertices::{Phase, Vertices};

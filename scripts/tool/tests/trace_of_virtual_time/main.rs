@@ -43,12 +43,8 @@ fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, Run)) {
             false => Overruns::Never,
         };
         let mut set = set::draw(&mut random, overruns);
-        for subtask in set.dags.iter_mut().flat_map(|dag| &mut dag.subtasks) {
-            for execution_ns in &mut subtask.executions_ns {
-                // An instance of no length has all its events in one instant.
-                *execution_ns *= u64::from(!random.chance(10));
-            }
-        }
+        // An instance of no length has all its events in one instant.
+        set.has_instances_of_no_length = true;
         let run = record(&set);
         with(seed, &mut random, run);
     }
