@@ -128,18 +128,3 @@ impl Equations<'_> {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::multi_path;
-    use crate::analysis::Task;
-
-    #[test]
-    fn no_cores_and_no_subtasks() {
-        let none = Task::new(9, 9, vec![], &[]).unwrap();
-        assert_eq!(
-            (multi_path(&none, 2), multi_path(&none, 0)),
-            (Some(0), None)
-        );
-    }
-}

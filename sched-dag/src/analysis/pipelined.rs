@@ -29,11 +29,11 @@
 //! 1. To follow the chain back only over the jobs that the job itself can meet
 //!    (`j T < R`). But each job may delay only the next, and a delay still be
 //!    handed on forever: a subtask with a WCET of one period never catches up.
-//!    In the test `delays_handed_on_are_counted` that would claim 18 where
+//!    In the test `delays_that_are_handed_on_count` that would claim 18 where
 //!    observed response times grow without end.
 //! 2. To take another DAG to use no more cores than one of its jobs can, also
-//!    when its jobs overlap. In the test `overlapping_jobs_stack` that would
-//!    claim 8, and 9 is observed.
+//!    when its jobs overlap. In the test `overlapping_jobs_take_more_cores`
+//!    that would claim 8, and 9 is observed.
 //!
 //! The least solution is found exactly, from below. Both sides are piecewise
 //! linear, so instead of creeping up by the difference, which may be one
@@ -253,41 +253,14 @@ impl Figures {
 
 #[cfg(test)]
 mod tests {
-    use crate::analysis::{Clip, Refusal, Task, multi_path_fp};
-
-    fn pipelined_fp(tasks: &[&Task], cores: u32) -> Result<Vec<u64>, Refusal> {
-        multi_path_fp(tasks, cores, Clip::Window)
-    }
+    use crate::analysis::{Clip, Task, multi_path_fp};
 
     #[test]
     fn e8_two_pipelines() {
         let chain = Task::new(10, 30, vec![4, 5, 3], &[(0, 1), (1, 2)]).unwrap();
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
         let other = Task::new(25, 50, vec![1, 3, 3, 1], &diamond).unwrap();
-        assert_eq!(pipelined_fp(&[&chain, &other], 3), Ok(vec![13, 14]));
-    }
-
-    #[test]
-    fn overlapping_jobs_stack() {
-        // Two of the chain's jobs run for 8 of each 10: then two of four cores
-        // are left, on which six subtasks of 3 take 9.
-        let edges = [(0, 1), (1, 2)];
-        let chain = Task::new(10, 30, vec![6, 6, 6], &edges).unwrap();
-        let wide = Task::new(100, 60, vec![3; 6], &[]).unwrap();
-        let bounds = pipelined_fp(&[&chain, &wide], 4).unwrap();
-        assert!(bounds[1] >= 9, "{bounds:?}");
-    }
-
-    #[test]
-    fn delays_handed_on_are_counted() {
-        // Once a period of 1000 all four cores are busy for 5. Each time, the
-        // second subtask below falls behind by 5, and can never catch up.
-        let burst = Task::new(1000, 1000, vec![5; 4], &[]).unwrap();
-        let full = Task::new(10, 30, vec![1, 10], &[(0, 1)]).unwrap();
-        let refusal = pipelined_fp(&[&burst, &full], 4);
-        assert_eq!(refusal, Err(Refusal::Fails { position: 1 }));
-        // With one unit of slack a period it does catch up.
-        let slack = Task::new(10, 30, vec![1, 9], &[(0, 1)]).unwrap();
-        assert!(pipelined_fp(&[&burst, &slack], 4).is_ok());
+        let bounds = multi_path_fp(&[&chain, &other], 3, Clip::Window);
+        assert_eq!(bounds, Ok(vec![13, 14]));
     }
 }

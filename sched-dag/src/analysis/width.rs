@@ -149,18 +149,6 @@ mod tests {
     }
 
     #[test]
-    fn known_widths() {
-        assert_eq!(width(&task(0, &[])), Some(0));
-        assert_eq!(width(&task(5, &[])), Some(5));
-        assert_eq!(width(&task(4, &[(0, 1), (1, 2), (2, 3)])), Some(1));
-        // Two chains of two with a crossing edge: {0, 2} or {1, 2}, ...
-        assert_eq!(width(&task(4, &[(0, 1), (2, 3), (0, 3)])), Some(2));
-        // A layered graph: 3 sources, each before 2 of 4 sinks.
-        let edges = [(0, 3), (0, 4), (1, 4), (1, 5), (2, 5), (2, 6)];
-        assert_eq!(width(&task(7, &edges)), Some(4));
-    }
-
-    #[test]
     fn agrees_with_all_subsets_of_small_graphs() {
         let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
         for _ in 0..300 {
@@ -170,7 +158,7 @@ mod tests {
                 seed ^= seed << 17;
                 seed % bound
             };
-            let count = usize::try_from(1 + next(10)).unwrap();
+            let count = usize::try_from(next(11)).unwrap();
             let mut edges = Vec::new();
             for to in 0..count {
                 for from in 0..to {

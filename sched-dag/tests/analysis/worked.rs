@@ -9,6 +9,8 @@ use sched_dag::{DagSpec, Policy, Preemption, Priority};
 use crate::simulate::{commit, observe, responses, spec};
 use crate::{DIAMOND, FP, settings};
 
+const NON_PREEMPTIVE_EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Disabled);
+
 fn fork_join() -> Task {
     let edges: Vec<(usize, usize)> = (1..5).flat_map(|v| [(0, v), (v, 5)]).collect();
     Task::new(50, 50, vec![2, 6, 5, 4, 3, 1], &edges).expect("well formed")
@@ -35,6 +37,8 @@ fn e1_and_e11_one_fork_join() {
     );
     assert_eq!(task.bottom_levels(), [9, 7, 6, 5, 4, 1]);
     assert_eq!(multi_path(&task, 0), None);
+    let none = Task::new(9, 9, vec![], &[]).unwrap();
+    assert_eq!([0, 2].map(|m| multi_path(&none, m)), [None, Some(0)]);
 }
 
 #[test]
@@ -46,10 +50,19 @@ fn e2_e3_and_e13_two_dags() {
     for clip in [Clip::Window, Clip::Waiting, Clip::Chains] {
         assert_eq!(multi_path_fp(&tasks, 2, clip), Ok(vec![4, 14]));
     }
-    // The commit, which comes from below, has bounds; see `e2_and_e3_two_dags`.
+    // The commit, which comes from below, has bounds under EDF, too. Alone, the first DAG has two
+    // paths that cover it: 4, where Graham's bound is 5.
     let position = 0;
     let from_deadlines = multi_path_edf(&tasks, 2, Clip::Chains);
     assert_eq!(from_deadlines, Err(Refusal::Fails { position }));
+    let specs = [
+        spec(10, 10, &[1, 2, 2, 1], &DIAMOND, 0),
+        spec(20, 20, &[1, 3, 3, 3, 1], &forks, 1),
+    ];
+    for (policy, expected) in [(Policy::StaticPriority, [4, 14]), (Policy::Edf, [8, 14])] {
+        let kind = (policy, Preemption::Enabled);
+        assert_eq!(bounds(&specs, kind, 2).0, expected.map(Some), "{policy:?}");
+    }
     assert_eq!(width(&fork_join()), Some(4));
 }
 
@@ -160,9 +173,12 @@ fn a_dag_near_its_bound_slowly_leaves_a_more_urgent_one_its_own() {
     assert_eq!(answer.reasons, [None, Some(Reason::Limit)]);
 }
 
-/// Returns the bounds without preemption under EDF, of jobs and of their sinks.
-fn non_preemptive_edf(specs: &[DagSpec], cores: u32) -> (Vec<Option<u64>>, Vec<Vec<Option<u64>>>) {
-    let kind = (Policy::Edf, Preemption::Disabled);
+/// Returns the bounds of jobs and of their sinks.
+fn bounds(
+    specs: &[DagSpec],
+    kind: (Policy, Preemption),
+    cores: u32,
+) -> (Vec<Option<u64>>, Vec<Vec<Option<u64>>>) {
     let answer = answer(&commit(specs, kind.0, cores), &settings(kind, cores));
     let jobs = answer.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     (jobs.collect(), answer.sinks_ns)
@@ -175,7 +191,7 @@ fn under_edf_what_has_a_shorter_deadline_may_block_too() {
     // before it.
     let chain = spec(40, 40, &[2, 3], &[(0, 1)], 0);
     let short = spec(20, 20, &[6], &[], 1);
-    let (jobs, _) = non_preemptive_edf(&[chain, short], 2);
+    let (jobs, _) = bounds(&[chain, short], NON_PREEMPTIVE_EDF, 2);
     assert_eq!(jobs, [Some(14), Some(9)]);
 }
 
@@ -186,23 +202,19 @@ fn a_sink_waits_for_what_is_due_later_and_keeps_its_core() {
     quick.offset_ns = 1;
     let slow = spec(1000, 1000, &[50], &[], 0);
     let specs = [quick.clone(), slow.clone()];
-    assert_eq!(non_preemptive_edf(&specs, 1).0[0], None);
+    assert_eq!(bounds(&specs, NON_PREEMPTIVE_EDF, 1).0[0], None);
     // With time to wait for it, that is what the bounds count.
     quick.subtasks[0].relative_deadline_ns = Some(60);
     let specs = [quick, slow];
-    let (jobs, sinks) = non_preemptive_edf(&specs, 1);
+    let (jobs, sinks) = bounds(&specs, NON_PREEMPTIVE_EDF, 1);
     assert_eq!(
         (jobs[0], &sinks[0][..]),
         (Some(52), &[Some(52), Some(52)][..])
     );
-    let platform = (Policy::Edf, Preemption::Disabled, 1);
-    let observed = observe(
-        &commit(&specs, Policy::Edf, 1),
-        platform,
-        1000,
-        |instance| {
-            if instance.dag.0 == 0 { 1 } else { 50 }
-        },
-    );
+    let (policy, preemption) = NON_PREEMPTIVE_EDF;
+    let task_set = commit(&specs, policy, 1);
+    let observed = observe(&task_set, (policy, preemption, 1), 1000, |instance| {
+        if instance.dag.0 == 0 { 1 } else { 50 }
+    });
     assert_eq!(observed.subtasks[0], [50, 51]);
 }
