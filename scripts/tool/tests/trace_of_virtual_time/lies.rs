@@ -1,212 +1,159 @@
 //! Single changes to a right trace that each break a rule.
 //!
-//! A lie says whether it could be told of the run at hand. What would not break
-//! a rule, such as moving an event within an instant, is never told.
+//! Each is told where it can be. What would not break a rule, such as moving an event within an
+//! instant, is never told.
 
 use sched_dag::journal::{Event, What};
 use tool::trace::model::Run;
 
 use crate::random::Random;
 
-/// Changes a run, if it can.
-pub(crate) type Lie = fn(&mut Run, &mut Random) -> bool;
+/// A lie: its name, of what and of which events it can be told, and how it changes the one at a
+/// place.
+pub(crate) type Lie = (
+    &'static str,
+    What,
+    fn(&Run, &Event) -> bool,
+    fn(&mut Run, usize, &mut Random),
+);
 
-/// All lies by name.
-pub(crate) const LIES: [(&str, Lie); 16] = [
-    ("a start is missing", |run, random| {
-        drop_one(run, random, What::Start)
-    }),
-    ("a finish is missing", |run, random| {
-        drop_one(run, random, What::Finish)
-    }),
-    ("a suspension is missing", |run, random| {
-        drop_one(run, random, What::Suspend)
-    }),
-    ("a resumption is missing", |run, random| {
-        drop_one(run, random, What::Resume)
-    }),
-    ("a readiness is missing", missing_readiness),
-    ("a release is missing", |run, random| {
-        drop_one(run, random, What::Released)
-    }),
-    ("a completion is missing", |run, random| {
-        drop_one(run, random, What::Completed)
-    }),
-    ("a start happens twice", |run, random| {
-        double(run, random, What::Start)
-    }),
-    ("a finish happens twice", |run, random| {
-        double(run, random, What::Finish)
-    }),
-    ("a miss is made up", made_up_miss),
-    ("a miss is not noticed", missing_miss),
-    ("a release is early", early_release),
-    ("a start comes before the join", start_before_join),
-    ("a start comes late", late_start),
-    ("start and finish are swapped", swapped),
-    ("a finish is on another core", finish_elsewhere),
+/// All lies.
+pub(crate) const LIES: [Lie; 16] = [
+    ("a start is missing", What::Start, any, remove),
+    ("a finish is missing", What::Finish, any, remove),
+    ("a suspension is missing", What::Suspend, any, remove),
+    ("a resumption is missing", What::Resume, any, remove),
+    ("a readiness is missing", What::Ready, starts, remove),
+    ("a release is missing", What::Released, any, remove),
+    ("a completion is missing", What::Completed, any, remove),
+    ("a start happens twice", What::Start, any, double),
+    ("a finish happens twice", What::Finish, any, double),
+    ("a miss is made up", What::Completed, is_in_time, miss),
+    ("a miss is not noticed", What::Missed, is_not_cut, remove),
+    ("a release is early", What::Released, is_after_0, early),
+    ("a start before the join", What::Start, joins, before_join),
+    ("a start comes late", What::Start, runs_on, late),
+    ("start and finish swapped", What::Start, finishes, swap),
+    ("a finish elsewhere", What::Finish, has_others, elsewhere),
 ];
 
-/// Brings the events back into the order of a log.
-pub(crate) fn order(run: &mut Run) {
-    run.events.sort_by_key(|event| event.time_ns);
-}
-
-fn pick(run: &Run, random: &mut Random, is_it: impl Fn(&Event) -> bool) -> Option<usize> {
-    let positions = run.events.iter().enumerate();
-    let positions: Vec<usize> = positions
-        .filter(|(_, event)| is_it(event))
-        .map(|(position, _)| position)
-        .collect();
-    (!positions.is_empty()).then(|| positions[random.below(positions.len())])
-}
-
-fn find(run: &Run, like: &Event, what: What) -> Option<usize> {
-    let is_it = |event: &Event| {
-        event.what == what
-            && (event.dag, event.job, event.subtask) == (like.dag, like.job, like.subtask)
-    };
-    run.events.iter().position(is_it)
-}
-
-fn drop_one(run: &mut Run, random: &mut Random, what: What) -> bool {
-    let position = pick(run, random, |event| event.what == what);
-    position
-        .map(|position| run.events.remove(position))
-        .is_some()
-}
-
-fn missing_readiness(run: &mut Run, random: &mut Random) -> bool {
-    let starts = |event: &Event| find(run, event, What::Start).is_some();
-    let position = pick(run, random, |event| {
-        event.what == What::Ready && starts(event)
-    });
-    position
-        .map(|position| run.events.remove(position))
-        .is_some()
-}
-
-fn double(run: &mut Run, random: &mut Random, what: What) -> bool {
-    let position = pick(run, random, |event| event.what == what);
-    let Some(position) = position else {
-        return false;
-    };
-    let event = run.events[position];
-    run.events.insert(position, event);
-    true
-}
-
-fn made_up_miss(run: &mut Run, random: &mut Random) -> bool {
-    let position = pick(run, random, |event| event.what == What::Completed);
-    let Some(completed) = position.map(|position| run.events[position]) else {
-        return false;
-    };
-    let of_job = |event: &Event| (event.dag, event.job) == (completed.dag, completed.job);
-    let is_other =
-        |event: &Event| of_job(event) && matches!(event.what, What::Missed | What::Aborted);
-    if run.events.iter().any(is_other) {
+/// Tells a lie about one of the events of which it can be told, if there is one.
+pub(crate) fn tell((_, what, can_be, change): Lie, run: &mut Run, random: &mut Random) -> bool {
+    let events = run.events.iter().enumerate();
+    let of_these = events.filter(|(_, event)| event.what == what && can_be(run, event));
+    let places: Vec<usize> = of_these.map(|(place, _)| place).collect();
+    if places.is_empty() {
         return false;
     }
-    run.events.push(Event {
-        what: What::Missed,
-        ..completed
-    });
+    change(run, places[random.below(places.len())], random);
+    // The order of a log.
+    run.events.sort_by_key(|event| event.time_ns);
     true
 }
 
-fn missing_miss(run: &mut Run, random: &mut Random) -> bool {
-    let completes = |event: &Event| {
-        let is_cut = |other: &Event| {
-            (other.dag, other.job) == (event.dag, event.job)
-                && matches!(other.what, What::Skipped | What::Aborted)
-        };
-        !run.events.iter().any(is_cut)
-    };
-    let position = pick(run, random, |event| {
-        event.what == What::Missed && completes(event)
-    });
-    position
-        .map(|position| run.events.remove(position))
-        .is_some()
+/// Returns where something else happened to the instance or the job of an event.
+fn find(run: &Run, like: &Event, what: What) -> Option<usize> {
+    let of = |event: &Event| (event.dag, event.job, event.subtask);
+    let mut events = run.events.iter();
+    events.position(|event| event.what == what && of(event) == of(like))
 }
 
-fn early_release(run: &mut Run, random: &mut Random) -> bool {
-    let is_late_enough = |event: &Event| {
-        event.what == What::Released && run.task_set.dag(event.dag).grid_ns(event.job) > 0
-    };
-    let Some(position) = pick(run, random, is_late_enough) else {
-        return false;
-    };
-    let event = &run.events[position];
-    let nominal_ns = run.task_set.dag(event.dag).grid_ns(event.job);
-    run.events[position].time_ns = random.between(0, nominal_ns - 1);
+fn time_ns(run: &Run, like: &Event, what: What) -> Option<u64> {
+    find(run, like, what).map(|place| run.events[place].time_ns)
+}
+
+fn any(_: &Run, _: &Event) -> bool {
     true
 }
 
-/// The last finish of an instance's predecessors.
+fn starts(run: &Run, event: &Event) -> bool {
+    find(run, event, What::Start).is_some()
+}
+
+fn is_in_time(run: &Run, event: &Event) -> bool {
+    [What::Missed, What::Aborted]
+        .iter()
+        .all(|&what| find(run, event, what).is_none())
+}
+
+fn is_not_cut(run: &Run, event: &Event) -> bool {
+    [What::Skipped, What::Aborted]
+        .iter()
+        .all(|&what| find(run, event, what).is_none())
+}
+
+fn is_after_0(run: &Run, event: &Event) -> bool {
+    run.task_set.dag(event.dag).grid_ns(event.job) > 0
+}
+
+/// Returns the last finish of an instance's predecessors.
 fn join_ns(run: &Run, event: &Event) -> Option<u64> {
-    let subtask = event.subtask?;
-    let predecessors = run.task_set.dag(event.dag).predecessors(subtask);
+    let predecessors = run.task_set.dag(event.dag).predecessors(event.subtask?);
     let finishes = predecessors.iter().map(|&predecessor| {
-        let like = Event {
-            subtask: Some(predecessor),
-            ..*event
-        };
-        Some(run.events[find(run, &like, What::Finish)?].time_ns)
+        let subtask = Some(predecessor);
+        time_ns(run, &Event { subtask, ..*event }, What::Finish)
     });
     finishes.max().flatten()
 }
 
-fn start_before_join(run: &mut Run, random: &mut Random) -> bool {
-    let waits = |event: &Event| {
-        event.what == What::Start && join_ns(run, event).is_some_and(|join_ns| join_ns > 0)
-    };
-    let Some(position) = pick(run, random, waits) else {
-        return false;
-    };
-    let join_ns = join_ns(run, &run.events[position]).expect("it waits");
-    run.events[position].time_ns = join_ns - 1;
-    true
+fn joins(run: &Run, event: &Event) -> bool {
+    join_ns(run, event) > Some(0)
 }
 
-fn late_start(run: &mut Run, random: &mut Random) -> bool {
-    let lasts = |event: &Event| {
-        let next = [What::Suspend, What::Finish].map(|what| find(run, event, what));
-        let mut next = next
-            .into_iter()
-            .flatten()
-            .map(|next| run.events[next].time_ns);
-        event.what == What::Start && next.all(|next_ns| next_ns > event.time_ns + 1)
-    };
-    let Some(position) = pick(run, random, lasts) else {
-        return false;
-    };
-    run.events[position].time_ns += 1;
-    true
+fn runs_on(run: &Run, event: &Event) -> bool {
+    let next = [What::Suspend, What::Finish].map(|what| time_ns(run, event, what));
+    let mut next = next.into_iter().flatten();
+    next.all(|next_ns| next_ns > event.time_ns + 1)
 }
 
-fn swapped(run: &mut Run, random: &mut Random) -> bool {
-    let lasts = |event: &Event| {
-        let finish = find(run, event, What::Finish);
-        let finish_ns = finish.map(|finish| run.events[finish].time_ns);
-        event.what == What::Start && finish_ns.is_some_and(|finish_ns| finish_ns > event.time_ns)
+fn finishes(run: &Run, event: &Event) -> bool {
+    time_ns(run, event, What::Finish) > Some(event.time_ns)
+}
+
+fn has_others(run: &Run, _: &Event) -> bool {
+    run.options.cores > 1
+}
+
+fn remove(run: &mut Run, place: usize, _: &mut Random) {
+    run.events.remove(place);
+}
+
+fn double(run: &mut Run, place: usize, _: &mut Random) {
+    run.events.insert(place, run.events[place]);
+}
+
+fn miss(run: &mut Run, place: usize, _: &mut Random) {
+    let what = What::Missed;
+    let missed = Event {
+        what,
+        ..run.events[place]
     };
-    let Some(start) = pick(run, random, lasts) else {
-        return false;
-    };
-    let finish = find(run, &run.events[start], What::Finish).expect("it lasts");
+    run.events.push(missed);
+}
+
+fn early(run: &mut Run, place: usize, random: &mut Random) {
+    let event = &mut run.events[place];
+    let nominal_ns = run.task_set.dag(event.dag).grid_ns(event.job);
+    event.time_ns = random.between(0, nominal_ns - 1);
+}
+
+fn before_join(run: &mut Run, place: usize, _: &mut Random) {
+    let join_ns = join_ns(run, &run.events[place]).expect("it waits");
+    run.events[place].time_ns = join_ns - 1;
+}
+
+fn late(run: &mut Run, place: usize, _: &mut Random) {
+    run.events[place].time_ns += 1;
+}
+
+fn swap(run: &mut Run, start: usize, _: &mut Random) {
+    let finish = find(run, &run.events[start], What::Finish).expect("it finishes");
     let start_ns = run.events[start].time_ns;
     run.events[start].time_ns = run.events[finish].time_ns;
     run.events[finish].time_ns = start_ns;
-    true
 }
 
-fn finish_elsewhere(run: &mut Run, random: &mut Random) -> bool {
-    let position = pick(run, random, |event| event.what == What::Finish);
-    let Some(position) = position.filter(|_| run.options.cores > 1) else {
-        return false;
-    };
-    let core = &mut run.events[position].core.0;
+fn elsewhere(run: &mut Run, place: usize, _: &mut Random) {
+    let core = &mut run.events[place].core.0;
     *core = (*core + 1) % run.options.cores;
-    true
 }

@@ -4,14 +4,11 @@
 //! core as `cN`, and `dag.job` or `dag.job.subtask`. A breach is made by
 //! replacing lines of a good trace. Times and bounds are a few nanoseconds.
 
-mod dispatch;
-mod lost;
+mod breaches;
 mod malformed;
-mod rules;
-mod sporadic;
 
 use super::model::Run;
-use super::{Findings, check, read};
+use super::{check, read};
 use sched_dag::journal::Event;
 use sched_dag::{CoreId, DagId, SubtaskId};
 
@@ -22,9 +19,14 @@ const BOUND_NS: u64 = 5;
 pub(super) fn run_of(header: &str, events: &str) -> Run {
     let log = format!("{header}\n{{\"kind\":\"trace_end\",\"events\":0,\"lost\":0}}\n");
     let mut run = read(&log).unwrap().remove(0);
-    let lines = events.lines().map(str::trim);
-    run.events = lines.filter(|line| !line.is_empty()).map(event).collect();
+    run.events = lines_of(events).into_iter().map(event).collect();
     run
+}
+
+/// Returns the lines that are not empty.
+fn lines_of(text: &str) -> Vec<&str> {
+    let lines = text.lines().map(str::trim);
+    lines.filter(|line| !line.is_empty()).collect()
 }
 
 fn event(line: &str) -> Event {
@@ -46,31 +48,47 @@ fn event(line: &str) -> Event {
     }
 }
 
-/// Replaces lines of a trace, each of which must be there once.
-fn with(events: &str, changes: &[(&str, &str)]) -> String {
-    let mut events = events.to_string();
-    for (from, to) in changes {
-        assert_eq!(events.matches(from).count(), 1, "{from}");
-        events = events.replace(from, to);
+/// Changes a good trace, and asserts what that shows.
+///
+/// A row `FROM -> TO` puts other lines, with `; ` between, in the place of the one that begins with
+/// FROM, or of all from that one on if FROM ends with `..`. A row `lost` or `complete` is what the
+/// run says of itself. A row `= BREACH` judges the trace so changed: it shows this breach, perhaps
+/// among others, or none if nothing stands behind `=`. The next row changes the good trace again.
+fn assert_each(header: &str, good: &str, rows: &str) {
+    let (mut run, mut lines) = (run_of(header, ""), lines_of(good));
+    for row in lines_of(rows) {
+        if let Some(breach) = row.strip_prefix('=') {
+            run.events = lines.iter().map(|line| event(line)).collect();
+            let found = check(&run, BOUND_NS).breaches;
+            let found = found.iter().map(|it| it.with_names(&run.task_set));
+            let found: Vec<String> = found.map(|it| it.to_string()).collect();
+            let is_as_it_says = match breach.trim() {
+                "" => found.is_empty(),
+                breach => found.iter().any(|text| text == breach),
+            };
+            let (found, trace) = (found.join("\n"), lines.join("\n"));
+            assert!(is_as_it_says, "not `{breach}`, but\n{found}\nof\n{trace}");
+            (run, lines) = (run_of(header, ""), lines_of(good));
+        } else if let Some((from, to)) = row.split_once(" ->") {
+            change(&mut lines, from, to.trim());
+        } else {
+            run.lost += u64::from(row == "lost");
+            run.complete |= row == "complete";
+            assert!(["lost", "complete"].contains(&row), "{row}");
+        }
     }
-    events
 }
 
-/// Checks a run and returns its breaches as texts.
-fn breaches(run: &Run) -> Vec<String> {
-    let Findings { breaches, .. } = check(run, BOUND_NS);
-    let texts = breaches
-        .iter()
-        .map(|breach| breach.with_names(&run.task_set).to_string());
-    texts.collect()
-}
-
-/// Asserts that a run shows this breach, perhaps among others.
-fn assert_shows(run: &Run, breach: &str) {
-    let found = breaches(run);
-    assert!(
-        found.iter().any(|text| text == breach),
-        "not `{breach}`, but\n{}",
-        found.join("\n")
-    );
+/// Puts other lines in the place of one, which must be there once, or of all from it on.
+fn change<'t>(lines: &mut Vec<&'t str>, from: &str, to: &'t str) {
+    let (from, is_all) = match from.strip_suffix("..") {
+        Some(from) => (from, true),
+        None => (from, false),
+    };
+    let places = (0..lines.len()).filter(|&place| lines[place].starts_with(from));
+    let places: Vec<usize> = places.collect();
+    assert_eq!(places.len(), 1, "{from}");
+    let end = if is_all { lines.len() } else { places[0] + 1 };
+    let instead = to.split("; ").filter(|line| !line.is_empty());
+    lines.splice(places[0]..end, instead);
 }

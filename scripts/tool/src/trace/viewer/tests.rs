@@ -54,19 +54,8 @@ fn diamond() -> Run {
     run_of(HEADER, EVENTS)
 }
 
-/// The events of a text, each an object.
-fn events(text: &str) -> Vec<Value> {
-    let all = parse(text).expect("valid JSON");
-    all.get("traceEvents").expect("events").elements().to_vec()
-}
-
 fn text<'v>(event: &'v Value, name: &str) -> &'v str {
     event.get(name).and_then(Value::as_text).unwrap_or_default()
-}
-
-fn number(event: &Value, name: &str) -> u64 {
-    let number = event.get(name).and_then(Value::as_u64);
-    number.unwrap_or_else(|| panic!("no {name} in {event:?}"))
 }
 
 fn ns(event: &Value) -> u64 {
@@ -82,151 +71,144 @@ fn ns(event: &Value) -> u64 {
     }
 }
 
-/// The names of groups and tracks, by number.
-fn names(events: &[Value]) -> BTreeMap<u64, String> {
-    let of = |event: &&Value| text(event, "name").ends_with("_name");
-    let name = |event: &Value| {
-        let name = event.at(&["args", "name"]).and_then(Value::as_text);
-        (number(event, "tid"), name.expect("a name").to_string())
-    };
-    events.iter().filter(of).map(name).collect()
+/// A track that is read.
+#[derive(Default)]
+struct Track<'v> {
+    name: &'v str,
+    latest_ns: u64,
+    /// The slices that are open.
+    open: Vec<(&'v Value, u64)>,
 }
 
-/// A slice: track, name, begin and end.
-type Slice = (String, String, u64, u64);
-
-/// Takes the slices apart, and fails unless those of each track nest.
-fn slices(events: &[Value]) -> Vec<Slice> {
-    let names = names(events);
-    let mut open: BTreeMap<u64, Vec<(String, u64)>> = BTreeMap::new();
-    let mut latest: BTreeMap<u64, u64> = BTreeMap::new();
-    let mut slices = Vec::new();
-    for event in events.iter().filter(|event| text(event, "ph") != "M") {
-        let (track, at_ns) = (number(event, "tid"), ns(event));
-        let before = latest.insert(track, at_ns).unwrap_or(0);
-        assert!(before <= at_ns, "a track goes on in the order of time");
-        let open = open.entry(track).or_default();
-        match text(event, "ph") {
-            "B" => open.push((text(event, "name").into(), at_ns)),
-            "E" => {
-                let (name, begin_ns) = open.pop().expect("a slice that was begun");
-                slices.push((names[&track].clone(), name, begin_ns, at_ns));
+/// Draws runs, and returns the drawing as lines: a group is `group: NAME`, a slice is
+/// `TRACK: NAME FROM..TO`, on a core with how it begins and ends; a moment is `TRACK: NAME AT`, an
+/// arrow `NAME: FROM > TO`. Fails unless each track goes on in the order of time, its slices nest,
+/// and each arrow has one end in a slice and one in another.
+fn drawn(runs: &[Run], bound_ns: u64) -> Vec<String> {
+    let all = parse(&convert(runs, bound_ns)).expect("valid JSON");
+    let (mut lines, mut ends) = (Vec::new(), BTreeMap::<u64, Vec<_>>::new());
+    let mut tracks = BTreeMap::<u64, Track<'_>>::new();
+    for event in all.get("traceEvents").expect("events").elements() {
+        let number = |name| event.get(name).and_then(Value::as_u64).expect(name);
+        let (track, name) = (
+            tracks.entry(number("tid")).or_default(),
+            text(event, "name"),
+        );
+        match (text(event, "ph"), name) {
+            ("M", "thread_name") => track.name = text(event.get("args").expect("args"), "name"),
+            ("M", "process_name") => {
+                let name = text(event.get("args").expect("args"), "name");
+                lines.push(format!("group: {name}"));
             }
-            "s" | "f" => assert!(!open.is_empty(), "a flow has a slice at each end"),
-            "i" => {}
-            other => panic!("a phase `{other}`"),
+            ("M", _) => {}
+            (phase, _) => {
+                let at_ns = ns(event);
+                assert!(track.latest_ns <= at_ns, "in the order of time");
+                track.latest_ns = at_ns;
+                match phase {
+                    "B" => track.open.push((event, at_ns)),
+                    "E" => {
+                        let (begun, from_ns) = track.open.pop().expect("a slice that was begun");
+                        let how = |name| begun.at(&["args", name]).and_then(Value::as_text);
+                        let how = how("begins").zip(how("ends"));
+                        let how = how.map(|(begins, ends)| format!(", {begins} to {ends}"));
+                        let (name, how) = (text(begun, "name"), how.unwrap_or_default());
+                        lines.push(format!("{}: {name} {from_ns}..{at_ns}{how}", track.name));
+                    }
+                    "i" => lines.push(format!("{}: {name} {at_ns}", track.name)),
+                    "s" | "f" => {
+                        assert!(!track.open.is_empty(), "a flow has a slice at each end");
+                        ends.entry(number("id"))
+                            .or_default()
+                            .push((phase, at_ns, name));
+                    }
+                    other => panic!("a phase `{other}`"),
+                }
+            }
         }
     }
-    assert!(open.values().all(Vec::is_empty), "each slice is ended");
-    slices
+    let is_ended = |track: &Track<'_>| track.open.is_empty();
+    assert!(tracks.values().all(is_ended), "each slice is ended");
+    for mut ends in ends.into_values() {
+        ends.sort_unstable();
+        let [("f", to_ns, name), ("s", from_ns, _)] = ends[..] else {
+            panic!("an arrow has two ends: {ends:?}");
+        };
+        lines.push(format!("{name}: {from_ns} > {to_ns}"));
+    }
+    lines
 }
 
-/// Returns the flows as pairs of times, and fails unless each has both ends.
-fn flows(events: &[Value]) -> Vec<(u64, u64)> {
-    let ends = |phase: &str| {
-        let ends: Vec<(u64, u64)> = events
-            .iter()
-            .filter(|event| text(event, "ph") == phase)
-            .map(|event| (number(event, "id"), ns(event)))
-            .collect();
-        let count = ends.len();
-        let ends: BTreeMap<u64, u64> = ends.into_iter().collect();
-        assert_eq!(ends.len(), count, "no two flows have one number");
-        ends
-    };
-    let (starts, finishes) = (ends("s"), ends("f"));
-    assert!(starts.keys().eq(finishes.keys()));
-    starts.into_values().zip(finishes.into_values()).collect()
-}
-
-fn instants<'e>(events: &'e [Value], track: &str) -> Vec<(u64, &'e str)> {
-    let names = names(events);
-    let of = |event: &&Value| text(event, "ph") == "i" && names[&number(event, "tid")] == track;
-    let all = events.iter().filter(of);
-    all.map(|event| (ns(event), text(event, "name"))).collect()
-}
-
-fn slice(track: &str, name: &str, begin_ns: u64, end_ns: u64) -> Slice {
-    (track.into(), name.into(), begin_ns, end_ns)
+/// Draws a run, and asserts which lines of the drawing begin like this, in any order.
+fn assert_drawn(run: Run, begin: &str, expected: &str) {
+    let lines = drawn(&[run], 10);
+    let found = lines.iter().filter_map(|line| line.strip_prefix(begin));
+    let mut found: Vec<&str> = found.collect();
+    let mut expected: Vec<&str> = expected.lines().map(str::trim).skip(1).collect();
+    found.sort_unstable();
+    expected.sort_unstable();
+    assert_eq!(found, expected, "{begin}: {lines:#?}");
 }
 
 #[test]
 fn a_core_shows_each_piece_of_execution() {
-    let events = events(&convert(&[diamond()], 10));
-    let slices = slices(&events);
-    let of_core_1: Vec<_> = slices.iter().filter(|slice| slice.0 == "core 1").collect();
-    let expected = [
-        slice("core 1", "a/r #0", 93, 152),
-        slice("core 1", "\"b\"/x #0", 152, 300),
-        slice("core 1", "a/r #0", 300, 1100),
-        slice("core 1", "a/j #0", 1102, 1200),
-        slice("core 1", "a/r #1", 1301, 2501),
-    ];
-    assert!(of_core_1.into_iter().eq(&expected), "{slices:#?}");
-    assert_eq!(
-        instants(&events, "core 1"),
-        [(151, "preempt for \"b\"/x #0"), (152, "preempted a/r #0")]
-    );
-    let begins_and_ends: Vec<_> = events
-        .iter()
-        .filter(|event| text(event, "name") == "a/r #0" && text(event, "ph") == "B")
-        .map(|event| ["begins", "ends"].map(|name| text(event.get("args").expect("args"), name)))
-        .collect();
-    assert_eq!(
-        begins_and_ends,
-        [["start", "suspend"], ["resume", "finish"]]
-    );
+    let pieces = "
+        a/r #0 93..152, start to suspend
+        preempt for \"b\"/x #0 151
+        preempted a/r #0 152
+        \"b\"/x #0 152..300, start to finish
+        a/r #0 300..1100, resume to finish
+        a/j #0 1102..1200, start to finish
+        a/r #1 1301..2501, start to after the trace";
+    assert_drawn(diamond(), "core 1: ", pieces);
 }
 
 #[test]
 fn a_dag_shows_its_jobs_its_subtasks_and_what_was_missed() {
-    let events = events(&convert(&[diamond()], 10));
-    let slices = slices(&events);
-    for expected in [
-        // Two jobs overlap, so they lie on two lanes.
-        slice("jobs, lane 1", "job #0", 0, 1200),
-        slice("jobs, lane 2", "job #1, missed", 1000, 2501),
-        slice("jobs, lane 1", "job #0, missed", 150, 300),
-        slice("r", "#0", 91, 1100),
-        slice("r", "on core 1", 93, 152),
-        slice("r", "on core 1", 300, 1100),
-    ] {
-        assert!(slices.contains(&expected), "{expected:?} in {slices:#?}");
-    }
-    let moments = instants(&events, "releases, deadlines");
-    let expected = [
-        (0, "release #0"),
-        (1000, "release #1"),
-        (1500, "deadline #0"),
-        (2500, "deadline #1"),
-        (2501, "MISS #1"),
-        (150, "release #0"),
-        (250, "deadline #0"),
-        (251, "MISS #0"),
-    ];
-    assert_eq!(moments, expected);
-    assert_eq!(
-        instants(&events, "j"),
-        [(1101, "ready #0")],
-        "a ready instant"
-    );
+    // Two jobs overlap, so they lie on two lanes.
+    let jobs = "
+        1: job #0 0..1200
+        2: job #1, missed 1000..2501
+        1: job #0, missed 150..300";
+    assert_drawn(diamond(), "jobs, lane ", jobs);
+    let r = "
+        #0 91..1100
+        on core 1 93..152
+        on core 1 300..1100
+        #1 1300..2501
+        on core 1 1301..2501
+        ready #0 91
+        ready #1 1300";
+    assert_drawn(diamond(), "r: ", r);
+    let moments = "
+        release #0 0
+        release #1 1000
+        deadline #0 1500
+        deadline #1 2500
+        MISS #1 2501
+        release #0 150
+        deadline #0 250
+        MISS #0 251";
+    assert_drawn(diamond(), "releases, deadlines: ", moments);
 }
 
+/// Each is drawn twice: between cores, and between the DAGs' own tracks.
 #[test]
 fn an_arrow_leads_along_each_edge_whose_ends_ran() {
-    let events = events(&convert(&[diamond()], 10));
-    let mut flows = flows(&events);
-    flows.sort_unstable();
-    let one = [
-        (90, 92),
-        (90, 93),
-        (400, 1102),
-        (1100, 1102),
-        (1300, 1300),
-        (1300, 1301),
-    ];
-    let both: Vec<_> = one.into_iter().flat_map(|arrow| [arrow, arrow]).collect();
-    assert_eq!(flows, both);
+    let edges = "
+        90 > 92
+        90 > 92
+        90 > 93
+        90 > 93
+        400 > 1102
+        400 > 1102
+        1100 > 1102
+        1100 > 1102
+        1300 > 1300
+        1300 > 1300
+        1300 > 1301
+        1300 > 1301";
+    assert_drawn(diamond(), "precedes: ", edges);
 }
 
 #[test]
@@ -235,37 +217,28 @@ fn an_arrow_leads_from_a_value_to_each_instance_that_samples_it() {
     let graph = r#"
 {"kind":"graph","commit":0,"policy":"edf","preemption":"on","cores":2,"overhead_ns":[],"period_ns":1,"relative_deadline_ns":1,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[],"edges":[],"hash":1,"sporadic":false,"jobs":[],"states":[],"dag":0,"name":"a","bound_ns":[],"topics":[["t","u8",0,[1,2],1]],"samples":[]}
 {"kind":"graph","commit":0,"policy":"edf","preemption":"on","cores":2,"overhead_ns":[],"period_ns":1,"relative_deadline_ns":1,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[],"edges":[],"hash":1,"sporadic":false,"jobs":[],"states":[],"dag":1,"name":"\"b\"","bound_ns":[9],"topics":[],"samples":[[0,0,0,null]]}"#;
-    let events = events(&convert(&[run_of(&format!("{graph}{HEADER}"), EVENTS)], 10));
-    assert_eq!(flows(&events).len(), 14);
-    let of_samples = |event: &&Value| text(event, "name") == "sampled by";
-    let ends = events.iter().filter(of_samples);
-    let ends: Vec<_> = ends.map(|event| (text(event, "ph"), ns(event))).collect();
-    let once = [("s", 90), ("f", 152)];
-    assert_eq!(ends, [once, once].concat());
+    let run = run_of(&format!("{graph}{HEADER}"), EVENTS);
+    let sampled = "
+        90 > 152
+        90 > 152";
+    assert_drawn(run, "sampled by: ", sampled);
 }
 
 #[test]
 fn breaches_are_shown_where_they_are() {
-    let group = |text: &str| {
-        names(&events(text))
-            .into_values()
-            .any(|name| name == "breaches")
+    let shows = |bound_ns, begin: &str| {
+        let lines = drawn(&[diamond()], bound_ns);
+        lines.iter().any(|line| line.starts_with(begin))
     };
-    assert!(!group(&convert(&[diamond()], 10)));
+    assert!(!shows(10, "group: breaches"));
     // At a bound of 0, taking a core for `b` took too long.
-    let text = convert(&[diamond()], 0);
-    assert!(group(&text));
-    assert!(!instants(&events(&text), "rules").is_empty());
+    assert!(shows(0, "group: breaches") && shows(0, "rules: "));
 }
 
 #[test]
 fn runs_stand_side_by_side_and_share_no_number() {
-    let events = events(&convert(&[diamond(), diamond()], 10));
-    slices(&events);
-    assert_eq!(flows(&events).len(), 24);
-    let names = names(&events);
-    assert_eq!(
-        names.values().filter(|name| *name == "run 0 cores").count(),
-        2
-    );
+    let (one, two) = (drawn(&[diamond()], 10), drawn(&[diamond(), diamond()], 10));
+    assert_eq!(two.len(), 2 * one.len());
+    let is_of_cores = |line: &&String| *line == "group: run 0 cores";
+    assert_eq!(two.iter().filter(is_of_cores).count(), 2);
 }
