@@ -1,0 +1,182 @@
+//! What holds for every command of the tool alike: how it refuses what it does not know,
+//! and that it does not mind who reads.
+
+use std::fs;
+use std::io::{self, BufRead};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use tool::system::workspace;
+
+use crate::{assert_refused, call, command, folder, refusal};
+
+/// Every command, by the words that name it.
+const COMMANDS: &str = "run, boot, test, new-app, check-trace, trace, recording, soak, bench, \
+    bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle bounds, \
+    oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer";
+
+/// Runs the tool with the other ends of both its outputs closed; returns its exit code.
+fn code_without_readers(line: &str) -> Option<i32> {
+    let closed = || {
+        let (reader, writer) = io::pipe().expect("a pipe");
+        drop(reader);
+        writer
+    };
+    let mut command = command(&workspace(), line.split(' '));
+    command.stdout(closed()).stderr(closed());
+    let status = command.status().expect("the tool can be started");
+    status.code()
+}
+
+#[test]
+fn every_command_explains_itself_and_names_an_unknown_option() {
+    for name in COMMANDS.split(", ") {
+        let (help, unknown) = (format!("{name} --help"), format!("{name} --frobnicate"));
+        let explained = call(&workspace(), help.split(' '));
+        assert_eq!(explained.code, Some(0), "{name}");
+        let usage = format!("usage: ./scripts/{name} ");
+        assert!(explained.out.contains(&usage), "{}", explained.out);
+        let script = name.split(' ').next().unwrap_or_default();
+        assert!(workspace().join("scripts").join(script).is_file(), "{name}");
+
+        let said = refusal(&workspace(), unknown.split(' '));
+        let words = format!("{name}: unknown option `--frobnicate`; ");
+        assert!(said.starts_with(&words), "{said}");
+        assert!(said.ends_with("--help"), "{said}");
+
+        assert_eq!(code_without_readers(&help), Some(0), "{name}");
+        assert_eq!(code_without_readers(&unknown), Some(2), "{name}");
+    }
+}
+
+#[test]
+fn that_no_one_reads_is_no_failure_and_that_there_is_no_room_is_one() {
+    let folder = folder("unread");
+    fs::write(folder.join("good.log"), crate::traces::GOOD).expect("a file");
+    let log = folder.join("good.log").display().to_string();
+    for line in [
+        "run --print-dag --dag apps/dag-file/examples/rd-gen/gnp_01.yaml",
+        "oracle synchronizer tests/oracle/synchronizer.txt",
+        &format!("trace {log}"),
+        &format!("check-trace {log}"),
+    ] {
+        assert_eq!(code_without_readers(line), Some(0), "{line}");
+    }
+    for line in [
+        "run --help",
+        "run --print-dag --dag apps/dag-file/examples/demo.dag",
+        "oracle synchronizer tests/oracle/synchronizer.txt",
+    ] {
+        let full = fs::File::create("/dev/full").expect("the device is there");
+        let mut command = command(&workspace(), line.split(' '));
+        let output = command.stdout(full).output().expect("it starts");
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
+        let words = "fass-tool: standard output could not be written: No space left on device";
+        assert!(said.starts_with(words), "{said}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused_with_the_remedy() {
+    let rows = "
+run --coers 3 | run: unknown option `--coers`; did you mean `--cores`?
+oracle schedules --in-kernal | oracle schedules: unknown option `--in-kernal`; did you mean `--in-kernel`?
+bench hand-of | bench: unknown WHAT `hand-of`; did you mean `hand-off`?
+oracle bound | oracle: unknown KIND `bound`; did you mean `bounds`?
+tset | fass-tool: unknown SUBCOMMAND `tset`; did you mean `test`?
+run --app dag-file --mode deterministic | run: app `dag-file` runs the DAGs of a file; name one by `--dag FILE`
+run --execution wcet | `--execution` needs `--dag FILE`
+bench bounds --cores 2,2 | `--cores`: `2` stands twice
+bench native --only join,join | `--only`: `join` stands twice
+soak --short --seconds 5 | `--short` and `--seconds`
+soak --rounds 1 --seconds 5 | `--rounds` and `--seconds`
+bench join-latency --once --mode threads | `--once`
+new-app | new-app: which name? give one, such as `./scripts/new-app brake-assist`
+new-app fork-join | new-app: there is an app `fork-join` already; choose another name, or edit apps/fork-join
+new-app Fork-Join | new-app: `Fork-Join` cannot be an app's name: 'F' is in it; use small letters, digits and hyphens, as in `fork-join`
+new-app one two | new-app: `two`: only one NAME is allowed, and `one` is one
+new-app one --git https://example.org | new-app: `--git` is for a repository; add its folder, `--out DIR`";
+    assert_refused(&workspace(), rows);
+    assert!(!workspace().join("apps/one").exists());
+    let seed = format!("seed={}", "1".repeat(2100));
+    let words = ["run", "--mode", "deterministic", "--append", &seed];
+    let expected = "run: the guest's command line has 2137 bytes, and 2048 is the most that it \
+                    takes; give fewer or shorter words";
+    assert_eq!(refusal(&workspace(), words), expected);
+}
+
+/// In each line, a word stands for one that a terminal would obey.
+#[test]
+fn what_a_message_repeats_cannot_rewrite_the_terminal() {
+    for word in ["\u{1b}[2J", "a\nb", "\u{202e}abc", "\u{feff}"] {
+        for line in [
+            "run --cores WORD",
+            "run WORD",
+            "run --app WORD",
+            "run --set WORD=",
+            "run --dag WORD",
+            "run --dag apps/dag-file/examples/demo.dag --graph WORD",
+            "run --dag apps/dag-file/examples/demo.dag --clusters 1WORD1",
+            "run --image WORD",
+            "check-trace WORD",
+            "oracle bounds WORD",
+            "bench WORD",
+            "bench join-latency --policies fassWORDexact",
+            "new-app WORD",
+            "soak --only WORD",
+        ] {
+            let words = line.split(' ').map(|given| given.replace("WORD", word));
+            let said = refusal(&workspace(), words);
+            let is_raw = |character: char| !matches!(character, ' '..='~');
+            assert!(!said.contains(is_raw), "{line}: {said:?}");
+        }
+    }
+    assert!(refusal(&workspace(), ["run", "--set", "gain=1\n2"]).contains("\\n"));
+}
+
+#[test]
+fn that_another_command_builds_is_said_and_help_does_not_wait_for_it() {
+    let target = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("locked");
+    let folder = target.join("tool");
+    let _ = fs::remove_dir_all(&target);
+    fs::create_dir_all(&folder).expect("the test's folder takes one");
+    let lock = fs::File::create(folder.join(".cargo-lock")).expect("a file in it");
+    lock.lock().expect("nobody else has it");
+    let run_help = || {
+        let mut command = Command::new(workspace().join("scripts/run"));
+        command.arg("--help").env("CARGO_TARGET_DIR", &target);
+        command.stdin(Stdio::null()).stderr(Stdio::piped());
+        command
+    };
+    let mut child = run_help().stdout(Stdio::null()).spawn();
+    let child = child.as_mut().expect("the script can be started");
+    let said = child.stderr.take().map(io::BufReader::new);
+    let line = said.and_then(|said| said.lines().next());
+    let line = line.expect("it says something").expect("UTF-8");
+    // It waits for us now; it is cargo by then, by the same process id.
+    child.kill().expect("it runs");
+    child.wait().expect("it was killed");
+    let folder = folder.display();
+    let waiting = format!("waiting for another command, which builds in {folder}");
+    assert_eq!(line, waiting);
+
+    // A tool that is built, and newer than its sources, answers while the lock is held.
+    let built = env!("CARGO_BIN_EXE_fass-tool");
+    fs::copy(built, target.join("tool/fass-tool")).expect("the folder takes a program");
+    let output = run_help().output().expect("the script can be started");
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert_eq!(output.stderr, b"");
+    assert!(output.stdout.starts_with(b"Builds an app, "), "{output:?}");
+}
+
+#[test]
+fn boot_runs_what_is_no_image_as_it_is() {
+    let program = call(&workspace(), "boot /bin/echo --help me".split(' '));
+    let found = (program.code, program.out.as_str());
+    assert_eq!(found, (Some(0), "--help me\n"));
+    let nothing = call(&workspace(), ["boot", "./no-such-program"]);
+    assert_eq!(nothing.code, Some(1), "{}", nothing.complaint);
+    let words = "boot: cannot start ./no-such-program: ";
+    assert!(nothing.complaint.starts_with(words));
+}
