@@ -125,25 +125,15 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_word_is_named_with_the_nearest_or_with_all() {
+    fn the_words_are_listed_and_an_unknown_one_is_named_with_the_nearest_or_with_all() {
         let refusal = |word| MENU.choose(OsStr::new(word)).unwrap_err();
+        let all = "give one of soup, salad, and see ./scripts/cook --help";
+        let steak = format!("unknown DISH `steak-tartare`; {all}");
         assert_eq!(refusal("sop"), "unknown DISH `sop`; did you mean `soup`?");
-        assert_eq!(
-            refusal("steak-tartare"),
-            "unknown DISH `steak-tartare`; give one of soup, salad, and see ./scripts/cook --help"
-        );
-        assert_eq!(
-            refusal("--hot"),
-            "unknown option `--hot`; give one of soup, salad, and see ./scripts/cook --help"
-        );
-    }
-
-    #[test]
-    fn the_help_text_lists_the_words() {
-        assert_eq!(
-            MENU.help(),
-            "Cooks.\n\nusage: ./scripts/cook DISH [options]; each DISH explains itself by --help\
-             \n\n  soup          hot\n  salad         cold\n\nHot.\n"
-        );
+        assert_eq!(refusal("steak-tartare"), steak);
+        assert_eq!(refusal("--hot"), format!("unknown option `--hot`; {all}"));
+        let help = "Cooks.\n\nusage: ./scripts/cook DISH [options]; each DISH explains itself by \
+                    --help\n\n  soup          hot\n  salad         cold\n\nHot.\n";
+        assert_eq!(MENU.help(), help);
     }
 }

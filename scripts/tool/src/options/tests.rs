@@ -39,103 +39,55 @@ fn refusal(line: &str) -> String {
 }
 
 #[test]
-fn defaults_hold_where_nothing_is_given() {
-    let parsed = parsed("");
-    assert_eq!(parsed.number("cores"), Some(8));
-    assert_eq!(parsed.text("mode"), None);
-    assert!(!parsed.is_given("quiet"));
-    assert!(!parsed.is_given("cores"));
-}
-
-#[test]
-fn values_are_separate_or_attached() {
-    let parsed = parsed("--cores 4 --mode=threads -q --subtasks=2,4,6");
-    assert_eq!(parsed.number("cores"), Some(4));
-    assert_eq!(parsed.text("mode"), Some("threads"));
-    assert_eq!(parsed.text("subtasks"), Some("2,4,6"));
-    assert!(parsed.is_given("quiet"));
-}
-
-#[test]
-fn a_number_out_of_range_is_named_with_its_range() {
-    let range = "must be a number from 1 to 64";
-    for value in ["0", "65", "x", "-1", "+1", "1.5", "99999999999999999999999"] {
-        let refusal = refusal(&format!("--cores {value}"));
-        assert_eq!(refusal, format!("`--cores {value}`: {range}"));
-    }
-    assert_eq!(
-        refusal("--subtasks 2,0,6"),
-        "`--subtasks 2,0,6`: must be numbers from 1 to 14 with commas between"
-    );
-    assert!(refusal("--subtasks 2,,6").contains("commas"));
-}
-
-#[test]
-fn an_unknown_option_is_named_with_the_nearest() {
-    assert_eq!(
-        refusal("--core 4"),
-        "unknown option `--core`; did you mean `--cores`?"
-    );
-    assert_eq!(
-        refusal("--frobnicate"),
-        "unknown option `--frobnicate`; \
-         allowed are --cores, --subtasks, --mode, --serial, --only, --quiet, --help"
-    );
-    assert!(refusal("-x").starts_with("unknown option `-x`; "));
-    assert!(refusal("-é").starts_with("unknown option `-é`; "));
-}
-
-#[test]
-fn an_unknown_word_is_named_with_those_allowed() {
-    assert_eq!(
-        refusal("--mode thread"),
-        "`--mode thread`: must be one of kvm, deterministic, threads; did you mean `threads`?"
-    );
-    assert_eq!(
-        refusal("stray"),
-        "unknown word `stray`; options begin with `--`, see ./scripts/example --help"
-    );
-}
-
-#[test]
-fn a_line_that_is_not_whole_is_refused() {
-    assert_eq!(
-        refusal("--cores"),
-        "option `--cores` lacks its value: a number from 1 to 64"
-    );
-    assert_eq!(
-        refusal("--cores 1 --cores 2"),
-        "option `--cores` stands twice; give it once"
-    );
-    assert_eq!(
-        refusal("--quiet=yes"),
-        "option `--quiet` takes no value; write it alone"
-    );
-    assert_eq!(refusal("--serial="), "`--serial `: must be a file");
-    for word in ["--help=1", "-h="] {
-        let said = "option `--help` takes no value; write it alone";
-        assert_eq!(refusal(word), said);
+fn what_is_given_holds_and_else_the_default() {
+    let given = parsed("");
+    assert_eq!(given.number("cores"), Some(8));
+    assert_eq!(given.text("mode"), None);
+    assert!(!given.is_given("quiet") && !given.is_given("cores"));
+    let given = parsed("--cores 4 --mode=threads -q --subtasks=2,4,6");
+    assert_eq!(given.number("cores"), Some(4));
+    assert_eq!(given.text("mode"), Some("threads"));
+    assert_eq!(given.text("subtasks"), Some("2,4,6"));
+    assert!(given.is_given("quiet"));
+    for (line, file) in [("--serial=--quiet", "--quiet"), ("--serial -x", "-x")] {
+        assert_eq!(parsed(line).path("serial"), Some(Path::new(file)));
     }
 }
 
+/// A command line, and what is said of it.
+const REFUSED: &str = "\
+--cores 0 | `--cores 0`: must be a number from 1 to 64
+--cores 65 | `--cores 65`: must be a number from 1 to 64
+--cores x | `--cores x`: must be a number from 1 to 64
+--cores -1 | `--cores -1`: must be a number from 1 to 64
+--cores +1 | `--cores +1`: must be a number from 1 to 64
+--cores 1.5 | `--cores 1.5`: must be a number from 1 to 64
+--cores 99999999999999999999999 | `--cores 99999999999999999999999`: must be a number from 1 to 64
+--subtasks 2,0,6 | `--subtasks 2,0,6`: must be numbers from 1 to 14 with commas between
+--subtasks 2,,6 | `--subtasks 2,,6`: must be numbers from 1 to 14 with commas between
+--core 4 | unknown option `--core`; did you mean `--cores`?
+--frobnicate | unknown option `--frobnicate`; allowed are --cores, --subtasks, --mode, --serial, --only, --quiet, --help
+-x | unknown option `-x`; allowed are --cores, --subtasks, --mode, --serial, --only, --quiet, --help
+-é | unknown option `-é`; allowed are --cores, --subtasks, --mode, --serial, --only, --quiet, --help
+--mode thread | `--mode thread`: must be one of kvm, deterministic, threads; did you mean `threads`?
+stray | unknown word `stray`; options begin with `--`, see ./scripts/example --help
+--cores | option `--cores` lacks its value: a number from 1 to 64
+--cores 1 --cores 2 | option `--cores` stands twice; give it once
+--quiet=yes | option `--quiet` takes no value; write it alone
+--serial= | `--serial `: must be a file
+--help=1 | option `--help` takes no value; write it alone
+-h= | option `--help` takes no value; write it alone
+--serial --quiet | option `--serial` lacks its value: a file; one that begins with `-` is written `--serial=VALUE`
+--serial -q | option `--serial` lacks its value: a file; one that begins with `-` is written `--serial=VALUE`
+--serial --frobnicate | option `--serial` lacks its value: a file; one that begins with `-` is written `--serial=VALUE`
+--cores --quiet | option `--cores` lacks its value: a number from 1 to 64";
+
 #[test]
-fn an_option_is_no_value() {
-    for line in ["--serial --quiet", "--serial -q", "--serial --frobnicate"] {
-        assert_eq!(
-            refusal(line),
-            "option `--serial` lacks its value: a file; \
-             one that begins with `-` is written `--serial=VALUE`"
-        );
+fn what_the_table_does_not_allow_is_named_with_what_it_does() {
+    for row in REFUSED.lines() {
+        let (line, said) = row.split_once(" | ").expect(row);
+        assert_eq!(refusal(line), said);
     }
-    assert_eq!(
-        refusal("--cores --quiet"),
-        "option `--cores` lacks its value: a number from 1 to 64"
-    );
-    assert_eq!(
-        parsed("--serial=--quiet").path("serial"),
-        Some(Path::new("--quiet"))
-    );
-    assert_eq!(parsed("--serial -x").path("serial"), Some(Path::new("-x")));
 }
 
 #[test]

@@ -17,5 +17,7 @@ pub mod observed;
 pub mod overheads;
 pub mod report;
 pub mod slack;
+#[cfg(test)]
+mod tests;
 pub mod wcets;
 pub mod witness;

@@ -81,31 +81,3 @@ impl Measured {
             .end()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{Costs, measure};
-
-    #[test]
-    fn the_longest_waits_of_a_run_are_what_is_charged() {
-        let log = "{\"kind\":\"trace_begin\",\"policy\":\"edf\",\"preemption\":\"on\",\"cores\":1,\"run\":0}\n\
-            {\"kind\":\"trace_dag\",\"dag\":0,\"name\":\"x\",\"period_ns\":100,\"relative_deadline_ns\":100,\
-             \"offset_ns\":0,\"in_flight\":1,\"overrun\":\"queue\",\"subtasks\":[[\"a\",0,0,50]],\"edges\":[]}\n\
-            {\"kind\":\"trace\",\"events\":[[2,\"released\",0,0,0,-1],[2,\"ready\",0,0,0,0],\
-             [5,\"start\",0,0,0,0],[20,\"finish\",0,0,0,0],[20,\"completed\",0,0,0,-1],\
-             [101,\"released\",0,0,1,-1],[101,\"ready\",0,0,1,0],[108,\"start\",0,0,1,0],\
-             [120,\"finish\",0,0,1,0],[120,\"completed\",0,0,1,-1]]}\n\
-            {\"kind\":\"trace_end\",\"events\":10,\"lost\":0,\"complete\":true}\n";
-        let measured = measure(log).unwrap();
-        let expected = Costs {
-            dispatches: 2,
-            owed_ns: 7,
-            releases: 2,
-            late_ns: 2,
-        };
-        assert_eq!(measured.0, expected);
-        assert_eq!(measured.word(0), "overheads_ns=0,9,7");
-        assert_eq!(measured.word(50), "overheads_ns=0,14,11");
-        assert_eq!(measure("").unwrap_err(), "the guest has run nothing");
-    }
-}

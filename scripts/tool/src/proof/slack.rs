@@ -113,25 +113,3 @@ fn spec(dag: &Dag) -> DagSpec {
         ..DagSpec::default()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::commits::{read, tests::log};
-    use super::{Slack, of};
-    use crate::protocol::Transcript;
-    use sched_dag::DagId;
-
-    #[test]
-    fn the_parts_of_a_bound_are_the_bound() {
-        let commits = read(&Transcript::read(&log("5002000"))).unwrap();
-        let slack = of(&commits[0], DagId(0));
-        let expected = Slack {
-            overheads_ns: Some(2_000),
-            blocking_ns: Some(0),
-            interference_ns: Some(0),
-            own_order_ns: Some(0),
-            length_ns: Some(5_000_000),
-        };
-        assert_eq!(slack, expected);
-    }
-}

@@ -39,16 +39,3 @@ fn file(path: &Path, commit: u64) -> PathBuf {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::file;
-    use std::path::Path;
-
-    #[test]
-    fn each_commit_has_a_file() {
-        let path = Path::new("a/demo.witness");
-        assert_eq!(file(path, 0), path);
-        assert_eq!(file(path, 2), Path::new("a/demo.witness.2"));
-    }
-}

@@ -241,27 +241,20 @@ error: no video\r{\"kind\":\"progress\",\"done\":1,\"total\":2}\r
 
     #[test]
     fn a_damaged_line_is_named_by_its_number() {
-        let log = "\
-ok
-{\"kind\":\"progress\",\"done\":1
-{\"done\":1}
-{\"kind\":\"progress\",\"done\":1}
-{\"kind\":\"fork_join\"}
-";
-        let faults: Vec<_> = Transcript::read(log)
-            .faults
-            .iter()
-            .map(|f| f.to_string())
-            .collect();
-        assert_eq!(
-            faults,
-            [
-                "serial line 2: column 28: the line ends where `,` or `}` must stand",
-                "serial line 3: a machine line without a text `kind`",
-                "serial line 4: a line of kind `progress` without `total`",
-                "serial line 5: a line of kind `fork_join` without `subtasks`",
-            ]
-        );
+        let log = r#"ok
+{"kind":"progress","done":1
+{"done":1}
+{"kind":"progress","done":1}
+{"kind":"fork_join"}
+"#;
+        let faults = Transcript::read(log).faults;
+        let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
+        let expected = "\
+serial line 2: column 28: the line ends where `,` or `}` must stand
+serial line 3: a machine line without a text `kind`
+serial line 4: a line of kind `progress` without `total`
+serial line 5: a line of kind `fork_join` without `subtasks`";
+        assert_eq!(faults.join("\n"), expected);
     }
 
     #[test]

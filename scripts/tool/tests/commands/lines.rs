@@ -22,7 +22,7 @@ fn code_without_readers(line: &str) -> Option<i32> {
         drop(reader);
         writer
     };
-    let mut command = command(&workspace(), line.split(' '));
+    let mut command = command(workspace(), line.split(' '));
     command.stdout(closed()).stderr(closed());
     let status = command.status().expect("the tool can be started");
     status.code()
@@ -32,14 +32,14 @@ fn code_without_readers(line: &str) -> Option<i32> {
 fn every_command_explains_itself_and_names_an_unknown_option() {
     for name in COMMANDS.split(", ") {
         let (help, unknown) = (format!("{name} --help"), format!("{name} --frobnicate"));
-        let explained = call(&workspace(), help.split(' '));
+        let explained = call(workspace(), help.split(' '));
         assert_eq!(explained.code, Some(0), "{name}");
         let usage = format!("usage: ./scripts/{name} ");
         assert!(explained.out.contains(&usage), "{}", explained.out);
         let script = name.split(' ').next().unwrap_or_default();
         assert!(workspace().join("scripts").join(script).is_file(), "{name}");
 
-        let said = refusal(&workspace(), unknown.split(' '));
+        let said = refusal(workspace(), unknown.split(' '));
         let words = format!("{name}: unknown option `--frobnicate`; ");
         assert!(said.starts_with(&words), "{said}");
         assert!(said.ends_with("--help"), "{said}");
@@ -68,7 +68,7 @@ fn that_no_one_reads_is_no_failure_and_that_there_is_no_room_is_one() {
         "oracle synchronizer tests/oracle/synchronizer.txt",
     ] {
         let full = fs::File::create("/dev/full").expect("the device is there");
-        let mut command = command(&workspace(), line.split(' '));
+        let mut command = command(workspace(), line.split(' '));
         let output = command.stdout(full).output().expect("it starts");
         let said = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(1), "{line}: {said}");
@@ -97,13 +97,13 @@ new-app fork-join | new-app: there is an app `fork-join` already; choose another
 new-app Fork-Join | new-app: `Fork-Join` cannot be an app's name: 'F' is in it; use small letters, digits and hyphens, as in `fork-join`
 new-app one two | new-app: `two`: only one NAME is allowed, and `one` is one
 new-app one --git https://example.org | new-app: `--git` is for a repository; add its folder, `--out DIR`";
-    assert_refused(&workspace(), rows);
+    assert_refused(workspace(), rows);
     assert!(!workspace().join("apps/one").exists());
     let seed = format!("seed={}", "1".repeat(2100));
     let words = ["run", "--mode", "deterministic", "--append", &seed];
     let expected = "run: the guest's command line has 2137 bytes, and 2048 is the most that it \
                     takes; give fewer or shorter words";
-    assert_eq!(refusal(&workspace(), words), expected);
+    assert_eq!(refusal(workspace(), words), expected);
 }
 
 /// In each line, a word stands for one that a terminal would obey.
@@ -127,12 +127,12 @@ fn what_a_message_repeats_cannot_rewrite_the_terminal() {
             "soak --only WORD",
         ] {
             let words = line.split(' ').map(|given| given.replace("WORD", word));
-            let said = refusal(&workspace(), words);
+            let said = refusal(workspace(), words);
             let is_raw = |character: char| !matches!(character, ' '..='~');
             assert!(!said.contains(is_raw), "{line}: {said:?}");
         }
     }
-    assert!(refusal(&workspace(), ["run", "--set", "gain=1\n2"]).contains("\\n"));
+    assert!(refusal(workspace(), ["run", "--set", "gain=1\n2"]).contains("\\n"));
 }
 
 #[test]
@@ -172,10 +172,10 @@ fn that_another_command_builds_is_said_and_help_does_not_wait_for_it() {
 
 #[test]
 fn boot_runs_what_is_no_image_as_it_is() {
-    let program = call(&workspace(), "boot /bin/echo --help me".split(' '));
+    let program = call(workspace(), "boot /bin/echo --help me".split(' '));
     let found = (program.code, program.out.as_str());
     assert_eq!(found, (Some(0), "--help me\n"));
-    let nothing = call(&workspace(), ["boot", "./no-such-program"]);
+    let nothing = call(workspace(), ["boot", "./no-such-program"]);
     assert_eq!(nothing.code, Some(1), "{}", nothing.complaint);
     let words = "boot: cannot start ./no-such-program: ";
     assert!(nothing.complaint.starts_with(words));
