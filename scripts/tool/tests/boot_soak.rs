@@ -1,24 +1,18 @@
 //! The short form of `./scripts/soak`: random DAG sets under both policies, in
 //! overload under every overrun policy, with everything checked.
 
+use tool::soak;
 use tool::soak::plan::{Length, Plan};
-use tool::soak::{self, Report};
-
-fn run(length: Length) -> Report {
-    let plan = Plan {
-        side_by_side: 2,
-        ..Plan::new(length, 90, 130)
-    };
-    let rounds = plan.rounds();
-    let report = soak::run(&plan, |_| {}).expect("the guests start");
-    assert_eq!(report.failures, Vec::<String>::new());
-    assert_eq!((report.passed, report.failed), (rounds, 0));
-    report
-}
 
 #[test]
 fn random_sets_break_no_rule_and_leave_nothing_behind() {
-    let report = run(Length::SHORT);
+    let plan = Plan {
+        side_by_side: 2,
+        ..Plan::new(Length::SHORT, 90, 130)
+    };
+    let report = soak::run(&plan, |_| {}).expect("the guests start");
+    assert_eq!(report.failures, Vec::<String>::new());
+    assert_eq!((report.passed, report.failed), (plan.rounds(), 0));
     let figures = |name: &str| {
         let part = report.parts.iter().find(|(part, _)| part == name);
         part.unwrap_or_else(|| panic!("there is no part {name}")).1

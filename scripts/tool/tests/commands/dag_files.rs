@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tool::system::workspace;
 
-use crate::{assert_refused, call, folder, refusal, succeed};
+use crate::support::{assert_refused, call, folder, refusal, succeed};
 
 const DAG: &str = "dag x period 10ms\nsubtask a wcet 1ms\nsubtask b wcet 1ms\nedge a -> b\nend\n";
 const YAML: &str = "nodes:\n- id: 0\n  execution_time: 5\n  period: 9\n- id: 1\n  \

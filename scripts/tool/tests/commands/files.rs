@@ -9,7 +9,7 @@ use std::process::Command;
 
 use tool::system::workspace;
 
-use crate::{assert_refused, call, folder, refusal};
+use crate::support::{assert_refused, call, folder, refusal};
 
 fn demo() -> String {
     let demo = workspace().join("apps/dag-file/examples/demo.dag");

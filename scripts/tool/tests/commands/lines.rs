@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 
 use tool::system::workspace;
 
-use crate::{assert_refused, call, command, folder, refusal};
+use crate::support::{assert_refused, call, command, folder, refusal};
 
 /// Every command, by the words that name it.
 const COMMANDS: &str = "run, boot, test, new-app, check-trace, trace, recording, soak, bench, \

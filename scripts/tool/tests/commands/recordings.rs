@@ -7,7 +7,7 @@ use std::process::Command;
 
 use recording::{Channel, DagHeader, Entry, Header, Recordable, Role, What, Writer, to_bytes};
 
-use crate::{assert_refused, call, folder, refusal, succeed};
+use crate::support::{assert_refused, call, folder, refusal, succeed};
 
 type Value = (String, Option<f64>, [i16; 2], Vec<u64>);
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use tool::protocol::{MachineLine, read_line};
 
-use crate::{assert_refused, call, folder, succeed};
+use crate::support::{assert_refused, call, folder, succeed};
 
 pub(crate) const GOOD: &str = r#"the guest says hello
 {"kind":"trace_begin","policy":"edf","preemption":"on","cores":1,"run":0}

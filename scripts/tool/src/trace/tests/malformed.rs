@@ -81,24 +81,19 @@ fn a_graph_that_no_commit_takes_is_refused_as_there() {
 }
 
 #[test]
-fn a_run_that_stands_twice_is_refused_with_both_lines() {
-    let fault = read(&format!("{GOOD}{GOOD}")).unwrap_err();
-    let reason = "`trace_begin`: run 3 stands here twice, first on line 2; give each boot's log \
-                  alone";
-    assert_eq!((fault.line, fault.reason.as_str()), (10, reason));
-}
-
-#[test]
-fn a_first_line_that_something_spoils_is_named() {
-    for spoiler in [" ", "\u{feff}"] {
-        let log = GOOD.replace(
-            "{\"kind\":\"trace_begin\"",
-            &format!("{spoiler}{{\"kind\":\"trace_begin\""),
-        );
+fn a_run_that_stands_twice_or_whose_first_line_is_spoilt_is_named() {
+    let spoilt = |spoiler: &str| GOOD.replacen("\n{", &format!("\n{spoiler}{{"), 1);
+    let no_begin = "`trace_dag`: no `trace_begin` comes before it; that of line 2 does not begin \
+                    with `{`";
+    let twice = "`trace_begin`: run 3 stands here twice, first on line 2; give each boot's log \
+                 alone";
+    for (log, line, reason) in [
+        (spoilt(" "), 3, no_begin),
+        (spoilt("\u{feff}"), 3, no_begin),
+        (GOOD.repeat(2), 10, twice),
+    ] {
         let fault = read(&log).unwrap_err();
-        let reason = "`trace_dag`: no `trace_begin` comes before it; that of line 2 does not begin \
-                      with `{`";
-        assert_eq!((fault.line, fault.reason.as_str()), (3, reason));
+        assert_eq!((fault.line, fault.reason.as_str()), (line, reason));
     }
 }
 

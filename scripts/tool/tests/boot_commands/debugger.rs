@@ -1,19 +1,13 @@
 //! `debug` as a person uses it: gdb stops in a subtask and shows what is there.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::{Write, stderr};
-use std::process::{Command, Output};
 
 use tool::image::{self, Profile};
-use tool::{install, system};
+use tool::{install, system::workspace};
 
-/// Calls the tool, and returns its output with what it said.
-fn tool(words: &[&str]) -> (Output, String) {
-    let mut tool = Command::new(env!("CARGO_BIN_EXE_fass-tool"));
-    let output = tool.args(words).output().expect("the tool can be started");
-    let said = [&output.stdout[..], &output.stderr[..]].concat();
-    (output, String::from_utf8_lossy(&said).into_owned())
-}
+use crate::support::{call, folder};
 
 /// Reports whether there is a gdb, or one can be installed; says so if not, past the test's
 /// captured output.
@@ -30,14 +24,13 @@ fn a_breakpoint_in_a_subtask_shows_locals_and_callers() {
     if !is_gdb_here() {
         return;
     }
-    let commands = system::new_log("commands").expect("a folder for logs");
+    let folder = folder("debugged");
     let lines = "next\nnext\ninfo locals\nprint goal[2]\nbacktrace 2\n";
-    fs::write(&commands, lines).expect("a file in it");
-    let words = ["debug", "--app=drone", "--break=control", "--cores=2"];
-    let file = commands.to_str().expect("a path of text");
-    let (output, said) = tool(&[&words[..], &["--commands", file]].concat());
-    let _ = fs::remove_file(&commands);
-    assert!(output.status.success(), "{said}");
+    fs::write(folder.join("commands"), lines).expect("a file in it");
+    let line = "debug --app=drone --break=control --cores=2 --commands commands";
+    let called = call(&folder, line.split(' '));
+    let said = called.out + &called.complaint;
+    assert_eq!(called.code, Some(0), "{said}");
     for shown in [
         "drone::attitude::control (estimate=",
         "apps/drone/src/attitude.rs:",
@@ -61,8 +54,9 @@ fn a_place_that_is_not_there_is_refused() {
         ("contrl", "; did you mean `control`?"),
         ("attitude.rs:9999", "no code of that line; name a file"),
     ] {
-        let (output, said) = tool(&["debug", "--app=drone", "--break", place]);
-        assert_eq!(output.status.code(), Some(2), "{said}");
+        let called = call(workspace(), ["debug", "--app=drone", "--break", place]);
+        let said = called.complaint;
+        assert_eq!(called.code, Some(2), "{said}");
         assert!(said.contains(place) && said.contains(remedy), "{said}");
     }
 }
@@ -74,10 +68,18 @@ fn without_optimization_the_stacks_hold() {
         ("drone", "seconds=1", "\"kind\":\"drone\""),
     ] {
         let image = image::build_by(app, Profile::Gdb).expect("it builds").path;
-        let image = image.to_str().expect("a path of text");
         let words = format!("budget_factor=0 {words}");
-        let run = ["run", "--mode=deterministic", "--cores=4", "--image", image];
-        let (_, said) = tool(&[&run[..], &["--append", &words]].concat());
+        let run = [
+            "run",
+            "--mode=deterministic",
+            "--cores=4",
+            "--append",
+            &words,
+            "--image",
+        ];
+        let words = run.iter().map(OsStr::new).chain([image.as_os_str()]);
+        let called = call(workspace(), words);
+        let said = called.out + &called.complaint;
         assert!(said.contains(result), "{said}");
         for never in ["fault:", "panic", "\"kind\":\"fault\""] {
             assert!(!said.contains(never), "{said}");

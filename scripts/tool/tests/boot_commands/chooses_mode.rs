@@ -1,0 +1,124 @@
+//! The mode that a command takes: by the probe where KVM comes into question, with one
+//! sentence where KVM is of no use.
+//!
+//! A script in QEMU's place plays a KVM that is of no use, and hands every other mode on
+//! to QEMU; so the tests run on any host. The last one takes the host as it is.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use tool::qemu::{PROGRAM, Qemu};
+use tool::tiny::{TinyEnd, tiny_image};
+use tool::{image, install, probe, system};
+
+use crate::support::{Called, command, folder, succeed};
+
+/// A limit that no busy host reaches.
+const FAR: Duration = Duration::from_secs(120);
+
+/// As QEMU 7.2 does where the host's KVM does not know an instruction.
+const STOPS: &str = "echo 'KVM internal error. Suberror: 1' >&2; exec sleep 600";
+/// As QEMU 7.2 does where there is no device.
+const IS_ABSENT: &str = "echo 'Could not access KVM kernel module: No such file or directory' >&2
+    echo 'qemu-system-x86_64: failed to initialize kvm: No such file or directory' >&2; exit 1";
+
+/// Makes a folder with a program of QEMU's name that does `under_kvm` in place of KVM.
+fn stub(name: &str, under_kvm: &str) -> PathBuf {
+    install::ensure_qemu().expect("QEMU");
+    let folder = folder(name);
+    let real = system::find_program(PROGRAM).expect("QEMU");
+    let real = real.display();
+    let script = format!(
+        "#!/bin/sh\ncase \"$*\" in *'-accel kvm'*) {under_kvm};; esac\nexec {real} \"$@\"\n"
+    );
+    let stub = folder.join(PROGRAM);
+    fs::write(&stub, script).expect("the script is written");
+    fs::set_permissions(&stub, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    folder
+}
+
+/// Calls the tool where the programs of a folder come first.
+fn call_by(stub: &Path, line: &str) -> Called {
+    let path = std::env::var("PATH").expect("a PATH");
+    let mut command = command(system::workspace(), line.split(' '));
+    command.env("PATH", format!("{}:{path}", stub.display()));
+    Called::of(command.output().expect("the tool starts"))
+}
+
+#[test]
+fn the_probe_passes_where_nothing_is_wrong() {
+    install::ensure_qemu().expect("QEMU");
+    let image = image::build("fork-join").expect("the image");
+    assert_eq!(probe::run(&Qemu::default(), &image.path, FAR), Ok(()));
+}
+
+#[test]
+fn a_failed_probe_is_told_in_words() {
+    install::ensure_qemu().expect("QEMU");
+    let image = folder("probed").join("tiny.image");
+    fs::write(&image, tiny_image("", TinyEnd::Never)).expect("the image is written");
+    let limit = Duration::from_millis(500);
+    let why = probe::run(&Qemu::default(), &image, limit).unwrap_err();
+    assert!(
+        why.starts_with("no end within 0.5 s, QEMU was killed; the host's load was "),
+        "{why}"
+    );
+    fs::write(&image, tiny_image("", TinyEnd::Exit(0x10))).expect("the image is written");
+    let why = probe::run(&Qemu::default(), &image, FAR).unwrap_err();
+    assert!(why.contains("gave no verdict"), "{why}");
+}
+
+#[test]
+fn without_a_named_mode_a_useless_kvm_costs_a_sentence() {
+    let stopped = "KVM could not run the guest any further, QEMU was killed (KVM internal error. \
+                   Suberror: 1)";
+    let absent = "QEMU ended with status 1 (Could not access KVM kernel module: No such file or \
+                  directory)";
+    for (under_kvm, why) in [(STOPS, stopped), (IS_ABSENT, absent)] {
+        let called = call_by(&stub("useless", under_kvm), "run --jobs 2 --subtasks 2");
+        let shown = called.out;
+        assert_eq!(called.code, Some(0), "{shown}{}", called.complaint);
+        let sentence = format!("mode deterministic because KVM is of no use here: {why}\n");
+        let told = shown.matches("KVM").count();
+        assert_eq!(told, sentence.matches("KVM").count(), "{shown}");
+        assert!(shown.contains(&sentence), "{shown}");
+        assert!(shown.contains("\"status\":\"success\""), "{shown}");
+    }
+}
+
+#[test]
+fn a_named_kvm_that_is_of_no_use_is_refused_by_every_command_that_boots() {
+    let stub = stub("refused", STOPS);
+    for line in [
+        "run --mode kvm",
+        "run --dag apps/dag-file/examples/demo.dag --mode kvm",
+        "soak --short --mode kvm",
+        "oracle schedules --in-kernel --mode kvm --cores-up-to 1 tests/oracle/schedules.txt",
+        "bench hand-off --mode kvm",
+        "bench join-latency --mode kvm --out target/no-such-folder",
+    ] {
+        let called = call_by(&stub, line);
+        assert_eq!(called.code, Some(1), "{line}");
+        let complaint = called.complaint;
+        // Where an image is built first, a slow host says how long that takes.
+        let mut lines = complaint
+            .lines()
+            .filter(|line| !line.ends_with(" s so far"));
+        let refusal = lines.next().unwrap_or_default();
+        assert_eq!(lines.next(), None, "{line}: {complaint}");
+        let words = "`--mode kvm`: KVM is of no use here: KVM could not run the guest any further, \
+                     QEMU was killed (KVM internal error. Suberror: 1); use deterministic or threads";
+        assert!(refusal.contains(words), "{line}: {complaint}");
+    }
+}
+
+#[test]
+fn a_command_settles_its_mode_on_this_host_too() {
+    let line = "run --jobs 2 --subtasks 2 --append budget_factor=0";
+    let shown = succeed(system::workspace(), line);
+    let useless = shown.matches("\nmode deterministic because KVM is of no use here: ");
+    let useful = shown.matches("\nmode kvm because ");
+    assert_eq!(useless.count() + useful.count(), 1, "{shown}");
+}

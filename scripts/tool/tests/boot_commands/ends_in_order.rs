@@ -1,0 +1,116 @@
+//! Ctrl-C, and the timeout, end a run in order: by real signals, on the machine in QEMU and on
+//! Linux. The counts, the recording and the trace are there and whole; the second ctrl-C kills.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, Stdio};
+
+use linux::EndSignals;
+use tool::protocol::Transcript;
+use tool::system::workspace;
+
+use crate::support::{call, command, folder, succeed};
+
+/// The exit code after ctrl-C.
+const BY_PERSON: Option<i32> = Some(130);
+
+/// Reads lines up to one that has this in it.
+fn await_line(said: &mut impl BufRead, awaited: &str) {
+    let mut line = String::new();
+    while !line.contains(awaited) {
+        line.clear();
+        let bytes = said.read_line(&mut line).expect("UTF-8");
+        assert!(bytes > 0, "it ended before `{awaited}`");
+    }
+}
+
+/// Starts a run, and returns it with what it says after it has booted.
+fn start(folder: &Path, line: &str) -> (Child, BufReader<impl Read>) {
+    let mut command = command(folder, line.split(' '));
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the tool can be started");
+    let mut said = BufReader::new(child.stdout.take().expect("it is a pipe"));
+    await_line(&mut said, "\"kind\":\"boot\"");
+    (child, said)
+}
+
+/// Waits for the end; returns what it has said on standard output, and its exit code.
+fn end(mut child: Child, mut said: BufReader<impl Read>) -> (String, Option<i32>) {
+    let mut text = String::new();
+    said.read_to_string(&mut text).expect("UTF-8");
+    let status = child.wait().expect("it is ours");
+    (text, status.code())
+}
+
+/// Makes sure that the trace in a folder breaks no rule; returns how many of its events close a DAG.
+fn closings(folder: &Path) -> usize {
+    succeed(folder, "check-trace --bound-us 5000000 trace.log");
+    let text = fs::read_to_string(folder.join("trace.log")).expect("it is there");
+    text.matches("\"closed\"").count()
+}
+
+#[test]
+fn the_first_ctrl_c_ends_a_run_in_order() {
+    let folder = folder("ended");
+    let gaps = workspace().join("apps/cruise/gaps.txt");
+    let machine = format!(
+        "run --app cruise --mode deterministic --jobs 100000 --append trace_events=2000 --input {} \
+         --record ended.rec --trace trace.log",
+        gaps.display()
+    );
+    let linux = "run --app fork-join --on linux --cores 1 --jobs 5000 --trace trace.log";
+    for line in [&machine, linux] {
+        let (child, said) = start(&folder, line);
+        EndSignals::send(child.id());
+        let (text, code) = end(child, said);
+        assert_eq!(code, BY_PERSON, "{line}: {text}");
+        let transcript = Transcript::read(&text);
+        assert!(transcript.of_kind("dag_status").count() > 0, "{text}");
+        let verdict = transcript.of_kind("verdict").next();
+        let status = verdict.and_then(|line| line.text_at("status"));
+        assert_eq!(status, Some("success"), "{text}");
+        let words = "\nended by ctrl-C, in order, after ";
+        assert!(text.contains(words), "{text}");
+        assert_eq!(closings(&folder), transcript.of_kind("dag_status").count());
+    }
+    succeed(&folder, "recording ended.rec");
+}
+
+#[test]
+fn so_does_the_timeout_which_is_a_failure() {
+    let folder = folder("timed-out");
+    for on in [
+        "--mode deterministic --jobs 100000 --append trace_events=2000",
+        "--on linux --jobs 5000",
+    ] {
+        let run = "run --app fork-join --cores 1 --longest 1 --timeout 3 --trace trace.log";
+        let called = call(&folder, format!("{run} {on}").split(' '));
+        let said = called.complaint;
+        assert_eq!(called.code, Some(1), "{on}: {said}");
+        let words = "no end within 3 s, so it was ended in order; ";
+        assert!(said.contains(words), "{said}");
+        assert!(closings(&folder) > 0, "{on}");
+    }
+}
+
+#[test]
+fn the_second_ctrl_c_kills() {
+    // The first one is heard, and what is in flight takes long.
+    let folder = folder("endless");
+    let dag = "dag d period 1000s\nsubtask a wcet 500s\nend\n";
+    fs::write(folder.join("endless.dag"), dag).expect("the tests' folder takes a file");
+    let run = "run --dag endless.dag --mode deterministic --cores 1 --jobs 2 --occupy spin \
+               --timeout 500";
+    let (mut child, said) = start(&folder, run);
+    let mut complaints = BufReader::new(child.stderr.take().expect("it is a pipe"));
+    EndSignals::send(child.id());
+    await_line(&mut complaints, "ctrl-C again");
+    EndSignals::send(child.id());
+    let (text, code) = end(child, said);
+    assert_eq!(code, BY_PERSON, "{text}");
+    await_line(
+        &mut complaints,
+        "ctrl-C was pressed again, and QEMU was killed",
+    );
+}
