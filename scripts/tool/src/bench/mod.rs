@@ -23,39 +23,20 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use crate::lasting::Lasting;
-use crate::options::{Choice, Command, Menu, Parsed, Refusal};
+use crate::options::{Command, Menu, Parsed, Refusal, choices};
 
 static BENCH: Menu = Menu {
     invocation: "./scripts/bench",
     word: "WHAT",
     about: "Measures one part of the project.",
-    choices: &[
-        Choice {
-            name: "bounds",
-            about: "random sets that the analysis proves, by load and cores",
-            work: bounds::run,
-        },
-        Choice {
-            name: "hand-off",
-            about: "from a completion to its successor's first instruction",
-            work: hand_off::run,
-        },
-        Choice {
-            name: "join-latency",
-            about: "the paper's evaluation: samples, figures, plots and a report",
-            work: join_latency::run,
-        },
-        Choice {
-            name: "native",
-            about: "the scheduler on this host's own processors, in nanoseconds",
-            work: native::run,
-        },
-        Choice {
-            name: "sizes",
-            about: "what each part of an image takes of its room",
-            work: sizes::run,
-        },
-    ],
+    choices: choices! {
+        "bounds": "random sets that the analysis proves, by load and cores", bounds::run;
+        "hand-off": "from a completion to its successor's first instruction", hand_off::run;
+        "join-latency": "the paper's evaluation: samples, figures, plots and a report",
+            join_latency::run;
+        "native": "the scheduler on this host's own processors, in nanoseconds", native::run;
+        "sizes": "what each part of an image takes of its room", sizes::run;
+    },
     notes: "Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",
 };
 

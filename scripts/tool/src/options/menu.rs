@@ -33,6 +33,15 @@ pub struct Choice {
     pub work: fn(&[OsString]) -> ExitCode,
 }
 
+/// Makes the choices of a [`Menu`]: behind each word what the help text says of it, and what it does.
+#[macro_export]
+macro_rules! choices {
+    ($($name:literal: $about:literal, $work:expr;)*) => {
+        &[$($crate::options::Choice { name: $name, about: $about, work: $work }),*]
+    };
+}
+pub use choices;
+
 impl Menu {
     /// Does what a command line chooses, shows the help text, or refuses the word with
     /// exit code 2.

@@ -25,7 +25,7 @@ use std::os::unix::ffi::OsStrExt;
 
 use replay::shown::quoted;
 
-pub use menu::{Choice, Menu};
+pub use menu::{Choice, Menu, choices};
 pub use parsed::Parsed;
 pub(crate) use read::BY_PERSON;
 pub use read::Refusal;

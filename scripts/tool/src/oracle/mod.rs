@@ -28,70 +28,32 @@ use std::process::ExitCode;
 use replay::lines::Malformed;
 
 use crate::files;
-use crate::options::{Choice, Command, Menu, Refusal};
+use crate::options::{Command, Menu, Refusal, choices};
 use crate::progress::Progress;
 
-/// One kind of reference file: how to read its cases and how to check one.
-struct Kind<Case> {
-    table: &'static Command,
-    parse: fn(&str) -> Result<Vec<Case>, Malformed>,
-    name: fn(&Case) -> &str,
-    check: fn(&Case) -> Result<(), String>,
-}
+/// What reads the cases of one kind.
+type Parse<Case> = fn(&str) -> Result<Vec<Case>, Malformed>;
 
 static ORACLE: Menu = Menu {
     invocation: "./scripts/oracle",
     word: "KIND",
     about: "Compares reference cases with what this project computes.",
-    choices: &[
-        Choice {
-            name: "bounds",
-            about: "lengths, widths, response-time bounds and verdicts",
-            work: |words| {
-                let kind = Kind {
-                    table: &table::BOUNDS,
-                    parse: bounds::parse,
-                    name: |case| &case.name,
-                    check: bounds::check,
-                };
-                run_files(&kind, words)
-            },
-        },
-        Choice {
-            name: "responses",
-            about: "random accepted sets in virtual time, with overheads, against their bounds",
-            work: responses::command,
-        },
-        Choice {
-            name: "schedules",
-            about: "starts, finishes, preemptions, response times and misses",
-            work: |words| {
-                if words.iter().any(|word| word == "--in-kernel") {
-                    return in_kernel::command(words);
-                }
-                let kind = Kind {
-                    table: &table::SCHEDULES,
-                    parse: schedules::parse,
-                    name: |case| &case.name,
-                    check: schedules::check,
-                };
-                run_files(&kind, words)
-            },
-        },
-        Choice {
-            name: "synchronizer",
-            about: "sets that ExactTime and ApproximateTime emit, and what they drop",
-            work: |words| {
-                let kind = Kind {
-                    table: &table::SYNCHRONIZER,
-                    parse: synchronizer::parse,
-                    name: |case| &case.name,
-                    check: synchronizer::check,
-                };
-                run_files(&kind, words)
-            },
-        },
-    ],
+    choices: choices! {
+        "bounds": "lengths, widths, response-time bounds and verdicts", |words| {
+            run_files(words, &table::BOUNDS, bounds::parse, bounds::check, |case| &case.name)
+        };
+        "responses": "random accepted sets in virtual time, with overheads, against their bounds",
+            responses::command;
+        "schedules": "starts, finishes, preemptions, response times and misses", |words| {
+            if words.iter().any(|word| word == "--in-kernel") {
+                return in_kernel::command(words);
+            }
+            run_files(words, &table::SCHEDULES, schedules::parse, schedules::check, |case| &case.name)
+        };
+        "synchronizer": "sets that ExactTime and ApproximateTime emit, and what they drop", |words| {
+            run_files(words, &table::SYNCHRONIZER, synchronizer::parse, synchronizer::check, |case| &case.name)
+        };
+    },
     notes: table::NOTES,
 };
 
@@ -101,18 +63,25 @@ pub fn oracle(words: &[OsString]) -> ExitCode {
     ORACLE.run(words)
 }
 
-fn run_files<Case>(kind: &Kind<Case>, words: &[OsString]) -> ExitCode {
-    kind.table.carry_out(words, |options| {
-        let cases = read(options.files(), kind.parse).map_err(Refusal::Usage)?;
+/// Reads the cases of one kind, checks each, and prints the differences by the cases' names.
+fn run_files<Case>(
+    words: &[OsString],
+    table: &Command,
+    parse: Parse<Case>,
+    check: fn(&Case) -> Result<(), String>,
+    name: fn(&Case) -> &str,
+) -> ExitCode {
+    table.carry_out(words, |options| {
+        let cases = read(options.files(), parse).map_err(Refusal::Usage)?;
         let mut failed = 0_usize;
         let mut progress = Progress::new(cases.len() as u64, "cases");
         for (over, case) in (1..).zip(&cases) {
-            let checked = (kind.check)(case);
+            let checked = check(case);
             progress.show(over);
             if let Err(difference) = checked {
                 failed += 1;
                 progress.end();
-                println!("{}: {difference}", (kind.name)(case));
+                println!("{}: {difference}", name(case));
             }
         }
         progress.end();
@@ -124,7 +93,7 @@ fn run_files<Case>(kind: &Kind<Case>, words: &[OsString]) -> ExitCode {
 /// Reads the cases of all files, of which there must be one.
 fn read<'f, Case>(
     names: impl ExactSizeIterator<Item = &'f Path> + Clone,
-    parse: impl Fn(&str) -> Result<Vec<Case>, Malformed>,
+    parse: Parse<Case>,
 ) -> Result<Vec<Case>, String> {
     if names.len() == 0 {
         return Err("which files? name at least one reference file".into());

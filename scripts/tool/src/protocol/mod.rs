@@ -12,7 +12,6 @@
 //! `docs/serial-protocol.md` and the pages that it names describe the listed ones for
 //! people.
 
-mod app_kinds;
 mod kinds;
 
 use std::fmt;

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 
 use super::figure::Figure;
-use crate::json;
+use crate::json::{self, Object};
 
 /// When a figure has grown, in words; [`margin`] says the same.
 pub(super) const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
@@ -78,7 +78,7 @@ pub(super) fn text(figures: &[Figure]) -> String {
     for (number, figure) in figures.iter().enumerate() {
         let end = if number + 1 < figures.len() { "," } else { "" };
         // Writing into a `String` cannot fail.
-        let _ = writeln!(text, "{{{}}}{end}", figure.json_members());
+        let _ = writeln!(text, "{}{end}", figure.json(Object::new()));
     }
     text + "]}\n"
 }

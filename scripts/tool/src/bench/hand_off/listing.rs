@@ -18,43 +18,21 @@ use crate::places::Frame;
 use crate::qemu::{Ending, Mode};
 use crate::{protocol::Status, system};
 
-/// The steps of the way, by a part of the file's or the function's name; the first that
-/// fits counts.
-const STEPS: [(&str, &[&str]); 11] = [
-    (
-        "clock: three readings",
-        &["machine/clock.rs", "time_stamp", "rdtsc"],
-    ),
-    (
-        "interrupts off and on",
-        &["machine/cpu.rs", "interrupts_off.rs"],
-    ),
-    ("the lock", &["spinlock.rs"]),
-    (
-        "journal: finish, ready, start",
-        &["sched-dag/src/kept/", "sched-dag/src/journal/"],
-    ),
-    ("body: inputs, call, outputs", &["fass/src/", "poll_fn.rs"]),
-    (
-        "scheduler: completion, join, line",
-        &["sched-dag/src/scheduler/"],
-    ),
-    ("places of bodies", &["sched-dag/src/placement/"]),
-    (
-        "budget and alarm",
-        &[
-            "execution/runner.rs",
-            "machine/timer.rs",
-            "machine/context.rs",
-        ],
-    ),
-    (
-        "execution: the rest",
-        &["kernel/executive/src/run/execution/"],
-    ),
-    ("worker's loop", &["kernel/executive/src/run/worker.rs"]),
-    ("the app's function", &["apps/"]),
-];
+/// The steps of the way, and behind each the parts of files' or functions' names by which it is
+/// known; the first that fits counts.
+const STEPS: &str = "\
+clock: three readings | machine/clock.rs time_stamp rdtsc
+interrupts off and on | machine/cpu.rs interrupts_off.rs
+the lock | spinlock.rs
+journal: finish, ready, start | sched-dag/src/kept/ sched-dag/src/journal/
+body: inputs, call, outputs | fass/src/ poll_fn.rs
+scheduler: completion, join, line | sched-dag/src/scheduler/
+places of bodies | sched-dag/src/placement/
+budget and alarm | execution/runner.rs machine/timer.rs machine/context.rs
+execution: the rest | kernel/executive/src/run/execution/
+worker's loop | kernel/executive/src/run/worker.rs
+the app's function | apps/
+";
 
 /// Boots, prints how many instructions each step takes, and writes all of them to a file.
 ///
@@ -160,10 +138,9 @@ fn step(frames: &[Frame]) -> &'static str {
     let step_of = |frame: &Frame| {
         let names = [&frame.line, &frame.function];
         let is_in = |part: &str| names.iter().any(|name| name.contains(part));
-        let step = STEPS
-            .iter()
-            .find(|(_, parts)| parts.iter().any(|part| is_in(part)));
-        step.map(|(step, _)| *step)
+        let mut steps = STEPS.lines().filter_map(|line| line.split_once(" | "));
+        let step = steps.find(|(_, parts)| parts.split(' ').any(is_in));
+        step.map(|(step, _)| step)
     };
     frames.iter().find_map(step_of).unwrap_or("elsewhere")
 }

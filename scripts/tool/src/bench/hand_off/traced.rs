@@ -107,29 +107,23 @@ fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
         samples[1].push(start - suspended);
         samples[2].push(resumed - finish);
     }
-    let workload = if cores == 1 {
-        "preemption"
-    } else {
-        "preemption of another core"
+    let workload = match cores {
+        1 => "preemption",
+        _ => "preemption of another core",
     };
     let figures = PARTS.iter().zip(samples);
     let figures = figures.filter(|(_, samples)| !samples.is_empty());
     figures
         .map(|(part, samples)| {
-            let Distribution {
-                median_ns,
-                p99_ns,
-                max_ns,
-                ..
-            } = Distribution::of(samples);
+            let of = Distribution::of(samples);
             Figure {
                 cores,
                 workload: workload.into(),
                 figure: (*part).into(),
                 per: 1,
-                median: median_ns,
-                p99: p99_ns,
-                max: max_ns,
+                median: of.median_ns,
+                p99: of.p99_ns,
+                max: of.max_ns,
             }
         })
         .collect()
