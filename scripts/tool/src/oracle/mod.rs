@@ -108,3 +108,13 @@ fn read<'f, Case>(
     }
     Ok(cases)
 }
+
+/// Compares a value that a case expects with the one that came by what `how` says.
+fn equal(how: &str, place: &str, what: &str, expected: u64, found: u64) -> Result<(), String> {
+    match expected == found {
+        true => Ok(()),
+        false => Err(format!(
+            "{place}: {what}: expected {expected}, {how} {found}"
+        )),
+    }
+}

@@ -28,6 +28,7 @@ use std::process::ExitCode;
 
 use crate::image;
 use crate::install;
+use crate::options::Refusal;
 use crate::system;
 use libtest::Plan;
 
@@ -37,47 +38,37 @@ pub use tally::Tally;
 /// Runs the subcommand with the words after its name.
 #[must_use]
 pub fn test(words: &[OsString]) -> ExitCode {
-    let options = match TEST.read(words) {
-        Ok(options) => options,
-        Err(code) => return code,
-    };
-    if let Err(line) = disk::check() {
-        return TEST.fail(&line);
-    }
-    let list = options
-        .is_given("bless")
-        .then(|| system::new_log("blessed"));
-    let blessed = match list.transpose() {
-        Ok(list) => list,
-        Err(line) => return TEST.fail(&line),
-    };
-    let plan = Plan {
-        filter: options.positional().map(String::from),
-        quick: options.is_given("quick"),
-        verbose: options.is_given("verbose"),
-        boots: install::ensure_qemu(),
-        blessed,
-    };
-    let mut tally = Tally::default();
-    build_images(&plan, &mut tally);
-    libtest::run_all(&plan, &mut tally);
-    checks::run_all(&plan, &mut tally);
-    if let Some(list) = &plan.blessed {
-        // There is none if nothing was rewritten.
-        tally.bless(&fs::read_to_string(list).unwrap_or_default());
-        let _ = fs::remove_file(list);
-    }
+    TEST.carry_out(words, |options| {
+        disk::check()?;
+        let list = options.is_given("bless");
+        let list = list.then(|| system::new_log("blessed"));
+        let plan = Plan {
+            filter: options.positional().map(String::from),
+            quick: options.is_given("quick"),
+            verbose: options.is_given("verbose"),
+            boots: install::ensure_qemu(),
+            blessed: list.transpose()?,
+        };
+        let mut tally = Tally::default();
+        build_images(&plan, &mut tally);
+        libtest::run_all(&plan, &mut tally);
+        checks::run_all(&plan, &mut tally);
+        if let Some(list) = &plan.blessed {
+            // There is none if nothing was rewritten.
+            tally.bless(&fs::read_to_string(list).unwrap_or_default());
+            let _ = fs::remove_file(list);
+        }
 
-    // A filter without a match ends in the complaint alone: `0 passed, 0 failed`
-    // would look like success.
-    if !tally.is_empty() {
-        print!("{tally}");
-    }
-    match complaint(plan.filter.as_deref(), &tally) {
-        Some(line) => TEST.refuse(&line),
-        None if tally.failed() > 0 => ExitCode::FAILURE,
-        None => ExitCode::SUCCESS,
-    }
+        // A filter without a match ends in the complaint alone: `0 passed, 0 failed`
+        // would look like success.
+        if !tally.is_empty() {
+            print!("{tally}");
+        }
+        match complaint(plan.filter.as_deref(), &tally) {
+            Some(line) => Err(Refusal::Usage(line)),
+            None => Ok(ExitCode::from(u8::from(tally.failed() > 0))),
+        }
+    })
 }
 
 /// Says what is wrong with a filter by which nothing has run.

@@ -185,15 +185,10 @@ fn list<T: ToString>(values: &[T]) -> String {
     words.join(" ")
 }
 
-fn compare<T: PartialEq + std::fmt::Display>(
-    what: &str,
-    expected: &T,
-    computed: &T,
-) -> Result<(), String> {
-    if expected == computed {
-        Ok(())
-    } else {
-        Err(format!("{what}: expected {expected}, computed {computed}"))
+fn compare(what: &str, expected: &str, computed: &str) -> Result<(), String> {
+    match expected == computed {
+        true => Ok(()),
+        false => Err(format!("{what}: expected {expected}, computed {computed}")),
     }
 }
 

@@ -4,6 +4,7 @@ use replay::Case;
 
 use super::transcript::Ran;
 use super::{Deviation, Settings};
+use crate::oracle::equal;
 
 /// Compares a case with what ran.
 ///
@@ -17,35 +18,24 @@ pub(super) fn compare(case: &Case, ran: &Ran, settings: &Settings) -> Result<Dev
         tolerance_ns: settings.tolerance_ns(),
         deviation: Deviation::default(),
     };
-    for place in in_order_of_starts(case) {
-        let Place { position, .. } = place;
+    for (dag, job, subtask) in in_order_of_starts(case) {
+        let position = case.dags[dag].position(job, subtask);
         let (expected, found) = (case.instances[position], ran.instances[position]);
-        let place = format!(
-            "dag {} job {} subtask {}",
-            place.dag, place.job, place.subtask
-        );
+        let place = format!("dag {dag} job {job} subtask {subtask}");
+        let same = |what, expected, found| equal("ran", &place, what, expected, found);
         near.check(&place, "start", expected.start_ns, found.start_ns)?;
         near.check(&place, "finish", expected.finish_ns, found.finish_ns)?;
-        equal(
-            &place,
-            "preemptions",
-            expected.preemptions,
-            found.preemptions,
-        )?;
+        same("preemptions", expected.preemptions, found.preemptions)?;
     }
     let mut ran_jobs = ran.jobs.iter();
     for (dag, jobs) in case.jobs.iter().enumerate() {
         for (job, (expected, found)) in jobs.iter().zip(ran_jobs.by_ref()).enumerate() {
             let place = format!("dag {dag} job {job}");
             let release_ns = expected.release_ns.saturating_mul(unit_ns);
-            equal(&place, "release", release_ns, found.release_ns)?;
+            let same = |what, expected, found| equal("ran", &place, what, expected, found);
+            same("release", release_ns, found.release_ns)?;
             near.check(&place, "finish", expected.finish_ns, found.finish_ns)?;
-            equal(
-                &place,
-                "missed",
-                expected.missed.into(),
-                found.missed.into(),
-            )?;
+            same("missed", expected.missed.into(), found.missed.into())?;
         }
     }
     if ran.violations > 0 {
@@ -60,26 +50,18 @@ pub(super) fn compare(case: &Case, ran: &Ran, settings: &Settings) -> Result<Dev
     Ok(near.deviation)
 }
 
-struct Place {
-    position: usize,
-    dag: usize,
-    job: usize,
-    subtask: usize,
-}
-
-fn in_order_of_starts(case: &Case) -> Vec<Place> {
+/// Returns each instance's DAG, job and subtask.
+fn in_order_of_starts(case: &Case) -> Vec<(usize, usize, usize)> {
     let mut places = Vec::with_capacity(case.instances.len());
     for (number, dag) in case.dags.iter().enumerate() {
         for job in 0..dag.jobs {
-            places.extend((0..dag.subtasks).map(|subtask| Place {
-                position: dag.position(job, subtask),
-                dag: number,
-                job,
-                subtask,
-            }));
+            places.extend((0..dag.subtasks).map(|subtask| (number, job, subtask)));
         }
     }
-    places.sort_by_key(|place| case.instances[place.position].start_ns);
+    places.sort_by_key(|&(dag, job, subtask)| {
+        let position = case.dags[dag].position(job, subtask);
+        case.instances[position].start_ns
+    });
     places
 }
 
@@ -105,13 +87,5 @@ impl Near {
             latest_ns: difference_ns,
         });
         Ok(())
-    }
-}
-
-fn equal(place: &str, what: &str, expected: u64, found: u64) -> Result<(), String> {
-    if expected == found {
-        Ok(())
-    } else {
-        Err(format!("{place}: {what}: expected {expected}, ran {found}"))
     }
 }

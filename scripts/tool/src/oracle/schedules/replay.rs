@@ -6,6 +6,8 @@ use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions};
 
 use ::replay::{Case, InstanceTimes, JobTimes};
 
+use crate::oracle::equal;
+
 /// More cores than these are only simulated if there are as many subtasks: of
 /// each subtask at most one instance runs at a time.
 const ALWAYS_SIMULATED: usize = 1024;
@@ -24,44 +26,25 @@ pub fn check(case: &Case) -> Result<(), String> {
                 let position = dag.position(job, subtask);
                 let (expected, replayed) = (case.instances[position], instances[position]);
                 let place = format!("dag {index} job {job} subtask {subtask}");
-                compare(&place, "start", expected.start_ns, replayed.start_ns)?;
-                compare(&place, "finish", expected.finish_ns, replayed.finish_ns)?;
-                compare(
-                    &place,
-                    "preemptions",
-                    expected.preemptions,
-                    replayed.preemptions,
-                )?;
+                let same = |what, expected, found| equal("replayed", &place, what, expected, found);
+                same("start", expected.start_ns, replayed.start_ns)?;
+                same("finish", expected.finish_ns, replayed.finish_ns)?;
+                same("preemptions", expected.preemptions, replayed.preemptions)?;
             }
-            let (expected, replayed) = (expected_job, replayed_job);
             let place = format!("dag {index} job {job}");
-            compare(&place, "release", expected.release_ns, replayed.release_ns)?;
-            compare(&place, "finish", expected.finish_ns, replayed.finish_ns)?;
-            compare(
-                &place,
+            let same = |what, expected, found| equal("replayed", &place, what, expected, found);
+            same("release", expected_job.release_ns, replayed_job.release_ns)?;
+            same("finish", expected_job.finish_ns, replayed_job.finish_ns)?;
+            same(
                 "response",
-                expected.response_ns,
-                replayed.response_ns,
+                expected_job.response_ns,
+                replayed_job.response_ns,
             )?;
-            compare(
-                &place,
-                "missed",
-                expected.missed.into(),
-                replayed.missed.into(),
-            )?;
+            let (expected, replayed) = (expected_job.missed, replayed_job.missed);
+            same("missed", expected.into(), replayed.into())?;
         }
     }
     Ok(())
-}
-
-fn compare(place: &str, what: &str, expected: u64, replayed: u64) -> Result<(), String> {
-    if expected == replayed {
-        Ok(())
-    } else {
-        Err(format!(
-            "{place}: {what}: expected {expected}, replayed {replayed}"
-        ))
-    }
 }
 
 type Times = (Vec<InstanceTimes>, Vec<Vec<JobTimes>>);

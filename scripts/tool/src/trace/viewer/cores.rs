@@ -6,14 +6,13 @@ use sched_dag::{CoreId, Instance};
 use super::super::view::{Slice, View};
 use super::flows::Flows;
 use super::output::{Output, Track};
-use super::{Pieces, instance_args, instance_name};
+use super::{draw_piece, instance_args, instance_name};
 
-/// A piece of an instance's execution: which one, counted from 0, and of how many.
+/// A piece of an instance's execution, and which one of the instance's it is, counted from 0.
 struct Piece {
     instance: Instance,
     slice: Slice,
-    number: u64,
-    of: usize,
+    number: usize,
 }
 
 /// Draws the cores of a run.
@@ -23,7 +22,7 @@ pub(super) fn draw(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Ou
     for core in (0..view.run.options.cores).map(CoreId) {
         let mut track = output.track(group, &format!("core {}", core.0));
         for piece in pieces.iter().filter(|piece| piece.slice.core == core) {
-            draw_piece(view, piece, flows, &mut track);
+            draw_one(view, piece, flows, &mut track);
         }
         draw_preemptions(view, core, &mut track);
         output.add(track);
@@ -32,31 +31,27 @@ pub(super) fn draw(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Ou
 
 /// Returns all pieces in the order of time.
 fn pieces(view: &View<'_>) -> Vec<Piece> {
-    let mut numbers = Pieces::default();
     let mut pieces = Vec::new();
     for (&instance, history) in &view.histories {
-        for &slice in &history.slices {
-            pieces.push(Piece {
-                instance,
-                slice,
-                number: numbers.next(instance),
-                of: history.slices.len(),
-            });
-        }
+        let slices = history.slices.iter().enumerate();
+        pieces.extend(slices.map(|(number, &slice)| Piece {
+            instance,
+            slice,
+            number,
+        }));
     }
     pieces.sort_by_key(|piece| (piece.slice.from_ns, piece.slice.to_ns.unwrap_or(u64::MAX)));
     pieces
 }
 
-fn draw_piece(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) {
-    let Piece {
+fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) {
+    let &Piece {
         instance,
         slice,
         number,
-        of,
-    } = *piece;
+    } = piece;
     let history = &view.histories[&instance];
-    let is_last = number + 1 == of as u64;
+    let is_last = number + 1 == history.slices.len();
     let begins = if number > 0 {
         "resume"
     } else if history.start_ns.is_some() {
@@ -72,23 +67,13 @@ fn draw_piece(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) 
         Some(_) => "suspend",
     };
     let args = instance_args(instance)
-        .number("piece", number + 1)
+        .number("piece", number as u64 + 1)
         .text("begins", begins)
         .text("ends", ends);
     let name = instance_name(view.run, instance);
-    track.begin(slice.from_ns, &name, &args.end());
-    if begins == "start" {
-        flows.into(instance).for_each(|flow| track.flow_in(flow));
-    }
-    let to_ns = slice.to_ns.unwrap_or(view.end_ns);
-    track.advance(to_ns);
-    if ends == "finish" {
-        flows.out(instance).for_each(|flow| track.flow_out(flow));
-    }
-    track.end(to_ns);
+    draw_piece(view, (instance, number), (&name, &args.end()), flows, track);
 }
 
-/// Draws what was asked of a core and what it did.
 fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut Track) {
     for event in &view.events {
         let what = match event.what {

@@ -10,7 +10,7 @@ use sched_dag::{DagId, Instance, SubtaskId};
 use super::super::view::{JobHistory, View};
 use super::flows::Flows;
 use super::output::{Group, Output, Track};
-use super::{instance_args, name_or};
+use super::{draw_piece, instance_args, name_or};
 use crate::json::Object;
 
 /// Draws all DAGs of a run.
@@ -150,16 +150,8 @@ fn draw_subtask(view: &View<'_>, dag: DagId, subtask: SubtaskId, flows: &Flows, 
         track.begin(begin_ns, &name, &args.end());
         for (index, slice) in history.slices.iter().enumerate() {
             let args = Object::new().number("core", slice.core.0).end();
-            track.begin(slice.from_ns, &format!("on core {}", slice.core.0), &args);
-            if index == 0 && history.start_ns.is_some() {
-                flows.into(instance).for_each(|flow| track.flow_in(flow));
-            }
-            let to_ns = slice.to_ns.unwrap_or(view.end_ns);
-            track.advance(to_ns);
-            if index + 1 == history.slices.len() && history.finish_ns.is_some() {
-                flows.out(instance).for_each(|flow| track.flow_out(flow));
-            }
-            track.end(to_ns);
+            let name = format!("on core {}", slice.core.0);
+            draw_piece(view, (instance, index), (&name, &args), flows, track);
         }
         track.end(over_ns.unwrap_or(view.end_ns));
     }

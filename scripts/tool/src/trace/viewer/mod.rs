@@ -32,8 +32,6 @@ mod output;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
-
 use sched_dag::Instance;
 use sched_dag::law::Violation;
 
@@ -42,7 +40,7 @@ use super::model::Run;
 use super::view::View;
 use crate::json::Object;
 use flows::Flows;
-use output::Output;
+use output::{Output, Track};
 
 pub use command::{TRACE, trace};
 
@@ -50,7 +48,7 @@ pub use command::{TRACE, trace};
 /// [`check`] does.
 #[must_use]
 pub fn convert(runs: &[Run], bound_ns: u64) -> String {
-    let mut output = Output::default();
+    let (mut output, mut next_flow) = (Output::default(), 0);
     for run in runs {
         let view = View::new(run);
         let breaches = check(run, bound_ns).breaches;
@@ -58,11 +56,11 @@ pub fn convert(runs: &[Run], bound_ns: u64) -> String {
             [_] => String::new(),
             _ => format!("run {} ", run.number),
         };
-        let mut flows = Flows::new(&view, output.next_flow());
+        let mut flows = Flows::new(&view, next_flow);
         cores::draw(&view, &prefix, &flows, &mut output);
         dags::draw(&view, &prefix, &mut flows, &mut output);
         draw_breaches(run, &breaches, &prefix, &mut output);
-        output.set_next_flow(flows.next());
+        next_flow = flows.next();
     }
     output.end()
 }
@@ -105,14 +103,24 @@ fn instance_args(instance: Instance) -> Object {
         .number("subtask", subtask.0)
 }
 
-/// Counts how often each instance was named, from 0.
-#[derive(Default)]
-struct Pieces(BTreeMap<Instance, u64>);
-
-impl Pieces {
-    fn next(&mut self, instance: Instance) -> u64 {
-        let count = self.0.entry(instance).or_default();
-        *count += 1;
-        *count - 1
+/// Draws a piece of an instance's execution, with the arrows into its start and out of its finish.
+fn draw_piece(
+    view: &View<'_>,
+    (instance, piece): (Instance, usize),
+    (name, args): (&str, &str),
+    flows: &Flows,
+    track: &mut Track,
+) {
+    let history = &view.histories[&instance];
+    let slice = history.slices[piece];
+    track.begin(slice.from_ns, name, args);
+    if piece == 0 && history.start_ns.is_some() {
+        flows.into(instance).for_each(|flow| track.flow_in(flow));
     }
+    let to_ns = slice.to_ns.unwrap_or(view.end_ns);
+    track.advance(to_ns);
+    if piece + 1 == history.slices.len() && history.finish_ns.is_some() {
+        flows.out(instance).for_each(|flow| track.flow_out(flow));
+    }
+    track.end(to_ns);
 }

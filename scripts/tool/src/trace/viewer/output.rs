@@ -18,7 +18,6 @@ pub(super) struct Output {
     /// The last number given to a group or a track; no two share one, as viewers
     /// mix up a process and a thread of the same number.
     last_id: u64,
-    next_flow: u64,
 }
 
 /// A group of tracks.
@@ -78,14 +77,6 @@ impl Output {
         for (_, event) in track.drawn {
             self.push(&event);
         }
-    }
-
-    pub(super) const fn next_flow(&self) -> u64 {
-        self.next_flow
-    }
-
-    pub(super) fn set_next_flow(&mut self, next: u64) {
-        self.next_flow = next;
     }
 
     /// Returns the whole text.
