@@ -1,8 +1,7 @@
-//! What `./scripts/run --dag FILE` boots: the file as a boot module, words for the
+//! What `./scripts/run --dag FILE` boots: the file that becomes the boot module, words for the
 //! guest, and enough memory and time.
 
 use std::fmt::{self, Write};
-use std::fs;
 use std::path::PathBuf;
 
 use dag_file::time::parse_ns;
@@ -15,7 +14,6 @@ use super::load::{Import, load};
 use super::source_lines;
 use crate::files;
 use crate::options::Parsed;
-use crate::system;
 
 /// The options that only mean something together with `--dag`.
 const COMPANIONS: [&str; 6] = [
@@ -51,8 +49,6 @@ pub struct Prepared {
     pub path: PathBuf,
     /// What it says.
     pub file: DagFile,
-    /// Where the boot module lies, once it is written. It is removed with this value.
-    pub module: Option<PathBuf>,
     /// The least memory for it, in MiB.
     pub memory_mib: u64,
     /// Words for the guest besides those that options become.
@@ -62,32 +58,11 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Writes the boot module, with this text before it.
-    ///
-    /// # Errors
-    ///
-    /// In words: it cannot be written.
-    pub fn write_module(&mut self, before: &str) -> Result<(), String> {
-        let module = system::new_log("dag-file")?.with_extension("dag");
-        let written = files::write(&module, format!("{before}{}", self.file));
-        self.module = Some(module);
-        written
-    }
-
     /// Returns what the guest says of the file as [`load`] would have said it, one line a
     /// fault; `None` if it speaks of something else.
     #[must_use]
     pub fn translate(&self, said: &str) -> Option<String> {
         source_lines::translate(said, &self.path, &self.file)
-    }
-}
-
-impl Drop for Prepared {
-    fn drop(&mut self) {
-        if let Some(module) = &self.module {
-            // It is ours, and in the way of no one if it cannot be removed.
-            let _ = fs::remove_file(module);
-        }
     }
 }
 
@@ -162,7 +137,6 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         limit_s: limit_s.min(MOST_S),
         path: path.into(),
         file,
-        module: None,
         words,
     }))
 }
@@ -265,26 +239,12 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
 mod tests {
     use super::{MOST_S, limit_s, memory_mib, prepare};
     use crate::run::RUN;
-    use crate::system::workspace;
     use dag_file::{DagFile, Length, parse};
 
     fn file(subtasks: usize) -> DagFile {
         let subtasks = (0..subtasks).map(|number| format!("subtask s{number} wcet 1ms\n"));
         let subtasks: String = subtasks.collect();
         parse(&format!("dag x period 1s\n{subtasks}end")).unwrap()
-    }
-
-    #[test]
-    fn a_file_is_read_without_a_write() {
-        let demo = workspace().join("apps/dag-file/examples/demo.dag");
-        let options = RUN.right("--print-dag --jobs 3").with("dag", demo);
-        let mut prepared = prepare(&options).unwrap().unwrap();
-        assert_eq!(prepared.module, None);
-        prepared.write_module("").unwrap();
-        let module = prepared.module.clone().unwrap();
-        assert!(module.is_file());
-        drop(prepared);
-        assert!(!module.exists());
     }
 
     #[test]

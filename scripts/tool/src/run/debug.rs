@@ -108,7 +108,7 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let memory_mib = loading::choose_memory(&run, None)?;
     let program = loading::choose_program(&run)?;
     install::ensure(&install::GDB)?;
-    let handed = Handed::read(&run, true)?;
+    let handed = Handed::read(&run, None)?;
     let mode = run.text("mode").and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let mut qemu = super::describe(&run, &program, mode, memory_mib, None);

@@ -1,7 +1,7 @@
 //! `run --dag FOLDER`: each DAG file of a folder, one boot each, in one table; with `--prove`
 //! two boots each.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::{RUN, boot_app, conclude, go_on, prepare, prove};
@@ -39,33 +39,14 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
     if !shows_lines {
         println!("{}", batch::heading());
     }
-    let (mut refused, mut failed) = (0, 0);
-    for file in &files {
-        let place = files::place(file);
+    let (refused, failed) = each(&files, |file| {
         let one = options.with("dag", file).with("quiet", "yes");
-        let booted =
-            prepare(&one).and_then(|mut dags| Ok((boot_app(&one, dags.as_mut(), false)?, dags)));
-        let (booted, dags) = match booted {
-            Ok(booted) => booted,
-            Err(Refusal::Usage(lines)) => {
-                RUN.complain(&lines);
-                refused += 1;
-                continue;
-            }
-            Err(Refusal::ByPerson) => return Err(Refusal::ByPerson),
-            Err(Refusal::Failure(line)) => {
-                RUN.complain(&format!("{place}: {line}"));
-                failed += 1;
-                continue;
-            }
-        };
-        match booted.outcome.judge() {
-            Ok(()) => {}
-            Err(fault) if fault.status == Status::Usage => refused += 1,
-            Err(_) => {
-                RUN.complain(&format!("{place}:"));
-                failed += 1;
-            }
+        let dags = prepare(&one)?;
+        let booted = boot_app(&one, dags.as_ref(), false)?;
+        let judged = booted.outcome.judge();
+        let status = judged.map_or_else(|fault| fault.status, |()| Status::Success);
+        if status == Status::Failure {
+            RUN.complain(&format!("{}:", files::place(file)));
         }
         conclude(&booted, dags.as_ref(), &one);
         go_on(&booted)?;
@@ -75,14 +56,46 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
             let cores = options.number("cores").unwrap_or(1);
             print!("{}", batch::rows(file, cores, &booted.outcome));
         }
-    }
+        Ok(status)
+    })?;
     if !shows_lines {
         let count = files.len();
         println!("{count} files: {refused} refused, {failed} failed");
     }
-    Ok(match (refused, failed) {
+    Ok(worst(refused, failed))
+}
+
+/// Runs each file; one that is refused or fails does not keep the others from running. Returns
+/// how many were refused, and how many failed.
+pub(super) fn each(
+    files: &[PathBuf],
+    mut run: impl FnMut(&Path) -> Result<Status, Refusal>,
+) -> Result<(usize, usize), Refusal> {
+    let (mut refused, mut failed) = (0, 0);
+    for file in files {
+        let status = match run(file) {
+            Ok(status) => status,
+            Err(Refusal::Usage(lines)) => {
+                RUN.complain(&lines);
+                Status::Usage
+            }
+            Err(Refusal::Failure(line)) => {
+                RUN.complain(&format!("{}: {line}", files::place(file)));
+                Status::Failure
+            }
+            Err(Refusal::ByPerson) => return Err(Refusal::ByPerson),
+        };
+        refused += usize::from(status == Status::Usage);
+        failed += usize::from(status == Status::Failure);
+    }
+    Ok((refused, failed))
+}
+
+/// Returns the exit code of the worst of the files.
+pub(super) fn worst(refused: usize, failed: usize) -> ExitCode {
+    match (refused, failed) {
         (0, 0) => ExitCode::SUCCESS,
         (0, _) => ExitCode::FAILURE,
         _ => ExitCode::from(2),
-    })
+    }
 }

@@ -89,12 +89,12 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     }
     options.check_apart(&APART_IN_ONE).map_err(Refusal::Usage)?;
     check_files(options)?;
-    let mut dags = prepare(options)?;
+    let dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
         print!("{}", dags.file);
         return Ok(ExitCode::SUCCESS);
     }
-    let booted = boot_app(options, dags.as_mut(), true)?;
+    let booted = boot_app(options, dags.as_ref(), true)?;
     Ok(conclude(&booted, dags.as_ref(), options))
 }
 
@@ -127,38 +127,27 @@ struct Booted {
 }
 
 /// Boots what the options name, and shows its lines if it shall.
-fn boot_app(
-    options: &Parsed,
-    mut dags: Option<&mut Prepared>,
-    shows: bool,
-) -> Result<Booted, Refusal> {
+fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Booted, Refusal> {
     let app = choose_app(options, dags.is_some())?;
     if on_linux::is_asked_for(options) {
-        let booted = on_linux::run_app(options, &app, dags, shows)?;
-        written::write(options, &booted)?;
-        return Ok(booted);
+        return on_linux::run_app(options, &app, dags, shows);
     }
-    let memory_mib = loading::choose_memory(options, dags.as_deref())?;
+    let memory_mib = loading::choose_memory(options, dags)?;
     let named = options.text("mode").and_then(Mode::from_name);
     loading::check(options, named).map_err(Refusal::Usage)?;
     let program = loading::choose_program(options)?;
     install::ensure_loader(loading::chosen(options))?;
 
-    let handed = Handed::read(options, dags.is_none())?;
+    let handed = Handed::read(options, dags)?;
     let parameters = params::guest_word(options)?;
     let recorded = Recorded::new(options, &app)?;
-    if let Some(dags) = dags.as_deref_mut() {
-        dags.write_module(handed.text())?;
-    }
-    let dags = dags.as_deref();
     let describe = |mode| {
-        let module = dags.and_then(|dags| dags.module.clone());
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
         qemu.guest_words += &handed.guest_words();
         qemu.guest_words += &parameters;
         qemu.guest_words += recorded.guest_word();
         qemu.records = recorded.raw();
-        qemu.module = module.or_else(|| handed.module());
+        qemu.module = handed.module();
         qemu
     };
     // No mode has a longer name than this one.
@@ -194,18 +183,7 @@ fn boot_app(
     let talk = seeing::relay(options, &log.path);
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
-    let outcome = outcome?;
-    written::say_trace(&screen, options);
-    if let Some(line) = recorded.write(options, &outcome)? {
-        screen.say(&line);
-    }
-    let booted = Booted {
-        outcome,
-        log,
-        screen,
-    };
-    written::write(options, &booted)?;
-    Ok(booted)
+    written::write(options, &recorded, outcome?, log, screen)
 }
 
 /// Settles which app runs: the one that the options name, which a given image must be of,

@@ -86,30 +86,24 @@ const GUEST_CORES: &str = "4";
 pub(super) fn run_app(
     options: &Parsed,
     app: &str,
-    mut dags: Option<&mut Prepared>,
+    dags: Option<&Prepared>,
     shows: bool,
 ) -> Result<Booted, Refusal> {
     let given = options.path("image");
     if given.is_none() {
         image::check_linux(app).map_err(Refusal::Usage)?;
     }
-    let handed = Handed::read(options, dags.is_none())?;
-    if let Some(dags) = dags.as_deref_mut() {
-        dags.write_module(handed.text())?;
-    }
-    let dags = dags.as_deref();
-    let module = dags.and_then(|dags| dags.module.clone());
+    let handed = Handed::read(options, dags)?;
     let mut words = words(options, dags);
     words.extend(handed.guest_words().split_whitespace().map(OsString::from));
-    if let Some(path) = module.or_else(|| handed.module()) {
-        let mut word = OsString::from("module=");
-        word.push(path);
-        words.push(word);
-    }
     let recorded = Recorded::new(options, app)?;
     let raw = recorded.raw().filter(|_| options.is_given("record"));
     let replayed = options.path("replay").map(Path::to_path_buf);
-    for (name, path) in [("record=", raw), ("replay=", replayed)] {
+    for (name, path) in [
+        ("module=", handed.module()),
+        ("record=", raw),
+        ("replay=", replayed),
+    ] {
         if let Some(path) = path {
             let mut word = OsString::from(name);
             word.push(path);
@@ -177,16 +171,7 @@ pub(super) fn run_app(
     if let (Some(guest), Ending::Program(why)) = (&guest, &mut outcome.ending) {
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
-    written::say_trace(&screen, options);
-    let said = recorded.write(options, &outcome);
-    if let Some(line) = said? {
-        screen.say(&line);
-    }
-    Ok(Booted {
-        outcome,
-        log,
-        screen,
-    })
+    written::write(options, &recorded, outcome, log, screen)
 }
 
 /// Says which program is run, and what its times are worth.

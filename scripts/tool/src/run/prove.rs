@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use super::folder::{each, worst};
 use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::states_overheads;
 use crate::files::{self, Temporary};
@@ -15,6 +16,7 @@ use crate::progress::Progress;
 use crate::proof::observed::{self, OfDag};
 use crate::proof::overheads::{self, Measured};
 use crate::proof::{commits, report, wcets};
+use crate::protocol::Status;
 use crate::system;
 
 /// What the platform costs; an error in words if no trace was kept.
@@ -61,30 +63,23 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
 /// refused or fails does not keep the others from being proven.
 pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
     let mut progress = Progress::new(files.len() as u64, "files");
-    let (mut rows, mut refused, mut failed) = (Vec::new(), 0, 0);
-    for (over, file) in (0..).zip(files) {
+    let (mut rows, mut over) = (Vec::new(), 0);
+    let (refused, failed) = each(files, |file| {
         progress.show(over);
+        over += 1;
         let one = options.with("dag", file).with("quiet", "yes");
         // Neither people nor programs want the lines of each run.
         let one = one.with("json", "yes").with("plain", "yes");
-        match prove(&one) {
-            Ok(Some(proven)) => {
-                let name = file.file_name().unwrap_or_default().to_string_lossy();
-                rows.extend(proven.rows.into_iter().map(|row| row.of_file(&name)));
-                failed += usize::from(!proven.is_well);
-            }
-            Ok(None) => failed += 1,
-            Err(Refusal::Usage(lines)) => {
-                RUN.complain(&lines);
-                refused += 1;
-            }
-            Err(Refusal::ByPerson) => return Err(Refusal::ByPerson),
-            Err(Refusal::Failure(line)) => {
-                RUN.complain(&format!("{}: {line}", files::place(file)));
-                failed += 1;
-            }
-        }
-    }
+        let Some(proven) = prove(&one)? else {
+            return Ok(Status::Failure);
+        };
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        rows.extend(proven.rows.into_iter().map(|row| row.of_file(&name)));
+        Ok(match proven.is_well {
+            true => Status::Success,
+            false => Status::Failure,
+        })
+    })?;
     progress.end();
     say(
         options,
@@ -95,11 +90,9 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
         let (count, summary) = (files.len(), report::summary(&rows));
         println!("{count} files: {refused} refused, {failed} failed; {summary}");
     }
-    match (refused, failed, report::complaint(&rows)) {
-        (_, _, Some(complaint)) => Err(Refusal::Failure(complaint)),
-        (0, 0, None) => Ok(ExitCode::SUCCESS),
-        (0, _, None) => Ok(ExitCode::FAILURE),
-        _ => Ok(ExitCode::from(2)),
+    match report::complaint(&rows) {
+        Some(complaint) => Err(Refusal::Failure(complaint)),
+        None => Ok(worst(refused, failed)),
     }
 }
 
@@ -118,8 +111,8 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     let Some(proving) = observe_first(options, own.0.as_deref())? else {
         return Ok(None);
     };
-    let mut dags = prepare(&proving)?;
-    let booted = boot_app(&proving, dags.as_mut(), true)?;
+    let dags = prepare(&proving)?;
+    let booted = boot_app(&proving, dags.as_ref(), true)?;
     let is_well = booted.outcome.judge().is_ok();
     let code = conclude(&booted, dags.as_ref(), &proving);
     go_on(&booted)?;
@@ -188,8 +181,8 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
             1 => observing.clone(),
             _ => observing.with("seed", seed.to_string()),
         };
-        let mut dags = prepare(&one)?;
-        let booted = boot_app(&one, dags.as_mut(), true)?;
+        let dags = prepare(&one)?;
+        let booted = boot_app(&one, dags.as_ref(), true)?;
         let is_well = booted.outcome.judge().is_ok();
         conclude(&booted, dags.as_ref(), &one);
         go_on(&booted)?;
