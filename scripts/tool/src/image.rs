@@ -42,23 +42,21 @@ pub struct Image {
 #[must_use]
 pub fn apps() -> Vec<String> {
     let entries = fs::read_dir(system::workspace().join("apps"));
-    let folders = entries
-        .into_iter()
-        .flatten()
-        .flatten()
-        .map(|entry| entry.path())
-        // A library for apps is not an app.
-        .filter(|folder| folder.join("src/main.rs").is_file());
-    let mut names: Vec<String> = folders.filter_map(|folder| package_name(&folder)).collect();
+    let folders = entries.into_iter().flatten().flatten();
+    let folders = folders.map(|entry| entry.path());
+    // A library for apps is not an app.
+    let folders = folders.filter(|folder| folder.join("src/main.rs").is_file());
+    let manifests = folders.flat_map(|folder| fs::read_to_string(folder.join("Cargo.toml")));
+    let mut names: Vec<String> = manifests.filter_map(|it| package_name(&it)).collect();
     names.sort();
     names
 }
 
-fn package_name(folder: &Path) -> Option<String> {
-    let manifest = fs::read_to_string(folder.join("Cargo.toml")).ok()?;
-    let line = manifest.lines().find(|line| line.starts_with("name"))?;
-    let name = line.split('"').nth(1)?;
-    Some(name.to_string())
+/// Reads the name of a package; a manifest may be of a workspace alone.
+pub(crate) fn package_name(manifest: &str) -> Option<String> {
+    let package = manifest.split("[package]").nth(1)?;
+    let line = package.lines().find(|line| line.starts_with("name"))?;
+    Some(line.split('"').nth(1)?.into())
 }
 
 /// Makes sure that `name` is an app.

@@ -20,4 +20,9 @@ impl Random {
         let mixed = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 16;
         least + mixed % (most - least + 1)
     }
+    /// Draws edges from subtasks to later ones, each of which is there once in `density` + 1 times.
+    pub fn edges(&mut self, subtasks: usize, density: u64) -> Vec<(usize, usize)> {
+        let pairs = (1..subtasks).flat_map(|to| (0..to).map(move |from| (from, to)));
+        pairs.filter(|_| self.within(0, density) == 0).collect()
+    }
 }

@@ -17,7 +17,7 @@ use std::process::Command;
 use crate::files::{Temporary, write};
 use crate::install;
 use crate::lasting::Lasting;
-use crate::qemu::{Mode, PROGRAM};
+use crate::qemu::{Mode, PROGRAM, file_value};
 use crate::system;
 use archive::Archive;
 use packages::Packages;
@@ -89,7 +89,7 @@ impl Guest {
         words.extend(accelerator.iter().map(OsString::from));
         // Not by standard output: the port would be closed with the end of standard input.
         for (port, path) in [("out", log), ("end", &own.with_extension("end"))] {
-            let file = file(&format!("file,id={port},path="), path);
+            let file = file_value(&format!("file,id={port},path="), path);
             words.extend(["-chardev".into(), file]);
         }
         let fixed = "-machine q35 -nodefaults -display none -no-reboot \
@@ -105,7 +105,7 @@ impl Guest {
             ("-m", MEMORY_MIB.to_string().into()),
             ("-kernel", packages.kernel.clone().into()),
             ("-initrd", own.with_extension("cpio").into()),
-            ("-serial", file("file:", &console)),
+            ("-serial", file_value("file:", &console)),
         ] {
             words.extend([option.into(), value]);
         }
@@ -210,11 +210,6 @@ fn run(command: &mut Command) -> Result<String, String> {
             String::from_utf8_lossy(&output.stderr).trim()
         )),
     }
-}
-
-/// A file as a value of QEMU's options, in which a comma is doubled.
-fn file(before: &str, path: &Path) -> OsString {
-    format!("{before}{}", path.to_string_lossy().replace(',', ",,")).into()
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, String> {

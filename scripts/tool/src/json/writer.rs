@@ -35,6 +35,13 @@ impl Object {
         self
     }
 
+    /// Adds a member with a list of values that are JSON already.
+    #[must_use]
+    pub fn list(self, name: &str, values: impl IntoIterator<Item = impl ToString>) -> Object {
+        let values = values.into_iter().map(|value| value.to_string());
+        self.json(name, &format!("[{}]", values.collect::<Vec<_>>().join(",")))
+    }
+
     /// Ends the object and returns its text.
     #[must_use]
     pub fn end(self) -> String {

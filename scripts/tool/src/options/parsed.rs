@@ -139,6 +139,16 @@ impl Parsed {
         self.positionals.first().and_then(|word| word.to_str())
     }
 
+    /// Returns the first positional argument as a file, or else the question which it is.
+    ///
+    /// # Errors
+    ///
+    /// The question: there is none.
+    pub fn file(&self, question: &str) -> Result<Named<'_>, String> {
+        let path = self.files().next().ok_or(question)?;
+        Ok(Named { option: "", path })
+    }
+
     /// Returns the files that the positional words name.
     pub fn files(&self) -> impl ExactSizeIterator<Item = &Path> + Clone {
         self.positionals.iter().map(Path::new)

@@ -151,7 +151,6 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
         let lines = dag.subtasks.iter().map(|(name, times)| {
             let buckets = times.buckets.iter();
             let buckets = buckets.map(|(top, count)| format!("[{top},{count}]"));
-            let buckets: Vec<String> = buckets.collect();
             let times_ns = Object::new()
                 .number("count", times.count())
                 .number("min", times.min)
@@ -165,7 +164,7 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
                 .number("hash", dag.hash)
                 .text("subtask", name)
                 .json("execution_time_ns", &times_ns)
-                .json("execution_histogram", &format!("[{}]", buckets.join(",")))
+                .list("execution_histogram", buckets)
                 .end()
         });
         lines.collect()

@@ -155,23 +155,17 @@ impl Qemu {
         arguments.extend(["-smp".into(), self.cores.to_string().into()]);
         arguments.extend(["-m".into(), format!("{}M", self.memory_mib).into()]);
         arguments.extend(self.loading(image));
-        // A comma would end the file's name in QEMU's syntax unless doubled.
-        let serial = with_doubled_commas(serial);
         if self.has_input || self.stops {
             // The log file gets every byte; QEMU's own output goes nowhere.
-            let mut port = OsString::from("stdio,id=console,signal=off,logfile=");
-            port.push(serial);
+            let port = file_value("stdio,id=console,signal=off,logfile=", serial);
             arguments.extend(["-chardev".into(), port]);
             arguments.extend(["-serial", "chardev:console"].map(OsString::from));
         } else {
-            let mut port = OsString::from("file:");
-            port.push(serial);
-            arguments.extend(["-serial".into(), port]);
+            arguments.extend(["-serial".into(), file_value("file:", serial)]);
         }
         arguments.extend(self.second.iter().flat_map(Second::arguments));
         if let Some(path) = &self.records {
-            let mut port = OsString::from("file,id=edge,path=");
-            port.push(with_doubled_commas(path));
+            let port = file_value("file,id=edge,path=", path);
             arguments.extend(["-chardev".into(), port]);
             let device = "isa-debugcon,iobase=0x402,chardev=edge";
             arguments.extend(["-device", device].map(OsString::from));
@@ -189,8 +183,7 @@ impl Qemu {
     /// Returns the arguments by which the image comes into memory, with words and module.
     fn loading(&self, image: &Path) -> Vec<OsString> {
         if self.loader.needs_stick() {
-            let mut drive = OsString::from("if=none,id=stick,format=raw,readonly=on,file=");
-            drive.push(with_doubled_commas(image));
+            let drive = file_value("if=none,id=stick,format=raw,readonly=on,file=", image);
             let mut arguments: Vec<OsString> = vec!["-drive".into(), drive];
             let devices = ["-device", "qemu-xhci", "-device", "usb-storage,drive=stick"];
             arguments.extend(devices.map(OsString::from));
@@ -265,13 +258,12 @@ fn log_instructions(program: &Path, arguments: &mut Vec<OsString>) {
     arguments.extend(["-d", "exec,nochain", "-D", "/dev/stdout"].map(OsString::from));
 }
 
-fn with_doubled_commas(path: &Path) -> OsString {
-    let parts: Vec<&[u8]> = path
-        .as_os_str()
-        .as_bytes()
-        .split(|byte| *byte == b',')
-        .collect();
-    OsString::from_vec(parts.join(&b",,"[..]))
+/// Returns a value that ends in a file's name. A comma would end the name in QEMU's syntax unless
+/// doubled.
+pub(crate) fn file_value(before: &str, path: &Path) -> OsString {
+    let parts = path.as_os_str().as_bytes().split(|byte| *byte == b',');
+    let name = parts.collect::<Vec<_>>().join(&b",,"[..]);
+    OsString::from_vec([before.as_bytes(), &name].concat())
 }
 
 #[cfg(test)]

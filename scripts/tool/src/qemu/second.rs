@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use super::with_doubled_commas;
+use super::file_value;
 
 /// What a guest's second serial port is connected to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -17,15 +17,12 @@ pub struct Second {
 impl Second {
     /// Returns QEMU's arguments for it.
     pub(super) fn arguments(&self) -> [OsString; 4] {
-        let mut device = OsString::from(match (self.is_live, &self.output) {
-            (true, _) => "stdio,id=wire,signal=off",
-            (false, Some(_)) => "file,id=wire",
-            (false, None) => "null,id=wire",
-        });
-        if let Some(output) = &self.output {
-            device.push(if self.is_live { ",logfile=" } else { ",path=" });
-            device.push(with_doubled_commas(output));
-        }
+        let device = match (&self.output, self.is_live) {
+            (None, false) => "null,id=wire".into(),
+            (None, true) => "stdio,id=wire,signal=off".into(),
+            (Some(output), false) => file_value("file,id=wire,path=", output),
+            (Some(output), true) => file_value("stdio,id=wire,signal=off,logfile=", output),
+        };
         let port = "isa-serial,chardev=wire,iobase=0x2f8,irq=3";
         ["-chardev".into(), device, "-device".into(), port.into()]
     }

@@ -145,6 +145,11 @@ fn text(to: &mut Vec<u8>, text: &str) {
     bytes(to, text.as_bytes());
 }
 
+/// Returns numbers as bytes, one behind the other.
+fn longs<const COUNT: usize>(numbers: [u64; COUNT]) -> impl Iterator<Item = u8> {
+    numbers.into_iter().flat_map(u64::to_le_bytes)
+}
+
 /// The messages that are written together.
 #[derive(Default)]
 struct Chunk {
@@ -193,8 +198,7 @@ impl File<'_> {
         // A counter of 32 bits; its low bits are enough to find gaps.
         let [low @ .., _, _, _, _] = entry.job.to_le_bytes();
         records.extend(low);
-        records.extend(entry.at_ns.to_le_bytes());
-        records.extend(entry.release_ns.to_le_bytes());
+        records.extend(longs([entry.at_ns, entry.release_ns]));
         records.extend(json);
         self.chunk
             .index
@@ -218,16 +222,14 @@ impl File<'_> {
         let all = index.values().flatten();
         let times = all.fold(None, |times, &(time_ns, _)| including(times, time_ns));
         let (first, last) = times.unwrap_or_default();
-        let size = (records.len() as u64).to_le_bytes();
+        let size = records.len() as u64;
         let mut crc = Crc::new();
         crc.update(&records);
         let mut content = Vec::with_capacity(records.len() + 64);
-        content.extend(first.to_le_bytes());
-        content.extend(last.to_le_bytes());
-        content.extend(size);
+        content.extend(longs([first, last, size]));
         content.extend(crc.value().to_le_bytes());
         text(&mut content, "");
-        content.extend(size);
+        content.extend(longs([size]));
         content.extend(records);
         let chunk_start = self.length;
         self.record(CHUNK, &content)?;
@@ -239,8 +241,7 @@ impl File<'_> {
             places.extend(self.length.to_le_bytes());
             let mut entries = Vec::with_capacity(messages.len() * 16);
             for (time_ns, place) in messages {
-                entries.extend(time_ns.to_le_bytes());
-                entries.extend(place.to_le_bytes());
+                entries.extend(longs([time_ns, place]));
             }
             let mut content = channel.to_le_bytes().to_vec();
             bytes(&mut content, &entries);
@@ -248,15 +249,11 @@ impl File<'_> {
         }
 
         let mut content = Vec::new();
-        content.extend(first.to_le_bytes());
-        content.extend(last.to_le_bytes());
-        content.extend(chunk_start.to_le_bytes());
-        content.extend((index_start - chunk_start).to_le_bytes());
+        content.extend(longs([first, last, chunk_start, index_start - chunk_start]));
         bytes(&mut content, &places);
-        content.extend((self.length - index_start).to_le_bytes());
+        content.extend(longs([self.length - index_start]));
         text(&mut content, "");
-        content.extend(size);
-        content.extend(size);
+        content.extend(longs([size, size]));
         self.chunk_indexes.push(content);
         Ok(())
     }
@@ -274,8 +271,7 @@ impl File<'_> {
         statistics.extend([0; 8]);
         statistics.extend(count(self.chunk_indexes.len()).to_le_bytes());
         let (first, last) = self.times.unwrap_or_default();
-        statistics.extend(first.to_le_bytes());
-        statistics.extend(last.to_le_bytes());
+        statistics.extend(longs([first, last]));
         let mut counts = Vec::new();
         for (channel, count) in &self.counts {
             counts.extend(channel.to_le_bytes());
@@ -299,12 +295,10 @@ impl File<'_> {
         let offsets = self.length;
         for (kind, start, length) in groups {
             let mut content = vec![kind];
-            content.extend(start.to_le_bytes());
-            content.extend(length.to_le_bytes());
+            content.extend(longs([start, length]));
             self.record(SUMMARY_OFFSET, &content)?;
         }
-        let mut footer = start.to_le_bytes().to_vec();
-        footer.extend(offsets.to_le_bytes());
+        let mut footer: Vec<u8> = longs([start, offsets]).collect();
         footer.extend(0_u32.to_le_bytes());
         self.record(FOOTER, &footer)?;
         self.put(MAGIC)?;

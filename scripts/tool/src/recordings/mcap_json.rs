@@ -58,7 +58,7 @@ fn object<'s>(fields: impl Iterator<Item = (impl Display, &'s Schema)>) -> Objec
     Object::new()
         .text("type", "object")
         .json("properties", &properties.end())
-        .json("required", &format!("[{}]", required.join(",")))
+        .list("required", required)
 }
 
 /// Reports whether a part of this type may have no value.

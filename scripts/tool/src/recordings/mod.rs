@@ -73,11 +73,9 @@ pub fn recording(words: &[OsString]) -> ExitCode {
 
 fn attempt(options: &Parsed) -> Result<(), Refusal> {
     let question = "which file? name a recording, or with --from-csv a table";
-    let file = options
-        .files()
-        .next()
-        .ok_or(Refusal::Usage(question.into()))?;
-    check(file, options).map_err(Refusal::Usage)?;
+    let input = options.file(question).map_err(Refusal::Usage)?;
+    check(input, options).map_err(Refusal::Usage)?;
+    let file = input.path;
     if options.is_given("from-csv") {
         let bytes = table_in::convert(file, options).map_err(Refusal::Usage)?;
         let out = options.path("out").unwrap_or(Path::new(""));
@@ -110,7 +108,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
 }
 
 /// Makes sure of the options and of all files, before any is opened.
-fn check(file: &Path, options: &Parsed) -> Result<(), String> {
+fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
     let of_tables = ["out", "dag", "topic"];
     if options.is_given("from-csv") {
         if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(name)) {
@@ -126,10 +124,6 @@ fn check(file: &Path, options: &Parsed) -> Result<(), String> {
     {
         return Err(format!("`--{name}` needs `--from-csv`; give it, too"));
     }
-    let input = Named {
-        option: "",
-        path: file,
-    };
     files::check(&[input], &options.named(&["out", "mcap"]))?;
     (options.named(&["csv"]).iter()).try_for_each(files::check_folder)
 }

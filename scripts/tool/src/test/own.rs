@@ -7,6 +7,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::image::package_name;
 use crate::system;
 
 /// Returns the names of the project's own packages, sorted.
@@ -54,13 +55,6 @@ fn read(root: &Path) -> (Vec<String>, Vec<PathBuf>) {
         }
     }
     (names, files)
-}
-
-/// Reads the name of a package; a manifest may be of a workspace alone.
-fn package_name(manifest: &str) -> Option<String> {
-    let package = manifest.split("[package]").nth(1)?;
-    let line = package.lines().find(|line| line.starts_with("name"))?;
-    Some(line.split('"').nth(1)?.into())
 }
 
 fn takes_lints(manifest: &str) -> bool {

@@ -11,7 +11,7 @@ use super::figures::Distribution;
 use super::model::Run;
 use super::report::{distribution, microseconds, object};
 use super::view::View;
-use crate::json::quoted;
+use crate::json::{Object, quoted};
 use crate::options::{Parsed, nearest};
 
 /// The most chains that are shown of a run, unless one is named.
@@ -130,19 +130,16 @@ pub(super) fn table(run: &Run, chains: &[Measured], is_named: bool) -> String {
 
 /// Returns the machine line of kind `chain`.
 pub(super) fn machine_line(file: &str, run: &Run, chain: &Measured) -> String {
-    let names: Vec<String> = chain.names.iter().map(|name| quoted(name)).collect();
     let bound = |of: &Result<u64, DagId>| of.map_or("null".into(), |ns| ns.to_string());
-    format!(
-        "{{\"kind\":\"chain\",\"file\":{},\"run\":{},\"path\":[{}],\"output_age_ns\":{},\
-         \"data_age_ns\":{},\"reaction_ns\":{},\"output_age_bound_ns\":{},\
-         \"reaction_bound_ns\":{}}}",
-        quoted(file),
-        run.number,
-        names.join(","),
-        object(&chain.output_age.0),
-        object(&chain.data_age.0),
-        object(&chain.reaction.0),
-        bound(&chain.output_age.1),
-        bound(&chain.reaction.1)
-    )
+    Object::new()
+        .text("kind", "chain")
+        .text("file", file)
+        .number("run", run.number)
+        .list("path", chain.names.iter().map(|name| quoted(name)))
+        .json("output_age_ns", &object(&chain.output_age.0))
+        .json("data_age_ns", &object(&chain.data_age.0))
+        .json("reaction_ns", &object(&chain.reaction.0))
+        .json("output_age_bound_ns", &bound(&chain.output_age.1))
+        .json("reaction_bound_ns", &bound(&chain.reaction.1))
+        .end()
 }

@@ -7,7 +7,7 @@ use sched_dag::{Policy, Preemption};
 use super::Findings;
 use super::figures::Distribution;
 use super::model::Run;
-use crate::json::quoted;
+use crate::json::Object;
 
 /// Returns the text for people: at most `shown` breaches, then the figures.
 #[must_use]
@@ -76,27 +76,23 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: u
 #[must_use]
 pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
     let Findings { breaches, figures } = findings;
-    let loads: Vec<String> = figures.load_permille.iter().map(u64::to_string).collect();
-    format!(
-        "{{\"kind\":\"trace_check\",\"file\":{},\"run\":{},\"events\":{},\"lost\":{},\
-         \"judged_from_ns\":{},\"span_ns\":{},\"instances\":{},\"preemptions\":{},\
-         \"breaches\":{},\"finish_to_ready_max_ns\":{},\"ready_to_start_ns\":{},\
-         \"preemption_latency_ns\":{},\"longest_inversion_ns\":{},\"load_permille\":[{}]}}",
-        quoted(file),
-        run.number,
-        figures.events,
-        run.lost,
-        figures.from_ns,
-        figures.span_ns,
-        figures.instances,
-        figures.preemptions,
-        breaches.len(),
-        figures.finish_to_ready_max_ns,
-        object(&figures.ready_to_start),
-        object(&figures.preemption),
-        figures.longest_inversion_ns,
-        loads.join(",")
-    )
+    Object::new()
+        .text("kind", "trace_check")
+        .text("file", file)
+        .number("run", run.number)
+        .number("events", figures.events as u64)
+        .number("lost", run.lost)
+        .number("judged_from_ns", figures.from_ns)
+        .number("span_ns", figures.span_ns)
+        .number("instances", figures.instances as u64)
+        .number("preemptions", figures.preemptions)
+        .number("breaches", breaches.len() as u64)
+        .number("finish_to_ready_max_ns", figures.finish_to_ready_max_ns)
+        .json("ready_to_start_ns", &object(&figures.ready_to_start))
+        .json("preemption_latency_ns", &object(&figures.preemption))
+        .number("longest_inversion_ns", figures.longest_inversion_ns)
+        .list("load_permille", &figures.load_permille)
+        .end()
 }
 
 pub(super) fn microseconds(ns: u64) -> String {

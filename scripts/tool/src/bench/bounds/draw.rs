@@ -1,5 +1,6 @@
 //! Random sets of DAGs: of a given load, or small ones.
 
+use sched_dag::analysis::Task;
 use sched_dag::{DagSpec, SubtaskSpec};
 
 use crate::random::Random;
@@ -46,7 +47,9 @@ pub(super) fn small(random: &mut Random) -> Vec<DagSpec> {
             UNIT_NS * random.within(1, 20)
         });
         let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
-        let (volume, length) = (wcets.sum::<u64>(), length_ns(&spec));
+        let task = Task::new(1, 1, wcets.collect(), &spec.edges);
+        let task = task.expect("its WCETs are above 0 and its edges lead to larger numbers");
+        let (volume, length) = (task.volume_ns(), task.length_ns());
         let period = random.within(length.max(volume / 4) / UNIT_NS, 3 * volume / UNIT_NS);
         let deadline = random.within(length / UNIT_NS, period);
         spec.name = format!("dag {number}");
@@ -57,44 +60,21 @@ pub(super) fn small(random: &mut Random) -> Vec<DagSpec> {
     dags.collect()
 }
 
-/// Returns the length of the longest path of a DAG whose edges lead to larger numbers.
-fn length_ns(spec: &DagSpec) -> u64 {
-    let wcet_ns = |subtask: usize| spec.subtasks[subtask].wcet_ns.unwrap_or(0);
-    let mut ends: Vec<u64> = Vec::new();
-    for to in 0..spec.subtasks.len() {
-        let before = spec.edges.iter().filter(|edge| edge.1 == to);
-        let start = before.map(|edge| ends[edge.0]).max().unwrap_or(0);
-        ends.push(start + wcet_ns(to));
-    }
-    ends.into_iter().max().unwrap_or(0)
-}
-
 fn dag(
     random: &mut Random,
     subtasks: u64,
     density: u64,
     mut wcet_ns: impl FnMut(&mut Random) -> u64,
 ) -> DagSpec {
-    let mut edges = Vec::new();
-    for to in 1..subtasks {
-        for from in 0..to {
-            if random.within(0, density) == 0 {
-                edges.push((from, to));
-            }
-        }
-    }
-    let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
+    let subtasks = usize::try_from(subtasks).unwrap_or(usize::MAX);
+    let edges = random.edges(subtasks, density);
+    let subtask = |_| SubtaskSpec {
+        wcet_ns: Some(wcet_ns(random)),
+        ..SubtaskSpec::default()
+    };
     DagSpec {
-        subtasks: (0..subtasks)
-            .map(|_| SubtaskSpec {
-                wcet_ns: Some(wcet_ns(random)),
-                ..SubtaskSpec::default()
-            })
-            .collect(),
-        edges: edges
-            .iter()
-            .map(|&(from, to)| (index(from), index(to)))
-            .collect(),
+        subtasks: (0..subtasks).map(subtask).collect(),
+        edges,
         ..DagSpec::default()
     }
 }

@@ -35,11 +35,7 @@ pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
     text.push('\n');
     let mut workload = String::new();
     for figure in first {
-        let heading = heading(figure);
-        if heading != workload {
-            let _ = writeln!(text, "{heading}");
-            workload = heading;
-        }
+        add_heading(&mut text, &mut workload, figure);
         let _ = write!(text, "  {:58}", figure.name());
         for (_, figures) in measured {
             let one = figures.iter().find(|other| other.is_same(figure));
@@ -63,12 +59,7 @@ pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> Comparison {
     let mut complaints = Vec::new();
     let mut workload = String::new();
     for figure in now {
-        let heading = heading(figure);
-        // Writing into a `String` cannot fail.
-        if heading != workload {
-            let _ = writeln!(text, "{heading}");
-            workload = heading;
-        }
+        add_heading(&mut text, &mut workload, figure);
         let before = baseline.iter().find(|before| before.is_same(figure));
         let grown = before.is_some_and(|before| has_grown(figure, before));
         let mark = match before {
@@ -117,6 +108,16 @@ pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> Comparison {
         "{verdict} ({MARGIN_RULE}; `./scripts/bench hand-off --save-baseline` accepts it)"
     );
     Comparison { text, complaints }
+}
+
+/// Adds the heading of a figure unless it is that of the one before.
+fn add_heading(text: &mut String, before: &mut String, figure: &Figure) {
+    let heading = heading(figure);
+    if heading != *before {
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(text, "{heading}");
+        *before = heading;
+    }
 }
 
 fn heading(figure: &Figure) -> String {

@@ -27,11 +27,7 @@ pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), String> {
 pub(super) fn samples_csv(measured: &Measured) -> String {
     let mut text = String::from("policy,subtasks,seed,metric,index,value_ns\n");
     for (condition, figures) in measured {
-        let Condition {
-            policy,
-            subtasks,
-            seed,
-        } = condition;
+        let (policy, subtasks, seed) = (condition.policy, condition.subtasks, condition.seed);
         for (metric, samples) in METRICS.iter().zip(&figures.samples) {
             for (index, value_ns) in samples {
                 // Writing into a `String` cannot fail.

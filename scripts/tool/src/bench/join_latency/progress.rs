@@ -68,32 +68,23 @@ impl Progress {
 
     /// Says something about the condition in hand.
     pub(super) fn note(&self, what: &str) {
-        let wipe = if self.on_terminal { "\r\x1b[K" } else { "" };
-        let _ = writeln!(stderr(), "{wipe}{}: {what}", self.name);
+        self.say("", what);
     }
 
     fn report(&self, what: &str) {
+        self.say(&format!("[{} of {}] ", self.complete, self.total), what);
+    }
+
+    fn say(&self, before: &str, what: &str) {
         let wipe = if self.on_terminal { "\r\x1b[K" } else { "" };
-        let Progress {
-            complete,
-            total,
-            name,
-            ..
-        } = self;
         // That no one reads it must not end the measurement.
-        let _ = writeln!(stderr(), "{wipe}[{complete} of {total}] {name}: {what}");
+        let _ = writeln!(stderr(), "{wipe}{before}{}: {what}", self.name);
     }
 
     fn draw(&self, part: f64) {
         if self.on_terminal {
-            let Progress {
-                complete,
-                total,
-                name,
-                ..
-            } = self;
-            let (now, percent) = (complete + 1, part * 100.0);
-            let left = self.left(part);
+            let (now, total, name) = (self.complete + 1, self.total, &self.name);
+            let (percent, left) = (part * 100.0, self.left(part));
             let _ = write!(
                 stderr(),
                 "\r\x1b[K[{now} of {total}] {name}: {percent:.0} %, {left}"
@@ -111,12 +102,11 @@ impl Progress {
         if done == 0.0 {
             return "time left unknown".into();
         }
-        let spent = self.spent.as_secs_f64()
-            + if part > 0.0 {
-                self.began.elapsed().as_secs_f64()
-            } else {
-                0.0
-            };
+        let in_hand = match part > 0.0 {
+            true => self.began.elapsed(),
+            false => Duration::ZERO,
+        };
+        let spent = (self.spent + in_hand).as_secs_f64();
         format!("about {:.0} s left", (spent / done * (to_do - part)).ceil())
     }
 }

@@ -8,7 +8,7 @@ use std::fmt::Write;
 use join_latency::{Joined, Samples, Span};
 
 use crate::json::Value;
-use crate::protocol::Transcript;
+use crate::protocol::{MachineLine, Transcript};
 
 /// The columns. `subtask` 0 is the source, 1 to N are the parallel ones.
 const COLUMNS: &str = "what,subtask,index,ready_ns,start_ns,finish_ns,joined_indices";
@@ -26,35 +26,16 @@ pub(super) fn read_transcript(transcript: &Transcript, subtasks: usize) -> Resul
     for line in transcript.of_kind("executions") {
         let damaged = || format!("serial line {} has no times as it should", line.number);
         let subtask = line.number_at("subtask").ok_or_else(damaged)?;
-        let spans = usize::try_from(subtask)
-            .ok()
-            .and_then(|subtask| match subtask {
-                0 => Some(&mut samples.source),
-                _ => samples.parallel.get_mut(subtask - 1),
-            });
-        let spans = spans.ok_or_else(damaged)?;
-        if line.number_at("first") != Some(spans.len() as u64) {
-            return Err(format!(
-                "a batch before serial line {} is missing",
-                line.number
-            ));
-        }
+        let subtask = usize::try_from(subtask).map_err(|_| damaged())?;
+        let spans = spans_of(&mut samples, subtask).ok_or_else(damaged)?;
+        check_batch(line, spans.len())?;
         for times in line.value.get("times").ok_or_else(damaged)?.elements() {
-            let [start_ns, finish_ns] = numbers(times).try_into().map_err(|_| damaged())?;
-            spans.push(Span {
-                start_ns,
-                finish_ns,
-            });
+            spans.push(span(numbers(times).try_into().map_err(|_| damaged())?));
         }
     }
     for line in transcript.of_kind("joins") {
         let damaged = || format!("serial line {} has no joins as it should", line.number);
-        if line.number_at("first") != Some(samples.joins.len() as u64) {
-            return Err(format!(
-                "a batch before serial line {} is missing",
-                line.number
-            ));
-        }
+        check_batch(line, samples.joins.len())?;
         for times in line.value.get("times").ok_or_else(damaged)?.elements() {
             let numbers = numbers(times);
             let [ready_ns, start_ns, finish_ns, indices @ ..] = &numbers[..] else {
@@ -67,19 +48,42 @@ pub(super) fn read_transcript(transcript: &Transcript, subtasks: usize) -> Resul
     Ok(samples)
 }
 
+/// Makes sure that a batch begins where the one before has ended.
+fn check_batch(line: &MachineLine, before: usize) -> Result<(), String> {
+    match line.number_at("first") == Some(before as u64) {
+        true => Ok(()),
+        false => Err(format!(
+            "a batch before serial line {} is missing",
+            line.number
+        )),
+    }
+}
+
+/// Returns the executions of a subtask; 0 is the source.
+fn spans_of(samples: &mut Samples, subtask: usize) -> Option<&mut Vec<Span>> {
+    match subtask {
+        0 => Some(&mut samples.source),
+        _ => samples.parallel.get_mut(subtask - 1),
+    }
+}
+
+const fn span([start_ns, finish_ns]: [u64; 2]) -> Span {
+    Span {
+        start_ns,
+        finish_ns,
+    }
+}
+
 fn numbers(list: &Value) -> Vec<u64> {
     list.elements().iter().filter_map(Value::as_u64).collect()
 }
 
 fn add_join(samples: &mut Samples, times_ns: [u64; 3], indices: &[u64]) -> Option<()> {
-    let [ready_ns, start_ns, finish_ns] = times_ns;
+    let [ready_ns, times_ns @ ..] = times_ns;
     if indices.len() != samples.parallel.len() {
         return None;
     }
-    let span = Span {
-        start_ns,
-        finish_ns,
-    };
+    let span = span(times_ns);
     samples.joins.push(Joined { ready_ns, span });
     samples.indices.extend(indices);
     Some(())
@@ -91,29 +95,16 @@ pub(super) fn to_csv(samples: &Samples, statement: &str) -> String {
     let subtasks = std::iter::once(&samples.source).chain(&samples.parallel);
     // Writing into a `String` cannot fail.
     for (subtask, spans) in subtasks.enumerate() {
-        for (
-            index,
-            Span {
-                start_ns,
-                finish_ns,
-            },
-        ) in spans.iter().enumerate()
-        {
+        for (index, span) in spans.iter().enumerate() {
+            let (start_ns, finish_ns) = (span.start_ns, span.finish_ns);
             let _ = writeln!(text, "execution,{subtask},{index},,{start_ns},{finish_ns},");
         }
     }
     let sink = samples.parallel.len() + 1;
     for (index, Joined { ready_ns, span }) in samples.joins.iter().enumerate() {
-        let Span {
-            start_ns,
-            finish_ns,
-        } = span;
-        let indices: Vec<_> = samples
-            .indices_of(index)
-            .iter()
-            .map(u64::to_string)
-            .collect();
-        let indices = indices.join(" ");
+        let (start_ns, finish_ns) = (span.start_ns, span.finish_ns);
+        let indices = samples.indices_of(index).iter().map(u64::to_string);
+        let indices = indices.collect::<Vec<_>>().join(" ");
         let _ = writeln!(
             text,
             "join,{sink},{index},{ready_ns},{start_ns},{finish_ns},{indices}"
@@ -145,14 +136,8 @@ pub(super) fn from_csv(text: &str, statement: &str, subtasks: usize) -> Option<S
             let times_ns = [ready_ns.parse().ok()?, start_ns, finish_ns];
             add_join(&mut samples, times_ns, &indices?)?;
         } else {
-            let spans = match subtask.parse::<usize>().ok()? {
-                0 => &mut samples.source,
-                subtask => samples.parallel.get_mut(subtask - 1)?,
-            };
-            spans.push(Span {
-                start_ns,
-                finish_ns,
-            });
+            let spans = spans_of(&mut samples, subtask.parse().ok()?)?;
+            spans.push(span([start_ns, finish_ns]));
         }
     }
     Some(samples)

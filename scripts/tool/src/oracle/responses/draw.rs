@@ -63,7 +63,8 @@ fn draw_dag(random: &mut Random, cores: u64, share: u64, pipelined: bool) -> Dag
     let wcets_ns: Vec<u64> = (0..random.within(1, 8))
         .map(|_| random.within(1_000, 9_000))
         .collect();
-    let edges = edges(random, wcets_ns.len());
+    let density = random.within(1, 6);
+    let edges = random.edges(wcets_ns.len(), density);
     let volume: u64 = wcets_ns.iter().sum();
     let longest = wcets_ns.iter().copied().max().unwrap_or(1);
     let period = (volume * share).div_ceil(cores * 4) + random.within(0, 10_000);
@@ -87,11 +88,4 @@ fn draw_dag(random: &mut Random, cores: u64, share: u64, pipelined: bool) -> Dag
         edges,
         ..DagSpec::default()
     }
-}
-
-/// Draws edges from subtasks to later ones.
-fn edges(random: &mut Random, subtasks: usize) -> Vec<(usize, usize)> {
-    let density = random.within(1, 6);
-    let pairs = (1..subtasks).flat_map(|to| (0..to).map(move |from| (from, to)));
-    pairs.filter(|_| random.within(0, density) == 0).collect()
 }

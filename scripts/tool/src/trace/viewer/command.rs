@@ -5,7 +5,7 @@ use std::fs;
 use std::process::ExitCode;
 
 use super::convert;
-use crate::files::{self, Named};
+use crate::files;
 use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::trace::bound;
 use crate::trace::command::read_file;
@@ -55,15 +55,10 @@ pub fn trace(words: &[OsString]) -> ExitCode {
 
 /// Converts the runs that the options ask for.
 fn draw(options: &Parsed) -> Result<String, String> {
-    let question = "which file? name a serial log with a trace";
-    let file = options.files().next().ok_or(question)?;
-    let input = Named {
-        option: "",
-        path: file,
-    };
+    let input = options.file("which file? name a serial log with a trace")?;
     files::check(&[input], &options.named(&["out"]))?;
-    let mut runs = read_file(file)?;
-    let file = files::place(file);
+    let mut runs = read_file(input.path)?;
+    let file = files::place(input.path);
     if let Some(number) = options.number("run") {
         let there: Vec<String> = runs.iter().map(|run| run.number.to_string()).collect();
         runs.retain(|run| run.number == number);
