@@ -57,7 +57,7 @@ pub fn loaded(mut file: Vec<u8>) -> Result<Vec<u8>, String> {
 /// Returns how far headers and segments reach into the file.
 fn loaded_bytes(file: &[u8]) -> Result<u64, String> {
     let segments = table(file, 32, 56, PROGRAM_HEADER_BYTES)?;
-    let mut end = 64 + PROGRAM_HEADER_BYTES * count(segments.len());
+    let mut end = 64 + PROGRAM_HEADER_BYTES * segments.len() as u64;
     for segment in segments {
         let offset = number(file, segment + 8, 8)?;
         let length = number(file, segment + 32, 8)?;
@@ -216,10 +216,6 @@ fn number(file: &[u8], at: u64, length: usize) -> Result<u64, String> {
         .iter()
         .rev()
         .fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
-}
-
-fn count(length: usize) -> u64 {
-    u64::try_from(length).unwrap_or(u64::MAX)
 }
 
 #[cfg(test)]

@@ -12,7 +12,6 @@ use super::load::Format;
 use crate::json::quoted;
 use crate::options::Parsed;
 use crate::outcome::Outcome;
-use crate::protocol::MachineLine;
 
 /// Returns the folder that `--dag` names, if it is one.
 #[must_use]
@@ -75,7 +74,7 @@ pub fn rows(file: &Path, cores: u64, outcome: &Outcome) -> String {
         let _ = writeln!(
             text,
             "{name:<18}{:<18}{:>8}{cores:>6}{:>6}{:>8}{violations:>11}{:>14}{:>14}{:>10}",
-            dag_name(line),
+            line.text_at("dag").unwrap_or("?"),
             number("subtasks"),
             number("completed"),
             number("deadline_misses"),
@@ -90,10 +89,6 @@ pub fn rows(file: &Path, cores: u64, outcome: &Outcome) -> String {
         );
     }
     text
-}
-
-fn dag_name(line: &MachineLine) -> &str {
-    line.text_at("dag").unwrap_or("?")
 }
 
 /// Writes nanoseconds as milliseconds with three places.

@@ -1,7 +1,6 @@
 //! What `./scripts/run --dag FILE` boots: the file that becomes the boot module, words for the
 //! guest, and enough memory and time.
 
-use std::fmt::{self, Write};
 use std::path::PathBuf;
 
 use dag_file::time::parse_ns;
@@ -189,23 +188,8 @@ fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
     let bytes = (subtasks.saturating_mul(OF_A_SUBTASK))
         .saturating_add(records.max().unwrap_or(0).saturating_mul(OF_A_RECORD))
         .saturating_add(cores.saturating_mul(OF_A_CORE))
-        .saturating_add(length_of_text(file).saturating_mul(OF_A_BYTE));
+        .saturating_add((file.to_string().len() as u64).saturating_mul(OF_A_BYTE));
     12 + bytes.div_ceil(MIB)
-}
-
-/// Returns how many bytes the boot module has, without writing it anywhere.
-fn length_of_text(file: &DagFile) -> u64 {
-    struct Counter(u64);
-    impl Write for Counter {
-        fn write_str(&mut self, text: &str) -> fmt::Result {
-            self.0 += text.len() as u64;
-            Ok(())
-        }
-    }
-    let mut counter = Counter(0);
-    // Counting cannot fail.
-    let _ = write!(counter, "{file}");
-    counter.0
 }
 
 /// The longest that a run may take if nobody says how long, in seconds: a day.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
+use std::str::FromStr;
 
 use replay::shown::quoted;
 
@@ -72,6 +73,13 @@ impl Parsed {
     #[must_use]
     pub fn number(&self, name: &str) -> Option<u64> {
         self.text(name).and_then(|value| value.parse().ok())
+    }
+
+    /// Returns the numbers of a list.
+    #[must_use]
+    pub fn numbers<N: FromStr>(&self, name: &str) -> Vec<N> {
+        let words = self.text(name).into_iter().flat_map(|all| all.split(','));
+        words.filter_map(|word| word.parse().ok()).collect()
     }
 
     /// Makes sure that nothing stands twice among the values with commas between of

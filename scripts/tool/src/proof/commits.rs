@@ -1,10 +1,10 @@
 //! The commits of a guest, as its lines of kind `graph` tell them.
 
+use sched_dag::TaskSet;
 use sched_dag::analysis::{self, Overheads, Settings};
-use sched_dag::{Clusters, DagSpec, SchedulerOptions, TaskSet};
 
 use crate::json::Value;
-use crate::protocol::{MachineLine, Transcript};
+use crate::protocol::Transcript;
 use crate::trace::dag;
 use crate::trace::line::Line;
 use replay::lines::Malformed;
@@ -24,19 +24,6 @@ pub struct Commit {
     pub bounds_ns: Vec<Option<u64>>,
 }
 
-/// The lines of one commit, as far as they are read.
-struct Open {
-    number: u64,
-    options: SchedulerOptions,
-    clusters: Clusters,
-    /// An instance's, and for each that becomes ready.
-    overheads_ns: [u64; 2],
-    dags: Vec<DagSpec>,
-    lines: Vec<usize>,
-    hashes: Vec<u64>,
-    bounds_ns: Vec<Option<u64>>,
-}
-
 /// Reads all commits of a guest, in their order.
 ///
 /// # Errors
@@ -48,43 +35,45 @@ pub fn read(transcript: &Transcript) -> Result<Vec<Commit>, String> {
         let Malformed { line, reason } = malformed;
         format!("serial line {line}: {reason}")
     };
-    let mut open: Vec<Open> = Vec::new();
-    for line in transcript.of_kind("graph") {
-        add(line, &mut open).map_err(say)?;
-    }
-    let commits = open
-        .into_iter()
-        .map(|open| close(open).map_err(say)?.agreed());
-    commits.collect()
+    let lines: Vec<Line<'_>> = transcript.of_kind("graph").map(Line).collect();
+    let number = |line: &Line<'_>| line.0.number_at("commit");
+    let commits = lines.chunk_by(|a, b| number(a) == number(b));
+    commits
+        .map(|lines| commit(lines).map_err(say)?.agreed())
+        .collect()
 }
 
-fn add(line: &MachineLine, all: &mut Vec<Open>) -> Result<(), Malformed> {
-    let line = Line(line);
-    let number = line.number("commit")?;
-    if all.last().is_none_or(|open| open.number != number) {
-        all.push(Open {
-            number,
-            options: dag::options(&line)?,
-            clusters: dag::clusters(&line)?,
-            overheads_ns: [
-                number_at(&line, "overhead_ns", 0)?.unwrap_or(u64::MAX),
-                number_at(&line, "overhead_ns", 1)?.unwrap_or(0),
-            ],
-            dags: Vec::new(),
-            lines: Vec::new(),
-            hashes: Vec::new(),
-            bounds_ns: Vec::new(),
-        });
-    }
-    let bound_ns = number_at(&line, "bound_ns", 0)?;
-    let (spec, hash) = (dag::spec(&line)?, line.number("hash")?);
-    if let Some(open) = all.last_mut() {
-        open.dags.push(spec);
-        open.lines.push(line.0.number);
-        open.hashes.push(hash);
-        open.bounds_ns.push(bound_ns);
-    }
-    Ok(())
+/// Reads the lines of one commit, a line a DAG.
+fn commit(lines: &[Line<'_>]) -> Result<Commit, Malformed> {
+    let first = &lines[0];
+    let number = first.number("commit")?;
+    let options = dag::options(first)?;
+    let clusters = dag::clusters(first)?;
+    // Two numbers are all that the analysis makes of them: an instance's, and for each that
+    // becomes ready.
+    let overheads = Overheads {
+        dispatch_ns: number_at(first, "overhead_ns", 0)?.unwrap_or(u64::MAX),
+        ready_ns: number_at(first, "overhead_ns", 1)?.unwrap_or(0),
+        ..Overheads::default()
+    };
+    let bounds_ns = lines.iter().map(|line| number_at(line, "bound_ns", 0));
+    let bounds_ns = bounds_ns.collect::<Result<_, _>>()?;
+    let dags = lines.iter().map(dag::spec).collect::<Result<Vec<_>, _>>()?;
+    let hashes = lines.iter().map(|line| line.number("hash"));
+    let hashes = hashes.collect::<Result<_, _>>()?;
+    let numbers: Vec<usize> = lines.iter().map(|line| line.0.number).collect();
+    Ok(Commit {
+        number,
+        task_set: dag::task_set("graph", (options, &clusters), &dags, &numbers)?,
+        settings: Settings {
+            policy: options.policy,
+            preemption: options.preemption,
+            cores: options.cores,
+            overheads,
+        },
+        hashes,
+        bounds_ns,
+    })
 }
 
 /// Returns a number of a list, or `None` of a shorter one.
@@ -94,32 +83,6 @@ fn number_at(line: &Line<'_>, name: &str, place: usize) -> Result<Option<u64>, M
         Some(Value::Integer(number)) if *number >= 0 => Ok(u64::try_from(*number).ok()),
         _ => Err(line.malformed(format!("`{name}` is a list of numbers"))),
     }
-}
-
-fn close(open: Open) -> Result<Commit, Malformed> {
-    let SchedulerOptions {
-        policy,
-        preemption,
-        cores,
-    } = open.options;
-    let options = (open.options, &open.clusters);
-    Ok(Commit {
-        number: open.number,
-        task_set: dag::task_set("graph", options, &open.dags, &open.lines)?,
-        settings: Settings {
-            policy,
-            preemption,
-            cores,
-            // Two numbers are all that the analysis makes of them.
-            overheads: Overheads {
-                dispatch_ns: open.overheads_ns[0],
-                ready_ns: open.overheads_ns[1],
-                ..Overheads::default()
-            },
-        },
-        hashes: open.hashes,
-        bounds_ns: open.bounds_ns,
-    })
 }
 
 impl Commit {

@@ -124,18 +124,12 @@ impl Running {
         let complaints = PathBuf::from(complaints);
         let errors = File::create(&complaints).map_err(file_error(&complaints))?;
 
-        command
-            .stdin(if has_input {
-                Stdio::piped()
-            } else {
-                Stdio::null()
-            })
-            .stdout(if has_log {
-                Stdio::piped()
-            } else {
-                Stdio::null()
-            })
-            .stderr(errors);
+        let piped = |is_piped: bool| match is_piped {
+            true => Stdio::piped(),
+            false => Stdio::null(),
+        };
+        command.stdin(piped(has_input)).stdout(piped(has_log));
+        command.stderr(errors);
         if stops {
             command.process_group(0);
         }

@@ -59,8 +59,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 }
 
 fn measure_all(options: &Parsed) -> Result<(), Refusal> {
-    let cores = options.text("cores").unwrap_or_default().split(',');
-    let cores = cores.filter_map(|number| number.parse().ok());
+    let cores = options.numbers("cores").into_iter();
     let sets = options.number("sets").unwrap_or(200);
     let seed = options.number("seed").unwrap_or(1);
     let points: Vec<Point> = cores.flat_map(|cores| measure(cores, sets, seed)).collect();

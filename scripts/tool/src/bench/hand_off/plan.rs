@@ -68,15 +68,9 @@ pub(super) struct Scale {
 
 impl Scale {
     fn new(options: &Parsed) -> Scale {
-        let numbers = |name| {
-            let text = options.text(name).unwrap_or_default();
-            text.split(',')
-                .filter_map(|number| number.parse().ok())
-                .collect()
-        };
         Scale {
-            cores: numbers("cores"),
-            subtasks: numbers("subtasks"),
+            cores: options.numbers("cores"),
+            subtasks: options.numbers("subtasks"),
             jobs: options.number("jobs").unwrap_or(2),
         }
     }
@@ -169,9 +163,8 @@ fn boots(options: &Parsed) -> Vec<Boot> {
     let [jobs, chain, branches, layered, seed] =
         ["jobs", "chain", "branches", "layered", "seed"].map(text);
     let sizes = format!("chain={chain} branches={branches} layered={layered} seed={seed}");
-    let numbers = [chain, layered].map(|sizes| sizes.split(','));
-    let numbers = numbers.into_iter().flatten().map(str::parse);
-    let largest = numbers.filter_map(Result::ok).max().unwrap_or(0);
+    let numbers = ["chain", "layered"].map(|name| options.numbers(name));
+    let largest = numbers.into_iter().flatten().max().unwrap_or(0);
     let boot = |kind, cores, words: String| {
         let words = format!("{words} {}", text("append"));
         Boot::new(kind, cores, largest, words)

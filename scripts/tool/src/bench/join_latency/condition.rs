@@ -86,38 +86,24 @@ impl Condition {
 
     /// Returns its words of the guest's command line.
     pub(super) fn guest_words(&self, jobs: u64, queue: u64) -> String {
-        let Condition {
-            policy,
-            subtasks,
-            seed,
-        } = self;
-        let policy = match policy {
-            Policy::Approximate(ms) => {
-                format!("policy_under_test=approximate max_interval_ms={ms} queue={queue}")
-            }
-            Policy::Exact => format!("policy_under_test=exact queue={queue}"),
-            Policy::Fass => "policy_under_test=fass".into(),
-        };
         // Inputs of the parallel subtasks must hold their backlog, which grows
         // slower than the jobs.
         let depth = jobs.clamp(1000, 100_000);
-        let depth = match self.policy {
-            Policy::Fass => String::new(),
-            _ => format!(" depth={depth}"),
+        let of_queues = format!("queue={queue} depth={depth}");
+        let policy = match self.policy {
+            Policy::Approximate(ms) => format!("approximate max_interval_ms={ms} {of_queues}"),
+            Policy::Exact => format!("exact {of_queues}"),
+            Policy::Fass => "fass".into(),
         };
-        format!("{policy}{depth} subtasks={subtasks} jobs={jobs} seed={seed}")
+        let (subtasks, seed) = (self.subtasks, self.seed);
+        format!("policy_under_test={policy} subtasks={subtasks} jobs={jobs} seed={seed}")
     }
 }
 
 impl fmt::Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}, N = {}, seed {}",
-            self.policy.title(),
-            self.subtasks,
-            self.seed
-        )
+        let (policy, subtasks) = (self.policy.title(), self.subtasks);
+        write!(f, "{policy}, N = {subtasks}, seed {}", self.seed)
     }
 }
 

@@ -4,6 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use replay::repeated;
+
 use super::condition::{Condition, Policy};
 use crate::files;
 use crate::options::Parsed;
@@ -56,15 +58,10 @@ impl Plan {
         let out = options.path("out").filter(|_| options.is_given("out"));
         (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
         let policies = Policy::list(options.text("policies").unwrap_or_default())?;
-        let mut subtasks: Vec<usize> = Vec::new();
-        for text in options.text("subtasks").unwrap_or_default().split(',') {
-            let parallel = text
-                .parse()
-                .map_err(|_| format!("`--subtasks`: `{text}`"))?;
-            if subtasks.contains(&parallel) {
-                return Err(format!("`--subtasks`: {parallel} stands twice"));
-            }
-            subtasks.push(parallel);
+        let subtasks: Vec<usize> = options.numbers("subtasks");
+        if let Some((_, second)) = repeated(&subtasks) {
+            let parallel = subtasks[second];
+            return Err(format!("`--subtasks`: {parallel} stands twice"));
         }
         let most_parallel = subtasks.iter().max().map_or(1, |most| *most as u64);
         let least_cores = most_parallel + 2;

@@ -99,8 +99,7 @@ impl Plan {
                 known.join(", ")
             ));
         }
-        let workers = options.text("workers").unwrap_or_default().split(',');
-        let workers: Vec<u32> = workers.filter_map(|number| number.parse().ok()).collect();
+        let workers: Vec<u32> = options.numbers("workers");
         let most = linux::processors();
         if let Some(count) = workers.iter().find(|count| **count > most) {
             return Err(format!(
