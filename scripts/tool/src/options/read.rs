@@ -18,7 +18,7 @@ pub enum Refusal {
     Usage(String),
     /// Something else is: exit code 1.
     Failure(String),
-    /// A person has ended a run before others that were to follow: exit code [`BY_PERSON`].
+    /// A person has ended a run before others that were to follow: exit code 130.
     ByPerson,
 }
 

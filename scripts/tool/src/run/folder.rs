@@ -1,9 +1,10 @@
 //! `run --dag FOLDER`: each DAG file of a folder, one boot each, in one table; with `--prove`
 //! two boots each.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
+use super::each::{each, worst};
 use super::{RUN, boot_app, conclude, go_on, prepare, prove};
 use crate::dag_file::batch;
 use crate::files;
@@ -63,39 +64,4 @@ pub(super) fn run(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> 
         println!("{count} files: {refused} refused, {failed} failed");
     }
     Ok(worst(refused, failed))
-}
-
-/// Runs each file; one that is refused or fails does not keep the others from running. Returns
-/// how many were refused, and how many failed.
-pub(super) fn each(
-    files: &[PathBuf],
-    mut run: impl FnMut(&Path) -> Result<Status, Refusal>,
-) -> Result<(usize, usize), Refusal> {
-    let (mut refused, mut failed) = (0, 0);
-    for file in files {
-        let status = match run(file) {
-            Ok(status) => status,
-            Err(Refusal::Usage(lines)) => {
-                RUN.complain(&lines);
-                Status::Usage
-            }
-            Err(Refusal::Failure(line)) => {
-                RUN.complain(&format!("{}: {line}", files::place(file)));
-                Status::Failure
-            }
-            Err(Refusal::ByPerson) => return Err(Refusal::ByPerson),
-        };
-        refused += usize::from(status == Status::Usage);
-        failed += usize::from(status == Status::Failure);
-    }
-    Ok((refused, failed))
-}
-
-/// Returns the exit code of the worst of the files.
-pub(super) fn worst(refused: usize, failed: usize) -> ExitCode {
-    match (refused, failed) {
-        (0, 0) => ExitCode::SUCCESS,
-        (0, _) => ExitCode::FAILURE,
-        _ => ExitCode::from(2),
-    }
 }

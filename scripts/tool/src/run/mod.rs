@@ -11,6 +11,7 @@
 mod boot;
 mod conclusion;
 mod debug;
+mod each;
 mod folder;
 mod gdb;
 mod handed;

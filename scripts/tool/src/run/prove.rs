@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use super::folder::{each, worst};
+use super::each::{each, worst};
 use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::states_overheads;
 use crate::files::{self, Temporary};
