@@ -49,7 +49,7 @@ fn latencies_stay_below_what_the_commit_promises() {
             let commit = finish_create_dags_with(&system.dags, construction()).expect("sound");
             let report = machine.run();
             assert_eq!(report.violations(), []);
-            let latencies = Latencies::of(report.task_set(), &report.record(), &system.acted_on);
+            let latencies = Latencies::of(report.task_set(), report.record(), &system.acted_on);
             assert_eq!(latencies.hot_path_ns.len(), 60);
             assert!(latencies.to_vehicle_ns.len() >= 58, "{latencies:?}");
 

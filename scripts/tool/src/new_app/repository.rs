@@ -148,7 +148,7 @@ git init                # docs/guide.md goes on from here
 
 #[cfg(test)]
 mod tests {
-    use super::{Source, create_repository};
+    use super::{PACKAGES, Source, create_repository};
     use crate::options::Refusal;
     use crate::system::workspace;
     use std::fs;
