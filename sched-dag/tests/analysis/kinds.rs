@@ -14,17 +14,17 @@ use std::collections::BTreeMap;
 use sched_dag::TaskSet;
 use sched_dag::analysis::{Answer, Settings, answer, fix_orders};
 
-use crate::number_from;
 use crate::random::{Kind, Random, sample_of};
 use crate::simulate::observe;
+use crate::support::number;
 
 /// How many sets of each kind are to be proven whole, where no number of sets is wanted.
 const WHOLE: u64 = 100;
 
 #[test]
 fn accepted_sets_keep_their_bounds() {
-    let first = number_from("ANALYSIS_SEED", 1);
-    let wanted = number_from("ANALYSIS_SETS", 0);
+    let first = number("ANALYSIS_SEED", 1);
+    let wanted = number("ANALYSIS_SETS", 0);
     let most = if wanted == 0 { 60_000 } else { wanted };
     let mut whole = [0; Kind::COUNT];
     let mut by_test: BTreeMap<String, u64> = BTreeMap::new();

@@ -8,6 +8,8 @@ mod kinds;
 mod one_core;
 mod random;
 mod simulate;
+#[path = "../support/mod.rs"]
+mod support;
 mod witnesses;
 mod worked;
 
@@ -30,13 +32,6 @@ fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> Settings 
         preemption,
         cores,
         overheads: Overheads::default(),
-    }
-}
-
-fn number_from(variable: &str, default: u64) -> u64 {
-    match std::env::var(variable) {
-        Ok(text) => text.parse().expect("a whole number"),
-        Err(_) => default,
     }
 }
 

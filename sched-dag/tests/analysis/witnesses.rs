@@ -12,7 +12,7 @@ use crate::forged;
 use crate::kinds::tighter;
 use crate::random::{Random, Sample, sample};
 use crate::simulate::spec;
-use crate::{number_from, settings};
+use crate::support::number;
 
 pub(crate) fn output(files: &[String]) -> Output {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/check-witness");
@@ -37,7 +37,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     let mut files = Vec::new();
     let mut expected = Vec::new();
     let mut to_alter = Vec::new();
-    for seed in 0..=number_from("WITNESS_SETS", 1_000) {
+    for seed in 0..=number("WITNESS_SETS", 1_000) {
         let mut random = Random::new(seed);
         let sample = match seed {
             0 => full_core(),
@@ -96,16 +96,12 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
 
 #[test]
 fn a_witness_that_lacks_a_cluster_is_refused() {
-    let sample = full_core();
-    let mut specs = sample.specs;
-    for (spec, cluster) in specs.iter_mut().zip(0..) {
+    let mut sample = full_core();
+    for (spec, cluster) in sample.specs.iter_mut().zip(0..) {
         spec.cluster = Some(ClusterId(cluster));
     }
-    let options = sched_dag::CommitOptions::new(sample.policy, 2)
-        .with_construction(sched_dag::ConstructionPolicy::any_graph())
-        .with_clusters(Clusters::Of(vec![1, 1]));
-    let task_set = sched_dag::verify(&specs, &options).unwrap().task_set;
-    let text = witness(&task_set, &settings((sample.policy, sample.preemption), 2));
+    (sample.cores, sample.clusters) = (2, Clusters::Of(vec![1, 1]));
+    let text = witness(&sample.task_set().unwrap(), &sample.settings());
     let second = text.rfind("machine ").unwrap();
     let (first, second) = text.split_at(second);
     let path = std::env::temp_dir().join(format!("witness-{}", std::process::id()));
@@ -169,9 +165,8 @@ fn behind_unknown() -> Sample {
     Sample {
         specs: vec![spec(100, 100, &[5, 5], &[(0, 1)], 0), unknown],
         policy: Policy::StaticPriority,
-        preemption: Preemption::Enabled,
         cores: 2,
-        clusters: Clusters::Undivided,
+        ..full_core()
     }
 }
 

@@ -334,7 +334,7 @@ fn end_shortly(
     instance: Instance,
 ) -> Vec<Decision> {
     let vertex = scheduler.vertex(instance);
-    match pass_on(scheduler, now_ns, core, vertex).0 {
+    match pass_on(scheduler, now_ns, core, vertex) {
         HandOff::To(next, decision) => {
             assert_eq!(scheduler.vertex(decision.instance()), next);
             vec![decision]

@@ -129,7 +129,7 @@ impl Hand {
         let mut cores = (0..self.scheduler.options().cores).map(CoreId);
         let core = cores.find(|core| self.scheduler.running(*core) == Some(named(whom)));
         let core = core.expect("it runs");
-        let (done, _) = pass_on(&mut self.scheduler, now_ns, core, vertex);
+        let done = pass_on(&mut self.scheduler, now_ns, core, vertex);
         self.done = Some(done);
         match done {
             HandOff::To(_, decision) => Some(decision),

@@ -19,7 +19,7 @@ use sched_dag::journal::{Event, What};
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
     Activation, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, FaultLimit, HandOff,
-    Instance, JobOutcome, Notice, OnFault, OverrunPolicy, Policy, Preemption, Priority, Scheduler,
+    Instance, JobOutcome, OnFault, OverrunPolicy, Policy, Preemption, Priority, Scheduler,
     SchedulerOptions, SubtaskId, SubtaskSpec, TaskSet, Vertex, verify,
 };
 pub(crate) use script::{Run, Script};
@@ -141,36 +141,23 @@ pub(crate) fn scheduler(specs: &[DagSpec], options: SchedulerOptions) -> Schedul
     Scheduler::new(commit(specs, options), options)
 }
 
-/// Ends an instance by the short way, and writes down what that leaves to its driver. If an
-/// instance has become ready so, there is no notice of it: then that is returned.
+/// Ends an instance by the short way, and writes down what that leaves to its driver.
 pub(crate) fn pass_on(
     scheduler: &mut Scheduler,
     now_ns: u64,
     core: CoreId,
     vertex: Vertex,
-) -> (HandOff, Option<Notice>) {
+) -> HandOff {
     let finished = scheduler.instance_of(vertex);
     let (done, is_unwritten) = scheduler.pass_on(now_ns, core, vertex);
-    let log = &mut scheduler.log;
-    let notice = match done {
-        HandOff::To(_, decision) if is_unwritten => {
-            let Instance { dag, job, subtask } = decision.instance();
-            log.on_core(core, What::Finish, now_ns, finished);
-            log.on_core(core, What::Ready, log.now_ns(), decision.instance());
-            let event = Event {
-                time_ns: log.now_ns(),
-                what: What::Ready,
-                core,
-                dag,
-                job,
-                subtask: Some(subtask),
-            };
-            let at_ns = None;
-            Some(Notice { event, at_ns })
-        }
-        _ => None,
-    };
-    (done, notice)
+    if let HandOff::To(_, decision) = done
+        && is_unwritten
+    {
+        let log = &mut scheduler.log;
+        log.on_core(core, What::Finish, now_ns, finished);
+        log.on_core(core, What::Ready, log.now_ns(), decision.instance());
+    }
+    done
 }
 
 pub(crate) fn instance(dag: u32, job: u64, subtask: u32) -> Instance {
