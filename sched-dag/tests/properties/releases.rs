@@ -1,7 +1,7 @@
 //! What the law does not judge, held against the rules: which jobs of a DAG are released, wait, are
 //! skipped or aborted, what is answered to requests and faults, and what is counted.
 //!
-//! The rules are those of overruns, P (pauses), C (closings), S (signals), E1 and E2, D1 and D2.
+//! The rules are those of overruns, P (pauses), C (closings), S (signals), E1 to E3, D1 and D2.
 //! All of it follows from what was asked and from what the scheduler tells of the DAG's jobs; when
 //! a job is complete or has missed its deadline, the law judges.
 
@@ -266,6 +266,12 @@ impl Releases {
 
     fn uncut(&mut self) -> impl Iterator<Item = &mut Job> {
         self.in_flight.iter_mut().filter(|it| !it.is_cut)
+    }
+
+    /// Reports whether a job must not start anything (E3, and as D2 and overruns say).
+    pub(crate) fn is_cut(&self, job: u64) -> bool {
+        let mut in_flight = self.in_flight.iter();
+        in_flight.any(|it| it.number == job && it.is_cut)
     }
 
     /// Cuts a job. Reports whether it was in flight and was not cut.

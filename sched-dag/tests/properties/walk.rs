@@ -242,10 +242,11 @@ impl<'s> Walk<'s> {
                             let is_resumed = matches!(decision, Decision::Resume { .. });
                             (What::Resume, is_free && is_resumed)
                         }
-                        None => (
-                            What::Start,
-                            is_free && matches!(decision, Decision::Start { .. }),
-                        ),
+                        None => {
+                            let is_cut = self.releases[instance.dag.index()].is_cut(instance.job);
+                            let is_started = matches!(decision, Decision::Start { .. });
+                            (What::Start, is_free && is_started && !is_cut)
+                        }
                     }
                 }
             };
