@@ -137,7 +137,7 @@ fn a_late_driver_keeps_the_rules() {
 
 #[test]
 fn every_order_of_events_keeps_the_rules() {
-    check(60, set::draw_tiny, |set, _| {
+    check(40, set::draw_tiny, |set, _| {
         let states = explore::explore(set)?;
         println!("{states} states");
         Ok(())
