@@ -253,6 +253,26 @@ mod tests {
     }
 
     #[test]
+    fn each_cluster_serves_what_concerns_its_own_dags() {
+        let changes = Changes::new(3, true).with_paused(vec![DagId(0), DagId(2)]);
+        let (_, mut parts) = divide(&task_set(), Some(&changes)).expect("there are no modes");
+        let mut served = |cluster: usize, request| {
+            let mut changes = Vec::new();
+            let part = parts[cluster].as_mut().expect("each has one");
+            part.serve(request, &mut changes);
+            changes
+        };
+        use crate::lifecycle::Change::{Close, Pause};
+        assert_eq!(served(0, Request::Begin), [Pause(DagId(0))]);
+        assert_eq!(served(1, Request::Begin), [Pause(DagId(2))]);
+        assert_eq!(
+            served(1, Request::ShutDown),
+            [Close(DagId(1)), Close(DagId(2))]
+        );
+        assert_eq!(served(0, Request::ShutDown), [Close(DagId(0))]);
+    }
+
+    #[test]
     fn modes_of_several_clusters_are_refused() {
         let changes = Changes::new(3, false).with_modes(vec![vec![DagId(0)], vec![DagId(2)]]);
         let why = divide(&task_set(), Some(&changes)).expect_err("DAG 0 is elsewhere");
