@@ -243,13 +243,15 @@ fn a_misspelt_topic_is_reported_from_both_sides_and_makes_no_second_sink() {
 
 #[test]
 fn a_topic_that_would_be_another_fault_or_is_of_another_dag_is_not_suggested() {
-    let other = "park: > sonar > near; near > stop >";
+    let other = "park: > sonar > near; near near1 > stop >";
     for (misspelt, topic) in [
         // `fuse` reads `image` already, and so cannot mean it again.
         (DRIVE.replace("image >", "image image2 >"), "`image2`"),
         // `image` has its writer.
         (DRIVE.replace("> obstacle", "> obstacle imagf"), "`imagf`"),
+        // `near` and `near1` are of another DAG.
         (DRIVE.replace("obstacle >", "obstacle nera >"), "`nera`"),
+        (DRIVE.replace("> obstacle", "> obstacle near2"), "`near2`"),
     ] {
         let text = refused(&[dag(&misspelt), dag(other)]).0.to_string();
         let is_suggested = text.contains("did you mean");

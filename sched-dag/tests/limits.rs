@@ -69,6 +69,23 @@ fn a_signal_is_dropped_if_the_instant_after_its_deadline_is_no_time() {
 }
 
 #[test]
+fn without_a_limit_of_jobs_a_dag_is_not_over_unless_it_waits_for_a_signal() {
+    let endless = || dag(10, 10, 1, &[0], &[]).endless();
+    Hand::new(&[endless()], PREEMPTIVE).must(
+        "0: released 0.0, finished=false
+         5 finish: completed 0.0 Met, finished=false",
+    );
+    // The second signal is kept until 17.
+    Hand::new(&[endless().sporadic()], PREEMPTIVE).must(
+        "0: finished=true
+         7 signal: released 0.0, finished=false
+         9 finish: completed 0.0 Met, finished=true
+         10 signal: finished=false
+         17: released 0.1, finished=false",
+    );
+}
+
+#[test]
 fn numbers_go_on_over_many_skipped_jobs() {
     // One job runs while thousands are skipped; slots are counted by sequence.
     let spec = dag(1, 1_000_000, 3, &[0, 0], &[(0, 1)]).overrunning(3, OverrunPolicy::Skip);

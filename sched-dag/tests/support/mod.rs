@@ -185,20 +185,8 @@ pub(crate) fn number(variable: &str, default: u64) -> u64 {
 
 /// Runs DAGs to the end.
 pub(crate) fn run(specs: &[DagSpec], options: SchedulerOptions, takes: impl Takes) -> Run {
-    run_failing(specs, options, &[], takes)
-}
-
-/// Runs DAGs to the end as [`run`] does, while some instances fail.
-pub(crate) fn run_failing(
-    specs: &[DagSpec],
-    options: SchedulerOptions,
-    failing: &[&str],
-    takes: impl Takes,
-) -> Run {
-    let failing: Vec<Instance> = failing.iter().map(|name| named(name)).collect();
-    let run = Script::new(takes)
-        .failing(move |instance| failing.contains(&instance))
-        .run(VirtualTime::new(scheduler(specs, options)));
+    let driver = VirtualTime::new(scheduler(specs, options));
+    let run = Script::new(takes).run(driver);
     assert!(run.driver.is_finished());
     run
 }
@@ -226,15 +214,6 @@ impl<const SUBTASKS: usize> Takes for [u64; SUBTASKS] {
 impl<const DAGS: usize, const SUBTASKS: usize> Takes for [[u64; SUBTASKS]; DAGS] {
     fn takes_ns(&mut self, instance: Instance) -> u64 {
         self[instance.dag.index()][instance.subtask.index()]
-    }
-}
-
-/// Each DAG's instances as long.
-pub(crate) struct ByDag<const DAGS: usize>(pub(crate) [u64; DAGS]);
-
-impl<const DAGS: usize> Takes for ByDag<DAGS> {
-    fn takes_ns(&mut self, instance: Instance) -> u64 {
-        self.0[instance.dag.index()]
     }
 }
 
