@@ -241,7 +241,7 @@ mod tests {
         assert_eq!(error, "a segment lies outside the file");
     }
 
-    /// Programs and texts are refused by `tests/command_lines.rs`.
+    /// Programs and texts are refused by `tests/commands/files.rs`.
     #[test]
     fn an_image_is_told_from_other_files() {
         let mut image = tiny_image("hello", TinyEnd::Never);

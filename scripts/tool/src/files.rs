@@ -320,7 +320,7 @@ mod tests {
         Named { option, path }
     }
 
-    /// Commands that are refused for it are in `tests/named_files.rs`.
+    /// Commands that are refused for it are in `tests/commands/files.rs`.
     #[test]
     fn one_file_of_two_names_is_found_and_kept() {
         let folder = folder("one-file");

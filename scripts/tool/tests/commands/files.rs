@@ -72,6 +72,7 @@ fn what_is_no_file_or_not_the_right_one_is_2_before_the_work() {
 run --serial file/x | name another
 run --trace none/x | name another
 run --dot file/x | `--dot file/x`: cannot be written: 
+run --dot file/x | name another
 bench join-latency --deterministic --out file/x | name another
 bench hand-off --save-baseline --mode deterministic --baseline none/x | name another
 run --dag /dev/zero | it is a device or a pipe

@@ -263,7 +263,7 @@ mod tests {
         assert!(plan.boots.iter().any(|boot| boot.cores == 2));
     }
 
-    /// Command lines, and what is said of them. More are in `tests/named_files.rs`.
+    /// Command lines, and what is said of them. More are in `tests/commands/files.rs`.
     const REFUSED: &str = "--compare --jobs 5 | the default of `--jobs`
 --compare --mode threads | leave `--mode` out
 --save-baseline --mode threads | `--save-baseline`

@@ -1,4 +1,4 @@
-//! Generated files are read, and broken ones refused. `tests/dag_file_exit_codes.rs` has more of
+//! Generated files are read, and broken ones refused. `tests/commands/dag_files.rs` has more of
 //! these, as a person sees them.
 
 use super::read;

@@ -1,4 +1,4 @@
-//! Published graphs are read, and broken ones refused. `tests/dag_file_exit_codes.rs` has more of
+//! Published graphs are read, and broken ones refused. `tests/commands/dag_files.rs` has more of
 //! these, as a person sees them.
 
 use super::{read, read_graphs};
