@@ -24,12 +24,25 @@ impl Linux {
     /// machine.end_recording(true).expect("the file is written");
     /// ```
     pub fn record(&self, app: &'static str, to: impl Write + Send + 'static) {
+        self.record_as(app, true, to);
+    }
+
+    /// Works like [`record`](Self::record), and takes also a run of which nothing is recorded.
+    pub fn keep(&self, app: &'static str, to: impl Write + Send + 'static) {
+        self.record_as(app, false, to);
+    }
+
+    fn record_as(&self, app: &'static str, is_needed: bool, to: impl Write + Send + 'static) {
         *unpoisoned(&FILE) = Some(File {
             writer: Box::new(to),
             failure: None,
         });
-        let bytes = ROOM_BYTES;
-        edge::get().set_wish(Box::leak(Box::new(Wish::Record { app, bytes })));
+        let wish = Wish::Record {
+            app,
+            bytes: ROOM_BYTES,
+            is_needed,
+        };
+        edge::get().set_wish(Box::leak(Box::new(wish)));
     }
 
     /// Has the run to come replay a recording.

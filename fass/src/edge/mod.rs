@@ -49,6 +49,8 @@ pub enum Wish {
         app: &'static str,
         /// The room for what is not drained yet.
         bytes: usize,
+        /// Whether an app of which no topic is recorded is refused.
+        is_needed: bool,
     },
     /// Replay these bytes.
     Replay(&'static [u8]),
@@ -211,7 +213,7 @@ pub struct Drained {
 /// Begins to do what is wished.
 pub(crate) fn begin(wish: Wish, host: Host) -> Box<dyn Crossing> {
     match wish {
-        Wish::Record { app, bytes } => Box::new(tape::Tape::new(app, bytes)),
+        Wish::Record { app, bytes, .. } => Box::new(tape::Tape::new(app, bytes)),
         Wish::Replay(bytes) => Box::new(machine::OfMachine::new(bytes, host)),
         Wish::Latest { app, jobs } => Box::new(latest::Latest::new(app, jobs)),
         Wish::Echo(other) => Box::new(echo::Echo::new(other.map(|other| begin(*other, host)))),

@@ -125,8 +125,12 @@ impl Edge {
             Some(Wish::Latest { .. } | Wish::Echo(_)) => "latest",
         };
         let is_asked_for = !matches!(self.wish, Some(Wish::Latest { .. }));
+        let is_needed = match self.wish {
+            Some(Wish::Record { is_needed, .. }) => *is_needed,
+            _ => is_asked_for,
+        };
         let launched = match &mut self.crossing {
-            None if !is_asked_for => return Ok(false),
+            None if !is_needed => return Ok(false),
             None => Err(format!(
                 "`{word}`: no topic of the app is recorded; name topics by `Dag::record`"
             )),

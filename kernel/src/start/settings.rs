@@ -46,6 +46,8 @@ pub(crate) struct Settings {
     replay_bytes: u64,
     /// How many KiB of memory a recording may wait in; 0: nothing is recorded.
     record_kib: u64,
+    /// The same, also where no topic is recorded.
+    keep_kib: u64,
     /// Of how many jobs the inputs are kept, where nothing is recorded or replayed.
     latest_jobs: u64,
     /// What else people want to see, and say.
@@ -66,9 +68,16 @@ impl Settings {
             edge::set_wish(Wish::Replay(recording)).map_err(UsageError::new)?;
             module = rest;
         }
-        if self.record_kib > 0 {
-            let bytes = usize::try_from(self.record_kib * 1024).unwrap_or(0);
-            edge::set_wish(Wish::Record { app, bytes }).map_err(UsageError::new)?;
+        let kib = self.record_kib.max(self.keep_kib);
+        if kib > 0 {
+            let bytes = usize::try_from(kib * 1024).unwrap_or(0);
+            let is_needed = self.record_kib > 0;
+            let wish = Wish::Record {
+                app,
+                bytes,
+                is_needed,
+            };
+            edge::set_wish(wish).map_err(UsageError::new)?;
         } else if self.replay_bytes == 0 && self.latest_jobs > 0 {
             let jobs = u32::try_from(self.latest_jobs).unwrap_or(0);
             edge::set_wish(Wish::Latest { app, jobs }).map_err(UsageError::new)?;
@@ -124,16 +133,18 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
     let (console, stops) = options.choice("console", &consoles)?;
     let replay_bytes = options.number("replay", 0..=1 << 32, 0)?;
     let record_kib = options.number("record", 0..=1 << 20, 0)?;
+    let keep_kib = options.number("keep", 0..=1 << 20, 0)?;
     let latest_jobs = options.number("latest", 0..=64, 16)?;
-    if replay_bytes > 0 && record_kib > 0 {
+    if replay_bytes > 0 && record_kib.max(keep_kib) > 0 {
         return Err(UsageError::new(
-            "`record` and `replay` exclude each other; give one",
+            "`record` and `keep` exclude `replay`; give one",
         ));
     }
     Ok(Settings {
         terms,
         replay_bytes,
         record_kib,
+        keep_kib,
         latest_jobs,
         wishes: Wishes {
             console,

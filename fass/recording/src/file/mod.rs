@@ -10,7 +10,8 @@
 //! frame's end, by the missing frame of the end. There are two kinds of ends: of a recording
 //! that says of everything what became of it, if only that it is lost, and of one that says
 //! nothing of what came after its last entry. [`mended`](read::mended) gives the second one to
-//! what a run that died has left.
+//! what a run that died has left. Between entries there may be text: what else is known of the
+//! run, in lines.
 
 use core::ops::RangeInclusive;
 
@@ -27,8 +28,8 @@ pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 
 /// The version of the format that is written, of values included. Those before are read, too: the
 /// first has no entries of [`What::Clock`](crate::What::Clock), and neither of
-/// [`What::Fault`](crate::What::Fault).
-pub const VERSION: u16 = 3;
+/// [`What::Fault`](crate::What::Fault); those before 4 have no text.
+pub const VERSION: u16 = 4;
 
 /// The versions that are read.
 const READ: RangeInclusive<u16> = 1..=VERSION;
@@ -38,3 +39,4 @@ const HEADER: u8 = 1;
 const ENTRY: u8 = 2;
 const END: u8 = 3;
 const CUT: u8 = 4;
+const TEXT: u8 = 5;

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use super::entry::{Entry, What};
 use super::header::{Channel, Header};
 use super::stream::Stream;
-use super::{CUT, END, ENTRY, HEADER, MAGIC, READ};
+use super::{CUT, END, ENTRY, HEADER, MAGIC, READ, TEXT};
 use crate::value::crc::Crc;
 use crate::value::decode::{Decoder, Malformed};
 use crate::value::recordable::Recordable;
@@ -114,6 +114,16 @@ impl<'b> Recording<'b> {
     pub fn entries(&self) -> Entries<'b> {
         Entries(Decoder::new(&self.bytes[self.first..]))
     }
+
+    /// Returns the texts.
+    ///
+    /// See [`Stream::text`].
+    pub fn texts(&self) -> impl Iterator<Item = &'b str> + use<'b> {
+        let mut input = Decoder::new(&self.bytes[self.first..]);
+        let frames = core::iter::from_fn(move || frame(&mut input).ok());
+        let texts = frames.filter(|frame| frame.kind == TEXT);
+        texts.filter_map(|frame| core::str::from_utf8(frame.payload).ok())
+    }
 }
 
 impl Progress {
@@ -136,7 +146,7 @@ impl Progress {
             return Err(Decoder::new(bytes).expected(mark));
         }
         let malformed =
-            input.expected("version 1 to 3 of recordings, which are those that are read");
+            input.expected("version 1 to 4 of recordings, which are those that are read");
         if !READ.contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
             return Err(malformed);
         }
@@ -167,6 +177,12 @@ impl Progress {
                     self.lost += u64::from(entry.what == What::Lost);
                     (self.last, self.crc) = (input.offset(), crc);
                 }
+                TEXT => {
+                    if core::str::from_utf8(frame.payload).is_err() {
+                        return Err(frame.expected("a text of UTF-8"));
+                    }
+                    (self.last, self.crc) = (input.offset(), crc);
+                }
                 END | CUT => {
                     let said = <(u64, u64)>::from_bytes(frame.payload).map_err(inside)?;
                     if said != (self.count, self.lost) {
@@ -180,7 +196,11 @@ impl Progress {
                     }
                     return Ok(frame.kind == CUT);
                 }
-                _ => return Err(frame.expected("an entry, frame kind 2, or an end, 3 or 4")),
+                _ => {
+                    return Err(
+                        frame.expected("an entry or a text, frame kind 2 or 5, or an end, 3 or 4")
+                    );
+                }
             }
         }
     }
@@ -220,11 +240,14 @@ impl<'b> Iterator for Entries<'b> {
     type Item = Entry<'b>;
 
     fn next(&mut self) -> Option<Entry<'b>> {
-        // Whatever could be wrong was found when the recording was read.
-        let frame = frame(&mut self.0).ok()?;
-        match frame.kind {
-            ENTRY => Entry::decode(frame.payload).ok(),
-            _ => None,
+        loop {
+            // Whatever could be wrong was found when the recording was read.
+            let frame = frame(&mut self.0).ok()?;
+            match frame.kind {
+                ENTRY => return Entry::decode(frame.payload).ok(),
+                TEXT => {}
+                _ => return None,
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::entry::{Entry, What};
 use super::header::Header;
-use super::{CUT, END, ENTRY, HEADER, MAGIC, VERSION};
+use super::{CUT, END, ENTRY, HEADER, MAGIC, TEXT, VERSION};
 use crate::value::crc::Crc;
 use crate::value::encode::Encoder;
 use crate::value::recordable::to_bytes;
@@ -73,6 +73,26 @@ impl Stream {
         self.put(&head, send);
         self.put(value, send);
         send(&self.crc.value().to_le_bytes());
+    }
+
+    /// Adds a text.
+    ///
+    /// # Panics
+    ///
+    /// If it has 4 GiB or more.
+    ///
+    /// ```
+    /// use recording::{Header, Recording, Stream};
+    ///
+    /// let mut file = Vec::new();
+    /// let mut send = |bytes: &[u8]| file.extend_from_slice(bytes);
+    /// let mut stream = Stream::begin(&Header::default(), &mut send);
+    /// stream.text("{}\n", &mut send);
+    /// stream.end(&mut send);
+    /// assert!(Recording::read(&file).unwrap().texts().eq(["{}\n"]));
+    /// ```
+    pub fn text(&mut self, text: &str, send: &mut dyn FnMut(&[u8])) {
+        self.whole(TEXT, text.as_bytes(), send);
     }
 
     /// Returns the number of entries so far.

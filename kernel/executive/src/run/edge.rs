@@ -30,14 +30,16 @@ pub fn get() -> SpinLockGuard<'static, Edge> {
 /// Takes what the command line says.
 pub fn set_wish(wish: Wish) -> Result<(), &'static str> {
     match wish {
-        Wish::Record { .. } if !debug_port::is_there() => {
+        Wish::Record {
+            is_needed: true, ..
+        } if !debug_port::is_there() => {
             return Err(
                 "`record`: there is no debug port at 0x402 to send it to; run it in QEMU, by \
                  `./scripts/run --record FILE`",
             );
         }
-        // Nobody has asked for it.
-        Wish::Latest { .. } if !debug_port::is_there() => return Ok(()),
+        // Nobody has asked for it, or for more than there is.
+        Wish::Latest { .. } | Wish::Record { .. } if !debug_port::is_there() => return Ok(()),
         _ => {}
     }
     EDGE.lock().set_wish(Box::leak(Box::new(wish)));

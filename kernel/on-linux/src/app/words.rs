@@ -91,15 +91,20 @@ pub(crate) fn apply(
     if let Some(wcets) = wcets {
         machine = machine.wcets(wcets);
     }
-    match (options.text("record"), options.text("replay")) {
+    let named = ["record", "keep"].map(|word| options.text(word).map(|path| (word, path)));
+    let [recorded, kept] = named;
+    match (recorded.or(kept), options.text("replay")) {
         (Some(_), Some(_)) => {
-            let line = "`record` and `replay` exclude each other; give one";
+            let line = "`record` and `keep` exclude `replay`; give one";
             return Err(UsageError::new(line));
         }
-        (Some(path), None) => {
+        (Some((word, path)), None) => {
             let file = File::create(path);
-            let file = file.map_err(|why| UsageError::new(format!("`record={path}`: {why}")))?;
-            machine.record(app, BufWriter::new(file));
+            let file = file.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
+            match recorded {
+                Some(_) => machine.record(app, BufWriter::new(file)),
+                None => machine.keep(app, BufWriter::new(file)),
+            }
         }
         (None, Some(path)) => machine.replay(read("replay", path)?),
         (None, None) => {}

@@ -20,8 +20,14 @@ use std::process::{self, ExitCode};
 
 use recording::Recording;
 
+use crate::dot;
 use crate::files::{self, Named};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::proof::{commits, observed, wcets, witness};
+use crate::protocol::Transcript;
+
+/// The options that want something of the lines of a run that was kept.
+const OF_LINES: [&str; 3] = ["dot", "witness", "observe"];
 
 /// The table of `recording`.
 pub static RECORDING: Command = Command {
@@ -36,6 +42,13 @@ pub static RECORDING: Command = Command {
         "csv": Takes::File("DIR");
         /// Write an MCAP file, with messages in JSON, for Foxglove and others.
         "mcap": Takes::File("FILE");
+        /// Of a run that was kept (`./scripts/run --keep FILE`): write the committed DAGs to this
+        /// file, for Graphviz.
+        "dot": Takes::File("FILE");
+        /// Of such a run: write what proves the commit's bounds.
+        "witness": Takes::File("FILE");
+        /// Of such a run: write what calls took, as WCETs with a margin of 20 %.
+        "observe": Takes::File("FILE");
         /// Show all that is recorded of a job. (What its subtasks compute of it is shown by the
         /// app's own replay.)
         "until": Takes::Text("DAG/JOB");
@@ -85,6 +98,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     }
     let bytes = read(file).map_err(Refusal::Usage)?;
     let recording = parse(file, &bytes).map_err(Refusal::Usage)?;
+    of_lines(&recording, options).map_err(Refusal::Usage)?;
     match options.text("until") {
         Some(job) => print!("{}", until::of(&recording, job).map_err(Refusal::Usage)?),
         None => print!("{}", summary::of(&recording)),
@@ -107,6 +121,34 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     Ok(())
 }
 
+/// Writes what the options want of the machine lines of a run that was kept.
+fn of_lines(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
+    let Some(name) = options.given_of(&OF_LINES) else {
+        return Ok(());
+    };
+    let lines: String = recording.texts().collect();
+    if lines.is_empty() {
+        let line = "it has values alone; `./scripts/run --keep FILE` keeps all of a run";
+        return Err(format!("`--{name}`: {line}"));
+    }
+    let transcript = Transcript::read(&lines);
+    if let Some(path) = options.path("dot") {
+        files::write_named("dot", path, dot::text(&transcript)?)?;
+        println!("{}", files::place(path));
+    }
+    if let Some(path) = options.path("witness") {
+        println!("{}", witness::write(path, &commits::read(&transcript)?)?);
+    }
+    if let Some(path) = options.path("observe") {
+        let mut observed = Vec::new();
+        observed::add(&mut observed, &transcript)?;
+        let text = wcets::text(&observed, wcets::MARGIN_PERCENT);
+        files::write_named("observe", path, text)?;
+        println!("{}", files::place(path));
+    }
+    Ok(())
+}
+
 /// Makes sure of the options and of all files, before any is opened.
 fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
     let of_tables = ["out", "dag", "topic"];
@@ -114,7 +156,8 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
         if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(name)) {
             return Err(format!("`--from-csv` needs `--{name}`; give it, too"));
         }
-        if let Some(name) = options.given_of(&["csv", "mcap", "until"]) {
+        let views = options.given_of(&["csv", "mcap", "until"]);
+        if let Some(name) = views.or(options.given_of(&OF_LINES)) {
             let line = "`--from-csv` exclude each other; convert what it has written";
             return Err(format!("`--{name}` and {line}"));
         }
@@ -124,7 +167,10 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
     {
         return Err(format!("`--{name}` needs `--from-csv`; give it, too"));
     }
-    files::check(&[input], &options.named(&["out", "mcap"]))?;
+    files::check(
+        &[input],
+        &options.named(&["out", "mcap", "dot", "witness", "observe"]),
+    )?;
     (options.named(&["csv"]).iter()).try_for_each(files::check_folder)
 }
 

@@ -53,6 +53,10 @@ pub(super) fn of(recording: &Recording<'_>) -> String {
             let _ = writeln!(text, "  {count} times {}", what.name());
         }
     }
+    let lines = recording.texts().flat_map(str::lines).count();
+    if lines > 0 {
+        let _ = writeln!(text, "  {lines} machine lines of the run");
+    }
     let _ = match recording.lost() {
         _ if recording.is_cut() => writeln!(
             text,

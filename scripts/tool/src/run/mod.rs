@@ -15,6 +15,7 @@ mod each;
 mod folder;
 mod gdb;
 mod handed;
+mod kept;
 mod loading;
 mod log;
 mod on_linux;
@@ -113,7 +114,7 @@ fn check_files(options: &Parsed) -> Result<(), Refusal> {
     let mut inputs = options.named(&names);
     inputs.extend(wire::input(options));
     let outputs = [
-        "serial", "trace", "record", "dot", "witness", "observe", "output",
+        "serial", "trace", "record", "keep", "dot", "witness", "observe", "output",
     ];
     let outputs = options.named(&outputs);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
@@ -146,7 +147,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
         qemu.guest_words += &handed.guest_words();
         qemu.guest_words += &parameters;
-        qemu.guest_words += recorded.guest_word();
+        qemu.guest_words += &recorded.guest_word();
         qemu.records = recorded.raw();
         qemu.module = handed.module();
         qemu
@@ -233,9 +234,8 @@ fn describe(
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
-    words.extend(options.is_given("trace").then(|| "trace=dump".into()));
     words.extend(seeing::guest_words(options));
-    words.extend(prove::guest_words(options));
+    words.extend(seeing::dumps(options));
     words.extend(options.text("append").map(String::from));
     Qemu {
         program: program.into(),

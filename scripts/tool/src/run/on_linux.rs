@@ -6,7 +6,7 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use super::{Booted, limit, prove, seeing, table, wire, written};
+use super::{Booted, limit, seeing, table, wire, written};
 use crate::dag_file::Prepared;
 use crate::debian::{Guest, Order};
 use crate::image;
@@ -23,7 +23,7 @@ use super::screen::Screen;
 const FOREIGN: [&str; 6] = ["boot", "gdb", "latest", "machine", "memory", "qemu"];
 
 /// Those of the rest that a guest has no way for, and those that only a guest has.
-const NOT_IN_GUEST: [&str; 5] = ["console", "input", "output", "record", "replay"];
+const NOT_IN_GUEST: [&str; 6] = ["console", "input", "keep", "output", "record", "replay"];
 const ONLY_IN_GUEST: [&str; 2] = ["mode", "busy"];
 
 /// How much longer a guest may take: Linux has to start.
@@ -97,11 +97,11 @@ pub(super) fn run_app(
     let mut words = words(options, dags);
     words.extend(handed.guest_words().split_whitespace().map(OsString::from));
     let recorded = Recorded::new(options, app)?;
-    let raw = recorded.raw().filter(|_| options.is_given("record"));
+    let raw = recorded.raw().filter(|_| recorded.word().is_some());
     let replayed = options.path("replay").map(Path::to_path_buf);
     for (name, path) in [
         ("module=", handed.module()),
-        ("record=", raw),
+        (&*format!("{}=", recorded.word().unwrap_or_default()), raw),
         ("replay=", replayed),
     ] {
         if let Some(path) = path {
@@ -214,9 +214,7 @@ fn words(options: &Parsed, dags: Option<&Prepared>) -> Vec<OsString> {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
-    words.extend(options.is_given("trace").then(|| "trace=dump".into()));
-    words.extend(seeing::graph_word(options));
-    words.extend(prove::guest_words(options));
+    words.extend(seeing::dumps(options));
     words.extend(options.is_given("console").then(|| "console=on".into()));
     words.extend(wire::is_live(options).then(|| "input=-".into()));
     words.extend(options.text("output").map(|path| format!("output={path}")));

@@ -215,14 +215,14 @@ fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
     }
 }
 
-/// Returns the words for the guest, and nothing if nobody asks. A run that only observes judges no
+/// Returns the word for statistics, if they are asked for. A run that only observes judges no
 /// bound: what its WCETs and overheads should be is what it is to show.
-pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
-    match (options.is_given("prove"), options.is_given("observe")) {
-        (true, _) => vec!["times=dump".into()],
-        (false, true) => vec!["times=observe".into()],
-        (false, false) => Vec::new(),
+pub(super) fn times_word(options: &Parsed) -> Option<String> {
+    if options.is_given("observe") && !options.is_given("prove") {
+        return Some("times=observe".into());
     }
+    let is_wanted = options.given_of(&["prove", "keep"]).is_some();
+    is_wanted.then(|| "times=dump".into())
 }
 
 /// Says what a guest has refused of a file of WCETs, by its name and line.

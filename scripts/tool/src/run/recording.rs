@@ -19,8 +19,8 @@ use crate::system;
 pub(super) struct Recorded {
     raw: Temporary,
     app: String,
-    /// Whether the person wants all of the run.
-    is_named: bool,
+    /// The word that asks for all of the run, if the person wants that.
+    word: Option<&'static str>,
 }
 
 impl Recorded {
@@ -32,7 +32,7 @@ impl Recorded {
         Ok(Recorded {
             raw: Temporary(path),
             app: app.into(),
-            is_named: options.is_given("record"),
+            word: options.given_of(&["record", "keep"]).filter(|_| is_wanted),
         })
     }
 
@@ -40,12 +40,18 @@ impl Recorded {
         self.raw.0.clone()
     }
 
-    /// Returns the word that asks for it, after a blank: how many KiB may wait in the guest.
-    pub(super) const fn guest_word(&self) -> &'static str {
-        match self.is_named {
-            true => " record=1024",
-            false => "",
-        }
+    pub(super) fn app(&self) -> &str {
+        &self.app
+    }
+
+    pub(super) const fn word(&self) -> Option<&'static str> {
+        self.word
+    }
+
+    /// Returns the word with its value, after a blank: how many KiB may wait in the guest.
+    pub(super) fn guest_word(&self) -> String {
+        let with_room = |word| format!(" {word}=1024");
+        self.word.map_or_else(String::new, with_room)
     }
 
     /// Writes the file that the person has named, and returns what to say of it. What a run has
@@ -59,7 +65,10 @@ impl Recorded {
             return Ok(None);
         };
         let Some(path) = options.path("record") else {
-            return self.write_crash(raw);
+            return match self.word {
+                None => self.write_crash(raw),
+                Some(_) => Ok(None),
+            };
         };
         if outcome.ending == Ending::Guest(Status::Usage) {
             return Ok(None);

@@ -36,16 +36,17 @@ pub(super) struct Screen {
 
 impl Screen {
     pub(super) fn new(options: &Parsed, image: &Path) -> Screen {
+        let is_kept = options.is_given("keep");
         Screen {
             people: !options.is_given("json"),
             machine: !options.is_given("plain")
                 && (options.is_given("json") || !options.is_given("console")),
             quiet: options.is_given("quiet"),
             // A person who wants these in a file does not want megabytes of them here.
-            traces: !options.is_given("trace") && !super::prove::is_asked_for(options),
+            traces: !is_kept && !options.is_given("trace") && !super::prove::is_asked_for(options),
             // Nor does one who wants something made of them.
-            graphs: super::seeing::graph_word(options).is_none(),
-            times: !super::prove::is_asked_for(options),
+            graphs: !super::seeing::needs_graphs(options),
+            times: !is_kept && !super::prove::is_asked_for(options),
             on_terminal: system::stderr_moves(),
             bar_is_shown: false,
             status: StatusLine::default(),

@@ -12,7 +12,7 @@ use std::process::ChildStdin;
 use std::thread;
 use std::time::Duration;
 
-use super::wire;
+use super::{prove, wire};
 use crate::dot;
 use crate::files;
 use crate::options::Parsed;
@@ -29,7 +29,6 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
         words.extend(can_stop(options).then(|| "console=stop".into()));
         words.extend(is_watched(options).then(|| "status=1".into()));
     }
-    words.extend(graph_word(options));
     words
 }
 
@@ -42,11 +41,21 @@ pub(super) fn can_stop(options: &Parsed) -> bool {
     !wire::is_live(options) && !says_otherwise
 }
 
-/// Returns the word by which commits print their DAGs, if the options ask for what needs them.
-pub(super) fn graph_word(options: &Parsed) -> Option<String> {
-    let of_graphs = ["dot", "trace", "witness", "observe", "prove"];
-    let is_wanted = options.given_of(&of_graphs).is_some();
-    is_wanted.then(|| "graph=dump".into())
+/// Returns the words by which runs print what the options need: commits their DAGs, and runs
+/// their trace and the statistics of all jobs.
+pub(super) fn dumps(options: &Parsed) -> Vec<String> {
+    let mut words = Vec::new();
+    words.extend(needs_graphs(options).then(|| "graph=dump".into()));
+    let traces = options.given_of(&["trace", "keep"]);
+    words.extend(traces.map(|_| "trace=dump".into()));
+    words.extend(prove::times_word(options));
+    words
+}
+
+/// Reports whether the options ask for what needs the committed DAGs.
+pub(super) fn needs_graphs(options: &Parsed) -> bool {
+    let names = ["dot", "trace", "keep", "witness", "observe", "prove"];
+    options.given_of(&names).is_some()
 }
 
 /// Reports whether a person watches, and does not talk meanwhile.

@@ -78,7 +78,10 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// Write what crosses the edge of the run to this file: the values of the topics that the
         /// app records, see docs/recordings.md.
         "record": Takes::File("FILE");
-        /// Without --record and --replay: of how many jobs of each DAG the inputs are kept, for a
+        /// Keep all of the run in one file: its machine lines, with graphs, bounds, trace and
+        /// statistics, which are not shown, and what crosses its edge; docs/recordings.md.
+        "keep": Takes::File("FILE");
+        /// Without --record, --keep and --replay: of how many jobs of each DAG the inputs are kept, for a
         /// file that shows a crash; 0: of none; the default is 16.
         "latest": Takes::number(0..=64);
         /// Take the values of sources from this recording, compare the others with it, and fail

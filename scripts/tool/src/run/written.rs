@@ -3,7 +3,7 @@
 use super::log::Log;
 use super::recording::Recorded;
 use super::screen::Screen;
-use super::{Booted, seeing, wire};
+use super::{Booted, kept, seeing, wire};
 use crate::files;
 use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
@@ -23,8 +23,9 @@ pub(super) fn write(
              `./scripts/trace {file} -o {file}.json` draws it"
         ));
     }
-    if let Some(line) = recorded.write(options, &outcome)? {
-        screen.say(&line);
+    let kept = kept::write(options, recorded.raw().as_deref(), recorded.app(), &outcome)?;
+    for line in recorded.write(options, &outcome)?.iter().chain(&kept) {
+        screen.say(line);
     }
     let written = [
         seeing::write_dot(options, &outcome),

@@ -12,6 +12,7 @@ use super::model::Run;
 use super::{bound, chains, check, read, report};
 use crate::files;
 use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::protocol;
 
 /// The table of `check-trace`.
 pub static CHECK_TRACE: Command = Command {
@@ -91,8 +92,7 @@ fn judge_all(options: &Parsed) -> Result<usize, String> {
 pub(super) fn read_file(path: &Path) -> Result<Vec<Run>, String> {
     let file = files::place(path);
     let bytes = files::read(path).map_err(|why| format!("{file}: {why}; name another file"))?;
-    // A person's line may be damaged; a machine line then is found to be.
-    let text = String::from_utf8_lossy(&bytes);
+    let text = protocol::lines(&bytes).map_err(|why| format!("{file}: {why}"))?;
     let runs = read(&text).map_err(|fault| format!("{file}:{}: {}", fault.line, fault.reason))?;
     let last = text.lines().count().max(1);
     match runs.first() {

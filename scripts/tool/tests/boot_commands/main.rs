@@ -6,6 +6,7 @@ mod crash;
 mod debugger;
 mod ends_in_order;
 mod images;
+mod keeps;
 mod prove;
 #[path = "../support/mod.rs"]
 mod support;

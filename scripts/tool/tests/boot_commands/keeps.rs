@@ -1,0 +1,72 @@
+//! All of a run in one file, which every command reads.
+
+use std::fs;
+use std::path::Path;
+
+use recording::Recording;
+
+use crate::support::{assert_refused, folder, succeed};
+
+const RUN: &str = "run --app autoware --cores 4 --mode deterministic --jobs 5";
+
+fn read(folder: &Path, file: &str) -> Vec<u8> {
+    fs::read(folder.join(file)).expect(file)
+}
+
+#[test]
+fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
+    let folder = folder("kept");
+    let said = succeed(&folder, &format!("{RUN} --keep run.kept"));
+    assert!(!said.contains("\"kind\":\"trace"), "{said}");
+    succeed(&folder, "check-trace run.kept");
+    succeed(&folder, "trace run.kept --out drawn.json");
+    let shown = succeed(
+        &folder,
+        "recording run.kept --dot dags --witness proof --observe wcets --csv tables",
+    );
+    assert!(
+        shown.contains(" machine lines of the run\ncomplete\n"),
+        "{shown}"
+    );
+    assert!(read(&folder, "wcets").starts_with(b"# WCETs that were observed"));
+    let replayed = succeed(&folder, &format!("{RUN} --policy edf --replay run.kept"));
+    assert!(replayed.contains("\"uncompared\":0"), "{replayed}");
+
+    // What is made of it is what the options of a run write.
+    let line = "--record values --dot dags.own --witness proof.own";
+    succeed(&folder, &format!("{RUN} {line}"));
+    for file in ["dags", "proof"] {
+        let own = read(&folder, &format!("{file}.own"));
+        assert_eq!(read(&folder, file), own, "{file}");
+    }
+    let (kept, values) = (read(&folder, "run.kept"), read(&folder, "values"));
+    let [kept, values] = [&kept, &values].map(|bytes| Recording::read(bytes).expect("whole"));
+    assert_eq!(kept.header(), values.header());
+    assert!(kept.count() > 0 && values.texts().next().is_none());
+
+    let bytes = read(&folder, "run.kept");
+    fs::write(folder.join("cut"), &bytes[..bytes.len() - 1]).expect("our folder takes a file");
+    assert_refused(
+        &folder,
+        "check-trace cut | cut: at byte
+recording cut | cut: at byte
+recording values --dot dags | `--dot`: it has values alone; `./scripts/run --keep FILE` keeps
+check-trace values | values:1: the file ends without a trace
+run --on debian --keep x | `--keep` is not for `--on debian`; leave it out",
+    );
+}
+
+#[test]
+fn a_run_on_linux_of_which_no_topic_is_recorded_is_kept_too() {
+    let folder = folder("kept-on-linux");
+    let line = "run --on linux --app fork-join --cores 1 --jobs 3 --subtasks 2 --keep run.kept";
+    succeed(&folder, line);
+    let bytes = read(&folder, "run.kept");
+    let kept = Recording::read(&bytes).expect("it is whole");
+    assert_eq!((kept.count(), kept.header().app.as_str()), (0, "fork-join"));
+    let lines: String = kept.texts().collect();
+    for kind in ["boot", "graph", "trace_end", "times_dag", "verdict"] {
+        let line = format!("{{\"kind\":\"{kind}\"");
+        assert!(lines.contains(&line), "{kind}: {lines}");
+    }
+}
