@@ -2,7 +2,7 @@
 
 use harness::{Guest, Members, Said};
 use sched_dag::chains::Chain;
-use tool::trace::figures::Distribution;
+use sched_dag::law::Distribution;
 
 #[test]
 fn the_hot_path_keeps_its_bounds() {
@@ -49,10 +49,10 @@ fn its_trace_tells_the_ages_that_its_values_tell() {
     let reaction_ns = times.reaction_ns.iter().max().copied().expect("some");
     assert!(chain.reaction_bound_ns(&run.task_set, bounds_ns) > Ok(reaction_ns));
     // All jobs of the vehicle but the first, which finds nothing.
-    let ages = Distribution::of(times.output_age_ns);
-    assert_eq!(ages.count, 39);
+    let ages = Distribution::new(times.output_age_ns);
+    assert_eq!(ages.count(), 39);
     line.has([
-        ("to_vehicle_ns.max", ages.max_ns),
-        ("to_vehicle_ns.median", ages.median_ns),
+        ("to_vehicle_ns.max", ages.max()),
+        ("to_vehicle_ns.median", ages.median()),
     ]);
 }

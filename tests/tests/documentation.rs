@@ -29,7 +29,7 @@ const FILES: [&str; 12] = [
     "kernel/front/src/text/console/mod.rs",
     "kernel/src/app/event.rs",
     "kernel/src/app/lock.rs",
-    "kernel/front/src/report/distribution.rs",
+    "sched-dag/src/law/distribution.rs",
     "kernel/front/src/report/time.rs",
 ];
 

@@ -69,7 +69,7 @@ impl Report {
                     .number("deadline_misses", dag.statistics.misses)
                     .number("skips", dag.statistics.skips)
                     .number("aborts", dag.statistics.aborts)
-                    .object("response_time_ns", |object| dag.responses.describe(object));
+                    .distribution("response_time_ns", &dag.responses);
                 match &dag.answer {
                     Verdict::Proven { test, .. } => {
                         line.number("bound_ns", dag.bound_ns().unwrap_or(0))
@@ -90,7 +90,7 @@ impl Report {
                         .text("sink", &sink.answer.sink.name)
                         .number("relative_deadline_ns", sink.relative_deadline_ns())
                         .number("deadline_misses", sink.misses)
-                        .object("response_time_ns", |object| sink.responses.describe(object));
+                        .distribution("response_time_ns", &sink.responses);
                     if let Some(bound_ns) = sink.bound_ns() {
                         line.number("bound_ns", bound_ns);
                     }
@@ -211,7 +211,7 @@ fn responses(dag: DagId, run: &Run) -> Distribution {
     if run.record().first_job(dag) > 0
         && let Some(times) = run.times()
     {
-        return Distribution::counted(times.dag(dag).response_time.clone());
+        return times.dag(dag).response_time.distribution();
     }
     Distribution::new(run.response_times_ns(dag))
 }
@@ -237,7 +237,7 @@ fn sink_responses(dag: DagId, subtask: SubtaskId, run: &Run) -> Distribution {
         && let Some(times) = run.times()
         && let Some(response_time) = &times.subtask(vertex(0)).response_time
     {
-        return Distribution::counted(response_time.clone());
+        return response_time.distribution();
     }
     let jobs = run.record().numbered(dag);
     Distribution::new(jobs.filter_map(|(job, times)| {

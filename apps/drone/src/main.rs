@@ -68,14 +68,13 @@ fn report(run: &Run, flight: &Flight) -> Result<(), Ending> {
             counts.skips
         );
         for (subtask, vertex) in dag.subtasks().iter().zip(&mut vertices) {
-            let observed = run
-                .times()
-                .map(|times| times.subtask(vertex).execution_time.max());
+            let times = run.times();
+            let observed = times.map(|times| times.subtask(vertex).execution_time.distribution());
             println!(
                 "    {:<12} WCET {:>10}, observed {:>12}",
                 subtask.name(),
                 Ns(subtask.wcet_ns().unwrap_or(0)),
-                Ns(observed.unwrap_or(0))
+                Ns(observed.unwrap_or_default().max())
             );
         }
     }

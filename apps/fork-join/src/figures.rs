@@ -81,18 +81,10 @@ impl Figures {
                 .number("jobs", self.jobs)
                 .number("joins", self.joins)
                 .number("violations", self.violations)
-                .object("join_latency_ns", |object| {
-                    self.join_latency.describe(object)
-                })
-                .object("join_to_start_ns", |object| {
-                    self.join_to_start.describe(object)
-                })
-                .object("response_time_ns", |object| {
-                    self.response_time.describe(object)
-                })
-                .object("release_jitter_ns", |object| {
-                    self.release_jitter.describe(object)
-                })
+                .distribution("join_latency_ns", &self.join_latency)
+                .distribution("join_to_start_ns", &self.join_to_start)
+                .distribution("response_time_ns", &self.response_time)
+                .distribution("release_jitter_ns", &self.release_jitter)
                 .number("deadline_misses", self.deadline_misses)
                 .number("allocations", self.allocations)
                 .number("first_release_ns", self.first_release_ns);

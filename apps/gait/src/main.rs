@@ -56,12 +56,12 @@ fn report(run: &Run, walk: &Walk) -> Result<(), Ending> {
         .zip((0..).map(Vertex))
     {
         let times = run.times();
-        let observed = times.map_or(0, |times| times.subtask(vertex).execution_time.max());
+        let observed = times.map(|times| times.subtask(vertex).execution_time.distribution());
         let wcet = Ns(subtask.wcet_ns().unwrap_or(0));
         println!(
             "  {:<6} WCET {wcet}, observed {}",
             subtask.name(),
-            Ns(observed)
+            Ns(observed.unwrap_or_default().max())
         );
     }
     let violations = run.violations().count() as u64;

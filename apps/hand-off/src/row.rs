@@ -40,8 +40,8 @@ impl Row {
             line.text("workload", &self.workload)
                 .text("figure", self.figure)
                 .number("per", self.per)
-                .number("samples", self.samples.count() as u64)
-                .object("value", |object| self.samples.describe(object));
+                .number("samples", self.samples.count())
+                .distribution("value", &self.samples);
         });
     }
 }

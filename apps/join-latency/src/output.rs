@@ -105,8 +105,8 @@ pub(crate) fn emit_summary(name: &str, outcome: &Outcome) {
             .number("lost_inputs", samples.lost_inputs)
             .number("violations", outcome.violations)
             .number("allocations", outcome.allocations)
-            .object("join_latency_ns", |object| literal.describe(object))
-            .object("cover_delay_ns", |object| cover.describe(object));
+            .distribution("join_latency_ns", &literal)
+            .distribution("cover_delay_ns", &cover);
     });
 }
 

@@ -189,7 +189,8 @@ impl Run {
     /// /// The response time that one job in a thousand of a DAG exceeds.
     /// fn tail_ns(run: &sched_dag::engine::Run, dag: &str) -> Option<u64> {
     ///     let dag = run.task_set().find(dag);
-    ///     Some(run.times()?.dag(dag).response_time.per_mille(999))
+    ///     let response_time = &run.times()?.dag(dag).response_time;
+    ///     Some(response_time.distribution().per_mille(999))
     /// }
     /// ```
     #[must_use]

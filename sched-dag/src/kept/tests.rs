@@ -86,7 +86,7 @@ fn statistics_are_those_of_all_jobs() {
     let statistics = journal
         .statistics(&task_set(1, Some(JOBS)))
         .expect("all were counted");
-    let responses = &statistics.dag(DagId(0)).response_time;
+    let responses = statistics.dag(DagId(0)).response_time.distribution();
     assert_eq!(
         (responses.count(), responses.min(), responses.max()),
         (JOBS, 4, 6)
@@ -99,7 +99,7 @@ fn statistics_are_those_of_all_jobs() {
     run_all(&mut large, 0..JOBS);
     assert_eq!(large.lost(), 0);
     let all = large.statistics(&task_set).expect("all are there");
-    let all = &all.dag(DagId(0)).response_time;
+    let all = all.dag(DagId(0)).response_time.distribution();
     assert_eq!((all.count(), all.per_mille(500)), (JOBS, 5));
 }
 
@@ -177,7 +177,7 @@ fn statistics_are_those_of_both_whichever_has_lost_events() {
         assert_eq!(journal.lost(), small * 80, "{free_bytes:?}");
         let statistics = journal.statistics(&task_set).expect("all were counted");
         for (dag, response_ns) in [(0, 3), (1, 4)] {
-            let times = &statistics.dag(DagId(dag)).response_time;
+            let times = statistics.dag(DagId(dag)).response_time.distribution();
             let found = (times.count(), times.max());
             assert_eq!(found, (20, response_ns), "{free_bytes:?}");
         }

@@ -10,6 +10,8 @@
 use alloc::boxed::Box;
 use alloc::vec;
 
+use super::Distribution;
+
 /// From this power of two on, values are not told apart.
 const LAST_BIT: u32 = 40;
 
@@ -20,6 +22,7 @@ const LAST_BIT: u32 = 40;
 ///
 /// let mut times = Histogram::new(5);
 /// (1..=1000).for_each(|time| times.add(time));
+/// let times = times.distribution();
 /// assert_eq!((times.count(), times.min(), times.max()), (1000, 1, 1000));
 /// // 500 is in the bucket from 496 to 503.
 /// assert_eq!(times.per_mille(500), 503);
@@ -90,48 +93,20 @@ impl Histogram {
         first + (1 << shift) - 1
     }
 
-    /// Returns how many values there are.
+    /// Returns the distribution. Its values are the largest ones of the buckets that are not
+    /// empty, the last of them the maximum.
     #[must_use]
-    pub const fn count(&self) -> u64 {
-        self.count
-    }
-
-    /// Returns the smallest value; 0 if there is none.
-    #[must_use]
-    pub const fn min(&self) -> u64 {
-        if self.count == 0 { 0 } else { self.min }
-    }
-
-    /// Returns the largest value; 0 if there is none.
-    #[must_use]
-    pub const fn max(&self) -> u64 {
-        self.max
-    }
-
-    /// Returns the buckets that are not empty, ascending: the largest value of each, and
-    /// how many values it has. That of the last one is the maximum.
-    pub fn filled(&self) -> impl Iterator<Item = (u64, u32)> {
+    pub fn distribution(&self) -> Distribution {
         let counts = self.counts.iter().copied().enumerate();
         let filled = counts.filter(|(_, count)| *count > 0);
-        filled.map(|(bucket, count)| match bucket + 1 == self.counts.len() {
-            true => (self.max, count),
-            false => (self.top(bucket).min(self.max), count),
-        })
-    }
-
-    /// Returns a value that at least so many thousandths of the values do not exceed;
-    /// 0 if there is none. See the module for how close it is.
-    #[must_use]
-    pub fn per_mille(&self, thousandths: u64) -> u64 {
-        let rank = u128::from(self.count) * u128::from(thousandths);
-        let rank = rank.div_ceil(1000).max(1);
-        let mut below = 0u128;
-        let mut buckets = self.filled();
-        let found = buckets.find(|&(_, count)| {
-            below += u128::from(count);
-            below >= rank
+        let values = filled.map(|(bucket, count)| match bucket + 1 == self.counts.len() {
+            true => (self.max, count.into()),
+            false => (self.top(bucket).min(self.max), count.into()),
         });
-        found.map_or(self.max, |(top, _)| top)
+        let mut distribution = Distribution::counted(self.min, values.collect());
+        // A bucket may have had more than it can count.
+        distribution.count = self.count;
+        distribution
     }
 }
 
@@ -163,28 +138,30 @@ mod tests {
         let mut histogram = Histogram::new(5);
         let mut values: Vec<u64> = (0..5000u64).map(|n| n * n * 7 % 1_000_003).collect();
         values.iter().for_each(|&value| histogram.add(value));
+        let distribution = histogram.distribution();
         values.sort_unstable();
         for (thousandths, rank) in [(1, 5), (500, 2500), (990, 4950), (999, 4995), (1000, 5000)] {
             let exact = values[rank - 1];
-            let found = histogram.per_mille(thousandths);
+            let found = distribution.per_mille(thousandths);
             assert!(exact <= found && found - exact <= exact >> 5);
         }
         let (min, max) = (values[0], values[4999]);
-        assert_eq!((histogram.min(), histogram.max()), (min, max));
+        assert_eq!((distribution.min(), distribution.max()), (min, max));
     }
 
     #[test]
     fn buckets_have_all_values_and_end_with_the_maximum() {
         let mut histogram = Histogram::new(2);
-        assert_eq!((histogram.min(), histogram.per_mille(500)), (0, 0));
+        let none = histogram.distribution();
+        assert_eq!((none.min(), none.per_mille(500)), (0, 0));
         for value in [3, 3, 9, 1 << 50] {
             histogram.add(value);
         }
-        let buckets: Vec<_> = histogram.filled().collect();
+        let buckets: Vec<_> = histogram.distribution().values().collect();
         assert_eq!(buckets, [(3, 2), (9, 1), (1 << 50, 1)]);
         // Beyond the last bucket, too.
         let mut beyond = Histogram::new(5);
         beyond.add(u64::MAX);
-        assert_eq!(beyond.per_mille(500), u64::MAX);
+        assert_eq!(beyond.distribution().per_mille(500), u64::MAX);
     }
 }

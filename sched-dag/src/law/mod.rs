@@ -9,7 +9,8 @@
 //! - [`Costs`]: what the platform's own work has taken;
 //! - [`Record::of_events`]: the times of every job and instance, of the latest whole
 //!   jobs if the oldest events are lost;
-//! - [`Tally`]: statistics of a run of any length, in a fixed amount of memory.
+//! - [`Tally`]: statistics of a run of any length, in a fixed amount of memory, each of
+//!   which is read as a [`Distribution`].
 //!
 //! How strictly a journal is judged is said by [`Terms`]. Times are in nanoseconds from
 //! the run's epoch.
@@ -22,6 +23,7 @@
 
 mod costs;
 mod dispatch;
+mod distribution;
 mod facts;
 mod histogram;
 mod replay;
@@ -36,6 +38,7 @@ use core::ops::Range;
 
 pub use costs::Costs;
 pub use dispatch::{Dispatch, dispatch_violations, judge_dispatch};
+pub use distribution::Distribution;
 pub use histogram::Histogram;
 pub use replay::{Verdict, judge, violations};
 pub use tally::{OfDag, OfSubtask, Tally};

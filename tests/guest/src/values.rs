@@ -65,8 +65,8 @@ pub(crate) fn emit(workload: &str, figure: &str, per: u64, samples: impl IntoIte
         line.text("workload", workload)
             .text("figure", figure)
             .number("per", per)
-            .number("samples", samples.count() as u64)
-            .object("value", |object| samples.describe(object));
+            .number("samples", samples.count())
+            .distribution("value", &samples);
     });
 }
 

@@ -31,7 +31,8 @@ pub(super) fn note(run: &Run, overheads: Overheads) {
             };
             let job = 0;
             let counted = counts.subtask(set.vertex(Instance { dag, job, subtask }));
-            let (calls, longest_ns) = (&counted.execution_time, counted.execution_time.max());
+            let times = counted.execution_time.distribution();
+            let (calls, longest_ns) = (times.count(), times.max());
             if longest_ns <= wcet_ns.saturating_add(charged_ns) {
                 continue;
             }
@@ -41,7 +42,7 @@ pub(super) fn note(run: &Run, overheads: Overheads) {
                 of_subtask.name(),
                 model.name(),
                 counted.beyond_wcet,
-                calls.count(),
+                calls,
                 Ns(longest_ns - wcet_ns),
                 Ns(wcet_ns)
             );
@@ -50,7 +51,7 @@ pub(super) fn note(run: &Run, overheads: Overheads) {
                     .text("dag_name", model.name())
                     .number("subtask", subtask.0)
                     .text("subtask_name", of_subtask.name())
-                    .number("calls", calls.count())
+                    .number("calls", calls)
                     .number("beyond", counted.beyond_wcet)
                     .number("longest_ns", longest_ns)
                     .number("wcet_ns", wcet_ns);

@@ -3,12 +3,11 @@
 
 pub mod counts;
 pub mod crossing;
-mod distribution;
 pub mod memory;
 mod time;
 pub mod times;
 pub mod trace;
 pub mod wire;
 
-pub use distribution::Distribution;
+pub use sched_dag::law::Distribution;
 pub use time::Ns;

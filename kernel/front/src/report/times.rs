@@ -21,28 +21,24 @@ pub fn dump(run: &Run) {
             line.number("dag", dag.0)
                 .text("name", model.name())
                 .number("first_recorded_job", run.record().first_job(dag))
-                .object("response_time_ns", |object| {
-                    describe(&of_dag.response_time, object);
-                })
-                .object("release_jitter_ns", |object| {
-                    describe(&of_dag.release_jitter, object);
-                });
+                .object("response_time_ns", figures(&of_dag.response_time))
+                .object("release_jitter_ns", figures(&of_dag.release_jitter));
         });
         for (subtask, model) in (0..).map(SubtaskId).zip(model.subtasks()) {
             let job = 0;
             let instance = Instance { dag, job, subtask };
             let of_subtask = times.subtask(run.task_set().vertex(instance));
+            let executions = of_subtask.execution_time.distribution();
+            let buckets = executions.values();
+            let buckets =
+                buckets.map(|(top, count)| fmt::from_fn(move |f| write!(f, "[{top},{count}]")));
             json::emit("times_subtask", |line| {
                 line.number("dag", dag.0)
                     .number("subtask", subtask.0)
                     .text("name", model.name())
-                    .object("join_latency_ns", |object| {
-                        describe(&of_subtask.join_latency, object);
-                    })
-                    .object("execution_time_ns", |object| {
-                        describe(&of_subtask.execution_time, object);
-                    })
-                    .list("execution_histogram", buckets(&of_subtask.execution_time));
+                    .object("join_latency_ns", figures(&of_subtask.join_latency))
+                    .object("execution_time_ns", figures(&of_subtask.execution_time))
+                    .list("execution_histogram", buckets.clone());
             });
             if let Some(response_time) = &of_subtask.response_time {
                 json::emit("times_sink", |line| {
@@ -51,7 +47,7 @@ pub fn dump(run: &Run) {
                         .text("name", model.name())
                         .number("relative_deadline_ns", model.relative_deadline_ns())
                         .number("misses", run.sink_misses(dag, subtask))
-                        .object("response_time_ns", |object| describe(response_time, object));
+                        .object("response_time_ns", figures(response_time));
                     if let Some(bound_ns) = run.sink_bound_ns(dag, subtask) {
                         line.number("bound_ns", bound_ns);
                     }
@@ -61,17 +57,16 @@ pub fn dump(run: &Run) {
     }
 }
 
-fn buckets(times: &Histogram) -> impl Iterator<Item = impl fmt::Display> {
-    let buckets = times.filled();
-    buckets.map(|(top, count)| fmt::from_fn(move |f| write!(f, "[{top},{count}]")))
-}
-
-fn describe(times: &Histogram, object: &mut Object<'_, '_>) {
-    object
-        .number("count", times.count())
-        .number("min", times.min())
-        .number("median", times.per_mille(500))
-        .number("p99", times.per_mille(990))
-        .number("p999", times.per_mille(999))
-        .number("max", times.max());
+/// Returns the fields of a distribution.
+fn figures(times: &Histogram) -> impl Fn(&mut Object<'_, '_>) + use<> {
+    let times = times.distribution();
+    move |object| {
+        object
+            .number("count", times.count())
+            .number("min", times.min())
+            .number("median", times.median())
+            .number("p99", times.p99())
+            .number("p999", times.per_mille(999))
+            .number("max", times.max());
+    }
 }

@@ -8,6 +8,8 @@
 
 use core::fmt::{self, Display, Formatter};
 
+use sched_dag::law::Distribution;
+
 use super::console;
 
 /// Writes the fields of one object.
@@ -61,6 +63,30 @@ impl Object<'_, '_> {
     /// See [`Object`].
     pub fn object(&mut self, name: &str, fields: impl Fn(&mut Object<'_, '_>)) -> &mut Self {
         self.shown(name, &Fields(&fields))
+    }
+
+    /// Writes a field with an object of a distribution's `min`, `median`, `p99` and `max`.
+    ///
+    /// ```no_run
+    /// use kernel::{json, report::Distribution};
+    ///
+    /// let latencies = Distribution::new([10, 20]);
+    /// let line = json::line("latency", |line| {
+    ///     line.distribution("ns", &latencies);
+    /// });
+    /// assert_eq!(
+    ///     line.to_string(),
+    ///     r#"{"kind":"latency","ns":{"min":10,"median":10,"p99":20,"max":20}}"#
+    /// );
+    /// ```
+    pub fn distribution(&mut self, name: &str, of: &Distribution) -> &mut Self {
+        self.object(name, |object| {
+            object
+                .number("min", of.min())
+                .number("median", of.median())
+                .number("p99", of.p99())
+                .number("max", of.max());
+        })
     }
 
     /// Writes a field with a list of values, each of which is JSON already.

@@ -7,19 +7,10 @@
 
 use std::collections::BTreeMap;
 
+use sched_dag::law::Distribution;
+
 use crate::json::{Object, Value};
 use crate::protocol::{MachineLine, Transcript};
-
-/// Values in buckets; count, minimum and maximum are exact.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Times {
-    /// The smallest one.
-    pub min: u64,
-    /// The largest one.
-    pub max: u64,
-    /// The largest value of each bucket, and how many it has.
-    pub buckets: BTreeMap<u64, u64>,
-}
 
 /// A DAG of one shape, in all its runs.
 #[derive(Clone, Debug)]
@@ -31,56 +22,7 @@ pub struct OfDag {
     /// The longest response time in nanoseconds, by the commit's number.
     pub longest_responses_ns: BTreeMap<u64, u64>,
     /// Its subtasks, by number: name and execution times in nanoseconds.
-    pub subtasks: Vec<(String, Times)>,
-}
-
-impl Times {
-    /// Returns how many values there are.
-    #[must_use]
-    pub fn count(&self) -> u64 {
-        self.buckets.values().sum()
-    }
-
-    /// Returns a value that at least so many thousandths of the values do not exceed.
-    #[must_use]
-    pub fn per_mille(&self, thousandths: u64) -> u64 {
-        let rank = u128::from(self.count()) * u128::from(thousandths);
-        let rank = rank.div_ceil(1000).max(1);
-        let mut below = 0;
-        let mut buckets = self.buckets.iter();
-        let found = buckets.find(|(_, count)| {
-            below += u128::from(**count);
-            below >= rank
-        });
-        found.map_or(self.max, |(&top, _)| top.clamp(self.min, self.max))
-    }
-
-    fn add(&mut self, other: &Times) {
-        self.min = match self.buckets.is_empty() {
-            true => other.min,
-            false if other.buckets.is_empty() => self.min,
-            false => self.min.min(other.min),
-        };
-        self.max = self.max.max(other.max);
-        for (top, count) in &other.buckets {
-            *self.buckets.entry(*top).or_default() += count;
-        }
-    }
-
-    fn read(line: &MachineLine) -> Option<Times> {
-        let mut times = Times {
-            min: line.number_at("execution_time_ns.min")?,
-            max: line.number_at("execution_time_ns.max")?,
-            ..Times::default()
-        };
-        for bucket in line.value.get("execution_histogram")?.elements() {
-            let [top, count] = bucket.elements() else {
-                return None;
-            };
-            times.buckets.insert(top.as_u64()?, count.as_u64()?);
-        }
-        Some(times)
-    }
+    pub subtasks: Vec<(String, Distribution)>,
 }
 
 /// Adds what a guest's runs took to what was seen before.
@@ -126,9 +68,9 @@ pub fn add(all: &mut Vec<OfDag>, transcript: &Transcript) -> Result<(), String> 
                 let number = usize::try_from(line.number_at("subtask")?).ok()?;
                 if number == subtasks.len() {
                     let name = line.text_at("name")?.to_string();
-                    subtasks.push((name, Times::default()));
+                    subtasks.push((name, Distribution::default()));
                 }
-                subtasks.get_mut(number)?.1.add(&Times::read(line)?);
+                subtasks.get_mut(number)?.1.add(&execution_times(line)?);
                 Some(())
             }
             _ => Some(()),
@@ -145,18 +87,30 @@ pub fn add(all: &mut Vec<OfDag>, transcript: &Transcript) -> Result<(), String> 
     }
 }
 
+/// Reads the execution times of a subtask; their count and maximum follow from the buckets.
+fn execution_times(line: &MachineLine) -> Option<Distribution> {
+    let buckets = line.value.get("execution_histogram")?.elements().iter();
+    let buckets = buckets.map(|bucket| match bucket.elements() {
+        [top, count] => Some((top.as_u64()?, count.as_u64()?)),
+        _ => None,
+    });
+    let min_ns = line.number_at("execution_time_ns.min")?;
+    let times = Distribution::counted(min_ns, buckets.collect::<Option<_>>()?);
+    (line.number_at("execution_time_ns.max")? == times.max()).then_some(times)
+}
+
 /// Returns a machine line for each subtask.
 pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
     let of_dag = |dag: &OfDag| -> Vec<String> {
         let lines = dag.subtasks.iter().map(|(name, times)| {
-            let buckets = times.buckets.iter();
+            let buckets = times.values();
             let buckets = buckets.map(|(top, count)| format!("[{top},{count}]"));
             let times_ns = Object::new()
                 .number("count", times.count())
-                .number("min", times.min)
-                .number("median", times.per_mille(500))
-                .number("p99", times.per_mille(990))
-                .number("max", times.max)
+                .number("min", times.min())
+                .number("median", times.median())
+                .number("p99", times.p99())
+                .number("max", times.max())
                 .end();
             Object::new()
                 .text("kind", "observed")

@@ -6,9 +6,10 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use sched_dag::law::Distribution;
 use sched_dag::wcets::{Record, records};
 
-use super::observed::{OfDag, Times};
+use super::observed::OfDag;
 use crate::files;
 
 /// What is added to the longest call if nobody says how much, in hundredths of it.
@@ -29,7 +30,7 @@ pub fn text(all: &[OfDag], margin_percent: u64) -> String {
         let _ = writeln!(text, "dag {} {}", dag.hash, dag.name);
         for (number, (name, times)) in dag.subtasks.iter().enumerate() {
             if times.count() > 0 {
-                let wcet_ns = with_margin(times.max, margin_percent);
+                let wcet_ns = with_margin(times.max(), margin_percent);
                 let _ = writeln!(text, "wcet {wcet_ns} {number} {name}");
             }
         }
@@ -120,16 +121,11 @@ pub fn table(all: &[OfDag], margin_percent: u64) -> String {
             format!("max+{margin_percent}%")
         );
         for (name, times) in &dag.subtasks {
-            let figures = [
-                times.min,
-                times.per_mille(500),
-                times.per_mille(990),
-                times.max,
-            ];
+            let figures = [times.min(), times.median(), times.p99(), times.max()];
             let _ = write!(text, "  {name:<22}{:>8}", times.count());
             for ns in figures
                 .into_iter()
-                .chain([with_margin(times.max, margin_percent)])
+                .chain([with_margin(times.max(), margin_percent)])
             {
                 let _ = write!(text, "{:>12}", shown(ns));
             }
@@ -150,13 +146,13 @@ pub fn shown(ns: u64) -> String {
 }
 
 /// Returns a histogram of ten equal parts between the smallest and the largest value.
-fn bars(times: &Times) -> String {
+fn bars(times: &Distribution) -> String {
     const PARTS: usize = 10;
     const HEIGHTS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let mut parts = [0; PARTS];
-    let width = (times.max - times.min).max(1);
-    for (&top, &count) in &times.buckets {
-        let from = u128::from(top.clamp(times.min, times.max) - times.min);
+    let width = (times.max() - times.min()).max(1);
+    for (top, count) in times.values() {
+        let from = u128::from(top - times.min());
         let part = from * PARTS as u128 / u128::from(width);
         parts[usize::try_from(part).map_or(PARTS - 1, |part| part.min(PARTS - 1))] += count;
     }

@@ -6,8 +6,8 @@ use std::fmt::Write;
 
 use sched_dag::DagId;
 use sched_dag::chains::{Chain, Place};
+use sched_dag::law::Distribution;
 
-use super::figures::Distribution;
 use super::model::Run;
 use super::report::{distribution, microseconds, object};
 use super::view::View;
@@ -59,11 +59,11 @@ pub(super) fn measure(run: &Run, options: &Parsed) -> Result<Vec<Measured>, Stri
         Measured {
             names: names.collect(),
             output_age: (
-                Distribution::of(times.output_age_ns),
+                Distribution::new(times.output_age_ns),
                 chain.output_age_bound_ns(&run.task_set, bounds),
             ),
-            data_age: (Distribution::of(times.data_age_ns), reaction),
-            reaction: (Distribution::of(times.reaction_ns), reaction),
+            data_age: (Distribution::new(times.data_age_ns), reaction),
+            reaction: (Distribution::new(times.reaction_ns), reaction),
         }
     };
     Ok(chains.iter().map(measured).collect())

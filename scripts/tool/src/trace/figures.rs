@@ -18,6 +18,7 @@ use std::collections::BTreeMap;
 
 use sched_dag::CoreId;
 use sched_dag::journal::What;
+use sched_dag::law::Distribution;
 use sched_dag::law::sweep::Waits;
 
 use super::view::View;
@@ -48,38 +49,6 @@ pub struct Figures {
     pub load_permille: Vec<u64>,
 }
 
-/// What is said of a number of times; all 0 if there are none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Distribution {
-    /// How many there are.
-    pub count: usize,
-    /// The median.
-    pub median_ns: u64,
-    /// The 99th percentile, by nearest rank.
-    pub p99_ns: u64,
-    /// The largest.
-    pub max_ns: u64,
-}
-
-impl Distribution {
-    /// Sums up some times.
-    #[must_use]
-    pub fn of(mut times_ns: Vec<u64>) -> Distribution {
-        times_ns.sort_unstable();
-        let count = times_ns.len();
-        let rank = |percent: usize| {
-            let rank = (count * percent).div_ceil(100).max(1);
-            times_ns.get(rank - 1).copied().unwrap_or(0)
-        };
-        Distribution {
-            count,
-            median_ns: rank(50),
-            p99_ns: rank(99),
-            max_ns: rank(100),
-        }
-    }
-}
-
 /// Computes the figures of a run.
 pub(super) fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: Waits) -> Figures {
     let first_ns = view.events.first().map_or(0, |event| event.time_ns);
@@ -92,8 +61,8 @@ pub(super) fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: Waits
         from_ns: view.from_ns,
         span_ns,
         finish_to_ready_max_ns,
-        ready_to_start: Distribution::of(waits.ready_to_start_ns),
-        preemption: Distribution::of(preemption_latencies_ns(view)),
+        ready_to_start: Distribution::new(waits.ready_to_start_ns),
+        preemption: Distribution::new(preemption_latencies_ns(view)),
         longest_inversion_ns: waits.longest_owed_ns,
         load_permille: load_permille(view, first_ns, span_ns),
     }

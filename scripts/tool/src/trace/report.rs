@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
+use sched_dag::law::Distribution;
 use sched_dag::{Policy, Preemption};
 
 use super::Findings;
-use super::figures::Distribution;
 use super::model::Run;
 use crate::json::Object;
 
@@ -100,21 +100,24 @@ pub(super) fn microseconds(ns: u64) -> String {
 }
 
 pub(super) fn distribution(of: &Distribution) -> String {
-    if of.count == 0 {
+    if of.count() == 0 {
         return "none".into();
     }
     format!(
         "median {}, p99 {}, max {} of {}",
-        microseconds(of.median_ns),
-        microseconds(of.p99_ns),
-        microseconds(of.max_ns),
-        of.count
+        microseconds(of.median()),
+        microseconds(of.p99()),
+        microseconds(of.max()),
+        of.count()
     )
 }
 
 pub(super) fn object(of: &Distribution) -> String {
     format!(
         "{{\"count\":{},\"median\":{},\"p99\":{},\"max\":{}}}",
-        of.count, of.median_ns, of.p99_ns, of.max_ns
+        of.count(),
+        of.median(),
+        of.p99(),
+        of.max()
     )
 }

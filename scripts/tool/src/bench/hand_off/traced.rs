@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 
 use sched_dag::DagId;
 use sched_dag::journal::{Event, What};
+use sched_dag::law::Distribution;
 
 use super::figure::Figure;
-use crate::trace::figures::Distribution;
 use crate::trace::model::Run;
 use crate::trace::read;
 
@@ -115,15 +115,15 @@ fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
     let figures = figures.filter(|(_, samples)| !samples.is_empty());
     figures
         .map(|(part, samples)| {
-            let of = Distribution::of(samples);
+            let of = Distribution::new(samples);
             Figure {
                 cores,
                 workload: workload.into(),
                 figure: (*part).into(),
                 per: 1,
-                median: of.median_ns,
-                p99: of.p99_ns,
-                max: of.max_ns,
+                median: of.median(),
+                p99: of.p99(),
+                max: of.max(),
             }
         })
         .collect()

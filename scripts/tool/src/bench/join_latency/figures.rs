@@ -5,8 +5,7 @@
 //! can be compared is told in `docs/evaluation.md`.
 
 use join_latency::Samples;
-
-use crate::trace::figures::Distribution;
+use sched_dag::law::Distribution;
 
 /// The time between two releases, in nanoseconds.
 pub(super) const PERIOD_NS: u64 = 25_000_000;
@@ -90,7 +89,7 @@ impl Figures {
     /// Returns the distribution of a metric, by nearest rank as the guest's own.
     pub(super) fn distribution(&self, metric: usize) -> Distribution {
         let samples = self.samples[metric].iter();
-        Distribution::of(samples.map(|(_, ns)| *ns).collect())
+        Distribution::new(samples.map(|(_, ns)| *ns))
     }
 
     /// Returns the mean of a metric in nanoseconds, rounded down; 0 without samples.
@@ -148,6 +147,6 @@ mod tests {
         let mut both = figures.clone();
         both.add(figures);
         assert_eq!((both.jobs, both.joins, both.missing), (6, 2, 4));
-        assert_eq!((both.distribution(1).count, both.mean_ns(2)), (4, 12));
+        assert_eq!((both.distribution(1).count(), both.mean_ns(2)), (4, 12));
     }
 }

@@ -107,11 +107,11 @@ fn result_json(policy: Policy, subtasks: usize, figures: &Figures) -> String {
             text,
             ",\n      \"{metric}_ns\": {{\"count\": {}, \"median\": {}, \"mean\": {}, \"p99\": {}, \
              \"max\": {}}}",
-            of.count,
-            of.median_ns,
+            of.count(),
+            of.median(),
             figures.mean_ns(position),
-            of.p99_ns,
-            of.max_ns
+            of.p99(),
+            of.max()
         );
     }
     text.push('}');

@@ -32,11 +32,11 @@ pub(super) fn table(rows: &[(Policy, usize, Figures)]) -> String {
             figures.same_index,
             figures.cross_index,
             figures.missing,
-            ns(latency.median_ns),
-            ns(latency.p99_ns),
-            ns(cover.median_ns),
-            ns(cover.p99_ns),
-            ns(response.median_ns)
+            ns(latency.median()),
+            ns(latency.p99()),
+            ns(cover.median()),
+            ns(cover.p99()),
+            ns(response.median())
         );
     }
     text

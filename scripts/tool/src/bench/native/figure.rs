@@ -38,7 +38,8 @@ impl Figure {
         self.samples[0]
     }
 
-    fn median(&self) -> f64 {
+    /// Returns the time that half of the samples do not exceed.
+    pub(super) fn median(&self) -> f64 {
         self.samples[self.samples.len() / 2]
     }
 

@@ -56,7 +56,7 @@ impl Stamps {
 pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
     let count = usize::try_from(jobs).map_err(|_| "too many jobs".to_owned())?;
     let epoch = Instant::now();
-    let clock = clock(epoch);
+    let clock = Figure::new("", "reading the clock", "", 1, clock(epoch));
     let [
         source_end,
         one_start,
@@ -72,7 +72,7 @@ pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
         end(epoch, &sink_start),
     ];
     run(jobs, functions)?;
-    let reading = clock[clock.len() / 2];
+    let reading = clock.median();
     let (mut joins, mut starts) = (Vec::new(), Vec::new());
     for job in count / 10..count {
         let ends = [one_end.get(job), other_end.get(job)];
@@ -97,7 +97,7 @@ pub(super) fn measure(jobs: u64) -> Result<Vec<Figure>, String> {
         figure("last return -> sink start", joins),
         figure("source return -> other core's start", starts),
         Figure::new("", "one cache line, one way", "", 2, transfer()?),
-        Figure::new("", "reading the clock", "", 1, clock),
+        clock,
     ])
 }
 
@@ -182,10 +182,10 @@ fn transfer() -> Result<Vec<f64>, String> {
 #[repr(align(128))]
 struct Line(AtomicU64);
 
-/// Returns what reading the clock takes, sorted.
+/// Returns what reading the clock takes.
 fn clock(epoch: Instant) -> Vec<f64> {
     const READINGS: u32 = 50;
-    let mut samples: Vec<f64> = (0..2_000)
+    (0..2_000)
         .map(|_| {
             let start = Instant::now();
             for _ in 0..READINGS {
@@ -193,7 +193,5 @@ fn clock(epoch: Instant) -> Vec<f64> {
             }
             start.elapsed().as_secs_f64() * 1e9 / f64::from(READINGS)
         })
-        .collect();
-    samples.sort_unstable_by(f64::total_cmp);
-    samples
+        .collect()
 }

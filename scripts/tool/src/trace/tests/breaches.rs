@@ -48,9 +48,9 @@ fn a_good_trace_shows_nothing_but_its_figures() {
     assert_eq!(figures.instances, 8);
     assert_eq!(figures.finish_to_ready_max_ns, 2);
     // Ready to start, a core idle: 1 2 2 1 1 2 3 1.
-    assert_eq!(figures.ready_to_start.count, 8);
-    assert_eq!(figures.ready_to_start.median_ns, 1);
-    assert_eq!(figures.ready_to_start.max_ns, 3);
+    assert_eq!(figures.ready_to_start.count(), 8);
+    assert_eq!(figures.ready_to_start.median(), 1);
+    assert_eq!(figures.ready_to_start.max(), 3);
     assert_eq!(figures.longest_inversion_ns, 3);
     assert_eq!(figures.span_ns, 221);
     // Core 0: 9 + 17 + 9 + 27 + 78; core 1: 26 + 8 + 16.
@@ -256,14 +256,14 @@ fn a_preemption_is_measured_from_the_latest_request() {
     let figures = |events: &str| check(&run_of(TWO, events), BOUND_NS).figures;
     let measured = figures(PREEMPTED);
     let preemption = &measured.preemption;
-    assert_eq!((measured.preemptions, preemption.count), (1, 1));
-    assert_eq!((preemption.max_ns, measured.longest_inversion_ns), (3, 4));
+    assert_eq!((measured.preemptions, preemption.count()), (1, 1));
+    assert_eq!((preemption.max(), measured.longest_inversion_ns), (3, 4));
     // Only `low` found an idle core.
-    assert_eq!(measured.ready_to_start.count, 1);
+    assert_eq!(measured.ready_to_start.count(), 1);
     let requests = "51 request c0 0.0.0\n52 request c0 1.0.0";
     let overtaken = figures(&PREEMPTED.replace("51 request c0 0.0.0", requests)).preemption;
     // The second one is answered when `low` goes on.
-    assert_eq!((overtaken.count, overtaken.max_ns), (1, 30));
+    assert_eq!((overtaken.count(), overtaken.max()), (1, 30));
 }
 
 const CHAIN: &str = r#"
