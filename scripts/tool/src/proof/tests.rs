@@ -65,8 +65,10 @@ fn another_bound_a_damaged_line_and_no_times_are_refused() {
     let damaged = refused(&LOG.replace("\"on\"", "\"maybe\""));
     let words = "serial line 1: `graph`: `preemption` is `maybe` and must be on or off";
     assert_eq!(damaged, words);
-    let refused = |log| observed::add(&mut Vec::new(), &Transcript::read(log)).unwrap_err();
+    let refused = |log: &str| observed::add(&mut Vec::new(), &Transcript::read(log)).unwrap_err();
     assert!(refused("").starts_with("the guest has run no DAG"));
+    let other = refused(&LOG.replace("[9,1]", "[8,1]"));
+    assert!(other.contains("a line of kind `times_subtask` is malformed"));
     let orphan = LOG.split_once('\n').map_or("", |(_, rest)| rest);
     assert!(refused(orphan).contains("serial line 1: a line of kind `times_dag`"));
 }
