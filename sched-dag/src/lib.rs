@@ -118,6 +118,7 @@ mod topic;
 mod verify;
 pub mod virtual_time;
 pub mod wcets;
+mod worded;
 
 pub use clusters::{Clusters, Why};
 pub use ids::{ClusterId, CoreId, DagId, Instance, ModeId, SubtaskId, Vertex};

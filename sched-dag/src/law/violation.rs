@@ -1,8 +1,20 @@
-//! What can be wrong with a journal.
+//! What can be wrong with a journal: the rules, and one row for each breach.
+//!
+//! A row has the code of a breach, the rule, when or by which event it shows, and the text:
+//! what happened, where, and why it must not be. Its documentation begins with the rule, and
+//! is what `docs/debugging.md` says of the code.
 
+use core::fmt;
+
+use Rule::{AndJoin, CompletionBoundary, Dispatch, JobCompletion, OneCore, OneLife, Release};
+use Shown::{At, By};
+
+use super::words::{Names, comes, does, over, shown_ns};
 use crate::ids::{CoreId, DagId, Instance};
 use crate::journal::{Event, What};
 use crate::law::sweep::{Stage, Wrong};
+use crate::task_set::TaskSet;
+use crate::worded;
 
 /// A rule of the task model, which the [crate] states, or one of two that every
 /// machine must keep whatever the model says.
@@ -25,202 +37,212 @@ pub enum Rule {
     OneCore,
 }
 
-/// A breach of a rule in a journal.
-///
-/// Its text says what happened, where, and why it must not be; with the names of DAGs
-/// and subtasks if it is printed [`with_names`](Self::with_names).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the fields' names are the words of the model")]
-pub enum Violation {
-    /// R1: something of a job happened before its nominal release.
-    BeforeRelease { event: Event, release_ns: u64 },
-    /// R1: something of a job happened before its release was carried out.
-    BeforeReleased { event: Event, released_ns: u64 },
-    /// R1: something of a job happened that was not released, or is forgotten, for a
-    /// later one is complete. The first that happened; all else of it is not judged.
-    NotReleased { event: Event, is_over: bool },
-    /// R1: nothing says when a sporadic job was due.
-    NotDue { event: Event },
-    /// R1: a job was released of a DAG that was paused or closed.
-    WhileOff { event: Event },
-    /// R1: a sporadic job's release is less than one minimum inter-arrival time after
-    /// the one before it, or before the offset.
-    TooSoon {
-        dag: DagId,
-        job: u64,
-        release_ns: u64,
-        earliest_ns: u64,
-    },
-    /// R1: a job was released after a later one.
-    OutOfOrder { event: Event, later: u64 },
-    /// The overrun policy: a job was released while as many were in flight as may be.
-    TooMany { event: Event, in_flight: u32 },
-    /// R1 and the overrun policy, where times are exact: the release was carried out at
-    /// another time than the nominal one, or, if it was queued, the end of an older job.
-    Unpunctual {
-        event: Event,
-        expected_ns: Option<u64>,
-    },
-    /// R1 and R4: what happens to a job once happened again, or after what excludes it.
-    Again {
-        event: Event,
-        before: What,
-        before_ns: u64,
-    },
-    /// R2: an instance was ready, or started, before another one was over.
-    BeforeJoin {
-        event: Event,
-        awaited: Instance,
-        /// When and where that was over; `None` if it was not over yet.
-        over: Option<(u64, CoreId)>,
-    },
-    /// R3: an instance became ready in a step that nothing brought about that it waits
-    /// for. R4: the same for a job's completion and its instances.
-    OutOfStep {
-        event: Event,
-        last_ns: u64,
-        last_core: CoreId,
-    },
-    /// R3: an instance became ready too late. R4: a job was complete, or missed, too
-    /// late.
-    Late { event: Event, since_ns: u64 },
-    /// R3: an instance never became ready.
-    NeverReady {
-        instance: Instance,
-        since_ns: u64,
-        core: CoreId,
-    },
-    /// R4: a job was completed before one of its instances was over.
-    BeforeItsEnd {
-        event: Event,
-        awaited: Instance,
-        over_ns: Option<u64>,
-    },
-    /// R4: a job is not completed.
-    NeverCompleted {
-        dag: DagId,
-        job: u64,
-        /// When its last instance was over; `None`: one is not.
-        over_ns: Option<u64>,
-        /// The end of the events.
-        end_ns: u64,
-    },
-    /// R4: a deadline was missed before it had passed.
-    MissedEarly { event: Event, deadline_ns: u64 },
-    /// R4: a job was missed that finished in time.
-    MissedInTime {
-        event: Event,
-        finish_ns: u64,
-        deadline_ns: u64,
-    },
-    /// R4: a job was not missed that finished late, or not at all.
-    NotMissed {
-        dag: DagId,
-        job: u64,
-        finish_ns: Option<u64>,
-        deadline_ns: u64,
-        /// When that was clear.
-        at_ns: u64,
-    },
-    /// One life: what happened to an instance does not follow from what it was.
-    OutOfTurn { event: Event, stage: Stage },
-    /// One life: it happened before what comes before it.
-    Backwards {
-        event: Event,
-        before: What,
-        before_ns: u64,
-    },
-    /// One life: an instance was cancelled of a job that nothing had cut.
-    CancelledUncut { event: Event },
-    /// D1: a DAG went on after a fault that it does not survive.
-    FaultBeyondLimit { event: Event },
-    /// One core: an instance began on a core that still ran another one.
-    CoreNotFree { event: Event, occupant: Instance },
-    /// R5: an instance waited although a core was idle, or ran an instance that it
-    /// outranks and could have replaced.
-    PassedOver(Wrong),
-    /// R5: an instance was on a core that is not its cluster's.
-    OutsideItsCluster { event: Event },
-    /// R5: an instance that keeps its core lost it.
-    LostItsCore { event: Event },
+/// When a violation shows.
+#[derive(Clone, Copy)]
+enum Shown<'v> {
+    /// At a time, in nanoseconds from the run's epoch.
+    At(u64),
+    /// By an event, with which its text begins.
+    By(&'v Event),
+}
+
+/// Writes the rule's name, such as `R2 join`.
+impl fmt::Display for Rule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Release => "R1 release",
+            Self::AndJoin => "R2 join",
+            Self::CompletionBoundary => "R3 completion boundary",
+            Self::JobCompletion => "R4 completion",
+            Self::Dispatch => "R5 dispatch",
+            Self::OneLife => "one life",
+            Self::OneCore => "one core",
+        })
+    }
+}
+
+worded! {
+    /// A breach of a rule in a journal.
+    ///
+    /// Its text has the names of DAGs and subtasks if it is printed
+    /// [`with_names`](Self::with_names).
+    #[derive(Copy)]
+    pub enum Violation[names: Names<'_>] -> (Rule, Shown<'_>) {
+        /// R1: something of a job happened before its nominal release.
+        BeforeRelease { event: Event, release_ns: u64 } = "before_release", (Release, By(event)),
+            " before its release time {release_ns} ns";
+        /// R1: something of a job happened before its release was carried out.
+        BeforeReleased { event: Event, released_ns: u64 } = "before_released", (Release, By(event)),
+            " before its release was made at {released_ns} ns";
+        /// R1: something of a job happened that was not released; nothing more of it is judged.
+        NotReleased { event: Event } = "not_released", (Release, By(event)),
+            " although its job was never released";
+        /// R1: something happened of a job that is over, and a later one is, too.
+        Forgotten { event: Event } = "forgotten", (Release, By(event)),
+            " although its job is over, and a later one, too";
+        /// R1: nothing says when a sporadic job was due.
+        NotDue { event: Event } = "not_due", (Release, By(event)),
+            ", and nothing says when it was due";
+        /// R1: a job was released of a DAG that was paused or closed.
+        WhileOff { event: Event } = "while_off", (Release, By(event)),
+            " although its DAG is paused or closed";
+        /// R1: a sporadic job's release is less than one minimum inter-arrival time after the
+        /// one before it, or before the offset.
+        TooSoon { dag: DagId, job: u64, release_ns: u64, earliest_ns: u64 } =
+            "too_soon", (Release, At(*release_ns)),
+            "{} is due before {earliest_ns} ns, the earliest by its DAG's distance",
+            names.job(*dag, *job);
+        /// R1: a job was released after a later one.
+        OutOfOrder { event: Event, later: u64 } = "out_of_order", (Release, By(event)),
+            " after job {later}";
+        /// R1: a job was released while as many were in flight as may be.
+        TooMany { event: Event, in_flight: u32 } = "too_many", (Release, By(event)),
+            " although {in_flight} jobs are in flight, the most there may be";
+        /// R1: where times are exact, the release was carried out at another time than the
+        /// nominal one, or, if it was queued, than the end of an older job.
+        Unpunctual { event: Event, expected_ns: u64 } = "unpunctual", (Release, By(event)),
+            ", which was due at {expected_ns} ns";
+        /// R1: where times are exact, a queued release was carried out before any job had
+        /// ended.
+        StillQueued { event: Event } = "still_queued", (Release, By(event)),
+            " although it waits, and no job has ended";
+        /// R1: a job was released, queued or skipped once more, or after what excludes it.
+        ReleasedAgain { event: Event, before: What, before_ns: u64 } =
+            "released_again", (Release, By(event)),
+            " although it was {before} at {before_ns} ns";
+        /// R2: an instance was ready, or started, before one was over that it waits for.
+        BeforeJoin { event: Event, awaited: Instance, over: Option<(u64, CoreId)> } =
+            "before_join", (AndJoin, By(event)),
+            "; {}, {}", names.instance(*awaited), comes(event, *awaited, *over);
+        /// R3: an instance became ready in a step that nothing brought about that it waits for.
+        ReadyOutOfStep { event: Event, last_ns: u64, last_core: CoreId } =
+            "ready_out_of_step", (CompletionBoundary, At(event.time_ns)),
+            "{} in a step on core {} that nothing it waits for brought about; the last of that was \
+             over at {last_ns} ns on core {}", names.event(event), event.core.0, last_core.0;
+        /// R3: an instance became ready too late after the last of what it waits for.
+        ReadyLate { event: Event, since_ns: u64 } =
+            "ready_late", (CompletionBoundary, At(event.time_ns)),
+            "{} {} ns after the last of what it waits for was over at {since_ns} ns",
+            names.event(event), event.time_ns.saturating_sub(*since_ns);
+        /// R3: an instance never became ready although all that it waits for was over.
+        NeverReady { instance: Instance, since_ns: u64, core: CoreId } =
+            "never_ready", (CompletionBoundary, At(*since_ns)),
+            "{} is never ready although all that it waits for was over at {since_ns} ns on core {}",
+            names.instance(*instance), core.0;
+        /// R4: a job was aborted, missed or completed once more.
+        EndedAgain { event: Event, before: What, before_ns: u64 } =
+            "ended_again", (JobCompletion, By(event)),
+            " although it was {before} at {before_ns} ns";
+        /// R4: a job was completed before one of its instances was over.
+        BeforeItsEnd { event: Event, awaited: Instance, over_ns: Option<u64> } =
+            "before_its_end", (JobCompletion, By(event)),
+            " although {} is {}", names.instance(*awaited), over(*over_ns);
+        /// R4: a job was completed in a step that ended none of its instances.
+        CompletedOutOfStep { event: Event, last_ns: u64, last_core: CoreId } =
+            "completed_out_of_step", (JobCompletion, By(event)),
+            " in a step on core {} that no instance of it brought about; the last of that was over \
+             at {last_ns} ns on core {}", event.core.0, last_core.0;
+        /// R4: a job was completed too late after its last instance.
+        CompletedLate { event: Event, since_ns: u64 } =
+            "completed_late", (JobCompletion, By(event)),
+            " {} ns after all of it was over at {since_ns} ns",
+            event.time_ns.saturating_sub(*since_ns);
+        /// R4: a job is not completed although its last instance was over.
+        NeverCompleted { dag: DagId, job: u64, over_ns: u64 } =
+            "never_completed", (JobCompletion, At(*over_ns)),
+            "{} is not completed although all of it was over at {over_ns} ns",
+            names.job(*dag, *job);
+        /// R4: a job is not completed at the end of a run in which all are.
+        Unfinished { dag: DagId, job: u64, end_ns: u64 } =
+            "unfinished", (JobCompletion, At(*end_ns)),
+            "{} is not completed although the run says that it is", names.job(*dag, *job);
+        /// R4: a deadline was missed before it had passed.
+        MissedEarly { event: Event, deadline_ns: u64 } = "missed_early", (JobCompletion, By(event)),
+            " before its deadline {deadline_ns} ns has passed";
+        /// R4: a job was missed that finished in time.
+        MissedInTime { event: Event, finish_ns: u64, deadline_ns: u64 } =
+            "missed_in_time", (JobCompletion, By(event)),
+            " although its last instance finished at {finish_ns} ns, by its deadline \
+             {deadline_ns} ns";
+        /// R4: where times are exact, a job was missed later than right after its deadline.
+        MissedLate { event: Event, deadline_ns: u64 } = "missed_late", (JobCompletion, By(event)),
+            " {} ns after its deadline at {deadline_ns} ns",
+            event.time_ns.saturating_sub(*deadline_ns);
+        /// R4: a job was not missed that finished late.
+        NotMissed { dag: DagId, job: u64, finish_ns: u64, deadline_ns: u64 } =
+            "not_missed", (JobCompletion, At(*finish_ns)),
+            "{} is not missed although its last instance finished at {finish_ns} ns, after its \
+             deadline {deadline_ns} ns", names.job(*dag, *job);
+        /// R4: a job was not missed that did not finish, and its deadline has passed.
+        NeverMissed { dag: DagId, job: u64, deadline_ns: u64, end_ns: u64 } =
+            "never_missed", (JobCompletion, At(*end_ns)),
+            "{} is not missed although its deadline {deadline_ns} ns has passed",
+            names.job(*dag, *job);
+        /// R5: an instance waited although a core was idle, or ran an instance that it outranks
+        /// and could have replaced.
+        PassedOver(wrong: Wrong) = "passed_over", (Dispatch, At(shown_ns(wrong))),
+            "{}", names.passed_over(wrong);
+        /// R5: an instance was on a core that is not its cluster's.
+        OutsideItsCluster { event: Event } = "outside_its_cluster", (Dispatch, By(event)),
+            ", outside its cluster";
+        /// R5: an instance that keeps its core lost it.
+        LostItsCore { event: Event } = "lost_its_core", (Dispatch, By(event)),
+            " although it keeps its core until it finishes";
+        /// One life: what happened to an instance does not follow from what it was.
+        OutOfTurn { event: Event, stage: Stage } = "out_of_turn", (OneLife, By(event)),
+            " although it {}", does(*stage);
+        /// One life: something happened to an instance before the event that comes first.
+        Backwards { event: Event, before: What, before_ns: u64 } =
+            "backwards", (OneLife, By(event)),
+            " before its `{before}` at {before_ns} ns, which comes first";
+        /// One life: an instance was cancelled of a job that nothing had cut.
+        CancelledUncut { event: Event } = "cancelled_uncut", (OneLife, By(event)),
+            " although its job was not cut, nor its DAG ended";
+        /// One life: a DAG went on after a fault that it does not survive (D1).
+        FaultBeyondLimit { event: Event } = "fault_beyond_limit", (OneLife, By(event)),
+            " although its DAG does not survive that fault";
+        /// One core: an instance began on a core that still ran another one.
+        CoreNotFree { event: Event, occupant: Instance } =
+            "core_not_free", (OneCore, At(event.time_ns)),
+            "core {} runs {} while it still runs {}",
+            event.core.0, names.subject(event), names.instance(*occupant);
+    }
 }
 
 impl Violation {
     /// Returns the rule that is broken.
     #[must_use]
     pub const fn rule(&self) -> Rule {
-        match self {
-            Self::BeforeRelease { .. }
-            | Self::BeforeReleased { .. }
-            | Self::NotReleased { .. }
-            | Self::NotDue { .. }
-            | Self::WhileOff { .. }
-            | Self::TooSoon { .. }
-            | Self::OutOfOrder { .. }
-            | Self::TooMany { .. }
-            | Self::Unpunctual { .. } => Rule::Release,
-            Self::Again { event, .. } => match event.what {
-                What::Released | What::Queued | What::Skipped => Rule::Release,
-                _ => Rule::JobCompletion,
-            },
-            Self::BeforeJoin { .. } => Rule::AndJoin,
-            Self::OutOfStep { event, .. } | Self::Late { event, .. } => match event.what {
-                What::Ready => Rule::CompletionBoundary,
-                _ => Rule::JobCompletion,
-            },
-            Self::NeverReady { .. } => Rule::CompletionBoundary,
-            Self::BeforeItsEnd { .. }
-            | Self::NeverCompleted { .. }
-            | Self::MissedEarly { .. }
-            | Self::MissedInTime { .. }
-            | Self::NotMissed { .. } => Rule::JobCompletion,
-            Self::OutOfTurn { .. }
-            | Self::Backwards { .. }
-            | Self::CancelledUncut { .. }
-            | Self::FaultBeyondLimit { .. } => Rule::OneLife,
-            Self::CoreNotFree { .. } => Rule::OneCore,
-            Self::PassedOver(_) | Self::OutsideItsCluster { .. } | Self::LostItsCore { .. } => {
-                Rule::Dispatch
-            }
-        }
+        self.columns().0
     }
 
     /// Returns when it shows, in nanoseconds from the run's epoch.
     #[must_use]
     pub const fn time_ns(&self) -> u64 {
-        match *self {
-            Self::BeforeRelease { event, .. }
-            | Self::BeforeReleased { event, .. }
-            | Self::NotReleased { event, .. }
-            | Self::NotDue { event }
-            | Self::WhileOff { event }
-            | Self::OutOfOrder { event, .. }
-            | Self::TooMany { event, .. }
-            | Self::Unpunctual { event, .. }
-            | Self::Again { event, .. }
-            | Self::BeforeJoin { event, .. }
-            | Self::OutOfStep { event, .. }
-            | Self::Late { event, .. }
-            | Self::BeforeItsEnd { event, .. }
-            | Self::MissedEarly { event, .. }
-            | Self::MissedInTime { event, .. }
-            | Self::OutOfTurn { event, .. }
-            | Self::Backwards { event, .. }
-            | Self::CancelledUncut { event }
-            | Self::FaultBeyondLimit { event }
-            | Self::CoreNotFree { event, .. }
-            | Self::OutsideItsCluster { event }
-            | Self::LostItsCore { event } => event.time_ns,
-            Self::TooSoon { release_ns, .. } => release_ns,
-            Self::NeverReady { since_ns, .. } => since_ns,
-            Self::NeverCompleted {
-                over_ns: Some(over_ns),
-                ..
-            } => over_ns,
-            Self::NeverCompleted { end_ns, .. } => end_ns,
-            Self::NotMissed { at_ns, .. } => at_ns,
-            Self::PassedOver(Wrong::Waits { since_ns, .. }) => since_ns,
-            Self::PassedOver(Wrong::OutOfTurn { at_ns, .. }) => at_ns,
+        match self.columns().1 {
+            At(time_ns) => time_ns,
+            By(event) => event.time_ns,
         }
+    }
+
+    /// Returns its text with the names of the model that was run, instead of numbers.
+    #[must_use]
+    pub fn with_names(self, task_set: &TaskSet) -> impl fmt::Display {
+        fmt::from_fn(move |f| self.tell(Names(Some(task_set)), f))
+    }
+
+    fn tell(&self, names: Names<'_>, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (rule, shown) = self.columns();
+        write!(f, "at {} ns, {rule}: ", self.time_ns())?;
+        if let By(event) = shown {
+            write!(f, "{}", names.on_its_core(event))?;
+        }
+        self.words(names, f)
+    }
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.tell(Names(None), f)
     }
 }

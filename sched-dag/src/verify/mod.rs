@@ -26,7 +26,6 @@ mod shape;
 mod states;
 mod topics;
 mod warning;
-mod worded;
 
 use alloc::vec::Vec;
 use core::borrow::Borrow;

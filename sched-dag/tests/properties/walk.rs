@@ -318,8 +318,9 @@ impl<'s> Walk<'s> {
 /// Reports whether that is right if a driver comes late, or ends what has lost its core.
 fn is_of_lateness(violation: &Violation) -> bool {
     match violation {
-        Violation::Unpunctual { .. } => true,
-        Violation::Late { event, .. } => event.what == What::Missed,
+        Violation::Unpunctual { .. }
+        | Violation::StillQueued { .. }
+        | Violation::MissedLate { .. } => true,
         Violation::OutOfTurn { event, stage } => {
             event.what == What::Finish && *stage == Stage::Suspended
         }

@@ -52,14 +52,14 @@ impl Replay<'_> {
                 .iter()
                 .filter(|due| due.finish_ns.is_some() && !due.is_met());
             let late = late.max_by_key(|due| due.finish_ns)?;
+            let finish_ns = late.finish_ns?;
             let may_be_lost = self.may_be_lost(&dues);
             let is_cut = known.cut.is_some() || of_dag.is_stopped;
             return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
                 dag,
                 job,
-                finish_ns: late.finish_ns,
+                finish_ns,
                 deadline_ns: late.deadline_ns,
-                at_ns: late.finish_ns?,
             });
         };
         // Which of several sinks is meant is not known if a finish may be lost.
@@ -97,10 +97,7 @@ impl Replay<'_> {
             });
         }
         let is_late = self.is_exact() && missed.time_ns > deadline_ns + 1;
-        is_late.then_some(Violation::Late {
-            event,
-            since_ns: deadline_ns,
-        })
+        is_late.then_some(Violation::MissedLate { event, deadline_ns })
     }
 
     /// Reports whether what followed from one of the deadlines may be among the events
@@ -126,12 +123,11 @@ impl Replay<'_> {
         let deadline_ns = unfinished.map(|due| due.deadline_ns).min()?;
         let has_passed = !self.is_tolerable(deadline_ns, self.end_ns);
         let is_missing = has_passed && !of_dag.is_stopped && !self.may_be_lost(&dues);
-        is_missing.then_some(Violation::NotMissed {
+        is_missing.then_some(Violation::NeverMissed {
             dag,
             job,
-            finish_ns: None,
             deadline_ns,
-            at_ns: self.end_ns,
+            end_ns: self.end_ns,
         })
     }
 }

@@ -71,10 +71,18 @@ impl Job {
         };
         let earlier = place.replace(moment)?;
         *place = Some(earlier);
-        Some(Violation::Again {
-            event: *event,
-            before: event.what,
-            before_ns: earlier.time_ns,
+        let (event, before, before_ns) = (*event, event.what, earlier.time_ns);
+        Some(match before {
+            What::Released | What::Queued | What::Skipped => Violation::ReleasedAgain {
+                event,
+                before,
+                before_ns,
+            },
+            _ => Violation::EndedAgain {
+                event,
+                before,
+                before_ns,
+            },
         })
     }
 }
@@ -119,7 +127,7 @@ impl Replay<'_> {
             let before_ns = known.released.map_or(0, |released| released.time_ns);
             let before = What::Released;
             // Twice, or queued or skipped after all.
-            found[0] = Some(Violation::Again {
+            found[0] = Some(Violation::ReleasedAgain {
                 event,
                 before,
                 before_ns,
@@ -132,7 +140,7 @@ impl Replay<'_> {
         found[0] = waiting.note(&event, moment);
         if is_released && let Some(skipped) = waiting.skipped {
             let (before, before_ns) = (What::Skipped, skipped.time_ns);
-            found[1] = Some(Violation::Again {
+            found[1] = Some(Violation::ReleasedAgain {
                 event,
                 before,
                 before_ns,
@@ -189,7 +197,10 @@ impl Replay<'_> {
             false => Some(release_ns),
         };
         let is_late = self.is_exact() && self.terms.is_whole && expected_ns != Some(event.time_ns);
-        is_late.then_some(Violation::Unpunctual { event, expected_ns })
+        is_late.then_some(match expected_ns {
+            Some(expected_ns) => Violation::Unpunctual { event, expected_ns },
+            None => Violation::StillQueued { event },
+        })
     }
 
     /// From now on the job is in flight.
@@ -291,14 +302,14 @@ impl Replay<'_> {
             }
         }
         if !has_cause {
-            return Some(Violation::OutOfStep {
+            return Some(Violation::CompletedOutOfStep {
                 event,
                 last_ns,
                 last_core: last.core,
             });
         }
         let is_late = !self.is_tolerable(last_ns, completed.time_ns);
-        is_late.then_some(Violation::Late {
+        is_late.then_some(Violation::CompletedLate {
             event,
             since_ns: last_ns,
         })
@@ -315,14 +326,13 @@ impl Replay<'_> {
             let life = known.life(SubtaskId(subtask))?;
             Some(life.over()?.time_ns)
         };
+        let end_ns = self.end_ns;
         let over_ns = latest((0..self.subtasks(dag)).map(over_ns))
-            .filter(|over_ns| !self.is_tolerable(*over_ns, self.end_ns));
-        let is_missing = over_ns.is_some() || self.terms.is_complete;
-        is_missing.then_some(Violation::NeverCompleted {
-            dag,
-            job,
-            over_ns,
-            end_ns: self.end_ns,
-        })
+            .filter(|over_ns| !self.is_tolerable(*over_ns, end_ns));
+        let unfinished = Violation::Unfinished { dag, job, end_ns };
+        match over_ns {
+            Some(over_ns) => Some(Violation::NeverCompleted { dag, job, over_ns }),
+            None => self.terms.is_complete.then_some(unfinished),
+        }
     }
 }

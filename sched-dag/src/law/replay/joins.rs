@@ -50,13 +50,13 @@ impl Replay<'_> {
         drop(conditions);
         let (event, since_ns) = (*event, held.time_ns);
         if !has_cause {
-            self.found.push(Violation::OutOfStep {
+            self.found.push(Violation::ReadyOutOfStep {
                 event,
                 last_ns: held.time_ns,
                 last_core: held.core,
             });
         } else if !self.is_tolerable(since_ns, event.time_ns) {
-            self.found.push(Violation::Late { event, since_ns });
+            self.found.push(Violation::ReadyLate { event, since_ns });
         }
         if last.awaited.is_some() {
             let latency_ns = event.time_ns.saturating_sub(since_ns);

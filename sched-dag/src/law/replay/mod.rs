@@ -202,7 +202,10 @@ impl Replay<'_> {
         of_dag.jobs.insert(job, Job::partial(release_ns));
         if !is_partial {
             let event = *event;
-            self.found.push(Violation::NotReleased { event, is_over });
+            self.found.push(match is_over {
+                true => Violation::Forgotten { event },
+                false => Violation::NotReleased { event },
+            });
         }
         is_partial
     }

@@ -5,16 +5,30 @@
 /// computed of them (they are references there) follows it, as in `write!`. A variant
 /// may hold one other text instead, with a name in parentheses; `of` says whose code it has
 /// then.
+///
+/// If the texts need more than the fields, brackets behind the enum's name say what, and
+/// `words` takes it. Then there may be a type of all that a row says next to its code, in
+/// parentheses, and `columns` returns it. The caller writes the `Display` of such a table.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! worded {
+    ($(#[$about:meta])* pub enum $Table:ident { $($rows:tt)+ }) => {
+        $crate::worded! { $(#[$about])* pub enum $Table[_nothing: ()] -> () { $($rows)+ } }
+
+        impl core::fmt::Display for $Table {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                self.words((), f)
+            }
+        }
+    };
     (
         $(#[$about:meta])*
-        pub enum $Table:ident {
+        pub enum $Table:ident[$needed:ident: $Needed:ty] -> $Columns:ty {
             $(
-                $(#[$doc:meta])*
+                $(#[doc = $doc:literal])+
                 $Kind:ident $({ $($field:ident: $Type:ty),+ })? $(($inner:ident: $Inner:ty))? =
-                    $($code:literal)? $(of $whose:expr)?, $text:literal $(, $value:expr)*;
+                    $($code:literal)? $(of $whose:expr)?, $(($($column:expr),+),)?
+                    $text:literal $(, $value:expr)*;
             )+
         }
     ) => {
@@ -23,12 +37,15 @@ macro_rules! worded {
         #[non_exhaustive]
         #[allow(missing_docs, reason = "the fields' names are the words of the model")]
         pub enum $Table {
-            $($(#[$doc])* $Kind $({ $($field: $Type),+ })? $(($Inner))?,)+
+            $($(#[doc = $doc])+ $Kind $({ $($field: $Type),+ })? $(($Inner))?,)+
         }
 
         impl $Table {
             /// Every code that is a variant's own.
             pub const CODES: &'static [&'static str] = &[$($($code,)?)+];
+
+            /// The meaning of every variant, as it is documented.
+            pub const MEANINGS: &'static [&'static str] = &[$(concat!($($doc),+),)+];
 
             /// Returns the kind as a stable word in snake case.
             #[must_use]
@@ -38,11 +55,16 @@ macro_rules! worded {
                     $(Self::$Kind $({ $($field),+ })? $(($inner))? => $($code)? $($whose)?,)+
                 }
             }
-        }
 
-        impl core::fmt::Display for $Table {
+            #[allow(dead_code, unused_variables, reason = "few tables say more, of few fields")]
+            const fn columns(&self) -> $Columns {
+                match self {
+                    $(Self::$Kind $({ $($field),+ })? $(($inner))? => ($($($column),+)?),)+
+                }
+            }
+
             #[allow(unused_variables, reason = "a text may leave out a field")]
-            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+            fn words(&self, $needed: $Needed, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
                 match self {
                     $(Self::$Kind $({ $($field),+ })? $(($inner))? => write!(f, $text $(, $value)*),)+
                 }
