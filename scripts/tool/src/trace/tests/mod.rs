@@ -10,6 +10,7 @@ mod malformed;
 use super::model::Run;
 use super::{check, read};
 use sched_dag::journal::Event;
+use sched_dag::law::Violation;
 use sched_dag::{CoreId, DagId, SubtaskId};
 
 /// How long one may wait in these traces.
@@ -60,6 +61,7 @@ fn assert_each(header: &str, good: &str, rows: &str) {
         if let Some(breach) = row.strip_prefix('=') {
             run.events = lines.iter().map(|line| event(line)).collect();
             let found = check(&run, BOUND_NS).breaches;
+            found.iter().for_each(assert_documented_with_its_rule);
             let found = found.iter().map(|it| it.with_names(&run.task_set));
             let found: Vec<String> = found.map(|it| it.to_string()).collect();
             let is_as_it_says = match breach.trim() {
@@ -91,4 +93,16 @@ fn change<'t>(lines: &mut Vec<&'t str>, from: &str, to: &'t str) {
     let end = if is_all { lines.len() } else { places[0] + 1 };
     let instead = to.split("; ").filter(|line| !line.is_empty());
     lines.splice(places[0]..end, instead);
+}
+
+/// Asserts that the documentation of a violation begins with its rule, as the page's row does.
+fn assert_documented_with_its_rule(breach: &Violation) {
+    let code = breach.code();
+    let kind = Violation::CODES.iter().position(|it| *it == code).unwrap();
+    let (rule, _) = Violation::MEANINGS[kind].trim().split_once(": ").unwrap();
+    let whole = breach.rule().to_string();
+    assert!(
+        whole.starts_with(&rule.replace('O', "o")),
+        "{code}: {whole}"
+    );
 }
