@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use fass::edge::Begin;
+use fass::log::Line;
 use fass::{
     Channel, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
     Recorded, Runner,
@@ -189,6 +190,11 @@ impl Platform for Host {
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         edge::get().lend(channel, job, take);
+    }
+
+    fn log(&self, mut line: Line, keep: fn(&Line)) {
+        (line.instance, line.at_ns) = edge::here();
+        keep(&line);
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::thread;
 
+use fass::log::Level;
 use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::{Linux, Live, Mechanism};
 use support::{alone, alone_on, breaches, chain, mechanisms, ms};
@@ -24,6 +25,43 @@ fn a_chain_on_one_core_wakes_nobody() {
             counts.calls <= releases && counts.hand_offs > 0,
             "{counts:?}"
         );
+    }
+}
+
+#[test]
+fn lines_of_the_log_bear_the_instance_that_says_them() {
+    for mechanism in mechanisms() {
+        let alone = alone(1, mechanism);
+        let dag = create_dag();
+        dag.name("front")
+            .jobs(3)
+            .period(ms(5))
+            .relative_deadline(ms(5));
+        let say = |job| fass::log!(Level::Warn, "late", by_ns = 7 * job);
+        dag.register_untyped_subtask(say, SubtaskAttributes::named("camera"));
+        finish_create_dags(&[dag]).unwrap();
+        fass::log!(Level::Error, "begins");
+        let run = alone.machine.run().unwrap();
+        fass::log!(Level::Debug, "is not kept");
+        let lines: Vec<_> = std::iter::from_fn(fass::log::take).collect();
+        // The first one counts from the epoch of the run before.
+        assert!(lines[1..].is_sorted_by_key(|line| line.at_ns) && lines[3].at_ns >= 10_000_000);
+        let shown = lines
+            .iter()
+            .map(|line| line.shown(Some(run.task_set())).to_string());
+        let shown: Vec<String> = shown.collect();
+        assert!(shown[0].starts_with("error ") && shown[0].ends_with(" s: begins"));
+        for (job, line) in shown[1..].iter().enumerate() {
+            assert!(
+                line.starts_with(&format!("warn front/camera[{job}] ")),
+                "{line}"
+            );
+            assert!(
+                line.ends_with(&format!(" s: late by_ns={}", 7 * job)),
+                "{line}"
+            );
+        }
+        assert_eq!(shown.len(), 4);
     }
 }
 

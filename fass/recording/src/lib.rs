@@ -67,5 +67,5 @@ pub use value::decode::{Decoder, Malformed};
 pub use value::encode::{Encoder, Full};
 pub use value::recordable::{MOST_GROWTH, Recordable, to_bytes};
 pub use value::schema::{Field, MOST_DEPTH, MOST_WEIGHTLESS, Scalar, Schema};
-pub use value::shown::{Shown, write_json};
+pub use value::shown::{Shown, write_json, write_json_text};
 pub use value::walk::Part;

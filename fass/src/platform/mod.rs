@@ -7,6 +7,7 @@
 
 mod clock;
 mod installed;
+mod log;
 
 use alloc::borrow::Cow;
 use alloc::string::String;
@@ -19,11 +20,13 @@ use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
 
 use crate::edge::Begin;
 use crate::run::crossing::Recorded;
+use crate::run::log::Line;
 use crate::run::plan::Plan;
 
 pub use clock::{Clock, now_ns, set_clock};
 pub use installed::{AlreadyInstalled, install};
 pub(crate) use installed::{expect_installed, installed, record};
+pub use log::say;
 
 /// A machine that schedules committed DAGs.
 ///
@@ -185,6 +188,14 @@ pub trait Platform: Sync {
     /// Lends the recorded value of a channel and a job to `take`, if there is one.
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         let _ = (channel, job, take);
+    }
+
+    /// Takes a line of the [log](mod@crate::log) from the function that runs here, and adds which
+    /// instance that is, if it is one, and the time of the run. `keep` has it wait until
+    /// [`take`](crate::log::take), for platforms that show it later. Must not wait.
+    fn log(&self, mut line: Line, keep: fn(&Line)) {
+        line.at_ns = self.now_ns();
+        keep(&line);
     }
 
     /// Takes a plan over. Its first release is the platform's to time.

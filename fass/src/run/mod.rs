@@ -15,6 +15,7 @@ pub(crate) mod effect;
 pub(crate) mod latest;
 pub(crate) mod latest_jobs;
 pub(crate) mod line;
+pub mod log;
 pub(crate) mod message;
 pub(crate) mod plan;
 pub(crate) mod record;

@@ -12,6 +12,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use fass::edge::Begin;
+use fass::log::{Level, Line, set_level};
 use fass::{
     Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
 };
@@ -49,6 +50,8 @@ pub(crate) fn make_current() -> Rc<Machine> {
         IS_OURS.get_or_init(|| fass::install(&HostPlatform).is_ok()),
         "another platform is installed; virtual time must be the program's only platform"
     );
+    // Machines may differ in that.
+    set_level(Some(Level::Debug));
     let machine = Rc::new(Machine::default());
     CURRENT.set(Rc::downgrade(&machine));
     machine
@@ -188,6 +191,12 @@ impl Platform for HostPlatform {
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         surroundings().edge.lend(channel, job, take);
+    }
+
+    fn log(&self, line: Line, _keep: fn(&Line)) {
+        if let Some(machine) = current() {
+            machine.surroundings.log(line);
+        }
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {

@@ -13,7 +13,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The kernel's own words, which every app has: `settings` takes them.
-const KERNELS: [&str; 21] = [
+const KERNELS: [&str; 22] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -23,6 +23,7 @@ const KERNELS: [&str; 21] = [
     "trace_events",
     "times",
     "graph",
+    "log",
     "measure",
     "idle",
     "console",
@@ -288,8 +289,8 @@ mod tests {
         assert_eq!(
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
-             budget_factor, overheads_ns, wcets, trace, trace_events, times, graph, measure, \
-             idle, console, status, mode, probe, end, clock, avx, x2apic, cores, smt"
+             budget_factor, overheads_ns, wcets, trace, trace_events, times, graph, log, \
+             measure, idle, console, status, mode, probe, end, clock, avx, x2apic, cores, smt"
         );
     }
 

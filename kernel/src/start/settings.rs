@@ -14,6 +14,7 @@
 //! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
 //! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
 //! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
+//! | `log=off\|error\|warn\|info\|debug` | up to which level lines of the log are shown | `info` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
 //! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or how much each subtask uses of its stack | `nothing` |
 //! | `console=off\|stop\|on\|echo` | whether a person can end a run by ctrl-C (`stop`), and talk to the kernel; `echo` sends back what is typed | `off` |

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use core::hint::black_box;
 use core::time::Duration;
 
+use fass::log::Level;
 use fass::{
     Dag, FaultLimit, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags,
 };
@@ -50,13 +51,17 @@ fn run(machine: &Machine, dags: &[Dag]) -> Result<(), Ending> {
     machine.run().map(drop)
 }
 
-/// Panics in job 1, and the app does not look at faults.
+/// Panics in job 1, and the app does not look at faults. It says so in the log beforehand; with
+/// `log=debug` it says more.
 pub(crate) fn unnoticed(machine: &Machine) -> Result<(), Ending> {
     let mut jobs = 0;
     let panics = move || {
         jobs += 1;
+        fass::log!(Level::Warn, "counted", jobs = jobs, of = "careless");
+        fass::log!(Level::Debug, "looks");
         assert_eq!(jobs, 1, "a panic on purpose");
     };
+    fass::log!(Level::Info, "begins");
     run(machine, &[single("careless", 3, named("panics"), panics)])
 }
 

@@ -44,13 +44,13 @@ fn write_part(part: Part<'_>, out: &mut dyn Write) -> fmt::Result {
         Part::Open(Some(_)) => out.write_char('{'),
         Part::Close(Some(_)) => out.write_char('}'),
         Part::Field(name) => {
-            write_text(name, out)?;
+            write_json_text(name, out)?;
             out.write_char(':')
         }
         Part::Nothing => out.write_str("null"),
         Part::Bool(truth) => write!(out, "{truth}"),
-        Part::Char(letter) => write_text(letter.encode_utf8(&mut [0; 4]), out),
-        Part::Text(text) => write_text(text, out),
+        Part::Char(letter) => write_json_text(letter.encode_utf8(&mut [0; 4]), out),
+        Part::Text(text) => write_json_text(text, out),
         // Most numbers are short, and are faster so.
         Part::Unsigned(number) => match u64::try_from(number) {
             Ok(number) => write!(out, "{number}"),
@@ -67,7 +67,17 @@ fn write_part(part: Part<'_>, out: &mut dyn Write) -> fmt::Result {
 }
 
 /// Writes a string of JSON (RFC 8259, section 7).
-fn write_text(text: &str, out: &mut dyn Write) -> fmt::Result {
+///
+/// # Errors
+///
+/// What `out` says of its own.
+///
+/// ```
+/// let mut json = String::new();
+/// recording::write_json_text("so \"far\"", &mut json).unwrap();
+/// assert_eq!(json, "\"so \\\"far\\\"\"");
+/// ```
+pub fn write_json_text(text: &str, out: &mut dyn Write) -> fmt::Result {
     out.write_char('"')?;
     for letter in text.chars() {
         match letter {

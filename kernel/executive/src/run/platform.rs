@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::edge::Begin;
+use fass::log::Line;
 use fass::{
     Channel, Clock, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy,
     Preemption, Recorded,
@@ -15,7 +16,7 @@ use sched_dag::{DagId, SchedulerOptions, TaskSet};
 use super::execution::{self, Division, Terms};
 use super::{edge, occupation, stacks};
 use crate::machine::once::Once;
-use crate::machine::{clock, this_core};
+use crate::machine::{clock, interrupt_flag, this_core};
 use front::graph;
 
 /// The one kernel, as `fass` sees it.
@@ -232,6 +233,16 @@ impl Platform for Kernel {
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         edge::get().lend(channel, job, take);
+    }
+
+    fn log(&self, mut line: Line, keep: fn(&Line)) {
+        let were_enabled = interrupt_flag::disable();
+        line.instance = execution::running(this_core::get());
+        if were_enabled {
+            interrupt_flag::enable();
+        }
+        line.at_ns = execution::since_epoch(clock::now_ns());
+        keep(&line);
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {

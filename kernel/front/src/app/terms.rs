@@ -3,6 +3,7 @@
 
 use alloc::format;
 
+use fass::log::{Level, set_level};
 use fass::{Overheads, Policy, Preemption};
 
 use crate::options::{Options, UsageError};
@@ -20,6 +21,15 @@ const TIMES: [(&str, (bool, bool)); 3] = [
     ("keep", (false, true)),
     ("dump", (true, true)),
     ("observe", (true, false)),
+];
+
+/// Up to which level lines of the log are shown.
+const LOG: [(&str, Option<Level>); 5] = [
+    ("info", Some(Level::Info)),
+    ("off", None),
+    ("error", Some(Level::Error)),
+    ("warn", Some(Level::Warn)),
+    ("debug", Some(Level::Debug)),
 ];
 
 /// What these words say.
@@ -42,11 +52,12 @@ pub struct Terms {
 }
 
 impl Terms {
-    /// Takes the words. If they say so, commits print their DAGs from now on.
+    /// Takes the words. If they say so, commits print their DAGs from now on; the log has its level.
     pub fn read(options: &Options<'_>) -> Result<Self, UsageError> {
         if options.choice("graph", &KEEP_OR_DUMP)? {
             graph::enable();
         }
+        set_level(options.choice("log", &LOG)?);
         let (dumps_times, judges_bounds) = options.choice("times", &TIMES)?;
         Ok(Self {
             policy: options.choice("policy", &POLICIES)?,

@@ -1,9 +1,10 @@
 //! What is told of a run when it is over: its trace, its statistics, and figures over many
-//! samples. All of it is computed from the journal.
+//! samples, all of it computed from the journal; and what its functions say meanwhile.
 
 pub mod counts;
 pub mod crossing;
 mod distribution;
+pub mod log;
 pub mod memory;
 mod time;
 pub mod times;

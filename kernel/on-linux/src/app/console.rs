@@ -1,13 +1,16 @@
-//! The console: a person at standard input talks with the run.
+//! What people see and say while a run goes on: the log, and the console, at which a person at
+//! standard input talks with the run.
 
 use std::io::{self, BufReader, Read};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use fass::edge::Seen;
+use front::report::log;
 use front::shell::topics::Topics;
 use front::shell::{Commands, END, Extra, LiveRun, PERIOD_NS, Session};
 use linux::Live;
@@ -20,6 +23,9 @@ static INPUT: OnceLock<Mutex<Receiver<u8>>> = OnceLock::new();
 /// Commands about parameters, and about topics.
 pub(crate) static PARAMETERS: OnceLock<&'static dyn Commands> = OnceLock::new();
 static TOPICS: OnceLock<&'static dyn Commands> = OnceLock::new();
+
+/// The most lines of the log that are shown before the person is listened to again.
+const MOST_LINES: usize = 64;
 
 /// Whether a person has ended the run.
 static IS_SHUT_DOWN: AtomicBool = AtomicBool::new(false);
@@ -103,8 +109,8 @@ pub(crate) fn show_topics() {
     TOPICS.get_or_init(|| &ALL);
 }
 
-/// Talks, from another thread, as long as `run` takes. Reports whether the person has ended it.
-pub(crate) fn talk_during<R>(run: impl FnOnce() -> R) -> (R, bool) {
+/// Reads standard input, from now on.
+fn listen() {
     INPUT.get_or_init(|| {
         let (bytes, input) = channel();
         thread::spawn(move || {
@@ -118,24 +124,40 @@ pub(crate) fn talk_during<R>(run: impl FnOnce() -> R) -> (R, bool) {
         });
         Mutex::new(input)
     });
+}
+
+/// Shows the log and, with a console, talks, from another thread, as long as `run` takes. Reports
+/// whether the person has ended it.
+pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, bool) {
+    if has_console {
+        listen();
+    }
+    // What a thread allocates when it begins is not the run's.
+    let begun = Barrier::new(2);
     IS_SHUT_DOWN.store(false, Ordering::Relaxed);
     let is_over = AtomicBool::new(false);
     let result = thread::scope(|scope| {
-        scope.spawn(|| {
-            let mut session = Session::<LinuxRun>::new(false);
+        let thread = scope.spawn(|| {
+            let mut session = has_console.then(|| Session::<LinuxRun>::new(false));
+            begun.wait();
             let mut is_raised = false;
             while !is_over.load(Ordering::Acquire) {
-                if let Some(live) = Live::get().filter(|_| !is_raised) {
+                if let Some(live) = Live::get().filter(|_| has_console && !is_raised) {
                     live.raise();
                     is_raised = true;
                 }
-                while session.slice() {}
-                thread::sleep(Duration::from_nanos(PERIOD_NS));
+                while session.as_mut().is_some_and(Session::slice) {}
+                // When the run is over, the rest is told, with the names that it has.
+                let tells = |live: Live| log::tell(|| Some(Arc::clone(live.task_set())));
+                let _ = (0..MOST_LINES).all(|_| Live::get().is_some_and(tells));
+                thread::park_timeout(Duration::from_nanos(PERIOD_NS));
             }
         });
-        let result = run();
+        begun.wait();
+        let result = catch_unwind(AssertUnwindSafe(run));
         is_over.store(true, Ordering::Release);
-        result
+        thread.thread().unpark();
+        result.unwrap_or_else(|panic| resume_unwind(panic))
     });
     (result, IS_SHUT_DOWN.load(Ordering::Relaxed))
 }

@@ -92,13 +92,11 @@ impl System for LinuxSystem {
             Some(epoch_ns) => self.linux.run_from(epoch_ns),
             None => self.linux.run(),
         };
-        let (run, is_closed) = match self.has_console {
-            true => console::talk_during(run),
-            false => (run(), false),
-        };
+        let (run, is_closed) = console::talk_during(self.has_console, run);
         self.is_closed.set(is_closed);
         let run = run.map_err(|why| failure(why.to_string()))?;
         drop(connection);
+        report::log::tell_all(Some(run.task_set()));
         tell_faults(&run);
         let crossed = self.linux.end_recording(!self.is_shut_down());
         let crossed = crossed.map_err(|why| failure(format!("the recording: {why}")))?;

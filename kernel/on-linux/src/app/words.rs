@@ -14,8 +14,8 @@
 //! | `replay=FILE` | the run replays that recording |
 //! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
 //!
-//! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `trace`, `times` and `graph`
-//! mean what they mean on the machine.
+//! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `trace`, `times`, `graph` and
+//! `log` mean what they mean on the machine.
 
 use std::fs::{self, File};
 use std::io::BufWriter;

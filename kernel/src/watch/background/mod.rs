@@ -1,7 +1,7 @@
 //! What core 0 does for people while a run goes on, when it has nothing else to do.
 //!
-//! It prints progress, the status if the command line asks for it, and holds the
-//! console's conversation. All this is core 0's background, which is suspended
+//! It prints progress, the status if the command line asks for it, and what functions say in the
+//! log, and holds the console's conversation. All this is core 0's background, which is suspended
 //! whenever the core has an instance to run.
 //!
 //! It is not suspended within a *slice* of the status or the console, which holds a lock, with
@@ -11,7 +11,7 @@
 //!
 //! Under overload the background may never run again, and then a person wants most to see
 //! what goes on, and to stop it. So if it has not run for [`STARVED_NS`], core 0's heartbeat
-//! does the slices instead. The heartbeat also notices that an instance keeps its core for
+//! does the slices instead, and shows a few lines of the log. The heartbeat also notices that an instance keeps its core for
 //! long ([`stall`]).
 
 mod listener;
@@ -30,8 +30,9 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use executive::machine::clock;
 use executive::machine::once::Once;
 use executive::machine::spinlock::SpinLock;
-use executive::run::heartbeat;
+use executive::run::{execution, heartbeat};
 use executive::text::console;
+use front::report::log;
 use front::shell::{self, Session};
 use listener::Listener;
 use live_run::KernelRun;
@@ -84,6 +85,9 @@ pub(crate) static LINE: Once<&'static dyn Line> = Once::new();
 /// For how long the background may not run before the heartbeat helps out.
 const STARVED_NS: u64 = 200_000_000;
 
+/// How many lines of the log a heartbeat shows then.
+const LINES_A_BEAT: usize = 4;
+
 /// What is done in slices, by the background or by the heartbeat.
 #[derive(Debug)]
 struct Sliced {
@@ -96,7 +100,7 @@ static SLICED: SpinLock<Sliced> = SpinLock::new(Sliced {
     session: None,
 });
 
-/// When the background ran last, on the clock; `u64::MAX` if there are no slices.
+/// When the background ran last, on the clock; `u64::MAX` outside of runs.
 static RAN_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
 impl Sliced {
@@ -120,10 +124,17 @@ pub(crate) fn beat(now_ns: u64) {
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
         return;
     }
+    let mut speaks = false;
     if let Some(mut sliced) = SLICED.try_lock() {
         sliced.slice(true);
+        speaks = sliced.status.is_some() || sliced.session.is_some();
     }
-    console::send_what_goes_at_once();
+    for _ in 0..LINES_A_BEAT {
+        speaks |= log::tell(execution::task_set);
+    }
+    if speaks {
+        console::send_what_goes_at_once();
+    }
 }
 
 /// The background of one run.
@@ -131,8 +142,6 @@ pub(crate) fn beat(now_ns: u64) {
 pub(crate) struct Background {
     progress: Progress,
     listener: Option<Listener>,
-    /// Whether [`SLICED`] has something to do.
-    is_sliced: bool,
     /// The heartbeat that the core had before.
     heartbeat_before_ns: u64,
 }
@@ -149,14 +158,13 @@ impl Background {
         ];
         let periods = periods.into_iter().flatten();
         heartbeat::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
-        let is_sliced = wishes.console.is_some() || wishes.status_ns > 0;
-        if is_sliced {
+        if wishes.console.is_some() || wishes.status_ns > 0 {
             *SLICED.lock() = Sliced {
                 status: (wishes.status_ns > 0).then(|| Status::begin(wishes.status_ns, total)),
                 session: wishes.console.map(|echo| Session::new(echo == Echo::On)),
             };
-            RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         }
+        RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         stall::begin();
         // What a person says to the console is no event.
         let input = input.filter(|_| wishes.console.is_none());
@@ -168,7 +176,6 @@ impl Background {
         Self {
             heartbeat_before_ns: before_ns,
             progress: Progress::new(total),
-            is_sliced,
             listener,
         }
     }
@@ -180,11 +187,8 @@ impl Background {
             listener.step();
         }
         let has_more = LINE.get().is_some_and(|line| line.step());
-        if !self.is_sliced {
-            return has_more;
-        }
         RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
-        SLICED.lock().slice(false) || has_more
+        log::tell(execution::task_set) | SLICED.lock().slice(false) || has_more
     }
 
     /// Ends it. Reports whether a person has asked for the run to end.
@@ -195,6 +199,7 @@ impl Background {
             line.end();
         }
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
+        log::tell_all(execution::task_set().as_ref());
         let mut sliced = SLICED.lock();
         sliced.status = None;
         sliced.session = None;

@@ -12,6 +12,7 @@ pub(super) const GUEST_WORDS: &[&str] = &[
     "clusters",
     "jobs",
     "latest",
+    "log",
     "seconds",
     "seed",
     "execution",
@@ -136,6 +137,8 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// Talk to the kernel while it runs: type `help`. Real time unless --mode says otherwise,
         /// no timeout unless --timeout does, no machine lines unless --json.
         "console": Takes::Nothing;
+        /// Up to which level lines are shown that functions say by `fass::log!`; info.
+        "log": Takes::OneOf(&["off", "error", "warn", "info", "debug"]);
         /// Bytes for the app's wire, with their times: lines such as 4ms "on\n"; docs/wires.md.
         /// With - what comes on standard input, in real time unless --mode says otherwise.
         "input": Takes::File("FILE");
