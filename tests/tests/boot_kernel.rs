@@ -26,6 +26,18 @@ fn a_panic_in_the_kernel_ends_in_failure_and_names_its_place() {
     }
 }
 
+#[test]
+fn output_that_does_not_fit_is_counted() {
+    let outcome = Guest::test("talkative").succeed();
+    let counted = outcome.serial.lines().find_map(|line| {
+        let count = line.strip_suffix(" bytes of output did not fit in the buffer)")?;
+        count.strip_prefix('(')?.parse::<usize>().ok()
+    });
+    // Whatever was printed, 20 lines of 1001 bytes, is shown or counted.
+    let shown = outcome.serial.lines().filter(|line| line.ends_with("much"));
+    assert_eq!(counted, Some((20 - shown.count()) * 1001));
+}
+
 /// Every fault that a subtask commits costs its DAG what its policy says, and no other
 /// anything.
 fn faults_are_contained(guest: &Guest) {

@@ -58,6 +58,7 @@ const TESTS: &[(&str, Test)] = &[
     ("drop_loops", |machine| single::leave(machine, true)),
     ("spend_stacks", single::spend_stacks),
     ("storm", storm::run),
+    ("talkative", single::talkative),
     ("unnoticed", single::unnoticed),
     ("values", values::run),
 ];

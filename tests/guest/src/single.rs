@@ -9,7 +9,7 @@ use core::time::Duration;
 use fass::{
     Dag, FaultLimit, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags,
 };
-use kernel::{Ending, Machine};
+use kernel::{Ending, Machine, println};
 use sched_dag::DagId;
 
 use crate::kernel_crimes;
@@ -48,6 +48,12 @@ fn run(machine: &Machine, dags: &[Dag]) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
     finish_create_dags(dags)?;
     machine.run().map(drop)
+}
+
+/// Prints more in one job than may wait.
+pub(crate) fn talkative(machine: &Machine) -> Result<(), Ending> {
+    let talk = || (0..20).for_each(|_| println!("{:>1000}", "much"));
+    run(machine, &[single("talkative", 1, named("talks"), talk)])
 }
 
 /// Panics in job 1, and the app does not look at faults.

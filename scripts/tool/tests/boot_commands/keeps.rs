@@ -1,11 +1,12 @@
 //! All of a run in one file, which every command reads.
 
-use std::fs;
+use std::fs::{self, Permissions};
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use recording::Recording;
 
-use crate::support::{assert_refused, folder, succeed};
+use crate::support::{assert_refused, call, folder, succeed};
 
 const RUN: &str = "run --app autoware --cores 4 --mode deterministic --jobs 5";
 
@@ -54,6 +55,26 @@ recording values --dot dags | `--dot`: it has values alone; `./scripts/run --kee
 check-trace values | values:1: the file ends without a trace
 run --on debian --keep x | `--keep` is not for `--on debian`; leave it out",
     );
+}
+
+#[test]
+fn of_a_run_that_died_what_it_said_until_then_is_kept() {
+    tool::install::ensure_qemu().expect("QEMU");
+    let folder = folder("died");
+    let stub = folder.join("qemu");
+    let script = "#!/bin/sh\nexec timeout --signal KILL 5 qemu-system-x86_64 \"$@\"\n";
+    fs::write(&stub, script).expect("our folder takes a file");
+    fs::set_permissions(&stub, Permissions::from_mode(0o755)).expect("it is ours");
+    let line = "run --app autoware --cores 4 --mode threads --jobs 10000 --qemu ./qemu --keep died";
+    let called = call(&folder, line.split(' '));
+    assert_eq!(called.code, Some(1), "{}{}", called.out, called.complaint);
+    let bytes = read(&folder, "died");
+    let kept = Recording::read(&bytes).expect("it is whole as far as it goes");
+    assert!(kept.is_cut() && kept.header().app == "autoware");
+    let lines: String = kept.texts().collect();
+    assert!(!lines.contains("\"kind\":\"verdict\""), "{lines}");
+    let shown = succeed(&folder, "recording died");
+    assert!(shown.ends_with("incomplete: it says nothing of what came after its last entry\n"));
 }
 
 #[test]
