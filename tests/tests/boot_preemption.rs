@@ -4,7 +4,6 @@
 
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::{Event, What};
-use sched_dag::{DagId, SubtaskId};
 use tool::protocol::{MachineLine, Status};
 use tool::trace::model::Run;
 use tool::{Mode, Outcome};
@@ -35,7 +34,9 @@ fn keeps_all(outcome: &Outcome, has_avx: bool, least_preemptions: u64) {
 /// Returns the longest time from an instance's start to its end, of the most urgent DAG's source,
 /// which has next to nothing to do, and which no other preempts by static priorities.
 fn longest_of_the_source(run: &Run) -> u64 {
-    let is_of = |event: &&Event| (event.dag, event.subtask) == (DagId(0), Some(SubtaskId(0)));
+    let dag = run.task_set.find("every-2-ms");
+    let source = run.task_set.dag(dag).find("source");
+    let is_of = |event: &&Event| (event.dag, event.subtask) == (dag, Some(source));
     let mut started_ns = 0;
     let mut longest_ns = 0;
     for event in run.events.iter().filter(is_of) {
