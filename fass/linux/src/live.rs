@@ -38,12 +38,13 @@ impl Live {
         LIVE.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    pub(crate) fn begin(office: &Arc<Office>, teams: &[Arc<Team>]) {
+    pub(crate) fn begin(office: &Arc<Office>, teams: &[Arc<Team>]) -> Self {
         let live = Self {
             office: Arc::clone(office),
             teams: teams.into(),
         };
-        *LIVE.write().unwrap_or_else(PoisonError::into_inner) = Some(live);
+        *LIVE.write().unwrap_or_else(PoisonError::into_inner) = Some(live.clone());
+        live
     }
 
     pub(crate) fn end() {
@@ -60,6 +61,13 @@ impl Live {
     pub fn raise(&self) {
         if let Some(levels) = self.office.levels {
             levels.bring(sys::thread(), Role::Release);
+        }
+    }
+
+    /// Puts it behind them again.
+    pub(crate) fn lower(&self) {
+        if let Some(levels) = self.office.levels {
+            levels.bring(sys::thread(), Role::Abandoned);
         }
     }
 

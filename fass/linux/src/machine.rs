@@ -7,8 +7,7 @@ use std::os::fd::AsFd;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use fass::{Clusters, Overheads, Plan, Platform as _, Policy, Preemption, Signal};
-use sched_dag::SchedulerOptions;
+use fass::{Clusters, Overheads, Platform as _, Policy, Preemption, Signal};
 
 use crate::control::Control;
 use crate::level::{Levels, USUAL_TOP};
@@ -190,7 +189,6 @@ impl Linux {
             clusters: Clusters::Undivided,
             assigns: false,
             wcets: None,
-            look_at_commit: |_, _, _| (),
             allocations: || 0,
         });
         Ok(Self { warnings: found })
@@ -247,13 +245,6 @@ impl Linux {
     #[must_use = "the machine itself is returned"]
     pub fn wcets(self, file: impl Into<Cow<'static, str>>) -> Self {
         self.change(|terms| terms.wcets = Some(file.into()))
-    }
-
-    /// Has each commit looked at: what it hands over, how that is scheduled, and what was
-    /// charged for overheads.
-    #[must_use = "the machine itself is returned"]
-    pub fn at_commit(self, look: fn(&Plan, SchedulerOptions, Overheads)) -> Self {
-        self.change(|terms| terms.look_at_commit = look)
     }
 
     /// Says how to count what the program has allocated so far, for

@@ -39,7 +39,6 @@ pub(crate) struct Terms {
     /// Whether the commit divides the cores.
     pub(crate) assigns: bool,
     pub(crate) wcets: Option<Cow<'static, str>>,
-    pub(crate) look_at_commit: fn(&Plan, SchedulerOptions, Overheads),
     pub(crate) allocations: fn() -> u64,
 }
 
@@ -207,7 +206,7 @@ impl Platform for Host {
             cores: self.cores(),
         };
         edge::launch(&mut plan)?;
-        (terms.look_at_commit)(&plan, options, terms.overheads);
+        edge::commit(&plan, options, terms.overheads);
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;
         let office = Office::new(plan.number, &plan.task_set, letters, terms.levels);

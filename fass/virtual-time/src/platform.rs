@@ -214,6 +214,7 @@ impl Platform for HostPlatform {
         }
         let launched = surroundings.edge.launch(&mut plan, settings.most_jobs);
         launched.map_err(LaunchError::new)?;
+        (surroundings.edge).commit(&plan, settings.scheduler, self.overheads());
         machine.plan.set(Some(plan.number));
         let session = Session::new(plan, settings.scheduler, surroundings);
         machine.session.replace(Some(session));

@@ -86,7 +86,10 @@ fn run(
         is_closed: Cell::new(false),
     };
     let bounds = BoundVerdict::new(false, false);
-    let result = Machine::serve(system, options, &terms, module, bounds, app);
+    let result = Machine::serve(system, options, module, bounds, app);
+    let kept = Linux::end_record();
+    let result =
+        result.and_then(|()| kept.map_err(|why| Ending::Failure(format!("the record: {why}"))));
     let [refusal, complaint] = Linux::objections();
     match refusal {
         Some(refusal) => Err(UsageError::new(refusal).into()),

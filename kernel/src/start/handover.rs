@@ -25,7 +25,7 @@ use executive::machine::{
 };
 use executive::memory::{self, OutOfMemory};
 use executive::run::platform::KERNEL;
-use executive::run::{containment, contexts, edge, heartbeat, worker};
+use executive::run::{containment, contexts, edge, heartbeat, record, worker};
 use executive::text::console;
 use front::app::bound_verdict::BoundVerdict;
 use front::app::ending::{self, Ending, Told};
@@ -359,14 +359,8 @@ fn run_app(
         mode == Some("deterministic") && this_core::all().len() > 1,
     );
     let wishes = settings.wishes;
-    let result = Machine::serve(
-        BareMachine::new(wishes),
-        options,
-        &settings.terms,
-        module,
-        bounds,
-        app,
-    );
+    let result = Machine::serve(BareMachine::new(wishes), options, module, bounds, app);
+    record::end();
     let [refusal, complaint] = edge::objections();
     if let Some(refusal) = refusal {
         return Err(usage(&refusal));

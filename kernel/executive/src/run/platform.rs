@@ -13,10 +13,9 @@ use sched_dag::analysis::OverheadSource;
 use sched_dag::{DagId, SchedulerOptions, TaskSet};
 
 use super::execution::{self, Division, Terms};
-use super::{edge, occupation, stacks};
+use super::{edge, occupation, record, stacks};
 use crate::machine::once::Once;
 use crate::machine::{clock, this_core};
-use front::graph;
 
 /// The one kernel, as `fass` sees it.
 pub struct Kernel {
@@ -253,7 +252,7 @@ impl Platform for Kernel {
             fass::set_clock(&TOLD);
         }
         stacks::watch(&mut plan);
-        graph::dump(&plan, options, self.overheads());
+        record::commit(&plan, options, self.overheads());
         execution::prepare(plan, options, terms)
     }
 }

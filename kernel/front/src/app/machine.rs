@@ -14,11 +14,9 @@ use super::bound_verdict::BoundVerdict;
 use super::ending::Ending;
 use super::fault_verdict::FaultVerdict;
 use super::offered::Parameters;
-use super::terms::Terms;
 use super::wcet_notes;
 use crate::options::Options;
 use crate::report::memory::Memory;
-use crate::report::{times, trace};
 
 /// What an app's machine is made of: the bare machine, or Linux.
 ///
@@ -101,14 +99,8 @@ pub struct Machine<S> {
     pub(super) module: Cell<Option<&'static [u8]>>,
     /// Whether the app has asked for that.
     has_asked: Cell<bool>,
-    /// Whether each run's trace is printed after it.
-    dumps_trace: bool,
-    /// Whether each run's statistics are printed after it.
-    dumps_times: bool,
     /// What bytes of input raise during a run.
     input: RefCell<Option<Signal>>,
-    /// How many runs have ended.
-    runs: Cell<u64>,
     /// Whether faults in them make the app fail.
     fault_verdict: FaultVerdict,
     /// Whether response times beyond their bounds do.
@@ -124,7 +116,6 @@ impl<S: System> Machine<S> {
     pub fn serve(
         system: S,
         options: Options<'static>,
-        terms: &Terms,
         module: Option<&'static [u8]>,
         bound_verdict: BoundVerdict,
         app: fn(&Self) -> Result<(), Ending>,
@@ -134,10 +125,7 @@ impl<S: System> Machine<S> {
             options,
             module: Cell::new(module),
             has_asked: Cell::new(false),
-            dumps_trace: terms.dumps_trace,
-            dumps_times: terms.dumps_times,
             input: RefCell::new(None),
-            runs: Cell::new(0),
             fault_verdict: FaultVerdict::default(),
             bound_verdict,
         };
@@ -311,12 +299,6 @@ impl<S: System> Machine<S> {
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);
         wcet_notes::note(&run, self.system.overheads());
-        if self.dumps_times {
-            times::dump(&run);
-        }
-        if self.dumps_trace {
-            trace::dump(&run, self.runs.replace(self.runs.get() + 1));
-        }
         if self.system.is_shut_down() {
             return Err(Ending::after_shutdown(&run));
         }

@@ -18,14 +18,15 @@
 //! mean what they mean on the machine.
 
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{self, BufWriter, Write};
 use std::time::Duration;
 
 use linux::{Linux, Mechanism};
 
+use fass::edge::Sink;
 use front::app::terms::{self, Terms};
-use front::graph;
 use front::options::{Options, UsageError};
+use front::report::record::Lines;
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
 const FOREIGN: [(&str, &str); 12] = [
@@ -86,28 +87,32 @@ pub(crate) fn apply(
         .preemption(terms.preemption)
         .budget_factor(terms.budget_factor)
         .overheads(terms.overheads)
-        .at_commit(graph::dump)
         .allocations(crate::heap::allocations);
     if let Some(wcets) = wcets {
         machine = machine.wcets(wcets);
     }
-    let named = ["record", "keep"].map(|word| options.text(word).map(|path| (word, path)));
-    let [recorded, kept] = named;
-    match (recorded.or(kept), options.text("replay")) {
-        (Some(_), Some(_)) => {
+    let replayed = options.text("replay");
+    let words = ["record", "keep", "events"].map(|word| Some((word, options.text(word)?)));
+    match (words.into_iter().flatten().next(), replayed) {
+        (Some(("record" | "keep", _)), Some(_)) => {
             let line = "`record` and `keep` exclude `replay`; give one";
             return Err(UsageError::new(line));
         }
-        (Some((word, path)), None) => {
+        (Some(("events", "on")), _) => machine.keep_events(ToConsole(Lines::new())),
+        (Some((word, path)), _) => {
             let file = File::create(path);
             let file = file.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
-            match recorded {
-                Some(_) => machine.record(app, BufWriter::new(file)),
-                None => machine.keep(app, BufWriter::new(file)),
+            let file = BufWriter::new(file);
+            match word {
+                "record" => machine.record(app, file),
+                "keep" => machine.keep(app, file),
+                _ => machine.keep_events(file),
             }
         }
-        (None, Some(path)) => machine.replay(read("replay", path)?),
-        (None, None) => {}
+        (None, _) => {}
+    }
+    if let Some(path) = replayed {
+        machine.replay(read("replay", path)?);
     }
     if limit_ms > 0 {
         let limited = machine.limit_real_time(Duration::from_millis(limit_ms));
@@ -121,4 +126,19 @@ fn read(word: &str, path: &str) -> Result<&'static [u8], UsageError> {
     let bytes = fs::read(path);
     let bytes = bytes.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
     Ok(bytes.leak())
+}
+
+/// The record as lines of the program's output.
+struct ToConsole(Lines);
+
+impl Write for ToConsole {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.put(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush();
+        Ok(())
+    }
 }

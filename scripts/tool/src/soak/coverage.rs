@@ -110,18 +110,17 @@ mod tests {
     use sched_dag::journal::Event;
 
     use super::*;
-    use crate::trace::read;
+    use crate::made::{commit, record_of};
+    use crate::record::Record;
 
-    const LOG: &str = r#"
-{"kind":"trace_begin","policy":"static","preemption":"on","cores":2,"run":0}
-{"kind":"trace_dag","dag":0,"name":"x","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,null]],"edges":[]}
-{"kind":"trace_dag","dag":1,"name":"y","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,null]],"edges":[]}
-{"kind":"trace_end","events":0,"lost":0}
-"#;
+    const TWO: &str = "static 2\nx T=9 D=9 O=0: a/0\ny T=9 D=9 O=0: a/0";
 
     /// A run of two DAGs, to which this happened.
     fn of_run(policy: Policy, events: &[(u32, What)]) -> Coverage {
-        let mut run = read(LOG).expect("it is a trace").remove(0);
+        let mut run = Record::read(&record_of("", &commit(TWO), ""))
+            .expect("it is a trace")
+            .runs
+            .remove(0);
         run.options.policy = policy;
         let event = |(dag, what): &(u32, What)| Event {
             time_ns: 0,

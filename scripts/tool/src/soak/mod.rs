@@ -156,7 +156,7 @@ fn words(plan: &Plan, boot: &Boot<'_>) -> String {
     };
     format!(
         "mode={} policy={policy} load={load} overrun={overrun} work={work} first={} rounds={} round_ms={} \
-         seed={} trouble={trouble} trace=dump budget_factor={budget_factor}",
+         seed={} trouble={trouble} events=on budget_factor={budget_factor}",
         plan.mode,
         boot.first,
         boot.rounds,

@@ -23,8 +23,7 @@ pub(super) fn judge(boot: &Boot<'_>, outcome: &Outcome, bound_ns: u64, judged: &
     let runs = match read(&outcome.serial) {
         Ok(runs) => runs,
         Err(fault) => {
-            let (line, reason) = (fault.line, fault.reason);
-            judged.fail(boot.first, format!("trace, serial line {line}: {reason}"));
+            judged.fail(boot.first, format!("trace: {fault}"));
             return;
         }
     };

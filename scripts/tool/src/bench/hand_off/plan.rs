@@ -171,7 +171,7 @@ fn boots(options: &Parsed) -> Vec<Boot> {
     };
     // A trace shows what it shows in a few jobs.
     let traced = |cores| {
-        let words = format!("part=traced jobs=20 branches={branches} trace=dump");
+        let words = format!("part=traced jobs=20 branches={branches} events=on");
         boot(Kind::Trace, cores, words)
     };
     let many = MANY_CORES.map(|cores| {

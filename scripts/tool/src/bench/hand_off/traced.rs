@@ -20,11 +20,14 @@ const PREEMPTOR: DagId = DagId(0);
 
 /// Reads all figures of a boot that has dumped its trace.
 pub(super) fn read_all(log: &str, cores: u64) -> Result<Vec<Figure>, String> {
-    let runs = read(log).map_err(|malformed| malformed.to_string())?;
+    figures_of(&read(log)?, cores)
+}
+
+fn figures_of(runs: &[Run], cores: u64) -> Result<Vec<Figure>, String> {
     if runs.iter().any(|run| run.lost > 0) {
         return Err("the trace has lost events; measure fewer jobs".into());
     }
-    let mut figures = wakeups(&runs, cores);
+    let mut figures = wakeups(runs, cores);
     let preemptions = runs.iter().filter(|run| is_of(run, "preemptor"));
     figures.extend(preemptions.flat_map(|run| preemption(run, cores)));
     if figures.is_empty() {
@@ -131,32 +134,34 @@ fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
 
 #[cfg(test)]
 mod tests {
-    use super::read_all;
+    use super::figures_of;
+    use crate::made::{commit as commit_of, record_of};
+    use crate::record::Record;
 
     /// Returns the first figure's workload and steps, and the medians of all, of such events.
     fn measured(name: &str, events: &str) -> (String, u64, Vec<u64>) {
-        let log = format!(
-            r#"{{"kind":"trace_begin","policy":"static","preemption":"on","cores":1,"run":0}}
-{{"kind":"trace_dag","dag":0,"name":"{name}","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,null],["b",1,0,null],["c",2,0,null]],"edges":[[0,1],[1,2]]}}
-{{"kind":"trace_dag","dag":1,"name":"low","period_ns":9,"relative_deadline_ns":9,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",9,0,null]],"edges":[]}}
-{{"kind":"trace","events":[{events}]}}
-{{"kind":"trace_end","events":{},"lost":0,"complete":true}}
-"#,
-            events.matches("[").count()
-        );
-        let figures = read_all(&log, 1).unwrap();
+        let commit =
+            format!("static 1\n{name} T=9 D=9 O=0: a/0 b/1 c/2; 0>1 1>2\nlow T=9 D=9 O=0: a/9");
+        let runs = Record::read(&record_of("", &commit_of(&commit), events))
+            .unwrap()
+            .runs;
+        let figures = figures_of(&runs, 1).unwrap();
         let medians = figures.iter().map(|figure| figure.median).collect();
         (figures[0].workload.clone(), figures[0].per, medians)
     }
 
     #[test]
     fn wake_ups_of_a_sink_are_counted_and_a_preemption_is_taken_apart() {
-        let ready = r#"[0,"released",0,0,0,-1],[1,"ready",0,0,0,1],[2,"ready",0,0,0,2],[3,"start",0,0,0,2],[4,"ready",0,0,0,2]"#;
+        let ready = "0 released c0 0.0\n1 ready c0 0.0.1\n2 ready c0 0.0.2\n3 start c0 0.0.2\n4 ready c0 0.0.2";
         let expected = ("fork-join-1".into(), 1, vec![2]);
         assert_eq!(measured("fork-join", ready), expected);
-        let preempted = r#"[10,"request",0,0,0,0],[13,"suspend",0,1,0,0],[20,"start",0,0,0,0],[30,"finish",0,0,0,0],[45,"resume",0,1,0,0]"#;
+        let preempted = "10 request c0 0.0.0\n13 suspend c0 1.0.0\n20 start c0 0.0.0\n30 finish c0 0.0.0\n45 resume c0 1.0.0";
         let expected = ("preemption".into(), 1, vec![3, 7, 15]);
         assert_eq!(measured("preemptor", preempted), expected);
-        assert!(read_all("", 1).unwrap_err().contains("shows no fork-join"));
+        assert!(
+            figures_of(&[], 1)
+                .unwrap_err()
+                .contains("shows no fork-join")
+        );
     }
 }
