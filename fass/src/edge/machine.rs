@@ -17,6 +17,7 @@ use crate::run::plan::Plan;
 /// A replay of what the loader has left in memory.
 pub(super) struct OfMachine {
     bytes: &'static [u8],
+    from: Option<(&'static str, u64)>,
     host: Host,
     own: Header,
     /// From the launch on.
@@ -25,9 +26,10 @@ pub(super) struct OfMachine {
 }
 
 impl OfMachine {
-    pub(super) fn new(bytes: &'static [u8], host: Host) -> Self {
+    pub(super) fn new(bytes: &'static [u8], from: Option<(&'static str, u64)>, host: Host) -> Self {
         Self {
             bytes,
+            from,
             host,
             own: Header::default(),
             replay: None,
@@ -46,8 +48,11 @@ impl Crossing for OfMachine {
         name(&mut self.own, "", &plan.task_set);
         let read = Replay::read(self.bytes);
         let mut replay = read.map_err(|malformed| format!("the recording, {malformed}"))?;
+        if let Some((dag, job)) = self.from {
+            replay.begin_before(dag, job);
+        }
         replay.fit(&self.own, &plan.task_set)?;
-        replay.prepare(plan);
+        replay.prepare(plan)?;
         replay.guard(plan);
         self.signals = Some(Signals::take_over(plan, &mut replay));
         self.replay = Some(replay);

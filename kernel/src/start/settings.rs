@@ -10,6 +10,7 @@
 //! | `record=N` | what crosses the edge of the run is sent to QEMU's debug port, from a buffer of N KiB; 0: nothing is | 0 |
 //! | `latest=N` | if neither is given and there is a debug port: the inputs of each DAG's last N jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |
 //! | `replay=N` | the next N bytes of the loader's module are a recording, which is replayed | 0 |
+//! | `from=DAG/JOB` | the replay begins with that job, or with the last one before it of which all states are recorded | all jobs |
 //! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
 //! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
@@ -44,6 +45,8 @@ pub(crate) struct Settings {
     pub(crate) terms: Terms,
     /// How many bytes of the loader's module, behind the WCETs, are a recording to replay.
     replay_bytes: u64,
+    /// The job that the replay begins with, or before it.
+    from: Option<(&'static str, u64)>,
     /// How many KiB of memory a recording may wait in; 0: nothing is recorded.
     record_kib: u64,
     /// The same, also where no topic is recorded.
@@ -65,7 +68,8 @@ impl Settings {
         if self.replay_bytes > 0 {
             let shorter = || UsageError::new("`replay`: the module is shorter than that");
             let (recording, rest) = terms::split(module, self.replay_bytes).ok_or_else(shorter)?;
-            edge::set_wish(Wish::Replay(recording)).map_err(UsageError::new)?;
+            let (bytes, from) = (recording, self.from);
+            edge::set_wish(Wish::Replay { bytes, from }).map_err(UsageError::new)?;
             module = rest;
         }
         let kib = self.record_kib.max(self.keep_kib);
@@ -89,7 +93,7 @@ impl Settings {
 /// Takes the kernel's words and does what they say.
 ///
 /// The machine has so many `processors`, cores or not.
-pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings, UsageError> {
+pub(crate) fn apply(options: &Options<'static>, processors: usize) -> Result<Settings, UsageError> {
     let terms = Terms::read(options)?;
     KERNEL.set_policy(terms.policy);
     KERNEL.set_preemption(terms.preemption);
@@ -143,6 +147,7 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
     Ok(Settings {
         terms,
         replay_bytes,
+        from: terms::from(options)?,
         record_kib,
         keep_kib,
         latest_jobs,

@@ -146,7 +146,7 @@ impl Progress {
             return Err(Decoder::new(bytes).expected(mark));
         }
         let malformed =
-            input.expected("version 1 to 4 of recordings, which are those that are read");
+            input.expected("version 1 to 5 of recordings, which are those that are read");
         if !READ.contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
             return Err(malformed);
         }
