@@ -14,9 +14,10 @@ use std::collections::BTreeMap;
 use sched_dag::TaskSet;
 use sched_dag::analysis::{Answer, Settings, answer, fix_orders};
 
-use crate::random::{Kind, Random, sample_of};
+use crate::random::{Kind, sample_of};
 use crate::simulate::observe;
 use crate::support::number;
+use crate::support::random::Random;
 
 /// How many sets of each kind are to be proven whole, where no number of sets is wanted.
 const WHOLE: u64 = 100;
@@ -41,7 +42,7 @@ fn accepted_sets_keep_their_bounds() {
             continue;
         };
         let mut settings = sample.settings();
-        settings.overheads.dispatch_ns = random.within(0, 5).saturating_sub(3);
+        settings.overheads.dispatch_ns = random.between(0, 5).saturating_sub(3);
         let free = answer(&task_set, &settings);
         fix_orders(&mut task_set, &settings);
         let answer = answer(&task_set, &settings);
@@ -102,7 +103,7 @@ pub(crate) fn breach(
             let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
             // One that is not known is long.
             let full = subtask.wcet_ns().unwrap_or(50) + settings.overheads.dispatch_ns;
-            random.within(if shorten { 0 } else { full }, full)
+            random.between(if shorten { 0 } else { full }, full)
         });
         for (dag, model) in task_set.dags().iter().enumerate() {
             let Some(whole) = answer.bounds[dag] else {

@@ -20,8 +20,9 @@ use sched_dag::{
 };
 
 use kinds::breach;
-use random::{Random, sample};
+use random::sample;
 use simulate::{commit, responses, spec};
+use support::random::Random;
 
 const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
 const DIAMOND: [(usize, usize); 4] = [(0, 1), (0, 2), (1, 3), (2, 3)];
@@ -43,9 +44,9 @@ fn no_bound_rests_on_a_wcet_of_zero() {
     for seed in 1..3_000 {
         let mut random = Random::new(seed);
         let mut sample = sample(&mut random);
-        let dag = usize::try_from(random.within(0, sample.specs.len() as u64 - 1)).unwrap();
+        let dag = usize::try_from(random.between(0, sample.specs.len() as u64 - 1)).unwrap();
         let subtasks = &mut sample.specs[dag].subtasks;
-        let subtask = random.within(0, subtasks.len() as u64 - 1);
+        let subtask = random.between(0, subtasks.len() as u64 - 1);
         subtasks[usize::try_from(subtask).unwrap()].wcet_ns = Some(0);
         let Some(task_set) = sample.task_set() else {
             continue;

@@ -10,9 +10,10 @@ use sched_dag::{ClusterId, Clusters, Policy, Preemption, TaskSet};
 
 use crate::forged;
 use crate::kinds::tighter;
-use crate::random::{Random, Sample, sample};
+use crate::random::{Sample, sample};
 use crate::simulate::spec;
 use crate::support::number;
+use crate::support::random::Random;
 
 pub(crate) fn output(files: &[String]) -> Output {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/check-witness");
@@ -49,7 +50,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
             continue;
         };
         let mut settings = sample.settings();
-        settings.overheads.dispatch_ns = random.within(0, 2.min(seed));
+        settings.overheads.dispatch_ns = random.between(0, 2.min(seed));
         settings.overheads.ready_ns = u64::from(seed % 4 == 2);
         let path = folder.join(seed.to_string());
         fs::write(&path, witness(&task_set, &settings)).unwrap();
