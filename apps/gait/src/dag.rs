@@ -12,6 +12,9 @@ use crate::{DAG, PERIOD, Sample, Sensor, TOPIC, Walk};
 /// Each WCET: several times what was observed on two cores in mode `deterministic`.
 const WCET: Duration = Duration::from_micros(50);
 
+/// Takes what one sensor measured.
+type Take = fn(&Sample) -> &Sensor;
+
 /// Builds the DAG, which runs the jobs of a recording up to its last sample, and the place of its
 /// results.
 ///
@@ -35,7 +38,7 @@ pub fn build(recording: &Recording<'static>) -> Result<(Dag, Walk), Mismatch> {
     };
     dag.register_periodic_subtask(read, vec![TOPIC], PERIOD, taking("read"));
 
-    let legs: [(_, fn(&Sample) -> &Sensor); 2] = [
+    let legs: [(_, Take); 2] = [
         ("upper", |sample| &sample.upper),
         ("lower", |sample| &sample.lower),
     ];

@@ -210,7 +210,9 @@ impl<T: StateValue> State<T> {
         self.record_every(64)
     }
 
-    /// Works like [`record`](Self::record) every so many jobs.
+    /// Records the state every so many jobs.
+    ///
+    /// See [`record`](Self::record).
     ///
     /// # Panics
     ///
