@@ -77,6 +77,29 @@ pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
     candidates.into_iter().find(|file| is_program(file))
 }
 
+/// Returns all files below a folder but the generated and hidden ones, sorted; `enters` says for
+/// each folder whether to look into it.
+pub(crate) fn files_below(root: &Path, enters: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    let mut folders = vec![root.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        if !enters(&folder) {
+            continue;
+        }
+        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+            let name = entry.file_name();
+            let path = entry.path();
+            if !path.is_dir() {
+                files.push(path);
+            } else if !name.as_bytes().starts_with(b".") && name != "target" {
+                folders.push(path);
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
 fn is_program(file: &Path) -> bool {
     use std::os::unix::fs::PermissionsExt;
     fs::metadata(file).is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)

@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 use replay::shown::quoted;
 
+use crate::system::files_below;
+
 /// The longest name, in bytes, with which the template's lines stay short.
 const LONGEST: usize = 32;
 
@@ -98,20 +100,12 @@ fn suggestion(name: &str) -> String {
 
 /// Returns the folder, within the workspace, of the package with such a name.
 fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
-    let mut folders = vec![workspace.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        let manifest = fs::read_to_string(folder.join("Cargo.toml")).unwrap_or_default();
-        if names(&manifest).any(|other| other == name) {
-            return folder.strip_prefix(workspace).ok().map(Path::to_path_buf);
-        }
-        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
-            let hidden = entry.file_name().to_string_lossy().starts_with('.');
-            if entry.path().is_dir() && !hidden && entry.file_name() != "target" {
-                folders.push(entry.path());
-            }
-        }
-    }
-    None
+    let manifest = files_below(workspace, |_| true).into_iter().find(|file| {
+        let text = || fs::read_to_string(file).unwrap_or_default();
+        file.ends_with("Cargo.toml") && names(&text()).any(|other| other == name)
+    })?;
+    let folder = manifest.parent()?.strip_prefix(workspace);
+    folder.ok().map(Path::to_path_buf)
 }
 
 /// Returns the names that a manifest gives to a package, a library or a program, with

@@ -8,11 +8,11 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::libtest::Plan;
-use super::tally::Tally;
-use super::{budgets, layers, lint, own};
+use super::tally::{Tally, Why};
+use super::{Plan, budgets, layers, own};
 use crate::bench::hand_off;
 use crate::image;
+use crate::lasting::Lasting;
 use crate::probe;
 use crate::qemu::Qemu;
 use crate::recordings;
@@ -21,74 +21,104 @@ use crate::system;
 /// The most lines of a source file.
 const MOST_LINES: usize = 400;
 
-/// A check: its name, and what runs it.
-type Check<'c> = (&'static str, &'c dyn Fn() -> Result<(), String>);
-
 /// Runs the checks that the plan wants.
 pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     let files = own::files();
-    let mut sources = files.clone();
-    sources.retain(|path| path.extension().is_some_and(|ending| ending == "rs"));
-    let quick: [Check<'_>; 6] = [
-        ("Cargo.lock names only our own packages", &lock_is_ours),
-        ("no source file has more than 400 lines", &|| {
-            files_are_short(&sources)
-        }),
-        ("every source file opens with an essay", &|| {
-            files_have_essays(&sources)
-        }),
-        ("layers name only layers below them", &layers::check),
-        ("no crate has more lines than its budget", &|| {
-            budgets::check(&files, plan.blessed.as_deref())
-        }),
-        ("no line escapes the budgets", &|| {
-            complain(&files, budgets::escape)
-        }),
-    ];
-    for (name, check) in quick {
+    let packages = own::packages(&files);
+    let blessed = plan.blessed.as_deref();
+    let mut run = |name: &str, check: &dyn Fn() -> Result<(), Why>| {
         if plan.wants(name) {
-            tally.add(name, check());
+            tally.run(name, check);
         }
+    };
+    run("Cargo.lock names only our own packages", &|| {
+        Ok(lock_is_ours()?)
+    });
+    run("no source file has more than 400 lines", &|| {
+        Ok(complain(&files, is_long)?)
+    });
+    run("every source file opens with an essay", &|| {
+        Ok(complain(&files, lacks_essay)?)
+    });
+    run("layers name only layers below them", &|| {
+        Ok(layers::check(&files)?)
+    });
+    run("no crate has more lines than its budget", &|| {
+        Ok(budgets::check(&files, blessed)?)
+    });
+    run("no line escapes the budgets", &|| {
+        Ok(complain(&files, budgets::escape)?)
+    });
+
+    let doc = "doc --quiet --no-deps";
+    for (name, words, rest, remedy) in [
+        (
+            "rustfmt has nothing to change",
+            "fmt --check",
+            "",
+            "run `cargo fmt`",
+        ),
+        (
+            "clippy has nothing to say",
+            "clippy --quiet --all-targets",
+            "-- -D warnings",
+            "see above",
+        ),
+        ("rustdoc has nothing to say", doc, "", "see above"),
+        (
+            "rustdoc has nothing to say of private items",
+            &format!("{doc} --document-private-items"),
+            "",
+            "see above",
+        ),
+    ] {
+        run(name, &|| match plan.quick {
+            true => Err(Why::Skipped("left out by --quick".into())),
+            false => Ok(cargo(&packages, words, rest, remedy)?),
+        });
     }
-    for (name, check) in lint::CHECKS {
-        match (plan.wants(name), plan.quick) {
-            (false, _) => {}
-            (true, true) => tally.skip(name, "left out by --quick"),
-            (true, false) => tally.run(name, check),
-        }
-    }
-    let name = "an independent reader opens MCAP files in their test";
-    if plan.wants(name) {
-        match recordings::independent_reader() {
-            Ok(_) => tally.add(name, Ok(())),
-            Err(why) => tally.skip(name, &why),
-        }
-    }
+    run(
+        "an independent reader opens MCAP files in their test",
+        &|| {
+            let reader = recordings::independent_reader();
+            reader.map(drop).map_err(Why::Skipped)
+        },
+    );
     if plan.quick {
         return;
     }
-    let own = own::packages();
-    for app in image::apps().into_iter().filter(|app| own.contains(app)) {
-        let name = format!(
-            "image of {app} weighs at most {} KiB",
-            image::most_stripped_bytes(&app) >> 10
-        );
-        if plan.wants(&name) {
-            tally.run(&name, || image_is_light(&app));
-        }
+    for app in image::apps().iter().filter(|app| packages.contains(app)) {
+        let most = image::most_stripped_bytes(app);
+        let name = format!("image of {app} weighs at most {} KiB", most >> 10);
+        run(&name, &|| Ok(image_is_light(app, most)?));
     }
-    let name = "the hand-off takes no more instructions than its baseline";
-    if plan.wants(name) {
-        tally.run(name, || hand_off::check(plan.blessed.as_deref()));
-    }
-    let name = "a guest runs under KVM";
-    if plan.wants(name) {
+    run(
+        "the hand-off takes no more instructions than its baseline",
+        &|| Ok(hand_off::check(blessed)?),
+    );
+    run("a guest runs under KVM", &|| {
         let image = image::build("fork-join");
-        match image.and_then(|image| probe::kvm(&Qemu::default(), &image.path)) {
-            Ok(()) => tally.add(name, Ok(())),
-            Err(why) => tally.skip(name, &why),
-        }
+        let probed = image.and_then(|image| probe::kvm(&Qemu::default(), &image.path));
+        probed.map_err(Why::Skipped)
+    });
+}
+
+/// Runs cargo on packages; whatever it says goes to the terminal only if it fails.
+fn cargo(packages: &[String], words: &str, rest: &str, remedy: &str) -> Result<(), String> {
+    let mut command = system::cargo();
+    command.args(words.split(' '));
+    command.args(packages.iter().flat_map(|package| ["-p", package]));
+    command.args(rest.split_whitespace());
+    command.env("RUSTDOCFLAGS", "-D warnings");
+    let _lasting = Lasting::new(&format!("cargo {words}"));
+    let output = command.output();
+    let output = output.map_err(|error| format!("cannot start cargo: {error}"))?;
+    if output.status.success() {
+        return Ok(());
     }
+    eprint!("{}", String::from_utf8_lossy(&output.stdout));
+    eprint!("{}", String::from_utf8_lossy(&output.stderr));
+    Err(format!("`cargo {words}` failed; {remedy}"))
 }
 
 /// A package of ours has no `source`: it lies in the workspace.
@@ -112,30 +142,24 @@ fn foreign(lock: &str) -> Result<(), String> {
     ))
 }
 
-fn files_are_short(sources: &[PathBuf]) -> Result<(), String> {
-    complain(sources, |_, text| {
-        let lines = text.lines().count();
-        (lines > MOST_LINES).then(|| format!("has {lines} lines, split it"))
-    })
+fn is_long(name: &str, text: &str) -> Option<String> {
+    let lines = text.lines().count();
+    let is_long = name.ends_with(".rs") && lines > MOST_LINES;
+    is_long.then(|| format!("has {lines} lines, split it"))
 }
 
-fn files_have_essays(sources: &[PathBuf]) -> Result<(), String> {
-    complain(sources, |_, text| {
-        let code = text
-            .lines()
-            .find(|line| !line.trim().is_empty() && !line.starts_with("#!"));
-        let essay = code.is_some_and(|line| line.starts_with("//!"));
-        (!essay).then(|| "does not open with `//!`".to_string())
-    })
+fn lacks_essay(name: &str, text: &str) -> Option<String> {
+    let mut lines = text.lines();
+    let code = lines.find(|line| !line.trim().is_empty() && !line.starts_with("#!"));
+    let has_essay = code.is_some_and(|line| line.starts_with("//!"));
+    let lacks = name.ends_with(".rs") && !has_essay;
+    lacks.then(|| "does not open with `//!`".to_string())
 }
 
 /// Asks for a fault of each file, by its name and its text, and gathers them on one line.
-fn complain(
-    sources: &[PathBuf],
-    fault: impl Fn(&str, &str) -> Option<String>,
-) -> Result<(), String> {
+fn complain(files: &[PathBuf], fault: impl Fn(&str, &str) -> Option<String>) -> Result<(), String> {
     let mut faults = Vec::new();
-    for path in sources {
+    for path in files {
         let shown = own::shown(path);
         match fs::read(path) {
             Ok(text) => {
@@ -151,11 +175,9 @@ fn complain(
     Err(faults.join("; "))
 }
 
-fn image_is_light(app: &str) -> Result<(), String> {
-    let image = image::build(app)?;
-    let bytes = image.stripped_bytes()?;
+fn image_is_light(app: &str, most: u64) -> Result<(), String> {
+    let bytes = image::build(app)?.stripped_bytes()?;
     println!("image of {app}: {bytes} bytes stripped");
-    let most = image::most_stripped_bytes(app);
     if bytes <= most {
         return Ok(());
     }

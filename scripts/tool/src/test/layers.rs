@@ -5,12 +5,17 @@
 //! layer may name those that stand after it. A folder may have a row of its own, which
 //! orders what is right below it. Everywhere, no file may lead back to itself through files
 //! that name each other, but for a file and those it contains.
+//!
+//! A file's *module* is its path from the workspace's root, without `.rs` and `/mod`; the
+//! crate's root is its folder `src`. It *names* a module if a path in its code, within `use`
+//! or without, begins with `crate`, `super`, `self` or a child's name and leads into that
+//! module. Code for tests is left out: a test may name anything.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::path::{Path, PathBuf};
 
-use super::imports::{self, Module, Names};
-use crate::system;
+use crate::system::workspace;
 
 /// Where the table stands: the page, and the heading right above it.
 const PAGE: &str = "docs/architecture.md";
@@ -24,35 +29,40 @@ struct Row {
     layers: Vec<String>,
 }
 
-/// Holds every crate of the table against it.
-pub(super) fn check() -> Result<(), String> {
-    let page = fs::read_to_string(system::workspace().join(PAGE))
-        .map_err(|error| format!("{PAGE}: {error}"))?;
-    let rows = rows(&page);
+/// Which modules of its crate each module names, itself left out.
+type Names = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
+
+/// Holds the files of every crate of the table against it.
+pub(super) fn check(files: &[PathBuf]) -> Result<(), String> {
+    let page = fs::read_to_string(workspace().join(PAGE));
+    let rows = rows(&page.map_err(|error| format!("{PAGE}: {error}"))?);
     if rows.is_empty() {
         return Err(format!("{PAGE} has no table below `{HEADING}`"));
     }
-    let mut faults = Vec::new();
-    for row in &rows {
-        let (src, folder) = match row.src.split_once("/src/") {
-            Some((above, folder)) => (format!("{above}/src"), folder),
-            None => (row.src.clone(), ""),
-        };
-        let names = imports::read(&system::workspace().join(&src))?;
-        if folder.is_empty() {
-            for circle in circles(&names) {
-                let files = circle.join(", ");
-                faults.push(format!("{src}: {files} name each other in a circle"));
-            }
+    let mut codes = BTreeMap::new();
+    for file in files {
+        let place = file.strip_prefix(workspace()).unwrap_or(file);
+        if let Some(module) = module(place)
+            && rows.iter().any(|row| module.starts_with(&row.src))
+        {
+            let text = fs::read_to_string(file);
+            let text = text.map_err(|error| format!("{}: {error}", place.display()))?;
+            codes.insert(module, code(&text));
         }
-        let names = within(folder, &names);
-        faults.extend(strangers(row, &names));
-        faults.extend(upward(row, &names));
     }
-    if faults.is_empty() {
-        return Ok(());
+    let names = names(&codes);
+    let circles = circles(&names).into_iter();
+    let circles = circles.map(|circle| format!("{} name each other in a circle", list(&circle)));
+    let of_row = |row| {
+        strangers(row, &names)
+            .into_iter()
+            .chain(upward(row, &names))
+    };
+    let faults: Vec<String> = circles.chain(rows.iter().flat_map(of_row)).collect();
+    match faults.is_empty() {
+        true => Ok(()),
+        false => Err(faults.join("; ")),
     }
-    Err(faults.join("; "))
 }
 
 /// Reads the rows of the table, such as ``| `fass/src` | `api`, `run` |``.
@@ -77,24 +87,142 @@ fn rows(page: &str) -> Vec<Row> {
     section.lines().filter_map(row).collect()
 }
 
-/// What the files of a folder name of each other, by their paths from there.
-fn within(folder: &str, names: &Names) -> Names {
-    let above: Vec<&str> = folder.split_terminator('/').collect();
-    let inside = |module: &Module| {
-        let is_inside =
-            module.len() >= above.len() && module.iter().zip(&above).all(|(a, b)| a == b);
-        is_inside.then(|| module[above.len()..].to_vec())
+/// Returns a source file's module; nothing for tests and for what is no source.
+fn module(place: &Path) -> Option<PathBuf> {
+    let mut module = place.with_extension("");
+    let is_source = place.extension().is_some_and(|ending| ending == "rs");
+    if !is_source || module.iter().any(|part| part == "tests") {
+        return None;
+    }
+    if ["mod", "lib", "main"]
+        .iter()
+        .any(|name| module.ends_with(name))
+    {
+        module.pop();
+    }
+    Some(module)
+}
+
+/// Returns a file's text without its comments, and without its unit tests, which stand last.
+fn code(text: &str) -> String {
+    let product = text.split("\n#[cfg(test)]\nmod tests {").next();
+    let lines = product.unwrap_or_default().lines();
+    let lines = lines.filter(|line| !line.trim_start().starts_with("//"));
+    lines.map(|line| format!("{line}\n")).collect()
+}
+
+fn names(codes: &BTreeMap<PathBuf, String>) -> Names {
+    let named = |(module, code): (&PathBuf, &String)| {
+        let paths = paths(code).into_iter();
+        let mut named: BTreeSet<PathBuf> = paths
+            .filter_map(|path| target(module, &path, codes))
+            .collect();
+        named.remove(module);
+        (module.clone(), named)
     };
-    let files = names.iter().filter_map(|(module, named)| {
-        Some((inside(module)?, named.iter().filter_map(inside).collect()))
-    });
-    files.collect()
+    codes.iter().map(named).collect()
+}
+
+/// Returns the module that a path leads into, seen from `module`; nothing for a path into
+/// another crate.
+fn target(module: &Path, path: &[&str], modules: &BTreeMap<PathBuf, String>) -> Option<PathBuf> {
+    let [first, rest @ ..] = path else {
+        return None;
+    };
+    // A word alone is no path.
+    rest.first()?;
+    let mut from = module.to_path_buf();
+    match *first {
+        "crate" => {
+            from = module
+                .ancestors()
+                .find(|above| above.ends_with("src"))?
+                .into()
+        }
+        "self" => {}
+        "super" => drop(from.pop()),
+        child => {
+            from.push(child);
+            modules.get(&from)?;
+        }
+    }
+    for word in rest {
+        match *word {
+            "super" => drop(from.pop()),
+            word => from.push(word),
+        }
+    }
+    while !modules.contains_key(&from) {
+        from.pop().then_some(())?;
+    }
+    Some(from)
+}
+
+/// Returns every path of the code, those of a `use` written out one by one.
+fn paths(code: &str) -> Vec<Vec<&str>> {
+    let mut found = Vec::new();
+    // The path so far, whether it is one by itself, and how much of it the branches within each
+    // open brace begin with.
+    let (mut path, mut is_whole, mut begins) = (Vec::new(), false, Vec::new());
+    let mut is_joined = false;
+    for token in tokens(code) {
+        if !is_joined && token != "::" {
+            if is_whole {
+                found.push(path.clone());
+            }
+            is_whole = false;
+            path.truncate(begins.last().copied().unwrap_or(0));
+        }
+        match token {
+            "{" if is_joined => {
+                begins.push(path.len());
+                is_whole = false;
+            }
+            "}" => drop(begins.pop()),
+            "*" if is_joined => path.push("*"),
+            // What follows `::` at the begin of a path is another crate's, or of a type.
+            word if is_word(word) && (!is_joined || !path.is_empty()) => {
+                path.push(word);
+                is_whole = true;
+            }
+            _ => {}
+        }
+        is_joined = token == "::";
+    }
+    found
+}
+
+fn is_word(token: &str) -> bool {
+    token.starts_with(|c: char| c.is_alphabetic() || c == '_')
+}
+
+/// Cuts the code into words, `::`, and single other characters.
+fn tokens(code: &str) -> impl Iterator<Item = &str> {
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    let mut rest = code.trim_start();
+    std::iter::from_fn(move || {
+        let first = rest.chars().next()?;
+        let length = match rest.find(|c| !is_part(c)).unwrap_or(rest.len()) {
+            0 if rest.starts_with("::") => 2,
+            0 => first.len_utf8(),
+            length => length,
+        };
+        let (token, after) = rest.split_at(length);
+        rest = after.trim_start();
+        Some(token)
+    })
+}
+
+/// Returns the layer of a row that a module lies in.
+fn layer(row: &Row, module: &Path) -> Option<String> {
+    let first = module.strip_prefix(&row.src).ok()?.iter().next()?;
+    Some(first.to_string_lossy().into())
 }
 
 /// Layers that only the table or only the folder has.
 fn strangers(row: &Row, names: &Names) -> Vec<String> {
-    let there: BTreeSet<&String> = names.keys().filter_map(|module| module.first()).collect();
-    let listed: BTreeSet<&String> = row.layers.iter().collect();
+    let there: BTreeSet<String> = names.keys().filter_map(|it| layer(row, it)).collect();
+    let listed: BTreeSet<String> = row.layers.iter().cloned().collect();
     let missing = there.difference(&listed).map(|layer| {
         format!(
             "{}/{layer} is missing in {PAGE}; say which layers it may name",
@@ -108,53 +236,45 @@ fn strangers(row: &Row, names: &Names) -> Vec<String> {
 }
 
 /// Files that name a layer above their own.
-fn upward(row: &Row, names: &Names) -> Vec<String> {
-    let place = |module: &Module| {
-        let layer = module.first()?;
-        row.layers.iter().position(|listed| listed == layer)
+fn upward(row: &Row, names: &Names) -> impl Iterator<Item = String> {
+    let place = |module: &Path| {
+        let layer = layer(row, module)?;
+        row.layers.iter().position(|listed| *listed == layer)
     };
-    let mut faults = Vec::new();
-    for (module, named) in names {
-        for other in named {
-            if let (Some(from), Some(to)) = (place(module), place(other))
-                && to < from
-            {
-                faults.push(format!(
-                    "{}/{} names `{}`, a layer above its own",
-                    row.src,
-                    module.join("/"),
-                    other.join("::")
-                ));
-            }
-        }
-    }
-    faults
+    let all = names.iter();
+    let arrows = all.flat_map(|(from, named)| named.iter().map(move |to| (from, to)));
+    let is_upward = move |(from, to): &(&PathBuf, &PathBuf)| {
+        place(to)
+            .zip(place(from))
+            .is_some_and(|(to, from)| to < from)
+    };
+    arrows.filter(is_upward).map(|(from, to)| {
+        let (from, to) = (from.display(), to.display());
+        format!("{from} names {to}, a layer above its own")
+    })
 }
 
 /// Returns the circles of files that name each other, each in order of their names.
-fn circles(names: &Names) -> impl Iterator<Item = Vec<String>> {
-    let reached: BTreeMap<&Module, BTreeSet<&Module>> = names
+fn circles(names: &Names) -> BTreeSet<Vec<&PathBuf>> {
+    let reached = names
         .keys()
-        .map(|module| (module, reached_from(module, names)))
-        .collect();
-    let circle = |module: &&Module| -> Vec<String> {
-        let back = |other: &&&Module| reached[**other].contains(*module);
-        reached[*module]
-            .iter()
-            .filter(back)
-            .map(|other| other.join("/"))
+        .map(|module| (module, reached_from(module, names)));
+    let reached: BTreeMap<_, _> = reached.collect();
+    let circle = |module| -> Vec<&PathBuf> {
+        let others = reached[module].iter().copied();
+        others
+            .filter(|other| reached[other].contains(module))
             .collect()
     };
-    let found: BTreeSet<Vec<String>> = names
+    names
         .keys()
-        .by_ref()
-        .map(|module| circle(&module))
-        .collect();
-    found.into_iter().filter(|circle| circle.len() > 1)
+        .map(circle)
+        .filter(|circle| !circle.is_empty())
+        .collect()
 }
 
 /// Returns the modules that `module` names, directly or through others.
-fn reached_from<'n>(module: &'n Module, names: &'n Names) -> BTreeSet<&'n Module> {
+fn reached_from<'n>(module: &'n PathBuf, names: &'n Names) -> BTreeSet<&'n PathBuf> {
     let mut reached = BTreeSet::new();
     let mut open = vec![module];
     while let Some(next) = open.pop() {
@@ -168,18 +288,22 @@ fn reached_from<'n>(module: &'n Module, names: &'n Names) -> BTreeSet<&'n Module
     reached
 }
 
+fn list(modules: &[&PathBuf]) -> String {
+    let shown = modules.iter().map(|module| module.display().to_string());
+    shown.collect::<Vec<_>>().join(", ")
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{HEADING, Names, circles, rows, strangers, upward, within};
+    use super::*;
 
     /// Reads arrows between modules, such as `a/x>b`.
-    fn names(arrows: &str) -> Names {
-        let module = |path: &str| path.split('/').map(String::from).collect::<Vec<_>>();
+    fn arrows(line: &str) -> Names {
         let mut names = Names::new();
-        for arrow in arrows.split(' ') {
+        for arrow in line.split(' ') {
             let (from, to) = arrow.split_once('>').unwrap();
-            names.entry(module(to)).or_default();
-            names.entry(module(from)).or_default().insert(module(to));
+            names.entry(to.into()).or_default();
+            names.entry(from.into()).or_default().insert(to.into());
         }
         names
     }
@@ -193,13 +317,11 @@ mod tests {
         let [row] = &rows[..] else {
             panic!("{rows:?}");
         };
-        let up = ["x/src/low/b names `top::a`, a layer above its own"];
-        assert_eq!(upward(row, &names("top/a>low")), [""; 0]);
-        assert_eq!(upward(row, &names("low/b>top/a")), up);
-        // A folder has an order of its own.
-        let all = names("x/top/a>low x/low/b>x/top/a x/low/b>top");
-        assert_eq!(upward(row, &within("x", &all)), up);
-        let strangers = strangers(row, &names("top>new"));
+        let up = ["x/src/low/b names x/src/top/a, a layer above its own"];
+        let upward = |line| upward(row, &arrows(line)).collect::<Vec<_>>();
+        assert_eq!(upward("x/src/top/a>x/src/low x/src/low>top"), [""; 0]);
+        assert_eq!(upward("x/src/low/b>x/src/top/a"), up);
+        let strangers = strangers(row, &arrows("x/src/top>x/src/new"));
         let expected = [
             "x/src/new is missing in docs/architecture.md; say which layers it may name",
             "docs/architecture.md lists `low`, which x/src does not have",
@@ -209,8 +331,53 @@ mod tests {
 
     #[test]
     fn a_circle_is_named_but_not_one_of_parent_and_child() {
-        assert_eq!(circles(&names("a>a/x a/x>a")).count(), 0);
-        let circle = names("a/x>b b>c c>a/x b>d");
-        assert_eq!(circles(&circle).collect::<Vec<_>>(), [["a/x", "b", "c"]]);
+        assert!(circles(&arrows("a>a/x a/x>a")).is_empty());
+        let names = arrows("a/x>b b>c c>a/x b>d");
+        let circles: Vec<String> = circles(&names).iter().map(|it| list(it)).collect();
+        assert_eq!(circles, ["a/x, b, c"]);
+    }
+
+    #[test]
+    fn a_tree_of_imports_is_written_out() {
+        let code = "use crate::a::{self, B, c::{D as E, f::*}};\nlet x = super::g::H::new(y);";
+        let paths: BTreeSet<String> = paths(code).iter().map(|path| path.join("::")).collect();
+        for path in ["self", "B", "c::D", "c::f::*"] {
+            assert!(paths.contains(&format!("crate::a::{path}")), "{paths:?}");
+        }
+        assert!(paths.contains("super::g::H::new"), "{paths:?}");
+    }
+
+    #[test]
+    fn a_path_leads_into_the_module_that_is_there() {
+        let files = [
+            ("x/src", "mod a; mod b;", ""),
+            (
+                "x/src/a",
+                "mod x; use crate::b::Thing; x::f(); b.a",
+                "x/src/a/x x/src/b",
+            ),
+            (
+                "x/src/a/x",
+                "use super::super::b::y; use std::fs; crate::a::g();",
+                "x/src/a x/src/b",
+            ),
+            ("x/src/b", "", ""),
+        ];
+        let codes = files.map(|(path, code, _)| (path.into(), code.into()));
+        let names = names(&codes.into());
+        for (path, _, named) in files {
+            let expected = named.split_whitespace().map(PathBuf::from).collect();
+            assert_eq!(names[Path::new(path)], expected, "{path}");
+        }
+    }
+
+    #[test]
+    fn unit_tests_and_comments_do_not_count() {
+        let text = "//! A.\n#[cfg(test)]\nuse crate::a;\nfn f() {}\n\n#[cfg(test)]\nmod tests {\n}";
+        assert_eq!(code(text), "#[cfg(test)]\nuse crate::a;\nfn f() {}\n");
+        assert_eq!(module(Path::new("x/src/a/mod.rs")), Some("x/src/a".into()));
+        for other in ["x/src/tests.rs", "x/src/tests/a.rs", "x/src/a.s"] {
+            assert_eq!(module(Path::new(other)), None);
+        }
     }
 }

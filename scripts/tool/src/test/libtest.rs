@@ -1,19 +1,21 @@
-//! Running libtest binaries and doctests, and reading what they say.
+//! The tests of all packages: cargo compiles them and says where, libtest counts them.
 //!
-//! Cargo compiles; the binaries are run here, one after the other, so that
-//! each has a limit of its own and a name in the report. A binary's output is
-//! a file that is followed: its last word is its `test result:` lines, which
-//! are summed. Output is shown in full if something failed.
+//! The binaries are run here, one after the other, so that each has a limit of its own and a
+//! name in the report, and guests are booted only where they can be. A binary's last word is
+//! its `test result:` lines, which are summed. Output is shown in full if something failed.
 
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use super::crates::{self, TestBinary};
-use super::tally::Tally;
+use super::Plan;
+use super::tally::{Tally, Why};
 use crate::child::{Child, Waited, bound_to_us};
 use crate::golden;
+use crate::install::{self, Need};
+use crate::json::Value;
+use crate::lasting::Lasting;
 use crate::system;
 use crate::tail::Tail;
 
@@ -21,127 +23,165 @@ use crate::tail::Tail;
 /// host makes slow. Each guest has a limit of its own.
 const LIMIT: Duration = Duration::from_secs(3600);
 
-/// What shall run.
-pub(super) struct Plan {
-    /// A part of the names of the tests wanted; `None`: all.
-    pub(super) filter: Option<String>,
-    /// Leave out guests, images and lints.
-    pub(super) quick: bool,
-    /// Show every test by name.
-    pub(super) verbose: bool,
-    /// Whether guests can be booted, or why not.
-    pub(super) boots: Result<(), String>,
-    /// The list of rewritten files, if what differs is to be rewritten.
-    pub(super) blessed: Option<PathBuf>,
-}
+/// What test programs need besides QEMU.
+const NEEDS: [(&str, &[&Need]); 4] = [
+    ("boot_by_efi", &[&install::MTOOLS, &install::OVMF]),
+    (
+        "boot_on_screen",
+        &[&install::GRUB, &install::MTOOLS, &install::OVMF],
+    ),
+    ("boot_by_grub", &[&install::GRUB, &install::OVMF]),
+    ("boot_in_bochs", &[&install::GRUB, &install::BOCHS]),
+];
 
-impl Plan {
-    pub(super) fn wants(&self, name: &str) -> bool {
-        self.filter
-            .as_ref()
-            .is_none_or(|filter| name.contains(filter.as_str()))
-    }
+/// A compiled libtest binary.
+#[derive(Debug, PartialEq, Eq)]
+struct TestBinary {
+    /// The package's folder.
+    folder: PathBuf,
+    /// The target: the library's or the integration test's name.
+    target: String,
+    executable: PathBuf,
 }
 
 /// Runs the tests of all packages.
 pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     println!("compiling the tests");
-    let start = Instant::now();
-    let (binaries, compiled) = crates::compile();
-    tally.took("compiling the tests", start.elapsed());
+    let (binaries, compiled) = compile();
     if let Err(why) = compiled {
-        tally.add("all tests compile", Err(why));
+        tally.run("all tests compile", || Err(why.into()));
     }
     for binary in binaries {
-        let name = binary.name();
-        let skipped = match &plan.boots {
-            _ if !binary.boots_guests() => None,
-            _ if plan.quick => Some("left out by --quick".into()),
-            Err(why) => Some(why.clone()),
-            Ok(()) if has_matches(plan, &binary) => binary.ensure_needs().err(),
-            Ok(()) => None,
+        let (name, boots) = (binary.name(), binary.boots_guests());
+        if boots && !binary.has_matches(plan) {
+            continue;
+        }
+        let obstacle = match &plan.boots {
+            _ if !boots => Ok(()),
+            _ if plan.quick => Err("left out by --quick".into()),
+            boots => boots.clone().and_then(|()| binary.ensure_needs()),
         };
-        match skipped {
-            Some(why) if has_matches(plan, &binary) => tally.skip(&name, &why),
-            Some(_) => {}
-            None => run_binary(plan, &binary, tally),
+        match obstacle {
+            Err(why) => tally.skip(&name, &why),
+            Ok(()) => run(plan, &name, binary.command(plan), tally),
         }
     }
     if !plan.quick {
-        run_doctests(plan, tally);
+        run(plan, "doctests", doctests(plan), tally);
     }
 }
 
-/// Whether a binary that is not run has tests that the filter wants. One that
-/// cannot say so counts as if it had.
-fn has_matches(plan: &Plan, binary: &TestBinary) -> bool {
-    let Some(filter) = &plan.filter else {
-        return true;
-    };
-    let mut command = bound_to_us(&binary.executable);
-    let listed = command.args(["--list", "--format=terse"]).arg(filter);
-    match listed.stdin(Stdio::null()).stderr(Stdio::null()).output() {
-        Ok(output) if output.status.success() => !output.stdout.is_empty(),
-        _ => true,
+/// Compiles the tests of all packages. Cargo's errors go to standard error.
+fn compile() -> (Vec<TestBinary>, Result<(), String>) {
+    let _lasting = Lasting::new("compiling the tests");
+    let mut command = system::cargo();
+    let words = "test --workspace --no-run --no-fail-fast --quiet \
+                 --message-format=json-render-diagnostics";
+    command.args(words.split_whitespace());
+    let (messages, compiled) = system::messages_of(&mut command);
+    let mut binaries: Vec<TestBinary> = messages.iter().filter_map(TestBinary::read).collect();
+    // Cheap ones first: a mistake shows soon.
+    binaries.sort_by_key(|binary| (binary.boots_guests(), binary.name()));
+    (binaries, compiled)
+}
+
+impl TestBinary {
+    /// Reads one of cargo's messages: the test binary, if it announces one.
+    fn read(message: &Value) -> Option<TestBinary> {
+        let text = |path: &[&str]| message.at(path).and_then(Value::as_text);
+        let is_test = message.at(&["profile", "test"]).and_then(Value::as_bool);
+        if is_test != Some(true) {
+            return None;
+        }
+        let target = text(&["target", "name"])?;
+        let kind = message.at(&["target", "kind"])?.elements().first()?;
+        let target = match kind.as_text()? {
+            // The tool's package has a library and a program of one name.
+            "bin" => format!("{target} (program)"),
+            _ => target.into(),
+        };
+        Some(TestBinary {
+            folder: PathBuf::from(text(&["manifest_path"])?).parent()?.into(),
+            target,
+            executable: text(&["executable"])?.into(),
+        })
+    }
+
+    /// Names it for people: the package's folder and the target.
+    fn name(&self) -> String {
+        let folder = self.folder.strip_prefix(system::workspace());
+        let folder = folder.unwrap_or(&self.folder).display();
+        format!("{folder}: {}", self.target)
+    }
+
+    /// Whether its tests need QEMU; they say so by the target's name.
+    fn boots_guests(&self) -> bool {
+        self.target.starts_with("boot_") || self.target.ends_with("_qemu")
+    }
+
+    /// Installs what its tests need besides QEMU, if it is missing; they say so by the
+    /// target's name.
+    fn ensure_needs(&self) -> Result<(), String> {
+        let needs = NEEDS.iter().filter(|(target, _)| *target == self.target);
+        let mut needs = needs.flat_map(|(_, needs)| needs.iter());
+        needs.try_for_each(|need| install::ensure(need))
+    }
+
+    /// Returns what runs the tests that the filter wants. As cargo does it: tests run in their
+    /// package's folder. A tool that they start is called from where they start it, not from
+    /// where this one was.
+    fn command(&self, plan: &Plan) -> Command {
+        let mut command = bound_to_us(&self.executable);
+        command.current_dir(&self.folder).args(&plan.filter);
+        command.env("CARGO_MANIFEST_DIR", &self.folder);
+        command.env_remove("TOOL_CALLED_IN");
+        command
+    }
+
+    /// Whether it has tests that the filter wants. One that cannot say so counts as if it had.
+    fn has_matches(&self, plan: &Plan) -> bool {
+        let mut listed = self.command(plan);
+        listed.args(["--list", "--format=terse"]);
+        match listed.stdin(Stdio::null()).stderr(Stdio::null()).output() {
+            Ok(output) if output.status.success() => !output.stdout.is_empty(),
+            _ => true,
+        }
     }
 }
 
-fn run_binary(plan: &Plan, binary: &TestBinary, tally: &mut Tally) {
-    let mut command = bound_to_us(&binary.executable);
-    // As cargo does it: tests run in their package's folder. A tool that they start is
-    // called from where they start it, not from where this one was.
-    command
-        .current_dir(&binary.folder)
-        .env("CARGO_MANIFEST_DIR", &binary.folder)
-        .env_remove("TOOL_CALLED_IN");
-    command.args(&plan.filter);
-    run_and_read(plan, &binary.name(), command, tally);
-}
-
-fn run_doctests(plan: &Plan, tally: &mut Tally) {
+/// Returns what runs the examples in the documentation.
+fn doctests(plan: &Plan) -> Command {
     let mut command = system::cargo();
     // What the kernel on Linux shares with the kernel has examples that name the latter, where
     // they are tested; and `--doc` does not ask whether a library wants its examples tested.
-    command.args([
-        "test",
-        "--quiet",
-        "--workspace",
-        "--exclude=kernel-on-linux",
-        "--doc",
-        "--no-fail-fast",
-        "--",
-    ]);
     // `--quiet` makes libtest quiet too, which would hide the names.
-    command.arg("--format=pretty").args(&plan.filter);
-    run_and_read(plan, "doctests", command, tally);
+    let words = "test --quiet --workspace --exclude=kernel-on-linux --doc --no-fail-fast -- \
+                 --format=pretty";
+    command.args(words.split_whitespace()).args(&plan.filter);
+    command
 }
 
 /// Runs one command and counts what its output says.
-fn run_and_read(plan: &Plan, name: &str, mut command: Command, tally: &mut Tally) {
-    let ran = system::new_log("test").and_then(|log| {
-        let ran = run_logged(plan, &mut command, &log);
-        let _ = fs::remove_file(&log);
-        ran
-    });
-    let (waited, output, elapsed) = match ran {
-        Ok(ran) => ran,
-        Err(why) => return tally.add(name, Err(why)),
+fn run(plan: &Plan, name: &str, command: Command, tally: &mut Tally) {
+    let mut report = Report::default();
+    let (waited, elapsed) = match follow(plan, command, &mut report) {
+        Ok(ended) => ended,
+        Err(why) => return tally.run(name, || Err(why.into())),
     };
-    tally.took(name, elapsed);
-    let report = Report::read(&output);
     for (test, why) in &report.ignored {
         tally.skip(test, why);
     }
-    for test in &report.failed {
+    let failed = report.failed();
+    for test in &failed {
         tally.fail(&format!("{name}: {test}"), "see its output above");
     }
     tally.pass(report.passed);
 
     let died = match waited {
-        Waited::Ended(status) if !status.success() && report.failed.is_empty() => {
+        Waited::Ended(status) if !status.success() && failed.is_empty() => {
             Some(format!("ended with {status} although no test failed"))
         }
-        Waited::Ended(_) if report.results == 0 => Some("printed no `test result:` line".into()),
+        Waited::Ended(_) if !report.has_result => Some("printed no `test result:` line".into()),
         Waited::Ended(_) => None,
         Waited::TimedOut | Waited::GivenUp | Waited::Killed => Some(format!(
             "did not end within {} s and was killed; {}",
@@ -149,113 +189,107 @@ fn run_and_read(plan: &Plan, name: &str, mut command: Command, tally: &mut Tally
             system::host_load()
         )),
     };
-    if died.is_some() || !report.failed.is_empty() {
-        println!("{output}");
+    if died.is_some() || !failed.is_empty() {
+        println!("{}", report.output);
     }
     if let Some(why) = died {
-        return tally.add(name, Err(why));
-    }
-    if report.passed > 0 || !report.failed.is_empty() {
-        println!(
-            "{name}: {} passed, {} failed in {:.1} s",
-            report.passed,
-            report.failed.len(),
-            elapsed.as_secs_f64()
-        );
+        tally.run(name, || Err(Why::Failed(why)));
+    } else if report.passed > 0 || !failed.is_empty() {
+        let (passed, failed, seconds) = (report.passed, failed.len(), elapsed.as_secs_f64());
+        println!("{name}: {passed} passed, {failed} failed in {seconds:.1} s");
     }
 }
 
-fn run_logged(
+/// Runs one command to its end, and reads its output line by line.
+fn follow(
     plan: &Plan,
-    command: &mut Command,
-    log: &Path,
-) -> Result<(Waited, String, Duration), String> {
+    mut command: Command,
+    report: &mut Report,
+) -> Result<(Waited, Duration), String> {
+    let log = system::new_log("test")?;
     let error = |error| format!("`{}`: {error}", log.display());
-    let file = File::options()
-        .create(true)
-        .append(true)
-        .open(log)
-        .map_err(error)?;
+    let file = File::create(&log).map_err(error)?;
     let same = file.try_clone().map_err(error)?;
     command.stdin(Stdio::null()).stdout(file).stderr(same);
     command.envs(plan.blessed.iter().map(|list| (golden::BLESSED, list)));
     let program = command.get_program().display().to_string();
-    let started = Child::start(command);
+    let started = Child::start(&mut command);
     let mut child = started.map_err(|error| format!("cannot start `{program}`: {error}"))?;
 
-    let mut tail = Tail::new(log);
+    let mut tail = Tail::new(&log);
     let mut show = |line: &str| {
         if plan.verbose && line.starts_with("test ") {
             println!("{line}");
         }
+        report.take(line);
     };
     let waited = child.wait(LIMIT, || {
         tail.follow(&mut show);
         true
     });
     tail.finish(&mut show);
-    let output = fs::read(log).map_err(error)?;
-    let output = String::from_utf8_lossy(&output).into_owned();
-    Ok((waited, output, child.elapsed()))
+    // It is ours, and in the way of no one if it cannot be removed.
+    let _ = fs::remove_file(&log);
+    Ok((waited, child.elapsed()))
 }
 
 /// What libtest's output says.
-#[derive(Debug, Default, PartialEq, Eq)]
+#[derive(Default)]
 struct Report {
+    output: String,
     passed: u64,
-    failed: Vec<String>,
+    /// The number of failures, and the names of those that have a line of their own.
+    failures: u64,
+    named: Vec<String>,
     /// Names and reasons.
     ignored: Vec<(String, String)>,
-    /// The number of `test result:` lines.
-    results: usize,
+    has_result: bool,
 }
 
 impl Report {
-    fn read(output: &str) -> Report {
-        let mut report = Report::default();
-        // A name that stands in the result's count, but in no line of its own.
-        let mut unnamed = 0;
-        for line in output.lines() {
-            if let Some(result) = line.strip_prefix("test result: ") {
-                report.results += 1;
-                report.passed += count(result, " passed");
-                unnamed += count(result, " failed");
-            } else if let Some((name, how)) = test_line(line) {
-                match how.split_once(", ") {
-                    Some(("ignored", why)) => report.ignored.push((name.into(), why.into())),
-                    _ if how == "ignored" => {
-                        report.ignored.push((name.into(), "marked `ignore`".into()));
-                    }
-                    _ if how.starts_with("FAILED") => report.failed.push(name.into()),
-                    _ => {}
-                }
-            }
+    fn take(&mut self, line: &str) {
+        self.output += line;
+        self.output.push('\n');
+        if let Some(result) = line.strip_prefix("test result: ") {
+            self.has_result = true;
+            self.passed += count(result, " passed");
+            self.failures += count(result, " failed");
         }
-        let named = u64::try_from(report.failed.len()).unwrap_or(u64::MAX);
-        for _ in named..unnamed {
-            report
-                .failed
-                .push("a test without a line of its own".into());
+        let test = line.strip_prefix("test ");
+        let Some((name, how)) = test.and_then(|test| test.split_once(" ... ")) else {
+            return;
+        };
+        if let Some(why) = how.strip_prefix("ignored") {
+            let why = format!("marked `ignore`{why}");
+            self.ignored.push((name.into(), why));
+        } else if how.starts_with("FAILED") {
+            self.named.push(name.into());
         }
-        report
     }
-}
 
-/// Reads `test NAME ... HOW`.
-fn test_line(line: &str) -> Option<(&str, &str)> {
-    line.strip_prefix("test ")?.split_once(" ... ")
+    /// Returns the names of the tests that failed.
+    fn failed(&self) -> Vec<&str> {
+        let unnamed = self.failures.saturating_sub(self.named.len() as u64);
+        let unnamed = (0..unnamed).map(|_| "a test without a line of its own");
+        self.named
+            .iter()
+            .map(String::as_str)
+            .chain(unnamed)
+            .collect()
+    }
 }
 
 /// Reads the number before a word in `ok. 3 passed; 0 failed; ...`.
 fn count(result: &str, word: &str) -> u64 {
-    let parts = result.split([';', '.']).map(str::trim);
-    let numbers = parts.filter_map(|part| part.strip_suffix(word)?.parse::<u64>().ok());
-    numbers.sum()
+    let mut parts = result.split([';', '.']).map(str::trim);
+    let number = parts.find_map(|part| part.strip_suffix(word)?.parse().ok());
+    number.unwrap_or(0)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Report;
+    use super::{Report, TestBinary};
+    use crate::json::parse;
 
     const SAID: &str = "\
 running 4 tests
@@ -269,19 +303,41 @@ test result: FAILED. 1 passed; 1 failed; 2 ignored; 0 measured; 0 filtered out; 
 test result: ok. 40 passed; 0 failed; 0 ignored; 0 measured; 9 filtered out; finished in 0.00s
 ";
 
+    fn report(said: &str) -> Report {
+        let mut report = Report::default();
+        said.lines().for_each(|line| report.take(line));
+        assert_eq!(report.output, said);
+        report
+    }
+
     #[test]
     fn results_are_summed_and_names_kept() {
-        let report = Report::read(SAID);
-        let ignored = [("a::two", "waits for two"), ("a::three", "marked `ignore`")];
+        let said = report(SAID);
+        let ignored = [
+            ("a::two", "marked `ignore`, waits for two"),
+            ("a::three", "marked `ignore`"),
+        ];
         let ignored = ignored.map(|(name, why)| (name.into(), why.into()));
-        assert_eq!((report.passed, report.results), (41, 2));
-        assert_eq!(
-            (report.failed, report.ignored),
-            (vec!["a::four".into()], ignored.into())
-        );
+        assert!(said.passed == 41 && said.has_result);
+        assert_eq!(said.failed(), ["a::four"]);
+        assert_eq!(said.ignored, ignored);
         // A failure without a line counts, too.
-        let report = Report::read("test result: FAILED. 0 passed; 2 failed; 0 ignored\n");
-        assert_eq!(report.failed.len(), 2);
-        assert_eq!(Report::read("thread panicked\n"), Report::default());
+        let said = report("test result: FAILED. 0 passed; 2 failed; 0 ignored\n");
+        assert_eq!(said.failed().len(), 2);
+        let said = report("thread panicked\n");
+        assert!(said.failed().is_empty() && !said.has_result);
+    }
+
+    #[test]
+    fn a_message_about_a_test_binary_is_told_from_others() {
+        let message = r#"{"reason":"compiler-artifact","manifest_path":"/w/a/Cargo.toml",
+            "target":{"kind":["test"],"name":"boot_x"},
+            "profile":{"test":true},"executable":"/w/target/boot_x-1"}"#;
+        let found = TestBinary::read(&parse(message).unwrap()).unwrap();
+        assert!(found.name() == "/w/a: boot_x" && found.boots_guests());
+        let of_product = message.replace("true", "false");
+        for other in [&of_product, r#"{"reason":"build-finished","success":true}"#] {
+            assert_eq!(TestBinary::read(&parse(other).unwrap()), None);
+        }
     }
 }

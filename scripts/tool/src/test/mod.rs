@@ -11,29 +11,71 @@
 
 mod budgets;
 mod checks;
-mod code;
-mod crates;
 mod disk;
-mod imports;
 mod layers;
 mod libtest;
-mod lint;
 mod own;
-mod table;
 mod tally;
 
 use std::ffi::OsString;
 use std::fs;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use crate::image;
 use crate::install;
-use crate::options::Refusal;
+use crate::options::{Command, Refusal, Takes, options};
 use crate::system;
-use libtest::Plan;
+use tally::Tally;
 
-pub use table::TEST;
-pub use tally::Tally;
+/// The table of `test`.
+pub static TEST: Command = Command {
+    invocation: "./scripts/test",
+    about: "Runs every test, on the host and in QEMU, and counts them.",
+    positional: Some((
+        Takes::Text("FILTER"),
+        "Run only tests and checks whose name contains this.",
+    )),
+    options: options! {
+        /// Only what runs on the host: no guests, no images, no lints.
+        "quick": Takes::Nothing;
+        /// Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.
+        "bless": Takes::Nothing;
+        /// Show every test by name, not only those that fail.
+        "verbose" 'v': Takes::Nothing;
+    },
+    notes: "\
+The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
+the reasons above it. Each part says when it ends how many seconds it took.
+
+With --bless the files that were rewritten stand there, too; `git diff` shows what
+has changed in them. What cannot be rewritten still fails.
+
+exit codes: 0 nothing failed; 1 something failed; 2 a refused command line, or
+a FILTER by which nothing has run
+",
+};
+
+/// What shall run.
+struct Plan {
+    /// A part of the names of the tests wanted; `None`: all.
+    filter: Option<String>,
+    /// Leave out guests, images and lints.
+    quick: bool,
+    /// Show every test by name.
+    verbose: bool,
+    /// Whether guests can be booted, or why not.
+    boots: Result<(), String>,
+    /// The list of rewritten files, if what differs is to be rewritten.
+    blessed: Option<PathBuf>,
+}
+
+impl Plan {
+    fn wants(&self, name: &str) -> bool {
+        let filter = self.filter.as_deref();
+        filter.is_none_or(|filter| name.contains(filter))
+    }
+}
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
@@ -66,7 +108,7 @@ pub fn test(words: &[OsString]) -> ExitCode {
         }
         match complaint(plan.filter.as_deref(), &tally) {
             Some(line) => Err(Refusal::Usage(line)),
-            None => Ok(ExitCode::from(u8::from(tally.failed() > 0))),
+            None => Ok(ExitCode::from(u8::from(tally.has_failed()))),
         }
     })
 }
@@ -94,7 +136,7 @@ fn build_images(plan: &Plan, tally: &mut Tally) {
     for app in image::apps() {
         let name = format!("image of {app} builds");
         if plan.wants(&name) {
-            tally.run(&name, || image::build(&app).map(|_| ()));
+            tally.run(&name, || Ok(image::build(&app).map(drop)?));
         }
     }
 }

@@ -10,19 +10,19 @@ use std::path::{Path, PathBuf};
 use crate::image::package_name;
 use crate::system;
 
-/// Returns the names of the project's own packages, sorted.
-pub(super) fn packages() -> Vec<String> {
-    let (mut names, _) = read(system::workspace());
-    names.sort();
-    names
-}
-
 /// Returns all files of the workspace but the generated ones, and but those of packages that
 /// are not the project's own; sorted.
 pub(super) fn files() -> Vec<PathBuf> {
-    let (_, mut files) = read(system::workspace());
-    files.sort();
-    files
+    of(system::workspace())
+}
+
+/// Returns the names of the packages whose files these are, sorted.
+pub(super) fn packages(files: &[PathBuf]) -> Vec<String> {
+    let manifests = files.iter().filter(|file| file.ends_with("Cargo.toml"));
+    let texts = manifests.flat_map(fs::read_to_string);
+    let mut names: Vec<String> = texts.filter_map(|text| package_name(&text)).collect();
+    names.sort();
+    names
 }
 
 /// Names a file from the workspace's root.
@@ -31,30 +31,13 @@ pub(super) fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-fn read(root: &Path) -> (Vec<String>, Vec<PathBuf>) {
-    let (mut names, mut files) = (Vec::new(), Vec::new());
-    let mut folders = vec![root.to_path_buf()];
-    while let Some(folder) = folders.pop() {
-        if let Ok(manifest) = fs::read_to_string(folder.join("Cargo.toml"))
-            && let Some(name) = package_name(&manifest)
-        {
-            if !takes_lints(&manifest) {
-                continue;
-            }
-            names.push(name);
-        }
-        for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
-            let path = entry.path();
-            let name = entry.file_name();
-            let name = name.to_string_lossy();
-            if !path.is_dir() {
-                files.push(path);
-            } else if !name.starts_with('.') && name != "target" {
-                folders.push(path);
-            }
-        }
-    }
-    (names, files)
+fn of(root: &Path) -> Vec<PathBuf> {
+    system::files_below(root, |folder| {
+        let manifest = fs::read_to_string(folder.join("Cargo.toml"));
+        manifest.map_or(true, |text| {
+            package_name(&text).is_none() || takes_lints(&text)
+        })
+    })
 }
 
 fn takes_lints(manifest: &str) -> bool {
@@ -66,7 +49,7 @@ fn takes_lints(manifest: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{packages, read};
+    use super::{files, of, packages};
     use std::fs;
 
     #[test]
@@ -79,14 +62,13 @@ mod tests {
             fs::write(folder.join("Cargo.toml"), manifest).unwrap();
             fs::write(folder.join("src/lib.rs"), "").unwrap();
         }
-        let (names, mut files) = read(&root);
-        files.sort();
-        assert_eq!(names, ["ours"]);
+        let found = of(&root);
+        assert_eq!(packages(&found), ["ours"]);
         let ours = root.join("apps/ours");
-        assert_eq!(files, [ours.join("Cargo.toml"), ours.join("src/lib.rs")]);
+        assert_eq!(found, [ours.join("Cargo.toml"), ours.join("src/lib.rs")]);
         fs::remove_dir_all(root).unwrap();
 
-        let packages = packages();
+        let packages = packages(&files());
         let some = "sched-dag fass kernel boot-link tool harness fork-join";
         let missing = some
             .split(' ')
