@@ -8,7 +8,7 @@ use crate::fault_page::{documented_faults, with_names_of};
 use crate::markdown::{Block, blocks, page};
 use tool::golden::Golden;
 use tool::new_app::NEW_APP;
-use tool::options::{Command, Request};
+use tool::options::Command;
 use tool::run::RUN;
 use tool::system::workspace;
 use tool::test::TEST;
@@ -82,7 +82,7 @@ fn every_command_is_one_that_its_script_accepts() {
             command.unwrap_or_else(|| panic!("`{script}` is no script that the guide may name"));
         assert!(workspace().join(script).is_file(), "{script}");
         let parsed = command.parse(&words.map(OsString::from).collect::<Vec<_>>());
-        assert!(matches!(parsed, Ok(Request::Work(_))), "{line}: {parsed:?}");
+        assert!(parsed.is_ok(), "{line}: {parsed:?}");
         commands += 1;
     }
     assert!(commands >= 8, "{commands} commands are left");

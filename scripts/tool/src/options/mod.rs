@@ -12,24 +12,25 @@
 //! Words come as the system hands them over, and need not be text. The name of a file
 //! may be anything; every other word must be UTF-8.
 
-mod help;
 mod menu;
+mod option;
 mod parsed;
-mod read;
-mod value;
 
 use std::ffi::{OsStr, OsString};
-use std::fmt;
-use std::ops::RangeInclusive;
+use std::fmt::Write;
 use std::os::unix::ffi::OsStrExt;
+use std::process::ExitCode;
 
-use replay::shown::quoted;
+use replay::shown::{quoted, visible};
 
 pub use menu::{Choice, Menu, choices};
+pub(crate) use option::options;
+pub use option::{Opt, Takes};
 pub use parsed::Parsed;
-pub(crate) use read::BY_PERSON;
-pub use read::Refusal;
 pub use sched_dag::nearest;
+
+/// The exit code of a run that a person has ended before its time, as a shell has it for ctrl-C.
+pub(crate) const BY_PERSON: u8 = 130;
 
 /// A subcommand of the tool.
 #[derive(Debug)]
@@ -47,108 +48,84 @@ pub struct Command {
     pub notes: &'static str,
 }
 
-/// One option of a command.
-#[derive(Clone, Copy, Debug)]
-pub struct Opt {
-    /// The long name without its dashes.
-    pub name: &'static str,
-    /// The short form without its dash, such as `q`.
-    pub short: Option<char>,
-    /// What must follow.
-    pub takes: Takes,
-    /// The value when the option is not given; empty: it has none.
-    pub default: &'static str,
-    /// One sentence for the help text.
-    pub help: &'static str,
-}
-
-/// Makes the options of a [`Command`]: above each its sentence for the help text; a short form stands
-/// behind the name, and the value when the option is not given behind `or`.
-macro_rules! options {
-    ($($(#[doc = $help:literal])+ $name:literal $($short:literal)?: $takes:expr $(, or $default:expr)?;)*) => {
-        &[$(
-            $crate::options::Opt::new($name, $takes, concat!($($help),+))$(.short($short))?$(.or($default))?
-        ),*]
-    };
-}
-pub(crate) use options;
-
-/// What follows an option.
-#[derive(Clone, Copy, Debug)]
-pub enum Takes {
-    /// Nothing: the option is a flag.
-    Nothing,
-    /// A decimal number within bounds, both included.
-    Number {
-        /// The smallest number allowed.
-        least: u64,
-        /// The largest number allowed.
-        most: u64,
-    },
-    /// One or more such numbers with commas between.
-    Numbers {
-        /// The smallest number allowed.
-        least: u64,
-        /// The largest number allowed.
-        most: u64,
-    },
-    /// One of these words.
-    OneOf(&'static [&'static str]),
-    /// Any text; the word stands for it in the help text.
-    Text(&'static str),
-    /// The name of a file or folder, of any bytes; the word stands for it likewise.
-    File(&'static str),
-}
-
-impl Takes {
-    /// Takes a number of a range.
-    #[must_use]
-    pub const fn number(range: RangeInclusive<u64>) -> Takes {
-        let (least, most) = (*range.start(), *range.end());
-        Takes::Number { least, most }
-    }
-
-    /// Takes numbers of a range with commas between.
-    #[must_use]
-    pub const fn numbers(range: RangeInclusive<u64>) -> Takes {
-        let (least, most) = (*range.start(), *range.end());
-        Takes::Numbers { least, most }
-    }
-}
-
-/// What a command line asks for.
-#[derive(Debug)]
-pub enum Request {
-    /// To do the command's work.
-    Work(Parsed),
-    /// To be shown this help text.
-    Help(String),
-}
-
-/// A command line that breaks the command's table: one line of text.
+/// Why a command's work has come to nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct UsageError(pub String);
-
-impl fmt::Display for UsageError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
+pub enum Refusal {
+    /// The person wants to be shown this help text instead.
+    Help(String),
+    /// The command line, or a file that it names, is at fault: exit code 2.
+    Usage(String),
+    /// Something else is: exit code 1.
+    Failure(String),
+    /// A person has ended a run before others that were to follow: exit code 130.
+    ByPerson,
 }
 
-impl std::error::Error for UsageError {}
+impl From<String> for Refusal {
+    fn from(lines: String) -> Refusal {
+        Refusal::Failure(lines)
+    }
+}
 
 impl Command {
+    /// Does the work that a command line asks for, and returns the exit code. Help, and what is
+    /// refused, or failed, is shown here.
+    pub(crate) fn carry_out(
+        &self,
+        words: &[OsString],
+        work: impl FnOnce(&Parsed) -> Result<ExitCode, Refusal>,
+    ) -> ExitCode {
+        match self.parse(words).and_then(|options| work(&options)) {
+            Ok(code) => code,
+            Err(Refusal::Help(text)) => {
+                print!("{text}");
+                ExitCode::SUCCESS
+            }
+            Err(Refusal::Usage(lines)) => self.refuse(&lines),
+            Err(Refusal::Failure(lines)) => self.fail(&lines),
+            Err(Refusal::ByPerson) => ExitCode::from(BY_PERSON),
+        }
+    }
+
+    /// Says why the command line, or a file that it names, is refused, each line under
+    /// the command's name, and returns the exit code for it.
+    pub fn refuse(&self, lines: &str) -> ExitCode {
+        self.complain(lines);
+        ExitCode::from(2)
+    }
+
+    /// Says what failed, as [`refuse`](Self::refuse), and returns the exit code for it.
+    pub fn fail(&self, lines: &str) -> ExitCode {
+        self.complain(lines);
+        ExitCode::FAILURE
+    }
+
+    /// Says lines under the command's name. What they repeat of files and of words must
+    /// not rewrite a terminal.
+    pub(crate) fn complain(&self, lines: &str) {
+        let name = self.invocation.trim_start_matches("./scripts/");
+        (lines.lines()).for_each(|line| eprintln!("{name}: {}", visible(line)));
+    }
+
+    /// Returns the options of a command line that is right, for tests.
+    #[cfg(test)]
+    pub(crate) fn right(&self, line: &str) -> Parsed {
+        let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
+        let parsed = self.parse(&words);
+        parsed.unwrap_or_else(|refusal| panic!("`{line}` gave {refusal:?}"))
+    }
+
     /// Reads a command line (without the program's and the command's name).
     ///
     /// # Errors
     ///
-    /// The first word that the table does not allow.
-    pub fn parse(&self, words: &[OsString]) -> Result<Request, UsageError> {
+    /// The first word that the table does not allow, or the help text if that is asked for.
+    pub fn parse(&self, words: &[OsString]) -> Result<Parsed, Refusal> {
         let mut parsed = Parsed::new(self.options);
         let mut words = words.iter().map(OsString::as_os_str).peekable();
         while let Some(word) = words.next() {
             if word == "--help" || word == "-h" {
-                return Ok(Request::Help(self.help()));
+                return Err(Refusal::Help(self.help()));
             }
             if !word.as_bytes().starts_with(b"-") || word == "-" {
                 self.take_positional(&mut parsed, word)?;
@@ -156,31 +133,30 @@ impl Command {
             }
             let (name, attached) = split(word);
             let option = self.find(name, attached)?;
-            if parsed.is_given(option.name) {
-                return Err(UsageError(format!(
-                    "option `--{}` stands twice; give it once",
-                    option.name
-                )));
+            let name = option.name;
+            if parsed.is_given(name) {
+                let line = format!("option `--{name}` stands twice; give it once");
+                return Err(Refusal::Usage(line));
             }
             let value = match (option.takes, attached) {
                 (Takes::Nothing, None) => OsStr::new("yes"),
-                (Takes::Nothing, Some(_)) => return Err(takes_no_value(option.name)),
+                (Takes::Nothing, Some(_)) => return Err(takes_no_value(name)),
                 (_, Some(value)) => value,
                 // What looks like an option is meant as one.
                 (_, None) => words
                     .next_if(|next| !self.is_option(next))
-                    .ok_or_else(|| option.missing(words.peek().is_some()))?,
+                    .ok_or_else(|| Refusal::Usage(option.missing(words.peek().is_some())))?,
             };
-            option.check(value)?;
-            parsed.take(option.name, value);
+            option.check(value).map_err(Refusal::Usage)?;
+            parsed.take(name, value);
         }
-        Ok(Request::Work(parsed))
+        Ok(parsed)
     }
 
-    fn take_positional(&self, parsed: &mut Parsed, word: &OsStr) -> Result<(), UsageError> {
+    fn take_positional(&self, parsed: &mut Parsed, word: &OsStr) -> Result<(), Refusal> {
         let shown = quoted(&word.to_string_lossy()).to_string();
         let Some((takes, _)) = self.positional else {
-            return Err(UsageError(format!(
+            return Err(Refusal::Usage(format!(
                 "unknown word {shown}; options begin with `--`, see {} --help",
                 self.invocation
             )));
@@ -189,13 +165,13 @@ impl Command {
         if let Some(first) = parsed.files().next()
             && !name.ends_with("...")
         {
-            return Err(UsageError(format!(
+            return Err(Refusal::Usage(format!(
                 "{shown}: only one {name} is allowed, and {} is one",
                 quoted(&first.to_string_lossy())
             )));
         }
         if matches!(takes, Takes::Text(_)) && word.to_str().is_none() {
-            return Err(UsageError(format!(
+            return Err(Refusal::Usage(format!(
                 "{shown}: a {name} must be UTF-8 text; write it so"
             )));
         }
@@ -220,67 +196,77 @@ impl Command {
     }
 
     /// Finds the option of this name, to which this value is attached.
-    fn find(&self, name: &OsStr, attached: Option<&OsStr>) -> Result<&'static Opt, UsageError> {
+    fn find(&self, name: &OsStr, attached: Option<&OsStr>) -> Result<&'static Opt, Refusal> {
         let name = name.to_string_lossy();
         if attached.is_some() && (name == "--help" || name == "-h") {
             return Err(takes_no_value("help"));
         }
-        self.named(&name).ok_or_else(|| self.unknown(&name))
+        self.named(&name).ok_or_else(|| {
+            let names = self.options.iter().map(|option| option.name);
+            let allowed = names.chain(["help"]).collect::<Vec<_>>();
+            let hint = match nearest(name.trim_start_matches('-'), &allowed) {
+                Some(near) => format!("did you mean `--{near}`?"),
+                None => format!("allowed are --{}", allowed.join(", --")),
+            };
+            Refusal::Usage(format!("unknown option {}; {hint}", quoted(&name)))
+        })
     }
 
-    fn unknown(&self, name: &str) -> UsageError {
-        let names = self.options.iter().map(|option| option.name);
-        let allowed = names.chain(["help"]).collect::<Vec<_>>();
-        let hint = match nearest(name.trim_start_matches('-'), &allowed) {
-            Some(near) => format!("did you mean `--{near}`?"),
-            None => format!("allowed are --{}", allowed.join(", --")),
+    /// Returns the help text, ending in a newline.
+    #[must_use]
+    pub fn help(&self) -> String {
+        let mut text = String::new();
+        let positional = match self.positional {
+            Some((takes, _)) => format!(" [{}]", takes.name()),
+            None => String::new(),
         };
-        UsageError(format!("unknown option {}; {hint}", quoted(name)))
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(text, "{}\n", self.about);
+        let _ = writeln!(text, "usage: {}{positional} [options]\n", self.invocation);
+        if let Some((takes, help)) = self.positional {
+            add_entry(&mut text, takes.name(), help);
+        }
+        for option in self.options {
+            add_entry(&mut text, &option.heading(), &option.sentence());
+        }
+        add_entry(&mut text, "-h, --help", "Show this text.");
+        if !self.notes.is_empty() {
+            let _ = writeln!(text, "\n{}", self.notes.trim_end());
+        }
+        text
     }
 }
 
-fn takes_no_value(name: &str) -> UsageError {
-    UsageError(format!("option `--{name}` takes no value; write it alone"))
+/// Adds an entry to a help text: the sentence begins at a column, and is broken to a width.
+fn add_entry(text: &mut String, heading: &str, sentence: &str) {
+    const COLUMN: usize = 26;
+    const WIDTH: usize = 80;
+    let mut line = format!("  {heading}");
+    if line.len() + 2 > COLUMN {
+        let _ = writeln!(text, "{line}");
+        line.clear();
+    }
+    line = format!("{line:COLUMN$}");
+    for word in sentence.split_whitespace() {
+        if line.len() + word.len() > WIDTH {
+            let _ = writeln!(text, "{}", line.trim_end());
+            line = " ".repeat(COLUMN);
+        }
+        line.push_str(word);
+        line.push(' ');
+    }
+    let _ = writeln!(text, "{}", line.trim_end());
+}
+
+fn takes_no_value(name: &str) -> Refusal {
+    Refusal::Usage(format!("option `--{name}` takes no value; write it alone"))
 }
 
 /// Splits a word into the name of an option and the value attached by `=`.
 fn split(word: &OsStr) -> (&OsStr, Option<&OsStr>) {
-    let bytes = word.as_bytes();
-    match bytes.iter().position(|byte| *byte == b'=') {
-        Some(at) => (
-            OsStr::from_bytes(&bytes[..at]),
-            Some(OsStr::from_bytes(&bytes[at + 1..])),
-        ),
-        None => (word, None),
-    }
-}
-
-impl Opt {
-    /// Describes an option without short form and default.
-    #[must_use]
-    pub const fn new(name: &'static str, takes: Takes, help: &'static str) -> Opt {
-        Opt {
-            name,
-            short: None,
-            takes,
-            default: "",
-            help,
-        }
-    }
-
-    /// Adds a short form, without its dash.
-    #[must_use]
-    pub const fn short(mut self, short: char) -> Opt {
-        self.short = Some(short);
-        self
-    }
-
-    /// Adds the value when the option is not given.
-    #[must_use]
-    pub const fn or(mut self, default: &'static str) -> Opt {
-        self.default = default;
-        self
-    }
+    let mut parts = word.as_bytes().splitn(2, |byte| *byte == b'=');
+    let name = parts.next().unwrap_or_default();
+    (OsStr::from_bytes(name), parts.next().map(OsStr::from_bytes))
 }
 
 #[cfg(test)]

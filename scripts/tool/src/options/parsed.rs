@@ -13,27 +13,23 @@ use crate::files::Named;
 /// A command line that was understood.
 #[derive(Clone, Debug)]
 pub struct Parsed {
-    values: BTreeMap<&'static str, OsString>,
-    given: Vec<&'static str>,
+    options: &'static [Opt],
+    given: BTreeMap<&'static str, OsString>,
     positionals: Vec<OsString>,
 }
 
 impl Parsed {
     /// Begins with the defaults of these options.
-    pub(super) fn new(options: &[Opt]) -> Parsed {
-        let with_default = options.iter().filter(|option| !option.default.is_empty());
+    pub(super) fn new(options: &'static [Opt]) -> Parsed {
         Parsed {
-            values: with_default
-                .map(|option| (option.name, option.default.into()))
-                .collect(),
-            given: Vec::new(),
+            options,
+            given: BTreeMap::new(),
             positionals: Vec::new(),
         }
     }
 
     pub(super) fn take(&mut self, name: &'static str, value: &OsStr) {
-        self.values.insert(name, value.into());
-        self.given.push(name);
+        self.given.insert(name, value.into());
     }
 
     pub(super) fn take_positional(&mut self, word: &OsStr) {
@@ -43,20 +39,32 @@ impl Parsed {
     /// Returns whether the person gave the option (or flag).
     #[must_use]
     pub fn is_given(&self, name: &str) -> bool {
-        self.given.contains(&name)
+        self.given.contains_key(name)
+    }
+
+    fn value(&self, name: &str) -> Option<&OsStr> {
+        let default = || {
+            let mut options = self.options.iter();
+            let option = options.find(|option| option.name == name)?;
+            (!option.default.is_empty()).then(|| OsStr::new(option.default))
+        };
+        self.given
+            .get(name)
+            .map(OsString::as_os_str)
+            .or_else(default)
     }
 
     /// Returns the option's value or default; `None` if it has neither. For one that
     /// takes a file there is [`path`](Self::path).
     #[must_use]
     pub fn text(&self, name: &str) -> Option<&str> {
-        self.values.get(name).and_then(|value| value.to_str())
+        self.value(name).and_then(OsStr::to_str)
     }
 
     /// Returns the file that the option names, or its default; `None` if it has neither.
     #[must_use]
     pub fn path(&self, name: &str) -> Option<&Path> {
-        self.values.get(name).map(Path::new)
+        self.value(name).map(Path::new)
     }
 
     /// Returns the files that options of these names name, as far as they are given.
@@ -137,7 +145,7 @@ impl Parsed {
     #[must_use]
     pub fn without(&self, name: &str) -> Parsed {
         let mut other = self.clone();
-        other.given.retain(|given| *given != name);
+        other.given.remove(name);
         other
     }
 

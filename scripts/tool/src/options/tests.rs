@@ -4,7 +4,7 @@ use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::Path;
 
-use super::{Command, Opt, Parsed, Request, Takes};
+use super::{Command, Opt, Parsed, Refusal, Takes};
 
 static COMMAND: Command = Command {
     invocation: "./scripts/example",
@@ -25,17 +25,24 @@ static COMMAND: Command = Command {
     notes: "Exit codes: none.",
 };
 
-fn request(line: &str) -> Result<Request, String> {
-    let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
-    COMMAND.parse(&words).map_err(|error| error.to_string())
-}
-
 fn parsed(line: &str) -> Parsed {
     COMMAND.right(line)
 }
 
 fn refusal(line: &str) -> String {
-    request(line).expect_err(line)
+    refusal_of(
+        &line
+            .split_whitespace()
+            .map(OsString::from)
+            .collect::<Vec<_>>(),
+    )
+}
+
+fn refusal_of(words: &[OsString]) -> String {
+    match COMMAND.parse(words) {
+        Err(Refusal::Usage(line)) => line,
+        other => panic!("{words:?} gave {other:?}"),
+    }
 }
 
 #[test]
@@ -94,28 +101,24 @@ fn what_the_table_does_not_allow_is_named_with_what_it_does() {
 fn only_a_file_may_have_a_name_that_is_not_utf_8() {
     let odd = OsStr::from_bytes(b"\xff.log");
     let with = |option: &str| {
-        let words = [OsString::from(option), odd.into()];
+        let words = vec![OsString::from(option), odd.into()];
         let mut attached = OsString::from(format!("{option}=")).into_vec();
         attached.extend(odd.as_bytes());
-        let attached = COMMAND.parse(&[OsString::from_vec(attached)]);
-        (COMMAND.parse(&words), attached)
+        [words, vec![OsString::from_vec(attached)]]
     };
-    let (Ok(Request::Work(one)), Ok(Request::Work(other))) = with("--serial") else {
-        panic!("a file may have any name");
-    };
-    assert_eq!(one.path("serial"), Some(Path::new(odd)));
-    assert_eq!(other.path("serial"), Some(Path::new(odd)));
+    for words in with("--serial") {
+        let parsed = COMMAND.parse(&words).expect("a file may have any name");
+        assert_eq!(parsed.path("serial"), Some(Path::new(odd)));
+    }
     for (option, must) in [
         ("--cores", "a number from 1 to 64"),
         ("--mode", "one of kvm, deterministic, threads"),
         ("--only", "a name"),
     ] {
-        let (one, other) = with(option);
         let said = format!("`{option} \u{fffd}.log`: is not UTF-8 text; must be {must}");
-        assert_eq!(one.unwrap_err().0, said);
-        assert_eq!(other.unwrap_err().0, said);
+        assert_eq!(with(option).map(|words| refusal_of(&words)), [&*said; 2]);
     }
-    let word = COMMAND.parse(&[odd.into()]).unwrap_err().0;
+    let word = refusal_of(&[odd.into()]);
     assert!(word.starts_with("unknown word `\u{fffd}.log`; "), "{word}");
 }
 
@@ -129,15 +132,14 @@ fn a_value_is_repeated_in_part_and_visibly() {
         format!("`--cores {shown}...`: {range}")
     );
     let words = [OsString::from("--cores"), "1\n\u{1b}[2J".into()];
-    let said = COMMAND.parse(&words).unwrap_err().0;
+    let said = refusal_of(&words);
     assert_eq!(said, format!("`--cores 1\\n\\u{{1b}}[2J`: {range}"));
 }
 
 #[test]
 fn help_shows_the_table() {
-    let Ok(Request::Help(text)) = request("--cores 3 --help") else {
-        panic!("`--help` must give the help text");
-    };
+    let words = ["--cores", "3", "--help"].map(OsString::from);
+    let refusal = COMMAND.parse(&words).unwrap_err();
     let expected = "\
 Does nothing.
 
@@ -153,5 +155,5 @@ usage: ./scripts/example [options]
 
 Exit codes: none.
 ";
-    assert_eq!(text, expected);
+    assert_eq!(refusal, Refusal::Help(expected.into()));
 }

@@ -15,7 +15,7 @@ use std::process::{self, ExitCode};
 use super::{RUN, on_linux, run};
 use crate::files;
 use crate::image;
-use crate::options::{Command, Request, Takes};
+use crate::options::{Command, Refusal, Takes};
 
 /// The table of `boot`, for its help.
 static BOOT: Command = Command {
@@ -42,13 +42,13 @@ exit codes: those of ./scripts/run, or of the program
 pub fn boot(words: &[OsString]) -> ExitCode {
     let named = words.split_first();
     let Some((file, rest)) = named.filter(|(file, _)| !file.as_bytes().starts_with(b"-")) else {
-        return match BOOT.read(words) {
-            Ok(_) => BOOT.refuse("which file? name an image, such as `target/release/fork-join`"),
-            Err(code) => code,
-        };
+        return BOOT.carry_out(words, |_| {
+            let question = "which file? name an image, such as `target/release/fork-join`";
+            Err(Refusal::Usage(question.into()))
+        });
     };
     if let Ok(app) = image::check_file(Path::new(file)) {
-        if let Ok(Request::Work(options)) = RUN.parse(rest)
+        if let Ok(options) = RUN.parse(rest)
             && on_linux::is_asked_for(&options)
         {
             return match for_linux(app.as_deref()) {

@@ -21,7 +21,7 @@ use crate::child;
 use crate::files;
 use crate::image::{self, Profile};
 use crate::install;
-use crate::options::{Command, Opt, Parsed, Refusal, Request, Takes};
+use crate::options::{Command, Opt, Parsed, Refusal, Takes};
 use crate::qemu::{Mode, Qemu};
 use crate::system;
 
@@ -147,11 +147,7 @@ fn as_run(own: &Parsed) -> Result<Parsed, Refusal> {
         word.push(own.path(name)?);
         Some(word)
     });
-    match RUN.parse(&words.collect::<Vec<_>>()) {
-        Ok(Request::Work(parsed)) => Ok(parsed),
-        Ok(Request::Help(_)) => Err(Refusal::Usage("no word asks for help".into())),
-        Err(error) => Err(Refusal::Usage(error.to_string())),
-    }
+    RUN.parse(&words.collect::<Vec<_>>())
 }
 
 /// Starts QEMU, which waits for gdb at the socket, and a filter that shows what the guest

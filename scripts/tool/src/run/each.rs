@@ -26,7 +26,7 @@ pub(super) fn each(
                 RUN.complain(&format!("{}: {line}", files::place(file)));
                 Status::Failure
             }
-            Err(Refusal::ByPerson) => return Err(Refusal::ByPerson),
+            Err(refusal) => return Err(refusal),
         };
         refused += usize::from(status == Status::Usage);
         failed += usize::from(status == Status::Failure);

@@ -31,7 +31,6 @@ use plan::{Boot, Kind, Plan};
 
 use super::by_plan;
 use crate::golden::Golden;
-use crate::options::Request;
 use crate::outcome::boot;
 use crate::progress::Progress;
 use crate::qemu::Mode;
@@ -52,11 +51,9 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 ///
 /// In words: a guest failed, there is no baseline, or which figures have grown.
 pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
-    let plan = match table::TABLE.parse(&["--compare".into(), "--mode=deterministic".into()]) {
-        Ok(Request::Work(options)) => Plan::new(&options)?,
-        Ok(Request::Help(_)) => return Err("the options of the check ask for help".into()),
-        Err(error) => return Err(error.to_string()),
-    };
+    let words = ["--compare".into(), "--mode=deterministic".into()];
+    let options = table::TABLE.parse(&words);
+    let plan = Plan::new(&options.map_err(|refusal| format!("{refusal:?}"))?)?;
     install::ensure_qemu()?;
     let before = plan.before.as_deref().unwrap_or_default();
     let image = image::build("hand-off")?;
