@@ -8,13 +8,12 @@
 //! the list by which the firmware corrects them; one that cannot be is refused.
 
 use std::iter;
-use std::path::Path;
 
 use boot_efi::file::{self, IMAGE, MODULE, SUM, WORDS};
 
 use crate::elf::{self, Correction};
 use crate::files;
-use crate::image;
+use crate::image::{self, Contents};
 
 /// Where a firmware looks for it on a stick.
 pub const PLACE: &str = "EFI/BOOT/BOOTX64.EFI";
@@ -47,35 +46,33 @@ impl Section {
     }
 }
 
-/// Makes the application that boots `image` with `words` and leaves `module` in memory. The
-/// part that the firmware starts is built first.
+/// Makes the application that boots what `contents` have. The part that the firmware starts is
+/// built first.
 ///
 /// # Errors
 ///
-/// In words: a file cannot be read or is none of ours, or the build failed.
-pub fn application(image: &Path, words: &str, module: Option<&Path>) -> Result<Vec<u8>, String> {
-    let of = |path: &Path, why: String| format!("`{}`: {why}", files::place(path));
-    let read = |path: &Path| files::read(path).map_err(|why| of(path, why));
-    let loaded = elf::loaded(read(image)?).map_err(|why| of(image, why))?;
-    let module = module.map(read).transpose()?;
-    let built = image::build("boot-efi")?;
-    let own = read(&built.path)?;
-    assemble(&own, contents(loaded, words, module)).map_err(|why| of(&built.path, why))
+/// In words: the build failed, or its result is none of ours.
+pub fn application(contents: &Contents<'_>) -> Result<Vec<u8>, String> {
+    let own = image::build("boot-efi")?.path;
+    let made = assemble(&files::read_at(&own)?, parts(contents));
+    made.map_err(|why| format!("`{}`: {why}", files::place(&own)))
 }
 
 /// Returns the sections that the application looks for.
-fn contents(image: Vec<u8>, words: &str, module: Option<Vec<u8>>) -> Vec<(&'static str, Vec<u8>)> {
-    let sum = file::sum([
-        &image,
-        words.as_bytes(),
-        module.as_deref().unwrap_or_default(),
-    ]);
+fn parts(contents: &Contents<'_>) -> Vec<(&'static str, Vec<u8>)> {
+    let Contents {
+        image,
+        words,
+        module,
+    } = contents;
+    let content = module.as_deref().unwrap_or_default();
+    let sum = file::sum([image, words.as_bytes(), content]);
     let always = [
-        (IMAGE, image),
-        (WORDS, words.into()),
+        (IMAGE, image.clone()),
+        (WORDS, (*words).into()),
         (SUM, sum.to_le_bytes().into()),
     ];
-    let module = module.map(|module| (MODULE, module));
+    let module = module.clone().map(|module| (MODULE, module));
     always.into_iter().chain(module).collect()
 }
 
@@ -223,7 +220,7 @@ fn short(number: u64) -> [u8; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Correction, IMAGE, MODULE, WORDS, assemble, contents, corrections_list};
+    use super::{Contents, Correction, IMAGE, MODULE, WORDS, assemble, corrections_list, parts};
     use crate::tiny::{TinyEnd, tiny_image};
     use boot_efi::file::{is_whole, section};
 
@@ -248,8 +245,12 @@ mod tests {
     fn the_application_finds_what_the_file_has() {
         let program = tiny_image("program", TinyEnd::Never);
         for module in [Some(vec![9; 4096]), None] {
-            let parts = contents(vec![7; 5000], "jobs=3", module.clone());
-            let file = assemble(&program, parts).unwrap();
+            let contents = Contents {
+                image: vec![7; 5000],
+                words: "jobs=3",
+                module: module.clone(),
+            };
+            let file = assemble(&program, parts(&contents)).unwrap();
             assert!(file.len().is_multiple_of(512));
             let mut memory = loaded(&file);
             for (name, content) in [

@@ -17,6 +17,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use replay::shown::visible;
 
+use crate::system;
+
 /// The most bytes of an input: far more than a guest or a reader can use.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -81,6 +83,15 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
+/// Reads an input that a message names by its path alone.
+///
+/// # Errors
+///
+/// In words, with the file.
+pub(crate) fn read_at(path: &Path) -> Result<Vec<u8>, String> {
+    read(path).map_err(|why| format!("`{}`: {why}", place(path)))
+}
+
 /// Reads the input that an option names.
 ///
 /// # Errors
@@ -105,14 +116,30 @@ pub(crate) fn write_named(
     written.map_err(|error| format!("{}: cannot be written: {error}", named.words()))
 }
 
-/// Writes a file of ours.
+/// Writes a file of ours, and makes the folder that it lies in.
 ///
 /// # Errors
 ///
 /// In words, with the file.
 pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), String> {
-    let written = fs::write(path, content);
+    let written = fs::create_dir_all(folder_of(path)).and_then(|()| fs::write(path, content));
     written.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
+}
+
+/// Lends `work` the name of a folder of ours, which is removed afterwards.
+///
+/// # Errors
+///
+/// As of `work`, or as [`system::new_log`].
+pub(crate) fn in_folder<R>(
+    name: &str,
+    work: impl FnOnce(&Path) -> Result<R, String>,
+) -> Result<R, String> {
+    let folder = system::new_log(name)?.with_extension("folder");
+    let result = work(&folder);
+    // It is ours, and in the way of no one if it cannot be removed.
+    let _ = fs::remove_dir_all(&folder);
+    result
 }
 
 /// Reads an input that must be text, of at most 64 MiB. The invisible mark by which some
@@ -295,6 +322,13 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
 /// A file of ours, removed when it is of no more use.
 #[derive(Debug)]
 pub(crate) struct Temporary(pub(crate) Option<PathBuf>);
+
+impl Temporary {
+    /// Returns its name; nothing if there is no file.
+    pub(crate) fn path(&self) -> &Path {
+        self.0.as_deref().unwrap_or(Path::new(""))
+    }
+}
 
 impl Drop for Temporary {
     fn drop(&mut self) {

@@ -118,6 +118,33 @@ pub fn check_linux_file(path: &Path) -> Result<Option<String>, String> {
     }
 }
 
+/// All that is on a medium from which a PC boots.
+#[derive(Debug)]
+pub struct Contents<'w> {
+    /// The image, as far as it is loaded.
+    pub image: Vec<u8>,
+    /// The words for it.
+    pub words: &'w str,
+    /// A file to be left in memory.
+    pub module: Option<Vec<u8>>,
+}
+
+impl<'w> Contents<'w> {
+    /// Reads the files of image and module.
+    ///
+    /// # Errors
+    ///
+    /// In words: one cannot be read, or the image is no ELF file.
+    pub fn read(image: &Path, words: &'w str, module: Option<&Path>) -> Result<Self, String> {
+        let loaded = elf::loaded(files::read_at(image)?);
+        Ok(Contents {
+            image: loaded.map_err(|why| format!("`{}`: {why}", files::place(image)))?,
+            words,
+            module: module.map(files::read_at).transpose()?,
+        })
+    }
+}
+
 /// How an image is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Profile {

@@ -5,12 +5,11 @@
 //! other. `grub-mkrescue` makes it, with the few of GRUB's modules that this takes.
 
 use std::ffi::OsString;
-use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use crate::elf;
 use crate::files;
+use crate::image::Contents;
 use crate::install;
 use crate::system;
 
@@ -40,40 +39,26 @@ pub fn check_words(words: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Makes the ISO `iso` that boots `image` with `words` and leaves `module` in memory.
+/// Makes the ISO `iso` that boots what `contents` have.
 /// What it is made with is installed if it is missing.
 ///
 /// # Errors
 ///
-/// In words: the words are refused, something is missing, a file cannot be read or written,
-/// or `grub-mkrescue` failed.
-pub fn write(iso: &Path, image: &Path, words: &str, module: Option<&Path>) -> Result<(), String> {
-    check_words(words)?;
+/// In words: the words are refused, something is missing, a file cannot be written, or
+/// `grub-mkrescue` failed.
+pub fn write(iso: &Path, contents: &Contents<'_>) -> Result<(), String> {
+    check_words(contents.words)?;
     install::ensure(&install::GRUB)?;
-    let folder = system::new_log("iso")?.with_extension("folder");
-    let made = fill(&folder, image, words, module).and_then(|()| rescue(&folder, iso));
-    // It is ours, and in the way of no one if it cannot be removed.
-    let _ = fs::remove_dir_all(&folder);
-    made
-}
-
-/// Lays out what the ISO is to have in `folder`.
-fn fill(folder: &Path, image: &Path, words: &str, module: Option<&Path>) -> Result<(), String> {
-    let of = |path: &Path, why: String| format!("`{}`: {why}", files::place(path));
-    let read = |path: &Path| files::read(path).map_err(|why| of(path, why));
-    let loaded = elf::loaded(read(image)?).map_err(|why| of(image, why))?;
-    let boot = folder.join("boot");
-    let write = |name: &str, bytes: &[u8]| files::write(&boot.join(name), bytes);
-    fs::create_dir_all(boot.join("grub"))
-        .map_err(|why| format!("cannot make the folder `{}`: {why}", folder.display()))?;
-    write("image", &loaded)?;
-    if let Some(module) = module {
-        write("module", &read(module)?)?;
-    }
-    write(
-        "grub/grub.cfg",
-        commands(words, module.is_some()).as_bytes(),
-    )
+    files::in_folder("iso", |folder| {
+        let boot = folder.join("boot");
+        let commands = commands(contents.words, contents.module.is_some());
+        files::write(&boot.join("grub/grub.cfg"), commands)?;
+        files::write(&boot.join("image"), &contents.image)?;
+        if let Some(module) = &contents.module {
+            files::write(&boot.join("module"), module)?;
+        }
+        rescue(folder, iso)
+    })
 }
 
 /// Returns GRUB's commands. A file is left as it is, compressed or not. A processor without
@@ -103,18 +88,14 @@ fn rescue(folder: &Path, iso: &Path) -> Result<(), String> {
     output.push(iso);
     let mut command = Command::new("grub-mkrescue");
     command.args(["--locales=", "--themes=", "--fonts=", MODULES]);
-    let made = command.arg(output).arg(folder).output();
-    let made = made.map_err(|why| format!("`grub-mkrescue` did not start: {why}"))?;
-    if made.status.success() && iso.is_file() {
-        return Ok(());
-    }
-    let said = String::from_utf8_lossy(&made.stderr);
-    let last: Vec<&str> = said.lines().rev().take(3).collect();
-    Err(format!(
-        "`grub-mkrescue` could not make `{}`: {}",
-        files::place(iso),
-        last.into_iter().rev().collect::<Vec<_>>().join("; ")
-    ))
+    let made = system::run(command.arg(output).arg(folder));
+    made.and_then(|_| match iso.is_file() {
+        true => Ok(()),
+        false => Err(format!(
+            "`grub-mkrescue` has not made `{}`",
+            files::place(iso)
+        )),
+    })
 }
 
 #[cfg(test)]

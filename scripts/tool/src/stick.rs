@@ -13,7 +13,7 @@ use std::process::ExitCode;
 
 use crate::efi;
 use crate::files;
-use crate::image;
+use crate::image::{self, Contents};
 use crate::iso;
 use crate::medium::Medium;
 use crate::options::{Command, Parsed, Refusal, Takes, options};
@@ -115,7 +115,7 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
         );
     }
     if let Some(path) = options.path("efi") {
-        let made = efi::application(&image, words, module)?;
+        let made = efi::application(&Contents::read(&image, words, module)?)?;
         files::write_named("efi", path, &made)?;
         let place = files::place(path);
         lines += &format!(

@@ -64,6 +64,24 @@ pub(crate) fn messages_of(cargo: &mut Command) -> (Vec<Value>, Result<(), String
     (messages.collect(), ended)
 }
 
+/// Runs a command to its end, and returns what it has printed.
+///
+/// # Errors
+///
+/// In words, with the program and the last lines that it has complained by.
+pub(crate) fn run(command: &mut Command) -> Result<String, String> {
+    let name = command.get_program().display().to_string();
+    let output = command.stdin(Stdio::null()).output();
+    let output = output.map_err(|why| format!("`{name}` did not start: {why}"))?;
+    if output.status.success() {
+        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
+    }
+    let said = String::from_utf8_lossy(&output.stderr);
+    let lines: Vec<&str> = said.trim().lines().collect();
+    let last = lines[lines.len().saturating_sub(12)..].join("\n");
+    Err(format!("`{name}` failed ({}): {last}", output.status))
+}
+
 /// Returns where a program lies: a path that is one itself, or a name found
 /// on the `PATH`.
 #[must_use]

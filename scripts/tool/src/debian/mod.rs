@@ -2,11 +2,10 @@
 //! computer's: one with `sched_ext`, or one that grants SCHED_FIFO.
 //!
 //! Kernel and tools are Debian's packages (`packages`). What the guest has of files is in an
-//! archive that the kernel unpacks into memory (`archive`): the program, the libraries that it
+//! archive that the kernel unpacks into memory: the program, the libraries that it
 //! names, and a script that runs it. What it prints comes through a port of its own, as bytes
 //! and at any speed; its exit code through another one, into a file.
 
-mod archive;
 mod packages;
 
 use std::ffi::OsString;
@@ -14,12 +13,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::files::{Temporary, write};
+use crate::files::{self, Temporary, write};
 use crate::install;
 use crate::lasting::Lasting;
 use crate::qemu::{Mode, PROGRAM, file_value};
-use crate::system;
-use archive::Archive;
+use crate::system::{self, run};
 use packages::Packages;
 
 /// What the guest runs first, and all that it runs besides the program.
@@ -76,9 +74,11 @@ impl Guest {
         let place = |kind: &str| Temporary(Some(own.with_extension(kind)));
         let (archive, end) = (place("cpio"), place("end"));
         let console = log.with_extension("console");
-        let files = order.pack(&packages)?;
-        write(&own.with_extension("cpio"), files.finish())?;
-        write(&own.with_extension("end"), "")?;
+        files::in_folder("debian", |folder| {
+            order.lay_out(folder, &packages)?;
+            pack(folder, &packages, archive.path())
+        })?;
+        write(end.path(), "")?;
         let mut words: Vec<OsString> = Vec::new();
         let accelerator: &[&str] = match order.mode {
             Mode::Kvm => &["-accel", "kvm", "-cpu", "host"],
@@ -88,7 +88,7 @@ impl Guest {
         };
         words.extend(accelerator.iter().map(OsString::from));
         // Not by standard output: the port would be closed with the end of standard input.
-        for (port, path) in [("out", log), ("end", &own.with_extension("end"))] {
+        for (port, path) in [("out", log), ("end", end.path())] {
             let file = file_value(&format!("file,id={port},path="), path);
             words.extend(["-chardev".into(), file]);
         }
@@ -104,7 +104,7 @@ impl Guest {
             ("-smp", order.cores.to_string().into()),
             ("-m", MEMORY_MIB.to_string().into()),
             ("-kernel", packages.kernel.clone().into()),
-            ("-initrd", own.with_extension("cpio").into()),
+            ("-initrd", archive.path().into()),
             ("-serial", file_value("file:", &console)),
         ] {
             words.extend([option.into(), value]);
@@ -122,8 +122,8 @@ impl Guest {
     /// Linux has ended the policy before the program's end.
     #[must_use]
     pub fn code(&self) -> Option<i32> {
-        let end = self.end.0.as_ref()?;
-        fs::read_to_string(end).ok()?.trim().parse().ok()
+        let end = fs::read_to_string(self.end.path());
+        end.ok()?.trim().parse().ok()
     }
 
     /// Returns the last lines of what the guest itself has said, and where all of it is.
@@ -142,76 +142,58 @@ impl Guest {
 }
 
 impl Order<'_> {
-    /// Packs what the guest needs of files.
-    fn pack(&self, packages: &Packages) -> Result<Archive, String> {
-        let mut archive = Archive::default();
+    /// Lays out what the guest needs of files in a folder.
+    fn lay_out(&self, folder: &Path, packages: &Packages) -> Result<(), String> {
+        let add = |name: &str, source: &Path| write(&folder.join(name), files::read_at(source)?);
         let mut words = Vec::new();
         for word in self.words {
             match word.to_str().and_then(|word| word.strip_prefix("module=")) {
                 Some(module) => {
-                    archive.add("module", &read(Path::new(module))?);
+                    add("module", Path::new(module))?;
                     words.push("module=/module".to_owned());
                 }
                 None => words.push(word.to_string_lossy().into_owned()),
             }
         }
-        archive.add("init", INIT.as_bytes());
-        archive.add("words", words.join("\n").as_bytes());
-        archive.add("busy", self.busy.to_string().as_bytes());
-        archive.add(
-            "bin/busybox",
-            &read(&packages.root.join("usr/bin/busybox"))?,
-        );
-        archive.add("program", &read(self.program)?);
+        write(&folder.join("init"), INIT)?;
+        write(&folder.join("words"), words.join("\n"))?;
+        write(&folder.join("busy"), self.busy.to_string())?;
+        add("bin/busybox", &packages.busybox())?;
+        add("program", self.program)?;
         let mut programs = vec![self.program.to_path_buf()];
         if self.with_policy {
             let bpftool = packages.root.join("usr/sbin/bpftool");
-            archive.add("bin/bpftool", &read(&bpftool)?);
-            archive.add("policy.o", &compile(packages)?);
+            add("bin/bpftool", &bpftool)?;
+            compile(packages, &folder.join("policy.o"))?;
             programs.push(bpftool);
         }
-        archive.add("lib64/ld-linux-x86-64.so.2", &read(&packages.loader())?);
+        add("lib64/ld-linux-x86-64.so.2", &packages.loader())?;
         for library in packages.libraries(&programs)? {
             if let Some(name) = library.file_name().and_then(|name| name.to_str()) {
-                archive.add(&format!("lib/x86_64-linux-gnu/{name}"), &read(&library)?);
+                add(&format!("lib/x86_64-linux-gnu/{name}"), &library)?;
             }
         }
-        for folder in ["proc", "sys", "dev", "tmp"] {
-            archive.folder(folder);
-        }
-        Ok(archive)
+        Ok(())
     }
 }
 
+/// Packs a folder for Linux, which unpacks it into memory when it starts: in cpio's format, with
+/// the folders that the script mounts. Everything may be executed, and is root's.
+fn pack(folder: &Path, packages: &Packages, archive: &Path) -> Result<(), String> {
+    const LINES: &str = "set -e; mkdir proc sys dev tmp; chmod -R 755 .
+        find . | \"$0\" cpio -o -H newc -R 0:0 >\"$1\"";
+    let busybox = packages.busybox();
+    let mut command = Command::new(&busybox);
+    command.current_dir(folder).args(["sh", "-c", LINES]);
+    run(command.arg(&busybox).arg(archive)).map(drop)
+}
+
 /// Compiles the policy.
-fn compile(packages: &Packages) -> Result<Vec<u8>, String> {
+fn compile(packages: &Packages, object: &Path) -> Result<(), String> {
     let _lasting = Lasting::new("compiling the policy");
-    let object = system::new_log("policy")?.with_extension("o");
-    let object = Temporary(Some(object));
-    let place = object.0.as_deref().unwrap_or(Path::new(""));
     let mut clang = packages.command("usr/lib/llvm-19/bin/clang");
     clang.args("-target bpf -mcpu=v3 -O2 -g -Wall -Werror -D__TARGET_ARCH_x86 -c".split(' '));
     clang.arg("-I").arg(packages.root.join("usr/include"));
     clang.arg(system::workspace().join(POLICY));
-    run(clang.arg("-o").arg(place))?;
-    read(place)
-}
-
-/// Runs a command to its end, and returns what it has printed.
-fn run(command: &mut Command) -> Result<String, String> {
-    let name = command.get_program().to_string_lossy().into_owned();
-    let output = command.output();
-    let output = output.map_err(|why| format!("`{name}` did not start: {why}"))?;
-    match output.status.success() {
-        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
-        false => Err(format!(
-            "`{name}` failed ({}): {}",
-            output.status,
-            String::from_utf8_lossy(&output.stderr).trim()
-        )),
-    }
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, String> {
-    fs::read(path).map_err(|why| format!("cannot read `{}`: {why}", path.display()))
+    run(clang.arg("-o").arg(object)).map(drop)
 }

@@ -8,10 +8,9 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::run;
 use crate::files;
 use crate::lasting::Lasting;
-use crate::system::{self, find_program};
+use crate::system::{self, find_program, run};
 
 /// What is fetched besides the kernel, with all that it depends on.
 const PACKAGES: [&str; 4] = ["busybox-static", "bpftool", "clang-19", "libbpf-dev"];
@@ -62,12 +61,23 @@ impl Packages {
         self.root.join("usr/lib64/ld-linux-x86-64.so.2")
     }
 
+    /// Returns the program of many tools, which needs no libraries.
+    pub(super) fn busybox(&self) -> PathBuf {
+        self.root.join("usr/bin/busybox")
+    }
+
     /// Returns a command of one of the packages' programs.
     pub(super) fn command(&self, program: &str) -> Command {
+        let mut command = self.loading();
+        command.arg(self.root.join(program));
+        command
+    }
+
+    /// Returns the command that loads a program with the packages' libraries.
+    fn loading(&self) -> Command {
         let mut command = Command::new(self.loader());
         let libraries = self.root.join("usr/lib/x86_64-linux-gnu");
         command.arg("--library-path").arg(libraries);
-        command.arg(self.root.join(program));
         command
     }
 
@@ -75,10 +85,7 @@ impl Packages {
     pub(super) fn libraries(&self, programs: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
         let mut found = Vec::new();
         for program in programs {
-            let mut command = Command::new(self.loader());
-            let libraries = self.root.join("usr/lib/x86_64-linux-gnu");
-            command.arg("--library-path").arg(libraries);
-            let list = run(command.arg("--list").arg(program))?;
+            let list = run(self.loading().arg("--list").arg(program))?;
             found.extend(list.lines().filter_map(library).filter(|path| {
                 // The loader lies elsewhere.
                 !path.ends_with("ld-linux-x86-64.so.2")
