@@ -10,7 +10,7 @@
 //!
 //! - [`json`], [`protocol`]: what a guest prints, read strictly;
 //! - [`elf`], [`image`], [`efi`], [`iso`], [`medium`], [`places`], [`tiny`]: what is booted;
-//! - [`asking`], [`child`], [`qemu`], [`tail`], [`outcome`]: booting it and judging the end;
+//! - [`child`], [`qemu`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
 //!   [`output`], [`progress`], [`lasting`]: printing without a panic, and while it takes long;
@@ -35,7 +35,6 @@
 #[macro_use]
 pub mod output;
 
-pub mod asking;
 pub mod bench;
 pub mod child;
 pub mod dag_file;
@@ -68,7 +67,6 @@ pub mod run;
 pub mod soak;
 pub mod stick;
 pub mod system;
-pub mod tail;
 pub mod test;
 pub mod tiny;
 pub mod trace;

@@ -7,19 +7,17 @@
 //! and then hang, or end in success having printed nothing.
 
 use std::fmt::Write;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ChildStdin;
 use std::time::Duration;
 
-use crate::asking::Asked;
+use crate::child::Asked;
 use crate::files;
 use crate::medium::Medium;
 use crate::places::Places;
 use crate::protocol::{MachineLine, Status, Transcript};
 use crate::qemu::{Ending, Qemu};
 use crate::system;
-use crate::tail::Tail;
 
 /// How many of the last serial lines are shown at a failure.
 const SHOWN_LINES: usize = 30;
@@ -95,12 +93,7 @@ pub fn boot_with_input(
     let loaded = medium.as_ref().map_or(image, Medium::path);
     let mut running = qemu.start(loaded, log)?;
     talk(running.input());
-    let mut tail = Tail::new(log);
-    let ending = running.wait(limit, || tail.follow(&mut show));
-    tail.finish(&mut show);
-    let bytes = fs::read(log)
-        .map_err(|error| format!("cannot read the serial log `{}`: {error}", log.display()))?;
-    let serial = String::from_utf8_lossy(&bytes).into_owned();
+    let (ending, serial) = running.follow(limit, &mut show)?;
     let outcome = Outcome {
         asked: running.asked(),
         elapsed: running.elapsed(),

@@ -3,7 +3,7 @@
 //! Its standard output is the log. Its exit code is one of two witnesses, as QEMU's status is.
 
 use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs::File;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{ExitStatus, Stdio};
@@ -11,13 +11,11 @@ use std::time::Duration;
 
 use linux::EndSignals;
 
-use crate::asking::Asked;
-use crate::child::{Child, Waited, bound_to_us};
+use crate::child::{Asked, Child, Waited, bound_to_us};
 use crate::outcome::Outcome;
 use crate::protocol::{Status, Transcript};
 use crate::qemu::Ending;
 use crate::system;
-use crate::tail::Tail;
 
 /// A program, and how it is run.
 #[derive(Clone, Copy, Debug)]
@@ -79,30 +77,20 @@ pub fn run_for(
     }
     let mut child = Child::start(&mut command)
         .map_err(|error| format!("cannot start `{}`: {error}", program.display()))?;
-    let mut tail = Tail::new(log);
-    let mut watch = || {
-        tail.follow(show);
-        fs::metadata(log).map_or(Some(0), |file| Some(file.len()))
-    };
     let process = child.id();
-    let ask = |why| {
+    let mut ask = |why| {
         if is_apart || why != Asked::ByPerson {
             EndSignals::send(process);
         }
     };
-    let (waited, asked) = match stops {
-        true => child.wait_and_ask(limit, ask, watch),
-        false => (child.wait(limit, || watch().is_some()), None),
-    };
-    tail.finish(show);
-    let bytes = fs::read(log).map_err(|error| format!("cannot read `{place}`: {error}"))?;
-    let serial = String::from_utf8_lossy(&bytes).into_owned();
+    let stop: Option<&mut dyn FnMut(Asked)> = if stops { Some(&mut ask) } else { None };
+    let followed = child.follow(limit, log, show, stop, |_| true)?;
     let mut outcome = Outcome {
-        asked,
+        asked: followed.asked,
         elapsed: child.elapsed(),
-        ..Outcome::of(Ending::Killed, serial, log, program)
+        ..Outcome::of(Ending::Killed, followed.text, log, program)
     };
-    outcome.ending = match waited {
+    outcome.ending = match followed.waited {
         Waited::Ended(status) => ending_of(status, code(&status), &outcome.transcript),
         Waited::Killed => Ending::Killed,
         Waited::TimedOut | Waited::GivenUp => Ending::Program(format!(

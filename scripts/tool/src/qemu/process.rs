@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 use std::process::{ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
-use crate::asking::Asked;
-use crate::child::{Child, Waited};
+use crate::child::{Asked, Child, Waited};
+use crate::files::Temporary;
 use crate::protocol::Status;
 use crate::system;
 
@@ -99,7 +99,7 @@ impl fmt::Display for Ending {
 pub struct Running {
     child: Child,
     serial: PathBuf,
-    complaints: PathBuf,
+    complaints: Temporary,
     /// The way by which the guest is asked to end, if it listens.
     stop: Option<File>,
     asked: Option<Asked>,
@@ -121,8 +121,8 @@ impl Running {
         File::create(serial).map_err(file_error(serial))?;
         let mut complaints = serial.as_os_str().to_owned();
         complaints.push(OsString::from(".qemu"));
-        let complaints = PathBuf::from(complaints);
-        let errors = File::create(&complaints).map_err(file_error(&complaints))?;
+        let complaints = Temporary(Some(complaints.into()));
+        let errors = File::create(complaints.path()).map_err(file_error(complaints.path()))?;
 
         let piped = |is_piped: bool| match is_piped {
             true => Stdio::piped(),
@@ -144,29 +144,32 @@ impl Running {
         })
     }
 
-    /// Waits for the end, for at most `limit` since the start. `look` is
-    /// called between two looks at the process, to show what was printed.
-    pub fn wait(&mut self, limit: Duration, mut look: impl FnMut()) -> Ending {
-        let (serial, complaints) = (&self.serial, &self.complaints);
+    /// Waits for the end, for at most `limit` since the start, and shows each whole serial line
+    /// to `show` as it comes. Returns also the serial log.
+    ///
+    /// # Errors
+    ///
+    /// In words: the log cannot be read.
+    pub fn follow(
+        &mut self,
+        limit: Duration,
+        show: &mut dyn FnMut(&str),
+    ) -> Result<(Ending, String), String> {
+        let complaints = self.complaints.path();
         let mut kvm_failed = false;
-        let mut watch = || {
-            look();
+        let is_well = |bytes| {
             let said = fs::read(complaints).unwrap_or_default();
             let said = String::from_utf8_lossy(&said);
             kvm_failed = KVM_FAILURES.iter().any(|failure| said.contains(failure));
-            let bytes = fs::metadata(serial).ok()?.len();
-            (!kvm_failed && bytes <= MOST_SERIAL_BYTES).then_some(bytes)
+            !kvm_failed && bytes <= MOST_SERIAL_BYTES
         };
-        let (waited, asked) = match &mut self.stop {
-            None => (self.child.wait(limit, || watch().is_some()), None),
-            Some(stop) => {
-                // One that has just ended hears nothing any more.
-                let ask = |_| drop(stop.write_all(CTRL_C));
-                self.child.wait_and_ask(limit, ask, watch)
-            }
-        };
-        self.asked = asked;
-        match waited {
+        // One that has just ended hears nothing any more.
+        let stop = self.stop.take();
+        let mut ask = |_| drop(stop.as_ref().map(|mut stop| stop.write_all(CTRL_C)));
+        let ask: Option<&mut dyn FnMut(Asked)> = if stop.is_some() { Some(&mut ask) } else { None };
+        let followed = (self.child).follow(limit, &self.serial, show, ask, is_well)?;
+        self.asked = followed.asked;
+        let ending = match followed.waited {
             Waited::Ended(status) => ending_of(status),
             Waited::TimedOut => Ending::TimedOut {
                 limit,
@@ -175,7 +178,8 @@ impl Running {
             Waited::Killed => Ending::Killed,
             Waited::GivenUp if kvm_failed => Ending::KvmFailed,
             Waited::GivenUp => Ending::TooMuchOutput,
-        }
+        };
+        Ok((ending, followed.text))
     }
 
     /// Returns why the guest was asked to end, if it was.
@@ -203,16 +207,9 @@ impl Running {
     /// Returns what QEMU itself complained of, on one line; mostly empty.
     #[must_use]
     pub fn complaints(&self) -> String {
-        let text = fs::read(&self.complaints).unwrap_or_default();
+        let text = fs::read(self.complaints.path()).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);
         text.lines().collect::<Vec<_>>().join("; ")
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It is ours, and in the way of no one if it cannot be removed.
-        let _ = fs::remove_file(&self.complaints);
     }
 }
 

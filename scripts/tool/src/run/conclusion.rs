@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use super::{Booted, RUN, on_linux, prove};
-use crate::asking::Asked;
+use crate::child::Asked;
 use crate::dag_file::Prepared;
 use crate::options::{BY_PERSON, Parsed, Refusal};
 use crate::protocol::{Status, Transcript};

@@ -17,7 +17,6 @@ use crate::install::{self, Need};
 use crate::json::Value;
 use crate::lasting::Lasting;
 use crate::system;
-use crate::tail::Tail;
 
 /// How long one test binary, or all doctests, may take: what hangs, and not what a busy
 /// host makes slow. Each guest has a limit of its own.
@@ -216,21 +215,16 @@ fn follow(
     let started = Child::start(&mut command);
     let mut child = started.map_err(|error| format!("cannot start `{program}`: {error}"))?;
 
-    let mut tail = Tail::new(&log);
     let mut show = |line: &str| {
         if plan.verbose && line.starts_with("test ") {
             println!("{line}");
         }
         report.take(line);
     };
-    let waited = child.wait(LIMIT, || {
-        tail.follow(&mut show);
-        true
-    });
-    tail.finish(&mut show);
+    let followed = child.follow(LIMIT, &log, &mut show, None, |_| true);
     // It is ours, and in the way of no one if it cannot be removed.
     let _ = fs::remove_file(&log);
-    Ok((waited, child.elapsed()))
+    Ok((followed?.waited, child.elapsed()))
 }
 
 /// What libtest's output says.

@@ -68,9 +68,9 @@ fn executed(boot: &Boot, image: &Path) -> Result<Vec<u64>, String> {
     let (ending, addresses) = std::thread::scope(|scope| {
         let reader =
             scope.spawn(|| log.map_or_else(Vec::new, |log| addresses(BufReader::new(log))));
-        let ending = running.wait(super::LIMIT, || ());
-        (ending, reader.join().unwrap_or_default())
-    });
+        let followed = running.follow(super::LIMIT, &mut |_| ());
+        followed.map(|(ending, _)| (ending, reader.join().unwrap_or_default()))
+    })?;
     if ending != Ending::Guest(Status::Success) {
         let (said, log) = (running.complaints(), serial.display());
         return Err(format!("{ending} {said}; its serial log is {log}"));

@@ -20,7 +20,7 @@ pub enum Asked {
 
 /// The next step after a look at the child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(super) enum Step {
     /// To look again.
     Wait,
     /// To ask it.
@@ -33,7 +33,7 @@ pub(crate) enum Step {
 
 /// The state of a child as seen so far.
 #[derive(Debug)]
-pub(crate) struct Asking {
+pub(super) struct Asking {
     limit: Duration,
     /// Why, and how many signals there had been then.
     why: Option<(Asked, u32)>,
@@ -44,7 +44,7 @@ pub(crate) struct Asking {
 
 impl Asking {
     /// Begins at the child's start.
-    pub(crate) const fn new(limit: Duration) -> Asking {
+    pub(super) const fn new(limit: Duration) -> Asking {
         Asking {
             limit,
             why: None,
@@ -55,12 +55,12 @@ impl Asking {
     }
 
     /// Returns why the child was asked, if it was.
-    pub(crate) fn why(&self) -> Option<Asked> {
+    pub(super) fn why(&self) -> Option<Asked> {
         self.why.map(|(why, _)| why)
     }
 
     /// Takes a look: so much time, so many signals and so many bytes since the start.
-    pub(crate) fn step(&mut self, elapsed: Duration, signals: u32, printed_bytes: u64) -> Step {
+    pub(super) fn step(&mut self, elapsed: Duration, signals: u32, printed_bytes: u64) -> Step {
         let is_over = elapsed >= self.limit;
         if printed_bytes > self.printed_bytes {
             self.printed_bytes = printed_bytes;

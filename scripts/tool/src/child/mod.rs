@@ -2,20 +2,29 @@
 //! own process id when its time is over or when we let go of it. One that can end in order is
 //! asked to do so first.
 //!
+//! It is asked at its limit, and when a *signal* asks us to end, such as ctrl-C (`asking`). What it
+//! prints goes to a file, which is followed (`tail`).
+//!
 //! Where the program `setpriv` exists, the system kills the child also if the
 //! tool itself is killed, so nothing is left behind in any case.
+
+mod asking;
+mod tail;
 
 use std::fs::File;
 use std::io;
 use std::os::fd::AsFd;
+use std::path::Path;
 use std::process::{self, ChildStdin, ChildStdout, Command, ExitStatus};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use linux::EndSignals;
 
-use crate::asking::{Asked, Asking, Step};
 use crate::system;
+pub use asking::Asked;
+use asking::{Asking, Step};
+use tail::Tail;
 
 /// How long one look at the process is from the next.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -38,6 +47,17 @@ pub enum Waited {
     GivenUp,
     /// A person pressed ctrl-C again before it had ended, and it was killed.
     Killed,
+}
+
+/// What became of a child that was followed.
+#[derive(Debug)]
+pub struct Followed {
+    /// Why the wait ended.
+    pub waited: Waited,
+    /// Why it was asked to end before its time, if it was.
+    pub asked: Option<Asked>,
+    /// All that it has printed; bytes that are no UTF-8 are replaced.
+    pub text: String,
 }
 
 impl Child {
@@ -74,20 +94,33 @@ impl Child {
         }
     }
 
-    /// Works like [`wait`](Self::wait), but has `ask` ask the child to end before it is killed.
-    /// `watch` returns how many bytes it has printed, or nothing to give it up. Returns also why
-    /// it was asked.
-    pub fn wait_and_ask(
+    /// Works like [`wait`](Self::wait), and shows each whole line of `log`, where the child
+    /// prints, to `show` as it comes. It is given up when `is_well`, which gets the number of
+    /// bytes there, says so. One that can end in order is asked to by `stop` before it is killed.
+    ///
+    /// # Errors
+    ///
+    /// In words: the log cannot be read.
+    pub fn follow(
         &mut self,
         limit: Duration,
-        mut ask: impl FnMut(Asked),
-        mut watch: impl FnMut() -> Option<u64>,
-    ) -> (Waited, Option<Asked>) {
-        let (signals, started) = (EndSignals::catch(), self.started);
-        let (mut asking, mut why_killed) = (Asking::new(limit), Waited::GivenUp);
-        let waited = self.wait(Duration::MAX, || {
-            let Some(printed_bytes) = watch() else {
+        log: &Path,
+        show: &mut dyn FnMut(&str),
+        mut stop: Option<&mut dyn FnMut(Asked)>,
+        mut is_well: impl FnMut(u64) -> bool,
+    ) -> Result<Followed, String> {
+        let (mut tail, mut asking) = (Tail::new(log), Asking::new(limit));
+        let signals = stop.as_ref().map(|_| EndSignals::catch());
+        let (started, mut killed) = (self.started, Waited::GivenUp);
+        let of_wait = signals.as_ref().map_or(limit, |_| Duration::MAX);
+        let waited = self.wait(of_wait, || {
+            let _ = tail.follow(show);
+            let printed_bytes = tail.bytes();
+            if !is_well(printed_bytes) {
                 return false;
+            }
+            let (Some(ask), Some(signals)) = (&mut stop, &signals) else {
+                return true;
             };
             match asking.step(started.elapsed(), signals.count(), printed_bytes) {
                 Step::Wait => return true,
@@ -98,15 +131,21 @@ impl Child {
                     ask(why);
                     return true;
                 }
-                Step::Kill => why_killed = Waited::Killed,
-                Step::TimeOut => why_killed = Waited::TimedOut,
+                Step::Kill => killed = Waited::Killed,
+                Step::TimeOut => killed = Waited::TimedOut,
             }
             false
         });
-        match waited {
-            Waited::GivenUp => (why_killed, asking.why()),
-            _ => (waited, asking.why()),
-        }
+        let text = tail.finish(show);
+        Ok(Followed {
+            waited: if waited == Waited::GivenUp {
+                killed
+            } else {
+                waited
+            },
+            asked: asking.why(),
+            text: text.map_err(|why| format!("cannot read the log `{}`: {why}", log.display()))?,
+        })
     }
 
     /// Returns the child's process id.
@@ -155,7 +194,7 @@ impl Drop for Child {
 /// thread dies, if `setpriv` is there to ask for it. `setpriv` becomes the
 /// program, so the process id stays the same.
 #[must_use]
-pub fn bound_to_us(program: &std::path::Path) -> Command {
+pub fn bound_to_us(program: &Path) -> Command {
     if system::find_program("setpriv").is_none() {
         return Command::new(program);
     }
