@@ -19,19 +19,13 @@ pub struct Need {
     what: &'static str,
     /// What it is there by: programs on the `PATH`, and files or folders.
     parts: &'static [&'static str],
-    /// For each package manager that is known to have it, the packages, with blanks between.
-    packages: &'static [(&'static str, &'static str)],
+    /// The packages by the managers in their order, with blanks between; empty where a manager
+    /// is not known to have it.
+    packages: [&'static str; 5],
 }
 
-/// Describes a package that has one name everywhere.
-const fn everywhere(package: &str) -> [(&str, &str); 5] {
-    [
-        ("apt-get", package),
-        ("dnf", package),
-        ("pacman", package),
-        ("zypper", package),
-        ("apk", package),
-    ]
+const fn by_apt(packages: &str) -> [&str; 5] {
+    [packages, "", "", "", ""]
 }
 
 /// The emulator that everything boots in, with the firmware that it brings.
@@ -39,12 +33,12 @@ pub static QEMU: Need = Need {
     name: "QEMU",
     what: "QEMU's system emulator for x86_64",
     parts: &[PROGRAM],
-    packages: &[
-        ("apt-get", "qemu-system-x86"),
-        ("dnf", "qemu-system-x86-core"),
-        ("pacman", "qemu-system-x86"),
-        ("zypper", "qemu-x86"),
-        ("apk", "qemu-system-x86_64"),
+    packages: [
+        "qemu-system-x86",
+        "qemu-system-x86-core",
+        "qemu-system-x86",
+        "qemu-x86",
+        "qemu-system-x86_64",
     ],
 };
 
@@ -53,7 +47,7 @@ pub static GDB: Need = Need {
     name: "gdb",
     what: "GNU's debugger",
     parts: &["gdb"],
-    packages: &everywhere("gdb"),
+    packages: ["gdb"; 5],
 };
 
 /// What an ISO is made with, for BIOS and for UEFI.
@@ -67,7 +61,7 @@ pub static GRUB: Need = Need {
         "/usr/lib/grub/i386-pc",
         "/usr/lib/grub/x86_64-efi",
     ],
-    packages: &[("apt-get", "grub-pc-bin grub-efi-amd64-bin xorriso mtools")],
+    packages: by_apt("grub-pc-bin grub-efi-amd64-bin xorriso mtools"),
 };
 
 /// What makes a FAT stick.
@@ -75,7 +69,7 @@ pub static MTOOLS: Need = Need {
     name: "mtools",
     what: "mtools, which write FAT file systems",
     parts: &["mformat", "mmd", "mcopy"],
-    packages: &everywhere("mtools"),
+    packages: ["mtools"; 5],
 };
 
 /// UEFI for QEMU.
@@ -83,7 +77,7 @@ pub static OVMF: Need = Need {
     name: "OVMF",
     what: "the firmware that gives QEMU's machines UEFI",
     parts: &[OVMF_FILE],
-    packages: &[("apt-get", "ovmf")],
+    packages: by_apt("ovmf"),
 };
 
 /// The emulator that imitates a PC the most strictly.
@@ -95,20 +89,21 @@ pub static BOCHS: Need = Need {
         "/usr/share/bochs/BIOS-bochs-latest",
         "/usr/lib/x86_64-linux-gnu/bochs/plugins/libbx_sdl2_gui.so",
     ],
-    packages: &[("apt-get", "bochs bochs-sdl bochsbios vgabios")],
+    packages: by_apt("bochs bochs-sdl bochsbios vgabios"),
 };
 
-/// The package managers, each by the commands that install packages, whose names follow the last
-/// one. A command begins with the manager's program.
-const MANAGERS: [&[&str]; 5] = [
-    &[
-        "apt-get update",
-        "apt-get install --yes --no-install-recommends",
-    ],
-    &["dnf install --assumeyes"],
-    &["pacman --sync --refresh --noconfirm --needed"],
-    &["zypper --non-interactive install"],
-    &["apk add"],
+/// The package managers: the program, the words by which it updates what it knows, if it needs
+/// to be told so, and those by which it installs the packages that follow.
+const MANAGERS: [(&str, Option<&str>, &str); 5] = [
+    (
+        "apt-get",
+        Some("update"),
+        "install --yes --no-install-recommends",
+    ),
+    ("dnf", None, "install --assumeyes"),
+    ("pacman", None, "--sync --refresh --noconfirm --needed"),
+    ("zypper", None, "--non-interactive install"),
+    ("apk", None, "add"),
 ];
 
 /// Makes sure that QEMU is there, as [`ensure`] does.
@@ -145,21 +140,16 @@ pub fn ensure(need: &Need) -> Result<(), String> {
     let Some(part) = missing(need) else {
         return Ok(());
     };
-    let mut plan = plan(need, part, |name| find_program(name).is_some(), is_root())?;
+    let (update, install) = plan(need, part, |name| find_program(name).is_some(), is_root())?;
     let name = need.name;
-    let install = plan.pop();
-    for line in plan {
-        // One source of packages that cannot be reached fails the whole update,
-        // and need not be the one with what is needed: the installation will tell.
-        if let Err(why) = run(name, &line) {
-            eprintln!("{why}");
-        }
+    // One source of packages that cannot be reached fails the whole update,
+    // and need not be the one with what is needed: the installation will tell.
+    if let Some(Err(why)) = update.map(|line| run(name, &line)) {
+        eprintln!("{why}");
     }
-    if let Some(line) = install {
-        run(name, &line).map_err(|why| {
-            format!("{name} could not be installed: {why}; install it by hand and start again")
-        })?;
-    }
+    run(name, &install).map_err(|why| {
+        format!("{name} could not be installed: {why}; install it by hand and start again")
+    })?;
     match missing(need) {
         None => Ok(()),
         Some(part) => Err(format!(
@@ -178,18 +168,20 @@ fn missing(need: &Need) -> Option<&'static str> {
     need.parts.iter().copied().find(|part| !is_there(part))
 }
 
-/// Decides on the commands to run, the installation last, given what is missing, which
-/// programs exist and whether we are root.
+/// Decides on the commands that update, if there is one, and install, given what is missing,
+/// which programs exist and whether we are root.
 fn plan(
     need: &Need,
     part: &str,
     exists: impl Fn(&str) -> bool,
     root: bool,
-) -> Result<Vec<String>, String> {
+) -> Result<(Option<String>, String), String> {
     let Need { name, what, .. } = need;
-    let mut known = need.packages.iter();
-    let (manager, packages) = known.find(|(manager, _)| exists(manager)).ok_or_else(|| {
-        let known: Vec<&str> = need.packages.iter().map(|(manager, _)| *manager).collect();
+    let known = MANAGERS.iter().zip(need.packages);
+    let known = known.filter(|(_, packages)| !packages.is_empty());
+    let found = known.clone().find(|((manager, ..), _)| exists(manager));
+    let ((manager, update, install), packages) = found.ok_or_else(|| {
+        let known: Vec<&str> = known.map(|((manager, ..), _)| *manager).collect();
         format!(
             "{name} is missing, and none of the package managers that are known to have it \
                  is here ({}); install the package that brings `{part}` ({what}) and start again",
@@ -202,14 +194,11 @@ fn plan(
              `{packages}` and start again"
         ));
     }
-    let sudo = if root { "" } else { "sudo " };
-    let is_it = |command: &&&str| command.split(' ').next() == Some(*manager);
-    let commands = MANAGERS.iter().copied().flatten().filter(is_it);
-    let mut lines: Vec<String> = commands.map(|line| format!("{sudo}{line}")).collect();
-    if let Some(last) = lines.last_mut() {
-        *last += &format!(" {packages}");
-    }
-    Ok(lines)
+    let program = format!("{}{manager}", if root { "" } else { "sudo " });
+    Ok((
+        update.map(|words| format!("{program} {words}")),
+        format!("{program} {install} {packages}"),
+    ))
 }
 
 fn run(name: &str, line: &str) -> Result<(), String> {
@@ -239,8 +228,9 @@ mod tests {
 
     fn lines(need: &Need, programs: &[&str], root: bool) -> Result<String, String> {
         let exists = |name: &str| programs.contains(&name);
-        let lines = plan(need, need.parts[0], exists, root)?;
-        Ok(lines.join("; "))
+        let (update, install) = plan(need, need.parts[0], exists, root)?;
+        let update = update.map_or(String::new(), |line| format!("{line}; "));
+        Ok(update + &install)
     }
 
     #[test]

@@ -14,7 +14,6 @@
 
 mod name;
 mod repository;
-mod table;
 
 use std::ffi::OsString;
 use std::fs;
@@ -22,12 +21,40 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use crate::options::{Parsed, Refusal};
+use crate::files;
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::system;
 
 pub use name::check;
 pub use repository::{Source, create_repository};
-pub use table::NEW_APP;
+
+/// The table of `new-app`.
+pub static NEW_APP: Command = Command {
+    invocation: "./scripts/new-app",
+    about: "\
+Makes an app of your own, in a repository of its own or under apps/: a library with
+functions and their DAG, a program that boots it, and a test that runs it on the host in
+virtual time.",
+    positional: Some((
+        Takes::Text("NAME"),
+        "The app's name: small letters, digits and hyphens, a letter first, at most 32.",
+    )),
+    options: options! {
+        /// Make the app in this new folder, which is the root of a repository.
+        "out": Takes::File("DIR");
+        /// --out: take the crates from this git repository, not from the folder of these commands.
+        /// Its runner is `fass-tool boot`, which `cargo install --git URL tool` installs.
+        "git": Takes::Text("URL");
+    },
+    notes: "\
+With --out, cargo run boots the app and cargo test tests it; without, it is in apps/,
+./scripts/run --app NAME boots it and cargo test -p NAME tests it. docs/guide.md shows
+what to do next.
+
+exit codes: 0 the app is there; 1 its files cannot be written; 2 a refused
+command line
+",
+};
 
 /// The template's name, as a package and as a crate.
 const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
@@ -56,6 +83,9 @@ const FILES: &[AppFile] = &[
         include_str!("../../template/tests/virtual_time.rs"),
     ),
 ];
+
+/// Texts of the template, and those that stand for them in an app.
+type Changes = Vec<(String, String)>;
 
 /// Runs the subcommand with the words after its name.
 #[must_use]
@@ -91,14 +121,8 @@ pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, Refusal> {
     check(workspace, name).map_err(Refusal::Usage)?;
     let folder = workspace.join("apps").join(name);
     let files = [MANIFEST].into_iter().chain(FILES.iter().copied());
-    // Another command has been as quick.
-    write_folder(
-        &folder,
-        name,
-        files,
-        |text| text.into(),
-        || name::taken(name),
-    )?;
+    // Another command may have been as quick.
+    write_folder(&folder, name, files, Changes::new(), &name::taken(name))?;
     Ok(folder)
 }
 
@@ -107,19 +131,27 @@ pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, Refusal> {
 fn write_folder(
     folder: &Path,
     name: &str,
-    files: impl Iterator<Item = AppFile>,
-    change: impl Fn(&str) -> String,
-    taken: impl Fn() -> String,
+    mut files: impl Iterator<Item = AppFile>,
+    mut changes: Changes,
+    taken: &str,
 ) -> Result<(), Refusal> {
-    let failed = |error| format!("cannot write `{}`: {error}", folder.display());
+    let failed = |error| Refusal::Failure(format!("cannot write `{}`: {error}", folder.display()));
     if let Some(parent) = folder.parent() {
-        fs::create_dir_all(parent).map_err(|error| Refusal::Failure(failed(error)))?;
+        fs::create_dir_all(parent).map_err(failed)?;
     }
     fs::create_dir(folder).map_err(|error| match error.kind() {
-        ErrorKind::AlreadyExists => Refusal::Usage(taken()),
-        _ => Refusal::Failure(failed(error)),
+        ErrorKind::AlreadyExists => Refusal::Usage(taken.into()),
+        _ => failed(error),
     })?;
-    write_all(folder, name, files, change).map_err(|line| {
+    changes.push((PLACEHOLDER.0.into(), name.into()));
+    changes.push((PLACEHOLDER.1.into(), name.replace('-', "_")));
+    let written = files.try_for_each(|(place, text)| {
+        let place = folder.join(place.replace(PLACEHOLDER.0, name));
+        let changes = changes.iter();
+        let text = changes.fold(text.to_string(), |text, (old, new)| text.replace(old, new));
+        files::write(&place, text)
+    });
+    written.map_err(|line| {
         // What cannot be written can perhaps not be removed either; the line
         // names the place.
         let _ = fs::remove_dir_all(folder);
@@ -127,23 +159,17 @@ fn write_folder(
     })
 }
 
-fn write_all(
-    folder: &Path,
-    name: &str,
-    files: impl Iterator<Item = AppFile>,
-    change: impl Fn(&str) -> String,
-) -> Result<(), String> {
-    let crate_name = name.replace('-', "_");
-    for (place, text) in files {
-        let path = folder.join(place.replace(PLACEHOLDER.0, name));
-        let text = change(text)
-            .replace(PLACEHOLDER.0, name)
-            .replace(PLACEHOLDER.1, &crate_name);
-        let parent = path.parent().unwrap_or(folder);
-        let written = fs::create_dir_all(parent).and_then(|()| fs::write(&path, text));
-        written.map_err(|error| format!("cannot write `{}`: {error}", path.display()))?;
-    }
-    Ok(())
+/// Says what is in an app's folder.
+fn is_there(folder: &str) -> String {
+    format!(
+        "\
+{folder} is there:
+  src/lib.rs             the functions and their DAG: begin here
+  src/main.rs            boots it and reports
+  tests/virtual_time.rs  runs it on the host, in virtual time
+
+"
+    )
 }
 
 fn next_steps(name: &str) -> String {
@@ -152,16 +178,12 @@ fn next_steps(name: &str) -> String {
     let test = format!("cargo test -p {name}");
     format!(
         "\
-apps/{name} is there:
-  src/lib.rs             the functions and their DAG: begin here
-  src/main.rs            boots it and reports
-  tests/virtual_time.rs  runs it on the host, in virtual time
-
-{boot:width$}  boots it in QEMU
+{}{boot:width$}  boots it in QEMU
 {linux}  runs it on Linux
 {test:width$}  tests it on the host
 {:width$}  goes on from here
 ",
+        is_there(&format!("apps/{name}")),
         "docs/guide.md",
         width = linux.len()
     )

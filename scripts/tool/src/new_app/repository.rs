@@ -8,7 +8,7 @@ use std::path::Path;
 
 use replay::shown::quoted;
 
-use super::{AppFile, FILES, name, write_folder};
+use super::{AppFile, Changes, FILES, is_there, name, write_folder};
 use crate::options::Refusal;
 
 /// Where a repository's app has the crates from, and cargo its runner.
@@ -74,7 +74,7 @@ pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(
         )));
     }
     let shown = quoted(&out.to_string_lossy()).to_string();
-    let change = match source {
+    let changes = match source {
         Source::Git(url) if url.contains(['"', '\\', '\n']) => {
             let line = format!("`--git {}`: no URL has such a character", quoted(url));
             return Err(Refusal::Usage(line));
@@ -89,35 +89,32 @@ pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(
         Source::Git(url) => from_git(url),
     };
     let files = OWN_FILES.into_iter().chain(FILES.iter().copied());
-    write_folder(out, name, files, change, || {
-        format!("`--out` {shown}: it is there already; name a folder to be made")
-    })
+    let taken = format!("`--out` {shown}: it is there already; name a folder to be made");
+    write_folder(out, name, files, changes, &taken)
 }
 
 /// Returns how texts change for crates of this workspace. Nothing is installed for them.
-fn from_folder(root: &str) -> Box<dyn Fn(&str) -> String> {
-    let root = root.to_string();
-    Box::new(move |text| {
-        let lines = text.split_inclusive('\n');
-        let kept = lines.filter(|line| !line.contains("cargo install"));
-        kept.collect::<String>()
-            .replace("ubuntu-latest", "self-hosted # where the crates are")
-            .replace(WORKSPACE, &root)
-    })
+fn from_folder(root: &str) -> Changes {
+    let install = "      - run: cargo install --locked --git /workspace tool\n";
+    let changes = [
+        (install, ""),
+        ("ubuntu-latest", "self-hosted # where the crates are"),
+        (WORKSPACE, root),
+    ];
+    changes.map(|(old, new)| (old.into(), new.into())).into()
 }
 
 /// Returns how texts change for crates of this git repository.
-fn from_git(url: &str) -> Box<dyn Fn(&str) -> String> {
-    let url = url.to_string();
-    Box::new(move |text| {
-        let mut text = text.replace("\"/workspace/scripts/boot\"", "\"fass-tool\", \"boot\"");
-        text = text.replace("/workspace/scripts/debug", "fass-tool debug");
-        for package in PACKAGES {
-            let by_path = format!("path = \"{WORKSPACE}/{package}\"");
-            text = text.replace(&by_path, &format!("git = \"{url}\""));
-        }
-        text.replace(WORKSPACE, &url)
-    })
+fn from_git(url: &str) -> Changes {
+    let by_path = |package| format!("path = \"{WORKSPACE}/{package}\"");
+    let crates = PACKAGES.map(|package| (by_path(package), format!("git = \"{url}\"")));
+    let others = [
+        ("\"/workspace/scripts/boot\"", "\"fass-tool\", \"boot\""),
+        ("/workspace/scripts/debug", "fass-tool debug"),
+        (WORKSPACE, url),
+    ];
+    let others = others.map(|(old, new)| (old.into(), new.into()));
+    crates.into_iter().chain(others).collect()
 }
 
 /// Says what to do in the repository.
@@ -130,18 +127,13 @@ pub(super) fn next_steps(out: &Path, source: Source<'_>) -> String {
     };
     format!(
         "\
-{} is there:
-  src/lib.rs             the functions and their DAG: begin here
-  src/main.rs            boots it and reports
-  tests/virtual_time.rs  runs it on the host, in virtual time
-
-{install}cd {}
+{}{install}cd {}
 cargo run               # boots it in QEMU
 cargo test              # tests it on the host
 cargo run -- --on linux # runs it on Linux, docs/linux.md
 git init                # docs/guide.md goes on from here
 ",
-        out.display(),
+        is_there(&out.display().to_string()),
         out.display()
     )
 }
