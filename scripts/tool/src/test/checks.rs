@@ -6,9 +6,9 @@
 //! baseline, and a guest under KVM where KVM works. They judge the project's own packages.
 
 use std::fs;
-use std::path::PathBuf;
 
-use super::tally::{Tally, Why};
+use super::own::Source;
+use super::tally::{Tally, Why, none_of};
 use super::{Plan, budgets, layers, own};
 use crate::bench::hand_off;
 use crate::image;
@@ -23,8 +23,8 @@ const MOST_LINES: usize = 400;
 
 /// Runs the checks that the plan wants.
 pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
-    let files = own::files();
-    let packages = own::packages(&files);
+    let sources = own::sources();
+    let packages = own::packages(&sources);
     let blessed = plan.blessed.as_deref();
     let mut run = |name: &str, check: &dyn Fn() -> Result<(), Why>| {
         if plan.wants(name) {
@@ -32,22 +32,25 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
         }
     };
     run("Cargo.lock names only our own packages", &|| {
-        Ok(lock_is_ours()?)
+        let lock = fs::read_to_string(system::workspace().join("Cargo.lock"));
+        Ok(foreign(
+            &lock.map_err(|error| format!("Cargo.lock: {error}"))?,
+        )?)
     });
     run("no source file has more than 400 lines", &|| {
-        Ok(complain(&files, is_long)?)
+        Ok(complain(&sources, is_long)?)
     });
     run("every source file opens with an essay", &|| {
-        Ok(complain(&files, lacks_essay)?)
+        Ok(complain(&sources, lacks_essay)?)
     });
     run("layers name only layers below them", &|| {
-        Ok(layers::check(&files)?)
+        Ok(layers::check(&sources)?)
     });
     run("no crate has more lines than its budget", &|| {
-        Ok(budgets::check(&files, blessed)?)
+        Ok(budgets::check(&sources, blessed)?)
     });
     run("no line escapes the budgets", &|| {
-        Ok(complain(&files, budgets::escape)?)
+        Ok(complain(&sources, budgets::escape)?)
     });
 
     let doc = "doc --quiet --no-deps";
@@ -121,25 +124,13 @@ fn cargo(packages: &[String], words: &str, rest: &str, remedy: &str) -> Result<(
     Err(format!("`cargo {words}` failed; {remedy}"))
 }
 
-/// A package of ours has no `source`: it lies in the workspace.
-fn lock_is_ours() -> Result<(), String> {
-    let path = system::workspace().join("Cargo.lock");
-    let lock = fs::read_to_string(&path).map_err(|error| format!("Cargo.lock: {error}"))?;
-    foreign(&lock)
-}
-
+/// Names packages of others: one of ours has no `source`, it lies in the workspace.
 fn foreign(lock: &str) -> Result<(), String> {
     let packages = lock.split("[[package]]").skip(1);
     let foreign = packages.filter(|package| package.contains("\nsource = "));
     let name = |package: &str| package.split('"').nth(1).unwrap_or("?").to_string();
-    let names: Vec<String> = foreign.map(name).collect();
-    if names.is_empty() {
-        return Ok(());
-    }
-    Err(format!(
-        "packages of others: {}; do without them",
-        names.join(", ")
-    ))
+    let names = none_of(foreign.map(name).collect());
+    names.map_err(|names| format!("packages of others: {names}; do without them"))
 }
 
 fn is_long(name: &str, text: &str) -> Option<String> {
@@ -157,22 +148,15 @@ fn lacks_essay(name: &str, text: &str) -> Option<String> {
 }
 
 /// Asks for a fault of each file, by its name and its text, and gathers them on one line.
-fn complain(files: &[PathBuf], fault: impl Fn(&str, &str) -> Option<String>) -> Result<(), String> {
-    let mut faults = Vec::new();
-    for path in files {
-        let shown = own::shown(path);
-        match fs::read(path) {
-            Ok(text) => {
-                let fault = fault(&shown, &String::from_utf8_lossy(&text));
-                faults.extend(fault.map(|fault| format!("{shown} {fault}")));
-            }
-            Err(error) => faults.push(format!("{shown}: {error}")),
-        }
-    }
-    if faults.is_empty() {
-        return Ok(());
-    }
-    Err(faults.join("; "))
+fn complain(
+    sources: &[Source],
+    fault: impl Fn(&str, &str) -> Option<String>,
+) -> Result<(), String> {
+    let faults = sources.iter().filter_map(|Source { name, text }| {
+        let fault = fault(name, text)?;
+        Some(format!("{name} {fault}"))
+    });
+    none_of(faults.collect())
 }
 
 fn image_is_light(app: &str, most: u64) -> Result<(), String> {

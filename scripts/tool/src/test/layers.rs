@@ -15,6 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::own::Source;
+use super::tally::none_of;
 use crate::system::workspace;
 
 /// Where the table stands: the page, and the heading right above it.
@@ -33,23 +35,18 @@ struct Row {
 type Names = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
 
 /// Holds the files of every crate of the table against it.
-pub(super) fn check(files: &[PathBuf]) -> Result<(), String> {
+pub(super) fn check(sources: &[Source]) -> Result<(), String> {
     let page = fs::read_to_string(workspace().join(PAGE));
     let rows = rows(&page.map_err(|error| format!("{PAGE}: {error}"))?);
     if rows.is_empty() {
         return Err(format!("{PAGE} has no table below `{HEADING}`"));
     }
-    let mut codes = BTreeMap::new();
-    for file in files {
-        let place = file.strip_prefix(workspace()).unwrap_or(file);
-        if let Some(module) = module(place)
-            && rows.iter().any(|row| module.starts_with(&row.src))
-        {
-            let text = fs::read_to_string(file);
-            let text = text.map_err(|error| format!("{}: {error}", place.display()))?;
-            codes.insert(module, code(&text));
-        }
-    }
+    let is_listed = |module: &PathBuf| rows.iter().any(|row| module.starts_with(&row.src));
+    let of_source = |source: &Source| {
+        let module = module(Path::new(&source.name)).filter(is_listed)?;
+        Some((module, code(&source.text)))
+    };
+    let codes = sources.iter().filter_map(of_source).collect();
     let names = names(&codes);
     let circles = circles(&names).into_iter();
     let circles = circles.map(|circle| format!("{} name each other in a circle", list(&circle)));
@@ -58,11 +55,7 @@ pub(super) fn check(files: &[PathBuf]) -> Result<(), String> {
             .into_iter()
             .chain(upward(row, &names))
     };
-    let faults: Vec<String> = circles.chain(rows.iter().flat_map(of_row)).collect();
-    match faults.is_empty() {
-        true => Ok(()),
-        false => Err(faults.join("; ")),
-    }
+    none_of(circles.chain(rows.iter().flat_map(of_row)).collect())
 }
 
 /// Reads the rows of the table, such as ``| `fass/src` | `api`, `run` |``.

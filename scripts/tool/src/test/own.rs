@@ -5,39 +5,49 @@
 //! taking the workspace's lints.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::image::package_name;
 use crate::system;
 
+/// A file: its name from the workspace's root, and its text.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Source {
+    pub(super) name: String,
+    pub(super) text: String,
+}
+
 /// Returns all files of the workspace but the generated ones, and but those of packages that
 /// are not the project's own; sorted.
-pub(super) fn files() -> Vec<PathBuf> {
-    of(system::workspace())
+pub(super) fn sources() -> Vec<Source> {
+    below(system::workspace())
 }
 
 /// Returns the names of the packages whose files these are, sorted.
-pub(super) fn packages(files: &[PathBuf]) -> Vec<String> {
-    let manifests = files.iter().filter(|file| file.ends_with("Cargo.toml"));
-    let texts = manifests.flat_map(fs::read_to_string);
-    let mut names: Vec<String> = texts.filter_map(|text| package_name(&text)).collect();
+pub(super) fn packages(sources: &[Source]) -> Vec<String> {
+    let manifests = sources.iter().filter(|it| it.name.ends_with("Cargo.toml"));
+    let mut names: Vec<String> = manifests.filter_map(|it| package_name(&it.text)).collect();
     names.sort();
     names
 }
 
-/// Names a file from the workspace's root.
-pub(super) fn shown(path: &Path) -> String {
-    let path = path.strip_prefix(system::workspace()).unwrap_or(path);
-    path.display().to_string()
-}
-
-fn of(root: &Path) -> Vec<PathBuf> {
-    system::files_below(root, |folder| {
+fn below(root: &Path) -> Vec<Source> {
+    let files = system::files_below(root, |folder| {
         let manifest = fs::read_to_string(folder.join("Cargo.toml"));
         manifest.map_or(true, |text| {
             package_name(&text).is_none() || takes_lints(&text)
         })
-    })
+    });
+    let source = |file: &Path| Source {
+        name: file
+            .strip_prefix(root)
+            .unwrap_or(file)
+            .display()
+            .to_string(),
+        // One that cannot be read has no essay.
+        text: String::from_utf8_lossy(&fs::read(file).unwrap_or_default()).into_owned(),
+    };
+    files.iter().map(|file| source(file)).collect()
 }
 
 fn takes_lints(manifest: &str) -> bool {
@@ -49,7 +59,7 @@ fn takes_lints(manifest: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{files, of, packages};
+    use super::{below, packages, sources};
     use std::fs;
 
     #[test]
@@ -62,13 +72,13 @@ mod tests {
             fs::write(folder.join("Cargo.toml"), manifest).unwrap();
             fs::write(folder.join("src/lib.rs"), "").unwrap();
         }
-        let found = of(&root);
+        let found = below(&root);
         assert_eq!(packages(&found), ["ours"]);
-        let ours = root.join("apps/ours");
-        assert_eq!(found, [ours.join("Cargo.toml"), ours.join("src/lib.rs")]);
+        let names: Vec<&str> = found.iter().map(|source| &*source.name).collect();
+        assert_eq!(names, ["apps/ours/Cargo.toml", "apps/ours/src/lib.rs"]);
         fs::remove_dir_all(root).unwrap();
 
-        let packages = packages(&files());
+        let packages = packages(&sources());
         let some = "sched-dag fass kernel boot-link tool harness fork-join";
         let missing = some
             .split(' ')

@@ -19,6 +19,14 @@ impl From<String> for Why {
     }
 }
 
+/// Reports that there are no faults, or which there are.
+pub(super) fn none_of(faults: Vec<String>) -> Result<(), String> {
+    match faults.is_empty() {
+        true => Ok(()),
+        false => Err(faults.join("; ")),
+    }
+}
+
 /// The count, and the names behind it.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
