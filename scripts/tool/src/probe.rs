@@ -35,10 +35,10 @@ pub fn choose(
         return Ok((mode, None));
     }
     match (kvm(machine, image), named) {
-        (Ok(()), None) => Ok((
-            Mode::Kvm,
-            Some("the image passed its probe under KVM".into()),
-        )),
+        (Ok(()), None) => {
+            let why = "the image passed its probe under KVM";
+            Ok((Mode::Kvm, Some(why.into())))
+        }
         (Ok(()), Some(mode)) => Ok((mode, None)),
         (Err(why), None) => Ok((otherwise, Some(format!("KVM is of no use here: {why}")))),
         (Err(why), Some(_)) => Err(format!(
@@ -53,15 +53,9 @@ pub fn choose(
 ///
 /// Why KVM is of no use here, in words.
 pub fn kvm(machine: &Qemu, image: &Path) -> Result<(), String> {
-    let mode = Mode::Kvm;
-    run(
-        &Qemu {
-            mode,
-            ..machine.clone()
-        },
-        image,
-        LIMIT,
-    )
+    let mut machine = machine.clone();
+    machine.mode = Mode::Kvm;
+    run(&machine, image, LIMIT)
 }
 
 /// Boots the probe on `machine`, for at most `limit`, without a firmware, which takes longer.

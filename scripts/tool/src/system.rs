@@ -76,10 +76,16 @@ pub(crate) fn run(command: &mut Command) -> Result<String, String> {
     if output.status.success() {
         return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
     }
-    let said = String::from_utf8_lossy(&output.stderr);
-    let lines: Vec<&str> = said.trim().lines().collect();
-    let last = lines[lines.len().saturating_sub(12)..].join("\n");
-    Err(format!("`{name}` failed ({}): {last}", output.status))
+    let said = last_lines(&output.stderr);
+    Err(format!("`{name}` failed ({}): {said}", output.status))
+}
+
+/// Returns the last lines that a program has printed: enough to see why it failed.
+pub(crate) fn last_lines(said: &[u8]) -> String {
+    const LINES: usize = 12;
+    let said = String::from_utf8_lossy(said);
+    let lines: Vec<&str> = said.trim_end().lines().map(str::trim_end).collect();
+    lines[lines.len().saturating_sub(LINES)..].join("\n")
 }
 
 /// Returns where a program lies: a path that is one itself, or a name found

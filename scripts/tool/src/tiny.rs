@@ -44,9 +44,29 @@ pub fn tiny_image(text: &str, end: TinyEnd) -> Vec<u8> {
     let code_length = u32::try_from(code.len()).expect("the code has some 30 bytes");
     let file_length = HEADERS + NOTE + code_length + length;
 
-    let mut image = elf_header(code_at);
-    image.extend(program_header(PT_LOAD, 0, file_length));
-    image.extend(program_header(PT_NOTE, HEADERS, NOTE));
+    // 64-bit, little-endian, version 1; executable, x86-64, version 1.
+    let mut image = b"\x7fELF\x02\x01\x01\0\0\0\0\0\0\0\0\0\x02\0\x3e\0\x01\0\0\0".to_vec();
+    let longs = |image: &mut Vec<u8>, longs: &[u32]| {
+        image.extend(longs.iter().flat_map(|long| u64::from(*long).to_le_bytes()));
+    };
+    // Program headers follow at once, and there are no sections and no flags.
+    longs(&mut image, &[code_at, 64, 0]);
+    image.extend([0; 4]);
+    image.extend(
+        [64_u16, 56, 2, 64, 0, 0]
+            .iter()
+            .flat_map(|half| half.to_le_bytes()),
+    );
+    for (kind, offset, length) in [(PT_LOAD, 0, file_length), (PT_NOTE, HEADERS, NOTE)] {
+        let readable_executable = 5;
+        let address = BASE + offset;
+        image.extend(
+            [kind, readable_executable]
+                .iter()
+                .flat_map(|word| word.to_le_bytes()),
+        );
+        longs(&mut image, &[offset, address, address, length, length, 4]);
+    }
     for word in [4, 4, XEN_ELFNOTE_PHYS32_ENTRY] {
         image.extend(u32::to_le_bytes(word));
     }
@@ -80,31 +100,4 @@ fn code(code_at: u32, text_length: u32, end: TinyEnd) -> Vec<u8> {
     };
     let length = u32::try_from(make(0).len()).expect("the code has some 30 bytes");
     make(code_at + length)
-}
-
-fn elf_header(entry: u32) -> Vec<u8> {
-    let mut header = Vec::new();
-    header.extend(b"\x7fELF\x02\x01\x01"); // 64-bit, little-endian, version 1
-    header.extend([0; 9]);
-    header.extend([2, 0, 62, 0, 1, 0, 0, 0]); // executable, x86-64, version 1
-    header.extend(u64::from(entry).to_le_bytes());
-    header.extend(64_u64.to_le_bytes()); // program headers follow at once
-    header.extend(0_u64.to_le_bytes()); // no section headers
-    header.extend(0_u32.to_le_bytes()); // no flags
-    for half in [64_u16, 56, 2, 64, 0, 0] {
-        header.extend(half.to_le_bytes());
-    }
-    header
-}
-
-fn program_header(kind: u32, offset: u32, length: u32) -> Vec<u8> {
-    let address = u64::from(BASE + offset);
-    let (offset, length) = (u64::from(offset), u64::from(length));
-    let mut header = Vec::new();
-    header.extend(kind.to_le_bytes());
-    header.extend(5_u32.to_le_bytes()); // readable, executable
-    for word in [offset, address, address, length, length, 4] {
-        header.extend(word.to_le_bytes());
-    }
-    header
 }

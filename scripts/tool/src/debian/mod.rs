@@ -129,15 +129,8 @@ impl Guest {
     /// Returns the last lines of what the guest itself has said, and where all of it is.
     #[must_use]
     pub fn said(&self) -> String {
-        let bytes = fs::read(&self.console).unwrap_or_default();
-        let text = String::from_utf8_lossy(&bytes);
-        let lines: Vec<&str> = text.lines().rev().take(12).collect();
-        let lines: Vec<&str> = lines.into_iter().rev().map(str::trim_end).collect();
-        format!(
-            "{}\nits console: {}",
-            lines.join("\n"),
-            self.console.display()
-        )
+        let said = system::last_lines(&fs::read(&self.console).unwrap_or_default());
+        format!("{said}\nits console: {}", self.console.display())
     }
 }
 

@@ -1,11 +1,11 @@
 //! A first word that chooses what the rest is for: `bench WHAT`, `oracle KIND`.
 
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use replay::shown::quoted;
 
-use super::nearest;
+use super::{Refusal, nearest};
 
 /// The words to choose from.
 #[derive(Debug)]
@@ -47,38 +47,32 @@ impl Menu {
     /// exit code 2.
     #[must_use]
     pub fn run(&self, words: &[OsString]) -> ExitCode {
-        let name = self.invocation.trim_start_matches("./scripts/");
-        match words.split_first() {
-            Some((word, _)) if word == "--help" || word == "-h" => {
-                print!("{}", self.help());
-                ExitCode::SUCCESS
-            }
-            Some((word, rest)) => match self.choose(word) {
-                Ok(choice) => (choice.work)(rest),
-                Err(line) => {
-                    eprintln!("{name}: {line}");
-                    ExitCode::from(2)
-                }
-            },
-            None => {
-                eprintln!("{name}: which {}? {}", self.word, self.remedy());
-                ExitCode::from(2)
-            }
+        match self.choose(words) {
+            Ok(choice) => (choice.work)(&words[1..]),
+            Err(refusal) => refusal.end(self.invocation),
         }
     }
 
-    fn choose(&self, word: &OsStr) -> Result<&Choice, String> {
+    fn choose(&self, words: &[OsString]) -> Result<&Choice, Refusal> {
+        let Some(word) = words.first() else {
+            let question = format!("which {}? {}", self.word, self.remedy());
+            return Err(Refusal::Usage(question));
+        };
         let word = &*word.to_string_lossy();
+        if word == "--help" || word == "-h" {
+            return Err(Refusal::Help(self.help()));
+        }
         if let Some(choice) = self.choices.iter().find(|choice| choice.name == word) {
             return Ok(choice);
         }
         let names: Vec<&str> = self.choices.iter().map(|choice| choice.name).collect();
-        let hint = nearest(word, &names)
-            .map_or_else(|| self.remedy(), |near| format!("did you mean `{near}`?"));
-        Err(match word.starts_with('-') {
-            true => format!("unknown option {}; {}", quoted(word), self.remedy()),
-            false => format!("unknown {} {}; {hint}", self.word, quoted(word)),
-        })
+        let (what, near) = match word.starts_with('-') {
+            true => ("option", None),
+            false => (self.word, nearest(word, &names)),
+        };
+        let hint = near.map_or_else(|| self.remedy(), |near| format!("did you mean `{near}`?"));
+        let line = format!("unknown {what} {}; {hint}", quoted(word));
+        Err(Refusal::Usage(line))
     }
 
     fn remedy(&self) -> String {
@@ -104,8 +98,8 @@ impl Menu {
 
 #[cfg(test)]
 mod tests {
-    use super::{Choice, Menu};
-    use std::ffi::{OsStr, OsString};
+    use super::{Choice, Menu, Refusal};
+    use std::ffi::OsString;
     use std::process::ExitCode;
 
     static MENU: Menu = Menu {
@@ -135,7 +129,10 @@ mod tests {
 
     #[test]
     fn the_words_are_listed_and_an_unknown_one_is_named_with_the_nearest_or_with_all() {
-        let refusal = |word| MENU.choose(OsStr::new(word)).unwrap_err();
+        let refusal = |word: &str| match MENU.choose(&[word.into()]) {
+            Err(Refusal::Usage(line) | Refusal::Help(line)) => line,
+            other => panic!("`{word}` gave {other:?}"),
+        };
         let all = "give one of soup, salad, and see ./scripts/cook --help";
         let steak = format!("unknown DISH `steak-tartare`; {all}");
         assert_eq!(refusal("sop"), "unknown DISH `sop`; did you mean `soup`?");
@@ -143,6 +140,6 @@ mod tests {
         assert_eq!(refusal("--hot"), format!("unknown option `--hot`; {all}"));
         let help = "Cooks.\n\nusage: ./scripts/cook DISH [options]; each DISH explains itself by \
                     --help\n\n  soup          hot\n  salad         cold\n\nHot.\n";
-        assert_eq!(MENU.help(), help);
+        assert_eq!(refusal("--help"), help);
     }
 }

@@ -67,6 +67,30 @@ impl From<String> for Refusal {
     }
 }
 
+impl Refusal {
+    /// Says to a person why nothing has come of this invocation, and returns its exit code.
+    fn end(self, invocation: &str) -> ExitCode {
+        let (lines, code) = match self {
+            Refusal::Help(text) => {
+                print!("{text}");
+                return ExitCode::SUCCESS;
+            }
+            Refusal::Usage(lines) => (lines, 2),
+            Refusal::Failure(lines) => (lines, 1),
+            Refusal::ByPerson => (String::new(), BY_PERSON),
+        };
+        complain(invocation, &lines);
+        ExitCode::from(code)
+    }
+}
+
+/// Says lines under a command's name. What they repeat of files and of words must
+/// not rewrite a terminal.
+fn complain(invocation: &str, lines: &str) {
+    let name = invocation.trim_start_matches("./scripts/");
+    (lines.lines()).for_each(|line| eprintln!("{name}: {}", visible(line)));
+}
+
 impl Command {
     /// Does the work that a command line asks for, and returns the exit code. Help, and what is
     /// refused, or failed, is shown here.
@@ -75,36 +99,24 @@ impl Command {
         words: &[OsString],
         work: impl FnOnce(&Parsed) -> Result<ExitCode, Refusal>,
     ) -> ExitCode {
-        match self.parse(words).and_then(|options| work(&options)) {
-            Ok(code) => code,
-            Err(Refusal::Help(text)) => {
-                print!("{text}");
-                ExitCode::SUCCESS
-            }
-            Err(Refusal::Usage(lines)) => self.refuse(&lines),
-            Err(Refusal::Failure(lines)) => self.fail(&lines),
-            Err(Refusal::ByPerson) => ExitCode::from(BY_PERSON),
-        }
+        let done = self.parse(words).and_then(|options| work(&options));
+        done.unwrap_or_else(|refusal| refusal.end(self.invocation))
     }
 
     /// Says why the command line, or a file that it names, is refused, each line under
     /// the command's name, and returns the exit code for it.
     pub fn refuse(&self, lines: &str) -> ExitCode {
-        self.complain(lines);
-        ExitCode::from(2)
+        Refusal::Usage(lines.into()).end(self.invocation)
     }
 
     /// Says what failed, as [`refuse`](Self::refuse), and returns the exit code for it.
     pub fn fail(&self, lines: &str) -> ExitCode {
-        self.complain(lines);
-        ExitCode::FAILURE
+        Refusal::Failure(lines.into()).end(self.invocation)
     }
 
-    /// Says lines under the command's name. What they repeat of files and of words must
-    /// not rewrite a terminal.
+    /// Says lines under the command's name.
     pub(crate) fn complain(&self, lines: &str) {
-        let name = self.invocation.trim_start_matches("./scripts/");
-        (lines.lines()).for_each(|line| eprintln!("{name}: {}", visible(line)));
+        complain(self.invocation, lines);
     }
 
     /// Returns the options of a command line that is right, for tests.

@@ -59,20 +59,22 @@ impl Takes {
     /// Takes a number of a range.
     #[must_use]
     pub const fn number(range: RangeInclusive<u64>) -> Takes {
+        let (least, most, is_list) = (*range.start(), *range.end(), false);
         Takes::Number {
-            least: *range.start(),
-            most: *range.end(),
-            is_list: false,
+            least,
+            most,
+            is_list,
         }
     }
 
     /// Takes numbers of a range with commas between.
     #[must_use]
     pub const fn numbers(range: RangeInclusive<u64>) -> Takes {
+        let (least, most, is_list) = (*range.start(), *range.end(), true);
         Takes::Number {
-            least: *range.start(),
-            most: *range.end(),
-            is_list: true,
+            least,
+            most,
+            is_list,
         }
     }
 
@@ -94,11 +96,11 @@ impl Takes {
             Takes::Number {
                 least,
                 most,
-                is_list,
-            } => match is_list {
-                false => format!("a number from {least} to {most}"),
-                true => format!("numbers from {least} to {most} with commas between"),
-            },
+                is_list: false,
+            } => format!("a number from {least} to {most}"),
+            Takes::Number { least, most, .. } => {
+                format!("numbers from {least} to {most} with commas between")
+            }
             Takes::OneOf(words) => format!("one of {}", words.join(", ")),
             Takes::Text(what) | Takes::File(what) => format!("a {}", what.to_lowercase()),
         }

@@ -22,9 +22,7 @@ use crate::system;
 const MOST_LINES: usize = 400;
 
 /// Runs the checks that the plan wants.
-pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
-    let sources = own::sources();
-    let packages = own::packages(&sources);
+pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
     let blessed = plan.blessed.as_deref();
     let mut run = |name: &str, check: &dyn Fn() -> Result<(), Why>| {
         if plan.wants(name) {
@@ -38,48 +36,36 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
         )?)
     });
     run("no source file has more than 400 lines", &|| {
-        Ok(complain(&sources, is_long)?)
+        Ok(complain(sources, is_long)?)
     });
     run("every source file opens with an essay", &|| {
-        Ok(complain(&sources, lacks_essay)?)
+        Ok(complain(sources, lacks_essay)?)
     });
     run("layers name only layers below them", &|| {
-        Ok(layers::check(&sources)?)
+        Ok(layers::check(sources)?)
     });
     run("no crate has more lines than its budget", &|| {
-        Ok(budgets::check(&sources, blessed)?)
+        Ok(budgets::check(sources, blessed)?)
     });
     run("no line escapes the budgets", &|| {
-        Ok(complain(&sources, budgets::escape)?)
+        Ok(complain(sources, budgets::escape)?)
     });
 
+    let lint = |words: &str, remedy: &str| match plan.quick {
+        true => Err(Why::Skipped("left out by --quick".into())),
+        false => Ok(cargo(sources, words, remedy)?),
+    };
+    run("rustfmt has nothing to change", &|| {
+        lint("fmt --check", "run `cargo fmt`")
+    });
+    run("clippy has nothing to say", &|| {
+        lint("clippy --quiet --all-targets -- -D warnings", "see above")
+    });
     let doc = "doc --quiet --no-deps";
-    for (name, words, rest, remedy) in [
-        (
-            "rustfmt has nothing to change",
-            "fmt --check",
-            "",
-            "run `cargo fmt`",
-        ),
-        (
-            "clippy has nothing to say",
-            "clippy --quiet --all-targets",
-            "-- -D warnings",
-            "see above",
-        ),
-        ("rustdoc has nothing to say", doc, "", "see above"),
-        (
-            "rustdoc has nothing to say of private items",
-            &format!("{doc} --document-private-items"),
-            "",
-            "see above",
-        ),
-    ] {
-        run(name, &|| match plan.quick {
-            true => Err(Why::Skipped("left out by --quick".into())),
-            false => Ok(cargo(&packages, words, rest, remedy)?),
-        });
-    }
+    run("rustdoc has nothing to say", &|| lint(doc, "see above"));
+    run("rustdoc has nothing to say of private items", &|| {
+        lint(&format!("{doc} --document-private-items"), "see above")
+    });
     run(
         "an independent reader opens MCAP files in their test",
         &|| {
@@ -89,11 +75,6 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     );
     if plan.quick {
         return;
-    }
-    for app in image::apps().iter().filter(|app| packages.contains(app)) {
-        let most = image::most_stripped_bytes(app);
-        let name = format!("image of {app} weighs at most {} KiB", most >> 10);
-        run(&name, &|| Ok(image_is_light(app, most)?));
     }
     run(
         "the hand-off takes no more instructions than its baseline",
@@ -106,13 +87,15 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
     });
 }
 
-/// Runs cargo on packages; whatever it says goes to the terminal only if it fails.
-fn cargo(packages: &[String], words: &str, rest: &str, remedy: &str) -> Result<(), String> {
+/// Runs cargo on the packages of these files; whatever it says goes to the terminal only if it fails.
+fn cargo(sources: &[Source], words: &str, remedy: &str) -> Result<(), String> {
     let mut command = system::cargo();
-    command.args(words.split(' '));
-    command.args(packages.iter().flat_map(|package| ["-p", package]));
-    command.args(rest.split_whitespace());
-    command.env("RUSTDOCFLAGS", "-D warnings");
+    let mut each = words.split(' ');
+    command.args(each.next());
+    for package in own::packages(sources) {
+        command.args(["-p", &package]);
+    }
+    command.args(each).env("RUSTDOCFLAGS", "-D warnings");
     let _lasting = Lasting::new(&format!("cargo {words}"));
     let output = command.output();
     let output = output.map_err(|error| format!("cannot start cargo: {error}"))?;
@@ -157,15 +140,6 @@ fn complain(
         Some(format!("{name} {fault}"))
     });
     none_of(faults.collect())
-}
-
-fn image_is_light(app: &str, most: u64) -> Result<(), String> {
-    let bytes = image::build(app)?.stripped_bytes()?;
-    println!("image of {app}: {bytes} bytes stripped");
-    if bytes <= most {
-        return Ok(());
-    }
-    Err(format!("it weighs {bytes} bytes, {most} are allowed"))
 }
 
 #[cfg(test)]

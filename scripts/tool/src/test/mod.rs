@@ -26,6 +26,7 @@ use crate::image;
 use crate::install;
 use crate::options::{Command, Refusal, Takes, options};
 use crate::system;
+use own::Source;
 use tally::Tally;
 
 /// The table of `test`.
@@ -92,9 +93,10 @@ pub fn test(words: &[OsString]) -> ExitCode {
             blessed: list.transpose()?,
         };
         let mut tally = Tally::default();
-        build_images(&plan, &mut tally);
+        let sources = own::sources();
+        build_images(&plan, &sources, &mut tally);
         libtest::run_all(&plan, &mut tally);
-        checks::run_all(&plan, &mut tally);
+        checks::run_all(&plan, &sources, &mut tally);
         if let Some(list) = &plan.blessed {
             // There is none if nothing was rewritten.
             tally.bless(&fs::read_to_string(list).unwrap_or_default());
@@ -128,17 +130,31 @@ fn complaint(filter: Option<&str>, tally: &Tally) -> Option<String> {
 }
 
 /// Builds the images before the tests that boot them, so that their limits do
-/// not have to hold for a compiler too. A failure shows in those tests.
-fn build_images(plan: &Plan, tally: &mut Tally) {
+/// not have to hold for a compiler too. One of the project's own must be light.
+fn build_images(plan: &Plan, sources: &[Source], tally: &mut Tally) {
     if plan.quick {
         return;
     }
+    let own = own::packages(sources);
     for app in image::apps() {
-        let name = format!("image of {app} builds");
+        let most = own.contains(&app).then(|| image::most_stripped_bytes(&app));
+        let name = match most {
+            Some(most) => format!("image of {app} weighs at most {} KiB", most >> 10),
+            None => format!("image of {app} builds"),
+        };
         if plan.wants(&name) {
-            tally.run(&name, || Ok(image::build(&app).map(drop)?));
+            tally.run(&name, || Ok(build_image(&app, most.unwrap_or(u64::MAX))?));
         }
     }
+}
+
+fn build_image(app: &str, most: u64) -> Result<(), String> {
+    let bytes = image::build(app)?.stripped_bytes()?;
+    println!("image of {app}: {bytes} bytes stripped");
+    if bytes <= most {
+        return Ok(());
+    }
+    Err(format!("it weighs {bytes} bytes, {most} are allowed"))
 }
 
 #[cfg(test)]
