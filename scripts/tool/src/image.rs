@@ -15,8 +15,8 @@ use replay::shown::quoted;
 use crate::elf;
 use crate::files;
 use crate::json::Value;
-use crate::lasting::Lasting;
 use crate::options::nearest;
+use crate::progress::Lasting;
 use crate::system;
 
 /// Returns the most that an app's stripped image may weigh. Two measure, and carry all their

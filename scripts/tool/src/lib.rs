@@ -13,7 +13,7 @@
 //! - [`child`], [`qemu`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
-//!   [`output`], [`progress`], [`lasting`]: printing without a panic, and while it takes long;
+//!   [`output`], [`progress`]: printing without a panic, and while it takes long;
 //!   [`random`]: sets that are drawn;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`golden`]: texts of the tree that tests hold to their word;
@@ -48,7 +48,6 @@ pub mod image;
 pub mod install;
 pub mod iso;
 pub mod json;
-pub mod lasting;
 pub mod medium;
 pub mod new_app;
 pub mod options;

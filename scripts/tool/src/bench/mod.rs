@@ -22,8 +22,8 @@ pub mod sizes;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use crate::lasting::Lasting;
 use crate::options::{Command, Menu, Parsed, Refusal, choices};
+use crate::progress::Lasting;
 
 static BENCH: Menu = Menu {
     invocation: "./scripts/bench",

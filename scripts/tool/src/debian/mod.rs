@@ -15,7 +15,7 @@ use std::process::Command;
 
 use crate::files::{self, Temporary, write};
 use crate::install;
-use crate::lasting::Lasting;
+use crate::progress::Lasting;
 use crate::qemu::{Mode, PROGRAM, file_value};
 use crate::system::{self, run};
 use packages::Packages;

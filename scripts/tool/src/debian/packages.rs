@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::files;
-use crate::lasting::Lasting;
+use crate::progress::Lasting;
 use crate::system::{self, find_program, run};
 
 /// What is fetched besides the kernel, with all that it depends on.

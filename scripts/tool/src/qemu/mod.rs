@@ -10,13 +10,8 @@
 //! drops bytes. The guest ends its run by writing to the port of QEMU's
 //! `isa-debug-exit` device, see [`Ending`]. Input to the serial port comes from us by a pipe.
 
-#[macro_use]
-mod named;
-
-mod loader;
-mod machine;
+mod choices;
 mod process;
-mod second;
 
 use std::ffi::OsString;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
@@ -25,10 +20,8 @@ use std::process::Command;
 
 use boot::MOST_COMMAND_LINE_BYTES;
 
-pub use loader::{Loader, OVMF_FILE};
-pub use machine::Machine;
+pub use choices::{Loader, Machine, Mode, OVMF_FILE};
 pub use process::{Ending, Running};
-pub use second::Second;
 
 /// The name under which QEMU is looked for.
 pub const PROGRAM: &str = "qemu-system-x86_64";
@@ -39,54 +32,26 @@ pub const LEAST_MEMORY_MIB: u64 = 16;
 /// The most processors that a guest gets.
 pub const MOST_CORES: u64 = replay::lines::MOST_CORES as u64;
 
-named! {
-    /// What time means in the guest.
-    Mode {
-        /// Real cores in real time, by the host's virtualization.
-        Kvm = "kvm",
-        /// One instruction is one virtual nanosecond; every run is the same.
-        Deterministic = "deterministic",
-        /// Emulated cores in real time, one host thread each.
-        Threads = "threads",
-    }
+/// What a guest's second serial port is connected to.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Second {
+    /// Hand what is written to [`Running::input`] to this port; then the first one has none.
+    pub is_live: bool,
+    /// The file that gets what the guest sends.
+    pub output: Option<PathBuf>,
 }
 
-impl Mode {
-    /// Says in one sentence what a time printed in this mode is worth.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
-        match self {
-            Mode::Kvm => "real nanoseconds on real cores, the host's noise included",
-            Mode::Deterministic => {
-                "one instruction is one virtual nanosecond, idle time is skipped, busy \
-                 processors share one clock; these are not wall times, and are the same \
-                 on every machine"
-            }
-            Mode::Threads => {
-                "real nanoseconds of emulated processors; expect milliseconds of \
-                 noise where the host has fewer cores"
-            }
-        }
-    }
-
-    fn arguments(self) -> &'static [&'static str] {
-        match self {
-            Mode::Kvm => &["-accel", "kvm", "-cpu", "host"],
-            // The sleep=off makes an idle guest jump to its next timer.
-            Mode::Deterministic => &[
-                "-accel",
-                "tcg",
-                "-icount",
-                "shift=0,sleep=off",
-                "-cpu",
-                "max",
-                "-seed",
-                "1",
-                "-rtc",
-                "base=2000-01-01,clock=vm",
-            ],
-            Mode::Threads => &["-accel", "tcg,thread=multi", "-cpu", "max"],
-        }
+impl Second {
+    /// Returns QEMU's arguments for it.
+    fn arguments(&self) -> [OsString; 4] {
+        let device = match (&self.output, self.is_live) {
+            (None, false) => "null,id=wire".into(),
+            (None, true) => "stdio,id=wire,signal=off".into(),
+            (Some(output), false) => file_value("file,id=wire,path=", output),
+            (Some(output), true) => file_value("stdio,id=wire,signal=off,logfile=", output),
+        };
+        let port = "isa-serial,chardev=wire,iobase=0x2f8,irq=3";
+        ["-chardev".into(), device, "-device".into(), port.into()]
     }
 }
 
@@ -268,7 +233,7 @@ pub(crate) fn file_value(before: &str, path: &Path) -> OsString {
 
 #[cfg(test)]
 mod tests {
-    use super::{Loader, Machine, Mode, Qemu};
+    use super::{Loader, Machine, Mode, Qemu, Second};
     use std::ffi::OsStr;
     use std::path::Path;
 
@@ -348,6 +313,27 @@ mod tests {
                 ..Qemu::default()
             };
             has(&guest, parts, others);
+        }
+    }
+
+    #[test]
+    fn the_port_has_what_is_connected_to_it() {
+        let with = |is_live, output: Option<&str>| {
+            let output = output.map(Into::into);
+            let words = Second { is_live, output }.arguments();
+            words.join(OsStr::new(" ")).into_string().unwrap()
+        };
+        let device = " -device isa-serial,chardev=wire,iobase=0x2f8,irq=3";
+        for (line, port) in [
+            (with(false, None), "-chardev null,id=wire"),
+            (with(false, Some("a,b")), "-chardev file,id=wire,path=a,,b"),
+            (with(true, None), "-chardev stdio,id=wire,signal=off"),
+            (
+                with(true, Some("a")),
+                "-chardev stdio,id=wire,signal=off,logfile=a",
+            ),
+        ] {
+            assert_eq!(line, format!("{port}{device}"));
         }
     }
 }

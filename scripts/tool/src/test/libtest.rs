@@ -15,7 +15,7 @@ use crate::child::{Child, Waited, bound_to_us};
 use crate::golden;
 use crate::install::{self, Need};
 use crate::json::Value;
-use crate::lasting::Lasting;
+use crate::progress::Lasting;
 use crate::system;
 
 /// How long one test binary, or all doctests, may take: what hangs, and not what a busy
