@@ -3,7 +3,7 @@
 //! A *test* is a libtest test of any package (boot tests are such: they boot
 //! guests), a doctest, or a *check*: one property of the whole tree with a
 //! name of its own, such as "clippy has nothing to say". All of them end up
-//! in one [`Tally`], whose last line is `N passed, M failed`, with
+//! in one tally, whose last line is `N passed, M failed`, with
 //! `, K skipped` if something could not run; the reasons stand above it.
 //!
 //! Nothing passes by not running: a test binary that does not compile, dies
