@@ -3,10 +3,9 @@
 //! J. Li, J.-J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, ECRTS 2014,
 //! doi:10.1109/ECRTS.2014.23; with `D <= T`: S. Baruah, DATE 2015. A *heavy*
 //! DAG (`volume > D`) gets `ceil((volume - length) / (D - length))` dedicated
-//! cores, on which Graham's bound is at most `D`; with the multi-path bound it
-//! often needs fewer. A *light* one is executed sequentially on one of the
-//! remaining cores, and a core takes light DAGs while the sum of their
-//! densities `volume / D` is at most 1 (partitioned EDF).
+//! cores, on which Graham's bound is at most `D`. A *light* one is executed
+//! sequentially on one of the remaining cores, and a core takes light DAGs while
+//! the sum of their densities `volume / D` is at most 1 (partitioned EDF).
 //!
 //! This is what the literature compares; a commit that makes its own clusters asks `assign`.
 //! Assumes `D <= T`.
@@ -17,7 +16,6 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::multi_path::multi_path;
 use super::ratio::Ratio;
 use super::set::constrained;
 use super::task::Task;
@@ -37,32 +35,6 @@ pub struct Federation {
 /// or a DAG has `D > T`.
 #[must_use]
 pub fn federated(tasks: &[&Task], cores: u32) -> Option<Federation> {
-    assign(tasks, cores, |task, _| {
-        let slack = task.relative_deadline_ns().checked_sub(task.length_ns())?;
-        let beside = task.volume_ns() - task.length_ns();
-        // Zero slack: then the volume, which exceeds D, exceeds the length.
-        let needed = beside
-            .checked_add(slack.checked_sub(1)?)?
-            .checked_div(slack)?;
-        u32::try_from(needed).ok()
-    })
-}
-
-/// Assigns cores by the multi-path bound: never more than [`federated`].
-#[must_use]
-pub fn federated_multi_path(tasks: &[&Task], cores: u32) -> Option<Federation> {
-    assign(tasks, cores, |task, most| {
-        (1..=most).find(|&count| {
-            multi_path(task, count).is_some_and(|bound| bound <= task.relative_deadline_ns())
-        })
-    })
-}
-
-fn assign(
-    tasks: &[&Task],
-    cores: u32,
-    needed: impl Fn(&Task, u32) -> Option<u32>,
-) -> Option<Federation> {
     if !constrained(tasks, cores) {
         return None;
     }
@@ -71,7 +43,11 @@ fn assign(
     let mut light = Vec::new();
     for (position, task) in tasks.iter().enumerate() {
         if task.volume_ns() > task.relative_deadline_ns() {
-            let count = needed(task, left)?;
+            // Zero slack: then the volume, which exceeds D, exceeds the length.
+            let slack = task.relative_deadline_ns().checked_sub(task.length_ns())?;
+            let beside = task.volume_ns() - task.length_ns();
+            let room = beside.checked_add(slack.checked_sub(1)?)?;
+            let count = u32::try_from(room.checked_div(slack)?).ok()?;
             left = left.checked_sub(count)?;
             heavy.push((position, count));
         } else {
@@ -107,7 +83,7 @@ fn place(tasks: &[&Task], mut light: Vec<usize>, cores: u32) -> Option<Vec<Vec<u
 
 #[cfg(test)]
 mod tests {
-    use super::{federated, federated_multi_path};
+    use super::federated;
     use crate::analysis::Task;
 
     #[test]
@@ -122,8 +98,6 @@ mod tests {
         assert_eq!((five.heavy, five.light), (vec![(0, 4)], vec![vec![1, 2]]));
         let six = federated(&tasks, 6).unwrap();
         assert_eq!((six.heavy, six.light.len()), (vec![(0, 4)], 2));
-        let four = federated_multi_path(&tasks, 4).unwrap();
-        assert_eq!((four.heavy, four.light), (vec![(0, 3)], vec![vec![1, 2]]));
     }
 
     #[test]

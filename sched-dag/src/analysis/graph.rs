@@ -5,13 +5,11 @@
 //! level is the task's length.
 //!
 //! Ranks order subtasks: the descending rank is the list order of HLF, "highest
-//! level first" (T. C. Hu, Operations Research 9(6), 1961) and, with
-//! communication times on the edges, of HEFT (H. Topcuoglu, S. Hariri, M.-Y. Wu,
-//! IEEE TPDS 13(3), 2002, doi:10.1109/71.993206).
+//! level first" (T. C. Hu, Operations Research 9(6), 1961).
 //!
 //! All functions are linear in subtasks and edges and walk the topological
 //! order backwards instead of recursing. No sum can overflow: each is at most
-//! the volume, except with communication times, which saturate.
+//! the volume, or the sum of the weights.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -22,24 +20,15 @@ impl Task {
     /// Returns the bottom level of each subtask.
     #[must_use]
     pub fn bottom_levels(&self) -> Vec<u64> {
-        self.bottom_levels_with(|_, _| 0)
+        self.levels(self.wcets_ns())
     }
 
-    /// Returns the bottom levels with a communication time on each edge:
-    /// `rank(v) = c_v + max over successors w of (communication(v, w) + rank(w))`.
-    ///
-    /// Sums saturate at `u64::MAX`.
-    #[must_use]
-    pub fn bottom_levels_with(&self, communication_ns: impl Fn(usize, usize) -> u64) -> Vec<u64> {
+    /// Returns for each subtask the largest sum of weights along a path that begins with it.
+    fn levels(&self, weights: &[u64]) -> Vec<u64> {
         let mut levels = vec![0_u64; self.subtask_count()];
         for &subtask in self.topological_order().iter().rev() {
-            let rest = self
-                .successors(subtask)
-                .iter()
-                .map(|&next| levels[next].saturating_add(communication_ns(subtask, next)))
-                .max()
-                .unwrap_or(0);
-            levels[subtask] = self.wcets_ns()[subtask].saturating_add(rest);
+            let rest = self.successors(subtask).iter().map(|&next| levels[next]);
+            levels[subtask] = weights[subtask] + rest.max().unwrap_or(0);
         }
         levels
     }
@@ -54,13 +43,8 @@ impl Task {
     /// If `weights` has fewer entries than there are subtasks.
     #[must_use]
     pub fn longest_path(&self, weights: &[u64]) -> Vec<usize> {
-        let count = self.subtask_count();
-        let mut levels = vec![0_u64; count];
-        for &subtask in self.topological_order().iter().rev() {
-            let rest = self.successors(subtask).iter().map(|&next| levels[next]);
-            levels[subtask] = weights[subtask] + rest.max().unwrap_or(0);
-        }
-        let mut at = first_largest(0..count, &levels);
+        let levels = self.levels(weights);
+        let mut at = first_largest(0..levels.len(), &levels);
         let mut path = Vec::new();
         while let Some(subtask) = at {
             path.push(subtask);
@@ -83,11 +67,7 @@ impl Task {
     /// Returns the largest number of subtasks on one path.
     #[must_use]
     pub fn most_subtasks_on_a_path(&self) -> u64 {
-        let mut counts = vec![0_u64; self.subtask_count()];
-        for &subtask in self.topological_order().iter().rev() {
-            let successors = self.successors(subtask).iter();
-            counts[subtask] = 1 + successors.map(|&next| counts[next]).max().unwrap_or(0);
-        }
+        let counts = self.levels(&vec![1; self.subtask_count()]);
         counts.into_iter().max().unwrap_or(0)
     }
 

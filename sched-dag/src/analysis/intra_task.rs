@@ -93,68 +93,6 @@ pub(super) fn each_path(task: &Task, mut visit: impl FnMut(&[usize])) {
     }
 }
 
-/// Assigns priorities within a DAG: the subtasks by descending priority.
-///
-/// Along the longest remaining path each subtask is numbered after its
-/// unnumbered ancestors, which are treated alike among themselves; then on to
-/// the next longest path. Ties go to the smallest position. Returns `None`
-/// beyond [`SUBTASK_LIMIT`](super::SUBTASK_LIMIT) subtasks.
-#[must_use]
-pub fn assign_intra_task(task: &Task) -> Option<Vec<usize>> {
-    let closure = Closure::of(task)?;
-    let count = task.subtask_count();
-    let mut numbered = vec![false; count];
-    let mut order = Vec::with_capacity(count);
-    // Each entry: a subtask to number once its ancestors are.
-    let mut waiting: Vec<usize> = Vec::new();
-    while order.len() < count {
-        let goal = waiting.last().copied();
-        let eligible = |v: usize| !numbered[v] && goal.is_none_or(|goal| closure.precedes(v, goal));
-        match longest_within(task, eligible) {
-            Some(path) => waiting.extend(path.into_iter().rev()),
-            None => {
-                let Some(done) = waiting.pop() else {
-                    break;
-                };
-                if !numbered[done] {
-                    numbered[done] = true;
-                    order.push(done);
-                }
-            }
-        }
-    }
-    Some(order)
-}
-
-/// Returns a longest path among the eligible subtasks, `None` if there is none.
-fn longest_within(task: &Task, eligible: impl Fn(usize) -> bool) -> Option<Vec<usize>> {
-    let count = task.subtask_count();
-    let mut levels = vec![0_u64; count];
-    let mut next = vec![None; count];
-    for &v in task
-        .topological_order()
-        .iter()
-        .rev()
-        .filter(|&&v| eligible(v))
-    {
-        for &successor in task.successors(v).iter().filter(|&&v| eligible(v)) {
-            if next[v].is_none_or(|best: usize| levels[successor] > levels[best]) {
-                next[v] = Some(successor);
-            }
-        }
-        levels[v] = task.wcets_ns()[v] + next[v].map_or(0, |after| levels[after]);
-    }
-    let eligible = (0..count).filter(|&v| eligible(v));
-    let mut at = eligible.max_by_key(|&v| (levels[v], core::cmp::Reverse(v)));
-    at?;
-    let mut path = Vec::new();
-    while let Some(v) = at {
-        path.push(v);
-        at = next[v];
-    }
-    Some(path)
-}
-
 /// Returns the number of complete paths, at most `u32::MAX`.
 fn paths(task: &Task) -> u32 {
     let count = task.subtask_count();
