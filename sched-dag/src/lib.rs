@@ -99,6 +99,7 @@ pub mod chains;
 mod clusters;
 pub mod engine;
 mod fnv;
+mod graph;
 mod ids;
 pub mod journal;
 mod kept;

@@ -19,19 +19,16 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::ids::{SubtaskId, to_u32};
+use crate::graph::Graph;
+use crate::ids::to_u32;
 use crate::order::sorted_by_key;
-use crate::task_set::Adjacency;
 
 /// Returns each subtask's position in the order of remaining paths.
-pub(crate) fn ranks(
-    wcets_ns: &[Option<u64>],
-    successors: &Adjacency,
-    topological_order: &[SubtaskId],
-) -> Vec<u32> {
+pub(crate) fn ranks(wcets_ns: &[Option<u64>], graph: &Graph) -> Vec<u32> {
     let known: Option<Vec<u64>> = wcets_ns.iter().copied().collect();
     let weights = known.unwrap_or_else(|| vec![1; wcets_ns.len()]);
-    let paths = remaining_paths(&weights, successors, topological_order);
+    // The sum of all WCETs fits, so no path overflows.
+    let paths = graph.levels(&weights);
     // Stable, so equal paths stay in the order of registration.
     let order = sorted_by_key(paths.len(), |subtask| core::cmp::Reverse(paths[subtask]));
     let mut ranks = vec![0; paths.len()];
@@ -39,22 +36,4 @@ pub(crate) fn ranks(
         ranks[subtask] = to_u32(rank);
     }
     ranks
-}
-
-fn remaining_paths(
-    weights: &[u64],
-    successors: &Adjacency,
-    topological_order: &[SubtaskId],
-) -> Vec<u64> {
-    let mut paths = vec![0_u64; weights.len()];
-    for &subtask in topological_order.iter().rev() {
-        let after = successors
-            .of(subtask)
-            .iter()
-            .map(|next| paths[next.index()])
-            .max();
-        // The sum of all WCETs fits, so no path overflows.
-        paths[subtask.index()] = weights[subtask.index()].saturating_add(after.unwrap_or(0));
-    }
-    paths
 }

@@ -33,8 +33,8 @@ impl Closure {
         }
         let words = words_for(count);
         let mut rows = vec![0; words * count];
-        for &subtask in task.topological_order().iter().rev() {
-            for &successor in task.successors(subtask) {
+        for subtask in task.topological_order().rev() {
+            for successor in task.successors(subtask) {
                 for word in 0..words {
                     rows[subtask * words + word] |= rows[successor * words + word];
                 }

@@ -191,7 +191,7 @@ impl<'a> Flow<'a> {
     }
 
     fn sweep(&self, entries: &mut Ways, exits: &mut Ways) {
-        for &v in self.task.topological_order() {
+        for v in self.task.topological_order() {
             let here = entries.weights[v];
             if !self.taken[v] {
                 let weight = here + self.task.wcets_ns()[v];
@@ -207,7 +207,7 @@ impl<'a> Flow<'a> {
 
     fn sweep_back(&self, entries: &mut Ways, exits: &mut Ways) -> bool {
         let mut changed = false;
-        for &v in self.task.topological_order().iter().rev() {
+        for v in self.task.topological_order().rev() {
             for (edge, to) in self.task.edges_of(v) {
                 if self.along[edge] > 0 {
                     let step = Step::UndoEdge { to, edge };

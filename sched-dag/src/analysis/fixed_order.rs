@@ -87,15 +87,9 @@ fn is_better(dag: DagId, after: &Answer, before: &Answer) -> bool {
 /// Schedules the WCETs; returns an edge for each two neighbours on a core, and the length.
 fn schedule(task: &Task, cores: u32) -> (Vec<(u32, u32)>, u64) {
     let (levels, wcets) = (task.bottom_levels(), task.wcets_ns());
-    let mut missing = vec![0; task.subtask_count()];
-    for &subtask in task.topological_order() {
-        for &next in task.successors(subtask) {
-            missing[next] += 1;
-        }
-    }
+    let mut missing = task.graph.predecessor_counts();
     let urgency = |subtask: usize| (levels[subtask], Reverse(subtask));
-    let sources = (0..missing.len()).filter(|&subtask| missing[subtask] == 0);
-    let mut ready: BinaryHeap<_> = sources.map(urgency).collect();
+    let mut ready: BinaryHeap<_> = task.sources().map(urgency).collect();
     let cores = usize::try_from(cores)
         .unwrap_or(usize::MAX)
         .min(missing.len());
@@ -124,7 +118,7 @@ fn schedule(task: &Task, cores: u32) -> (Vec<(u32, u32)>, u64) {
         {
             running.pop();
             idle.push(core);
-            for &next in task.successors(subtask) {
+            for next in task.successors(subtask) {
                 missing[next] -= 1;
                 if missing[next] == 0 {
                     ready.push(urgency(next));

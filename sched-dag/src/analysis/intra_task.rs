@@ -65,30 +65,20 @@ pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
 
 /// Visits each path from a source to a sink, in the order of their subtasks' positions.
 pub(super) fn each_path(task: &Task, mut visit: impl FnMut(&[usize])) {
-    let is_source = task.sources();
-    // The path so far, and for each of its subtasks which successor is next.
-    let mut path: Vec<usize> = Vec::new();
-    let mut tried: Vec<usize> = Vec::new();
-    for source in (0..task.subtask_count()).filter(|&v| is_source[v]) {
-        let mut step = Some(source);
-        loop {
-            if let Some(v) = step {
-                path.push(v);
-                tried.push(0);
+    for source in task.sources() {
+        // The path so far, and of each of its subtasks the successors that were not tried.
+        let (mut path, mut untried) = (vec![source], vec![task.successors(source)]);
+        while let (Some(&last), Some(successors)) = (path.last(), untried.last_mut()) {
+            if let Some(next) = successors.next() {
+                path.push(next);
+                untried.push(task.successors(next));
+                continue;
             }
-            let (Some(&last), Some(tried_here)) = (path.last(), tried.last_mut()) else {
-                break;
-            };
-            let successors = task.successors(last);
-            if successors.is_empty() {
+            if task.successors(last).len() == 0 {
                 visit(&path);
             }
-            step = successors.get(*tried_here).copied();
-            *tried_here += 1;
-            if step.is_none() {
-                path.pop();
-                tried.pop();
-            }
+            path.pop();
+            untried.pop();
         }
     }
 }
@@ -97,14 +87,13 @@ pub(super) fn each_path(task: &Task, mut visit: impl FnMut(&[usize])) {
 fn paths(task: &Task) -> u32 {
     let count = task.subtask_count();
     let mut onward = vec![0_u32; count];
-    for &v in task.topological_order().iter().rev() {
-        let successors = task.successors(v).iter();
-        let sum = successors.fold(0_u32, |sum, &next| sum.saturating_add(onward[next]));
+    for v in task.topological_order().rev() {
+        let successors = task.successors(v);
+        let sum = successors.fold(0_u32, |sum, next| sum.saturating_add(onward[next]));
         onward[v] = sum.max(1);
     }
-    let is_source = task.sources();
-    let from_sources = (0..count).filter(|&v| is_source[v]);
-    from_sources.fold(0, |sum, v| sum.saturating_add(onward[v]))
+    task.sources()
+        .fold(0, |sum, v| sum.saturating_add(onward[v]))
 }
 
 /// Returns each subtask's place in `order`, if that is a permutation that
@@ -116,11 +105,7 @@ fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
         *ranks.get_mut(v)? = rank;
     }
     let complete = order.len() == count && !ranks.contains(&usize::MAX);
-    let respects = |v: usize| {
-        task.successors(v)
-            .iter()
-            .all(|&next| ranks[v] < ranks[next])
-    };
+    let respects = |v: usize| task.successors(v).all(|next| ranks[v] < ranks[next]);
     (complete && (0..count).all(respects)).then_some(ranks)
 }
 

@@ -74,7 +74,6 @@ mod closure;
 mod cover;
 mod federated;
 mod fixed_order;
-mod graph;
 mod interference;
 mod intra_task;
 mod judge;

@@ -47,12 +47,10 @@ pub(super) struct Blocking {
 impl Blocking {
     /// Returns that of a DAG which nothing blocks.
     pub(super) fn none(task: &Task) -> Self {
-        let is_source = task.sources();
-        let later = is_source.iter().filter(|&&is_source| !is_source);
         Self {
             largest: Vec::new(),
             path: task.most_subtasks_on_a_path().into(),
-            later: later.count() as u128,
+            later: (task.subtask_count() - task.sources().len()) as u128,
         }
     }
 

@@ -94,7 +94,7 @@ impl Figures {
             volume: task.volume_ns().into(),
             last_volume: task.volume_ns().into(),
             length: task.length_ns().into(),
-            largest: task.largest_wcet_ns().into(),
+            largest: shape.largest_ns.first().copied().unwrap_or(0).into(),
             cores,
             parallelism: shape.parallelism.into(),
             whole: None,

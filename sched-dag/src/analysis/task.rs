@@ -8,7 +8,10 @@
 //!
 //! Words: the *volume* is the sum of all WCETs; the *length* is the largest sum
 //! of WCETs along a path. Both are computed once, checked against overflow, so
-//! every other analysis may rely on `length <= volume <= u64::MAX`.
+//! every other analysis may rely on `length <= volume <= u64::MAX`. The *bottom level* (also
+//! *rank*) of a subtask is the largest sum of WCETs along a path that begins with it; the
+//! descending rank is the list order of HLF, "highest level first" (T. C. Hu, Operations
+//! Research 9(6), 1961).
 //!
 //! No WCET is 0. All tests here count the work that delays a subtask, and one without
 //! any would be delayed by what they do not count: say a subtask of WCET 0 becomes
@@ -19,10 +22,12 @@
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cmp::Reverse;
 use core::fmt;
 
-use crate::ids::SubtaskId;
-use crate::task_set::Dag;
+use crate::graph::Graph;
+use crate::ids::{SubtaskId, to_u32};
+use crate::task_set::{Dag, Subtask};
 
 /// A DAG task: its timing and its weighted precedence graph.
 #[derive(Clone, Debug)]
@@ -31,10 +36,7 @@ pub struct Task {
     relative_deadline_ns: u64,
     least_deadline_ns: u64,
     wcets_ns: Box<[u64]>,
-    /// `starts[v]..starts[v + 1]` is the range of `v`'s successors.
-    starts: Box<[usize]>,
-    successors: Box<[usize]>,
-    topological_order: Box<[usize]>,
+    pub(super) graph: Graph,
     volume_ns: u64,
     length_ns: u64,
 }
@@ -88,20 +90,16 @@ impl Task {
                 });
             }
         }
-        let (starts, successors) = adjacency(count, edges);
-        let order = topological_order(&starts, &successors).ok_or(TaskError::Cycle)?;
+        let edges = edges.iter().map(|&(from, to)| (to_u32(from), to_u32(to)));
+        let graph = Graph::new(count, &edges.collect::<Vec<_>>());
+        if !graph.is_acyclic() {
+            return Err(TaskError::Cycle);
+        }
         let mut ids = (0_u32..).map(SubtaskId).zip(&wcets_ns);
         if let Some((subtask, _)) = ids.find(|&(_, &wcet)| wcet == 0) {
             return Err(TaskError::MissingWcet { subtask });
         }
-        Self::assemble(
-            period_ns,
-            relative_deadline_ns,
-            wcets_ns,
-            starts,
-            successors,
-            order,
-        )
+        Self::assemble(period_ns, relative_deadline_ns, wcets_ns, graph)
     }
 
     /// Makes a task from a verified DAG, adding `overhead_ns` to each WCET.
@@ -114,31 +112,17 @@ impl Task {
     /// above 0, whatever the overhead, or
     /// [`VolumeOverflow`](TaskError::VolumeOverflow).
     pub fn from_dag(dag: &Dag, overhead_ns: u64) -> Result<Self, TaskError> {
-        let order = dag.topological_order();
-        let count = dag.subtasks().len();
-        let mut wcets_ns = Vec::with_capacity(count);
-        let mut starts = Vec::with_capacity(count + 1);
-        let mut successors = Vec::new();
-        starts.push(0);
-        for (id, subtask) in (0_u32..).map(SubtaskId).zip(dag.subtasks()) {
-            let wcet = (subtask.wcet_ns()).filter(|&wcet| wcet > 0);
-            let charged = wcet
-                .ok_or(TaskError::MissingWcet { subtask: id })?
-                .checked_add(overhead_ns)
-                .ok_or(TaskError::VolumeOverflow)?;
-            wcets_ns.push(charged);
-            successors.extend(dag.successors(id).iter().map(|other| other.index()));
-            starts.push(successors.len());
-        }
-        let order = order.iter().map(|id| id.index()).collect();
-        let task = Self::assemble(
-            dag.period_ns(),
-            dag.relative_deadline_ns(),
-            wcets_ns,
-            starts,
-            successors,
-            order,
-        )?;
+        let charge = |(subtask, of): (u32, &Subtask)| {
+            let (subtask, wcet_ns) = (SubtaskId(subtask), of.wcet_ns());
+            let wcet_ns = wcet_ns.filter(|&wcet_ns| wcet_ns > 0);
+            let wcet_ns = wcet_ns.ok_or(TaskError::MissingWcet { subtask })?;
+            let charged_ns = wcet_ns.checked_add(overhead_ns);
+            charged_ns.ok_or(TaskError::VolumeOverflow)
+        };
+        let wcets_ns = (0..).zip(dag.subtasks()).map(charge);
+        let wcets_ns = wcets_ns.collect::<Result<Vec<u64>, _>>()?;
+        let (period_ns, deadline_ns) = (dag.period_ns(), dag.relative_deadline_ns());
+        let task = Self::assemble(period_ns, deadline_ns, wcets_ns, dag.graph.clone())?;
         Ok(Self {
             least_deadline_ns: dag.least_deadline_ns(),
             ..task
@@ -149,9 +133,7 @@ impl Task {
         period_ns: u64,
         relative_deadline_ns: u64,
         wcets_ns: Vec<u64>,
-        starts: Vec<usize>,
-        successors: Vec<usize>,
-        topological_order: Vec<usize>,
+        graph: Graph,
     ) -> Result<Self, TaskError> {
         if period_ns == 0 {
             return Err(TaskError::ZeroPeriod);
@@ -168,9 +150,7 @@ impl Task {
             relative_deadline_ns,
             least_deadline_ns: relative_deadline_ns,
             wcets_ns: wcets_ns.into(),
-            starts: starts.into(),
-            successors: successors.into(),
-            topological_order: topological_order.into(),
+            graph,
             volume_ns,
             length_ns: 0,
         };
@@ -208,32 +188,70 @@ impl Task {
         self.wcets_ns.len()
     }
 
-    /// Returns the direct successors of a subtask.
+    /// Returns the direct successors of a subtask, ascending.
     ///
     /// # Panics
     ///
     /// If there is no such subtask.
-    #[must_use]
-    pub fn successors(&self, subtask: usize) -> &[usize] {
-        &self.successors[self.starts[subtask]..self.starts[subtask + 1]]
+    pub fn successors(&self, subtask: usize) -> impl ExactSizeIterator<Item = usize> + Clone {
+        let successors = self.graph.successors.of(SubtaskId(to_u32(subtask)));
+        successors.iter().map(|next| next.index())
     }
 
     /// Returns the edges from a subtask: their numbers, and the successors.
     pub(super) fn edges_of(&self, subtask: usize) -> impl Iterator<Item = (usize, usize)> {
-        let range = self.starts[subtask]..self.starts[subtask + 1];
-        range.map(|edge| (edge, self.successors[edge]))
+        let edges = self.graph.successors.range(SubtaskId(to_u32(subtask)));
+        edges.zip(self.successors(subtask))
     }
 
     /// Returns the number of edges.
     #[must_use]
     pub const fn edge_count(&self) -> usize {
-        self.successors.len()
+        self.graph.successors.neighbours.len()
     }
 
     /// Returns the subtasks in an order in which every predecessor comes first.
+    pub fn topological_order(&self) -> impl DoubleEndedIterator<Item = usize> {
+        self.graph.topological_order.iter().map(|id| id.index())
+    }
+
+    /// Returns the subtasks without predecessor, ascending.
+    pub(super) fn sources(&self) -> impl ExactSizeIterator<Item = usize> {
+        self.graph.sources.iter().map(|id| id.index())
+    }
+
+    /// Returns the bottom level of each subtask.
     #[must_use]
-    pub const fn topological_order(&self) -> &[usize] {
-        &self.topological_order
+    pub fn bottom_levels(&self) -> Vec<u64> {
+        self.graph.levels(&self.wcets_ns)
+    }
+
+    /// Returns a longest path for the given weights; ties go to the smallest
+    /// position.
+    ///
+    /// The weights replace the WCETs and must sum to at most `u64::MAX`.
+    ///
+    /// # Panics
+    ///
+    /// If `weights` has not as many entries as there are subtasks.
+    #[must_use]
+    pub fn longest_path(&self, weights: &[u64]) -> Vec<usize> {
+        let levels = self.graph.levels(weights);
+        let rank = |&subtask: &usize| (levels[subtask], Reverse(subtask));
+        let mut at = (0..levels.len()).max_by_key(rank);
+        let mut path = Vec::new();
+        while let Some(subtask) = at {
+            path.push(subtask);
+            at = self.successors(subtask).max_by_key(rank);
+        }
+        path
+    }
+
+    /// Returns the largest number of subtasks on one path.
+    #[must_use]
+    pub fn most_subtasks_on_a_path(&self) -> u64 {
+        let counts = self.graph.levels(&vec![1; self.subtask_count()]);
+        counts.into_iter().max().unwrap_or(0)
     }
 
     /// Returns the volume: the sum of all WCETs.
@@ -247,45 +265,6 @@ impl Task {
     pub const fn length_ns(&self) -> u64 {
         self.length_ns
     }
-}
-
-/// Sorts the edges by their predecessor: counting sort, stable.
-fn adjacency(count: usize, edges: &[(usize, usize)]) -> (Vec<usize>, Vec<usize>) {
-    let mut starts = vec![0; count + 1];
-    for &(predecessor, _) in edges {
-        starts[predecessor + 1] += 1;
-    }
-    for index in 0..count {
-        starts[index + 1] += starts[index];
-    }
-    let mut next = starts.clone();
-    let mut successors = vec![0; edges.len()];
-    for &(predecessor, successor) in edges {
-        successors[next[predecessor]] = successor;
-        next[predecessor] += 1;
-    }
-    (starts, successors)
-}
-
-/// Orders the subtasks by precedence (Kahn 1962), or finds that none exists.
-fn topological_order(starts: &[usize], successors: &[usize]) -> Option<Vec<usize>> {
-    let count = starts.len() - 1;
-    let mut waiting_for = vec![0_usize; count];
-    for &successor in successors {
-        waiting_for[successor] += 1;
-    }
-    let mut order: Vec<usize> = (0..count).filter(|&v| waiting_for[v] == 0).collect();
-    let mut done = 0;
-    while let Some(&subtask) = order.get(done) {
-        done += 1;
-        for &successor in &successors[starts[subtask]..starts[subtask + 1]] {
-            waiting_for[successor] -= 1;
-            if waiting_for[successor] == 0 {
-                order.push(successor);
-            }
-        }
-    }
-    (order.len() == count).then_some(order)
 }
 
 impl fmt::Display for TaskError {
@@ -343,7 +322,15 @@ mod tests {
     #[test]
     fn indices_need_not_be_topological() {
         let task = Task::new(10, 10, vec![1, 2, 4], &[(2, 0), (0, 1), (2, 1)]).unwrap();
-        assert_eq!(task.topological_order(), [2, 0, 1]);
+        assert!(task.topological_order().eq([2, 0, 1]));
         assert_eq!((task.length_ns(), task.volume_ns()), (7, 7));
+    }
+
+    #[test]
+    fn the_longest_path_goes_to_the_first_subtasks_on_ties() {
+        let task = Task::new(9, 9, vec![1, 2, 2, 1], &[(0, 2), (0, 1), (1, 3), (2, 3)]).unwrap();
+        assert_eq!(task.longest_path(task.wcets_ns()), [0, 1, 3]);
+        assert_eq!(task.longest_path(&[0, 0, 0, 0]), [0, 1, 3]);
+        assert_eq!(task.most_subtasks_on_a_path(), 3);
     }
 }

@@ -157,14 +157,14 @@ impl Text {
             self.line(format_args!("cluster {cluster} {clusters}"));
         }
         for (id, dag) in dags.iter().enumerate() {
-            let ids = || (0..).map(crate::ids::SubtaskId).take(dag.subtasks().len());
-            let edges: usize = ids().map(|from| dag.successors(from).len()).sum();
+            let edges = dag.graph.successors.edges();
             self.line(format_args!(
-                "dag {id} {} {} {} {} {edges} {:?}",
+                "dag {id} {} {} {} {} {} {:?}",
                 dag.period_ns(),
                 dag.relative_deadline_ns(),
                 dag.in_flight(),
                 dag.subtasks().len(),
+                edges.len(),
                 dag.name(),
             ));
             for subtask in dag.subtasks() {
@@ -176,10 +176,8 @@ impl Text {
                     u8::from(keeps)
                 ));
             }
-            for from in ids() {
-                for to in dag.successors(from) {
-                    self.line(format_args!("edge {} {}", from.0, to.0));
-                }
+            for (from, to) in edges {
+                self.line(format_args!("edge {from} {to}"));
             }
             for &sink in dag.sinks() {
                 let deadline_ns = dag.subtask(sink).relative_deadline_ns();

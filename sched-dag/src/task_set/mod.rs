@@ -10,6 +10,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 
 use crate::clusters::Why;
+use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::{Activation, OnFault, Order, OverrunPolicy, Priority};
 use crate::topic::Topic;
@@ -44,11 +45,8 @@ pub struct Dag {
     pub(crate) order: Order,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
-    pub(crate) sources: Box<[SubtaskId]>,
-    pub(crate) sinks: Box<[SubtaskId]>,
-    pub(crate) predecessors: Adjacency,
-    pub(crate) successors: Adjacency,
-    pub(crate) topological_order: Box<[SubtaskId]>,
+    /// Its sinks are also those that state a deadline.
+    pub(crate) graph: Graph,
     pub(crate) state_precedences: Box<[StatePrecedence]>,
     pub(crate) topics: Box<[Topic]>,
 }
@@ -77,14 +75,6 @@ pub struct Subtask {
     pub(crate) relative_deadline_ns: u64,
 }
 
-/// For each subtask a list of neighbours, all lists in one allocation.
-#[derive(Clone, Debug)]
-pub(crate) struct Adjacency {
-    /// `starts[v]..starts[v + 1]` is the range of `v`'s neighbours.
-    pub(crate) starts: Box<[u32]>,
-    pub(crate) neighbours: Box<[SubtaskId]>,
-}
-
 impl TaskSet {
     /// Lets a DAG lose no job, for a replay: due releases queue, whatever it has stated. It ends
     /// after so many jobs, as its recording does.
@@ -92,6 +82,18 @@ impl TaskSet {
         let dag = &mut self.dags[dag.index()];
         dag.overrun = OverrunPolicy::Queue;
         dag.jobs = Some(dag.jobs.map_or(jobs, |stated| stated.min(jobs)));
+    }
+
+    /// Returns a DAG's graph with more edges, which close no cycle.
+    pub(crate) fn with_edges(&self, dag: DagId, edges: &[(u32, u32)]) -> Graph {
+        let stated = &self.dag(dag).graph;
+        let edges = [&stated.successors.edges(), edges].concat();
+        Graph::new(stated.len(), &edges)
+    }
+
+    /// Exchanges the graph of a DAG of which no sink has a deadline of its own.
+    pub(crate) fn exchange(&mut self, dag: DagId, graph: &mut Graph) {
+        core::mem::swap(&mut self.dags[dag.index()].graph, graph);
     }
 
     /// Counts the subtasks of verified DAGs.
@@ -252,26 +254,26 @@ impl Dag {
     /// Returns the subtasks without predecessor, ascending, never empty.
     #[must_use]
     pub fn sources(&self) -> &[SubtaskId] {
-        &self.sources
+        &self.graph.sources
     }
 
     /// Returns the subtasks without successor, ascending, never empty; also those that
     /// state a deadline and precede another sink only because of a shared state.
     #[must_use]
     pub fn sinks(&self) -> &[SubtaskId] {
-        &self.sinks
+        &self.graph.sinks
     }
 
     /// Returns the direct predecessors of a subtask, each once, ascending.
     #[must_use]
     pub fn predecessors(&self, subtask: SubtaskId) -> &[SubtaskId] {
-        self.predecessors.of(subtask)
+        self.graph.predecessors.of(subtask)
     }
 
     /// Returns the direct successors of a subtask, each once, ascending.
     #[must_use]
     pub fn successors(&self, subtask: SubtaskId) -> &[SubtaskId] {
-        self.successors.of(subtask)
+        self.graph.successors.of(subtask)
     }
 
     /// Returns the topics, in the order of their writers. Edges that were stated
@@ -284,7 +286,7 @@ impl Dag {
     /// Returns the subtasks in an order in which every predecessor comes first.
     #[must_use]
     pub fn topological_order(&self) -> &[SubtaskId] {
-        &self.topological_order
+        &self.graph.topological_order
     }
 
     /// Returns the edges that follow from shared states. They are among the
@@ -346,12 +348,5 @@ impl Subtask {
     #[must_use]
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
-    }
-}
-
-impl Adjacency {
-    pub(crate) fn of(&self, subtask: SubtaskId) -> &[SubtaskId] {
-        let index = subtask.index();
-        &self.neighbours[self.starts[index] as usize..self.starts[index + 1] as usize]
     }
 }

@@ -62,6 +62,6 @@ impl Dag {
                 None => true,
             }
         };
-        self.topological_order.iter().filter(begins_one).count()
+        self.topological_order().iter().filter(begins_one).count()
     }
 }

@@ -15,7 +15,7 @@ use alloc::collections::VecDeque;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::graph::Graph;
+use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sorted, sorted_by_key};
 

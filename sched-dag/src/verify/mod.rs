@@ -13,7 +13,6 @@ mod clusters;
 mod cycles;
 mod fault;
 mod findings;
-mod graph;
 mod interner;
 mod label;
 mod latest;

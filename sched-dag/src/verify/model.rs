@@ -1,22 +1,20 @@
 //! From specs without fault to the model.
 
-use alloc::boxed::Box;
 use alloc::vec::Vec;
-use core::mem::swap;
 
 use super::attributes::in_flight;
 use super::fault::Fault;
 use super::findings::Findings;
-use super::graph::Graph;
 use super::label::DagLabel;
 use super::options::CommitOptions;
 use super::shape::Shape;
-use crate::ids::{DagId, SubtaskId, to_u32};
+use crate::graph::Graph;
+use crate::ids::SubtaskId;
 use crate::order::sort_by_key;
 use crate::policy::Priority;
 use crate::priorities::ranks;
 use crate::spec::DagSpec;
-use crate::task_set::{Adjacency, Dag, Subtask, TaskSet};
+use crate::task_set::{Dag, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
 
@@ -38,42 +36,6 @@ pub(super) fn build(
     let dags = specs.iter().zip(shapes).zip(bases);
     let dags = dags.map(|((spec, shape), base)| build_dag(spec, shape, base));
     Some(TaskSet::new(dags.collect(), options.clusters.sizes()))
-}
-
-/// Precedence among a DAG's subtasks.
-pub(crate) struct Precedence {
-    graph: Graph,
-    sources: Box<[SubtaskId]>,
-    sinks: Box<[SubtaskId]>,
-    topological_order: Box<[SubtaskId]>,
-}
-
-impl TaskSet {
-    /// Returns a DAG's precedence with more edges, which close no cycle.
-    pub(crate) fn with_edges(&self, dag: DagId, edges: &[(u32, u32)]) -> Precedence {
-        let dag = self.dag(dag);
-        let stated = (0..).map(SubtaskId).take(dag.subtasks.len());
-        let stated =
-            stated.flat_map(|from| dag.successors(from).iter().map(move |to| (from.0, to.0)));
-        let edges: Vec<(u32, u32)> = stated.chain(edges.iter().copied()).collect();
-        let graph = Graph::new(dag.subtasks.len(), &edges);
-        Precedence {
-            sources: without_neighbours(&graph.predecessors),
-            sinks: without_neighbours(&graph.successors),
-            topological_order: graph.topological_order().into_boxed_slice(),
-            graph,
-        }
-    }
-
-    /// Exchanges the precedence of a DAG of which no sink has a deadline of its own.
-    pub(crate) fn exchange(&mut self, dag: DagId, new: &mut Precedence) {
-        let dag = &mut self.dags[dag.index()];
-        swap(&mut dag.predecessors, &mut new.graph.predecessors);
-        swap(&mut dag.successors, &mut new.graph.successors);
-        swap(&mut dag.sources, &mut new.sources);
-        swap(&mut dag.sinks, &mut new.sinks);
-        swap(&mut dag.topological_order, &mut new.topological_order);
-    }
 }
 
 /// Returns for each DAG without priorities the number of its first one:
@@ -120,8 +82,7 @@ fn has_priorities(spec: &DagSpec) -> bool {
 #[inline(never)]
 fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
     let Shape {
-        graph,
-        topological_order,
+        mut graph,
         state_precedences,
     } = shape;
     let ranks = if has_priorities(spec) {
@@ -132,9 +93,9 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
             .iter()
             .map(|subtask| subtask.wcet_ns)
             .collect();
-        ranks(&wcets_ns, &graph.successors, &topological_order)
+        ranks(&wcets_ns, &graph)
     };
-    let deadlines_ns = deadlines_ns(spec, &graph.successors, &topological_order);
+    let deadlines_ns = deadlines_ns(spec, &graph);
     let subtasks = spec
         .subtasks
         .iter()
@@ -163,8 +124,8 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
             .is_some();
         states_deadline || graph.successors.of(*subtask).is_empty()
     };
-    let sinks: Box<[SubtaskId]> = graph.subtasks().filter(is_sink).collect();
-    let of_sinks_ns = sinks.iter().map(|sink| deadlines_ns[sink.index()]);
+    graph.sinks = graph.subtasks().filter(is_sink).collect();
+    let of_sinks_ns = graph.sinks.iter().map(|sink| deadlines_ns[sink.index()]);
     Dag {
         name: spec.name.clone(),
         graph_hash: graph_hash(spec),
@@ -180,37 +141,25 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         why_there: None,
         jobs: spec.jobs,
         subtasks: subtasks.collect(),
-        sources: without_neighbours(&graph.predecessors),
-        sinks,
-        predecessors: graph.predecessors,
-        successors: graph.successors,
-        topological_order: topological_order.into_boxed_slice(),
+        graph,
         state_precedences: state_precedences.into_boxed_slice(),
         topics: topics_of(spec),
     }
 }
 
 /// Returns for each subtask the least relative deadline of the sinks that it reaches.
-fn deadlines_ns(spec: &DagSpec, successors: &Adjacency, order: &[SubtaskId]) -> Vec<u64> {
+fn deadlines_ns(spec: &DagSpec, graph: &Graph) -> Vec<u64> {
     let whole_ns = spec.relative_deadline_ns.expect("verified to be given");
     let stated = spec
         .subtasks
         .iter()
         .map(|subtask| subtask.relative_deadline_ns);
     let mut deadlines_ns: Vec<u64> = stated.map(|own_ns| own_ns.unwrap_or(whole_ns)).collect();
-    for subtask in order.iter().rev() {
-        for next in successors.of(*subtask) {
+    for subtask in graph.topological_order.iter().rev() {
+        for next in graph.successors.of(*subtask) {
             let least_ns = deadlines_ns[subtask.index()].min(deadlines_ns[next.index()]);
             deadlines_ns[subtask.index()] = least_ns;
         }
     }
     deadlines_ns
-}
-
-fn without_neighbours(adjacency: &Adjacency) -> Box<[SubtaskId]> {
-    let count = to_u32(adjacency.starts.len() - 1);
-    (0..count)
-        .map(SubtaskId)
-        .filter(|&subtask| adjacency.of(subtask).is_empty())
-        .collect()
 }

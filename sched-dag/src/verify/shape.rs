@@ -6,33 +6,20 @@ use alloc::vec::Vec;
 use super::cycles;
 use super::fault::Fault;
 use super::findings::Findings;
-use super::graph::Graph;
 use super::label::{DagLabel, SubtaskLabel};
 use super::options::{CommitOptions, ConstructionPolicy};
 use super::states;
 use super::topics::Topology;
 use super::warning::Warning;
+use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::spec::DagSpec;
 use crate::task_set::StatePrecedence;
 
-/// The graph of a DAG, with an order that is complete if there is no cycle.
+/// The graph of a DAG, with the edges that follow from shared states.
 pub(super) struct Shape {
     pub(super) graph: Graph,
-    pub(super) topological_order: Vec<SubtaskId>,
     pub(super) state_precedences: Vec<StatePrecedence>,
-}
-
-impl Shape {
-    /// Adds more edges to the graph, of which `edges` are the edges.
-    fn add(&mut self, edges: &mut Vec<(u32, u32)>, more: Vec<(u32, u32)>) {
-        if more.is_empty() {
-            return;
-        }
-        edges.extend(more);
-        self.graph = Graph::new(self.graph.len(), edges);
-        self.topological_order = self.graph.topological_order();
-    }
 }
 
 /// Checks the graph of DAG number `dag`.
@@ -46,7 +33,7 @@ pub(super) fn check(
 ) -> Shape {
     let spec = &specs[dag];
     add_plain_edges(specs, dag, &mut topology.edges, findings);
-    let graph = Graph::new(spec.subtasks.len(), &topology.edges);
+    let mut graph = Graph::new(spec.subtasks.len(), &topology.edges);
     let check = Check {
         specs,
         dag,
@@ -57,8 +44,7 @@ pub(super) fn check(
     check.sources(findings);
     check.sinks(&topology.unread, findings);
     check.deadlines(findings);
-    let topological_order = graph.topological_order();
-    if topological_order.len() < graph.len() {
+    if !graph.is_acyclic() {
         for cycle in cycles::shortest_cycles(&graph) {
             let hops = cycle.iter().map(|&subtask| check.label(subtask)).collect();
             findings.fault(
@@ -70,20 +56,21 @@ pub(super) fn check(
             );
         }
     }
-    let mut shape = Shape {
-        graph,
-        topological_order,
-        state_precedences: Vec::new(),
-    };
     // Last, so that all other checks judge the graph that the author stated.
-    if shape.topological_order.len() == shape.graph.len() {
-        let edges = &mut topology.edges;
-        shape.state_precedences = states::order_users(spec, &shape.graph);
-        let precedences = shape.state_precedences.iter();
-        let precedences = precedences.map(|added| (added.earlier.0, added.later.0));
-        shape.add(edges, precedences.collect());
+    let mut state_precedences = Vec::new();
+    if graph.is_acyclic() {
+        state_precedences = states::order_users(spec, &graph);
     }
-    shape
+    if !state_precedences.is_empty() {
+        let added = state_precedences.iter();
+        let added = added.map(|added| (added.earlier.0, added.later.0));
+        topology.edges.extend(added);
+        graph = Graph::new(graph.len(), &topology.edges);
+    }
+    Shape {
+        graph,
+        state_precedences,
+    }
 }
 
 /// Adds the edges that are given without a topic.
@@ -147,11 +134,9 @@ impl Check<'_> {
     /// its author did not mean a source: that fault is reported by itself.
     fn sources(&self, findings: &mut Findings) {
         let subtasks = &self.specs[self.dag].subtasks;
-        let is_source = |subtask: &SubtaskId| {
-            self.graph.predecessors.of(*subtask).is_empty()
-                && subtasks[subtask.index()].inputs.is_empty()
-        };
-        let sources: Vec<SubtaskId> = self.graph.subtasks().filter(is_source).collect();
+        let is_source = |subtask: &SubtaskId| subtasks[subtask.index()].inputs.is_empty();
+        let sources = self.graph.sources.iter().copied();
+        let sources: Vec<SubtaskId> = sources.filter(is_source).collect();
         let dag = || self.dag_label();
         if sources.is_empty() && !subtasks.is_empty() {
             findings.fault(self.dag, Fault::NoSource { dag: dag() });
@@ -173,11 +158,7 @@ impl Check<'_> {
     /// writers of unread topics, most likely of misspelt ones.
     #[inline(never)]
     fn sinks(&self, unread: &[(usize, &str)], findings: &mut Findings) {
-        let ends: Vec<SubtaskId> = self
-            .graph
-            .subtasks()
-            .filter(|&subtask| self.graph.successors.of(subtask).is_empty())
-            .collect();
+        let ends = &*self.graph.sinks;
         let mut writes_unread = alloc::vec![false; self.graph.len()];
         for &(writer, _) in unread {
             writes_unread[writer] = true;
@@ -191,7 +172,7 @@ impl Check<'_> {
         let sinks = if wants_one && !silent.is_empty() {
             &silent
         } else {
-            &ends
+            ends
         };
 
         if sinks.is_empty() && self.graph.len() > 0 {

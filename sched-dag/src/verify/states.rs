@@ -26,8 +26,8 @@ use core::cmp::Reverse;
 
 use super::fault::Fault;
 use super::findings::Findings;
-use super::graph::Graph;
 use super::label::{DagLabel, SubtaskLabel};
+use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
 use crate::spec::{DagSpec, StateSpec};
@@ -155,12 +155,9 @@ pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence>
 /// Returns each subtask's place in the order in which one core runs the DAG if it
 /// always takes the first registered of the ready ones.
 fn places(graph: &Graph) -> Vec<usize> {
-    let predecessors = |subtask| graph.predecessors.of(subtask).len();
-    let mut missing: Vec<usize> = graph.subtasks().map(predecessors).collect();
-    let sources = graph
-        .subtasks()
-        .filter(|&subtask| predecessors(subtask) == 0);
-    let mut ready: BinaryHeap<Reverse<SubtaskId>> = sources.map(Reverse).collect();
+    let mut missing = graph.predecessor_counts();
+    let mut ready: BinaryHeap<Reverse<SubtaskId>> =
+        graph.sources.iter().copied().map(Reverse).collect();
     let mut place = vec![0; missing.len()];
     let mut next = 0;
     while let Some(Reverse(subtask)) = ready.pop() {

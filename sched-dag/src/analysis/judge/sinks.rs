@@ -107,8 +107,8 @@ pub(in crate::analysis) fn equations<'a>(
 /// Returns the longest path to each sink, in their order.
 fn lengths_ns(task: &Task, model: &Dag) -> Vec<u64> {
     let mut lengths_ns: Vec<u64> = task.wcets_ns().to_vec();
-    for &subtask in task.topological_order() {
-        for &next in task.successors(subtask) {
+    for subtask in task.topological_order() {
+        for next in task.successors(subtask) {
             let through_ns = lengths_ns[subtask] + task.wcets_ns()[next];
             lengths_ns[next] = lengths_ns[next].max(through_ns);
         }
@@ -158,8 +158,8 @@ fn reaches(task: &Task, model: &Dag, policy: Policy, preemption: Mixture) -> Vec
     };
     // The largest number among the ancestors.
     let mut least_urgent: Vec<u64> = (0..subtasks.len()).map(urgency).collect();
-    for &subtask in task.topological_order() {
-        for &next in task.successors(subtask) {
+    for subtask in task.topological_order() {
+        for next in task.successors(subtask) {
             least_urgent[next] = least_urgent[next].max(least_urgent[subtask]);
         }
     }
