@@ -1,44 +1,51 @@
-//! The checks of numbers: periods, deadlines, WCETs, counts, priorities.
+//! The checks of what is stated of DAGs and subtasks by itself: periods, deadlines, WCETs,
+//! counts, priorities, clusters, names.
 //!
 //! Every sum and product is checked, so that a time or a count that does not
-//! fit is a fault and never wraps.
+//! fit is a fault and never wraps. A name is for people, so it may be left out; given twice
+//! within one DAG it would make every message about it ambiguous.
 
 use alloc::vec::Vec;
 
 use super::MAX_ARITY;
-use super::fault::{Direction, Fault, Time};
-use super::findings::Findings;
-use super::label::{DagLabel, SubtaskLabel};
+use super::fault::{Direction, Fault, Time, Warning};
+use super::findings::{Findings, Page};
+use super::interner::Interner;
+use super::label::SubtaskLabel;
 use super::options::CommitOptions;
 use super::states::is_shared;
-use super::warning::Warning;
+use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
 use crate::spec::{DagSpec, STACK_BYTES};
 
-/// Checks the numbers of the whole commit.
-pub(super) fn check(specs: &[&DagSpec], options: &CommitOptions, findings: &mut Findings) {
-    if specs.is_empty() {
-        findings.fault(0, Fault::NoDags);
+/// Checks the attributes of the whole commit.
+pub(super) fn check(options: &CommitOptions, findings: &mut Findings<'_>) {
+    let count = findings.specs.len();
+    if count == 0 {
+        findings.fault(Fault::NoDags);
     }
     if options.cores == 0 {
-        findings.fault(0, Fault::NoCores);
+        findings.fault(Fault::NoCores);
     }
-    if u32::try_from(specs.len()).is_err() {
-        findings.fault(0, Fault::TooManyDags { count: specs.len() });
+    if u32::try_from(count).is_err() {
+        findings.fault(Fault::TooManyDags { count });
     }
-    check_instances(specs, options, findings);
-    for dag in 0..specs.len() {
-        check_counts(specs, dag, findings);
-        check_times(specs, dag, findings);
-        check_subtasks(specs, dag, findings);
+    check_instances(options, findings);
+    for dag in 0..count {
+        let page = &mut findings.of(dag);
+        check_counts(page);
+        check_times(page);
+        check_subtasks(page);
         if options.policy == Policy::StaticPriority {
-            check_priorities_given(specs, dag, findings);
+            check_priorities_given(page);
         }
     }
     if options.policy == Policy::StaticPriority {
-        warn_of_equal_priorities(specs, findings);
+        warn_of_equal_priorities(findings);
     }
+    check_clusters(options, findings);
+    check_names(findings);
 }
 
 /// Returns the most jobs in flight of a DAG, given or enough for its deadline.
@@ -63,88 +70,75 @@ pub(super) fn in_flight(spec: &DagSpec) -> u64 {
     enough.min(spec.jobs.unwrap_or(u64::MAX))
 }
 
-fn check_instances(specs: &[&DagSpec], options: &CommitOptions, findings: &mut Findings) {
-    let of = |spec: &&DagSpec| u128::from(in_flight(spec)) * spec.subtasks.len() as u128;
-    let instances: u128 = specs.iter().map(of).sum();
+fn check_instances(options: &CommitOptions, findings: &mut Findings<'_>) {
+    let of = |spec: &DagSpec| u128::from(in_flight(spec)) * spec.subtasks.len() as u128;
+    let specs = findings.specs;
+    let instances: u128 = specs.iter().map(|spec| of(spec)).sum();
     if instances <= u128::from(options.instance_limit) {
         return;
     }
-    if let Some(most) = (0..specs.len()).max_by_key(|&dag| of(&specs[dag])) {
-        findings.fault(
-            most,
-            Fault::TooManyInstances {
-                dag: DagLabel::new(specs, most),
-                in_flight: in_flight(specs[most]),
-                instances,
-                limit: options.instance_limit,
-            },
-        );
+    if let Some(most) = (0..specs.len()).max_by_key(|&dag| of(specs[dag])) {
+        findings.of(most).fault(|dag| Fault::TooManyInstances {
+            dag,
+            in_flight: in_flight(specs[most]),
+            instances,
+            limit: options.instance_limit,
+        });
     }
 }
 
 #[inline(never)]
-fn check_counts(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
-    let spec = &specs[dag];
-    let label = || DagLabel::new(specs, dag);
+fn check_counts(page: &mut Page<'_, '_>) {
+    let spec = page.spec;
     let count = spec.subtasks.len();
     if count == 0 {
-        findings.fault(dag, Fault::NoSubtasks { dag: label() });
+        page.fault(|dag| Fault::NoSubtasks { dag });
     }
     if u32::try_from(count).is_err() {
-        findings.fault(
-            dag,
-            Fault::TooManySubtasks {
-                dag: label(),
-                count,
-            },
-        );
+        page.fault(|dag| Fault::TooManySubtasks { dag, count });
     }
     if spec.jobs == Some(0) {
-        findings.fault(dag, Fault::ZeroJobs { dag: label() });
+        page.fault(|dag| Fault::ZeroJobs { dag });
     }
     if spec.in_flight == Some(0) {
-        findings.fault(dag, Fault::ZeroInFlight { dag: label() });
+        page.fault(|dag| Fault::ZeroInFlight { dag });
     }
     if let OnFault::DropJob(limit) = spec.on_fault {
         if limit.faults == 0 || limit.in_all == 0 {
-            findings.fault(dag, Fault::ZeroFaults { dag: label() });
+            page.fault(|dag| Fault::ZeroFaults { dag });
         }
         if limit.window == 0 {
-            findings.fault(dag, Fault::ZeroWindow { dag: label() });
+            page.fault(|dag| Fault::ZeroWindow { dag });
         }
     }
 }
 
 #[inline(never)]
-fn check_times(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
-    let spec = &specs[dag];
-    let label = || DagLabel::new(specs, dag);
+fn check_times(page: &mut Page<'_, '_>) {
+    let spec = page.spec;
     // An app that registers subtasks states both with them.
     let has_subtasks = !spec.subtasks.is_empty();
     match spec.period_ns {
-        None if has_subtasks => findings.fault(dag, Fault::MissingPeriod { dag: label() }),
-        Some(0) => findings.fault(dag, Fault::ZeroPeriod { dag: label() }),
+        None if has_subtasks => page.fault(|dag| Fault::MissingPeriod { dag }),
+        Some(0) => page.fault(|dag| Fault::ZeroPeriod { dag }),
         _ => {}
     }
     match spec.relative_deadline_ns {
-        None if has_subtasks => findings.fault(dag, Fault::MissingDeadline { dag: label() }),
-        Some(0) => findings.fault(dag, Fault::ZeroDeadline { dag: label() }),
+        None if has_subtasks => page.fault(|dag| Fault::MissingDeadline { dag }),
+        Some(0) => page.fault(|dag| Fault::ZeroDeadline { dag }),
         _ => {}
     }
-    if deadline_of(spec, 0).is_none() {
-        let time = Time::FirstDeadline;
-        findings.fault(dag, Fault::TimeOverflow { dag: label(), time });
-    } else if spec
-        .jobs
-        .is_some_and(|jobs| deadline_of(spec, jobs.saturating_sub(1)).is_none())
-    {
-        let time = Time::LastDeadline;
-        findings.fault(dag, Fault::TimeOverflow { dag: label(), time });
-    }
+    let is_beyond = |jobs: u64| deadline_of(spec, jobs.saturating_sub(1)).is_none();
+    let deadline = match spec.jobs {
+        _ if is_beyond(1) => Some(Time::FirstDeadline),
+        Some(jobs) if is_beyond(jobs) => Some(Time::LastDeadline),
+        _ => None,
+    };
     let mut wcets_ns = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
-    if wcets_ns.try_fold(0_u64, u64::checked_add).is_none() {
-        let time = Time::Volume;
-        findings.fault(dag, Fault::TimeOverflow { dag: label(), time });
+    let volume = wcets_ns.try_fold(0_u64, u64::checked_add);
+    let volume = volume.is_none().then_some(Time::Volume);
+    for time in deadline.into_iter().chain(volume) {
+        page.fault(|dag| Fault::TimeOverflow { dag, time });
     }
 }
 
@@ -158,59 +152,47 @@ fn deadline_of(spec: &DagSpec, job: u64) -> Option<u64> {
 }
 
 #[inline(never)]
-fn check_subtasks(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
-    let spec = &specs[dag];
-    for (index, subtask) in spec.subtasks.iter().enumerate() {
-        let label = || (DagLabel::new(specs, dag), SubtaskLabel::new(spec, index));
-        check_sink_deadline(specs, dag, index, findings);
-        let deadlines_ns = [subtask.relative_deadline_ns, spec.relative_deadline_ns];
-        match (subtask.wcet_ns, deadlines_ns.into_iter().flatten().min()) {
-            (Some(0), _) => {
-                let (dag, subtask) = label();
-                findings.warnings.push(Warning::ZeroWcet { dag, subtask });
-            }
+fn check_subtasks(page: &mut Page<'_, '_>) {
+    let spec = page.spec;
+    for (index, stated) in spec.subtasks.iter().enumerate() {
+        let subtask = || SubtaskLabel::new(spec, index);
+        check_sink_deadline(page, index);
+        let deadlines_ns = [stated.relative_deadline_ns, spec.relative_deadline_ns];
+        match (stated.wcet_ns, deadlines_ns.into_iter().flatten().min()) {
+            (Some(0), _) => page.warn(|dag| Warning::ZeroWcet {
+                dag,
+                subtask: subtask(),
+            }),
             (Some(wcet_ns), Some(relative_deadline_ns)) if wcet_ns > relative_deadline_ns => {
-                let (label, subtask) = label();
-                findings.fault(
+                page.fault(|dag| Fault::WcetExceedsDeadline {
                     dag,
-                    Fault::WcetExceedsDeadline {
-                        dag: label,
-                        subtask,
-                        wcet_ns,
-                        relative_deadline_ns,
-                    },
-                );
+                    subtask: subtask(),
+                    wcet_ns,
+                    relative_deadline_ns,
+                });
             }
             _ => {}
         }
-        if let Some(bytes) = subtask.stack_bytes
+        if let Some(bytes) = stated.stack_bytes
             && !STACK_BYTES.contains(&bytes)
         {
-            let (label, subtask) = label();
-            findings.fault(
+            page.fault(|dag| Fault::StackOutOfRange {
                 dag,
-                Fault::StackOutOfRange {
-                    dag: label,
-                    subtask,
-                    bytes,
-                },
-            );
+                subtask: subtask(),
+                bytes,
+            });
         }
         for (direction, arity) in [
-            (Direction::Input, subtask.inputs.len()),
-            (Direction::Output, subtask.outputs.len()),
+            (Direction::Input, stated.inputs.len()),
+            (Direction::Output, stated.outputs.len()),
         ] {
             if arity > MAX_ARITY {
-                let (label, subtask) = label();
-                findings.fault(
+                page.fault(|dag| Fault::ArityTooLarge {
                     dag,
-                    Fault::ArityTooLarge {
-                        dag: label,
-                        subtask,
-                        direction,
-                        arity,
-                    },
-                );
+                    subtask: subtask(),
+                    direction,
+                    arity,
+                });
             }
         }
     }
@@ -218,76 +200,120 @@ fn check_subtasks(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
 
 /// Checks what a subtask states of its own deadline. That it is a sink's is checked with
 /// the graph.
-fn check_sink_deadline(specs: &[&DagSpec], dag: usize, index: usize, findings: &mut Findings) {
-    let spec = &specs[dag];
+fn check_sink_deadline(page: &mut Page<'_, '_>, index: usize) {
+    let spec = page.spec;
     let Some(relative_deadline_ns) = spec.subtasks[index].relative_deadline_ns else {
         return;
     };
-    let (label, sink) = (DagLabel::new(specs, dag), SubtaskLabel::new(spec, index));
-    if relative_deadline_ns == 0 && spec.relative_deadline_ns != Some(0) {
-        findings.fault(dag, Fault::ZeroSinkDeadline { dag: label, sink });
-    } else if let Some(of_dag_ns) = spec.relative_deadline_ns
-        && of_dag_ns > 0
+    let sink = page.subtask(index);
+    let of_dag_ns = spec.relative_deadline_ns;
+    if relative_deadline_ns == 0 && of_dag_ns != Some(0) {
+        page.fault(|dag| Fault::ZeroSinkDeadline { dag, sink });
+    } else if let Some(of_dag_ns @ 1..) = of_dag_ns
         && relative_deadline_ns > of_dag_ns
     {
-        findings.fault(
+        page.fault(|dag| Fault::SinkDeadlineBeyondDag {
             dag,
-            Fault::SinkDeadlineBeyondDag {
-                dag: label,
-                sink,
-                relative_deadline_ns,
-                of_dag_ns,
-            },
-        );
+            sink,
+            relative_deadline_ns,
+            of_dag_ns,
+        });
     }
 }
 
-fn check_priorities_given(specs: &[&DagSpec], dag: usize, findings: &mut Findings) {
-    let subtasks = &specs[dag].subtasks;
-    let missing = subtasks
-        .iter()
-        .filter(|subtask| subtask.priority.is_none())
-        .count();
-    if missing == 0 || missing == subtasks.len() {
-        return;
+fn check_priorities_given(page: &mut Page<'_, '_>) {
+    let subtasks = &page.spec.subtasks;
+    let without = (0..subtasks.len()).filter(|&index| subtasks[index].priority.is_none());
+    let without: Vec<_> = without.map(|index| page.subtask(index)).collect();
+    if !without.is_empty() && without.len() < subtasks.len() {
+        page.fault(|dag| Fault::PrioritiesPartlyGiven { dag, without });
     }
-    let without = (0..subtasks.len())
-        .filter(|&index| subtasks[index].priority.is_none())
-        .map(|index| SubtaskLabel::new(specs[dag], index))
-        .collect();
-    let label = DagLabel::new(specs, dag);
-    findings.fault(
-        dag,
-        Fault::PrioritiesPartlyGiven {
-            dag: label,
-            without,
-        },
-    );
 }
 
-fn warn_of_equal_priorities(specs: &[&DagSpec], findings: &mut Findings) {
+fn warn_of_equal_priorities(findings: &mut Findings<'_>) {
     let mut given: Vec<(u32, usize, usize)> = Vec::new();
-    for (dag, spec) in specs.iter().enumerate() {
+    for (dag, spec) in findings.specs.iter().enumerate() {
         for (index, subtask) in spec.subtasks.iter().enumerate() {
-            given.extend(
-                subtask
-                    .priority
-                    .map(|Priority(number)| (number, dag, index)),
-            );
+            let number = subtask.priority.map(|Priority(number)| number);
+            given.extend(number.map(|number| (number, dag, index)));
         }
     }
     for group in sorted(&given).chunk_by(|one, other| one.0 == other.0) {
         if group.len() > 1 {
-            let label = |&(_, dag, index): &_| {
-                (
-                    DagLabel::new(specs, dag),
-                    SubtaskLabel::new(specs[dag], index),
-                )
-            };
-            findings.warnings.push(Warning::EqualPriorities {
+            let subtasks = group.iter().map(|&(_, dag, index)| {
+                let subtask = SubtaskLabel::new(findings.specs[dag], index);
+                (findings.label(dag), subtask)
+            });
+            let warning = Warning::EqualPriorities {
                 priority: Priority(group[0].0),
-                subtasks: group.iter().map(label).collect(),
+                subtasks: subtasks.collect(),
+            };
+            findings.warnings.push(warning);
+        }
+    }
+}
+
+/// Checks the clusters' cores, and the one that each DAG is in.
+#[inline(never)]
+fn check_clusters(options: &CommitOptions, findings: &mut Findings<'_>) {
+    let sizes = options.clusters.sizes();
+    for (cluster, &size) in (0..).map(ClusterId).zip(sizes) {
+        if size == 0 {
+            findings.fault(Fault::ClusterWithoutCores { cluster });
+        }
+    }
+    let wanted: u64 = sizes.iter().copied().map(u64::from).sum();
+    let (cores, clusters) = (options.cores, sizes.len());
+    if wanted > cores.into() {
+        findings.fault(Fault::ClustersBeyondCores { wanted, cores });
+    }
+    for dag in 0..findings.specs.len() {
+        let mut page = findings.of(dag);
+        match page.spec.cluster {
+            None if clusters > 0 => page.fault(|dag| Fault::NoCluster { dag, clusters }),
+            Some(cluster) if cluster.index() >= clusters.max(1) => {
+                page.fault(|dag| Fault::UnknownCluster {
+                    dag,
+                    cluster,
+                    clusters,
+                });
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Checks the names of DAGs and subtasks.
+fn check_names(findings: &mut Findings<'_>) {
+    let specs = findings.specs;
+    for (first, second) in duplicates(specs.iter().map(|spec| spec.name.as_str())) {
+        let (first, second) = (findings.label(first), findings.label(second));
+        let warning = Warning::DuplicateDagName { first, second };
+        findings.warnings.push(warning);
+    }
+    for (dag, spec) in specs.iter().enumerate() {
+        let names = spec.subtasks.iter().map(|subtask| subtask.name.as_str());
+        for (first, second) in duplicates(names) {
+            findings.of(dag).fault(|dag| Fault::DuplicateSubtask {
+                dag,
+                first: SubtaskLabel::new(spec, first),
+                second: SubtaskLabel::new(spec, second),
             });
         }
     }
+}
+
+/// Returns each position whose name, unless empty, stands at an earlier one, after that one.
+fn duplicates<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> Vec<(usize, usize)> {
+    let mut interner = Interner::new(names.len());
+    let mut first_positions: Vec<usize> = Vec::with_capacity(names.len());
+    let mut found = Vec::new();
+    for (position, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
+        let number = interner.intern(name);
+        match first_positions.get(number) {
+            Some(&first) => found.push((first, position)),
+            None => first_positions.push(position),
+        }
+    }
+    found
 }

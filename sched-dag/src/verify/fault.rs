@@ -1,4 +1,5 @@
-//! Reasons why a commit is impossible, one row a kind.
+//! Reasons why a commit is impossible, one row a kind; and oddities that its author may not
+//! have meant, and that prevent nothing.
 //!
 //! A fault names everything that a message or a tool needs: the DAG, the
 //! subtasks, the topic, the numbers. Its text states the fact, the offender and
@@ -9,9 +10,10 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::label::{DagLabel, SubtaskLabel};
-use super::phrases::{list, ns, one_up_to, own_input, question, ring, undivided};
+use super::phrases::{list, members, ns, one_up_to, own_input, question, ring, undivided};
 use crate::MAX_ARITY;
 use crate::ids::ClusterId;
+use crate::policy::Priority;
 use crate::spec::STACK_BYTES;
 use crate::worded;
 
@@ -244,6 +246,36 @@ worded! {
             "topic `{topic}` of {dag} carries `{type_name}`, which can only be moved, and has \
              {readers} readers, those of its latest value included; keep one reader or send a type \
              that can be shared";
+    }
+}
+
+worded! {
+    /// One oddity that does not prevent scheduling.
+    pub enum Warning {
+        /// A WCET of 0, on which no bound can rest.
+        ZeroWcet { dag: DagLabel, subtask: SubtaskLabel } = "zero_wcet",
+            "{subtask} of {dag} has a WCET of 0 ns; measure it, or leave the WCET out";
+        /// Under static priority: subtasks with the same priority, so that the
+        /// order of registration decides.
+        EqualPriorities { priority: Priority, subtasks: Vec<(DagLabel, SubtaskLabel)> } =
+            "equal_priorities",
+            "priority {} is given {} times: to {}; the order of registration decides between them",
+            priority.0, subtasks.len(), list(&members(subtasks));
+        /// A sink writes a topic that no subtask reads.
+        UnreadSinkValue { dag: DagLabel, subtask: SubtaskLabel, topic: String } =
+            "unread_sink_value",
+            "{subtask}, a sink of {dag}, writes topic `{topic}`, which no subtask reads; drop the \
+             output";
+        /// Two DAGs with one name.
+        DuplicateDagName { first: DagLabel, second: DagLabel } = "duplicate_dag_name",
+            "two DAGs are named `{}` (number {} and {}); rename one",
+            first.name, first.id.0, second.id.0;
+        /// The analysis is certain that the DAG cannot keep its deadlines when
+        /// every instance takes its WCET; `reason` says why, with the remedy. Not
+        /// from [`verify`](crate::verify()), which does not analyse, but from a
+        /// caller that does.
+        CertainMiss { dag: DagLabel, reason: String } = "certain_miss",
+            "{dag} cannot keep its deadlines at its WCETs: {reason}";
     }
 }
 

@@ -9,31 +9,26 @@
 //! in subtasks, ports and edges, but for sorting numbers; nothing recurs.
 
 mod attributes;
-mod clusters;
 mod cycles;
 mod fault;
 mod findings;
 mod interner;
 mod label;
-mod latest;
 mod misspelt;
 mod model;
-mod names;
 mod options;
 mod phrases;
 mod shape;
 mod states;
 mod topics;
-mod warning;
 
 use alloc::vec::Vec;
 use core::borrow::Borrow;
 use core::fmt;
 
-pub use fault::{Direction, Fault, Time};
+pub use fault::{Direction, Fault, Time, Warning};
 pub use label::{DagLabel, SubtaskLabel};
 pub use options::{CommitOptions, ConstructionPolicy, Count};
-pub use warning::Warning;
 
 use findings::Findings;
 
@@ -73,21 +68,17 @@ pub fn verify<S: Borrow<DagSpec>>(
 }
 
 fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<Verified, Rejected> {
-    let mut findings = Findings::default();
-    attributes::check(specs, options, &mut findings);
-    clusters::check(specs, options, &mut findings);
-    names::check(specs, &mut findings);
-    states::check(specs, &mut findings);
-    let mut topologies = topics::check(specs, options, &mut findings);
-    latest::check(specs, &mut topologies, &mut findings);
-    let mut shapes = Vec::with_capacity(specs.len());
-    for (dag, topology) in topologies.into_iter().enumerate() {
-        shapes.push(shape::check(specs, dag, topology, options, &mut findings));
-    }
+    let (mut findings, policy) = (Findings::new(specs), options.construction);
+    attributes::check(options, &mut findings);
+    states::check(&mut findings);
+    let topologies = topics::check(options, &mut findings);
+    let shapes = topologies.into_iter().enumerate();
+    let shapes = shapes.map(|(dag, topology)| shape::check(dag, topology, policy, &mut findings));
+    let shapes: Vec<_> = shapes.collect();
     let task_set = if findings.has_faults() {
         None
     } else {
-        model::build(specs, options, shapes, &mut findings)
+        model::build(options, shapes, &mut findings)
     };
     let (mut faults, warnings) = findings.into_parts();
     misspelt::suggest(specs, &mut faults);

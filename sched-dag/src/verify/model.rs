@@ -5,7 +5,6 @@ use alloc::vec::Vec;
 use super::attributes::in_flight;
 use super::fault::Fault;
 use super::findings::Findings;
-use super::label::DagLabel;
 use super::options::CommitOptions;
 use super::shape::Shape;
 use crate::graph::Graph;
@@ -24,16 +23,15 @@ use crate::wcets::{WcetSource, graph_hash};
 ///
 /// If the specs have a fault that an earlier check finds.
 pub(super) fn build(
-    specs: &[&DagSpec],
     options: &CommitOptions,
     shapes: Vec<Shape>,
-    findings: &mut Findings,
+    findings: &mut Findings<'_>,
 ) -> Option<TaskSet> {
-    let bases = priority_bases(specs, findings);
+    let bases = priority_bases(findings);
     if findings.has_faults() {
         return None;
     }
-    let dags = specs.iter().zip(shapes).zip(bases);
+    let dags = findings.specs.iter().zip(shapes).zip(bases);
     let dags = dags.map(|((spec, shape), base)| build_dag(spec, shape, base));
     Some(TaskSet::new(dags.collect(), options.clusters.sizes()))
 }
@@ -41,7 +39,8 @@ pub(super) fn build(
 /// Returns for each DAG without priorities the number of its first one:
 /// deadline monotonic, after all that are given.
 #[inline(never)]
-fn priority_bases(specs: &[&DagSpec], findings: &mut Findings) -> Vec<u32> {
+fn priority_bases(findings: &mut Findings<'_>) -> Vec<u32> {
+    let specs = findings.specs;
     let given = specs
         .iter()
         .filter(|spec| has_priorities(spec))
@@ -61,12 +60,7 @@ fn priority_bases(specs: &[&DagSpec], findings: &mut Findings) -> Vec<u32> {
         let after = next + specs[dag].subtasks.len() as u64;
         match u32::try_from(next) {
             Ok(base) if after <= u64::from(u32::MAX) + 1 => bases[dag] = base,
-            _ => findings.fault(
-                dag,
-                Fault::PrioritiesExhausted {
-                    dag: DagLabel::new(specs, dag),
-                },
-            ),
+            _ => (findings.of(dag)).fault(|dag| Fault::PrioritiesExhausted { dag }),
         }
         next = after;
     }

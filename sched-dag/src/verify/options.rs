@@ -111,9 +111,3 @@ impl ConstructionPolicy {
         }
     }
 }
-
-impl Count {
-    pub(crate) const fn is_one(self) -> bool {
-        matches!(self, Self::One)
-    }
-}

@@ -4,16 +4,14 @@
 use alloc::vec::Vec;
 
 use super::cycles;
-use super::fault::Fault;
-use super::findings::Findings;
-use super::label::{DagLabel, SubtaskLabel};
-use super::options::{CommitOptions, ConstructionPolicy};
+use super::fault::{Fault, Warning};
+use super::findings::{Findings, Page};
+use super::label::SubtaskLabel;
+use super::options::{ConstructionPolicy, Count};
 use super::states;
 use super::topics::Topology;
-use super::warning::Warning;
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
-use crate::spec::DagSpec;
 use crate::task_set::StatePrecedence;
 
 /// The graph of a DAG, with the edges that follow from shared states.
@@ -25,35 +23,23 @@ pub(super) struct Shape {
 /// Checks the graph of DAG number `dag`.
 #[inline(never)]
 pub(super) fn check(
-    specs: &[&DagSpec],
     dag: usize,
     mut topology: Topology<'_>,
-    options: &CommitOptions,
-    findings: &mut Findings,
+    policy: ConstructionPolicy,
+    findings: &mut Findings<'_>,
 ) -> Shape {
-    let spec = &specs[dag];
-    add_plain_edges(specs, dag, &mut topology.edges, findings);
+    let page = &mut findings.of(dag);
+    let spec = page.spec;
+    add_plain_edges(&mut topology.edges, page);
     let mut graph = Graph::new(spec.subtasks.len(), &topology.edges);
-    let check = Check {
-        specs,
-        dag,
-        policy: options.construction,
-        graph: &graph,
-    };
-    check.connection(findings);
-    check.sources(findings);
-    check.sinks(&topology.unread, findings);
-    check.deadlines(findings);
+    check_connection(&graph, policy, page);
+    check_sources(&graph, policy, page);
+    check_sinks(&graph, policy, &topology.unread, page);
+    check_deadlines(&graph, page);
     if !graph.is_acyclic() {
         for cycle in cycles::shortest_cycles(&graph) {
-            let hops = cycle.iter().map(|&subtask| check.label(subtask)).collect();
-            findings.fault(
-                dag,
-                Fault::Cycle {
-                    dag: check.dag_label(),
-                    hops,
-                },
-            );
+            let hops = labels(page, &cycle);
+            page.fault(|dag| Fault::Cycle { dag, hops });
         }
     }
     // Last, so that all other checks judge the graph that the author stated.
@@ -74,178 +60,131 @@ pub(super) fn check(
 }
 
 /// Adds the edges that are given without a topic.
-fn add_plain_edges(
-    specs: &[&DagSpec],
-    dag: usize,
-    edges: &mut Vec<(u32, u32)>,
-    findings: &mut Findings,
-) {
-    let spec = &specs[dag];
-    let subtasks = spec.subtasks.len();
-    edges.reserve(spec.edges.len());
-    for &(from, to) in &spec.edges {
+fn add_plain_edges(edges: &mut Vec<(u32, u32)>, page: &mut Page<'_, '_>) {
+    let subtasks = page.spec.subtasks.len();
+    edges.reserve(page.spec.edges.len());
+    for &edge in &page.spec.edges {
+        let (from, to) = edge;
         if from >= subtasks || to >= subtasks {
-            let fault = Fault::EdgeOutOfRange {
-                dag: DagLabel::new(specs, dag),
-                edge: (from, to),
+            page.fault(|dag| Fault::EdgeOutOfRange {
+                dag,
+                edge,
                 subtasks,
-            };
-            findings.fault(dag, fault);
+            });
         } else if from == to {
-            let fault = Fault::SelfEdge {
-                dag: DagLabel::new(specs, dag),
-                subtask: SubtaskLabel::new(spec, from),
-                topic: None,
-            };
-            findings.fault(dag, fault);
+            let (subtask, topic) = (page.subtask(from), None);
+            page.fault(|dag| Fault::SelfEdge {
+                dag,
+                subtask,
+                topic,
+            });
         } else {
             edges.push((to_u32(from), to_u32(to)));
         }
     }
 }
 
-struct Check<'a> {
-    specs: &'a [&'a DagSpec],
-    dag: usize,
-    policy: ConstructionPolicy,
-    graph: &'a Graph,
+fn check_connection(graph: &Graph, policy: ConstructionPolicy, page: &mut Page<'_, '_>) {
+    if policy.parts == Count::Several {
+        return;
+    }
+    let (part_of, parts) = graph.parts();
+    if let Some(other) = part_of.iter().position(|&part| part != 0) {
+        let (one, other) = (page.subtask(0), page.subtask(other));
+        page.fault(|dag| Fault::NotConnected {
+            dag,
+            parts,
+            one,
+            other,
+        });
+    }
 }
 
-impl Check<'_> {
-    fn connection(&self, findings: &mut Findings) {
-        if !self.policy.parts.is_one() {
-            return;
-        }
-        let (part_of, parts) = self.graph.parts();
-        if let Some(other) = part_of.iter().position(|&part| part != 0) {
-            findings.fault(
-                self.dag,
-                Fault::NotConnected {
-                    dag: self.dag_label(),
-                    parts,
-                    one: SubtaskLabel::new(self.specs[self.dag], 0),
-                    other: SubtaskLabel::new(self.specs[self.dag], other),
-                },
-            );
-        }
+/// A subtask that only reads topics without writer has no predecessor, but
+/// its author did not mean a source: that fault is reported by itself.
+fn check_sources(graph: &Graph, policy: ConstructionPolicy, page: &mut Page<'_, '_>) {
+    let subtasks = &page.spec.subtasks;
+    let is_source = |subtask: &SubtaskId| subtasks[subtask.index()].inputs.is_empty();
+    let sources = graph.sources.iter().copied().filter(is_source);
+    let sources = labels(page, &sources.collect::<Vec<_>>());
+    if sources.is_empty() && !subtasks.is_empty() {
+        page.fault(|dag| Fault::NoSource { dag });
+    } else if sources.len() > 1 && policy.sources == Count::One {
+        page.fault(|dag| Fault::SeveralSources { dag, sources });
+    }
+}
+
+/// A topic without reader is a fault, but at an accepted sink it is only a
+/// value that nobody uses. Where one sink is wanted and a subtask without
+/// outputs is there to be it, other ends of the graph are no sinks but
+/// writers of unread topics, most likely of misspelt ones.
+#[inline(never)]
+fn check_sinks(
+    graph: &Graph,
+    policy: ConstructionPolicy,
+    unread: &[(usize, &str)],
+    page: &mut Page<'_, '_>,
+) {
+    let ends = &*graph.sinks;
+    let mut writes_unread = alloc::vec![false; graph.len()];
+    for &(writer, _) in unread {
+        writes_unread[writer] = true;
+    }
+    let silent = ends.iter().filter(|end| !writes_unread[end.index()]);
+    let silent: Vec<SubtaskId> = silent.copied().collect();
+    let wants_one = policy.sinks == Count::One;
+    let sinks = match wants_one && !silent.is_empty() {
+        true => &silent,
+        false => ends,
+    };
+
+    if sinks.is_empty() && graph.len() > 0 {
+        page.fault(|dag| Fault::NoSink { dag });
+    } else if sinks.len() > 1 && wants_one {
+        let sinks = labels(page, sinks);
+        page.fault(|dag| Fault::SeveralSinks { dag, sinks });
     }
 
-    /// A subtask that only reads topics without writer has no predecessor, but
-    /// its author did not mean a source: that fault is reported by itself.
-    fn sources(&self, findings: &mut Findings) {
-        let subtasks = &self.specs[self.dag].subtasks;
-        let is_source = |subtask: &SubtaskId| subtasks[subtask.index()].inputs.is_empty();
-        let sources = self.graph.sources.iter().copied();
-        let sources: Vec<SubtaskId> = sources.filter(is_source).collect();
-        let dag = || self.dag_label();
-        if sources.is_empty() && !subtasks.is_empty() {
-            findings.fault(self.dag, Fault::NoSource { dag: dag() });
-        } else if sources.len() > 1 && self.policy.sources.is_one() {
-            let sources = self.labels(&sources);
-            findings.fault(
-                self.dag,
-                Fault::SeveralSources {
-                    dag: dag(),
-                    sources,
-                },
-            );
-        }
-    }
-
-    /// A topic without reader is a fault, but at an accepted sink it is only a
-    /// value that nobody uses. Where one sink is wanted and a subtask without
-    /// outputs is there to be it, other ends of the graph are no sinks but
-    /// writers of unread topics, most likely of misspelt ones.
-    #[inline(never)]
-    fn sinks(&self, unread: &[(usize, &str)], findings: &mut Findings) {
-        let ends = &*self.graph.sinks;
-        let mut writes_unread = alloc::vec![false; self.graph.len()];
-        for &(writer, _) in unread {
-            writes_unread[writer] = true;
-        }
-        let silent: Vec<SubtaskId> = ends
-            .iter()
-            .copied()
-            .filter(|end| !writes_unread[end.index()])
-            .collect();
-        let wants_one = self.policy.sinks.is_one();
-        let sinks = if wants_one && !silent.is_empty() {
-            &silent
+    let accepted = !wants_one || (silent.is_empty() && ends.len() == 1);
+    for &(writer, topic) in unread {
+        let is_end = ends.binary_search(&SubtaskId(to_u32(writer))).is_ok();
+        let (writer, topic) = (page.subtask(writer), topic.into());
+        if accepted && is_end {
+            page.warn(|dag| Warning::UnreadSinkValue {
+                dag,
+                subtask: writer,
+                topic,
+            });
         } else {
-            ends
-        };
-
-        if sinks.is_empty() && self.graph.len() > 0 {
-            findings.fault(
-                self.dag,
-                Fault::NoSink {
-                    dag: self.dag_label(),
-                },
-            );
-        } else if sinks.len() > 1 && wants_one {
-            let sinks = self.labels(sinks);
-            findings.fault(
-                self.dag,
-                Fault::SeveralSinks {
-                    dag: self.dag_label(),
-                    sinks,
-                },
-            );
-        }
-
-        let accepted = !wants_one || (silent.is_empty() && ends.len() == 1);
-        for &(writer, topic) in unread {
-            let writer = SubtaskId(to_u32(writer));
-            let (dag, label, topic) = (self.dag_label(), self.label(writer), topic.into());
-            if accepted && self.graph.successors.of(writer).is_empty() {
-                findings.warnings.push(Warning::UnreadSinkValue {
-                    dag,
-                    subtask: label,
-                    topic,
-                });
-            } else {
-                findings.fault(
-                    self.dag,
-                    Fault::UnreadTopic {
-                        dag,
-                        topic,
-                        writer: label,
-                        meant: None,
-                    },
-                );
-            }
+            page.fault(|dag| Fault::UnreadTopic {
+                dag,
+                topic,
+                writer,
+                meant: None,
+            });
         }
     }
+}
 
-    /// Of subtasks only sinks have deadlines of their own.
-    fn deadlines(&self, findings: &mut Findings) {
-        let stated = &self.specs[self.dag].subtasks;
-        for subtask in self.graph.subtasks() {
-            if stated[subtask.index()].relative_deadline_ns.is_some()
-                && let Some(&successor) = self.graph.successors.of(subtask).first()
-            {
-                let fault = Fault::DeadlineOfNoSink {
-                    dag: self.dag_label(),
-                    subtask: self.label(subtask),
-                    successor: self.label(successor),
-                };
-                findings.fault(self.dag, fault);
-            }
+/// Of subtasks only sinks have deadlines of their own.
+fn check_deadlines(graph: &Graph, page: &mut Page<'_, '_>) {
+    let stated = &page.spec.subtasks;
+    for subtask in graph.subtasks() {
+        if stated[subtask.index()].relative_deadline_ns.is_some()
+            && let Some(successor) = graph.successors.of(subtask).first()
+        {
+            let (subtask, successor) = (subtask.index(), successor.index());
+            let (subtask, successor) = (page.subtask(subtask), page.subtask(successor));
+            page.fault(|dag| Fault::DeadlineOfNoSink {
+                dag,
+                subtask,
+                successor,
+            });
         }
     }
+}
 
-    fn dag_label(&self) -> DagLabel {
-        DagLabel::new(self.specs, self.dag)
-    }
-
-    fn label(&self, subtask: SubtaskId) -> SubtaskLabel {
-        SubtaskLabel::new(self.specs[self.dag], subtask.index())
-    }
-
-    fn labels(&self, subtasks: &[SubtaskId]) -> Vec<SubtaskLabel> {
-        subtasks
-            .iter()
-            .map(|&subtask| self.label(subtask))
-            .collect()
-    }
+fn labels(page: &Page<'_, '_>, subtasks: &[SubtaskId]) -> Vec<SubtaskLabel> {
+    let labels = subtasks.iter().map(|subtask| page.subtask(subtask.index()));
+    labels.collect()
 }

@@ -25,8 +25,8 @@ use alloc::vec::Vec;
 use core::cmp::Reverse;
 
 use super::fault::Fault;
-use super::findings::Findings;
-use super::label::{DagLabel, SubtaskLabel};
+use super::findings::{Findings, Page};
+use super::label::SubtaskLabel;
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
@@ -40,70 +40,60 @@ pub(super) fn is_shared(state: &StateSpec) -> bool {
 }
 
 /// Checks the states of all DAGs.
-pub(super) fn check(specs: &[&DagSpec], findings: &mut Findings) {
-    for (dag, spec) in specs.iter().enumerate() {
-        for (position, state) in spec.states.iter().enumerate() {
+pub(super) fn check(findings: &mut Findings<'_>) {
+    for dag in 0..findings.specs.len() {
+        let page = &mut findings.of(dag);
+        for (position, state) in page.spec.states.iter().enumerate() {
             let is_repeated = |other: &StateSpec| other.name == state.name;
-            if spec.states[..position].iter().any(is_repeated) {
-                let (label, state) = (DagLabel::new(specs, dag), state.name.clone());
-                findings.fault(dag, Fault::DuplicateState { dag: label, state });
+            if page.spec.states[..position].iter().any(is_repeated) {
+                let state = state.name.clone();
+                page.fault(|dag| Fault::DuplicateState { dag, state });
             }
-            check_users(specs, dag, state, findings);
+            check_users(state, page);
         }
     }
 }
 
 #[inline(never)]
-fn check_users(specs: &[&DagSpec], dag: usize, state: &StateSpec, findings: &mut Findings) {
-    let spec = &specs[dag];
-    let label = || DagLabel::new(specs, dag);
-    let user = |user: usize| SubtaskLabel::new(spec, user);
-    let name = || state.name.clone();
-    let mut users: Vec<usize> = state.users.iter().map(|user| user.subtask).collect();
+fn check_users(stated: &StateSpec, page: &mut Page<'_, '_>) {
+    let spec = page.spec;
+    let label = |user: usize| SubtaskLabel::new(spec, user);
+    let state = || stated.name.clone();
+    let mut users: Vec<usize> = stated.users.iter().map(|user| user.subtask).collect();
     sort_by_key(&mut users, |user| user);
-    match state.users.first() {
-        None => findings.fault(
+    match stated.users.first() {
+        None => page.fault(|dag| Fault::UnusedState {
             dag,
-            Fault::UnusedState {
-                dag: label(),
-                state: name(),
-            },
-        ),
-        Some(first) if state.users.iter().all(|user| !user.updates) => findings.fault(
-            dag,
-            Fault::StateNeverUpdated {
-                dag: label(),
-                state: name(),
-                reader: user(first.subtask),
-            },
-        ),
+            state: state(),
+        }),
+        Some(first) if stated.users.iter().all(|user| !user.updates) => {
+            page.fault(|dag| Fault::StateNeverUpdated {
+                dag,
+                state: state(),
+                reader: label(first.subtask),
+            });
+        }
         Some(_) => {}
     }
     for same in users.chunk_by(|one, other| one == other) {
         if let [subtask, _, ..] = *same {
-            findings.fault(
+            page.fault(|dag| Fault::StateUsedTwice {
                 dag,
-                Fault::StateUsedTwice {
-                    dag: label(),
-                    state: name(),
-                    subtask: user(subtask),
-                },
-            );
+                state: state(),
+                subtask: label(subtask),
+            });
         }
     }
     users.dedup();
-    if let Some(in_flight) = spec.in_flight.filter(|&jobs| jobs > 1)
-        && is_shared(state)
+    if let Some(in_flight @ 2..) = spec.in_flight
+        && is_shared(stated)
     {
-        findings.fault(
+        page.fault(|dag| Fault::StateOverJobs {
             dag,
-            Fault::StateOverJobs {
-                dag: label(),
-                state: name(),
-                in_flight,
-                users: users.into_iter().map(user).collect(),
-            },
-        );
+            state: state(),
+            in_flight,
+            users: users.into_iter().map(label).collect(),
+        });
     }
 }
 
