@@ -5,8 +5,9 @@
 //! clusters of one core are partitioned scheduling.
 
 use alloc::vec::Vec;
-use core::fmt;
 use core::time::Duration;
+
+use crate::worded::texts;
 
 /// How a commit divides the cores.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
@@ -30,33 +31,15 @@ impl Clusters {
     }
 }
 
-/// Why the commit has put a DAG into its cluster.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Why {
-    /// It is heavy.
-    Heavy {
-        /// The work of a job, overheads included.
-        volume_ns: u64,
-        /// By when it is to be done.
-        within_ns: u64,
-    },
-    /// It is light, and there the load was least.
-    Light,
-}
-
-impl fmt::Display for Why {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Heavy {
-                volume_ns,
-                within_ns,
-            } => write!(
-                f,
-                "its own, as a job is {:?} of work within {:?}",
-                Duration::from_nanos(*volume_ns),
-                Duration::from_nanos(*within_ns)
-            ),
-            Self::Light => f.write_str("the emptiest one"),
-        }
+texts! {
+    /// Why the commit has put a DAG into its cluster.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Why {
+        /// It is heavy: so much work of a job, overheads included, is to be done within that time.
+        Heavy { volume_ns: u64, within_ns: u64 } =
+            "its own, as a job is {:?} of work within {:?}",
+            Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
+        /// It is light, and there the load was least.
+        Light = "the emptiest one";
     }
 }

@@ -72,3 +72,31 @@ macro_rules! worded {
         }
     };
 }
+
+/// Declares an enum whose variants each have a text alone, which names the fields as that of
+/// a [`worded`](crate::worded!) one does.
+macro_rules! texts {
+    ($(#[$about:meta])* pub enum $Table:ident {
+        $(
+            $(#[doc = $doc:literal])+
+            $Kind:ident $({ $($field:ident: $Type:ty),+ })? $(($inner:ident: $Inner:ty))? =
+                $text:literal $(, $value:expr)*;
+        )+
+    }) => {
+        $(#[$about])*
+        #[allow(missing_docs, reason = "the fields' names are the words of the model")]
+        pub enum $Table {
+            $($(#[doc = $doc])+ $Kind $({ $($field: $Type),+ })? $(($Inner))?,)+
+        }
+
+        impl core::fmt::Display for $Table {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                match self {
+                    $(Self::$Kind $({ $($field),+ })? $(($inner))? => write!(f, $text $(, $value)*),)+
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use texts;

@@ -12,7 +12,6 @@
 
 use alloc::vec;
 use alloc::vec::Vec;
-use core::fmt;
 use core::time::Duration;
 
 use super::answer::Settings;
@@ -24,6 +23,7 @@ use crate::clusters::Why;
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::order::sort;
 use crate::task_set::TaskSet;
+use crate::worded::texts;
 
 /// A DAG that gets no cores, and why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,30 +34,28 @@ pub struct NotAssigned {
     pub reason: Unassigned,
 }
 
-/// Why a DAG gets no cores.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unassigned {
-    /// It states a cluster, and the clusters are not made yet.
-    Stated,
-    /// What it needs is not known.
-    Unknown(TaskError),
-    /// A path of it takes longer than a job has, on any number of cores.
-    TooLong {
-        /// The longest path, overheads included.
-        length_ns: u64,
-        /// By when it is to be done.
-        within_ns: u64,
-    },
-    /// It is heavy, and the cores that are left are too few.
-    TooHeavy {
-        /// The cores that are left.
-        left: u32,
-    },
-    /// It is light, and no core has room for it.
-    NoRoom {
-        /// The cores that heavy DAGs leave.
-        left: u32,
-    },
+texts! {
+    /// Why a DAG gets no cores.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Unassigned {
+        /// It states a cluster, and the clusters are not made yet.
+        Stated = "it states a cluster, and the commit is to make them; leave its cluster out";
+        /// What it needs is not known.
+        Unknown(error: TaskError) = "{error}";
+        /// A path of it, overheads included, takes longer than a job has, on any number of cores.
+        TooLong { length_ns: u64, within_ns: u64 } =
+            "its longest path takes {:?}, and a job has {:?} until its deadline or the next \
+             release; shorten the path, or lengthen both",
+            Duration::from_nanos(*length_ns), Duration::from_nanos(*within_ns);
+        /// It is heavy, and the cores that are left are too few.
+        TooHeavy { left: u32 } =
+            "a job is more work than one core does in time, and too few cores are left: {left}; \
+             add cores, or lengthen its deadline and period";
+        /// It is light, and no core has room for it, of those that heavy DAGs leave.
+        NoRoom { left: u32 } =
+            "no core has room for it, of those that heavy DAGs leave: {left}; add cores, or \
+             lengthen deadlines and periods";
+    }
 }
 
 /// Divides the cores of the settings among DAGs.
@@ -178,37 +176,6 @@ fn pack(
         assignment.of_dags[dag].0 = ClusterId(to_u32(first + place));
     }
     Ok(())
-}
-
-impl fmt::Display for Unassigned {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Stated => f.write_str(
-                "it states a cluster, and the commit is to make them; leave its cluster out",
-            ),
-            Self::Unknown(error) => error.fmt(f),
-            Self::TooLong {
-                length_ns,
-                within_ns,
-            } => write!(
-                f,
-                "its longest path takes {:?}, and a job has {:?} until its deadline or the next \
-                 release; shorten the path, or lengthen both",
-                Duration::from_nanos(*length_ns),
-                Duration::from_nanos(*within_ns)
-            ),
-            Self::TooHeavy { left } => write!(
-                f,
-                "a job is more work than one core does in time, and too few cores are left: \
-                 {left}; add cores, or lengthen its deadline and period"
-            ),
-            Self::NoRoom { left } => write!(
-                f,
-                "no core has room for it, of those that heavy DAGs leave: {left}; add cores, or \
-                 lengthen deadlines and periods"
-            ),
-        }
-    }
 }
 
 #[cfg(test)]

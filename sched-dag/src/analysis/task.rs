@@ -23,11 +23,11 @@ use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cmp::Reverse;
-use core::fmt;
 
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::task_set::{Dag, Subtask};
+use crate::worded::texts;
 
 /// A DAG task: its timing and its weighted precedence graph.
 #[derive(Clone, Debug)]
@@ -41,29 +41,27 @@ pub struct Task {
     length_ns: u64,
 }
 
-/// Why a DAG cannot be analysed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TaskError {
-    /// No WCET above 0 is known for this subtask, perhaps for further ones.
-    MissingWcet {
-        /// The subtask.
-        subtask: SubtaskId,
-    },
-    /// The sum of the WCETs (with overheads, if any were added) exceeds `u64`.
-    VolumeOverflow,
-    /// The period is 0.
-    ZeroPeriod,
-    /// The relative deadline is 0.
-    ZeroDeadline,
-    /// An edge names a subtask that does not exist.
-    EdgeOutOfRange {
-        /// The edge's first end.
-        predecessor: usize,
-        /// The edge's second end.
-        successor: usize,
-    },
-    /// The edges form a cycle.
-    Cycle,
+texts! {
+    /// Why a DAG cannot be analysed.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum TaskError {
+        /// No WCET above 0 is known for this subtask, perhaps for further ones.
+        MissingWcet { subtask: SubtaskId } =
+            "no WCET above 0 is given for subtask {}; give it one to have the DAG analysed",
+            subtask.0;
+        /// The sum of the WCETs (with overheads, if any were added) exceeds `u64`.
+        VolumeOverflow = "the sum of the WCETs exceeds 64 bits of nanoseconds; lower them";
+        /// The period is 0.
+        ZeroPeriod = "the period is 0; give a positive one";
+        /// The relative deadline is 0.
+        ZeroDeadline = "the relative deadline is 0; give a positive one";
+        /// An edge names a subtask that does not exist.
+        EdgeOutOfRange { predecessor: usize, successor: usize } =
+            "edge {predecessor} -> {successor} names a subtask that does not exist; name subtasks \
+             by their position";
+        /// The edges form a cycle.
+        Cycle = "the edges form a cycle; remove one of its edges";
+    }
 }
 
 impl Task {
@@ -264,32 +262,6 @@ impl Task {
     #[must_use]
     pub const fn length_ns(&self) -> u64 {
         self.length_ns
-    }
-}
-
-impl fmt::Display for TaskError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::MissingWcet { subtask } => write!(
-                f,
-                "no WCET above 0 is given for subtask {}; give it one to have the DAG analysed",
-                subtask.0
-            ),
-            Self::VolumeOverflow => {
-                f.write_str("the sum of the WCETs exceeds 64 bits of nanoseconds; lower them")
-            }
-            Self::ZeroPeriod => f.write_str("the period is 0; give a positive one"),
-            Self::ZeroDeadline => f.write_str("the relative deadline is 0; give a positive one"),
-            Self::EdgeOutOfRange {
-                predecessor,
-                successor,
-            } => write!(
-                f,
-                "edge {predecessor} -> {successor} names a subtask that does not exist; \
-                 name subtasks by their position"
-            ),
-            Self::Cycle => f.write_str("the edges form a cycle; remove one of its edges"),
-        }
     }
 }
 

@@ -15,26 +15,29 @@ use crate::journal::{Event, What};
 use crate::law::sweep::{Stage, Wrong};
 use crate::task_set::TaskSet;
 use crate::worded;
+use crate::worded::texts;
 
-/// A rule of the task model, which the [crate] states, or one of two that every
-/// machine must keep whatever the model says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Rule {
-    /// R1: jobs are released on the nominal grid, and nothing of one runs before.
-    Release,
-    /// R2: an instance is ready exactly when all that it waits for has happened.
-    AndJoin,
-    /// R3: what waits for an instance is released when that has finished, all at once.
-    CompletionBoundary,
-    /// R4: a job is complete with its last instance, and meets its deadline or not.
-    JobCompletion,
-    /// R5: the instances with the smallest keys run.
-    Dispatch,
-    /// An instance becomes ready, starts and finishes once, is suspended and resumed in
-    /// turns, and is on one core at a time.
-    OneLife,
-    /// A core runs one instance at a time.
-    OneCore,
+texts! {
+    /// A rule of the task model, which the [crate] states, or one of two that every
+    /// machine must keep whatever the model says. Its text is its name.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub enum Rule {
+        /// R1: jobs are released on the nominal grid, and nothing of one runs before.
+        Release = "R1 release";
+        /// R2: an instance is ready exactly when all that it waits for has happened.
+        AndJoin = "R2 join";
+        /// R3: what waits for an instance is released when that has finished, all at once.
+        CompletionBoundary = "R3 completion boundary";
+        /// R4: a job is complete with its last instance, and meets its deadline or not.
+        JobCompletion = "R4 completion";
+        /// R5: the instances with the smallest keys run.
+        Dispatch = "R5 dispatch";
+        /// An instance becomes ready, starts and finishes once, is suspended and resumed in
+        /// turns, and is on one core at a time.
+        OneLife = "one life";
+        /// A core runs one instance at a time.
+        OneCore = "one core";
+    }
 }
 
 /// When a violation shows.
@@ -44,21 +47,6 @@ enum Shown<'v> {
     At(u64),
     /// By an event, with which its text begins.
     By(&'v Event),
-}
-
-/// Writes the rule's name, such as `R2 join`.
-impl fmt::Display for Rule {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Release => "R1 release",
-            Self::AndJoin => "R2 join",
-            Self::CompletionBoundary => "R3 completion boundary",
-            Self::JobCompletion => "R4 completion",
-            Self::Dispatch => "R5 dispatch",
-            Self::OneLife => "one life",
-            Self::OneCore => "one core",
-        })
-    }
 }
 
 worded! {
