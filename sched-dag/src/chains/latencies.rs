@@ -105,12 +105,8 @@ impl Releases {
                 }
                 What::Released => {
                     let model = task_set.dag(event.dag);
-                    let sporadic_ns = due_ns.get(&of).copied();
-                    let release_ns = match model.is_sporadic() {
-                        true => sporadic_ns.unwrap_or(event.time_ns),
-                        false => model.grid_ns(event.job),
-                    };
-                    releases.insert(of, release_ns);
+                    let due_ns = due_ns.get(&of).copied().unwrap_or(event.time_ns);
+                    releases.insert(of, model.release_ns(event.job, due_ns));
                 }
                 _ => {}
             }

@@ -43,10 +43,8 @@ impl Record {
                         }
                     }
                     None => {
-                        let release_ns = match task_set.dag(event.dag).is_sporadic() {
-                            true => due_ns[index],
-                            false => task_set.dag(event.dag).grid_ns(event.job),
-                        };
+                        let model = task_set.dag(event.dag);
+                        let release_ns = model.release_ns(event.job, due_ns[index]);
                         record.note_job(&event, release_ns, stopped_ns[index]);
                     }
                 },
@@ -142,10 +140,7 @@ fn jobs(
             _ if is_whole => *of_dag = (0, of_dag.1.max(event.job + 1)),
             What::Released => {
                 let model = task_set.dag(event.dag);
-                let release_ns = match model.is_sporadic() {
-                    true => due_ns[event.dag.index()],
-                    false => model.grid_ns(event.job),
-                };
+                let release_ns = model.release_ns(event.job, due_ns[event.dag.index()]);
                 if release_ns > oldest_ns {
                     *of_dag = (of_dag.0.min(event.job), event.job + 1);
                 }

@@ -12,7 +12,7 @@
 //! priority that have been waiting for longer than the bound must have idle cores to
 //! go to. Without that, a wrong choice would show no longer than it takes to make.
 //!
-//! The [`Sweep`] takes changes one after the other and keeps only what waits and what
+//! A sweep takes changes one after the other and keeps only what waits and what
 //! runs, so it judges a run of any length.
 //!
 //! Not checked: what happens within one instant. An instance that executes for no time
@@ -20,22 +20,48 @@
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use crate::ids::{CoreId, DagId, Instance};
+use crate::policy::{Policy, Preemption, SchedulerOptions};
+use crate::task_set::TaskSet;
 
 /// The key of R5: the smaller one goes first. No two instances have the same.
-pub type Key = (u64, Instance);
+pub(super) type Key = (u64, Instance);
 
-/// What R5 has to know of the model.
-pub trait Ranking {
-    /// Returns an instance's place in the order of dispatch.
-    fn key(&self, instance: Instance) -> Key;
+/// The model and the options of a run, and the cores of the cluster in hand.
+pub(super) struct Model<'a> {
+    pub(super) task_set: &'a TaskSet,
+    pub(super) options: &'a SchedulerOptions,
+    pub(super) cores: Range<u32>,
+    /// When sporadic jobs were due.
+    pub(super) due_ns: BTreeMap<(DagId, u64), u64>,
+}
+
+impl Model<'_> {
+    /// Returns an instance's place in the order of dispatch. Static priority: (priority, DAG,
+    /// job, subtask). EDF: the deadline instead, that of the most urgent sink that the subtask
+    /// reaches.
+    pub(super) fn key(&self, instance: Instance) -> Key {
+        let Instance { dag, job, subtask } = instance;
+        let model = self.task_set.dag(dag);
+        let urgency = match self.options.policy {
+            Policy::StaticPriority => model.subtask(subtask).priority().0.into(),
+            Policy::Edf => {
+                let due_ns = self.due_ns.get(&(dag, job)).copied();
+                let release_ns = model.release_ns(job, due_ns.unwrap_or(u64::MAX));
+                release_ns.saturating_add(model.subtask(subtask).relative_deadline_ns())
+            }
+        };
+        (urgency, instance)
+    }
 
     /// Reports whether a started instance keeps its core until it finishes.
-    fn keeps_its_core(&self, instance: Instance) -> bool;
-
-    /// Returns the first core of those that are dispatched together.
-    fn first_core(&self) -> u32;
+    pub(super) fn keeps_its_core(&self, instance: Instance) -> bool {
+        let dag = self.task_set.dag(instance.dag);
+        self.options.preemption == Preemption::Disabled
+            || dag.subtask(instance.subtask).is_non_preemptive()
+    }
 }
 
 /// What an instance is, for the dispatch.
@@ -51,17 +77,6 @@ pub enum Stage {
     Suspended,
     /// It has finished, or will never run.
     Over,
-}
-
-/// What changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Change {
-    /// From now on it is known what a core does.
-    CoreIsKnown,
-    /// The waiting instances of a DAG are owed nothing any more.
-    Stopped(DagId),
-    /// An instance enters a stage.
-    Stage(Instance, Stage),
 }
 
 /// What runs while another instance should.
@@ -120,12 +135,13 @@ struct Owed {
     blame: Option<Blame>,
 }
 
-/// The state of the dispatch between two changes.
-#[derive(Debug)]
-pub struct Sweep<'r, R> {
-    ranking: &'r R,
+/// The state of the dispatch at an instant.
+pub(super) struct Sweep<'m> {
+    model: &'m Model<'m>,
     bound_ns: u64,
-    known_cores: usize,
+    now_ns: u64,
+    /// How many cores there are of which it is known what they do.
+    pub(super) known_cores: usize,
     /// Since when each waits.
     waiting: BTreeMap<Key, u64>,
     running: BTreeMap<Key, CoreId>,
@@ -137,20 +153,21 @@ pub struct Sweep<'r, R> {
     /// What has not started yet.
     unstarted: BTreeSet<Key>,
     wrong: Vec<Wrong>,
-    waits: Waits,
+    waits: &'m mut Waits,
 }
 
-impl<'r, R: Ranking> Sweep<'r, R> {
-    /// Judges changes, which are in the order of time, up to the run's end.
-    pub fn judge(
-        ranking: &'r R,
+impl<'m> Sweep<'m> {
+    /// Begins at an instant; what is found of waits is added to the ones given.
+    pub(super) fn new(
+        model: &'m Model<'m>,
         bound_ns: u64,
-        changes: impl IntoIterator<Item = (u64, Change)>,
-        end_ns: u64,
-    ) -> (Vec<Wrong>, Waits) {
-        let mut sweep = Self {
-            ranking,
+        now_ns: u64,
+        waits: &'m mut Waits,
+    ) -> Self {
+        Self {
+            model,
             bound_ns,
+            now_ns,
             known_cores: 0,
             waiting: BTreeMap::new(),
             running: BTreeMap::new(),
@@ -160,38 +177,37 @@ impl<'r, R: Ranking> Sweep<'r, R> {
             started: Vec::new(),
             unstarted: BTreeSet::new(),
             wrong: Vec::new(),
-            waits: Waits::default(),
-        };
-        let mut changes = changes.into_iter().peekable();
-        while let Some((now_ns, change)) = changes.next() {
-            sweep.apply(now_ns, change);
-            match changes.peek() {
-                Some((next_ns, _)) if *next_ns == now_ns => {}
-                next => {
-                    let until_ns = next.map_or(end_ns, |(next_ns, _)| *next_ns);
-                    sweep.settle(now_ns, until_ns);
-                }
-            }
+            waits,
         }
-        for (key, owed) in core::mem::take(&mut sweep.owed) {
-            sweep.close(key, &owed, end_ns);
-        }
-        (sweep.wrong, sweep.waits)
     }
 
-    fn apply(&mut self, now_ns: u64, change: Change) {
-        let (key, stage) = match change {
-            Change::CoreIsKnown => {
-                self.known_cores += 1;
-                return;
-            }
-            Change::Stopped(dag) => {
-                self.waiting.retain(|(_, instance), _| instance.dag != dag);
-                self.stopped.insert(dag);
-                return;
-            }
-            Change::Stage(instance, stage) => (self.ranking.key(instance), stage),
-        };
+    /// Judges what has been the case up to an instant; one that is past counts as now.
+    pub(super) fn go_on_to(&mut self, until_ns: u64) {
+        if until_ns > self.now_ns {
+            self.settle(until_ns);
+            self.now_ns = until_ns;
+        }
+    }
+
+    /// Judges the rest, up to the run's end.
+    pub(super) fn end(mut self, end_ns: u64) -> Vec<Wrong> {
+        self.settle(end_ns);
+        self.now_ns = end_ns;
+        for (key, owed) in core::mem::take(&mut self.owed) {
+            self.close(key, &owed);
+        }
+        self.wrong
+    }
+
+    /// The waiting instances of a DAG are owed nothing any more.
+    pub(super) fn stop(&mut self, dag: DagId) {
+        self.waiting.retain(|(_, instance), _| instance.dag != dag);
+        self.stopped.insert(dag);
+    }
+
+    /// An instance enters a stage.
+    pub(super) fn enter(&mut self, instance: Instance, stage: Stage) {
+        let key = self.model.key(instance);
         self.waiting.remove(&key);
         self.running.remove(&key);
         let is_owed_nothing = self.stopped.contains(&key.1.dag);
@@ -199,12 +215,12 @@ impl<'r, R: Ranking> Sweep<'r, R> {
         match stage {
             Stage::Ready | Stage::Suspended if is_owed_nothing => {}
             Stage::Ready => {
-                self.waiting.insert(key, now_ns);
+                self.waiting.insert(key, self.now_ns);
                 self.unstarted.insert(key);
                 self.fresh.push(key);
             }
             Stage::Suspended => {
-                self.waiting.insert(key, now_ns);
+                self.waiting.insert(key, self.now_ns);
             }
             Stage::Running(core) => {
                 self.running.insert(key, core);
@@ -216,12 +232,12 @@ impl<'r, R: Ranking> Sweep<'r, R> {
         }
     }
 
-    /// Judges what is the case from now until the next change.
-    fn settle(&mut self, now_ns: u64, until_ns: u64) {
+    /// Judges what is the case from now until then.
+    fn settle(&mut self, until_ns: u64) {
         let idle = self.known_cores.saturating_sub(self.running.len());
         for place in 0..self.started.len() {
             let (key, core) = self.started[place];
-            let wrong = self.out_of_turn(key, core, idle, now_ns);
+            let wrong = self.out_of_turn(key, core, idle);
             self.wrong.extend(wrong);
         }
         let should_run = self.should_run();
@@ -229,11 +245,11 @@ impl<'r, R: Ranking> Sweep<'r, R> {
         let over: Vec<Key> = self.owed.keys().copied().filter(past).collect();
         for key in over {
             if let Some(owed) = self.owed.remove(&key) {
-                self.close(key, &owed, now_ns);
+                self.close(key, &owed);
             }
         }
         for (rank, key) in should_run.iter().enumerate() {
-            let since_ns = self.owed.get(key).map_or(now_ns, |owed| owed.since_ns);
+            let since_ns = self.owed.get(key).map_or(self.now_ns, |owed| owed.since_ns);
             let has_blame = self.owed.get(key).is_some_and(|owed| owed.blame.is_some());
             let exceeds = since_ns.saturating_add(self.bound_ns) < until_ns;
             let blame = (exceeds && !has_blame).then(|| self.blame(rank < idle));
@@ -254,7 +270,7 @@ impl<'r, R: Ranking> Sweep<'r, R> {
         let (mut free, mut owed) = (self.known_cores, Vec::new());
         let mut movable = Vec::new();
         for key in self.running.keys() {
-            if self.ranking.keeps_its_core(key.1) {
+            if self.model.keeps_its_core(key.1) {
                 free = free.saturating_sub(1);
             } else {
                 movable.push(*key);
@@ -280,12 +296,12 @@ impl<'r, R: Ranking> Sweep<'r, R> {
     /// Says what runs instead of an instance that is owed a core.
     fn blame(&self, is_idle: bool) -> Blame {
         let mut running = self.running.iter().rev();
-        let movable = running.find(|(key, _)| !self.ranking.keeps_its_core(key.1));
+        let movable = running.find(|(key, _)| !self.model.keeps_its_core(key.1));
         match movable {
             Some((key, core)) if !is_idle => Blame::Runs(key.1, *core),
             _ => {
                 let is_busy = |core: &CoreId| self.running.values().any(|busy| busy == core);
-                let cores = self.ranking.first_core()..;
+                let cores = self.model.cores.start..;
                 let mut cores = cores.take(self.known_cores).map(CoreId);
                 Blame::Idle(cores.find(|core| !is_busy(core)))
             }
@@ -293,8 +309,8 @@ impl<'r, R: Ranking> Sweep<'r, R> {
     }
 
     /// Takes note that an instance is owed nothing any more.
-    fn close(&mut self, key: Key, owed: &Owed, now_ns: u64) {
-        let length_ns = now_ns.saturating_sub(owed.since_ns);
+    fn close(&mut self, key: Key, owed: &Owed) {
+        let length_ns = self.now_ns.saturating_sub(owed.since_ns);
         self.waits.longest_owed_ns = self.waits.longest_owed_ns.max(length_ns);
         let mut started = self.started.iter();
         if owed.finds_idle_core && started.any(|(started, _)| *started == key) {
@@ -311,19 +327,19 @@ impl<'r, R: Ranking> Sweep<'r, R> {
     }
 
     /// Judges the start of an instance that keeps its core from now on.
-    fn out_of_turn(&self, key: Key, core: CoreId, idle: usize, now_ns: u64) -> Option<Wrong> {
-        if !self.ranking.keeps_its_core(key.1) {
+    fn out_of_turn(&self, key: Key, core: CoreId, idle: usize) -> Option<Wrong> {
+        if !self.model.keeps_its_core(key.1) {
             return None;
         }
         let mut before = self.waiting.range(..key).filter(|(_, since_ns)| {
-            let longest_ns = now_ns.saturating_sub(**since_ns);
+            let longest_ns = self.now_ns.saturating_sub(**since_ns);
             longest_ns > self.bound_ns
         });
         let (first, since_ns) = before.nth(idle)?;
         Some(Wrong::OutOfTurn {
             started: key.1,
             core,
-            at_ns: now_ns,
+            at_ns: self.now_ns,
             first: first.1,
             since_ns: *since_ns,
         })

@@ -175,10 +175,7 @@ impl Tally {
                 return;
             }
             What::Released => {
-                let release_ns = match model.is_sporadic() {
-                    true => dag.due_ns,
-                    false => model.grid_ns(event.job),
-                };
+                let release_ns = model.release_ns(event.job, dag.due_ns);
                 dag.begin(event, release_ns, model.subtasks().len());
                 return;
             }

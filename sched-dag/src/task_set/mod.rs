@@ -205,6 +205,14 @@ impl Dag {
             .saturating_add(self.offset_ns)
     }
 
+    /// Returns the nominal release of a job, which of a sporadic DAG was due then.
+    pub(crate) const fn release_ns(&self, job: u64, due_ns: u64) -> u64 {
+        match self.is_sporadic() {
+            true => due_ns,
+            false => self.grid_ns(job),
+        }
+    }
+
     /// Returns the most jobs that may be in flight, never 0.
     #[must_use]
     pub const fn in_flight(&self) -> u32 {

@@ -5,52 +5,12 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::replay::{stage_after, stage_before};
-use super::sweep::{Change, Key, Ranking, Stage, Sweep, Waits, Wrong};
+use super::sweep::{Key, Model, Stage, Sweep, Waits, Wrong};
 use super::{Terms, Violation};
-use crate::ids::{CoreId, DagId, Instance};
+use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, What};
-use crate::policy::{OnFault, Policy, Preemption, SchedulerOptions};
+use crate::policy::{OnFault, SchedulerOptions};
 use crate::task_set::TaskSet;
-
-/// The model and the options of a run, and the cores of the cluster in hand.
-struct Model<'a> {
-    task_set: &'a TaskSet,
-    options: &'a SchedulerOptions,
-    cores: Range<u32>,
-    /// When sporadic jobs were due.
-    due_ns: BTreeMap<(DagId, u64), u64>,
-}
-
-impl Ranking for Model<'_> {
-    /// Static priority: (priority, DAG, job, subtask). EDF: the deadline instead, that of
-    /// the most urgent sink that the subtask reaches.
-    fn key(&self, instance: Instance) -> Key {
-        let Instance { dag, job, subtask } = instance;
-        let model = self.task_set.dag(dag);
-        let urgency = match self.options.policy {
-            Policy::StaticPriority => model.subtask(subtask).priority().0.into(),
-            Policy::Edf => {
-                let due_ns = || self.due_ns.get(&(dag, job)).copied();
-                let release_ns = match model.is_sporadic() {
-                    true => due_ns().unwrap_or(u64::MAX),
-                    false => model.grid_ns(job),
-                };
-                release_ns.saturating_add(model.subtask(subtask).relative_deadline_ns())
-            }
-        };
-        (urgency, instance)
-    }
-
-    fn keeps_its_core(&self, instance: Instance) -> bool {
-        let dag = self.task_set.dag(instance.dag);
-        self.options.preemption == Preemption::Disabled
-            || dag.subtask(instance.subtask).is_non_preemptive()
-    }
-
-    fn first_core(&self) -> u32 {
-        self.cores.start
-    }
-}
 
 /// What a journal shows of R5.
 #[derive(Clone, Debug, Default)]
@@ -90,12 +50,7 @@ pub fn judge_dispatch(
         for event in due {
             model.due_ns.insert((event.dag, event.job), event.time_ns);
         }
-        let Dispatch { violations, waits } = of_cluster(&model, terms, (first_ns, end_ns), events);
-        all.violations.extend(violations);
-        let ready_to_start_ns = waits.ready_to_start_ns;
-        all.waits.ready_to_start_ns.extend(ready_to_start_ns);
-        let longest_owed_ns = &mut all.waits.longest_owed_ns;
-        *longest_owed_ns = waits.longest_owed_ns.max(*longest_owed_ns);
+        of_cluster(&model, terms, (first_ns, end_ns), events, &mut all);
     }
     all
 }
@@ -106,44 +61,36 @@ fn of_cluster(
     terms: Terms,
     (first_ns, end_ns): (u64, u64),
     events: impl Iterator<Item = Event> + Clone,
-) -> Dispatch {
-    let Model {
-        task_set, cores, ..
-    } = model;
+    Dispatch { violations, waits }: &mut Dispatch,
+) {
+    let cores = model.cores.clone();
     let (mut known, before) = match terms.is_whole {
-        true => (cores.clone().map(CoreId).collect(), Vec::new()),
-        false => before(cores.clone(), events.clone()),
+        true => (cores.map(CoreId).collect(), BTreeMap::new()),
+        false => before(cores, events.clone()),
     };
-    let known_at_first = known.len();
-    let at_first = (0..known_at_first).map(|_| (first_ns, Change::CoreIsKnown));
-    let before = before.into_iter().map(|change| (first_ns, change));
-    let mut latest_ns = 0;
-    let changes = events.clone().flat_map(|event| {
-        latest_ns = event.time_ns.max(latest_ns);
+    let mut sweep = Sweep::new(model, terms.tolerance_ns, first_ns, waits);
+    sweep.known_cores = known.len();
+    for (instance, stage) in before {
+        sweep.enter(instance, stage);
+    }
+    for event in events.clone() {
+        sweep.go_on_to(event.time_ns);
         let is_new = event.what.is_of_machine() && known.insert(event.core);
-        let ends_its_dag = task_set.dag(event.dag).on_fault() == OnFault::EndDag;
-        let stops = match event.what {
-            What::Stopped => true,
-            What::Ended => ends_its_dag,
-            _ => false,
-        };
-        let stage = event.instance().filter(|_| event.what != What::Request);
-        let changes = [
-            is_new.then_some(Change::CoreIsKnown),
-            stops.then_some(Change::Stopped(event.dag)),
-            stage.map(|instance| Change::Stage(instance, stage_after(&event))),
-        ];
-        let changes = changes.into_iter().flatten();
-        changes.map(move |change| (latest_ns, change))
-    });
-    let changes = at_first.chain(before).chain(changes);
-    let (wrong, waits) = Sweep::judge(model, terms.tolerance_ns, changes, end_ns);
-    let mut violations: Vec<Violation> = wrong.into_iter().map(Violation::PassedOver).collect();
+        sweep.known_cores += usize::from(is_new);
+        let ends_its_dag = model.task_set.dag(event.dag).on_fault() == OnFault::EndDag;
+        if event.what == What::Stopped || event.what == What::Ended && ends_its_dag {
+            sweep.stop(event.dag);
+        }
+        if let Some(instance) = event.instance().filter(|_| event.what != What::Request) {
+            sweep.enter(instance, stage_after(&event));
+        }
+    }
+    let wrong = sweep.end(end_ns);
+    violations.extend(wrong.into_iter().map(Violation::PassedOver));
     if terms.tolerance_ns == 0 {
         violations.extend(chosen_wrongly(model, events.clone()));
     }
     violations.extend(wrong_cores(model, events));
-    Dispatch { violations, waits }
 }
 
 /// Returns the breaches that [`judge_dispatch`] finds.
@@ -162,7 +109,7 @@ pub fn dispatch_violations(
 fn before(
     cores: Range<u32>,
     events: impl Iterator<Item = Event>,
-) -> (BTreeSet<CoreId>, Vec<Change>) {
+) -> (BTreeSet<CoreId>, BTreeMap<Instance, Stage>) {
     let mut first_of_core: BTreeMap<CoreId, What> = BTreeMap::new();
     let mut first_of_instance: BTreeMap<Instance, Stage> = BTreeMap::new();
     for event in events.filter(|event| event.what != What::Request) {
@@ -177,12 +124,7 @@ fn before(
     let is_busy = |what: &What| !matches!(what, What::Start | What::Resume);
     let busy = cores.map(CoreId);
     let busy = busy.filter(|core| first_of_core.get(core).is_some_and(is_busy));
-    let stages = first_of_instance.into_iter();
-    let stages = stages.filter(|(_, stage)| *stage != Stage::Absent);
-    (
-        busy.collect(),
-        stages.map(|(it, stage)| Change::Stage(it, stage)).collect(),
-    )
+    (busy.collect(), first_of_instance)
 }
 
 /// Returns what started and keeps its core, although one that goes first had been ready
@@ -204,25 +146,18 @@ fn chosen_wrongly(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec
             continue;
         };
         let key = model.key(instance);
-        match event.what {
-            What::Ready => {
-                fresh.insert(key);
-            }
-            What::Start => {
-                fresh.remove(&key);
-                passed.retain(|(first, ..)| *first != key);
-                let first = fresh.first().filter(|first| **first < key);
-                if let Some(first) = first
-                    && model.keeps_its_core(instance)
-                {
-                    passed.push((*first, event));
-                }
-            }
-            What::Cancelled => {
-                fresh.remove(&key);
-                passed.retain(|(first, ..)| *first != key);
-            }
-            _ => {}
+        if event.what == What::Ready {
+            fresh.insert(key);
+        }
+        if matches!(event.what, What::Start | What::Cancelled) {
+            fresh.remove(&key);
+            passed.retain(|(first, ..)| *first != key);
+        }
+        if event.what == What::Start
+            && let Some(first) = fresh.first().filter(|first| **first < key)
+            && model.keeps_its_core(instance)
+        {
+            passed.push((*first, event));
         }
     }
     found.extend(passed);

@@ -2,7 +2,8 @@
 //! stretches of time in which one ran, as `dag@core from-to`.
 
 use super::*;
-use crate::ids::{ClusterId, SubtaskId};
+use crate::ids::{ClusterId, DagId, SubtaskId};
+use crate::policy::{Policy, Preemption};
 use crate::{Clusters, CommitOptions, DagSpec, Priority, SubtaskSpec, verify};
 
 /// DAGs of one subtask each in these clusters, DAG 0 the most urgent; the last one's subtask
