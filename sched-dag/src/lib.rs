@@ -52,8 +52,8 @@
 //! have is the DAG's [`OverrunPolicy`]; its scenarios are in `tests/scenarios/overrun.txt`.
 //!
 //! A DAG can be *ended* before its time, by an instance that [fails](Moment::fail)
-//! or by a [stop](Moment::stop): it starts nothing any more, and the others are
-//! scheduled on. The rules E1 to E8 for that stand in `scheduler/ending.rs`,
+//! or by a [stop](lifecycle::Request::Stop): it starts nothing any more, and the others are
+//! scheduled on. The rules E1 to E8 for that stand in `scheduler/phase.rs`,
 //! their scenarios in `tests/scenarios/ending.txt`; those for a fault that costs only its job, D1 to D7,
 //! in `scheduler/dropping.rs` and `tests/scenarios/faults.txt`.
 //!
@@ -132,7 +132,7 @@ pub use policy::{
     Priority, SchedulerOptions,
 };
 pub use scheduler::{
-    DagPhase, DagStatistics, Decision, HandOff, Log, Moment, Notice, Released, Scheduler, Snapshot,
+    DagPhase, DagStatistics, Decision, HandOff, Log, Moment, Notice, Scheduler, Snapshot,
 };
 pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};

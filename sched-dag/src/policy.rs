@@ -7,7 +7,7 @@ pub enum Activation {
     /// The clock: job k is released at O + kT.
     #[default]
     Periodic,
-    /// Signals ([`Moment::signal`](crate::Moment::signal)): one job each, but
+    /// Signals ([`Request::Signal`](crate::lifecycle::Request::Signal)): one job each, but
     /// never two releases less than T apart, and none before O. T is then the
     /// minimum inter-arrival time.
     Sporadic,

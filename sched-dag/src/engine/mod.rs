@@ -155,7 +155,7 @@ impl<B: Body, P> Engine<B, P> {
         while !self.scheduler.at(now_ns).release_some() {
             self.act(port);
         }
-        let _ = self.scheduler.at(now_ns).release_due().dispatch();
+        let _ = self.scheduler.at(now_ns).dispatch();
         self.act(port);
         self.set_targets(port);
         // It is about the step, and whoever takes one looks at the next event anyway.
@@ -201,7 +201,7 @@ impl<B: Body, P> Engine<B, P> {
                     is_rescheduled: false,
                 };
             };
-            body.set_job(decision.instance().job);
+            body.set_job(decision.instance.job);
             let log = &mut self.scheduler.log;
             let to = body.subject();
             let start = (What::Start, port.start(core, &mut body), to);
@@ -294,7 +294,9 @@ impl<B: Body, P> Engine<B, P> {
         let handler = handler.filter(|&dag| !port.forward(Request::Signal(dag)));
         self.tell(instant, port, |moment| {
             moment.fail(instance);
-            handler.into_iter().for_each(|dag| moment.signal(dag));
+            handler
+                .into_iter()
+                .for_each(|dag| moment.serve(Request::Signal(dag)));
         });
         self.lost.extend(body);
         cost
@@ -376,9 +378,9 @@ impl<B: Body, P> Engine<B, P> {
         let mut preempted = None;
         let (decisions, log) = self.scheduler.decided();
         for decision in decisions {
-            let (core, instance) = (decision.core(), decision.instance());
+            let (core, instance) = (decision.core, decision.instance);
             port.retarget(core);
-            if let Decision::Preempt { .. } = decision {
+            if decision.what == What::Suspend {
                 self.placement.set_target(core, None);
                 preempted = Some(core);
             } else {

@@ -17,8 +17,27 @@
 
 use super::key::Key;
 use super::vertices::Phase;
-use super::{Decision, OWED, Scheduler};
-use crate::ids::CoreId;
+use super::{OWED, Scheduler};
+use crate::ids::{CoreId, Instance};
+use crate::journal::What;
+
+/// One change of what a core executes.
+///
+/// A dispatch lists only changes: a core that it does not name goes on with
+/// what it does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[must_use]
+pub struct Decision {
+    /// [`Start`](What::Start) or [`Resume`](What::Resume): the core, idle or just preempted,
+    /// begins or continues the instance, perhaps one that ran on another core before.
+    /// [`Suspend`](What::Suspend): it gives up the instance, which keeps its progress; the next
+    /// decision of the dispatch gives it another one.
+    pub what: What,
+    /// The core.
+    pub core: CoreId,
+    /// The instance.
+    pub instance: Instance,
+}
 
 impl Scheduler {
     /// Fills `decisions`.
@@ -51,13 +70,17 @@ impl Scheduler {
     pub(super) fn give(&mut self, core: CoreId, key: Key) -> Decision {
         let vertex = self.vertices.get_mut(key.vertex());
         let instance = vertex.present_instance();
-        let decision = match vertex.phase {
-            Phase::Preempted => Decision::Resume { core, instance },
-            _ => Decision::Start { core, instance },
+        let what = match vertex.phase {
+            Phase::Preempted => What::Resume,
+            _ => What::Start,
         };
         vertex.phase = Phase::Running(core);
         self.cores.run(core, key, vertex.is_preemptible);
-        decision
+        Decision {
+            what,
+            core,
+            instance,
+        }
     }
 
     /// Puts the instance that runs on a core back in line.
@@ -66,7 +89,11 @@ impl Scheduler {
         let vertex = self.vertices.get_mut(running.vertex());
         vertex.phase = Phase::Preempted;
         let instance = vertex.present_instance();
-        self.decisions.push(Decision::Preempt { core, instance });
+        self.decisions.push(Decision {
+            what: What::Suspend,
+            core,
+            instance,
+        });
         self.ready.insert(running);
     }
 }

@@ -131,7 +131,11 @@ impl Scheduler {
         });
         next.phase = Phase::Running(core);
         self.cores.run(core, key, next.is_preemptible);
-        let decision = Decision::Start { core, instance };
+        let decision = Decision {
+            what: What::Start,
+            core,
+            instance,
+        };
         (HandOff::To(Vertex(number), decision), true)
     }
 

@@ -11,8 +11,7 @@
 //!
 //! 1. [`Scheduler::at`] begins the instant and gives a [`Moment`], which takes
 //!    completions, signals to sporadic DAGs, and faults and stops;
-//! 2. [`Moment::release_due`] turns it into a [`Released`], which takes none;
-//! 3. [`Released::dispatch`] ends it with the [`Decision`]s.
+//! 2. [`Moment::dispatch`] ends it: it releases what is due, then gives the [`Decision`]s.
 //!
 //! A driver calls them when a subtask has returned, and at the latest at
 //! [`Scheduler::next_event_ns`].
@@ -38,12 +37,9 @@
 
 mod bits;
 mod by_deadline;
-mod closing;
 mod cores;
-mod decision;
 mod dispatch;
 mod dropping;
-mod ending;
 mod hand_off;
 mod heap;
 mod instances;
@@ -52,7 +48,6 @@ mod key;
 mod log;
 mod moment;
 mod overrun;
-mod pausing;
 mod phase;
 mod ready_queue;
 mod signals;
@@ -64,10 +59,10 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::hash::{Hash, Hasher};
 
-pub use decision::Decision;
+pub use dispatch::Decision;
 pub use hand_off::HandOff;
 pub use log::{Log, Notice};
-pub use moment::{Moment, Released};
+pub use moment::Moment;
 pub use phase::{DagPhase, Snapshot};
 pub use statistics::DagStatistics;
 
@@ -293,7 +288,7 @@ impl Scheduler {
     }
 
     /// Reports whether a DAG releases no further job, whatever comes: it was closed by
-    /// [`Moment::close`], or [is ended](Self::is_ended).
+    /// [a request](crate::lifecycle::Request::Close), or [is ended](Self::is_ended).
     ///
     /// # Panics
     ///
@@ -304,7 +299,7 @@ impl Scheduler {
         self.dags[dag.index()].jobs.is_closed()
     }
 
-    /// Reports whether a DAG was ended by [`Moment::fail`] or [`Moment::stop`].
+    /// Reports whether a DAG was ended by [`Moment::fail`] or [a request](crate::lifecycle::Request::Stop).
     /// Instances of it that had started before may still run.
     ///
     /// # Panics

@@ -7,18 +7,11 @@ use crate::request::Request;
 
 /// One instant, in which completions are still taken.
 #[derive(Debug)]
-#[must_use = "an instant without `release_due` and `dispatch` leaves cores idle"]
+#[must_use = "an instant without `dispatch` leaves cores idle"]
 pub struct Moment<'s> {
     scheduler: &'s mut Scheduler,
     /// When the driver says that it is, which another core may have been later than.
     told_ns: u64,
-}
-
-/// One instant after its completions and releases.
-#[derive(Debug)]
-#[must_use = "an instant without `dispatch` leaves cores idle"]
-pub struct Released<'s> {
-    scheduler: &'s mut Scheduler,
 }
 
 impl Scheduler {
@@ -69,7 +62,7 @@ impl<'s> Moment<'s> {
     ///
     /// The instance's core is free. From now on the DAG releases no job and
     /// starts no instance; its instances that have started on other cores, or
-    /// were preempted, are to be completed as ever (the module `ending` states
+    /// were preempted, are to be completed as ever (the module `phase` states
     /// the rules). A further instance of an ended DAG may fail, too. As with
     /// [`complete`](Self::complete), the instance need not run any more in the
     /// scheduler's eyes. Completions of the same instant should come first, as
@@ -103,29 +96,6 @@ impl<'s> Moment<'s> {
         self.scheduler.fail_replaceable(instance);
     }
 
-    /// Ends a DAG as [`fail`](Self::fail) does, without an instance that has
-    /// failed. Does nothing if the DAG is ended.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such DAG.
-    #[inline]
-    pub fn stop(&mut self, dag: DagId) {
-        self.scheduler.stop(dag);
-    }
-
-    /// Pauses a DAG: from now on its due jobs are skipped, and what is in flight
-    /// goes on (the module `pausing` states the rules). Does nothing if the DAG
-    /// is closed or ended.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such DAG.
-    #[inline]
-    pub fn pause(&mut self, dag: DagId) {
-        self.scheduler.pause(dag);
-    }
-
     /// Returns the number of jobs of a DAG that are in flight.
     ///
     /// # Panics
@@ -137,42 +107,12 @@ impl<'s> Moment<'s> {
         self.scheduler.in_flight(dag)
     }
 
-    /// Ends the pause of a DAG: jobs that are due from now on are released. Does
-    /// nothing if it is not paused.
+    /// Does what is asked of one DAG; nothing at other requests. A pause of a closed DAG, or
+    /// anything asked of an ended one, does nothing (the module `phase` states the rules).
     ///
-    /// # Panics
-    ///
-    /// If there is no such DAG.
-    #[inline]
-    pub fn resume(&mut self, dag: DagId) {
-        self.scheduler.resume(dag);
-    }
-
-    /// Closes a DAG: it releases no further job, and is over when what is in flight has
-    /// ended (the module `closing` states the rules). Does nothing if it is closed or ended.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such DAG.
-    #[inline]
-    pub fn close(&mut self, dag: DagId) {
-        self.scheduler.close(dag);
-    }
-
-    /// Takes note of an event that a sporadic DAG waits for. Its next job is due
-    /// now, or as soon after the job before it as the minimum inter-arrival time
-    /// allows; while that one is to come, or waits for room, further signals are
-    /// dropped and counted (the module `signals` states the rules).
-    ///
-    /// # Panics
-    ///
-    /// If there is no such DAG, or it is not sporadic.
-    #[inline]
-    pub fn signal(&mut self, dag: DagId) {
-        self.scheduler.signal(dag);
-    }
-
-    /// Does what is asked of one DAG; nothing at other requests.
+    /// With a signal to a sporadic DAG its next job is due now, or as soon after the job before
+    /// it as the minimum inter-arrival time allows; while that one is to come, or waits for room,
+    /// further signals are dropped and counted (the module `signals` states the rules).
     ///
     /// # Panics
     ///
@@ -195,16 +135,18 @@ impl<'s> Moment<'s> {
         self.scheduler.cores.prefer(core);
     }
 
-    /// Releases the jobs that are due, and takes note of deadlines that have passed.
+    /// Releases the jobs that are due and takes note of deadlines that have passed. Then gives
+    /// the cores to the instances with the smallest keys (R5), and returns the changes. They are
+    /// in effect for the scheduler; the driver has to carry them out.
+    #[must_use = "the decisions are for the driver to carry out"]
     #[inline]
-    pub fn release_due(mut self) -> Released<'s> {
+    pub fn dispatch(mut self) -> &'s [Decision] {
         while self.release_next() {}
-        Released {
-            scheduler: self.scheduler,
-        }
+        self.scheduler.decide();
+        &self.scheduler.decisions
     }
 
-    /// Does so as long as there is room for [notices](super::Log::has_notices), and reports whether
+    /// Releases what is due as long as there is room for [notices](super::Log::has_notices), and reports whether
     /// that is all. A driver that is late finds any number of releases due.
     #[inline]
     pub fn release_some(mut self) -> bool {
@@ -226,17 +168,5 @@ impl<'s> Moment<'s> {
             self.scheduler.serve(DagId(to_u32(index)));
         }
         due.is_some()
-    }
-}
-
-impl<'s> Released<'s> {
-    /// Gives the cores to the instances with the smallest keys (R5), and
-    /// returns the changes. They are in effect for the scheduler; the driver
-    /// has to carry them out.
-    #[must_use = "the decisions are for the driver to carry out"]
-    #[inline]
-    pub fn dispatch(self) -> &'s [Decision] {
-        self.scheduler.decide();
-        &self.scheduler.decisions
     }
 }

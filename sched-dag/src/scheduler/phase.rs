@@ -1,7 +1,84 @@
-//! The life of a DAG, and how one does at an instant.
+//! The life of a DAG: how it is paused, closed and ended before its time, and how it does at an
+//! instant. The scenarios of the rules, in `tests/scenarios/lifecycle.txt` and `ending.txt`, bear
+//! their numbers.
+//!
+//! # Pausing: no releases for a while, on the same grid afterwards
+//!
+//! A person, or a mode of the system, wants a DAG to rest and to go on later.
+//!
+//! - **P1, no release.** A paused DAG releases no job. Each job that becomes due
+//!   is skipped at that instant, whatever the overrun policy; at the instant of
+//!   the pause, too, since pauses come before releases. Numbers and the grid O +
+//!   kT go on. Of a sporadic DAG, the job that a signal asks for is skipped.
+//! - **P2, no backlog.** Releases that wait for an older job are skipped at the
+//!   pause, the oldest first. Each costs a step, once.
+//! - **P3, in flight.** What was released goes on as ever, to its end.
+//! - **P4, resuming.** The first job that is due at the instant of the resumption
+//!   or later is released at its nominal release time.
+//! - **P5, the end.** Skipped jobs count towards the limit of jobs, so a paused
+//!   DAG with a limit comes to its end. A closed or ended DAG is neither paused nor
+//!   resumed.
+//!
+//! To the other rules a pause is nothing new: a job is skipped as with
+//! [`OverrunPolicy::Skip`](crate::OverrunPolicy::Skip).
+//!
+//! # Closing: its last jobs come to their end
+//!
+//! This is how a machine is stopped in order: nothing more begins, and what has begun is
+//! finished.
+//!
+//! - **C1, no release.** A closed DAG releases no job any more, at the very instant of the
+//!   closing neither, since closings come before releases. No further job is due, so none is
+//!   skipped either; a signal that is kept for one is forgotten.
+//! - **C2, no backlog.** Releases that wait for an older job are skipped at the closing, the
+//!   oldest first.
+//! - **C3, in flight.** What was released goes on as ever, to its end, and may be late.
+//! - **C4, over.** The DAG is over when nothing of it is in flight. Signals to it are dropped,
+//!   and counted.
+//! - **C5, finality.** It is neither paused nor resumed any more. A fault, or a stop, ends it
+//!   as any other (E1 to E8).
+//!
+//! To the other rules a closing is nothing new: it is a limit of jobs that is there already.
+//!
+//! # Ending: by a fault of one of its instances, or a stop
+//!
+//! An instance *fails* when a fault has ended it: its function will never
+//! return. A DAG is *ended* by the first instance of it that fails, unless
+//! that costs the job only (the module `dropping`), or by a *stop*, which needs no fault; it
+//! stays ended. It is *over* when nothing of it is in flight or to come.
+//!
+//! - **E1, failure.** A failing instance has started. It ends at that instant:
+//!   its core is free for the dispatch of the same instant. It may have been
+//!   preempted in the scheduler's eyes, as when it finishes.
+//! - **E2, no release.** An ended DAG releases no job, at the very instant of
+//!   its end neither, since ends come before releases. Releases that wait are
+//!   dropped; they are counted and not reported one by one.
+//! - **E3, no start.** No instance of an ended DAG starts. Those that are ready
+//!   are cancelled at once, the others when they would become ready: each once,
+//!   and after all its predecessors have ended.
+//! - **E4, what has started.** Its other started instances go on, preempted ones
+//!   at their key, until they complete or fail, too. In an ended DAG nothing
+//!   depends on them any more, so a driver that can take an instance's context
+//!   away for good may complete it at once.
+//! - **E5, jobs.** Each job in flight ends when no instance of it is left, with
+//!   [`JobOutcome::DagEnded`](crate::JobOutcome::DagEnded), or as aborted if it
+//!   was that before.
+//! - **E6, deadlines.** A deadline that has passed before the instant of the end
+//!   is a miss. No later deadline of the DAG is, and the run of consecutive
+//!   misses stays as it is.
+//! - **E7, others.** Nothing changes for other DAGs, except that cores are free
+//!   for them: their releases, keys, joins and deadlines do not know of it. From
+//!   that instant on the schedule is that of a set in which the ended DAG has no
+//!   work left but its started instances.
+//! - **E8, finality.** The scheduler never begins an ended DAG again: a subtask
+//!   that failed may have left anything behind. A new scheduler may.
+//!
+//! Not here: whether a fault did harm beyond its instance, and what becomes of
+//! its stack and values. That is the driver's.
 
 use super::{DagStatistics, Scheduler};
-use crate::ids::DagId;
+use crate::ids::{DagId, Instance};
+use crate::journal::What;
 
 /// A phase of a DAG's life. A DAG is paused and goes on any number of times; it never comes back
 /// from a later phase to an earlier one of the other two.
@@ -77,5 +154,101 @@ impl Scheduler {
             in_flight: self.in_flight(dag),
             waiting: self.waiting(dag),
         }
+    }
+
+    /// Reports whether a DAG is paused.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    #[inline]
+    pub fn is_paused(&self, dag: DagId) -> bool {
+        self.phase(dag) == DagPhase::Paused
+    }
+
+    /// Returns the number of jobs of a DAG that are in flight.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
+    #[must_use]
+    #[inline]
+    pub fn in_flight(&self, dag: DagId) -> u64 {
+        let jobs = &self.dags[dag.index()].jobs;
+        jobs.next - jobs.oldest
+    }
+
+    /// Pauses a DAG (P1, P2).
+    #[inline]
+    pub(super) fn pause(&mut self, dag: DagId) {
+        if self.is_closed(dag) {
+            return;
+        }
+        // What was late before the pause is a miss.
+        self.judge(dag, None);
+        let phase = &mut self.dags[dag.index()].jobs.phase;
+        if core::mem::replace(phase, DagPhase::Paused) != DagPhase::Paused {
+            self.log.of_dag(What::Off, dag);
+        }
+        self.skip_waiting(dag);
+    }
+
+    /// Ends the pause of a DAG (P4).
+    #[inline]
+    pub(super) fn resume(&mut self, dag: DagId) {
+        let state = &mut self.dags[dag.index()];
+        if state.jobs.phase == DagPhase::Paused {
+            state.jobs.phase = DagPhase::Running;
+            state.resumed_ns = self.log.now_ns;
+            self.log.of_dag(What::On, dag);
+        }
+    }
+
+    /// Closes a DAG (C1, C2).
+    #[inline]
+    pub(super) fn close(&mut self, dag: DagId) {
+        if self.is_closed(dag) {
+            return;
+        }
+        self.judge(dag, None);
+        self.dags[dag.index()].jobs.close(DagPhase::Closed);
+        self.log.of_dag(What::Closed, dag);
+        self.skip_waiting(dag);
+    }
+
+    /// Ends an instance that has started, and its DAG (E1).
+    #[inline]
+    pub(super) fn fail(&mut self, instance: Instance) {
+        let vertex = self.take_off(instance, "fails");
+        let dag = instance.dag;
+        self.dags[dag.index()].statistics.faults += 1;
+        self.stop(dag);
+        // Only now its job may end, so that the job counts as cut short.
+        self.end(vertex);
+    }
+
+    /// Ends a DAG.
+    #[inline]
+    pub(super) fn stop(&mut self, dag: DagId) {
+        if self.is_ended(dag) {
+            return;
+        }
+        self.judge(dag, None);
+        let state = &mut self.dags[dag.index()];
+        let (cut_short, dropped) = state.jobs.end_all();
+        state.statistics.cut_short += cut_short;
+        state.statistics.dropped += dropped;
+        self.set_timer(dag);
+        self.log.of_dag(What::Stopped, dag);
+        self.cancel_ready(dag, u64::MAX);
+    }
+
+    #[inline]
+    fn skip_waiting(&mut self, dag: DagId) {
+        while self.waiting(dag) > 0 {
+            self.skip_oldest_waiting(dag);
+        }
+        self.set_timer(dag);
     }
 }

@@ -10,7 +10,7 @@ use crate::journal::What;
 use crate::kept::Journal;
 use crate::lifecycle::{Request, Requests};
 use crate::placement::Next;
-use crate::scheduler::{Decision, Moment, Notice, Scheduler};
+use crate::scheduler::{Moment, Notice, Scheduler};
 
 /// What runs by itself.
 pub(super) struct Cluster<B: Body> {
@@ -142,8 +142,8 @@ impl<B: Body> Cluster<B> {
         self.engine.decide(now_ns, now);
         for place in 0..self.engine.decisions().len() {
             let decision = self.engine.decisions()[place];
-            let core = decision.core();
-            if let Decision::Preempt { .. } = decision {
+            let core = decision.core;
+            if decision.what == What::Suspend {
                 if let Some((finish_ns, body)) = self.running[core.index()].take() {
                     let parked = (finish_ns - now_ns, body);
                     self.engine.suspend(core, now_ns, parked);

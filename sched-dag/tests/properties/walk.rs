@@ -110,8 +110,7 @@ impl<'s> Walk<'s> {
             }
             self.hear()?;
         }
-        let end =
-            |scheduler: &mut Scheduler| scheduler.at(now_ns).release_due().dispatch().to_vec();
+        let end = |scheduler: &mut Scheduler| scheduler.at(now_ns).dispatch().to_vec();
         let decisions = decisions.unwrap_or_else(|| end(&mut self.scheduler));
         self.hear()?;
         self.carry_out(&decisions)?;
@@ -191,7 +190,7 @@ impl<'s> Walk<'s> {
         let mut long = self.scheduler.clone();
         long.log.here = core;
         long.at(self.now_ns).complete(instance);
-        let expected = long.at(self.now_ns).release_due().dispatch().to_vec();
+        let expected = long.at(self.now_ns).dispatch().to_vec();
         let mut elsewhere = self.scheduler.clone();
         let other = CoreId(instance.subtask.0 % self.set.options.cores);
         end_shortly(&mut elsewhere, self.now_ns, other, instance);
@@ -225,10 +224,10 @@ impl<'s> Walk<'s> {
     fn carry_out(&mut self, decisions: &[Decision]) -> Result<(), String> {
         let mut freed = None;
         for &decision in decisions {
-            let (core, instance) = (decision.core(), decision.instance());
+            let (core, instance) = (decision.core, decision.instance);
             let place = &mut self.cores[core.index()];
-            let (what, is_right) = match decision {
-                Decision::Preempt { .. } => {
+            let (what, is_right) = match decision.what {
+                What::Suspend => {
                     freed = Some(core);
                     self.preempted.push(instance);
                     (What::Suspend, place.take() == Some(instance))
@@ -239,12 +238,12 @@ impl<'s> Walk<'s> {
                     match self.preempted.iter().position(|it| *it == instance) {
                         Some(at) => {
                             self.preempted.remove(at);
-                            let is_resumed = matches!(decision, Decision::Resume { .. });
+                            let is_resumed = decision.what == What::Resume;
                             (What::Resume, is_free && is_resumed)
                         }
                         None => {
                             let is_cut = self.releases[instance.dag.index()].is_cut(instance.job);
-                            let is_started = matches!(decision, Decision::Start { .. });
+                            let is_started = decision.what == What::Start;
                             (What::Start, is_free && is_started && !is_cut)
                         }
                     }
@@ -338,11 +337,11 @@ fn end_shortly(
     let vertex = scheduler.vertex(instance);
     match pass_on(scheduler, now_ns, core, vertex) {
         HandOff::To(next, decision) => {
-            assert_eq!(scheduler.vertex(decision.instance()), next);
+            assert_eq!(scheduler.vertex(decision.instance), next);
             vec![decision]
         }
         HandOff::Idle => Vec::new(),
-        HandOff::Open => scheduler.at(now_ns).release_due().dispatch().to_vec(),
+        HandOff::Open => scheduler.at(now_ns).dispatch().to_vec(),
     }
 }
 

@@ -10,7 +10,7 @@
 //! `signal` are for a DAG, by default DAG 0; `prefer` is for a core. With `open` the
 //! instant ends without a dispatch.
 
-use sched_dag::journal::What;
+use sched_dag::lifecycle::Request;
 use sched_dag::{
     CoreId, DagId, DagSpec, Decision, HandOff, Journal, Moment, Scheduler, SchedulerOptions,
 };
@@ -84,8 +84,8 @@ impl Hand {
     fn done(&self) -> String {
         match self.done {
             Some(HandOff::To(vertex, decision)) => {
-                assert_eq!(self.scheduler.vertex(decision.instance()), vertex);
-                format!("on {}", decision.core().0)
+                assert_eq!(self.scheduler.vertex(decision.instance), vertex);
+                format!("on {}", decision.core.0)
             }
             done => format!("{done:?}"),
         }
@@ -109,17 +109,17 @@ impl Hand {
                 "finish" => moment.complete(instance()),
                 "fail" => moment.fail(instance()),
                 "replace" => moment.fail_replaceable(instance()),
-                "pause" => moment.pause(DagId(id)),
-                "resume" => moment.resume(DagId(id)),
-                "close" => moment.close(DagId(id)),
-                "stop" => moment.stop(DagId(id)),
-                "signal" => moment.signal(DagId(id)),
+                "pause" => moment.serve(Request::Pause(DagId(id))),
+                "resume" => moment.serve(Request::Resume(DagId(id))),
+                "close" => moment.serve(Request::Close(DagId(id))),
+                "stop" => moment.serve(Request::Stop(DagId(id))),
+                "signal" => moment.serve(Request::Signal(DagId(id))),
                 "prefer" => moment.prefer(CoreId(id)),
                 "open" => return,
                 _ => panic!("`{command}` is no command"),
             }
         }
-        let decisions = self.scheduler.at(now_ns).release_due().dispatch().to_vec();
+        let decisions = self.scheduler.at(now_ns).dispatch().to_vec();
         self.carry_out(now_ns, &decisions);
     }
 
@@ -139,13 +139,8 @@ impl Hand {
 
     fn carry_out(&mut self, now_ns: u64, decisions: &[Decision]) {
         for decision in decisions {
-            let what = match decision {
-                Decision::Start { .. } => What::Start,
-                Decision::Resume { .. } => What::Resume,
-                Decision::Preempt { .. } => What::Suspend,
-            };
-            let (core, instance) = (decision.core(), decision.instance());
-            self.scheduler.log.on_core(core, what, now_ns, instance);
+            let (core, instance) = (decision.core, decision.instance);
+            (self.scheduler.log).on_core(core, decision.what, now_ns, instance);
         }
     }
 }

@@ -155,7 +155,7 @@ pub(crate) fn pass_on(
     {
         let log = &mut scheduler.log;
         log.on_core(core, What::Finish, now_ns, finished);
-        log.on_core(core, What::Ready, log.now_ns(), decision.instance());
+        log.on_core(core, What::Ready, log.now_ns(), decision.instance);
     }
     done
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fass::{Preemption, SubtaskAttributes, create_dag, finish_create_dags};
+use sched_dag::lifecycle::Request;
 use sched_dag::{CoreId, DagId};
 
 use crate::platform::HOST;
@@ -73,7 +74,7 @@ impl Stage {
             // Its job is released, and the core that gets it begins with it, if it does.
             "signal" | "begin" => {
                 let mut state = team.lock();
-                state.step(&team.workers, |moment| moment.signal(dag));
+                state.step(&team.workers, |moment| moment.serve(Request::Signal(dag)));
                 let is_wanted = |core: &usize| state.engine.placement.is_wanted(*core);
                 if what == "begin" {
                     let worker = state.active[(0..2).find(is_wanted).unwrap()];

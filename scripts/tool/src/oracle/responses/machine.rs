@@ -124,7 +124,7 @@ impl Machine<'_> {
                     self.scheduler.at(now_ns).complete(instance);
                 }
             }
-            let decisions = self.scheduler.at(now_ns).release_due().dispatch().to_vec();
+            let decisions = self.scheduler.at(now_ns).dispatch().to_vec();
             self.scheduler.log.exchange_notices(&mut notices);
             notices.iter().for_each(|notice| watch.hear(notice));
             for decision in decisions {
@@ -139,19 +139,19 @@ impl Machine<'_> {
     }
 
     fn carry_out(&mut self, decision: Decision, now_ns: u64) {
-        let (core, instance) = (decision.core().index(), decision.instance());
-        let takes_ns = match decision {
-            Decision::Preempt { .. } => {
+        let (core, instance) = (decision.core.index(), decision.instance);
+        let takes_ns = match decision.what {
+            What::Suspend => {
                 if let Some((instance, finish_ns)) = self.cores[core].take() {
                     self.left_ns.insert(instance, finish_ns - now_ns);
                 }
                 return;
             }
-            Decision::Resume { .. } => {
+            What::Resume => {
                 let left_ns = self.left_ns.remove(&instance).unwrap_or(0);
                 left_ns + self.draw(self.costs.interrupt_ns)
             }
-            Decision::Start { .. } => {
+            _ => {
                 let dag = self.scheduler.task_set().dag(instance.dag);
                 let wcet_ns = dag.subtask(instance.subtask).wcet_ns().unwrap_or(0);
                 let own_ns = self.costs.dispatch_ns + 2 * self.costs.switch_ns;
