@@ -5,29 +5,39 @@
 
 use core::fmt;
 
-/// A DAG task, by its position among the DAGs of one commit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct DagId(pub u32);
+/// Declares ids.
+macro_rules! ids {
+    ($($(#[$about:meta])+ $Id:ident;)+) => {
+        $(
+            $(#[$about])+
+            #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+            pub struct $Id(pub u32);
 
-/// A subtask, by its position among the subtasks of its DAG.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct SubtaskId(pub u32);
+            impl $Id {
+                /// Returns the position as an index into a table.
+                #[must_use]
+                pub const fn index(self) -> usize {
+                    self.0 as usize
+                }
+            }
+        )+
+    };
+}
 
-/// A subtask, by its position among the subtasks of all DAGs of one commit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Vertex(pub u32);
-
-/// A processor, by its position among the processors that the scheduler serves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct CoreId(pub u32);
-
-/// A cluster of cores, by its position among those of one commit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct ClusterId(pub u32);
-
-/// A mode, by its position among those of one commit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ModeId(pub u32);
+ids! {
+    /// A DAG task, by its position among the DAGs of one commit.
+    DagId;
+    /// A subtask, by its position among the subtasks of its DAG.
+    SubtaskId;
+    /// A subtask, by its position among the subtasks of all DAGs of one commit.
+    Vertex;
+    /// A processor, by its position among the processors that the scheduler serves.
+    CoreId;
+    /// A cluster of cores, by its position among those of one commit.
+    ClusterId;
+    /// A mode, by its position among those of one commit.
+    ModeId;
+}
 
 /// One execution of a subtask: the part of job `job` that `subtask` does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -38,54 +48,6 @@ pub struct Instance {
     pub job: u64,
     /// The subtask.
     pub subtask: SubtaskId,
-}
-
-impl DagId {
-    /// Returns the position as an index into a table of DAGs.
-    #[must_use]
-    pub const fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-impl ClusterId {
-    /// Returns the position as an index into a table of clusters.
-    #[must_use]
-    pub const fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-impl ModeId {
-    /// Returns the position as an index into a table of modes.
-    #[must_use]
-    pub const fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-impl SubtaskId {
-    /// Returns the position as an index into a DAG's table of subtasks.
-    #[must_use]
-    pub const fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-impl Vertex {
-    /// Returns the position as an index into a table of all subtasks.
-    #[must_use]
-    pub const fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-impl CoreId {
-    /// Returns the position as an index into a table of cores.
-    #[must_use]
-    pub const fn index(self) -> usize {
-        self.0 as usize
-    }
 }
 
 impl fmt::Display for Instance {
