@@ -17,11 +17,10 @@ use core::time::Duration;
 use super::answer::Settings;
 use super::fixed_order;
 use super::multi_path::multi_path;
-use super::ratio::Ratio;
+use super::ratio::{Ratio, sort_largest_first};
 use super::task::{Task, TaskError};
 use crate::clusters::Why;
 use crate::ids::{ClusterId, DagId, to_u32};
-use crate::order::sort;
 use crate::task_set::TaskSet;
 use crate::worded::texts;
 
@@ -142,13 +141,7 @@ fn pack(
     left: u32,
     assignment: &mut Assignment,
 ) -> Result<(), NotAssigned> {
-    let is_denser = |one: usize, other: usize| {
-        let ((volume, within), (volume2, within2)) = (density(&tasks[one]), density(&tasks[other]));
-        let first = u128::from(volume) * u128::from(within2);
-        let second = u128::from(volume2) * u128::from(within);
-        second.cmp(&first).then(one.cmp(&other))
-    };
-    sort(&mut light, &mut { is_denser });
+    sort_largest_first(&mut light, |dag| density(&tasks[dag]));
     let first = assignment.sizes.len();
     // The densities on each core.
     let mut loads: Vec<Vec<(u64, u64)>> = Vec::new();

@@ -16,10 +16,9 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::ratio::Ratio;
+use super::ratio::{Ratio, sort_largest_first};
 use super::set::constrained;
 use super::task::Task;
-use crate::order::sort;
 
 /// Which DAG gets which cores.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,12 +63,7 @@ fn place(tasks: &[&Task], mut light: Vec<usize>, cores: u32) -> Option<Vec<Vec<u
         let task = tasks[position];
         (task.volume_ns(), task.relative_deadline_ns())
     };
-    sort(&mut light, &mut |one, other| {
-        let ((volume, deadline), (volume2, deadline2)) = (density(one), density(other));
-        let first = u128::from(volume) * u128::from(deadline2);
-        let second = u128::from(volume2) * u128::from(deadline);
-        second.cmp(&first).then(one.cmp(&other))
-    });
+    sort_largest_first(&mut light, density);
     let mut placed = vec![Vec::new(); cores];
     for position in light {
         let fits = |there: &&mut Vec<usize>| {

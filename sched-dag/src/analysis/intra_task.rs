@@ -16,8 +16,8 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::closure::{Closure, contains, insert, remove};
 use super::task::Task;
+use super::width::{Closure, contains, insert, remove};
 
 /// The most complete paths that [`intra_task`] enumerates: 4,096.
 pub const PATH_LIMIT: u32 = 4096;

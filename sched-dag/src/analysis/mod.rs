@@ -67,10 +67,7 @@
 
 mod answer;
 mod assign;
-mod bonifaci;
 mod bursts;
-mod capacity;
-mod closure;
 mod cover;
 mod federated;
 mod fixed_order;
@@ -87,15 +84,13 @@ mod ratio;
 mod relation;
 mod set;
 mod task;
+mod utilisation;
 mod width;
 mod witness;
 mod workload;
 
 pub use answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
 pub use assign::{NotAssigned, Unassigned, assign};
-pub use bonifaci::{bonifaci_dm, bonifaci_edf};
-pub use capacity::{gedf_capacity, grm_capacity};
-pub use closure::SUBTASK_LIMIT;
 pub use cover::covers;
 pub use federated::{Federation, federated};
 pub use fixed_order::fix_orders;
@@ -106,5 +101,6 @@ pub use multi_path::multi_path;
 pub use multi_path_sets::{Refusal, multi_path_edf, multi_path_fp};
 pub use overheads::{OverheadSource, Overheads};
 pub use task::{Task, TaskError};
-pub use width::{parallelism, width};
+pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
+pub use width::{SUBTASK_LIMIT, parallelism, width};
 pub use witness::witness;

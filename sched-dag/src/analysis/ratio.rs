@@ -6,6 +6,10 @@
 //! up. Rounding up can only turn "accepted" into "not accepted", and only for a
 //! set within `n * 2^-40` of the limit.
 
+use core::cmp::Ordering;
+
+use crate::order::sort;
+
 /// A non-negative rational number, or an upper approximation of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Ratio {
@@ -74,6 +78,18 @@ impl Ratio {
 }
 
 /// Returns the greatest common divisor (Euclid), 0 only of 0 and 0.
+/// Sorts positions by their fractions, the largest first; equal ones stay in their order.
+pub(super) fn sort_largest_first(positions: &mut [usize], of: impl Fn(usize) -> (u64, u64)) {
+    let wide = |position: usize| {
+        let (numerator, denominator) = of(position);
+        (u128::from(numerator), u128::from(denominator))
+    };
+    sort(positions, &mut |one, other| -> Ordering {
+        let (one, other) = (wide(one), wide(other));
+        (other.0 * one.1).cmp(&(one.0 * other.1))
+    });
+}
+
 fn greatest_common_divisor(mut one: u128, mut other: u128) -> u128 {
     while other != 0 {
         (one, other) = (other, one % other);

@@ -1,4 +1,7 @@
-//! Capacity-augmentation tests: global EDF and RM, implicit deadlines.
+//! Tests of whole sets by their utilisation: they bound no response time, but vouch for
+//! deadlines.
+//!
+//! # Capacity-augmentation tests: global EDF and RM, implicit deadlines
 //!
 //! J. Li, J.-J. Chen, K. Agrawal, C. Lu, C. Gill, A. Saifullah, "Analysis of
 //! Federated and Global Scheduling for Parallel Real-Time Tasks", ECRTS 2014,
@@ -15,8 +18,26 @@
 //!
 //! Assumes: preemptive, `D = T` for every DAG; for RM priorities by period, one
 //! a DAG. Linear in the number of DAGs, but accepts few sets.
+//!
+//! # Speed-up based tests: global EDF and DM, any deadlines
+//!
+//! V. Bonifaci, A. Marchetti-Spaccamela, S. Stiller, A. Wiese, "Feasibility
+//! Analysis in the Sporadic DAG Task Model", ECRTS 2013,
+//! doi:10.1109/ECRTS.2013.32:
+//!
+//! - EDF (Theorem 21): each length at most `D / 3` and the sum of
+//!   `volume / min(T, D)` at most `(m + 1/2) / 3`;
+//! - DM (Theorem 22): `D / 5` and `(m + 1/4) / 5`; if `D <= T` for every DAG
+//!   (Theorem 23): `D / 4` and `(m + 1/3) / 4`.
+//!
+//! Assumes: preemptive; for DM priorities by relative deadline, one a DAG. The
+//! theorems let jobs of one subtask run side by side; here a subtask is
+//! sequential over its own jobs. With `D <= T` an accepted set never has two
+//! jobs of a DAG at once, so that is the same; with `D > T` it is not proven
+//! for this model, and the verdict at commit does not use it there.
 
 use super::ratio::Ratio;
+use super::set::constrained;
 use super::task::Task;
 
 /// Tests global EDF. `None`: does not apply (a DAG has `D != T`, or there are
@@ -76,10 +97,39 @@ fn accepts(
     Some(short && light)
 }
 
+/// Tests global EDF (Theorem 21).
+#[must_use]
+pub fn bonifaci_edf(tasks: &[&Task], cores: u32) -> bool {
+    is_light(tasks, 3, 2 * u128::from(cores) + 1, 6)
+}
+
+/// Tests global DM (Theorem 23 if `D <= T` for every DAG, else Theorem 22).
+#[must_use]
+pub fn bonifaci_dm(tasks: &[&Task], cores: u32) -> bool {
+    let m = u128::from(cores);
+    if constrained(tasks, cores) {
+        is_light(tasks, 4, 3 * m + 1, 12)
+    } else {
+        is_light(tasks, 5, 4 * m + 1, 20)
+    }
+}
+
+fn is_light(tasks: &[&Task], part: u128, numerator: u128, denominator: u128) -> bool {
+    let short = |task: &&Task| {
+        part * u128::from(task.length_ns()) <= u128::from(task.relative_deadline_ns())
+    };
+    let density = |task: &&Task| {
+        let shorter = task.period_ns().min(task.relative_deadline_ns());
+        (task.volume_ns(), shorter)
+    };
+    tasks.iter().all(short)
+        && Ratio::sum(tasks.iter().map(density))
+            .is_some_and(|sum| sum.at_most(numerator, denominator))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{gedf_capacity, grm_capacity};
-    use crate::analysis::Task;
+    use super::*;
 
     fn copies(count: usize) -> Vec<Task> {
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
@@ -115,5 +165,19 @@ mod tests {
         assert_eq!(grm_capacity(&[&single(1000, 3732)], 1), Some(false));
         let constrained = Task::new(10, 9, vec![1], &[]).unwrap();
         assert_eq!(grm_capacity(&[&constrained], 1), None);
+    }
+
+    #[test]
+    fn limits_are_inclusive() {
+        // m = 1: EDF accepts density 1/2 and length D/3 exactly.
+        let task =
+            |wcets: Vec<u64>, period, deadline| Task::new(period, deadline, wcets, &[]).unwrap();
+        assert!(bonifaci_edf(&[&task(vec![2, 1], 6, 6)], 1));
+        assert!(!bonifaci_edf(&[&task(vec![2, 2], 6, 6)], 1));
+        assert!(!bonifaci_edf(&[&task(vec![3], 6, 6)], 1));
+        // DM, m = 1: density 1/3 with D <= T, 1/4 otherwise.
+        assert!(bonifaci_dm(&[&task(vec![2, 2], 12, 12)], 1));
+        assert!(!bonifaci_dm(&[&task(vec![2, 2], 12, 13)], 1));
+        assert!(bonifaci_dm(&[&task(vec![2, 1], 12, 13)], 1));
     }
 }
