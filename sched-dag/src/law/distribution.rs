@@ -1,10 +1,21 @@
 //! A distribution of times by its order statistics.
 //!
 //! It has its values in ascending order, each with how many there are of it. They are exact,
-//! or they were counted in *buckets*, as a [`Histogram`](super::Histogram) does: then each
+//! or they were counted in *buckets*, as a [`Histogram`] does: then each
 //! stands for its bucket's, none of which is larger. Ranks are nearest ranks: the value for
 //! so many thousandths is the smallest one that at least these do not exceed.
+//!
+//! A [`Histogram`] counts values in a fixed amount of memory.
+//!
+//! Values are counted in *buckets*. Those below 2^b are exact; above, each doubling
+//! of the value is divided into 2^b buckets of equal width. So a bucket is at most
+//! 1/2^b of its values wide, and a percentile, which is given by the largest value of
+//! its bucket, is never too small and too large by that part at most: with b = 5 by
+//! 3.2 %. The count, the minimum and the maximum are exact. Values from 2^40 on, 18
+//! minutes in nanoseconds, share the last bucket, whose largest value is the maximum.
 
+use alloc::boxed::Box;
+use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::order::sorted;
@@ -21,7 +32,7 @@ use crate::order::sorted;
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Distribution {
-    pub(super) count: u64,
+    count: u64,
     min_ns: Option<u64>,
     /// Ascending.
     values: Vec<(u64, u64)>,
@@ -151,6 +162,104 @@ impl Distribution {
     }
 }
 
+/// From this power of two on, values are not told apart.
+const LAST_BIT: u32 = 40;
+
+/// A number of values, by buckets.
+///
+/// ```
+/// use sched_dag::law::Histogram;
+///
+/// let mut times = Histogram::new(5);
+/// (1..=1000).for_each(|time| times.add(time));
+/// let times = times.distribution();
+/// assert_eq!((times.count(), times.min(), times.max()), (1000, 1, 1000));
+/// // 500 is in the bucket from 496 to 503.
+/// assert_eq!(times.per_mille(500), 503);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Histogram {
+    /// The logarithm of the number of buckets in a doubling.
+    bits: u32,
+    counts: Box<[u32]>,
+    count: u64,
+    min: u64,
+    max: u64,
+}
+
+impl Histogram {
+    /// Makes an empty one with `2^bits` buckets in each doubling.
+    ///
+    /// # Panics
+    ///
+    /// If `bits` is more than 16.
+    #[must_use]
+    pub fn new(bits: u32) -> Self {
+        Self {
+            bits,
+            counts: vec![0; Self::buckets(bits)].into_boxed_slice(),
+            count: 0,
+            min: u64::MAX,
+            max: 0,
+        }
+    }
+
+    /// Returns the bytes that one takes.
+    #[must_use]
+    pub const fn size_of(bits: u32) -> usize {
+        size_of::<Self>() + Self::buckets(bits) * size_of::<u32>()
+    }
+
+    const fn buckets(bits: u32) -> usize {
+        assert!(
+            bits <= 16,
+            "a histogram of more than 2^16 buckets a doubling"
+        );
+        ((LAST_BIT - bits + 1) as usize) << bits
+    }
+
+    /// Counts a value.
+    pub fn add(&mut self, value: u64) {
+        let bucket = self.bucket(value);
+        self.counts[bucket] = self.counts[bucket].saturating_add(1);
+        self.count += 1;
+        self.min = self.min.min(value);
+        self.max = self.max.max(value);
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "buckets are few")]
+    fn bucket(&self, value: u64) -> usize {
+        let value = value.min((1 << LAST_BIT) - 1);
+        // How many bits the bucket is wide.
+        let shift = (u64::BITS - value.leading_zeros()).saturating_sub(self.bits + 1);
+        ((u64::from(shift) << self.bits) + (value >> shift)) as usize
+    }
+
+    /// Returns the largest value of a bucket.
+    fn top(&self, bucket: usize) -> u64 {
+        let bucket = bucket as u64;
+        let shift = (bucket >> self.bits).saturating_sub(1);
+        let first = (bucket - (shift << self.bits)) << shift;
+        first + (1 << shift) - 1
+    }
+
+    /// Returns the distribution. Its values are the largest ones of the buckets that are not
+    /// empty, the last of them the maximum.
+    #[must_use]
+    pub fn distribution(&self) -> Distribution {
+        let counts = self.counts.iter().copied().enumerate();
+        let filled = counts.filter(|(_, count)| *count > 0);
+        let values = filled.map(|(bucket, count)| match bucket + 1 == self.counts.len() {
+            true => (self.max, count.into()),
+            false => (self.top(bucket).min(self.max), count.into()),
+        });
+        let mut distribution = Distribution::counted(self.min, values.collect());
+        // A bucket may have had more than it can count.
+        distribution.count = self.count;
+        distribution
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -181,5 +290,56 @@ mod tests {
             first.add(&second);
             assert_eq!(first, counted);
         }
+    }
+
+    #[test]
+    fn a_value_is_in_one_bucket_and_that_is_as_wide_as_stated() {
+        for bits in [0, 3, 5] {
+            let histogram = Histogram::new(bits);
+            let values = (0..2000)
+                .chain((11..LAST_BIT).flat_map(|bit| {
+                    [(1 << bit) - 1, 1 << bit, (1 << bit) + 1, (1 << bit) * 3 / 2]
+                }));
+            for value in values {
+                let bucket = histogram.bucket(value);
+                let top = histogram.top(bucket);
+                let below = bucket.checked_sub(1).map(|before| histogram.top(before));
+                assert!(value <= top && below.is_none_or(|below| below < value));
+                assert!(top - value <= value >> bits, "{value} {top}");
+            }
+            assert!(histogram.bucket(u64::MAX) < histogram.counts.len());
+        }
+    }
+
+    #[test]
+    fn percentiles_are_those_of_the_sorted_values_and_a_bucket_at_most() {
+        let mut histogram = Histogram::new(5);
+        let mut values: Vec<u64> = (0..5000u64).map(|n| n * n * 7 % 1_000_003).collect();
+        values.iter().for_each(|&value| histogram.add(value));
+        let distribution = histogram.distribution();
+        values.sort_unstable();
+        for (thousandths, rank) in [(1, 5), (500, 2500), (990, 4950), (999, 4995), (1000, 5000)] {
+            let exact = values[rank - 1];
+            let found = distribution.per_mille(thousandths);
+            assert!(exact <= found && found - exact <= exact >> 5);
+        }
+        let (min, max) = (values[0], values[4999]);
+        assert_eq!((distribution.min(), distribution.max()), (min, max));
+    }
+
+    #[test]
+    fn buckets_have_all_values_and_end_with_the_maximum() {
+        let mut histogram = Histogram::new(2);
+        let none = histogram.distribution();
+        assert_eq!((none.min(), none.per_mille(500)), (0, 0));
+        for value in [3, 3, 9, 1 << 50] {
+            histogram.add(value);
+        }
+        let buckets: Vec<_> = histogram.distribution().values().collect();
+        assert_eq!(buckets, [(3, 2), (9, 1), (1 << 50, 1)]);
+        // Beyond the last bucket, too.
+        let mut beyond = Histogram::new(5);
+        beyond.add(u64::MAX);
+        assert_eq!(beyond.distribution().per_mille(500), u64::MAX);
     }
 }

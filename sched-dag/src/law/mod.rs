@@ -25,7 +25,6 @@ mod costs;
 mod dispatch;
 mod distribution;
 mod facts;
-mod histogram;
 mod replay;
 pub mod sweep;
 mod tally;
@@ -38,8 +37,7 @@ use core::ops::Range;
 
 pub use costs::Costs;
 pub use dispatch::{Dispatch, dispatch_violations, judge_dispatch};
-pub use distribution::Distribution;
-pub use histogram::Histogram;
+pub use distribution::{Distribution, Histogram};
 pub use replay::{Verdict, judge, violations};
 pub use tally::{OfDag, OfSubtask, Tally};
 pub use violation::{Rule, Violation};
