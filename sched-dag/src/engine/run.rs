@@ -7,9 +7,9 @@ use core::cell::OnceCell;
 use super::{Body, Engine};
 use crate::chains::{Chain, Latencies};
 use crate::ids::{DagId, SubtaskId};
-use crate::kept::Journal;
+use crate::kept::{FINEST, Journal};
 use crate::key::{DagKey, SubtaskKey};
-use crate::law::{Record, Tally, Violation};
+use crate::law::{self, Record, Tally, Terms, Violation};
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{DagStatistics, Scheduler, Snapshot};
 use crate::task_set::TaskSet;
@@ -160,8 +160,11 @@ impl Run {
     /// See [`Run`].
     #[must_use]
     pub fn record(&self) -> &Record {
-        self.record
-            .get_or_init(|| self.journal.record(&self.task_set))
+        self.record.get_or_init(|| {
+            let (is_whole, events) = (self.journal.is_whole(), self.journal.events());
+            let record = Record::of_events(&self.task_set, is_whole, events);
+            record.expect("the times of a journal's events fit into memory")
+        })
     }
 
     /// Returns the response times of a DAG's complete jobs, in nanoseconds; of the latest jobs if
@@ -195,7 +198,7 @@ impl Run {
     /// ```
     #[must_use]
     pub fn times(&self) -> Option<&Tally> {
-        let tally = || self.journal.statistics(&self.task_set);
+        let tally = || self.journal.statistics(&self.task_set, FINEST);
         self.times.get_or_init(tally).as_ref()
     }
 
@@ -204,7 +207,7 @@ impl Run {
     /// See [`Run`].
     #[must_use]
     pub fn coarse_times(&self) -> Option<Tally> {
-        self.journal.coarse_statistics(&self.task_set)
+        self.journal.statistics(&self.task_set, 0)
     }
 
     /// Returns the journal: what has happened, in its order.
@@ -310,8 +313,10 @@ impl Run {
     /// the machine's affair.
     ///
     /// See [`Run`].
+    #[inline(never)]
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
-        self.journal.violations(&self.task_set).into_iter()
+        let found = law::violations(&self.task_set, self.terms(u64::MAX), self.journal.events());
+        found.into_iter()
     }
 
     /// Returns every breach of R5 (did the right instances run?) that lasts for longer than
@@ -320,8 +325,17 @@ impl Run {
     /// See [`Run`].
     #[must_use]
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
-        self.journal
-            .dispatch_violations(&self.task_set, &self.options, bound_ns)
+        let (task_set, events) = (&self.task_set, self.journal.events());
+        let terms = self.terms(bound_ns);
+        let judge = || law::dispatch_violations(task_set, &self.options, terms, events);
+        terms.is_whole.then(judge)
+    }
+
+    const fn terms(&self, tolerance_ns: u64) -> Terms {
+        Terms {
+            is_whole: self.journal.is_whole(),
+            ..Terms::whole(tolerance_ns)
+        }
     }
 
     /// Measures a chain that crosses DAGs, one of those of the commit: how old its outputs are,

@@ -20,22 +20,19 @@
 //!
 //! Times are nanoseconds since the run's epoch.
 
-mod judged;
-mod merged;
-
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::ids::{ClusterId, CoreId};
 use crate::journal::{Event, Subject, What};
-use crate::law::Tally;
+use crate::law::{Costs, Tally};
 use crate::task_set::{Dag, TaskSet};
 
 /// Where a run has no last job, as many events as make sense: 6 MiB.
 const EVENTS_WITHOUT_END: usize = 1 << 18;
 
 /// The finest resolution of statistics: 32 buckets a doubling.
-const FINEST: u32 = 5;
+pub(crate) const FINEST: u32 = 5;
 
 /// The events of a run, the latest ones if it is long.
 #[derive(Clone, Debug)]
@@ -59,31 +56,17 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Takes the memory for a run, of `free_bytes`, and for at most `most_events` events.
+    /// Takes the memory for what happens to the DAGs of one cluster, of `free_bytes`, and for
+    /// at most `most_events` events.
     #[must_use]
-    pub fn new(task_set: &Arc<TaskSet>, free_bytes: usize, most_events: u64) -> Self {
-        Self::of(task_set, None, free_bytes, most_events)
-    }
-
-    /// Takes it likewise for what happens to the DAGs of one cluster.
-    #[must_use]
+    #[inline(never)]
     pub fn of_cluster(
         task_set: &Arc<TaskSet>,
         cluster: ClusterId,
         free_bytes: usize,
         most_events: u64,
     ) -> Self {
-        Self::of(task_set, Some(cluster), free_bytes, most_events)
-    }
-
-    #[inline(never)]
-    fn of(
-        task_set: &Arc<TaskSet>,
-        cluster: Option<ClusterId>,
-        free_bytes: usize,
-        most_events: u64,
-    ) -> Self {
-        let is_here = |dag: &&Dag| cluster.is_none_or(|cluster| cluster == dag.cluster());
+        let is_here = |dag: &&Dag| cluster == dag.cluster();
         let mut here = task_set.dags().iter().filter(is_here);
         let needed = events_of(here.clone());
         let wished = usize::try_from(most_events).unwrap_or(usize::MAX);
@@ -101,13 +84,8 @@ impl Journal {
         let tally = (!is_enough && room > 0).then(|| tally(task_set, free_bytes / 8));
         Self {
             events,
-            put_away: Vec::new(),
-            oldest: 0,
-            lost: 0,
             tally,
-            is_complete: true,
-            grows: false,
-            is_closed: false,
+            ..Self::none()
         }
     }
 
@@ -254,6 +232,70 @@ impl Journal {
             number -= u64::from(place.is_some());
         }
         number
+    }
+
+    /// Reports whether no event is lost.
+    #[must_use]
+    pub const fn is_whole(&self) -> bool {
+        self.lost == 0
+    }
+
+    /// Computes the statistics of the run, in histograms of so many bits unless others were
+    /// kept; `None` if events were neither kept nor counted.
+    #[must_use]
+    #[inline(never)]
+    pub fn statistics(&self, task_set: &Arc<TaskSet>, bits: u32) -> Option<Tally> {
+        let mut tally = match &self.tally {
+            Some(tally) => tally.clone(),
+            None => Tally::new(task_set, bits),
+        };
+        self.events().for_each(|event| tally.take(&event));
+        self.is_complete.then_some(tally)
+    }
+
+    /// Measures what the platform's own work has cost, core by core; `None` if events are lost.
+    #[must_use]
+    #[inline(never)]
+    pub fn costs(&self, task_set: &TaskSet) -> Option<Costs> {
+        let measure = || Costs::of_cores(task_set, self.events());
+        self.is_whole().then(measure)
+    }
+
+    /// Takes over what another cluster's journal of the same run holds, which counts its cores
+    /// from the cluster's first one. If there is no memory for both, that counts as lost.
+    ///
+    /// Each is in the order in which its scheduler learnt of things, and stays so: of the next
+    /// events of two, the earlier one goes first. Nothing in one depends on another, since each
+    /// DAG and each core is in one cluster; so any order between them tells the same run.
+    #[inline(never)]
+    pub fn absorb(&mut self, other: Self, cluster: ClusterId, first_core: u32) {
+        let mut merged = Vec::new();
+        let both = self.events.len() + other.events.len();
+        if merged.try_reserve_exact(both).is_err() {
+            self.lost += other.written();
+            self.is_complete = false;
+            return;
+        }
+        let theirs = other.words();
+        let mut theirs = theirs
+            .map(|words| Event::on_core_from(*words, first_core))
+            .peekable();
+        for words in self.words() {
+            while let Some(earlier) = theirs.next_if(|theirs| theirs[0] < words[0]) {
+                merged.push(earlier);
+            }
+            merged.push(*words);
+        }
+        merged.extend(theirs);
+        self.events = merged;
+        self.oldest = 0;
+        self.lost += other.lost;
+        self.is_complete &= other.is_complete;
+        match (&mut self.tally, other.tally) {
+            (Some(ours), Some(theirs)) => ours.adopt(theirs, cluster),
+            // A cluster that has lost nothing has counted nothing yet.
+            (none, theirs) => *none = none.take().or(theirs),
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use crate::{ClusterId, Clusters, CommitOptions, DagId, DagSpec, Instance, Policy
 use crate::{SubtaskSpec, verify};
 
 use super::*;
+use crate::law;
 
 /// Jobs of one subtask, one each 10 ns.
 const JOBS: u64 = 50;
@@ -46,15 +47,23 @@ fn run_all(journal: &mut Journal, jobs: core::ops::Range<u64>) {
 }
 
 /// A journal with room for 12 events, after all jobs.
+fn whole(task_set: &Arc<TaskSet>, free_bytes: usize) -> Journal {
+    Journal::of_cluster(task_set, ClusterId(0), free_bytes, u64::MAX)
+}
+
+fn violations(journal: &Journal, task_set: &TaskSet) -> Vec<law::Violation> {
+    law::violations(task_set, law::Terms::whole(u64::MAX), journal.events())
+}
+
 fn small() -> Journal {
-    let mut journal = Journal::new(&task_set(1, Some(JOBS)), 12 * 24 * 4, u64::MAX);
+    let mut journal = whole(&task_set(1, Some(JOBS)), 12 * 24 * 4);
     run_all(&mut journal, 0..JOBS);
     journal
 }
 
 #[test]
 fn what_is_written_together_is_kept_one_by_one_where_room_ends() {
-    let mut journal = Journal::new(&task_set(1, Some(JOBS)), 4 * 24 * 4, u64::MAX);
+    let mut journal = whole(&task_set(1, Some(JOBS)), 4 * 24 * 4);
     let subject = Subject::of_job(DagId(0), 0);
     let at = |time_ns| (What::Released, time_ns, subject);
     for time_ns in [0, 3, 6] {
@@ -84,7 +93,7 @@ fn keeps_the_latest_events_and_counts_the_lost_ones() {
 fn statistics_are_those_of_all_jobs() {
     let journal = small();
     let statistics = journal
-        .statistics(&task_set(1, Some(JOBS)))
+        .statistics(&task_set(1, Some(JOBS)), FINEST)
         .expect("all were counted");
     let responses = statistics.dag(DagId(0)).response_time.distribution();
     assert_eq!(
@@ -95,17 +104,17 @@ fn statistics_are_those_of_all_jobs() {
     assert_eq!(responses.per_mille(500), 6);
     // A journal that has room for all is counted after the run, more exactly.
     let task_set = task_set(1, Some(JOBS));
-    let mut large = Journal::new(&task_set, 1 << 20, u64::MAX);
+    let mut large = whole(&task_set, 1 << 20);
     run_all(&mut large, 0..JOBS);
     assert_eq!(large.lost(), 0);
-    let all = large.statistics(&task_set).expect("all are there");
+    let all = large.statistics(&task_set, FINEST).expect("all are there");
     let all = all.dag(DagId(0)).response_time.distribution();
     assert_eq!((all.count(), all.per_mille(500)), (JOBS, 5));
 }
 
 #[test]
 fn a_dag_without_end_takes_no_more_than_its_room() {
-    let mut journal = Journal::new(&task_set(1, None), 1 << 16, u64::MAX);
+    let mut journal = whole(&task_set(1, None), 1 << 16);
     let room = (1 << 16) / 4 / 24;
     run_all(&mut journal, 0..room as u64);
     assert_eq!(journal.events().count(), room);
@@ -115,7 +124,7 @@ fn a_dag_without_end_takes_no_more_than_its_room() {
 #[test]
 fn what_is_forgotten_or_not_recorded_counts_as_lost() {
     let task_set = task_set(1, Some(JOBS));
-    let mut journal = Journal::new(&task_set, 1 << 20, u64::MAX);
+    let mut journal = whole(&task_set, 1 << 20);
     run_all(&mut journal, 0..1);
     journal.record_events(false);
     assert!(journal.has_room() && !journal.is_recording());
@@ -126,7 +135,7 @@ fn what_is_forgotten_or_not_recorded_counts_as_lost() {
     run_all(&mut journal, 2..3);
     assert_eq!((journal.events().count(), journal.lost()), (5, 10));
     assert!(
-        journal.statistics(&task_set).is_none(),
+        journal.statistics(&task_set, FINEST).is_none(),
         "some were not counted"
     );
 }
@@ -166,7 +175,7 @@ fn events_of_two_clusters_stand_in_the_order_of_time() {
     assert!(times.is_sorted());
     assert_eq!((times.len(), journal.lost()), (200, 0));
     assert!(journal.events().all(|event| event.core.0 == event.dag.0));
-    assert!(journal.violations(&task_set).is_empty());
+    assert!(violations(&journal, &task_set).is_empty());
 }
 
 #[test]
@@ -175,12 +184,14 @@ fn statistics_are_those_of_both_whichever_has_lost_events() {
         let (task_set, journal) = merged(free_bytes);
         let small = free_bytes.iter().filter(|bytes| **bytes == 2000).count() as u64;
         assert_eq!(journal.lost(), small * 80, "{free_bytes:?}");
-        let statistics = journal.statistics(&task_set).expect("all were counted");
+        let statistics = journal
+            .statistics(&task_set, FINEST)
+            .expect("all were counted");
         for (dag, response_ns) in [(0, 3), (1, 4)] {
             let times = statistics.dag(DagId(dag)).response_time.distribution();
             let found = (times.count(), times.max());
             assert_eq!(found, (20, response_ns), "{free_bytes:?}");
         }
-        assert!(journal.violations(&task_set).is_empty(), "{free_bytes:?}");
+        assert!(violations(&journal, &task_set).is_empty(), "{free_bytes:?}");
     }
 }
