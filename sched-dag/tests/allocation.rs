@@ -12,7 +12,7 @@ use random::Random;
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, DagStatistics, Instance, OverrunPolicy,
-    Policy, Preemption, Scheduler, SchedulerOptions, SubtaskSpec, verify,
+    Policy, Preemption, SchedulerOptions, SubtaskSpec, verify,
 };
 
 /// A layered DAG of 40 subtasks that overruns now and then.
@@ -64,7 +64,7 @@ fn run(seed: u64, policy: Policy, preemption: Preemption, may_fail: bool) -> [Da
         preemption,
         cores: 4,
     };
-    let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
+    let mut run = VirtualTime::new(&Arc::new(verified.task_set), options);
     let mut work = Work { random, may_fail };
 
     let before = allocated().0;

@@ -43,7 +43,7 @@ fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[u32]) -> 
         ..set.options
     };
     let script = Script::new(|it| set.execution_ns(of(it))).failing(|it| set.fails(of(it)));
-    let run = script.run(VirtualTime::of_clusters(task_set, options));
+    let run = script.run(VirtualTime::new(task_set, options));
     assert!(run.driver.is_finished());
     let named = |event: &Event| Event {
         dag: original(event.dag),

@@ -20,10 +20,9 @@ use sched_dag::law::{
     Histogram, InstanceRecord, JobRecord, Record, Tally, Terms, Violation, dispatch_violations,
     violations,
 };
-use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{DagId, Instance, JobOutcome, SubtaskId};
 use set::{Overruns, Set};
-use support::{PREEMPTIVE, Run, Script, Spec, commit, number, scheduler};
+use support::{PREEMPTIVE, Run, Script, Spec, commit, driver, number};
 
 fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
     let (count, first_seed) = (number("JOURNALS", 500), number("JOURNAL_SEED", 1));
@@ -35,7 +34,7 @@ fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
             false => Overruns::Never,
         };
         let set = set::draw(&mut random, overruns);
-        let driver = VirtualTime::new(scheduler(&set.specs(), set.options));
+        let driver = driver(&set.specs(), set.options);
         let run = Script::new(|instance| set.execution_ns(instance)).run(driver);
         with(seed, &mut random, &set, &run);
     }
@@ -204,10 +203,7 @@ fn the_law_accepts_what_is_survived_and_nothing_else() {
     let right = chain().surviving(1, 3, 3);
     let run = Script::new(3)
         .failing(|instance| instance.job % 3 == 2 && instance.subtask.0 == 1)
-        .run(VirtualTime::new(scheduler(
-            std::slice::from_ref(&right),
-            PREEMPTIVE,
-        )));
+        .run(driver(std::slice::from_ref(&right), PREEMPTIVE));
     let breaches = |spec, events: &[Event]| {
         let events = events.iter().copied();
         violations(&commit(&[spec], PREEMPTIVE), Terms::EXACT, events)

@@ -2,14 +2,14 @@
 
 mod support;
 
-use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
+use sched_dag::virtual_time::{End, ExecutionTimes};
 use sched_dag::{DagSpec, OverrunPolicy, Policy};
 use support::hand::Hand;
-use support::{PREEMPTIVE, Run, Script, Spec, dag, instance, scheduler, under};
+use support::{PREEMPTIVE, Run, Script, Spec, dag, driver, instance, under};
 
 /// Runs one that has further jobs, of which none can be due.
 fn unlimited(spec: DagSpec, policy: Policy) -> Run {
-    Script::new(1).run(VirtualTime::new(scheduler(&[spec], under(policy))))
+    Script::new(1).run(driver(&[spec], under(policy)))
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn the_last_deadline_that_there_is_can_be_met_and_missed() {
 #[test]
 fn an_instance_that_cannot_end_before_the_end_of_time_says_so() {
     let spec = dag(1, 4, 1, &[0], &[]).offset(u64::MAX - 5);
-    let mut run = VirtualTime::new(scheduler(&[spec], PREEMPTIVE));
+    let mut run = driver(&[spec], PREEMPTIVE);
     let end = run.run(&mut ExecutionTimes(|_| 6));
     assert_eq!(end, End::TimeOverflow(instance(0, 0, 0)));
 }

@@ -8,15 +8,14 @@ use std::collections::BTreeSet;
 
 use sched_dag::journal::{Event, What};
 use sched_dag::lifecycle::{Changes, Entry, Lifecycle, Request};
-use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{DagId, DagSpec, ModeId};
 use support::random::Random;
-use support::{Run, Script, Spec, TWO_CORES, Takes, dag, number, scheduler};
+use support::{Run, Script, Spec, TWO_CORES, Takes, dag, driver, number};
 
 /// Runs all jobs of DAGs on two cores.
 fn run(specs: &[DagSpec], lifecycle: Changes, script: Script<'_, impl Takes>) -> Run {
-    let driver = VirtualTime::new(scheduler(specs, TWO_CORES));
-    let run = script.run(driver.with_lifecycle(Some(Box::new(lifecycle))));
+    let in_virtual_time = driver(specs, TWO_CORES);
+    let run = script.run(in_virtual_time.with_lifecycle(Some(Box::new(lifecycle))));
     assert!(run.driver.is_finished());
     run
 }

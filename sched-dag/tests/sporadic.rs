@@ -7,7 +7,7 @@ use sched_dag::analysis::{Overheads, Settings, answer};
 use sched_dag::law::{Tally, Terms, violations};
 use sched_dag::lifecycle::Request;
 use sched_dag::virtual_time::VirtualTime;
-use sched_dag::{DagId, Instance, Scheduler};
+use sched_dag::{DagId, Instance};
 use support::random::Random;
 use support::{Script, Spec, TWO_CORES, commit, dag};
 
@@ -41,10 +41,9 @@ fn bounds_hold_for_random_signals() {
         });
         let task_set = commit(&specs, TWO_CORES);
         let bounds = answer(&task_set, &settings).bounds;
-        let scheduler = Scheduler::new(task_set, TWO_CORES);
         let wcet_ns = |it: Instance| specs[it.dag.index()].subtasks[it.subtask.index()].wcet_ns;
         let script = Script::new(|it| wcet_ns(it).expect("each has one")).asking(signals);
-        let run = script.run(VirtualTime::new(scheduler));
+        let run = script.run(VirtualTime::new(&task_set, TWO_CORES));
         let events = run.events.iter().copied();
         assert_eq!(violations(&run.task_set, Terms::EXACT, events), []);
         let mut tally = Tally::new(&run.task_set, 5);

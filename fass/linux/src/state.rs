@@ -289,13 +289,13 @@ impl State {
             self.note_at(now_ns, What::Resume, core, occupant);
         }
         for place in 0..self.engine.decisions().len() {
-            let core = self.engine.decisions()[place].core();
+            let core = self.engine.decisions()[place].core;
             if self.engine.placement.must_suspend(core.index()) {
                 self.suspend(core, workers);
             }
         }
         for place in 0..self.engine.decisions().len() {
-            self.call_if_wanted(self.engine.decisions()[place].core());
+            self.call_if_wanted(self.engine.decisions()[place].core);
         }
     }
 

@@ -122,53 +122,37 @@ struct DagState {
 }
 
 impl Scheduler {
-    /// Makes a scheduler of all DAGs on all cores with no job released, and allocates all
-    /// that it will ever need. Time begins at 0.
+    /// Makes the scheduler of all DAGs on all cores, which are not divided.
     ///
     /// # Panics
     ///
     /// If the options say 0 cores.
     #[must_use]
     pub fn new(task_set: Arc<TaskSet>, options: SchedulerOptions) -> Self {
-        Self::serving(task_set, options, None)
+        Self::of_cluster(task_set, options, ClusterId(0))
     }
 
-    /// Makes likewise the scheduler of one cluster of the machine that the options describe.
-    /// It counts the cluster's cores from 0. To it, the DAGs of other clusters are ended.
+    /// Makes the scheduler of one cluster of the machine that the options describe, with no job
+    /// released, and allocates all that it will ever need. Time begins at 0. It counts the
+    /// cluster's cores from 0. To it, the DAGs of other clusters are ended.
     ///
     /// # Panics
     ///
-    /// If there is no such cluster.
+    /// If there is no such cluster, or it has no cores.
     #[must_use]
+    #[inline(never)]
     pub fn of_cluster(
         task_set: Arc<TaskSet>,
-        options: SchedulerOptions,
+        mut options: SchedulerOptions,
         cluster: ClusterId,
     ) -> Self {
-        let cores = task_set.cores_of(cluster, options.cores).len();
-        let options = SchedulerOptions {
-            cores: to_u32(cores),
-            ..options
-        };
-        Self::serving(task_set, options, Some(cluster))
-    }
-
-    #[inline(never)]
-    fn serving(
-        task_set: Arc<TaskSet>,
-        options: SchedulerOptions,
-        cluster: Option<ClusterId>,
-    ) -> Self {
+        options.cores = to_u32(task_set.cores_of(cluster, options.cores).len());
         assert!(
             options.cores > 0,
             "a scheduler for 0 cores; give it at least 1"
         );
         let dags = task_set.dags();
-        let longest = dags
-            .iter()
-            .map(|dag| dag.subtasks().len())
-            .max()
-            .unwrap_or(0);
+        let longest = dags.iter().map(|dag| dag.subtasks().len()).max();
         let mut slots = 0;
         let states: Box<[DagState]> = dags
             .iter()
@@ -176,7 +160,7 @@ impl Scheduler {
                 let first_slot = to_u32(slots);
                 slots += dag.slots();
                 let mut jobs = Jobs::new(dag, first_slot);
-                if cluster.is_some_and(|cluster| cluster != dag.cluster()) {
+                if cluster != dag.cluster() {
                     jobs.end_all();
                 }
                 DagState {
@@ -204,7 +188,7 @@ impl Scheduler {
             cores: Cores::new(options.cores),
             quiet_until_ns: earliest_ns(&timers),
             timers,
-            ending: Vec::with_capacity(longest),
+            ending: Vec::with_capacity(longest.unwrap_or(0)),
             // A dispatch names a core at most twice: to preempt and to start.
             decisions: Vec::with_capacity(2 * options.cores as usize),
             task_set,

@@ -92,22 +92,21 @@ impl ConstructionPolicy {
     /// Returns the paper's policy, which is the default.
     #[must_use]
     pub const fn paper() -> Self {
-        Self {
-            sources: Count::One,
-            sinks: Count::One,
-            writers: Count::One,
-            parts: Count::One,
-        }
+        Self::all(Count::One)
     }
 
     /// Returns the policy that accepts every acyclic graph.
     #[must_use]
     pub const fn any_graph() -> Self {
+        Self::all(Count::Several)
+    }
+
+    const fn all(count: Count) -> Self {
         Self {
-            sources: Count::Several,
-            sinks: Count::Several,
-            writers: Count::Several,
-            parts: Count::Several,
+            sources: count,
+            sinks: count,
+            writers: count,
+            parts: count,
         }
     }
 }

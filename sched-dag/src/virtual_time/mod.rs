@@ -21,7 +21,7 @@
 //! use std::sync::Arc;
 //! use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
 //! use sched_dag::{
-//!     CommitOptions, DagId, DagSpec, Policy, Preemption, Scheduler, SchedulerOptions, SubtaskSpec, verify,
+//!     CommitOptions, DagId, DagSpec, Policy, Preemption, SchedulerOptions, SubtaskSpec, verify,
 //! };
 //!
 //! let dag = DagSpec {
@@ -34,14 +34,13 @@
 //! };
 //! let verified = verify(&[dag], &CommitOptions::new(Policy::Edf, 1)).expect("the DAG is right");
 //! let options = SchedulerOptions { policy: Policy::Edf, preemption: Preemption::Enabled, cores: 1 };
-//! let mut run = VirtualTime::new(Scheduler::new(Arc::new(verified.task_set), options));
+//! let mut run = VirtualTime::new(&Arc::new(verified.task_set), options);
 //! assert_eq!(run.run(&mut ExecutionTimes(|_instance| 20)), End::Finished);
 //! assert_eq!(run.now_ns(), 240);
 //! assert_eq!(run.scheduler_of(DagId(0)).statistics(DagId(0)).misses, 0);
 //! ```
 
 mod cluster;
-mod serving;
 mod workload;
 
 use alloc::boxed::Box;
@@ -50,10 +49,10 @@ use alloc::vec::Vec;
 use core::fmt;
 
 use crate::engine::{Body, Run};
-use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
+use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 use crate::journal::Event;
 use crate::kept::Journal;
-use crate::lifecycle::{Lifecycle, Request};
+use crate::lifecycle::{Change, Lifecycle, Request};
 use crate::policy::SchedulerOptions;
 use crate::scheduler::Scheduler;
 use crate::task_set::TaskSet;
@@ -89,19 +88,10 @@ pub enum End {
 }
 
 impl VirtualTime {
-    /// Makes a driver for a scheduler that has not begun, and allocates all that
-    /// it will need.
+    /// Makes a driver for a task set on the machine that the options describe, and allocates all
+    /// that it will need.
     #[must_use]
-    pub fn new(scheduler: Scheduler) -> Self {
-        let task_set = Arc::clone(scheduler.task_set());
-        let cluster = Cluster::new(scheduler, ClusterId(0), Vec::new());
-        Self::with(Box::from([cluster]), instances(&task_set))
-    }
-
-    /// Makes one likewise for the clusters of a task set on the machine that the options
-    /// describe; if its cores are not divided, for one scheduler of all.
-    #[must_use]
-    pub fn of_clusters(task_set: &Arc<TaskSet>, options: SchedulerOptions) -> Self {
+    pub fn new(task_set: &Arc<TaskSet>, options: SchedulerOptions) -> Self {
         Self::of_bodies(task_set, options, instances(task_set), &[])
     }
 }
@@ -128,10 +118,7 @@ impl<B: Body> VirtualTime<B> {
             let scheduler = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
             Cluster::new(scheduler, cluster, after_fault.to_vec())
         });
-        Self::with(clusters.collect(), bodies)
-    }
-
-    fn with(clusters: Box<[Cluster<B>]>, bodies: impl IntoIterator<Item = B>) -> Self {
+        let clusters: Box<[Cluster<B>]> = clusters.collect();
         let cores = |cluster: &Cluster<B>| cluster.engine.scheduler.options().cores as usize;
         let mut this = Self {
             failing: Vec::with_capacity(clusters.iter().map(cores).sum()),
@@ -300,6 +287,52 @@ impl<B: Body> VirtualTime<B> {
             }
         }
         Ok(false)
+    }
+
+    /// Serves a request at this instant.
+    fn serve(&mut self, request: Request, now: &mut Now<'_, impl Workload<B>>) {
+        let mut changes = Vec::new();
+        match (request, &mut self.lifecycle) {
+            (Request::Signal(dag), _) => _ = self.change(dag, request, now),
+            (_, Some(lifecycle)) => lifecycle.serve(request, &mut changes),
+            (_, None) => {}
+        }
+        // Between clusters the journals know no order within an instant; what is entered comes
+        // after what has led to it.
+        let mut latest = 0;
+        for change in changes {
+            let (dag, request) = match change {
+                Change::Pause(dag) => (dag, Request::Pause(dag)),
+                Change::Resume(dag) => (dag, Request::Resume(dag)),
+                Change::Close(dag) => (dag, Request::Close(dag)),
+                Change::Await(dag) if self.scheduler_of(dag).in_flight(dag) == 0 => continue,
+                Change::Await(_) => {
+                    self.waits = true;
+                    break;
+                }
+                Change::Enter(mode) => {
+                    self.waits = false;
+                    self.clusters[latest].tell(now, |moment| moment.entered(mode));
+                    continue;
+                }
+            };
+            latest = self.change(dag, request, now).unwrap_or(latest);
+        }
+    }
+
+    /// Has the cluster of a DAG serve a request, and returns its place if anything has changed.
+    fn change(
+        &mut self,
+        dag: DagId,
+        request: Request,
+        now: &mut Now<'_, impl Workload<B>>,
+    ) -> Option<usize> {
+        let place = self.place(dag);
+        let cluster = &mut self.clusters[place];
+        let before = cluster.engine.scheduler.log.journal.written();
+        cluster.tell(now, |moment| moment.serve(request));
+        let is_written = cluster.engine.scheduler.log.journal.written() > before;
+        is_written.then_some(place)
     }
 
     /// Returns the place of the cluster that runs a DAG.

@@ -78,7 +78,7 @@ pub(crate) fn observe(
         preemption,
         cores,
     };
-    let driver = VirtualTime::of_clusters(&Arc::new(task_set.clone()), options);
+    let driver = VirtualTime::new(&Arc::new(task_set.clone()), options);
     let mut driver = driver.recording();
     let end = driver.run_until(until_ns, &mut ExecutionTimes(execution_ns));
     assert!(!matches!(end, End::TimeOverflow(_)), "{end:?}");

@@ -18,12 +18,11 @@ use releases::SAID;
 use sched_dag::journal::What;
 use sched_dag::law::{Terms, dispatch_violations, violations};
 use sched_dag::lifecycle::Request;
-use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{DagId, Instance};
 use set::Set;
 pub(crate) use support::random;
 use support::random::Random;
-use support::{Script, number, scheduler};
+use support::{Script, driver, number};
 use walk::{Step, Walk};
 
 /// Judges `count` sets that `draw` makes; a judge says what is wrong.
@@ -158,7 +157,7 @@ fn virtual_time_keeps_the_rules_where_instances_fail() {
             .failing(|instance| set.fails(instance))
             .replacing(|instance| instance.subtask.0 != 1)
             .asking(signals)
-            .run(VirtualTime::new(scheduler(&set.specs(), set.options)));
+            .run(driver(&set.specs(), set.options));
         let events = || run.events.iter().copied();
         let found = violations(&run.task_set, Terms::EXACT, events());
         let of_dispatch = dispatch_violations(&run.task_set, &set.options, Terms::EXACT, events());

@@ -136,6 +136,11 @@ pub(crate) fn commit(specs: &[DagSpec], options: SchedulerOptions) -> Arc<TaskSe
     Arc::new(verified.task_set)
 }
 
+/// Makes a driver in virtual time for DAGs of any shape.
+pub(crate) fn driver(specs: &[DagSpec], options: SchedulerOptions) -> VirtualTime {
+    VirtualTime::new(&commit(specs, options), options)
+}
+
 /// Makes a scheduler for DAGs of any shape.
 pub(crate) fn scheduler(specs: &[DagSpec], options: SchedulerOptions) -> Scheduler {
     Scheduler::new(commit(specs, options), options)
@@ -185,8 +190,7 @@ pub(crate) fn number(variable: &str, default: u64) -> u64 {
 
 /// Runs DAGs to the end.
 pub(crate) fn run(specs: &[DagSpec], options: SchedulerOptions, takes: impl Takes) -> Run {
-    let driver = VirtualTime::new(scheduler(specs, options));
-    let run = Script::new(takes).run(driver);
+    let run = Script::new(takes).run(driver(specs, options));
     assert!(run.driver.is_finished());
     run
 }

@@ -22,7 +22,7 @@ pub(crate) use support::random;
 use std::sync::Arc;
 
 use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
-use sched_dag::{Scheduler, TaskSet};
+use sched_dag::TaskSet;
 use tool::trace::check;
 use tool::trace::commit::Committed;
 use tool::trace::model::Run;
@@ -58,8 +58,7 @@ fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, Run)) {
 /// Runs a set to its end, and returns what a trace tells of that.
 fn record(set: &Set) -> Run {
     let task_set = commit(&set.specs(), set.options);
-    let scheduler = Scheduler::new(Arc::clone(&task_set), set.options);
-    let mut run = VirtualTime::new(scheduler).recording();
+    let mut run = VirtualTime::new(&task_set, set.options).recording();
     let _ = run.run(&mut ExecutionTimes(|instance| set.execution_ns(instance)));
     Run {
         number: 0,

@@ -58,7 +58,7 @@ fn replay(case: &Case) -> Result<Times, String> {
         preemption: case.preemption,
         cores: case.cores.min(useful),
     };
-    let mut run = VirtualTime::of_clusters(&case.task_set, options).recording();
+    let mut run = VirtualTime::new(&case.task_set, options).recording();
     let end = run.run(&mut ExecutionTimes(|instance: Instance| {
         let times = &case.dags[instance.dag.index()].executions_ns;
         times[instance.subtask.index()][usize::try_from(instance.job).expect("few jobs")]
