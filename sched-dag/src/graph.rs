@@ -61,13 +61,12 @@ impl Adjacency {
     }
 
     pub(crate) fn of(&self, subtask: SubtaskId) -> &[SubtaskId] {
-        &self.neighbours[self.range(subtask)]
+        &self.neighbours[self.range(subtask.index())]
     }
 
     /// Returns where the neighbours of a subtask stand.
-    pub(crate) fn range(&self, subtask: SubtaskId) -> Range<usize> {
-        let index = subtask.index();
-        self.starts[index] as usize..self.starts[index + 1] as usize
+    pub(crate) fn range(&self, subtask: usize) -> Range<usize> {
+        self.starts[subtask] as usize..self.starts[subtask + 1] as usize
     }
 
     /// Returns all subtasks in the order of registration.

@@ -57,6 +57,14 @@ impl fmt::Display for Instance {
     }
 }
 
+/// Writes something by its name, as in "dag `lidar`", or as in "dag 3" if it has none.
+pub(crate) fn named<'n>(kind: &'n str, number: u32, name: &'n str) -> impl fmt::Display + 'n {
+    fmt::from_fn(move |f| match name {
+        "" => write!(f, "{kind} {number}"),
+        name => write!(f, "{kind} `{name}`"),
+    })
+}
+
 /// Returns an index as an id's number.
 ///
 /// # Panics

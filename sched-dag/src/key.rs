@@ -2,7 +2,7 @@
 
 use crate::ids::{DagId, SubtaskId};
 use crate::nearest::nearest_of;
-use crate::task_set::{Dag, TaskSet};
+use crate::task_set::{Dag, Subtask, TaskSet};
 
 /// What names a DAG of a task set: a name, a [`DagId`], or a handle of the crate that built it.
 ///
@@ -52,11 +52,11 @@ impl DagKey for DagId {
 impl DagKey for str {
     #[track_caller]
     fn find_in(&self, task_set: &TaskSet) -> DagId {
-        let names = || task_set.dags().iter().map(Dag::name);
-        match (0..).zip(names()).find(|(_, name)| *name == self) {
-            Some((number, _)) => DagId(number),
-            None => refuse("dag", self, &mut names()),
-        }
+        DagId(number_of(
+            "dag",
+            self,
+            task_set.dags().iter().map(Dag::name),
+        ))
     }
 }
 
@@ -76,11 +76,8 @@ impl SubtaskKey for SubtaskId {
 impl SubtaskKey for str {
     #[track_caller]
     fn find_in(&self, dag: &Dag) -> SubtaskId {
-        let names = || dag.subtasks().iter().map(crate::task_set::Subtask::name);
-        match (0..).zip(names()).find(|(_, name)| *name == self) {
-            Some((number, _)) => SubtaskId(number),
-            None => refuse("subtask", self, &mut names()),
-        }
+        let names = dag.subtasks().iter().map(Subtask::name);
+        SubtaskId(number_of("subtask", self, names))
     }
 }
 
@@ -88,6 +85,14 @@ impl<K: SubtaskKey + ?Sized> SubtaskKey for &K {
     #[track_caller]
     fn find_in(&self, dag: &Dag) -> SubtaskId {
         (**self).find_in(dag)
+    }
+}
+
+#[track_caller]
+fn number_of<'n>(what: &str, name: &str, names: impl Iterator<Item = &'n str> + Clone) -> u32 {
+    match (0..).zip(names.clone()).find(|(_, other)| *other == name) {
+        Some((number, _)) => number,
+        None => refuse(what, name, &mut { names }),
     }
 }
 

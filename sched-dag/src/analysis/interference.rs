@@ -63,19 +63,6 @@ pub(super) struct Delays {
     pub(super) bursts: Bursts,
 }
 
-/// Adds what DAGs may execute on `m - j` cores, as [`Other::add_to`] does.
-pub(super) fn add_to(
-    others: &[Other],
-    times: (u64, u64),
-    clip: Clip,
-    cores: usize,
-    [plain, clipped]: [&mut [Piece]; 2],
-) {
-    for other in others {
-        other.add_to(times, clip, cores, plain, clipped);
-    }
-}
-
 /// Returns what DAGs may execute on all cores within a window.
 pub(super) fn on_all_cores(others: &[Other], window_ns: u64) -> Piece {
     let pieces = others.iter();
@@ -132,13 +119,12 @@ impl Other {
     /// waits for `waiting_ns`: all that fits in to `plain`, and the clipped to `clipped`.
     pub(super) fn add_to(
         &self,
-        (window_ns, waiting_ns): (u64, u64),
+        times: (u64, u64),
         clip: Clip,
         cores: usize,
         plain: &mut [Piece],
         clipped: &mut [Piece],
     ) {
-        let times = (window_ns, waiting_ns);
         let of_chains = (clip == Clip::Chains).then(|| self.of_chains(times));
         let mut last = 0;
         let mut pieces = [Piece::NONE; 2];

@@ -27,7 +27,7 @@
 use alloc::vec;
 
 use super::cover::covers;
-use super::interference::{Clip, Delays, add_to};
+use super::interference::{Clip, Delays};
 use super::pipelined::Unsolved;
 use super::task::Task;
 use super::workload::Piece;
@@ -107,8 +107,9 @@ impl Equations<'_> {
         let times = (window_ns, window_ns - self.task.length_ns());
         let mut plain = vec![Piece::NONE; self.covers.len()];
         let mut clipped = plain.clone();
-        let sums = [&mut plain[..], &mut clipped];
-        add_to(others, times, self.clip, self.cores, sums);
+        for other in others {
+            other.add_to(times, self.clip, self.cores, &mut plain, &mut clipped);
+        }
         let has_clipped = !others.is_empty() && self.clip != Clip::Window;
         let sums = plain.into_iter().zip(clipped).enumerate();
         sums.flat_map(move |(j, (plain, clipped))| {

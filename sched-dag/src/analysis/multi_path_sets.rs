@@ -6,43 +6,9 @@
 use alloc::vec::Vec;
 
 use super::interference::Clip;
-use super::pipelined::Unsolved;
+use super::pipelined::Refusal;
 use super::set::{Set, constrained};
 use super::task::Task;
-use crate::worded::texts;
-
-texts! {
-    /// Why a sufficient test did not prove a set of DAGs schedulable.
-    ///
-    /// None of these says that the set is infeasible. DAGs are named by their position.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Refusal {
-        /// The set is outside the test's assumptions: there are no cores, or a
-        /// deadline or priority is not of the kind the test is about.
-        DoesNotApply = "the test does not apply to these DAGs";
-        /// This DAG has no bound within its relative deadline.
-        Fails { position: usize } =
-            "dag {position} has no bound within its relative deadline; give it more time, more \
-             cores or less interference";
-        /// The computation reached a limit on steps, on jobs in flight or on the
-        /// size of numbers, at this DAG.
-        Limit { position: usize } =
-            "the analysis of dag {position} reached a limit; shorten its deadline in periods or \
-             use a coarser unit of time";
-    }
-}
-
-impl core::error::Error for Refusal {}
-
-impl Unsolved {
-    /// Names the DAG whose equation has no usable solution.
-    pub(super) const fn at(self, position: usize) -> Refusal {
-        match self {
-            Self::BeyondDeadline => Refusal::Fails { position },
-            Self::Limit => Refusal::Limit { position },
-        }
-    }
-}
 
 /// Bounds the response times under global fixed priorities, the DAGs given from the highest
 /// priority to the lowest; also of jobs that overlap.

@@ -21,8 +21,7 @@ use alloc::vec::Vec;
 use super::bursts::Bursts;
 use super::interference::{Clip, Delays, Other, Shape};
 use super::multi_path::{Equations, alone};
-use super::multi_path_sets::Refusal;
-use super::pipelined::{Figures, OWN_STEPS, STEP_LIMIT, Unsolved};
+use super::pipelined::{Figures, OWN_STEPS, Refusal, STEP_LIMIT, Unsolved};
 use super::task::Task;
 use super::workload::Workload;
 

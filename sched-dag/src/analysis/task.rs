@@ -192,13 +192,14 @@ impl Task {
     ///
     /// If there is no such subtask.
     pub fn successors(&self, subtask: usize) -> impl ExactSizeIterator<Item = usize> + Clone {
-        let successors = self.graph.successors.of(SubtaskId(to_u32(subtask)));
-        successors.iter().map(|next| next.index())
+        let successors = &self.graph.successors;
+        let of_subtask = &successors.neighbours[successors.range(subtask)];
+        of_subtask.iter().map(|next| next.index())
     }
 
     /// Returns the edges from a subtask: their numbers, and the successors.
     pub(super) fn edges_of(&self, subtask: usize) -> impl Iterator<Item = (usize, usize)> {
-        let edges = self.graph.successors.range(SubtaskId(to_u32(subtask)));
+        let edges = self.graph.successors.range(subtask);
         edges.zip(self.successors(subtask))
     }
 

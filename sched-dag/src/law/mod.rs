@@ -192,7 +192,7 @@ impl Record {
     #[must_use]
     pub fn job(&self, dag: DagId, job: u64) -> Option<&JobRecord> {
         let dag = self.dags.get(dag.index())?;
-        dag.jobs.get(dag.place(job)?)
+        Some(&dag.jobs[dag.place(job)?])
     }
 
     /// Returns the instances of a job by subtask; empty if it is not recorded.
@@ -203,13 +203,8 @@ impl Record {
     #[must_use]
     pub fn instances(&self, dag: DagId, job: u64) -> &[InstanceRecord] {
         let dag = &self.dags[dag.index()];
-        let range = dag.place(job).and_then(|place| {
-            let start = place.checked_mul(dag.subtasks)?;
-            Some(start..start.checked_add(dag.subtasks)?)
-        });
-        range
-            .and_then(|range| dag.instances.get(range))
-            .unwrap_or(&[])
+        let of_job = |place| &dag.instances[place * dag.subtasks..][..dag.subtasks];
+        dag.place(job).map_or(&[], of_job)
     }
 
     /// Returns an instance's times, `None` if it is not recorded.
@@ -222,19 +217,16 @@ impl Record {
     /// Returns an instance's times to be filled in, `None` if it is not recorded.
     fn instance_mut(&mut self, instance: Instance) -> Option<&mut InstanceRecord> {
         let dag = self.dags.get_mut(instance.dag.index())?;
-        let place = dag.place(instance.job)?;
-        if place >= dag.jobs.len() || instance.subtask.index() >= dag.subtasks {
-            return None;
-        }
-        dag.instances
-            .get_mut(place * dag.subtasks + instance.subtask.index())
+        let first = dag.place(instance.job)? * dag.subtasks;
+        let of_job = &mut dag.instances[first..][..dag.subtasks];
+        of_job.get_mut(instance.subtask.index())
     }
 
     /// Returns a job's times to be filled in, `None` if it is not recorded.
     fn job_mut(&mut self, dag: DagId, job: u64) -> Option<&mut JobRecord> {
         let dag = self.dags.get_mut(dag.index())?;
         let place = dag.place(job)?;
-        dag.jobs.get_mut(place)
+        Some(&mut dag.jobs[place])
     }
 
     /// Returns when all predecessors of a subtask had finished their part of
@@ -252,11 +244,8 @@ impl Record {
     /// `None` if one has not finished.
     #[must_use]
     pub fn completion_ns(&self, dag: DagId, job: u64) -> Option<u64> {
-        latest(
-            self.instances(dag, job)
-                .iter()
-                .map(|instance| instance.finish_ns),
-        )
+        let instances = self.instances(dag, job).iter();
+        latest(instances.map(|instance| instance.finish_ns))
     }
 
     /// Returns every recorded instance with its times: by DAG, job, subtask.
@@ -264,23 +253,19 @@ impl Record {
         &'a self,
         task_set: &'a TaskSet,
     ) -> impl Iterator<Item = (Instance, &'a InstanceRecord)> {
-        (0..)
-            .map(DagId)
-            .zip(task_set.dags())
-            .flat_map(move |(dag, _)| {
-                self.numbered(dag).flat_map(move |(job, _)| {
-                    (0..)
-                        .map(SubtaskId)
-                        .zip(self.instances(dag, job))
-                        .map(move |(subtask, record)| (Instance { dag, job, subtask }, record))
-                })
-            })
+        let dags = (0..).map(DagId).take(task_set.dags().len());
+        let jobs = dags.flat_map(|dag| self.numbered(dag).map(move |(job, _)| (dag, job)));
+        jobs.flat_map(|(dag, job)| {
+            let instances = (0..).map(SubtaskId).zip(self.instances(dag, job));
+            instances.map(move |(subtask, record)| (Instance { dag, job, subtask }, record))
+        })
     }
 }
 
 impl DagRecord {
     fn place(&self, job: u64) -> Option<usize> {
-        usize::try_from(job.checked_sub(self.first_job)?).ok()
+        let place = usize::try_from(job.checked_sub(self.first_job)?).ok()?;
+        (place < self.jobs.len()).then_some(place)
     }
 }
 

@@ -4,9 +4,9 @@
 use core::fmt::{self, Display};
 
 use super::sweep::{Blame, Stage, Wrong};
-use crate::ids::{CoreId, DagId, Instance};
+use crate::ids::{CoreId, DagId, Instance, named};
 use crate::journal::{Event, What};
-use crate::task_set::TaskSet;
+use crate::task_set::{Subtask, TaskSet};
 
 /// Writes a job or an instance with the names that it has, for people.
 #[derive(Clone, Copy)]
@@ -15,24 +15,15 @@ pub(super) struct Names<'a>(pub(super) Option<&'a TaskSet>);
 impl Names<'_> {
     pub(super) fn job(self, dag: DagId, job: u64) -> impl Display {
         let name = self.0.map_or("", |task_set| task_set.dag(dag).name());
-        fmt::from_fn(move |f| match name {
-            "" => write!(f, "dag {} job {job}", dag.0),
-            name => write!(f, "dag `{name}` job {job}"),
-        })
+        let dag = named("dag", dag.0, name);
+        fmt::from_fn(move |f| write!(f, "{dag} job {job}"))
     }
 
     pub(super) fn instance(self, instance: Instance) -> impl Display {
         let Instance { dag, job, subtask } = instance;
-        let name = self
-            .0
-            .map_or("", |task_set| task_set.dag(dag).subtask(subtask).name());
-        fmt::from_fn(move |f| {
-            match name {
-                "" => write!(f, "subtask {} of ", subtask.0)?,
-                name => write!(f, "subtask `{name}` of ")?,
-            }
-            write!(f, "{}", self.job(dag, job))
-        })
+        let model = self.0.map(|task_set| task_set.dag(dag).subtask(subtask));
+        let subtask = named("subtask", subtask.0, model.map_or("", Subtask::name));
+        fmt::from_fn(move |f| write!(f, "{subtask} of {}", self.job(dag, job)))
     }
 
     /// Writes the instance or the job that an event happens to.

@@ -6,7 +6,7 @@
 use alloc::string::String;
 use core::fmt;
 
-use crate::ids::{DagId, SubtaskId};
+use crate::ids::{DagId, SubtaskId, named};
 use crate::spec::DagSpec;
 use crate::task_set::TaskSet;
 
@@ -78,20 +78,12 @@ fn saturating_u32(index: usize) -> u32 {
 
 impl fmt::Display for DagLabel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.name.is_empty() {
-            write!(f, "dag {}", self.id.0)
-        } else {
-            write!(f, "dag `{}`", self.name)
-        }
+        named("dag", self.id.0, &self.name).fmt(f)
     }
 }
 
 impl fmt::Display for SubtaskLabel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.name.is_empty() {
-            write!(f, "subtask {}", self.id.0)
-        } else {
-            write!(f, "subtask `{}`", self.name)
-        }
+        named("subtask", self.id.0, &self.name).fmt(f)
     }
 }

@@ -21,8 +21,8 @@ pub(crate) use support::random;
 
 use std::sync::Arc;
 
-use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
 use sched_dag::TaskSet;
+use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
 use tool::trace::check;
 use tool::trace::commit::Committed;
 use tool::trace::model::Run;
