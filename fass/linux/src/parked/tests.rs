@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fass::{Preemption, SubtaskAttributes, create_dag, finish_create_dags};
+use sched_dag::law::{self, Terms};
 use sched_dag::lifecycle::Request;
 use sched_dag::{CoreId, DagId};
 
@@ -132,11 +133,16 @@ impl Stage {
         let state = self.team.lock();
         assert!(state.left.is_empty());
         let journal = &state.engine.scheduler.log.journal;
-        let mut found: Vec<_> = journal.violations(&state.engine.task_set);
-        let options = state.engine.scheduler.options();
-        let of_dispatch =
-            journal.dispatch_violations(&state.engine.task_set, &options, 1_000_000_000);
-        found.extend(of_dispatch.unwrap());
+        assert!(journal.is_whole());
+        let (task_set, options) = (&state.engine.task_set, state.engine.scheduler.options());
+        let mut found = law::violations(task_set, Terms::whole(u64::MAX), journal.events());
+        let terms = Terms::whole(1_000_000_000);
+        found.extend(law::dispatch_violations(
+            task_set,
+            &options,
+            terms,
+            journal.events(),
+        ));
         assert!(found.is_empty(), "{found:?}");
         let events = journal.events().filter(|event| event.what.is_of_machine());
         let line = |event: sched_dag::journal::Event| {

@@ -19,8 +19,6 @@ mod support;
 
 pub(crate) use support::random;
 
-use std::sync::Arc;
-
 use sched_dag::TaskSet;
 use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
 use tool::trace::check;
