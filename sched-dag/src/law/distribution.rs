@@ -193,6 +193,8 @@ impl Histogram {
     /// # Panics
     ///
     /// If `bits` is more than 16.
+    ///
+    /// See [`Histogram`].
     #[must_use]
     pub fn new(bits: u32) -> Self {
         Self {
@@ -205,6 +207,8 @@ impl Histogram {
     }
 
     /// Returns the bytes that one takes.
+    ///
+    /// See [`Histogram`].
     #[must_use]
     pub const fn size_of(bits: u32) -> usize {
         size_of::<Self>() + Self::buckets(bits) * size_of::<u32>()
@@ -219,6 +223,8 @@ impl Histogram {
     }
 
     /// Counts a value.
+    ///
+    /// See [`Histogram`].
     pub fn add(&mut self, value: u64) {
         let bucket = self.bucket(value);
         self.counts[bucket] = self.counts[bucket].saturating_add(1);
@@ -245,6 +251,8 @@ impl Histogram {
 
     /// Returns the distribution. Its values are the largest ones of the buckets that are not
     /// empty, the last of them the maximum.
+    ///
+    /// See [`Histogram`].
     #[must_use]
     pub fn distribution(&self) -> Distribution {
         let counts = self.counts.iter().copied().enumerate();
