@@ -25,7 +25,7 @@ use crate::system;
 #[must_use]
 pub fn most_stripped_bytes(app: &str) -> u64 {
     match app {
-        "dag-file" | "drone" | "hand-off" | "join-latency" | "replay" | "soak" => 576 << 10,
+        "dag-file" | "drone" | "hand-off" | "join-latency" | "replay" => 576 << 10,
         "autoware" | "cruise" | "gait" => 640 << 10,
         _ => 512 << 10,
     }

@@ -19,6 +19,7 @@ mod preemption;
 mod recorded;
 mod scenarios;
 mod single;
+mod soak;
 mod stacks;
 mod storm;
 #[allow(unsafe_code, reason = "registers that the compiler would spill")]
@@ -50,6 +51,7 @@ const TESTS: &[(&str, Test)] = &[
     ("recorded", recorded::run),
     ("recorded_long", recorded::long),
     ("scenarios", scenarios::run),
+    ("soak", soak::run),
     ("stacks", stacks::run),
     ("stacks_of_chain", stacks::chain),
     ("stalled", single::stalled),

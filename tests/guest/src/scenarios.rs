@@ -1,25 +1,43 @@
 //! The suite of scenarios on the machine: those for as many cores as it has.
 
-use kernel::{Ending, Machine, json};
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use kernel::{Ending, Machine, Run, json};
 use scenarios::Scenario;
 
 /// Runs the scenarios, and prints of each what is wrong.
 pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     machine.options().finish(&["test"])?;
-    machine.accept_faults();
-    machine.accept_exceeded_bounds();
     let all = Scenario::suite().map_err(Ending::Failure)?.into_iter();
     for scenario in all.filter(|scenario| scenario.cores == machine.cores()) {
-        machine.configure(scenario.policy, scenario.preemption);
-        machine.divide(&scenario.clusters);
-        let wrong = match scenario.judge_commit(scenario.commit()) {
-            Some(judged) => judged,
-            None => scenario.judge_run(&machine.run()?),
-        };
-        json::emit("scenario", |line| {
-            line.text("title", &scenario.title)
-                .text("wrong", wrong.join("; "));
-        });
+        let wrong = judged(machine, &scenario, |run| scenario.judge_run(run))?;
+        print(&scenario, &wrong);
     }
     Ok(())
+}
+
+/// Runs a scenario, unless its commit is refused, and returns what is wrong.
+pub(crate) fn judged(
+    machine: &Machine,
+    scenario: &Scenario,
+    judge: impl FnOnce(&Run) -> Vec<String>,
+) -> Result<Vec<String>, Ending> {
+    machine.accept_faults();
+    machine.accept_exceeded_bounds();
+    machine.configure(scenario.policy, scenario.preemption);
+    machine.divide(&scenario.clusters);
+    let wrong = match scenario.judge_commit(scenario.commit()) {
+        Some(judged) => judged,
+        None => judge(&machine.run()?),
+    };
+    machine.divide(&[]); // its list of clusters is not to count as in use
+    Ok(wrong)
+}
+
+pub(crate) fn print(scenario: &Scenario, wrong: &[String]) {
+    json::emit("scenario", |line| {
+        line.text("title", &scenario.title)
+            .text("wrong", wrong.join("; "));
+    });
 }

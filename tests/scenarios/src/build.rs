@@ -18,7 +18,7 @@ use fass::{
 };
 
 use crate::dag::{DagText, Replaced, SubtaskText, Use};
-use crate::{Scenario, UNIT_NS};
+use crate::{Calls, Scenario};
 
 /// Tuples that a subtask takes.
 trait Inputs: VecToSubs {
@@ -71,7 +71,7 @@ inputs!(()(a)(a b)(a b c)(a b c d));
 
 /// What a subtask's functions do in a call; one follows another that has failed.
 struct Step {
-    takes: Vec<u64>,
+    takes: Vec<Duration>,
     /// A budget is one of processor time, so it is exceeded only by what computes.
     how: Occupation,
     fails: Vec<u64>,
@@ -80,21 +80,23 @@ struct Step {
     calls: AtomicU64,
     /// Whether all that it gets began in one call of one source.
     joins: bool,
+    of_all: Arc<Calls>,
 }
 
 impl Step {
-    fn new(dag: &DagText, subtask: &SubtaskText) -> Arc<Self> {
+    fn new(dag: &DagText, subtask: &SubtaskText, of_all: &Arc<Calls>) -> Arc<Self> {
         let sources = dag.subtasks.iter().filter(|of| of.after.is_empty());
         Arc::new(Self {
             takes: subtask.takes.clone(),
-            how: match subtask.budget {
-                Some(_) => Occupation::Spin,
-                None => Occupation::Hold,
+            how: match subtask.computes || subtask.budget.is_some() {
+                true => Occupation::Spin,
+                false => Occupation::Hold,
             },
             fails: subtask.fails.clone(),
             when: subtask.when.clone(),
             calls: AtomicU64::new(0),
             joins: sources.count() == 1,
+            of_all: Arc::clone(of_all),
         })
     }
 
@@ -104,18 +106,19 @@ impl Step {
         let takes = usize::try_from(call)
             .ok()
             .and_then(|call| self.takes.get(call));
-        let takes = takes.or(self.takes.last()).copied().unwrap_or(0);
-        execute_for(Duration::from_nanos(takes * UNIT_NS), self.how);
+        let takes = takes.or(self.takes.last()).copied().unwrap_or_default();
+        execute_for(takes, self.how);
         act(call, self.when.contains(&call));
-        assert!(
-            !self.fails.contains(&call),
-            "call {call} fails, as it is to"
-        );
+        if self.fails.contains(&call) {
+            self.of_all.failed.fetch_add(1, Relaxed);
+            panic!("call {call} fails, as it is to");
+        }
         let (first, are_same) = inputs.first().unwrap_or((call, true));
         assert!(
             are_same || !self.joins,
             "a join got values of different jobs"
         );
+        self.of_all.returned.fetch_add(1, Relaxed);
         O::of(first)
     }
 }
@@ -123,6 +126,7 @@ impl Step {
 /// A DAG that is being built, and what its subtasks use.
 struct Building<'a> {
     dag: &'a Dag,
+    calls: &'a Arc<Calls>,
     text: &'a DagText,
     signals: &'a BTreeMap<String, Signal>,
     dags: &'a BTreeMap<String, Dag>,
@@ -133,7 +137,7 @@ struct Building<'a> {
 
 impl Building<'_> {
     fn register<I: Inputs, O: Outputs>(&mut self, subtask: &SubtaskText, writes: bool) {
-        let step = Step::new(self.text, subtask);
+        let step = Step::new(self.text, subtask, self.calls);
         let inputs: Vec<&str> = subtask.after.iter().map(String::as_str).collect();
         let outputs = Vec::from_iter(writes.then_some(subtask.name.as_str()));
         let attributes = attributes(subtask);
@@ -156,7 +160,7 @@ impl Building<'_> {
         let place = (inputs, outputs, attributes);
         match &subtask.uses {
             Use::Nothing if subtask.due.is_some() => {
-                let due = Duration::from_millis(subtask.due.unwrap_or_default());
+                let due = subtask.due.unwrap_or_default();
                 let call = move |inputs: I| step.call::<I, ()>(inputs, |_, _| ());
                 dag.register_sink_subtask(call, place.0, due, place.2);
             }
@@ -250,16 +254,15 @@ fn using<U: Uses + 'static, I: Inputs, O: Outputs>(
 }
 
 fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
-    let ms = Duration::from_millis;
     let mut attributes = SubtaskAttributes::named(&subtask.name);
     if let Some(priority) = subtask.priority {
         attributes = attributes.priority(priority);
     }
     if let Some(wcet) = subtask.wcet {
-        attributes = attributes.wcet(ms(wcet));
+        attributes = attributes.wcet(wcet);
     }
     if let Some(budget) = subtask.budget {
-        attributes = attributes.budget(ms(budget));
+        attributes = attributes.budget(budget);
     }
     if subtask.is_non_preemptive {
         attributes = attributes.non_preemptive();
@@ -270,11 +273,10 @@ fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
 impl DagText {
     /// Begins the DAG. Returns its signal, too, if it is sporadic.
     fn begin(&self) -> (Dag, Option<Signal>) {
-        let ms = Duration::from_millis;
         let dag = create_dag();
         dag.name(&self.name).overrun(self.overrun).order(self.order);
-        dag.offset(ms(self.offset));
-        dag.relative_deadline(ms(self.deadline.unwrap_or(self.period)));
+        dag.offset(self.offset);
+        dag.relative_deadline(self.deadline.unwrap_or(self.period));
         if self.jobs > 0 {
             let all = u32::try_from(self.jobs).unwrap_or(u32::MAX);
             dag.jobs(self.jobs).in_flight(self.in_flight.unwrap_or(all));
@@ -290,9 +292,9 @@ impl DagText {
         if self.is_paused {
             dag.starts_paused();
         }
-        let signal = self.is_sporadic.then(|| dag.sporadic(ms(self.period)));
+        let signal = self.is_sporadic.then(|| dag.sporadic(self.period));
         if signal.is_none() {
-            dag.period(ms(self.period));
+            dag.period(self.period);
         }
         (dag, signal)
     }
@@ -310,6 +312,8 @@ impl Scenario {
     /// If the text names what it does not state.
     pub fn commit(&self) -> Result<Commit, CommitError> {
         let (mut dags, mut signals) = (BTreeMap::new(), BTreeMap::new());
+        self.calls.returned.store(0, Relaxed);
+        self.calls.failed.store(0, Relaxed);
         for text in &self.dags {
             let (dag, signal) = text.begin();
             dags.insert(text.name.clone(), dag);
@@ -337,6 +341,7 @@ impl Scenario {
             }
             let mut building = Building {
                 dag,
+                calls: &self.calls,
                 text,
                 signals: &signals,
                 dags: &dags,

@@ -3,6 +3,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use alloc::{format, vec};
+use core::time::Duration;
 
 use fass::{FaultLimit, Order, OverrunPolicy};
 
@@ -17,10 +18,10 @@ use crate::number;
 #[derive(Clone, Debug, Default)]
 pub struct DagText {
     pub(crate) name: String,
-    pub(crate) period: u64,
+    pub(crate) period: Duration,
     pub(crate) is_sporadic: bool,
-    pub(crate) deadline: Option<u64>,
-    pub(crate) offset: u64,
+    pub(crate) deadline: Option<Duration>,
+    pub(crate) offset: Duration,
     pub(crate) jobs: u64,
     pub(crate) in_flight: Option<u32>,
     pub(crate) overrun: OverrunPolicy,
@@ -45,13 +46,15 @@ pub struct DagText {
 #[derive(Clone, Debug, Default)]
 pub struct SubtaskText {
     pub(crate) name: String,
-    pub(crate) takes: Vec<u64>,
+    pub(crate) takes: Vec<Duration>,
     pub(crate) after: Vec<String>,
     pub(crate) priority: Option<u32>,
-    pub(crate) wcet: Option<u64>,
-    pub(crate) budget: Option<u64>,
-    pub(crate) due: Option<u64>,
+    pub(crate) wcet: Option<Duration>,
+    pub(crate) budget: Option<Duration>,
+    pub(crate) due: Option<Duration>,
     pub(crate) is_non_preemptive: bool,
+    /// Whether it computes and does not hold its core; one with a budget does so in any case.
+    pub(crate) computes: bool,
     pub(crate) fails: Vec<u64>,
     pub(crate) replaced: Replaced,
     pub(crate) uses: Use,
@@ -94,6 +97,10 @@ fn value<'a>(words: &mut Words<'a>) -> Result<&'a str, String> {
     words.next().ok_or_else(|| "a value is missing".into())
 }
 
+fn time(words: &mut Words<'_>) -> Result<Duration, String> {
+    Ok(Duration::from_millis(number(value(words)?)?))
+}
+
 fn numbers(words: &mut Words<'_>) -> Result<Vec<u64>, String> {
     value(words)?.split([',', '/']).map(number).collect()
 }
@@ -109,10 +116,10 @@ impl DagText {
         while let Some(key) = words.next() {
             let words = &mut words;
             match key {
-                "period" => dag.period = number(value(words)?)?,
-                "sporadic" => (dag.is_sporadic, dag.period) = (true, number(value(words)?)?),
-                "deadline" => dag.deadline = Some(number(value(words)?)?),
-                "offset" => dag.offset = number(value(words)?)?,
+                "period" => dag.period = time(words)?,
+                "sporadic" => (dag.is_sporadic, dag.period) = (true, time(words)?),
+                "deadline" => dag.deadline = Some(time(words)?),
+                "offset" => dag.offset = time(words)?,
                 "jobs" => dag.jobs = number(value(words)?)?,
                 "in-flight" => dag.in_flight = Some(number(value(words)?)?),
                 "overrun" => {
@@ -148,7 +155,9 @@ impl DagText {
         let mut words = line.split_whitespace().peekable();
         let mut subtask = SubtaskText {
             name: value(&mut words)?.into(),
-            takes: numbers(&mut words)?,
+            takes: (numbers(&mut words)?.into_iter())
+                .map(Duration::from_millis)
+                .collect(),
             ..SubtaskText::default()
         };
         let of_others: Vec<String> = self.subtasks.iter().map(|of| of.name.clone()).collect();
@@ -184,9 +193,9 @@ impl DagText {
                     }
                 }
                 "priority" => subtask.priority = Some(number(value(words)?)?),
-                "wcet" => subtask.wcet = Some(number(value(words)?)?),
-                "budget" => subtask.budget = Some(number(value(words)?)?),
-                "due" => subtask.due = Some(number(value(words)?)?),
+                "wcet" => subtask.wcet = Some(time(words)?),
+                "budget" => subtask.budget = Some(time(words)?),
+                "due" => subtask.due = Some(time(words)?),
                 "non-preemptive" => subtask.is_non_preemptive = true,
                 "fails" => subtask.fails = numbers(words)?,
                 "restarts" => subtask.replaced = Replaced::Anew,

@@ -4,11 +4,15 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use alloc::{format, vec};
 
-use fass::{Commit, CommitError};
-use sched_dag::engine::Run;
-use sched_dag::{DagStatistics, TaskSet};
+use core::sync::atomic::Ordering::Relaxed;
 
-use crate::{BYSTANDER, Scenario, UNIT_NS};
+use fass::{Commit, CommitError, OverrunPolicy};
+use sched_dag::engine::Run;
+use sched_dag::law::Record;
+use sched_dag::{DagId, DagStatistics, JobOutcome, TaskSet};
+
+use crate::dag::Use;
+use crate::{BYSTANDER, Calls, Scenario, UNIT_NS};
 
 impl Scenario {
     /// Holds the statistics of DAGs against what is said of them; `is_exact`: also against what is
@@ -38,6 +42,111 @@ impl Scenario {
                     wrong.push(format!("{name}: {counter} is {found}, and not {expected}"));
                 }
             }
+        }
+        wrong
+    }
+
+    /// Holds what each DAG's counters say against each other, against the record, and against what
+    /// functions have counted themselves, of a scenario without signals, modes and an asked end.
+    /// Returns what does not hold, a line each.
+    pub fn judge_accounts<'a>(
+        &self,
+        task_set: &TaskSet,
+        record: &Record,
+        statistics: impl Fn(DagId) -> &'a DagStatistics,
+    ) -> Vec<String> {
+        let pauses = |name| {
+            let mut subtasks = self.dags.iter().flat_map(|dag| &dag.subtasks);
+            subtasks.any(|of| matches!(&of.uses, Use::Switches(other, _) if other == name))
+        };
+        let (mut wrong, mut all_faults) = (vec![], 0);
+        for (id, text) in (0..).map(DagId).zip(&self.dags) {
+            let counts = statistics(id);
+            let DagStatistics {
+                released,
+                completed,
+                skips,
+                aborts,
+                faults,
+                restarts,
+                failed,
+                cut_short,
+                ..
+            } = *counts;
+            let recorded = |outcome| {
+                let outcomes = record.jobs(id).iter().map(|job| job.outcome);
+                outcomes.filter(|of| *of == Some(outcome)).count() as u64
+            };
+            let late = recorded(JobOutcome::Missed);
+            let are_all_to_run = text.overrun == OverrunPolicy::Queue && !pauses(&text.name);
+            let to_fail = text.subtasks.iter().map(|of| of.fails.len() as u64).sum();
+            let is_ended = faults > restarts;
+            all_faults += faults;
+            let due = released + skips;
+            let claims = [
+                (
+                    "each job is released or skipped",
+                    text.jobs == due || is_ended && text.jobs > due,
+                ),
+                (
+                    "each released job is completed, aborted, or lost by a fault",
+                    released == completed + aborts + failed + cut_short,
+                ),
+                (
+                    "completed jobs are recorded as such",
+                    completed == recorded(JobOutcome::Met) + late,
+                ),
+                (
+                    "aborted jobs are recorded as such",
+                    aborts == recorded(JobOutcome::Aborted),
+                ),
+                (
+                    "lost jobs are recorded as such",
+                    failed == recorded(JobOutcome::Failed)
+                        && cut_short == recorded(JobOutcome::DagEnded),
+                ),
+                (
+                    "late jobs are misses",
+                    (late..=text.jobs).contains(&counts.misses),
+                ),
+                (
+                    "jobs are skipped only if that is allowed",
+                    skips == 0 || !are_all_to_run,
+                ),
+                (
+                    "jobs are aborted only if that is allowed",
+                    aborts == 0 || text.overrun == OverrunPolicy::Abort,
+                ),
+                (
+                    "jobs wait only if that is allowed",
+                    counts.queued == 0 || text.overrun != OverrunPolicy::Skip,
+                ),
+                (
+                    "each call that is to fail does so, if it is made",
+                    faults == to_fail || faults < to_fail && !are_all_to_run,
+                ),
+                (
+                    "the DAG goes on after a fault that it survives, and after no other",
+                    restarts == text.survives.map_or(0, |_| faults) && failed <= restarts,
+                ),
+                (
+                    "a DAG that goes on loses nothing else",
+                    is_ended || cut_short + counts.dropped == 0,
+                ),
+            ];
+            let broken = claims.iter().filter(|(_, holds)| !holds);
+            wrong.extend(broken.map(|(claim, _)| {
+                format!("{}: it does not hold that {claim}: {counts:?}", text.name)
+            }));
+        }
+        let instances = record.all_instances(task_set);
+        let runs: u64 = instances.map(|(_, times)| u64::from(times.runs)).sum();
+        let Calls { returned, failed } = &*self.calls;
+        let (returned, failed) = (returned.load(Relaxed), failed.load(Relaxed));
+        if (returned, failed) != (runs, all_faults) {
+            wrong.push(format!(
+                "{returned} calls returned and {failed} failed, {runs} and {all_faults} are known"
+            ));
         }
         wrong
     }

@@ -43,10 +43,13 @@ extern crate alloc;
 pub mod build;
 pub mod dag;
 pub mod judge;
+mod random;
 
 use alloc::string::{String, ToString};
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use alloc::{format, vec};
+use core::sync::atomic::AtomicU64;
 
 use dag::{DagText, Use};
 
@@ -95,6 +98,15 @@ pub struct Scenario {
     pub everywhere: Vec<String>,
     /// The faults of its commit.
     pub refused: Vec<String>,
+    /// What the functions have counted since the last commit.
+    pub(crate) calls: Arc<Calls>,
+}
+
+/// How the calls of all functions of a run have ended.
+#[derive(Debug, Default)]
+pub(crate) struct Calls {
+    pub(crate) returned: AtomicU64,
+    pub(crate) failed: AtomicU64,
 }
 
 impl Scenario {
@@ -174,6 +186,7 @@ impl Scenario {
             exactly: vec![],
             everywhere: vec![],
             refused: vec![],
+            calls: Arc::default(),
         }
     }
 

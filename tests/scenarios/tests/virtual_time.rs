@@ -1,12 +1,17 @@
 //! The suite in virtual time: each scenario event by event.
 
+use std::cell::RefCell;
 use std::fs;
 
-use scenarios::Scenario;
-use virtual_time::VirtualTime;
+use std::time::Duration;
 
-/// Runs a scenario, and returns what is wrong.
-fn judge(scenario: &Scenario) -> Vec<String> {
+use scenarios::Scenario;
+use sched_dag::{DagId, DagStatistics};
+use virtual_time::{Report, VirtualTime};
+
+/// Runs a scenario, which shows what is wrong with the report. Nothing is, if it is refused as it
+/// should be.
+fn run(scenario: &Scenario, judge: impl FnOnce(&Report) -> Vec<String>) -> Vec<String> {
     let mut machine = VirtualTime::new()
         .cores(scenario.cores)
         .policy(scenario.policy)
@@ -19,11 +24,19 @@ fn judge(scenario: &Scenario) -> Vec<String> {
         return judged;
     }
     let report = machine.run();
-    let mut wrong = scenario.judge_events(&report.event_lines());
-    let statistics = |dag: sched_dag::DagId| report.dag(dag).statistics();
-    wrong.extend(scenario.judge_counts(report.task_set(), statistics, true));
+    let mut wrong = judge(&report);
     wrong.extend(report.violations().iter().map(|it| format!("{it:?}")));
     wrong
+}
+
+/// Returns what is wrong with a scenario of the suite.
+fn judge(scenario: &Scenario) -> Vec<String> {
+    run(scenario, |report| {
+        let mut wrong = scenario.judge_events(&report.event_lines());
+        let statistics = |dag: DagId| report.dag(dag).statistics();
+        wrong.extend(scenario.judge_counts(report.task_set(), statistics, true));
+        wrong
+    })
 }
 
 #[test]
@@ -35,6 +48,47 @@ fn each_scenario_is_as_it_says() {
         }
     }
     assert!(wrong.is_empty(), "{wrong}");
+}
+
+#[test]
+fn random_rounds_are_accounted_for_and_no_two_are_the_same() {
+    const LENGTH: Duration = Duration::from_millis(200);
+    let total: RefCell<DagStatistics> = RefCell::default();
+    let mut wrong = String::new();
+    for (cores, round) in [1, 2, 4]
+        .into_iter()
+        .flat_map(|cores| (0..24).map(move |it| (cores, it)))
+    {
+        let scenario = Scenario::random(1, round, cores, LENGTH);
+        let drawn = format!("{scenario:?}");
+        let text = |seed, round| format!("{:?}", Scenario::random(seed, round, cores, LENGTH));
+        assert_eq!(drawn, text(1, round));
+        assert!(drawn != text(1, round + 1) && drawn != text(2, round));
+        let judged = run(&scenario, |report| {
+            let statistics = |dag: DagId| report.dag(dag).statistics();
+            for dag in (0..).map(DagId).take(report.task_set().dags().len()) {
+                let (of_dag, mut total) = (statistics(dag), total.borrow_mut());
+                total.completed += of_dag.completed;
+                total.misses += of_dag.misses;
+                total.skips += of_dag.skips;
+                total.aborts += of_dag.aborts;
+                total.faults += of_dag.faults;
+                total.restarts += of_dag.restarts;
+            }
+            scenario.judge_accounts(report.task_set(), report.record(), statistics)
+        });
+        for line in judged {
+            wrong += &format!("{}: {line}\n", scenario.title);
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+    let total = total.into_inner();
+    let most = [total.completed, total.misses, total.skips, total.aborts];
+    assert!(most.iter().all(|count| *count > 100), "{total:?}");
+    assert!(
+        total.restarts > 20 && total.faults - total.restarts > 10,
+        "{total:?}"
+    );
 }
 
 #[test]

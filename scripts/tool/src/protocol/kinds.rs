@@ -70,8 +70,6 @@ dag_run: set dag subtasks released completed deadline_misses skips aborts respon
 dag_sink: set dag sink relative_deadline_ns deadline_misses response_time_ns.min \
     response_time_ns.median response_time_ns.p99 response_time_ns.max
 dag_set: set dags violations allocations
-soak: round policy load overrun jobs released completed misses skips aborts instances preemptions \
-    violations allocations span_ns heap_bytes contexts contexts_free
 executions: subtask first times
 joins: first times
 join_latency: policy subtasks jobs joins same_index cross_index missing lost_inputs violations \

@@ -1,59 +1,121 @@
 //! The subcommand `soak`: random DAG sets for a long time, everything checked.
 //!
-//! The app `soak` runs rounds of random DAG sets in the guest, and checks after
-//! each what can be checked there: rules, accounts, allocations, memory, stacks.
-//! Here the rounds are split into boots, a few at a time, and each round's trace
-//! is checked on the host against the same rules, from other evidence.
-//!
-//! - `plan`: which rounds, in which boots;
-//! - `judge`, `figures`: what became of a boot's rounds;
-//! - `coverage`: which combinations they came across;
-//! - `command`: the command line.
+//! A *round* is a random scenario (`tests/scenarios/src/random.rs`). The guest of the boot tests
+//! draws rounds, runs each twice, and checks after each run what can be checked there: rules,
+//! accounts, allocations, memory, stacks. Here the rounds are split into boots, a few at a time,
+//! and the trace of each run is held against the same rules, from other evidence.
 
 mod command;
-mod coverage;
-mod figures;
-mod judge;
-pub mod plan;
-mod trace;
 
-use std::collections::VecDeque;
+use std::collections::BTreeMap;
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use sched_dag::DagId;
+use sched_dag::journal::What;
+
 use crate::outcome::{self, Outcome};
 use crate::progress::SILENCE;
+use crate::protocol::MachineLine;
 use crate::qemu::{Mode, Qemu};
+use crate::trace::model::Run;
+use crate::trace::{bound, check, read};
 use crate::{image, install, probe, system};
-use judge::{Judged, judge};
-use plan::{Boot, Part, Plan};
 
 pub use command::soak;
-pub use coverage::Coverage;
-pub use figures::Figures;
+
+/// The guest that draws rounds, by its package.
+const GUEST: &str = "guest-tests";
 
 /// The guest's memory, up to a quarter of which is for journals.
 const MEMORY_MIB: u64 = 256;
 
+/// How often a round runs.
+const RUNS_A_ROUND: usize = 2;
+
+/// The rounds of one boot, few enough that the serial log stays small.
+const ROUNDS_A_BOOT: usize = 2;
+
+/// How many breaches of a run are told in words.
+const SHOWN: usize = 5;
+
+/// What to run, and on what.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// The numbers of the rounds.
+    pub rounds: Range<u64>,
+    /// The guest time in which a run of a round releases jobs, in milliseconds.
+    pub round_ms: u64,
+    /// The seed of all that is random.
+    pub seed: u64,
+    /// The cores of each guest.
+    pub cores: u64,
+    /// What time means.
+    pub mode: Mode,
+    /// For how long an instance may wait for what it is owed.
+    pub bound_ns: u64,
+    /// How many guests run at the same time.
+    pub side_by_side: usize,
+}
+
 /// What a soak run has come to.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
-    /// The figures of each part, by its name, in the plan's order.
-    pub parts: Vec<(String, Figures)>,
-    /// Of all parts.
-    pub total: Figures,
-    /// What can happen to a DAG, and how often it did.
-    pub coverage: Coverage,
+    /// How many events there were, by what happened.
+    pub events: BTreeMap<String, u64>,
+    /// How many DAGs had which combination of policy, overrun policy and division of the cores
+    /// with a fault, a restart and a pause.
+    pub dags: BTreeMap<String, u64>,
+    /// The longest time for which an instance waited that should have run.
+    pub longest_wait_ns: u64,
     /// A line for each thing that is wrong, with the command that shows it again.
     pub failures: Vec<String>,
     /// The rounds in which nothing is wrong.
     pub passed: u64,
     /// The rounds in which something is.
     pub failed: u64,
+}
+
+impl Plan {
+    /// The rounds of the long form: a quarter of an hour.
+    pub const LONG: Plan = Plan {
+        rounds: 0..84,
+        round_ms: 5000,
+        seed: 1,
+        cores: 4,
+        mode: Mode::Deterministic,
+        bound_ns: bound::COUNTED_NS,
+        side_by_side: 1,
+    };
+
+    /// Some seconds, for a test.
+    pub const SHORT: Plan = Plan {
+        rounds: 0..16,
+        round_ms: 500,
+        ..Self::LONG
+    };
+
+    /// Returns the command that runs one round again.
+    fn command(&self, round: u64) -> String {
+        let Plan {
+            round_ms,
+            seed,
+            cores,
+            mode,
+            bound_ns,
+            ..
+        } = self;
+        format!(
+            "./scripts/soak --first {round} --rounds 1 --round-ms {round_ms} --seed {seed} \
+             --cores {cores} --mode {mode} --bound-us {}",
+            bound_ns / 1000
+        )
+    }
 }
 
 /// Runs a plan to its end, and calls `show` with the rounds that are over: after each
@@ -64,133 +126,152 @@ pub struct Report {
 /// In words: there is no QEMU or no image, or a guest could not be started.
 pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
     install::ensure_qemu()?;
-    let image = image::build("soak")?;
-    let machine = Qemu {
+    let image = image::build(GUEST)?;
+    let qemu = Qemu {
+        mode: plan.mode,
         cores: plan.cores,
         memory_mib: MEMORY_MIB,
         ..Qemu::default()
     };
-    probe::choose(Some(plan.mode), plan.mode, &machine, &image.path)?;
-    let waiting = Mutex::new(plan.boots().collect::<VecDeque<_>>());
+    probe::choose(Some(plan.mode), plan.mode, &qemu, &image.path)?;
+    let boots = Mutex::new(plan.rounds.clone().step_by(ROUNDS_A_BOOT));
     let next = || {
-        waiting
+        let first = boots
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .pop_front()
+            .next()?;
+        Some(first..plan.rounds.end.min(first + ROUNDS_A_BOOT as u64))
     };
-    let parts = plan.parts.iter();
-    let mut report = Report {
-        parts: (parts.map(|part| (part.to_string(), Figures::default()))).collect(),
-        ..Report::default()
-    };
+    let mut report = Report::default();
     let (send, receive) = mpsc::channel();
     thread::scope(|scope| {
         for _ in 0..plan.side_by_side.max(1) {
-            let (send, next, path) = (send.clone(), &next, &image.path);
+            let (send, next, qemu, path) = (send.clone(), &next, &qemu, &image.path);
             scope.spawn(move || {
-                while let Some(boot) = next() {
+                while let Some(rounds) = next() {
+                    let booted = boot(plan, qemu, path, &rounds);
                     // Nobody listens any more once another guest did not start.
-                    if send.send((boot, run_boot(plan, &boot, path))).is_err() {
+                    if send.send((rounds, booted)).is_err() {
                         return;
                     }
                 }
             });
         }
         drop(send);
-        let mut over = 0;
         loop {
             match receive.recv_timeout(SILENCE) {
-                Ok((boot, judged)) => {
-                    over += boot.rounds;
-                    report.take(plan, &boot, &judged?);
-                }
+                Ok((rounds, booted)) => report.take(plan, rounds, &booted?),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Disconnected) => return Ok(report),
             }
-            show(over);
+            show(report.passed + report.failed);
         }
-        Ok::<(), String>(())
-    })?;
-    Ok(report)
+    })
 }
 
-/// Boots a guest and judges it; its log stays only if something is wrong.
-fn run_boot(plan: &Plan, boot: &Boot<'_>, image: &Path) -> Result<Judged, String> {
-    let log = system::new_log("soak")?;
-    let qemu = Qemu {
-        mode: plan.mode,
-        cores: plan.cores,
-        memory_mib: MEMORY_MIB,
-        guest_words: words(plan, boot),
-        ..Qemu::default()
-    };
-    let outcome: Outcome = outcome::boot(&qemu, image, &log, limit(plan, boot), |_| {})?;
-    let mut judged = judge(boot, &outcome);
-    trace::judge(boot, &outcome, plan.bound_ns, &mut judged);
-    if judged.failures.is_empty() {
-        let _ = fs::remove_file(&log);
-    } else {
-        let place = format!("the serial log is {}", log.display());
-        judged.failures.entry(boot.first).or_default().push(place);
-    }
-    Ok(judged)
-}
-
-fn words(plan: &Plan, boot: &Boot<'_>) -> String {
-    let Part {
-        policy,
-        load,
-        overrun,
-        work,
-        ..
-    } = boot.part;
-    let trouble = if boot.part.has_trouble() {
-        "drawn"
-    } else {
-        "none"
-    };
+fn boot(plan: &Plan, qemu: &Qemu, image: &Path, rounds: &Range<u64>) -> Result<Outcome, String> {
+    let count = rounds.end - rounds.start;
     // In real time the host's noise would exceed budgets that nobody asked for.
     let budget_factor = match plan.mode {
         Mode::Deterministic => 10,
         Mode::Kvm | Mode::Threads => 0,
     };
-    format!(
-        "mode={} policy={policy} load={load} overrun={overrun} work={work} first={} rounds={} round_ms={} \
-         seed={} trouble={trouble} trace=dump budget_factor={budget_factor}",
-        plan.mode,
-        boot.first,
-        boot.rounds,
-        plan.round.as_millis(),
-        plan.seed
-    )
-}
-
-/// How long a boot may take in wall time: the guest's own time, and far more for
-/// its trace, which goes through a serial line.
-fn limit(plan: &Plan, boot: &Boot<'_>) -> Duration {
-    let rounds = u32::try_from(boot.rounds).unwrap_or(u32::MAX);
-    Duration::from_secs(60) + plan.round.saturating_mul(rounds).saturating_mul(30)
+    let qemu = Qemu {
+        guest_words: format!(
+            "mode={} test=soak first={} rounds={count} round_ms={} seed={} trace=dump \
+             budget_factor={budget_factor}",
+            plan.mode, rounds.start, plan.round_ms, plan.seed
+        ),
+        ..qemu.clone()
+    };
+    // The guest's own time, and far more for its traces, which go through a serial line.
+    let guest_time = Duration::from_millis(plan.round_ms.saturating_mul(count * 2));
+    let limit = Duration::from_secs(60) + guest_time.saturating_mul(30);
+    outcome::boot(&qemu, image, &system::new_log("soak")?, limit, |_| {})
 }
 
 impl Report {
-    fn take(&mut self, plan: &Plan, boot: &Boot<'_>, judged: &Judged) {
-        let name = boot.part.to_string();
-        if let Some((_, figures)) = self.parts.iter_mut().find(|(part, _)| *part == name) {
-            figures.add(&judged.figures);
-        }
-        self.total.add(&judged.figures);
-        self.coverage.add(&judged.coverage);
-        for (round, reasons) in &judged.failures {
-            for reason in reasons {
-                self.failures
-                    .push(format!("{name}, round {round}: {reason}"));
+    /// Judges a boot and removes its log, unless something is wrong.
+    fn take(&mut self, plan: &Plan, rounds: Range<u64>, outcome: &Outcome) {
+        let (mut ending, log) = (outcome.judge().err(), outcome.log.display());
+        let lines: Vec<_> = outcome.transcript.of_kind("scenario").collect();
+        let runs = read(&outcome.serial).unwrap_or_else(|fault| {
+            let (line, reason) = (fault.line, fault.reason);
+            (self.failures).push(format!("trace, serial line {line} of {log}: {reason}"));
+            Vec::new()
+        });
+        let mut both = lines.into_iter().zip(&runs);
+        let failed_before = self.failed;
+        for round in rounds.clone() {
+            let ran: Vec<_> = both.by_ref().take(RUNS_A_ROUND).collect();
+            let is_whole = ran.len() == RUNS_A_ROUND;
+            let judged = ran
+                .into_iter()
+                .map(|(line, run)| self.judge(round, line, run, plan.bound_ns));
+            let mut wrong: Vec<String> = judged.flatten().collect();
+            if !is_whole || round + 1 == rounds.end {
+                wrong.extend(ending.take().map(|fault| fault.reason));
             }
-            let command = plan.command(boot.part, *round);
-            self.failures
-                .push(format!("{name}, round {round}: again by: {command}"));
+            if !is_whole {
+                wrong.push("did not run to its end".into());
+            }
+            if wrong.is_empty() {
+                self.passed += 1;
+                continue;
+            }
+            self.failed += 1;
+            wrong.push(format!("again by: {}", plan.command(round)));
+            let wrong = wrong.into_iter().map(|why| format!("round {round}: {why}"));
+            self.failures.extend(wrong);
         }
-        let failed = judged.failures.len() as u64;
-        self.failed += failed;
-        self.passed += boot.rounds.saturating_sub(failed);
+        if self.failed > failed_before {
+            self.failures.push(format!("the serial log is {log}"));
+        } else {
+            let _ = fs::remove_file(&outcome.log);
+        }
     }
+
+    /// Judges a run by what the guest says of it and by its trace; returns what is wrong.
+    fn judge(&mut self, round: u64, line: &MachineLine, run: &Run, bound_ns: u64) -> Vec<String> {
+        let title = line.text_at("title").unwrap_or_default();
+        let mut wrong = Vec::new();
+        match line.text_at("wrong") {
+            Some("") if title.starts_with(&format!("round {round}: ")) => {}
+            _ => wrong.push(line.text.clone()),
+        }
+        if run.lost > 0 || !run.complete {
+            let lost = run.lost;
+            wrong.push(format!(
+                "its trace has no end, or has lost its first {lost} events"
+            ));
+        }
+        let findings = check(run, bound_ns);
+        let breaches = findings.breaches.iter();
+        let shown = breaches.map(|breach| breach.with_names(&run.task_set).to_string());
+        wrong.extend(shown.take(SHOWN));
+        if let Some(more) = findings.breaches.len().checked_sub(SHOWN + 1) {
+            wrong.push(format!("and {} breaches more", more + 1));
+        }
+        self.longest_wait_ns = (self.longest_wait_ns).max(findings.figures.longest_inversion_ns);
+        for event in &run.events {
+            *self.events.entry(event.what.to_string()).or_default() += 1;
+        }
+        for dag in (0..).map(DagId).take(run.task_set.dags().len()) {
+            *self.dags.entry(fate(run, dag)).or_default() += 1;
+        }
+        wrong
+    }
+}
+
+/// Says under what a DAG has run, and what has happened to it.
+fn fate(run: &Run, dag: DagId) -> String {
+    let (policy, overrun) = (run.options.policy, run.task_set.dag(dag).overrun());
+    let cores = match run.task_set.is_divided() {
+        true => "Clusters",
+        false => "Together",
+    };
+    let kinds = [What::Ended, What::Restarted, What::Off].into_iter();
+    let had = |what: &What| (run.events.iter()).any(|it| it.dag == dag && it.what == *what);
+    let happened: String = (kinds.filter(had)).map(|what| format!(" {what}")).collect();
+    format!("{policy:?} {overrun:?} {cores}{happened}")
 }

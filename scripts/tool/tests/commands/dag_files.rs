@@ -98,7 +98,7 @@ fn options_that_do_not_fit_are_2() {
     fs::create_dir(folder.join("set")).expect("a folder");
     fs::copy(folder.join("good.dag"), folder.join("set/good.dag")).expect("a file");
     let rows = "
-run --dag good.dag --app soak | `--app` and `--dag` exclude each other
+run --dag good.dag --app drone | `--app` and `--dag` exclude each other
 run --dag good.dag --jobs 1 --seconds 1 | `--jobs` and `--seconds` exclude
 run --dag good.dag --jobs 0 | `--jobs 0` has no end, which is for fork-join; with `--dag` give at least 1
 run --dag good.dag --execution most | `--execution`: `most`: give wcet, uniform:

@@ -109,7 +109,7 @@ fn a_name_need_not_be_utf_8() {
         "bench",
         "",
         "new-app",
-        "soak --only",
+        "soak --mode",
     ] {
         let said = refusal(&folder, with_odd(line));
         assert!(said.contains('\u{fffd}'), "{said}");

@@ -89,8 +89,6 @@ run --app dag-file --mode deterministic | run: app `dag-file` runs the DAGs of a
 run --execution wcet | `--execution` needs `--dag FILE`
 bench bounds --cores 2,2 | `--cores`: `2` stands twice
 bench native --only join,join | `--only`: `join` stands twice
-soak --short --seconds 5 | `--short` and `--seconds`
-soak --rounds 1 --seconds 5 | `--rounds` and `--seconds`
 bench join-latency --once --mode threads | `--once`
 new-app | new-app: which name? give one, such as `./scripts/new-app brake-assist`
 new-app fork-join | new-app: there is an app `fork-join` already; choose another name, or edit apps/fork-join
@@ -124,7 +122,7 @@ fn what_a_message_repeats_cannot_rewrite_the_terminal() {
             "bench WORD",
             "bench join-latency --policies fassWORDexact",
             "new-app WORD",
-            "soak --only WORD",
+            "soak --mode WORD",
         ] {
             let words = line.split(' ').map(|given| given.replace("WORD", word));
             let said = refusal(workspace(), words);
