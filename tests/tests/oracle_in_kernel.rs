@@ -56,8 +56,8 @@ fn the_machine_reproduces_the_schedules_of_clusters_and_sink_deadlines() {
 fn the_machine_reproduces_schedules_of_functions_that_compute() {
     // Each unit is a million instructions: the short cases will do, and of those with
     // preemptions, one for each number of cores.
-    let last = |case: &Case| case.instances.iter().map(|times| times.finish_ns).max();
-    let has_preemptions = |case: &Case| case.instances.iter().any(|times| times.preemptions > 0);
+    let last = |case: &Case| case.instances.values().map(|times| times.finish_ns).max();
+    let has_preemptions = |case: &Case| case.instances.values().any(|times| times.preemptions > 0);
     let (cases, texts) = cases(|case| {
         let most = if has_preemptions(case) { 600 } else { 200 };
         [1, 2, 4, 8].contains(&case.cores) && last(case).is_some_and(|units| units <= most)
@@ -94,7 +94,7 @@ fn a_schedule_that_is_not_the_reference_s_is_found_out() {
     let cases = parse(&text).expect("well formed");
     let judged = run(&cases, &[text], &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
     let difference = judged[0].outcome.clone().expect_err("a difference");
-    let expected = "dag 0 job 0 subtask 0: finish: expected at 2, ran at 2.99";
+    let expected = "dag 0 job 0 subtask 0: finish: expected 2, found 2.99";
     assert!(difference.starts_with(expected), "{difference}");
 }
 

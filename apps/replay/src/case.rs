@@ -18,11 +18,12 @@
 //! a case chooses how long a unit is. WCETs play no part in a schedule; they are only
 //! checked against the execution times.
 
+use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use sched_dag::{Clusters, Policy, Preemption, TaskSet};
+use sched_dag::{Clusters, DagId, Instance, Policy, Preemption, TaskSet};
 
 /// One set of DAGs with its expected schedule.
 #[derive(Debug)]
@@ -37,31 +38,18 @@ pub struct Case {
     pub policy: Policy,
     /// Whether a started instance may lose its core.
     pub preemption: Preemption,
-    /// What the case says about each DAG besides its graph.
-    pub dags: Vec<CaseDag>,
     /// The verified DAGs.
     pub task_set: Arc<TaskSet>,
-    /// The expected instances, in the order of [`CaseDag::position`].
-    pub instances: Vec<InstanceTimes>,
-    /// The expected jobs, for each DAG.
-    pub jobs: Vec<Vec<JobTimes>>,
-}
-
-/// What a case says about one DAG besides its graph.
-#[derive(Debug)]
-pub struct CaseDag {
-    /// The number of its jobs.
-    pub jobs: usize,
-    /// The number of its subtasks.
-    pub subtasks: usize,
-    /// The position of job 0's subtask 0 in a table of all instances.
-    pub(crate) first_instance: usize,
-    /// For each subtask the execution time of each job.
-    pub executions_ns: Vec<Vec<u64>>,
+    /// The execution times: of each DAG, for each subtask that of each job.
+    pub executions_ns: Vec<Vec<Vec<u64>>>,
+    /// The expected instances.
+    pub instances: BTreeMap<Instance, InstanceTimes>,
+    /// The expected jobs, by DAG and number.
+    pub jobs: BTreeMap<(DagId, u64), JobTimes>,
 }
 
 /// What happened to an instance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstanceTimes {
     /// When it first executed.
     pub start_ns: u64,
@@ -72,7 +60,7 @@ pub struct InstanceTimes {
 }
 
 /// What happened to a job.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JobTimes {
     /// When it was released.
     pub release_ns: u64,
@@ -82,13 +70,4 @@ pub struct JobTimes {
     pub response_ns: u64,
     /// Whether that is more than the relative deadline.
     pub missed: bool,
-}
-
-impl CaseDag {
-    /// Returns an instance's position in a table of all instances: by DAG, then
-    /// by job, then by subtask.
-    #[must_use]
-    pub fn position(&self, job: usize, subtask: usize) -> usize {
-        self.first_instance + job * self.subtasks + subtask
-    }
 }

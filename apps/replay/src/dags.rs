@@ -6,8 +6,7 @@
 //! unit, for the scheduler, the switch and the interrupt take time too; along a
 //! chain of instances that would add up until it is a unit. So, as WCETs do, the
 //! execution times *include* what the kernel took: each unit of execution lasts
-//! up to the end of a whole unit of time, counted from the one nearest to its
-//! start. Only what the kernel takes while a unit of execution is under way, by
+//! up to the end of a whole unit of time, the one in which it began. Only what the kernel takes while a unit of execution is under way, by
 //! preempting and resuming it, makes that unit end later (or earlier, if it was
 //! suspended later than it was resumed).
 //!
@@ -67,39 +66,24 @@ impl Epoch {
 }
 
 impl Scale {
-    /// Returns how long a unit of execution lasts that starts `start_ns` after
-    /// time 0.
-    fn unit_from(self, start_ns: u64) -> u64 {
-        let nearest = start_ns.saturating_add(self.unit_ns / 2) / self.unit_ns;
-        let end_ns = nearest.saturating_add(1).saturating_mul(self.unit_ns);
-        end_ns
-            .saturating_sub(self.guard_ns)
-            .saturating_sub(start_ns)
+    /// Returns how long a unit of execution goes on that is under way `ns` after time 0. A
+    /// quarter of a unit is more than it may begin early by.
+    fn left_at(self, ns: u64) -> u64 {
+        let unit = ns.saturating_add(self.unit_ns / 4) / self.unit_ns;
+        let end_ns = unit.saturating_add(1).saturating_mul(self.unit_ns);
+        end_ns.saturating_sub(self.guard_ns).saturating_sub(ns)
     }
 
-    /// Executes for `units` units, inside a subtask. The core is held meanwhile.
-    fn execute(self, units: u64, epoch: &Epoch) {
+    /// Executes for `units` units, inside a subtask. The core is held meanwhile, but for what it
+    /// computes.
+    fn execute(self, units: u64, epoch: &Epoch, computing: Option<Computing>) {
         for _ in 0..units {
-            let ns = self.unit_from(epoch.elapsed_ns());
-            fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
-        }
-    }
-
-    /// Does as [`Scale::execute`], and computes at the beginning of each unit.
-    fn compute(self, units: u64, epoch: &Epoch, computing: Computing) {
-        for _ in 0..units {
-            computing.pace.compute_for(computing.time);
+            if let Some(computing) = computing {
+                computing.pace.compute_for(computing.time);
+            }
             let ns = self.left_at(epoch.elapsed_ns());
             fass::execute_for(Duration::from_nanos(ns), Occupation::Hold);
         }
-    }
-
-    /// Returns how long a unit of execution lasts that is under way `ns` after time 0.
-    fn left_at(self, ns: u64) -> u64 {
-        // The next unit of execution begins a guard before the unit of time.
-        let unit = ns.saturating_add(self.guard_ns) / self.unit_ns;
-        let end_ns = unit.saturating_add(1).saturating_mul(self.unit_ns);
-        end_ns.saturating_sub(self.guard_ns).saturating_sub(ns)
     }
 
     fn duration(self, units: u64) -> Result<Duration, String> {
@@ -125,27 +109,25 @@ pub fn build(
     epoch: &Epoch,
     computing: Option<Computing>,
 ) -> Result<Vec<Dag>, String> {
-    let dags = case.task_set.dags().iter().zip(&case.dags).enumerate();
-    dags.map(|(number, (model, times))| {
+    let dags = case.task_set.dags().iter().zip(&case.executions_ns);
+    let dags = dags.enumerate();
+    dags.map(|(number, (model, executions_ns))| {
         let dag = create_dag();
         dag.name(&format!("{number}"))
             .period(scale.duration(model.period_ns())?)
             .relative_deadline(scale.duration(model.relative_deadline_ns())?)
             .offset(scale.duration(model.offset_ns())?)
-            .jobs(u64::try_from(times.jobs).unwrap_or(u64::MAX))
+            .jobs(model.jobs().unwrap_or(0))
             .in_flight(model.in_flight());
         if case.task_set.is_divided() {
             dag.cluster(model.cluster().0);
         }
-        let subtasks: Vec<_> = (model.subtasks().iter().zip(&times.executions_ns))
+        let subtasks: Vec<_> = (model.subtasks().iter().zip(executions_ns))
             .map(|(subtask, executions)| {
                 let (executions, epoch) = (executions.clone(), epoch.clone());
                 let execute = move |job| {
                     let units = usize::try_from(job).map_or(0, |job| executions[job]);
-                    match computing {
-                        None => scale.execute(units, &epoch),
-                        Some(computing) => scale.compute(units, &epoch, computing),
-                    }
+                    scale.execute(units, &epoch, computing);
                 };
                 let attributes = SubtaskAttributes::default().priority(subtask.priority().0);
                 dag.register_untyped_subtask(execute, attributes)
@@ -175,22 +157,11 @@ mod tests {
             unit_ns: 1000,
             guard_ns: 10,
         };
-        assert_eq!(scale.unit_from(5000), 990);
-        assert_eq!(scale.unit_from(5040), 950); // 40 ns were the kernel's
-        assert_eq!(scale.unit_from(4990), 1000); // the unit before ended early
-        assert_eq!(scale.unit_from(5500), 1490); // nearer to 6 than to 5
-        assert_eq!(scale.unit_from(u64::MAX), 0);
-    }
-
-    #[test]
-    fn a_unit_that_has_computed_lasts_up_to_the_same_end() {
-        let scale = Scale {
-            unit_ns: 1000,
-            guard_ns: 10,
-        };
-        assert_eq!(scale.left_at(5400), 590);
-        assert_eq!(scale.left_at(5989), 1); // the last moment
-        assert_eq!(scale.left_at(5990), 1000); // the next one has begun
+        assert_eq!(scale.left_at(5000), 990);
+        assert_eq!(scale.left_at(5040), 950); // 40 ns were the kernel's
+        assert_eq!(scale.left_at(4990), 1000); // the unit before ended early
+        assert_eq!(scale.left_at(4760), 1230); // even earlier
+        assert_eq!(scale.left_at(5740), 250); // it has computed so long
         assert_eq!(scale.left_at(u64::MAX), 0);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! A *case* is a set of DAGs with the execution time of every instance, and the
 //! one schedule that the task model gives them ([`Case`]). The app runs cases
-//! one after the other and prints what happened; the host tool compares
+//! one after the other; the host tool compares their traces
 //! (`./scripts/oracle schedules --in-kernel`), and also reads the cases with the
 //! code here ([`parse()`]).
 //!
@@ -28,7 +28,7 @@ mod parse;
 mod repeated;
 pub mod shown;
 
-pub use case::{Case, CaseDag, InstanceTimes, JobTimes};
+pub use case::{Case, InstanceTimes, JobTimes};
 pub use dags::{Computing, Epoch, Scale, build};
 pub use faults::of_file;
 pub use parse::parse;

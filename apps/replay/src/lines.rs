@@ -171,6 +171,16 @@ impl Line<'_> {
         }
     }
 
+    /// Returns the words, of which there must be as many as the caller takes.
+    ///
+    /// # Errors
+    ///
+    /// As [`exactly`](Self::exactly).
+    pub fn fixed<const N: usize>(&self) -> Result<[&str; N], Malformed> {
+        let words = self.exactly(N)?;
+        Ok(core::array::from_fn(|place| words[place]))
+    }
+
     /// Reads a number in the range of its type.
     ///
     /// # Errors
@@ -203,6 +213,42 @@ impl Line<'_> {
             false => {
                 Err(self.malformed(format!("expected 1 to {MOST_CORES} cores, found {cores}")))
             }
+        }
+    }
+
+    /// Reads how many there are of something, of which there must be one.
+    ///
+    /// # Errors
+    ///
+    /// As [`number`](Self::number), and if it is 0.
+    pub fn at_least_one(&self, word: &str) -> Result<u32, Malformed> {
+        match self.number(word)? {
+            0 => Err(self.malformed(format!("`{}` needs at least 1 here, found 0", self.kind))),
+            number => Ok(number),
+        }
+    }
+
+    /// Reads the number of one of `count` things, which are called so.
+    ///
+    /// # Errors
+    ///
+    /// As [`number`](Self::number), and if there is no such thing.
+    pub fn index(&self, what: &str, word: &str, count: usize) -> Result<usize, Malformed> {
+        let number: u64 = self.number(word)?;
+        let index = usize::try_from(number).ok().filter(|index| *index < count);
+        index.ok_or_else(|| self.malformed(format!("there is no {what} {number}")))
+    }
+
+    /// Reads whether something is so.
+    ///
+    /// # Errors
+    ///
+    /// [`Malformed`] if the word is neither 0 nor 1.
+    pub fn flag(&self, word: &str) -> Result<bool, Malformed> {
+        match word {
+            "0" => Ok(false),
+            "1" => Ok(true),
+            _ => Err(self.malformed(format!("expected 0 or 1, found {}", quoted(word)))),
         }
     }
 

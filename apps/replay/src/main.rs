@@ -1,4 +1,4 @@
-//! Runs the reference schedules in the loader's file, and prints what happened.
+//! Runs the reference schedules in the loader's file. What happened is in their traces.
 //!
 //! Words of the command line: `unit_us` is the length of a unit of the cases'
 //! time; `guard_us` is how much before the end of a unit of time a unit of
@@ -19,14 +19,10 @@ use core::time::Duration;
 
 use fass::{ConstructionPolicy, finish_create_dags_with};
 use fork_join::Pace;
-use kernel::{Ending, Machine, Run, json, println};
+use kernel::{Ending, Machine, json, println};
 use replay::{Case, Computing, Epoch, Scale, build, parse};
-use sched_dag::{DagId, JobOutcome};
 
 kernel::entry!(main);
-
-/// How many instances or jobs a machine line lists at most.
-const ROWS_A_LINE: usize = 32;
 
 fn main(machine: &Machine) -> Result<(), Ending> {
     let cases = cases(machine)?;
@@ -87,13 +83,6 @@ fn run(
     let epoch_ns = fass::now_ns() + LEAD_NS;
     epoch.set(epoch_ns);
     let run = machine.run_from(epoch_ns)?;
-    print(case, &run);
-    Ok(())
-}
-
-/// Prints what happened to every instance and job.
-fn print(case: &Case, run: &Run) {
-    let record = run.record();
     let violations = run
         .violations()
         .inspect(|violation| println!("violation: {violation}"))
@@ -104,43 +93,5 @@ fn print(case: &Case, run: &Run) {
             .number("violations", violations as u64)
             .number("allocations", run.allocations());
     });
-    let absent = u64::MAX; // no time of a run
-    let instances = record
-        .all_instances(run.task_set())
-        .map(|(instance, times)| {
-            format!(
-                "[{},{},{},{},{},{}]",
-                instance.dag.0,
-                instance.job,
-                instance.subtask.0,
-                times.start_ns.unwrap_or(absent),
-                times.finish_ns.unwrap_or(absent),
-                times.preemptions
-            )
-        });
-    print_rows("replay_instances", instances);
-    let jobs = (0..case.dags.len()).flat_map(|number| {
-        let dag = DagId(u32::try_from(number).unwrap_or(u32::MAX));
-        record.numbered(dag).map(move |(job, times)| {
-            format!(
-                "[{number},{job},{},{},{}]",
-                times.release_ns.unwrap_or(absent),
-                record.completion_ns(dag, job).unwrap_or(absent),
-                u8::from(times.outcome != Some(JobOutcome::Met))
-            )
-        })
-    });
-    print_rows("replay_jobs", jobs);
-}
-
-fn print_rows(kind: &str, mut rows: impl Iterator<Item = String>) {
-    loop {
-        let some: Vec<String> = rows.by_ref().take(ROWS_A_LINE).collect();
-        if some.is_empty() {
-            return;
-        }
-        json::emit(kind, |line| {
-            line.list("rows", some.iter());
-        });
-    }
+    Ok(())
 }

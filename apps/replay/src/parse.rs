@@ -2,18 +2,18 @@
 //! is refused with its line.
 
 use alloc::borrow::ToOwned;
+use alloc::collections::BTreeMap;
 use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
-use alloc::vec;
 use alloc::vec::Vec;
 
 use sched_dag::{
-    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, Priority,
-    SubtaskSpec, TaskSet, verify,
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy,
+    Preemption, Priority, SubtaskId, SubtaskSpec, TaskSet, verify,
 };
 
-use crate::case::{Case, CaseDag, InstanceTimes, JobTimes};
+use crate::case::{Case, InstanceTimes, JobTimes};
 use crate::faults::of_file;
 use crate::lines::{Line, Lines, Malformed, cases, quoted};
 
@@ -28,19 +28,15 @@ pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
 }
 
 fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
-    let &[name, cores, edf, preemptive, count] = header.exactly(5)? else {
-        return Err(header.malformed("expected 5 words"));
-    };
+    let [name, cores, edf, preemptive, count] = header.fixed()?;
     let cores = header.cores(cores)?;
-    let policy = if yes(header, edf)? {
-        Policy::Edf
-    } else {
-        Policy::StaticPriority
+    let policy = match header.flag(edf)? {
+        true => Policy::Edf,
+        false => Policy::StaticPriority,
     };
-    let preemption = if yes(header, preemptive)? {
-        Preemption::Enabled
-    } else {
-        Preemption::Disabled
+    let preemption = match header.flag(preemptive)? {
+        true => Preemption::Enabled,
+        false => Preemption::Disabled,
     };
     let clusters = match lines.next_if("clusters") {
         Some(line) => Clusters::Of(parse_clusters(&line, cores)?),
@@ -52,33 +48,29 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
         .with_instance_limit(u32::MAX);
 
     let mut specs = Vec::new();
-    let mut dags: Vec<CaseDag> = Vec::new();
-    for _ in 0..at_least_one(header, count)? {
+    let mut executions_ns = Vec::new();
+    for _ in 0..header.at_least_one(count)? {
         let line = lines.expect("dag")?;
-        let first_instance = dags.last().map_or(0, |before| {
-            before.first_instance + before.jobs * before.subtasks
-        });
-        let cluster = parse_cluster(&clusters, lines)?;
-        let (mut spec, dag) = parse_dag(&line, lines, first_instance)?;
-        spec.cluster = cluster;
+        let (spec, of_dag_ns) = parse_dag(&line, lines, &clusters)?;
         commit(&line, core::slice::from_ref(&spec), &options)?;
         specs.push(spec);
-        dags.push(dag);
+        executions_ns.push(of_dag_ns);
     }
     let task_set = commit(header, &specs, &options)?;
-    check_horizon(header, &specs, &dags)?;
-    let (instances, jobs) = parse_schedule(lines, &dags)?;
-    Ok(Case {
+    check_horizon(header, &specs, &executions_ns)?;
+    let mut case = Case {
         name: name.to_owned(),
         cores,
         clusters,
         policy,
         preemption,
-        dags,
         task_set: Arc::new(task_set),
-        instances,
-        jobs,
-    })
+        executions_ns,
+        instances: BTreeMap::new(),
+        jobs: BTreeMap::new(),
+    };
+    parse_schedule(lines, &mut case)?;
+    Ok(case)
 }
 
 /// Reads the cores of each cluster, which are all there are.
@@ -96,30 +88,16 @@ fn parse_clusters(line: &Line<'_>, cores: u32) -> Result<Vec<u32>, Malformed> {
     }
 }
 
-/// Reads the cluster of a DAG, which stands after its first record.
-fn parse_cluster(
-    clusters: &Clusters,
-    lines: &mut Lines<'_>,
-) -> Result<Option<ClusterId>, Malformed> {
-    if *clusters == Clusters::Undivided {
-        return Ok(None);
-    }
-    let line = lines.expect("in")?;
-    let number = line.numbers::<u64>(1)?[0];
-    let cluster = in_range(&line, "cluster", number, clusters.sizes().len())?;
-    Ok(u32::try_from(cluster).ok().map(ClusterId))
-}
-
+/// Reads a DAG and the execution times of its subtasks' instances.
 fn parse_dag(
     header: &Line<'_>,
     lines: &mut Lines<'_>,
-    first_instance: usize,
-) -> Result<(DagSpec, CaseDag), Malformed> {
-    let &[period, deadline, offset, jobs, subtasks, edges] = header.exactly(6)? else {
-        return Err(header.malformed("expected 6 words"));
-    };
-    let jobs = at_least_one(header, jobs)?;
-    let subtasks = at_least_one(header, subtasks)?;
+    clusters: &Clusters,
+) -> Result<(DagSpec, Vec<Vec<u64>>), Malformed> {
+    let [period, deadline, offset, jobs, subtasks, edges] = header.fixed()?;
+    let jobs = header.at_least_one(jobs)?;
+    let subtasks = header.at_least_one(subtasks)?;
+    let edges: u32 = header.number(edges)?;
     let mut spec = DagSpec {
         period_ns: Some(header.number(period)?),
         relative_deadline_ns: Some(header.number(deadline)?),
@@ -129,41 +107,36 @@ fn parse_dag(
         jobs: Some(u64::from(jobs)),
         ..DagSpec::default()
     };
-    let edges: u32 = header.number(edges)?;
+    if *clusters != Clusters::Undivided {
+        let line = lines.expect("in")?;
+        let [cluster] = line.fixed()?;
+        let cluster = line.index("cluster", cluster, clusters.sizes().len())?;
+        spec.cluster = u32::try_from(cluster).ok().map(ClusterId);
+    }
     let mut executions_ns = Vec::new();
     for _ in 0..subtasks {
-        let line = lines.expect("sub")?;
-        let (priority, executions) = parse_subtask(&line, jobs)?;
-        spec.subtasks.push(SubtaskSpec {
-            priority: Some(priority),
-            ..SubtaskSpec::default()
-        });
-        executions_ns.push(executions);
+        let (subtask, of_subtask_ns) = parse_subtask(&lines.expect("sub")?, jobs)?;
+        spec.subtasks.push(subtask);
+        executions_ns.push(of_subtask_ns);
     }
-    let (subtasks, jobs) = (spec.subtasks.len(), executions_ns[0].len());
+    let subtasks = spec.subtasks.len();
     for _ in 0..edges {
         let line = lines.expect("edge")?;
-        let ends: Vec<usize> = line.numbers(2)?;
-        if let Some(end) = ends.iter().find(|&&end| end >= subtasks) {
-            return Err(line.malformed(format!("there is no subtask {end}")));
-        }
-        spec.edges.push((ends[0], ends[1]));
+        let [earlier, later] = line.fixed()?;
+        let end = |word| line.index("subtask", word, subtasks);
+        spec.edges.push((end(earlier)?, end(later)?));
     }
     while let Some(line) = lines.next_if("sink") {
-        parse_sink(&line, &mut spec)?;
+        let [sink, deadline] = line.fixed()?;
+        let sink = line.index("subtask", sink, subtasks)?;
+        let place = &mut spec.subtasks[sink].relative_deadline_ns;
+        once(&line, place.replace(line.number(deadline)?))?;
     }
-    Ok((
-        spec,
-        CaseDag {
-            jobs,
-            subtasks,
-            first_instance,
-            executions_ns,
-        },
-    ))
+    Ok((spec, executions_ns))
 }
 
-fn parse_subtask(line: &Line<'_>, jobs: u32) -> Result<(Priority, Vec<u64>), Malformed> {
+/// Reads a subtask and the execution time of each job's instance.
+fn parse_subtask(line: &Line<'_>, jobs: u32) -> Result<(SubtaskSpec, Vec<u64>), Malformed> {
     let [wcet, priority, executions @ ..] = &line.words[..] else {
         return Err(line.malformed("expected `sub wcet prio e_0 ..`"));
     };
@@ -174,30 +147,18 @@ fn parse_subtask(line: &Line<'_>, jobs: u32) -> Result<(Priority, Vec<u64>), Mal
         )));
     }
     let wcet_ns: u64 = line.number(wcet)?;
-    let mut executions_ns = Vec::with_capacity(executions.len());
-    for word in executions {
-        let execution_ns: u64 = line.number(word)?;
-        if !(1..=wcet_ns).contains(&execution_ns) {
-            return Err(line.malformed(format!(
-                "the execution time {execution_ns} is not between 1 and the WCET {wcet_ns}"
-            )));
-        }
-        executions_ns.push(execution_ns);
-    }
-    Ok((Priority(line.number(priority)?), executions_ns))
-}
-
-/// Reads the deadline of a sink.
-fn parse_sink(line: &Line<'_>, spec: &mut DagSpec) -> Result<(), Malformed> {
-    let &[sink, deadline] = line.exactly(2)? else {
-        return Err(line.malformed("expected 2 words"));
+    let execution = |word: &&str| match line.number(word)? {
+        execution_ns if (1..=wcet_ns).contains(&execution_ns) => Ok(execution_ns),
+        execution_ns => Err(line.malformed(format!(
+            "the execution time {execution_ns} is not between 1 and the WCET {wcet_ns}"
+        ))),
     };
-    let sink = in_range(line, "subtask", line.number(sink)?, spec.subtasks.len())?;
-    fill(
-        line,
-        &mut spec.subtasks[sink].relative_deadline_ns,
-        line.number(deadline)?,
-    )
+    let executions_ns = executions.iter().map(execution).collect::<Result<_, _>>()?;
+    let subtask = SubtaskSpec {
+        priority: Some(Priority(line.number(priority)?)),
+        ..SubtaskSpec::default()
+    };
+    Ok((subtask, executions_ns))
 }
 
 /// Verifies DAGs that the record `line` begins.
@@ -217,66 +178,74 @@ fn commit(
 
 /// Refuses a case in which even a schedule on one core might end after the last
 /// time there is.
-fn check_horizon(header: &Line<'_>, specs: &[DagSpec], dags: &[CaseDag]) -> Result<(), Malformed> {
+fn check_horizon(
+    header: &Line<'_>,
+    specs: &[DagSpec],
+    executions_ns: &[Vec<Vec<u64>>],
+) -> Result<(), Malformed> {
     let last_release_ns = specs.iter().map(|spec| {
         let jobs = spec.jobs.unwrap_or(1);
         u128::from(spec.offset_ns) + u128::from(spec.period_ns.unwrap_or(0)) * u128::from(jobs - 1)
     });
-    let executions_ns = dags
-        .iter()
-        .flat_map(|dag| dag.executions_ns.iter().flatten());
-    let busy_ns: u128 = executions_ns
-        .map(|&execution_ns| u128::from(execution_ns))
-        .sum();
+    let executions_ns = executions_ns.iter().flatten().flatten().copied();
+    let busy_ns: u128 = executions_ns.map(u128::from).sum();
     if last_release_ns.max().unwrap_or(0) + busy_ns > u128::from(u64::MAX) {
         return Err(header.malformed("the schedule may end after the last time that 64 bits hold"));
     }
     Ok(())
 }
 
-type Schedule = (Vec<InstanceTimes>, Vec<Vec<JobTimes>>);
-
-fn parse_schedule(lines: &mut Lines<'_>, dags: &[CaseDag]) -> Result<Schedule, Malformed> {
-    let count = dags.iter().map(|dag| dag.jobs * dag.subtasks).sum();
-    let mut instances: Vec<Option<InstanceTimes>> = vec![None; count];
-    let mut jobs: Vec<Vec<Option<JobTimes>>> =
-        dags.iter().map(|dag| vec![None; dag.jobs]).collect();
+/// Reads what is expected of each instance and each job.
+fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malformed> {
+    let executions_ns = &case.executions_ns;
+    let dag_and_job = |line: &Line<'_>, dag: &str, job: &str| {
+        let dag = line.index("dag", dag, executions_ns.len())?;
+        let job = line.index("job", job, executions_ns[dag][0].len())?;
+        Ok::<_, Malformed>((dag, job as u64))
+    };
+    let id = |index| u32::try_from(index).unwrap_or(u32::MAX);
     loop {
         let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
         match line.kind {
             "x" => {
-                let numbers: Vec<u64> = line.numbers(6)?;
-                let (dag, job) = dag_and_job(&line, dags, numbers[0], numbers[1])?;
-                let subtask = in_range(&line, "subtask", numbers[2], dags[dag].subtasks)?;
-                let times = InstanceTimes {
-                    start_ns: numbers[3],
-                    finish_ns: numbers[4],
-                    preemptions: numbers[5],
+                let [dag, job, subtask, start, finish, preemptions] = line.fixed()?;
+                let (dag, job) = dag_and_job(&line, dag, job)?;
+                let subtask = line.index("subtask", subtask, executions_ns[dag].len())?;
+                let instance = Instance {
+                    dag: DagId(id(dag)),
+                    job,
+                    subtask: SubtaskId(id(subtask)),
                 };
-                fill(
-                    &line,
-                    &mut instances[dags[dag].position(job, subtask)],
-                    times,
-                )?;
+                let times = InstanceTimes {
+                    start_ns: line.number(start)?,
+                    finish_ns: line.number(finish)?,
+                    preemptions: line.number(preemptions)?,
+                };
+                once(&line, case.instances.insert(instance, times))?;
             }
             "j" => {
-                let words = line.exactly(6)?;
-                let numbers: Vec<u64> = words[..5]
-                    .iter()
-                    .map(|word| line.number(word))
-                    .collect::<Result<_, _>>()?;
-                let (dag, job) = dag_and_job(&line, dags, numbers[0], numbers[1])?;
+                let [dag, job, release, finish, response, missed] = line.fixed()?;
+                let (dag, job) = dag_and_job(&line, dag, job)?;
                 let times = JobTimes {
-                    release_ns: numbers[2],
-                    finish_ns: numbers[3],
-                    response_ns: numbers[4],
-                    missed: yes(&line, words[5])?,
+                    release_ns: line.number(release)?,
+                    finish_ns: line.number(finish)?,
+                    response_ns: line.number(response)?,
+                    missed: line.flag(missed)?,
                 };
-                fill(&line, &mut jobs[dag][job], times)?;
+                once(&line, case.jobs.insert((DagId(id(dag)), job), times))?;
             }
             "end" => {
                 line.exactly(0)?;
-                return complete(&line, instances, jobs);
+                let jobs: usize = executions_ns.iter().map(|dag| dag[0].len()).sum();
+                let instances: usize = executions_ns.iter().flatten().map(Vec::len).sum();
+                let instances = instances - case.instances.len();
+                let jobs = jobs - case.jobs.len();
+                if instances + jobs > 0 {
+                    return Err(line.malformed(format!(
+                        "the case ends without {instances} `x` records and {jobs} `j` records"
+                    )));
+                }
+                return Ok(());
             }
             other => {
                 return Err(line.malformed(format!(
@@ -288,62 +257,10 @@ fn parse_schedule(lines: &mut Lines<'_>, dags: &[CaseDag]) -> Result<Schedule, M
     }
 }
 
-fn complete(
-    end: &Line<'_>,
-    instances: Vec<Option<InstanceTimes>>,
-    jobs: Vec<Vec<Option<JobTimes>>>,
-) -> Result<Schedule, Malformed> {
-    let missing = instances
-        .iter()
-        .filter(|instance| instance.is_none())
-        .count();
-    let missing_jobs = jobs.iter().flatten().filter(|job| job.is_none()).count();
-    if missing + missing_jobs > 0 {
-        return Err(end.malformed(format!(
-            "the case ends without {missing} `x` records and {missing_jobs} `j` records"
-        )));
-    }
-    let jobs = jobs
-        .into_iter()
-        .map(|jobs| jobs.into_iter().flatten().collect());
-    Ok((instances.into_iter().flatten().collect(), jobs.collect()))
-}
-
-fn fill<T>(line: &Line<'_>, place: &mut Option<T>, value: T) -> Result<(), Malformed> {
-    match place.replace(value) {
+/// Refuses a record that has replaced an earlier one.
+fn once<T>(line: &Line<'_>, earlier: Option<T>) -> Result<(), Malformed> {
+    match earlier {
         None => Ok(()),
         Some(_) => Err(line.malformed("this record stands here twice")),
-    }
-}
-
-fn dag_and_job(
-    line: &Line<'_>,
-    dags: &[CaseDag],
-    dag: u64,
-    job: u64,
-) -> Result<(usize, usize), Malformed> {
-    let dag = in_range(line, "dag", dag, dags.len())?;
-    Ok((dag, in_range(line, "job", job, dags[dag].jobs)?))
-}
-
-fn in_range(line: &Line<'_>, what: &str, number: u64, count: usize) -> Result<usize, Malformed> {
-    usize::try_from(number)
-        .ok()
-        .filter(|&number| number < count)
-        .ok_or_else(|| line.malformed(format!("there is no {what} {number}")))
-}
-
-fn at_least_one(line: &Line<'_>, word: &str) -> Result<u32, Malformed> {
-    match line.number(word)? {
-        0 => Err(line.malformed(format!("`{}` needs at least 1 here, found 0", line.kind))),
-        number => Ok(number),
-    }
-}
-
-fn yes(line: &Line<'_>, word: &str) -> Result<bool, Malformed> {
-    match word {
-        "0" => Ok(false),
-        "1" => Ok(true),
-        _ => Err(line.malformed(format!("expected 0 or 1, found {}", quoted(word)))),
     }
 }

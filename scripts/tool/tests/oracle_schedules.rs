@@ -1,6 +1,9 @@
 //! The scheduler against reference schedules, and the refusal of broken files.
 
-use tool::oracle::schedules::{check, parse};
+use fass::{ConstructionPolicy, finish_create_dags_with};
+use replay::{Epoch, Scale, build};
+use tool::oracle::schedules::{Case, Deviation, check, compare, parse};
+use virtual_time::VirtualTime;
 
 const PUBLIC: &str = include_str!("../../../tests/oracle/schedules.txt");
 const CLUSTERS: &str = include_str!("../../../tests/oracle/clusters.txt");
@@ -33,16 +36,51 @@ fn all_public_schedules_agree() {
         assert_eq!(cases.len(), count);
         for case in &cases {
             assert_eq!(check(case), Ok(()), "{}", case.name);
+            assert_eq!(built(case, 0, 0), Ok(Deviation::default()), "{}", case.name);
         }
     }
 }
 
+/// Compares a case with how the DAGs run that the app `replay` builds of it, in virtual time with
+/// units of 1000 ns and this guard.
+fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, String> {
+    let machine = VirtualTime::new()
+        .cores(case.cores)
+        .clusters(case.clusters.sizes())
+        .policy(case.policy)
+        .preemption(case.preemption);
+    let scale = Scale {
+        unit_ns: 1000,
+        guard_ns,
+    };
+    let dags = build(case, scale, &Epoch::default(), None).expect("short times");
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("any graph is right");
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    compare(case, report.task_set(), report.record(), 1000, tolerance_ns)
+}
+
+#[test]
+fn what_is_near_passes_and_by_how_much_is_told() {
+    let case = parse(SMALL).expect("well formed").remove(0);
+    let deviation = Deviation {
+        earliest_ns: -10,
+        latest_ns: 0,
+    };
+    assert_eq!(built(&case, 10, 10), Ok(deviation));
+    let far = "dag 0 job 0 subtask 0: finish: expected 1, found 0.990";
+    assert_eq!(built(&case, 10, 9), Err(far.to_owned()));
+}
+
 /// What stands in the small case, what is put in its place, and the difference that makes.
 const WRONG: &str =
-    "x 0 1 0 5 6 0 | x 0 1 0 4 6 0 | dag 0 job 1 subtask 0: start: expected 4, replayed 5
-x 0 1 1 6 10 0 | x 0 1 1 6 10 1 | dag 0 job 1 subtask 1: preemptions: expected 1, replayed 0
-j 0 0 0 5 5 1 | j 0 0 0 5 5 0 | dag 0 job 0: missed: expected 0, replayed 1
-j 0 1 4 10 6 1 | j 0 1 4 10 7 1 | dag 0 job 1: response: expected 7, replayed 6";
+    "x 0 1 0 5 6 0 | x 0 1 0 4 6 0 | dag 0 job 1 subtask 0: start: expected 4, found 5
+x 0 1 1 6 10 0 | x 0 1 1 6 11 0 | dag 0 job 1 subtask 1: finish: expected 11, found 10
+j 0 1 4 10 6 1 | j 0 1 5 10 6 1 | dag 0 job 1: release: expected 5, found 4
+j 0 1 4 10 6 1 | j 0 1 4 11 6 1 | dag 0 job 1: finish: expected 11, found 10
+x 0 1 1 6 10 0 | x 0 1 1 6 10 1 | dag 0 job 1 subtask 1: preemptions: expected 1, found 0
+j 0 0 0 5 5 1 | j 0 0 0 5 5 0 | dag 0 job 0: missed: expected 0, found 1
+j 0 1 4 10 6 1 | j 0 1 4 10 7 1 | dag 0 job 1: response: expected 7, found 6";
 
 #[test]
 fn the_first_difference_is_named() {

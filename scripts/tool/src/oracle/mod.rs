@@ -22,6 +22,7 @@ pub mod synchronizer;
 mod table;
 
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -109,12 +110,12 @@ fn read<'f, Case>(
     Ok(cases)
 }
 
-/// Compares a value that a case expects with the one that came by what `how` says.
-fn equal(how: &str, place: &str, what: &str, expected: u64, found: u64) -> Result<(), String> {
+/// Compares a value that a case expects with the one that was found.
+fn equal(place: impl Display, what: &str, expected: u64, found: u64) -> Result<(), String> {
     match expected == found {
         true => Ok(()),
         false => Err(format!(
-            "{place}: {what}: expected {expected}, {how} {found}"
+            "{place}: {what}: expected {expected}, found {found}"
         )),
     }
 }

@@ -63,8 +63,6 @@ fork_join: subtasks jobs joins violations deadline_misses allocations first_rele
     response_time_ns.min response_time_ns.median response_time_ns.p99 response_time_ns.max \
     release_jitter_ns.min release_jitter_ns.median release_jitter_ns.p99 release_jitter_ns.max
 replay: case cores violations allocations
-replay_instances: rows
-replay_jobs: rows
 dag_run: set dag subtasks released completed deadline_misses skips aborts response_time_ns.min \
     response_time_ns.median response_time_ns.p99 response_time_ns.max
 dag_sink: set dag sink relative_deadline_ns deadline_misses response_time_ns.min \

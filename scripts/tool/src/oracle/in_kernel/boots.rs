@@ -4,13 +4,16 @@ use std::fs;
 use std::path::Path;
 
 use replay::{Case, Epoch, build};
+use sched_dag::law::Record;
 
-use super::compare::compare;
-use super::transcript::read;
 use super::{Judged, Settings};
+use crate::oracle::equal;
+use crate::oracle::schedules::{Deviation, compare};
 use crate::outcome::{Outcome, boot};
 use crate::progress::Progress;
+use crate::protocol::MachineLine;
 use crate::qemu::Qemu;
+use crate::trace::{self, model::Run};
 use crate::{files, image, install, probe, system};
 
 /// The most cases of one boot: the guest has them all in memory.
@@ -70,7 +73,7 @@ fn runs_there(case: &Case, settings: &Settings) -> Result<(), String> {
     build(case, settings.scale(), &Epoch::default(), None).map(drop)
 }
 
-fn verdict(case: &Case, outcome: Result<super::Deviation, String>) -> Judged {
+fn verdict(case: &Case, outcome: Result<Deviation, String>) -> Judged {
     Judged {
         name: case.name.clone(),
         cores: case.cores,
@@ -104,7 +107,7 @@ fn boot_with(
         memory_mib: MEMORY_MIB,
         guest_words: format!(
             "mode={mode} unit_us={unit_us} guard_us={guard_us} window_us={window_us} \
-             work={work}"
+             work={work} trace=dump"
         ),
         module: Some(module.clone()),
         ..Qemu::default()
@@ -118,20 +121,28 @@ fn boot_with(
 
 /// Judges the cases that ran and, if the guest did not get through, the one that
 /// ended it; what comes after that has not been run.
-fn judge(outcome: &Outcome, cases: &[(&Case, &str)], settings: &Settings) -> Vec<Judged> {
+pub(super) fn judge(
+    outcome: &Outcome,
+    cases: &[(&Case, &str)],
+    settings: &Settings,
+) -> Vec<Judged> {
     let mut judged = Vec::with_capacity(cases.len());
     let ending = outcome.judge().err();
+    let (runs, damaged) = match trace::read(&outcome.serial) {
+        Ok(runs) => (runs, None),
+        Err(damaged) => (Vec::new(), Some(damaged.to_string())),
+    };
+    let mut ran = outcome.transcript.of_kind("replay").zip(&runs);
     for (case, _) in cases {
-        let Some(ran) = read(&outcome.transcript, case) else {
-            let why = ending.map_or("it printed nothing about it".into(), |fault| fault.reason);
+        let Some((line, run)) = ran.next() else {
+            let why = ending.map(|fault| fault.reason).or(damaged);
+            let why = why.unwrap_or_else(|| "it printed nothing about it".into());
             let log = outcome.log.display();
-            judged.push(verdict(
-                case,
-                Err(format!("did not run: {why}; the serial log is {log}")),
-            ));
+            let why = format!("did not run: {why}; the serial log is {log}");
+            judged.push(verdict(case, Err(why)));
             return judged;
         };
-        judged.push(verdict(case, compare(case, &ran, settings)));
+        judged.push(verdict(case, compare_run(case, line, run, settings)));
     }
     match (ending, judged.last_mut()) {
         (Some(fault), Some(last)) if last.outcome.is_ok() => last.outcome = Err(fault.reason),
@@ -141,4 +152,32 @@ fn judge(outcome: &Outcome, cases: &[(&Case, &str)], settings: &Settings) -> Vec
         _ => {}
     }
     judged
+}
+
+/// Compares a case with its trace, and with what the guest itself says of the run.
+fn compare_run(
+    case: &Case,
+    line: &MachineLine,
+    run: &Run,
+    settings: &Settings,
+) -> Result<Deviation, String> {
+    if line.text_at("case") != Some(case.name.as_str()) || run.lost > 0 {
+        return Err(format!(
+            "its trace is not whole, before line {}",
+            line.number
+        ));
+    }
+    let events = run.events.iter().copied();
+    let record = Record::of_events(&run.task_set, true, events).ok_or("too many jobs")?;
+    let (unit_ns, tolerance_ns) = (settings.scale().unit_ns, settings.tolerance_ns());
+    let deviation = compare(case, &run.task_set, &record, unit_ns, tolerance_ns)?;
+    for what in ["violations", "allocations"] {
+        equal(
+            "the guest itself",
+            what,
+            0,
+            line.number_at(what).unwrap_or(u64::MAX),
+        )?;
+    }
+    Ok(deviation)
 }

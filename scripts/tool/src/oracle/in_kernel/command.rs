@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use replay::Case;
 use replay::lines::Malformed;
 
-use super::{Deviation, Judged, Settings, run};
+use super::{Judged, Settings, run};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
-use crate::oracle::{read, schedules};
+use crate::oracle::read;
+use crate::oracle::schedules::{self, Deviation};
 use crate::qemu::{MOST_CORES, Machine, Mode};
 
 static IN_KERNEL: Command = Command {

@@ -1,7 +1,7 @@
 //! Reference schedules on the bare machine: the kernel against the oracle.
 //!
 //! The app `replay` runs the cases, all that have the same number of cores in
-//! one boot, and prints what happened; the comparison is made here. For every
+//! one boot; what happened is in their traces, which are compared here. For every
 //! instance start and finish have to be near the reference, the number of
 //! preemptions equal; for every job the release and whether it missed equal, the
 //! finish near. *Near* is within a tolerance, a fraction of a unit below a half,
@@ -30,15 +30,14 @@
 
 mod boots;
 mod command;
-mod compare;
 #[cfg(test)]
 mod tests;
-mod transcript;
 
 use std::time::Duration;
 
 use replay::{Case, Scale};
 
+use super::schedules::Deviation;
 use crate::qemu::{Machine, Mode};
 
 pub use boots::run;
@@ -73,15 +72,6 @@ pub struct Judged {
     pub cores: u32,
     /// How near it came, or the first difference, in one line.
     pub outcome: Result<Deviation, String>,
-}
-
-/// How far starts and finishes were from the reference.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Deviation {
-    /// The most that one was early, in nanoseconds, as a negative number.
-    pub earliest_ns: i128,
-    /// The most that one was late, in nanoseconds.
-    pub latest_ns: i128,
 }
 
 impl Settings {
@@ -129,7 +119,8 @@ impl Settings {
         const FOR_BOOT: Duration = Duration::from_secs(120);
         const FOR_CASE: Duration = Duration::from_secs(5);
         let count = u32::try_from(cases.len()).unwrap_or(u32::MAX);
-        let units = cases.iter().map(|case| last_finish(case));
+        let finishes = |case: &&Case| case.instances.values().map(|times| times.finish_ns).max();
+        let units = cases.iter().filter_map(finishes);
         let real = match self.mode {
             Mode::Deterministic => Duration::ZERO,
             Mode::Kvm | Mode::Threads => Duration::from_micros(self.unit_us)
@@ -137,20 +128,4 @@ impl Settings {
         };
         FOR_BOOT + FOR_CASE.saturating_mul(count) + real.saturating_mul(2)
     }
-}
-
-impl Deviation {
-    /// Returns what holds for both.
-    #[must_use]
-    pub fn and(self, other: Self) -> Self {
-        Self {
-            earliest_ns: self.earliest_ns.min(other.earliest_ns),
-            latest_ns: self.latest_ns.max(other.latest_ns),
-        }
-    }
-}
-
-fn last_finish(case: &Case) -> u64 {
-    let finishes = case.instances.iter().map(|times| times.finish_ns);
-    finishes.max().unwrap_or(0)
 }

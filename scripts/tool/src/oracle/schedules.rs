@@ -1,0 +1,158 @@
+//! Reference schedules: what runs when, to the unit.
+//!
+//! A case is a set of DAGs with the execution time of every instance, and the
+//! schedule that two independent implementations agree on (`replay::Case` has the
+//! format). [`check`] replays the DAGs through the real scheduler in virtual
+//! time; [`compare`] holds what ran, there or on a machine, against the case: each
+//! start, finish and number of preemptions, and of each job release, finish, response
+//! time and miss.
+
+use std::collections::BTreeMap;
+use std::fmt::Display;
+
+use sched_dag::law::{InstanceRecord, JobRecord, Record};
+use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
+use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, TaskSet};
+
+pub use ::replay::{Case, parse};
+
+use crate::oracle::equal;
+
+/// More cores than these are only simulated if there are as many subtasks: of
+/// each subtask at most one instance runs at a time.
+const ALWAYS_SIMULATED: usize = 1024;
+
+/// How far starts and finishes were from the reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Deviation {
+    /// The most that one was early, in nanoseconds, as a negative number.
+    pub earliest_ns: i128,
+    /// The most that one was late, in nanoseconds.
+    pub latest_ns: i128,
+}
+
+impl Deviation {
+    /// Returns what holds for both.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            earliest_ns: self.earliest_ns.min(other.earliest_ns),
+            latest_ns: self.latest_ns.max(other.latest_ns),
+        }
+    }
+}
+
+/// Replays a case and compares everything that it expects.
+///
+/// # Errors
+///
+/// The first difference, in one line.
+pub fn check(case: &Case) -> Result<(), String> {
+    let subtasks: usize = case.executions_ns.iter().map(Vec::len).sum();
+    let useful = u32::try_from(subtasks.max(ALWAYS_SIMULATED)).unwrap_or(u32::MAX);
+    let options = SchedulerOptions {
+        policy: case.policy,
+        preemption: case.preemption,
+        cores: case.cores.min(useful),
+    };
+    let mut run = VirtualTime::new(&case.task_set, options).recording();
+    let end = run.run(&mut ExecutionTimes(|instance: Instance| {
+        let times = &case.executions_ns[instance.dag.index()][instance.subtask.index()];
+        times[usize::try_from(instance.job).expect("few jobs")]
+    }));
+    match end {
+        End::Finished => {}
+        End::TimeReached | End::Stopped => return Err("the replay stopped early".to_owned()),
+        End::TimeOverflow(instance) => return Err(format!("{instance} never finishes")),
+    }
+    if !run.is_finished() {
+        return Err("some jobs have not ended".to_owned());
+    }
+    let events = run.events().into_iter();
+    let record = Record::of_events(&case.task_set, true, events).ok_or("too many jobs")?;
+    compare(case, &case.task_set, &record, 1, 0).map(drop)
+}
+
+/// Compares a case with the record of a run in which a unit of its time was so long; starts,
+/// finishes and response times may be `tolerance_ns` off. Returns how far they were.
+///
+/// # Errors
+///
+/// The first difference in the order of the reference's starts, then of its jobs, in one line.
+pub fn compare(
+    case: &Case,
+    task_set: &TaskSet,
+    record: &Record,
+    unit_ns: u64,
+    tolerance_ns: u64,
+) -> Result<Deviation, String> {
+    let instances: BTreeMap<Instance, &InstanceRecord> = record.all_instances(task_set).collect();
+    let dags = (0..).map(DagId).zip(task_set.dags());
+    let jobs = dags.flat_map(|(dag, _)| {
+        let numbered = record.numbered(dag);
+        numbered.map(move |(job, times)| ((dag, job), times))
+    });
+    let jobs: BTreeMap<(DagId, u64), &JobRecord> = jobs.collect();
+    if !instances.keys().eq(case.instances.keys()) || !jobs.keys().eq(case.jobs.keys()) {
+        return Err("there were other jobs or instances than the case's".to_owned());
+    }
+    let mut near = Near {
+        unit_ns,
+        tolerance_ns,
+        deviation: Deviation::default(),
+    };
+    let mut by_start: Vec<_> = case.instances.iter().zip(instances.values()).collect();
+    by_start.sort_by_key(|((_, expected), _)| expected.start_ns);
+    for ((instance, expected), found) in by_start {
+        near.check(instance, "start", expected.start_ns, found.start_ns)?;
+        near.check(instance, "finish", expected.finish_ns, found.finish_ns)?;
+        let preemptions = found.preemptions.into();
+        equal(instance, "preemptions", expected.preemptions, preemptions)?;
+    }
+    for ((&(dag, job), expected), found) in case.jobs.iter().zip(jobs.values()) {
+        let place = format!("dag {} job {job}", dag.0);
+        let release_ns = found.release_ns.unwrap_or(u64::MAX);
+        let expected_ns = expected.release_ns.saturating_mul(unit_ns);
+        equal(&place, "release", expected_ns, release_ns)?;
+        let finish_ns = record.completion_ns(dag, job);
+        near.check(&place, "finish", expected.finish_ns, finish_ns)?;
+        let response_ns = found.ended_ns.map(|ended_ns| ended_ns - release_ns);
+        near.check(&place, "response", expected.response_ns, response_ns)?;
+        let missed = found.outcome != Some(JobOutcome::Met);
+        equal(&place, "missed", expected.missed.into(), missed.into())?;
+    }
+    Ok(near.deviation)
+}
+
+/// Compares times, and remembers the greatest differences.
+struct Near {
+    unit_ns: u64,
+    tolerance_ns: u64,
+    deviation: Deviation,
+}
+
+impl Near {
+    fn check(
+        &mut self,
+        place: impl Display,
+        what: &str,
+        units: u64,
+        found_ns: Option<u64>,
+    ) -> Result<(), String> {
+        let found_ns = found_ns.ok_or_else(|| format!("{place}: {what}: there was none"))?;
+        let difference_ns = i128::from(found_ns) - i128::from(units) * i128::from(self.unit_ns);
+        if difference_ns.unsigned_abs() > u128::from(self.tolerance_ns) {
+            let (whole, part) = (found_ns / self.unit_ns, found_ns % self.unit_ns);
+            let found = match u128::from(part) * 1000 / u128::from(self.unit_ns) {
+                0 => whole.to_string(),
+                thousandths => format!("{whole}.{thousandths:03}"),
+            };
+            return Err(format!("{place}: {what}: expected {units}, found {found}"));
+        }
+        self.deviation = self.deviation.and(Deviation {
+            earliest_ns: difference_ns,
+            latest_ns: difference_ns,
+        });
+        Ok(())
+    }
+}
