@@ -12,18 +12,17 @@
 //! - [`sizes`]: what each part of an image takes of its room.
 
 pub mod bounds;
-mod code;
+mod frame;
 pub mod hand_off;
 pub mod join_latency;
 pub mod native;
-mod plots;
 pub mod sizes;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use crate::options::{Command, Menu, Parsed, Refusal, choices};
 use crate::progress::Lasting;
+use crate::options::{Menu, choices};
 
 static BENCH: Menu = Menu {
     invocation: "./scripts/bench",
@@ -51,19 +50,4 @@ pub fn bench(words: &[OsString]) -> ExitCode {
     let of_silent = words.first().is_some_and(is_silent);
     let _lasting = of_silent.then(|| Lasting::new("measuring"));
     BENCH.run(words)
-}
-
-/// Runs a measurement: `measure` gets what `plan` makes of the options, and says whether all limits
-/// hold.
-fn by_plan<Plan>(
-    table: &Command,
-    words: &[OsString],
-    plan: impl Fn(&Parsed) -> Result<Plan, String>,
-    measure: impl Fn(&Plan) -> Result<bool, String>,
-) -> ExitCode {
-    table.carry_out(words, |options| {
-        let plan = plan(options).map_err(Refusal::Usage)?;
-        let is_good = measure(&plan)?;
-        Ok(ExitCode::from(u8::from(!is_good)))
-    })
 }

@@ -49,7 +49,7 @@ fn a_refused_command_empties_no_file() {
         "run --serial old.log --app none",
         "run --serial old.log --dot old.dot --image bad.dag",
         "run --serial old.log --qemu /none",
-        "bench hand-off --save-baseline --baseline base.json --jobs 5",
+        "bench hand-off --save-baseline --baseline base.json --mode threads",
         "trace bad.dag -o old.log",
     ] {
         refusal(&folder, line.split(' '));

@@ -20,7 +20,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::process::ExitCode;
 
-use super::plots;
+use super::frame;
 use crate::files;
 use crate::options::{Command, Parsed, Refusal, Takes, options};
 use curves::{Point, measure};
@@ -71,7 +71,7 @@ fn measure_all(options: &Parsed) -> Result<(), Refusal> {
         let file = out.join("bounds.csv");
         let written = fs::create_dir_all(out).and_then(|()| fs::write(&file, curves::csv(&points)));
         written.map_err(|error| format!("`--out {}`: {error}", files::place(out)))?;
-        match plots::draw("bounds.py", out) {
+        match frame::draw("bounds.py", out) {
             Ok(()) => println!("{}", out.join("plots/bounds.svg").display()),
             Err(line) => println!("{line}"),
         }

@@ -1,19 +1,20 @@
-//! The figures that the repository keeps, and how new ones stand to them.
+//! The figures that the repository keeps, how new ones stand to them, and the tables.
 //!
 //! A baseline holds counted instructions, which repeat exactly on one core: one that
 //! differs comes from a change of the code, of the compiler or of QEMU. On several cores
 //! a rare interrupt comes some nanoseconds later, so there the margin is wider and the
 //! p99 does not count. [`MARGIN_RULE`] says when a figure has *grown*.
 
-use std::fmt::Write;
 use std::fs;
+use std::iter;
 use std::path::Path;
 
-use super::figure::Figure;
+use crate::bench::frame::{Column, Figure, Table};
 use crate::json::{self, Object};
+use crate::qemu::Mode;
 
 /// When a figure has grown, in words; [`margin`] says the same.
-pub(super) const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
+const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
      instructions, the jitter by 20; a commit by more than 10 %; on several cores the median \
      by more than 10 % and 40";
 
@@ -32,7 +33,7 @@ fn margin(figure: &Figure) -> (u128, u128) {
 }
 
 /// Reports whether a figure has grown since the baseline.
-pub(super) fn has_grown(now: &Figure, before: &Figure) -> bool {
+fn has_grown(now: &Figure, before: &Figure) -> bool {
     let (percent, instructions) = margin(now);
     let grows = |now_is: u64, was: u64| {
         // Both for the same number of steps.
@@ -49,45 +50,192 @@ pub(super) fn has_grown(now: &Figure, before: &Figure) -> bool {
 ///
 /// In words: the file cannot be read, or holds something else.
 pub(super) fn read(file: &Path) -> Result<Vec<Figure>, String> {
-    let place = file.display();
-    let again = "`./scripts/bench hand-off --save-baseline` writes it anew";
-    let text = fs::read_to_string(file)
-        .map_err(|error| format!("the baseline `{place}`: {error}; {again}"))?;
-    let value =
-        json::parse(&text).map_err(|error| format!("the baseline `{place}`: {error}; {again}"))?;
-    let figures = value.get("figures").map_or(&[][..], |list| list.elements());
-    let figures: Option<Vec<Figure>> = figures.iter().map(Figure::from_json).collect();
-    figures
-        .filter(|figures| !figures.is_empty())
-        .ok_or_else(|| format!("the baseline `{place}` holds no figures; {again}"))
-}
-
-/// Writes a baseline.
-///
-/// # Errors
-///
-/// In words: the file cannot be written.
-pub(super) fn write(file: &Path, figures: &[Figure]) -> Result<(), String> {
-    let failed = |error| format!("cannot write the baseline `{}`: {error}", file.display());
-    fs::write(file, text(figures)).map_err(failed)
+    let figures = || {
+        let text = fs::read_to_string(file).map_err(|error| format!(": {error}"))?;
+        let value = json::parse(&text).map_err(|error| format!(": {error}"))?;
+        let figures = value.get("figures").map_or(&[][..], |list| list.elements());
+        let figures: Option<Vec<Figure>> = figures.iter().map(Figure::from_json).collect();
+        let figures = figures.filter(|figures| !figures.is_empty());
+        figures.ok_or_else(|| " holds no figures".to_string())
+    };
+    figures().map_err(|why| {
+        let place = file.display();
+        format!(
+            "the baseline `{place}`{why}; `./scripts/bench hand-off --save-baseline` writes it anew"
+        )
+    })
 }
 
 /// Returns a baseline's text, a line a figure.
 pub(super) fn text(figures: &[Figure]) -> String {
-    let mut text = String::from("{\"counts\":\"instructions\",\"figures\":[\n");
-    for (number, figure) in figures.iter().enumerate() {
-        let end = if number + 1 < figures.len() { "," } else { "" };
-        // Writing into a `String` cannot fail.
-        let _ = writeln!(text, "{}{end}", figure.json(Object::new()));
+    let lines: Vec<String> = figures
+        .iter()
+        .map(|figure| figure.json(Object::new()))
+        .collect();
+    let lines = lines.join(",\n");
+    format!("{{\"counts\":\"instructions\",\"figures\":[\n{lines}\n]}}\n")
+}
+
+/// The figures, and what a person reads of each.
+const NAMES: &[(&str, &str)] = &[
+    ("reading", "reading the clock"),
+    ("stamp", "a body's stamp"),
+    ("return_to_ready", "last return -> successor ready"),
+    ("ready_to_start", "ready -> first instruction"),
+    ("return_to_start", "last return -> first instruction"),
+    (
+        "return_to_start_recorded",
+        "the same, if the value is recorded",
+    ),
+    ("recording", "recording a value"),
+    ("hop", "start -> start, per hop"),
+    ("source_to_sink", "source start -> sink start"),
+    ("instance", "source start -> sink start, per instance"),
+    ("release_to_start", "release -> first instruction"),
+    ("release_jitter", "release jitter above its minimum"),
+    ("commit", "commit, per subtask"),
+    ("allocations", "heap allocations, per job"),
+    ("locks", "takings of the scheduler's lock, per instance"),
+    ("sink_wakeups", "times the sink was made ready, per job"),
+    (
+        "request_to_suspended",
+        "preemption request -> the preempted suspended",
+    ),
+    (
+        "suspended_to_start",
+        "suspended -> preemptor started: switch of contexts",
+    ),
+    (
+        "finish_to_resumed",
+        "preemptor finished -> the preempted resumed",
+    ),
+    (
+        "preempted_to_start",
+        "preempted -> preemptor's first instruction",
+    ),
+    (
+        "return_to_resumed",
+        "preemptor's return -> the preempted goes on",
+    ),
+];
+
+/// Says in words what it is a figure of.
+fn name(figure: &Figure) -> &str {
+    let named = NAMES
+        .iter()
+        .find(|(figure_of, _)| *figure_of == figure.figure);
+    named.map_or(&figure.figure, |(_, name)| name)
+}
+
+fn heading(figure: &Figure) -> String {
+    match figure.cores {
+        1 => figure.workload.clone(),
+        cores => format!("{}, {cores} cores", figure.workload),
     }
-    text + "]}\n"
+}
+
+/// Adds a row for each figure, under the workload that it is of.
+fn add_rows(
+    table: &mut Table<'_>,
+    figures: &[Figure],
+    mut cells: impl FnMut(&Figure) -> Vec<String>,
+) {
+    let mut before = String::new();
+    for figure in figures {
+        let heading = heading(figure);
+        if heading != before {
+            table.line(&heading);
+            before = heading;
+        }
+        table.cells(iter::once(format!("  {}", name(figure))).chain(cells(figure)));
+    }
+}
+
+/// Returns the table of all figures, with the modes side by side.
+pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
+    let mut units = format!("{:60}", "");
+    let mut columns: Vec<Column<'_>> = vec![("", -60, 0)];
+    for (mode, _) in measured {
+        let unit = match mode {
+            Mode::Deterministic => "instructions".into(),
+            _ => format!("nanoseconds, {mode}"),
+        };
+        units += &format!("  {unit:^32}");
+        columns.extend([("median", 12, 0), ("p99", 11, 0), ("max", 11, 0)]);
+    }
+    let mut table = Table::new(&(units + "\n"), &columns);
+    let first = measured.first().map_or(&[][..], |(_, figures)| figures);
+    add_rows(&mut table, first, |figure| {
+        let of_mode = |(_, figures): &(Mode, Vec<Figure>)| {
+            let one = figures.iter().find(|other| other.is_same(figure));
+            one.map_or_else(Default::default, |one| {
+                [one.median, one.p99, one.max].map(|number| one.one(number))
+            })
+        };
+        measured.iter().flat_map(of_mode).collect()
+    });
+    table.text()
+}
+
+/// A comparison as text, and what comes of it.
+pub(super) struct Comparison {
+    pub(super) text: String,
+    /// What has grown or is missing, a line each.
+    pub(super) complaints: Vec<String>,
+}
+
+/// Returns the table of baseline, now and their ratio.
+pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> Comparison {
+    let columns = [
+        ("instructions", -60, 0),
+        ("baseline", 12, 0),
+        ("now", 11, 0),
+        ("ratio", 8, 0),
+        ("p99 was", 12, 0),
+        ("p99 is", 11, 0),
+        ("", 0, 0),
+    ];
+    let mut table = Table::new("", &columns);
+    let mut complaints = Vec::new();
+    add_rows(&mut table, now, |figure| {
+        let [is, p99_is] = [figure.median, figure.p99].map(|number| figure.one(number));
+        let Some(before) = baseline.iter().find(|before| before.is_same(figure)) else {
+            let (none, mark) = (String::new, "  new: save the baseline to keep it".into());
+            return vec![none(), is, none(), none(), p99_is, mark];
+        };
+        let [was, p99_was] = [before.median, before.p99].map(|number| before.one(number));
+        let ratio = match (figure.median, before.median) {
+            (0, 0) => 1.0,
+            (now, was) => figure.of_step(now) / before.of_step(was),
+        };
+        let mut mark = String::new();
+        if has_grown(figure, before) {
+            mark = "  GROWN".into();
+            let (place, name) = (heading(figure), name(figure));
+            complaints.push(format!(
+                "{place}, {name}: {is} (p99 {p99_is}) instead of {was} ({p99_was})"
+            ));
+        }
+        vec![was, is, format!("{ratio:.3}"), p99_was, p99_is, mark]
+    });
+    for gone in missing(now, baseline) {
+        let line = format!("{}, {}: not measured any more", heading(gone), name(gone));
+        table.line(&line);
+        complaints.push(line);
+    }
+    let verdict = match complaints.len() {
+        0 => "nothing has grown".into(),
+        some => format!("{some} GROWN OR MISSING"),
+    };
+    table.line(&format!(
+        "{verdict} ({MARGIN_RULE}; `./scripts/bench hand-off --save-baseline` accepts it)"
+    ));
+    let text = table.text();
+    Comparison { text, complaints }
 }
 
 /// Returns the figures of a baseline that were not measured now.
-pub(super) fn missing<'a>(
-    now: &'a [Figure],
-    baseline: &'a [Figure],
-) -> impl Iterator<Item = &'a Figure> {
+fn missing<'a>(now: &'a [Figure], baseline: &'a [Figure]) -> impl Iterator<Item = &'a Figure> {
     let is_missing = |before: &&Figure| !now.iter().any(|now| now.is_same(before));
     baseline.iter().filter(is_missing)
 }
@@ -106,6 +254,7 @@ mod tests {
             median,
             p99,
             max: p99,
+            ..Figure::default()
         }
     }
 
@@ -139,7 +288,7 @@ mod tests {
         fs::create_dir_all(&folder).unwrap();
         let file = folder.join("baseline.json");
         let figures = [figure([1, 2, 3]), figure([4, 5, 6])];
-        write(&file, &figures).unwrap();
+        fs::write(&file, text(&figures)).unwrap();
         let before = read(&file).unwrap();
         assert_eq!(before, figures);
         assert_eq!(missing(&[], &before).count(), 2);

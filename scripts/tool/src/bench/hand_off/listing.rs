@@ -12,8 +12,8 @@ use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use super::plan::Boot;
-use crate::bench::code::{self, Frames};
+use super::boots::{Boot, Kind, LIMIT};
+use crate::bench::frame::code::{self, Frames};
 use crate::places::Frame;
 use crate::qemu::{Ending, Mode};
 use crate::{protocol::Status, system};
@@ -39,9 +39,9 @@ the app's function | apps/
 /// # Errors
 ///
 /// In words: a program is missing, the guest failed, or the file cannot be written.
-pub(super) fn list(boot: &Boot, image: &Path, file: &Path) -> Result<(), String> {
+pub(super) fn list(image: &Path, file: &Path) -> Result<(), String> {
     let instructions = code::instructions(image)?;
-    let executed = executed(boot, image)?;
+    let executed = executed(image)?;
     let frames = |addresses: BTreeSet<u64>| {
         let addresses: Vec<u64> = addresses.into_iter().collect();
         code::frames(image, &addresses)
@@ -59,8 +59,10 @@ pub(super) fn list(boot: &Boot, image: &Path, file: &Path) -> Result<(), String>
 }
 
 /// Boots the image and returns the addresses of all instructions that it executes.
-fn executed(boot: &Boot, image: &Path) -> Result<Vec<u64>, String> {
-    let mut qemu = boot.qemu(Mode::Deterministic);
+fn executed(image: &Path) -> Result<Vec<u64>, String> {
+    // Few jobs, as a log is long.
+    let words = "part=workloads jobs=5 chain=64 branches=1 layered=3";
+    let mut qemu = Boot::new(Kind::Figures, 1, 64, words).qemu(Mode::Deterministic);
     qemu.logs_instructions = true;
     let serial = system::new_log("listing")?;
     let mut running = qemu.start(image, &serial)?;
@@ -68,7 +70,7 @@ fn executed(boot: &Boot, image: &Path) -> Result<Vec<u64>, String> {
     let (ending, addresses) = std::thread::scope(|scope| {
         let reader =
             scope.spawn(|| log.map_or_else(Vec::new, |log| addresses(BufReader::new(log))));
-        let followed = running.follow(super::LIMIT, &mut |_| ());
+        let followed = running.follow(LIMIT, &mut |_| ());
         followed.map(|(ending, _)| (ending, reader.join().unwrap_or_default()))
     })?;
     if ending != Ending::Guest(Status::Success) {

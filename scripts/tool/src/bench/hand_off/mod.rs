@@ -5,43 +5,142 @@
 //! the same figures come out of every run, and can be held against those that
 //! the repository keeps: `tests/baselines/hand-off.json`.
 //!
-//! - `table`, `plan`: what is to be measured;
-//! - `figure`, `baseline`: what was, and what it was before;
+//! - `boots`: what measures them;
+//! - `baseline`: what they were before, and the tables;
 //! - `traced`: what only the trace can tell;
-//! - `report`, `scale`: the tables;
+//! - `scale`: the same on more cores, and with more subtasks;
 //! - `listing`: one hop, instruction by instruction.
 
 mod baseline;
-mod figure;
+mod boots;
 mod listing;
-mod plan;
-mod report;
 mod scale;
-mod table;
 mod traced;
 
 use std::ffi::OsString;
-use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
-use figure::Figure;
-use plan::{Boot, Kind, Plan};
-
-use super::by_plan;
+use super::frame::{Figure, by_plan};
+use crate::files::{self, Named};
 use crate::golden::Golden;
-use crate::outcome::boot;
+use crate::options::{Command, Parsed, Takes, options};
 use crate::progress::Progress;
 use crate::qemu::Mode;
 use crate::{image, install, probe, system};
 
-/// How long a boot may take in wall time.
-const LIMIT: Duration = Duration::from_secs(300);
+static TABLE: Command = Command {
+    invocation: "./scripts/bench hand-off",
+    about: "Measures on the machine the way from a completion to its successor's first instruction.",
+    positional: None,
+    options: options! {
+        /// What is counted: instructions (deterministic), time (kvm, threads), or both.
+        "mode": Takes::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
+        /// Compare the instructions with the baseline; one that grew is a failure.
+        "compare": Takes::Nothing;
+        /// Write the instructions into the baseline.
+        "save-baseline": Takes::Nothing;
+        /// The baseline; tests/baselines/hand-off.json if not given.
+        "baseline": Takes::File("FILE");
+        /// Instead, count what the workloads cost on more cores and with more subtasks.
+        "scale": Takes::Nothing;
+        /// Instead, log each instruction of one hop, count them by parts of the code, and write
+        /// them to FILE. Needs objdump and addr2line (binutils).
+        "listing": Takes::File("FILE");
+    },
+    notes: "What each row means stands in docs/performance.md.
+
+Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
+2 the command line is refused.
+",
+};
+
+/// The baseline that is kept, from the workspace's root.
+const BASELINE: &str = "tests/baselines/hand-off.json";
+
+/// What is to be measured.
+#[derive(Debug)]
+enum Plan {
+    /// All figures.
+    Figures {
+        /// The one mode to measure in; else instructions and time.
+        mode: Option<Mode>,
+        /// The figures of the baseline, if they are to be compared.
+        before: Option<Vec<Figure>>,
+        /// Where the instructions are to be kept.
+        saved: Option<PathBuf>,
+    },
+    /// What cores and subtasks cost.
+    Scale,
+    /// The instructions of one hop, and where to write them.
+    Listing(PathBuf),
+}
+
+impl Plan {
+    /// Settles the plan.
+    ///
+    /// # Errors
+    ///
+    /// What the options ask for cannot be: one line that says why.
+    fn new(options: &Parsed) -> Result<Self, String> {
+        let mut all = vec![
+            "listing",
+            "scale",
+            "compare",
+            "save-baseline",
+            "baseline",
+            "mode",
+        ];
+        while let Some(own @ ("listing" | "scale")) = all.first().copied() {
+            all.remove(0);
+            if let Some(other) = options.given_of(&all).filter(|_| options.is_given(own)) {
+                return Err(format!(
+                    "`--{own}` with `--{other}`: it is a run of its own; leave `--{other}` out"
+                ));
+            }
+        }
+        let mode = options.text("mode").and_then(Mode::from_name);
+        match options.given_of(&["compare", "save-baseline"]) {
+            Some(name) if mode.is_some_and(|mode| mode != Mode::Deterministic) => {
+                return Err(format!(
+                    "`--{name}` needs the instructions, which this mode does not count; \
+                     leave `--mode` out"
+                ));
+            }
+            None if options.is_given("baseline") => {
+                let line = "`--baseline` without `--compare` and `--save-baseline`: it has no \
+                            use; give one of them, or leave it out";
+                return Err(line.into());
+            }
+            _ => {}
+        }
+        let kept = || system::workspace().join(BASELINE);
+        let baseline = options.path("baseline").map_or_else(kept, PathBuf::from);
+        let path = &*baseline;
+        let saved = options.is_given("save-baseline").then_some(Named {
+            option: "baseline",
+            path,
+        });
+        let written = options.named(&["listing"]).into_iter().chain(saved);
+        files::check(&[], &written.collect::<Vec<_>>())?;
+        if let Some(file) = options.path("listing") {
+            return Ok(Self::Listing(file.into()));
+        }
+        if options.is_given("scale") {
+            return Ok(Self::Scale);
+        }
+        let before = options.is_given("compare").then(|| baseline::read(path));
+        Ok(Self::Figures {
+            mode,
+            before: before.transpose()?,
+            saved: saved.map(|named| named.path.into()),
+        })
+    }
+}
 
 /// Runs `bench hand-off` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    by_plan(&table::TABLE, words, Plan::new, measure_all)
+    by_plan(&TABLE, words, Plan::new, measure)
 }
 
 /// Measures as `--compare` does, and prints the table; rewrites the baseline if figures have
@@ -51,14 +150,11 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 ///
 /// In words: a guest failed, there is no baseline, or which figures have grown.
 pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
-    let words = ["--compare".into(), "--mode=deterministic".into()];
-    let options = table::TABLE.parse(&words);
-    let plan = Plan::new(&options.map_err(|refusal| format!("{refusal:?}"))?)?;
     install::ensure_qemu()?;
-    let before = plan.before.as_deref().unwrap_or_default();
+    let before = baseline::read(&system::workspace().join(BASELINE))?;
     let image = image::build("hand-off")?;
-    let now = measure_mode(&plan, Mode::Deterministic, &image.path)?;
-    let comparison = report::comparison(&now, before);
+    let now = measure_mode(Mode::Deterministic, &image.path)?;
+    let comparison = baseline::comparison(&now, &before);
     print!("{}", comparison.text);
     if comparison.complaints.is_empty() {
         return Ok(());
@@ -66,87 +162,55 @@ pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     if list.is_none() {
         return Err(comparison.complaints.join("; "));
     }
-    let (file, text) = (plan::BASELINE, &*baseline::text(before));
+    let (file, text) = (BASELINE, &*baseline::text(&before));
     let below = "";
     Golden { file, below, text }.compare(&baseline::text(&now), list)
 }
 
 /// Measures and reports. Returns whether nothing has grown.
-fn measure_all(plan: &Plan) -> Result<bool, String> {
+fn measure(plan: &Plan) -> Result<bool, String> {
     install::ensure_qemu()?;
-    if let Some(scale) = &plan.scale {
-        return measure_scale(scale).map(|()| true);
-    }
-    let image = image::build("hand-off")?;
-    if let Some((boot, file)) = &plan.listing {
-        return listing::list(boot, &image.path, file).map(|()| true);
-    }
+    let image = &image::build("hand-off")?.path;
+    let (mode, before, saved) = match plan {
+        Plan::Scale => return scale::measure(image).map(|()| true),
+        Plan::Listing(file) => return listing::list(image, file).map(|()| true),
+        Plan::Figures {
+            mode,
+            before,
+            saved,
+        } => (*mode, before, saved),
+    };
     let mut measured = Vec::new();
-    for mode in modes(plan, &image.path)? {
-        let figures = measure_mode(plan, mode, &image.path)?;
+    for mode in modes(mode, image)? {
+        let figures = measure_mode(mode, image)?;
         for figure in &figures {
-            println!("{}", figure.machine_line(mode));
+            println!("{}", boots::machine_line(figure, mode));
         }
         measured.push((mode, figures));
     }
-    print!("{}", report::table(&measured));
-    let instructions = measured
-        .iter()
-        .find(|(mode, _)| *mode == Mode::Deterministic);
-    let Some((_, instructions)) = instructions else {
-        return Ok(true);
-    };
+    print!("{}", baseline::table(&measured));
     let mut is_good = true;
-    if let Some(before) = &plan.before {
-        let comparison = report::comparison(instructions, before);
-        print!("{}", comparison.text);
-        is_good = comparison.complaints.is_empty();
-    }
-    if plan.saves {
-        baseline::write(&plan.baseline, instructions)?;
-        println!("written: {}", plan.baseline.display());
+    let instructions = |(mode, _): &&(Mode, _)| *mode == Mode::Deterministic;
+    if let Some((_, figures)) = measured.iter().find(instructions) {
+        if let Some(before) = before {
+            let comparison = baseline::comparison(figures, before);
+            print!("{}", comparison.text);
+            is_good = comparison.complaints.is_empty();
+        }
+        if let Some(file) = saved {
+            files::write(file, baseline::text(figures))?;
+            println!("written: {}", file.display());
+        }
     }
     Ok(is_good)
 }
 
-/// Counts what more cores and more subtasks cost.
-fn measure_scale(scale: &plan::Scale) -> Result<(), String> {
-    let image = image::build("hand-off")?;
-    let count = |sizes: &[u64], boot: &dyn Fn(u64) -> Boot| {
-        let counted = sizes.iter().map(|&size| {
-            let figures = measure(&boot(size), Mode::Deterministic, &image.path)?;
-            for figure in &figures {
-                println!("{}", figure.machine_line(Mode::Deterministic));
-            }
-            Ok((size, figures))
-        });
-        counted.collect::<Result<Vec<_>, String>>()
-    };
-    let jobs = scale.jobs;
-    let by_cores = count(&scale.cores, &|cores| {
-        Boot::of_scale(cores, jobs, scale::LARGEST, scale::SIZES)
-    })?;
-    let by_subtasks = count(&scale.subtasks, &|subtasks| {
-        Boot::of_scale(1, jobs, subtasks, &scale::sizes(subtasks))
-    })?;
-    let by_clusters = count(&scale::CLUSTERS, &|clusters| {
-        Boot::of_clusters(clusters, jobs)
-    })?;
-    println!("medians of the instructions that all cores together executed:");
-    print!("{}", scale::by_cores(&by_cores));
-    println!("layered random graphs on one core:");
-    print!("{}", scale::by_subtasks(&by_subtasks));
-    println!("a layered random graph in each cluster of 4 cores:");
-    print!("{}", scale::by_clusters(&by_clusters)?);
-    Ok(())
-}
-
 /// Settles the modes: where none is named, instructions, and time as real as can be had.
-fn modes(plan: &Plan, image: &Path) -> Result<Vec<Mode>, String> {
-    let timed = plan.boots.iter().filter(|boot| boot.is_for(Mode::Kvm));
+fn modes(named: Option<Mode>, image: &Path) -> Result<Vec<Mode>, String> {
+    let timed = boots::of_mode(Mode::Kvm).into_iter();
     let machine = timed.max_by_key(|boot| boot.cores);
     let machine = machine.map_or_else(Default::default, |boot| boot.qemu(Mode::Kvm));
-    let (mode, why) = probe::choose(plan.mode, Mode::Threads, &machine, image)?;
+    let (mode, why) = probe::choose(named, Mode::Threads, &machine, image)?;
     if let Some(why) = why {
         println!("mode {mode} besides deterministic because {why}");
         return Ok(vec![Mode::Deterministic, mode]);
@@ -155,13 +219,13 @@ fn modes(plan: &Plan, image: &Path) -> Result<Vec<Mode>, String> {
 }
 
 /// Makes all boots in one mode.
-fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
+fn measure_mode(mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     let mut figures: Vec<Figure> = Vec::new();
-    let boots: Vec<&Boot> = plan.boots.iter().filter(|boot| boot.is_for(mode)).collect();
+    let boots = boots::of_mode(mode);
     let mut progress = Progress::new(boots.len() as u64, "boots");
     for (boot, over) in boots.into_iter().zip(0..) {
         progress.show(over);
-        for figure in measure(boot, mode, image)? {
+        for figure in boot.measure(mode, image)? {
             // What is counted afterwards stands with its workload.
             let end = figures.iter().rposition(|other| {
                 (other.cores, &other.workload) == (figure.cores, &figure.workload)
@@ -173,34 +237,29 @@ fn measure_mode(plan: &Plan, mode: Mode, image: &Path) -> Result<Vec<Figure>, St
     Ok(figures)
 }
 
-/// Boots once and reads the figures.
-fn measure(what: &Boot, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
-    let log = system::new_log("hand-off")?;
-    let recording = log.with_extension("rec");
-    let mut qemu = what.qemu(mode);
-    qemu.records = (what.kind == Kind::Recorded).then(|| recording.clone());
-    let image = match what.kind {
-        Kind::Figures | Kind::Trace => image.to_path_buf(),
-        Kind::Recorded | Kind::Divided => image::build("guest-tests")?.path,
-    };
-    let outcome = boot(&qemu, &image, &log, LIMIT, |_| {})?;
-    if let Err(fault) = outcome.judge() {
-        return Err(format!(
-            "the guest on {} cores, mode {mode}, failed: {}\n{}",
-            what.cores,
-            fault.reason,
-            outcome.tail()
-        ));
+#[cfg(test)]
+mod tests {
+    use super::{Plan, TABLE};
+
+    /// Command lines, and what is said of them. More are in `tests/commands/files.rs`.
+    const REFUSED: &str = "--compare --mode threads | leave `--mode` out
+--save-baseline --mode threads | `--save-baseline`
+--scale --compare | leave `--compare` out
+--listing x --compare | leave `--compare` out
+--listing x --scale | a run of its own
+--listing /none/x | cannot be written
+--baseline x | without `--compare`
+--compare --baseline /none/x --mode deterministic | the baseline `/none/x`: ";
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        for row in REFUSED.lines() {
+            let (line, words) = row.split_once(" | ").expect(row);
+            let refused = Plan::new(&TABLE.right(line)).expect_err(line);
+            assert!(refused.contains(words), "{refused}");
+        }
+        for line in ["--scale", "--listing /dev/null", "--compare --mode both"] {
+            assert!(Plan::new(&TABLE.right(line)).is_ok(), "{line}");
+        }
     }
-    let figures = match what.kind {
-        Kind::Trace => traced::read_all(&outcome.serial, what.cores)?,
-        _ => Figure::read_all(&outcome.transcript, what.cores)?,
-    };
-    if figures.is_empty() {
-        return Err(format!("the guest printed no figures\n{}", outcome.tail()));
-    }
-    // They are ours, and in the way of no one if they cannot be removed.
-    let _ = fs::remove_file(&log);
-    let _ = fs::remove_file(&recording);
-    Ok(figures)
 }

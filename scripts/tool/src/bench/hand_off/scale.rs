@@ -5,20 +5,17 @@
 //! in between, waiting for a lock included; halted cores execute none. It is work, not
 //! time: what it says is how much more there is to do for each instance.
 
-use std::fmt::Write;
+use std::iter;
+use std::path::Path;
 
-use super::figure::Figure;
+use super::boots::{Boot, Kind, MOST_SUBTASKS, WORKLOADS, machine_line};
+use crate::bench::frame::{Column, Figure, Table};
+use crate::qemu::Mode;
 
-/// The sizes of the workloads when the cores vary.
-pub(super) const SIZES: &str = "chain=64 branches=16 layered=1000";
+/// The workload, figure and heading of each column.
+type Columns = &'static [(&'static str, &'static str, &'static str)];
 
-/// The most subtasks among them.
-pub(super) const LARGEST: u64 = 1000;
-
-/// The columns: workload, figure, heading.
-type Column = (&'static str, &'static str, &'static str);
-
-const BY_CORES: &[Column] = &[
+const BY_CORES: Columns = &[
     ("chain-64", "hop", "chain-64 hop"),
     ("fork-join-16", "return_to_start", "fj-16 return->sink"),
     ("fork-join-16", "source_to_sink", "fj-16 source->sink"),
@@ -27,34 +24,73 @@ const BY_CORES: &[Column] = &[
     ("chain-64", "release_to_start", "release->start"),
 ];
 
-const BY_SUBTASKS: &[Column] = &[
+const BY_SUBTASKS: Columns = &[
     ("layered", "instance", "instance"),
     ("layered", "release_to_start", "release->start"),
     ("layered", "locks", "locks/instance"),
     ("layered", "commit", "commit/subtask"),
 ];
 
-/// The numbers of clusters, and the cores of each.
-pub(super) const CLUSTERS: [u64; 5] = [1, 2, 4, 8, 16];
-pub(super) const CORES_OF_A_CLUSTER: u64 = 4;
-
-/// The subtasks of each cluster's graph; all of them have stacks at one time.
-pub(super) const OF_A_CLUSTER: u64 = 100;
-
-const BY_CLUSTERS: &[Column] = &[
+const BY_CLUSTERS: Columns = &[
     ("layered-100", "instance", "layered instance"),
     ("layered-100", "locks", "locks/instance"),
 ];
 
+const CORES_OF_A_CLUSTER: u64 = 4;
+
+/// The subtasks of each cluster's graph; all of them have stacks at one time.
+const OF_A_CLUSTER: u64 = 100;
+
 /// By how much an instance may cost more where there are more clusters, in per cent.
 const MOST_GROWTH_PERCENT: u64 = 3;
 
-/// Returns a table with a row for each number of clusters.
+/// Counts what more cores, more subtasks and more clusters cost, and prints it.
 ///
 /// # Errors
 ///
-/// In words: an instance costs more than it may where there are more clusters.
-pub(super) fn by_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<String, String> {
+/// In words: a guest failed, or an instance costs more than it may.
+pub(super) fn measure(image: &Path) -> Result<(), String> {
+    let count = |sizes: &[u64], boot: &dyn Fn(u64) -> Boot| {
+        let counted = sizes.iter().map(|&size| {
+            let figures = boot(size).measure(Mode::Deterministic, image)?;
+            for figure in &figures {
+                println!("{}", machine_line(figure, Mode::Deterministic));
+            }
+            Ok((size, figures))
+        });
+        counted.collect::<Result<Vec<_>, String>>()
+    };
+    let by_cores = count(&[1, 2, 4, 8, 16, 32, 64], &|cores| {
+        Boot::new(Kind::Figures, cores, MOST_SUBTASKS, WORKLOADS)
+    })?;
+    let by_subtasks = count(&[10, 100, 1000, 10_000], &|subtasks| {
+        let words = format!("part=workloads chain=2 branches=2 layered={subtasks}");
+        Boot::new(Kind::Figures, 1, subtasks, words)
+    })?;
+    let by_clusters = count(&[1, 2, 4, 8, 16], &|clusters| {
+        let sizes: Vec<String> = (0..clusters)
+            .map(|_| CORES_OF_A_CLUSTER.to_string())
+            .collect();
+        let words = format!("test=cluster_scale jobs=200 clusters={}", sizes.join(","));
+        let (cores, subtasks) = (clusters * CORES_OF_A_CLUSTER, clusters * OF_A_CLUSTER);
+        Boot::new(Kind::Divided, cores, subtasks, words)
+    })?;
+    println!("medians of the instructions that all cores together executed:");
+    print!("{}", table("cores", BY_CORES, &by_cores));
+    println!("layered random graphs on one core:");
+    print!("{}", table("subtasks", BY_SUBTASKS, &by_subtasks));
+    println!("a layered random graph in each cluster of {CORES_OF_A_CLUSTER} cores:");
+    check_clusters(&by_clusters)?;
+    print!("{}", table("clusters", BY_CLUSTERS, &by_clusters));
+    Ok(())
+}
+
+/// Makes sure that an instance costs hardly more where there are more clusters.
+///
+/// # Errors
+///
+/// In words: it does, and how much.
+fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
     let cost = |figures: &[Figure]| {
         let one = figures.iter().find(|figure| figure.figure == "instance")?;
         Some((one.median, one.per))
@@ -73,62 +109,37 @@ pub(super) fn by_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<String, String>
             ));
         }
     }
-    Ok(table("clusters", BY_CLUSTERS, rows))
+    Ok(())
 }
 
-/// Returns the sizes of the workloads for a layered graph of `subtasks` subtasks.
-pub(super) fn sizes(subtasks: u64) -> String {
-    format!("chain=2 branches=2 layered={subtasks}")
-}
-
-/// Returns a table with a row for each number of cores.
-pub(super) fn by_cores(rows: &[(u64, Vec<Figure>)]) -> String {
-    table("cores", BY_CORES, rows)
-}
-
-/// Returns a table with a row for each number of subtasks, on one core.
-pub(super) fn by_subtasks(rows: &[(u64, Vec<Figure>)]) -> String {
-    table("subtasks", BY_SUBTASKS, rows)
-}
-
-fn table(what: &str, columns: &[Column], rows: &[(u64, Vec<Figure>)]) -> String {
-    let mut text = format!("{what:>8}");
-    for (_, _, heading) in columns {
-        // Writing into a `String` cannot fail.
-        let _ = write!(text, "  {heading:>18}");
-    }
-    text.push('\n');
+/// Returns a table with a row for each size; workload `layered` is the one of that size.
+fn table(what: &str, of: Columns, rows: &[(u64, Vec<Figure>)]) -> String {
+    let mut columns: Vec<Column<'_>> = vec![(what, 8, 0)];
+    columns.extend(of.iter().map(|&(_, _, heading)| (heading, 20, 0)));
+    let mut table = Table::new("", &columns);
     for (size, figures) in rows {
-        let _ = write!(text, "{size:>8}");
         let sized = format!("layered-{size}");
-        for &(workload, name, _) in columns {
-            let is_it = |figure: &&Figure| {
-                (figure.workload == workload || (workload == "layered" && figure.workload == sized))
-                    && figure.figure == name
+        let median = |&(workload, name, _): &(&str, &str, _)| {
+            let workload = if workload == "layered" {
+                &sized
+            } else {
+                workload
             };
-            let shown = figures.iter().find(is_it).map(|one| one.one(one.median));
-            let _ = write!(text, "  {:>18}", shown.unwrap_or_default());
-        }
-        text.push('\n');
+            let is_it = |one: &&Figure| one.workload == workload && one.figure == name;
+            let found = figures.iter().find(is_it);
+            found.map_or_else(String::new, |one| one.one(one.median))
+        };
+        table.cells(iter::once(size.to_string()).chain(of.iter().map(median)));
     }
-    text
+    table.text()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Figure, by_clusters};
+    use super::{BY_CLUSTERS, Figure, check_clusters, table};
 
     fn figures(median: u64) -> Vec<Figure> {
-        let figure = Figure {
-            cores: 4,
-            workload: "layered-100".into(),
-            figure: "instance".into(),
-            per: 100,
-            median,
-            p99: median,
-            max: median,
-        };
-        vec![figure]
+        vec![Figure::new((4, "layered-100", "instance"), 100, [median])]
     }
 
     #[test]
@@ -140,9 +151,10 @@ mod tests {
                 (16, figures(last)),
             ]
         };
-        let table = by_clusters(&rows(82_400)).expect("within 3 %");
+        check_clusters(&rows(82_400)).expect("within 3 %");
+        let table = table("clusters", BY_CLUSTERS, &rows(82_400));
         assert_eq!(table.lines().count(), 4, "{table}");
-        let complaint = by_clusters(&rows(82_401)).expect_err("beyond");
+        let complaint = check_clusters(&rows(82_401)).expect_err("beyond");
         assert!(complaint.starts_with("an instance takes more instructions in 16 clusters"));
     }
 }

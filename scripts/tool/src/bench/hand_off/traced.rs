@@ -9,9 +9,8 @@ use std::collections::BTreeMap;
 
 use sched_dag::DagId;
 use sched_dag::journal::{Event, What};
-use sched_dag::law::Distribution;
 
-use super::figure::Figure;
+use crate::bench::frame::Figure;
 use crate::trace::model::Run;
 use crate::trace::read;
 
@@ -44,89 +43,69 @@ fn wakeups(runs: &[Run], cores: u64) -> Vec<Figure> {
     let mut counts: BTreeMap<usize, (u64, u64)> = BTreeMap::new();
     for run in runs.iter().filter(|run| is_of(run, "fork-join")) {
         let sink = run.task_set.dag(DagId(0)).subtasks().len() - 1;
-        let count =
-            |is_it: &dyn Fn(&&Event) -> bool| run.events.iter().filter(is_it).count() as u64;
         let (ready, jobs) = counts.entry(sink - 1).or_default();
-        *ready += count(&|event| {
-            event.what == What::Ready && event.subtask.is_some_and(|of| of.index() == sink)
-        });
-        *jobs += count(&|event| event.what == What::Released);
+        for event in &run.events {
+            let is_sinks = event.subtask.is_some_and(|of| of.index() == sink);
+            *ready += u64::from(event.what == What::Ready && is_sinks);
+            *jobs += u64::from(event.what == What::Released);
+        }
     }
     let counts = counts.into_iter().filter(|(_, (_, jobs))| *jobs > 0);
-    counts
-        .map(|(branches, (ready, jobs))| Figure {
-            cores,
-            workload: format!("fork-join-{branches}"),
-            figure: "sink_wakeups".into(),
-            per: jobs,
-            median: ready,
-            p99: ready,
-            max: ready,
-        })
-        .collect()
+    let figure = |(branches, (ready, jobs))| {
+        let workload = format!("fork-join-{branches}");
+        Figure::new((cores, workload, "sink_wakeups"), jobs, [ready])
+    };
+    counts.map(figure).collect()
 }
 
 /// Takes preemptions apart: on one core, or on others than that with the timer.
 fn preemption(run: &Run, cores: u64) -> Vec<Figure> {
-    const PARTS: [&str; 3] = [
-        "request_to_suspended",
-        "suspended_to_start",
-        "finish_to_resumed",
+    let mut parts = [
+        ("request_to_suspended", Vec::new()),
+        ("suspended_to_start", Vec::new()),
+        ("finish_to_resumed", Vec::new()),
     ];
-    let mut samples: [Vec<u64>; 3] = Default::default();
     // A trace is in order of time only core by core.
     let mut events = run.events.clone();
     events.sort_by_key(|event| event.time_ns);
-    let requests = events.iter().enumerate();
-    let requests = requests.filter(|(_, event)| {
-        event.what == What::Request
-            && event.dag == PREEMPTOR
-            && (cores == 1 || event.core.index() > 0)
-    });
-    for (place, request) in requests {
+    for (place, request) in events.iter().enumerate() {
+        let is_meant = request.what == What::Request && request.dag == PREEMPTOR;
+        if !is_meant || (cores > 1 && request.core.index() == 0) {
+            continue;
+        }
         // What happened next on that core, each after the one before.
         let mut later = events[place..].iter();
-        let mut next = |word, of_preemptor: bool| {
-            let event = later.find(|event| {
-                event.what == word
-                    && event.core == request.core
-                    && (event.dag == PREEMPTOR) == of_preemptor
-            })?;
-            Some(event.time_ns)
-        };
         let times = [
-            next(What::Suspend, false),
-            next(What::Start, true),
-            next(What::Finish, true),
-            next(What::Resume, false),
+            (What::Suspend, false),
+            (What::Start, true),
+            (What::Finish, true),
+            (What::Resume, false),
         ];
-        let [Some(suspended), Some(start), Some(finish), Some(resumed)] = times else {
-            continue;
-        };
-        samples[0].push(suspended - request.time_ns);
-        samples[1].push(start - suspended);
-        samples[2].push(resumed - finish);
+        let times = times.map(|(what, of_preemptor)| {
+            let is_next = |event: &&Event| {
+                (event.what, event.core) == (what, request.core)
+                    && (event.dag == PREEMPTOR) == of_preemptor
+            };
+            later.find(is_next).map(|event| event.time_ns)
+        });
+        if let [Some(suspended), Some(start), Some(finish), Some(resumed)] = times {
+            let samples = [
+                suspended - request.time_ns,
+                start - suspended,
+                resumed - finish,
+            ];
+            for ((_, all), sample) in parts.iter_mut().zip(samples) {
+                all.push(sample);
+            }
+        }
     }
     let workload = match cores {
         1 => "preemption",
         _ => "preemption of another core",
     };
-    let figures = PARTS.iter().zip(samples);
-    let figures = figures.filter(|(_, samples)| !samples.is_empty());
-    figures
-        .map(|(part, samples)| {
-            let of = Distribution::new(samples);
-            Figure {
-                cores,
-                workload: workload.into(),
-                figure: (*part).into(),
-                per: 1,
-                median: of.median(),
-                p99: of.p99(),
-                max: of.max(),
-            }
-        })
-        .collect()
+    let parts = parts.into_iter().filter(|(_, samples)| !samples.is_empty());
+    let figure = |(part, samples)| Figure::new((cores, workload, part), 1, samples);
+    parts.map(figure).collect()
 }
 
 #[cfg(test)]

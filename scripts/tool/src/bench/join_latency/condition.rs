@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use replay::shown::shown;
+use replay::shown::quoted;
 
 /// What makes the joins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,21 +18,16 @@ pub(super) enum Policy {
 impl Policy {
     /// Reads a list of names with commas between.
     pub(super) fn list(text: &str) -> Result<Vec<Policy>, String> {
-        let mut policies = Vec::new();
-        for name in text.split(',') {
-            let (text, shown_name) = (shown(text), shown(name));
-            let policy = Policy::from_name(name).ok_or_else(|| {
+        let policy = |name| {
+            Policy::from_name(name).ok_or_else(|| {
                 format!(
-                    "`--policies {text}`: `{shown_name}` is none; there are fass, exact, and \
-                     approximate-MS with 1 to 1000000 ms"
+                    "`--policies`: {} is none; there are fass, exact, and approximate-MS with 1 \
+                     to 1000000 ms",
+                    quoted(name)
                 )
-            })?;
-            if policies.contains(&policy) {
-                return Err(format!("`--policies {text}`: `{shown_name}` stands twice"));
-            }
-            policies.push(policy);
-        }
-        Ok(policies)
+            })
+        };
+        text.split(',').map(policy).collect()
     }
 
     fn from_name(name: &str) -> Option<Policy> {
@@ -136,7 +131,6 @@ mod tests {
             let message = Policy::list(&format!("fass,{wrong}")).unwrap_err();
             assert!(message.contains(&format!("`{wrong}` is none")), "{message}");
         }
-        assert!(Policy::list("exact,exact").unwrap_err().contains("twice"));
     }
 
     #[test]

@@ -13,19 +13,22 @@ pub(super) const PERIOD_NS: u64 = 25_000_000;
 /// The names of the metrics.
 pub(super) const METRICS: [&str; 4] = ["join_latency", "cover_delay", "join_to_start", "response"];
 
+/// The names of the counts: jobs released, joins of any kind that happened, those of values of one
+/// job and of several, joins that never happened (fewer than jobs), and jobs that no join covers.
+pub(super) const COUNTS: [&str; 6] = [
+    "jobs",
+    "joins",
+    "same_index",
+    "cross_index",
+    "missing",
+    "uncovered",
+];
+
 /// What one condition, or several of one kind, amount to.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figures {
-    /// Jobs released.
-    pub(super) jobs: usize,
-    /// Joins that happened, of any kind.
-    pub(super) joins: usize,
-    pub(super) same_index: usize,
-    pub(super) cross_index: usize,
-    /// Joins that never happened: fewer than jobs.
-    pub(super) missing: usize,
-    /// Jobs that no join covers.
-    pub(super) uncovered: usize,
+    /// In the order of [`COUNTS`].
+    pub(super) counts: [usize; COUNTS.len()],
     /// The samples of each metric, as (index, nanoseconds), in the order of
     /// [`METRICS`].
     pub(super) samples: [Vec<(usize, u64)>; METRICS.len()],
@@ -44,13 +47,10 @@ impl Figures {
                 .max()
                 .copied()
         };
-        let join_to_start = samples
-            .joins
-            .iter()
-            .enumerate()
-            .filter_map(|(join, joined)| {
-                Some((join, joined.span.start_ns.saturating_sub(published(join)?)))
-            });
+        let joins = samples.joins.iter().enumerate();
+        let join_to_start = joins.filter_map(|(join, joined)| {
+            Some((join, joined.span.start_ns.saturating_sub(published(join)?)))
+        });
         let response = covering.iter().enumerate().map(|(job, &join)| {
             let finish_ns = samples.joins[join].span.finish_ns;
             (job, finish_ns.saturating_sub(job as u64 * PERIOD_NS))
@@ -58,12 +58,14 @@ impl Figures {
         let numbered = |values_ns: Vec<u64>| values_ns.into_iter().enumerate().collect();
         let jobs = samples.source.len();
         Self {
-            jobs,
-            joins: record.sets.len(),
-            same_index: record.same_index_sets(),
-            cross_index: record.cross_index_sets(),
-            missing: record.missing_joins(),
-            uncovered: jobs - covering.len(),
+            counts: [
+                jobs,
+                record.sets.len(),
+                record.same_index_sets(),
+                record.cross_index_sets(),
+                record.missing_joins(),
+                jobs - covering.len(),
+            ],
             samples: [
                 numbered(record.join_latencies_ns()),
                 numbered(record.cover_delays_ns()),
@@ -74,14 +76,11 @@ impl Figures {
     }
 
     /// Adds another condition's figures of the same kind.
-    pub(super) fn add(&mut self, other: Self) {
-        self.jobs += other.jobs;
-        self.joins += other.joins;
-        self.same_index += other.same_index;
-        self.cross_index += other.cross_index;
-        self.missing += other.missing;
-        self.uncovered += other.uncovered;
-        for (own, others) in self.samples.iter_mut().zip(other.samples) {
+    pub(super) fn add(&mut self, other: &Self) {
+        for (own, others) in self.counts.iter_mut().zip(other.counts) {
+            *own += others;
+        }
+        for (own, others) in self.samples.iter_mut().zip(&other.samples) {
             own.extend(others);
         }
     }
@@ -101,7 +100,8 @@ impl Figures {
 
     /// Returns the joins per job.
     pub(super) fn joins_per_job(&self) -> f64 {
-        self.joins as f64 / self.jobs.max(1) as f64
+        let [jobs, joins, ..] = self.counts;
+        joins as f64 / jobs.max(1) as f64
     }
 }
 
@@ -133,9 +133,7 @@ mod tests {
     #[test]
     fn metrics_are_what_they_are_defined_to_be_and_pooled() {
         let figures = Figures::of(&samples());
-        let joins = (figures.joins, figures.same_index, figures.cross_index);
-        assert_eq!(joins, (1, 0, 1));
-        assert_eq!((figures.missing, figures.uncovered), (2, 1));
+        assert_eq!(figures.counts, [3, 1, 0, 1, 2, 1]);
         let third = 2 * PERIOD_NS + 10;
         let expected = [
             vec![(0, third + 20 - 10)],
@@ -145,8 +143,8 @@ mod tests {
         ];
         assert_eq!(figures.samples, expected);
         let mut both = figures.clone();
-        both.add(figures);
-        assert_eq!((both.jobs, both.joins, both.missing), (6, 2, 4));
+        both.add(&figures);
+        assert_eq!(both.counts, [6, 2, 0, 2, 4, 2]);
         assert_eq!((both.distribution(1).count(), both.mean_ns(2)), (4, 12));
     }
 }

@@ -7,19 +7,14 @@
 //! interrupted, and what is there already is not measured again, as long as it was
 //! measured under the same conditions (image, QEMU, all options).
 //!
-//! - `table`, `plan`, `condition`: what is to be measured;
+//! - `plan`, `condition`: what is to be measured;
 //! - `times`, `figures`: from the guest's lines to figures;
-//! - `files`, `plots`, `report`: from figures to what people and programs read;
-//! - `progress`: what is seen meanwhile.
+//! - `results`: from figures to what people and programs read.
 
 mod condition;
 mod figures;
-mod files;
 mod plan;
-mod plots;
-mod progress;
-mod report;
-mod table;
+mod results;
 mod times;
 
 use std::ffi::OsString;
@@ -30,19 +25,21 @@ use std::time::Duration;
 
 use condition::Condition;
 use figures::Figures;
-use files::{Measured, samples_csv, summary_json, write_whole};
-use join_latency::Samples;
 use plan::{Plan, Provenance};
-use progress::Progress;
 
-use super::by_plan;
+use super::frame::{by_plan, draw, judged};
 use crate::outcome::boot;
+use crate::program::Order;
+use crate::progress::Progress;
 use crate::qemu::Mode;
-use crate::{image, install, probe, program, system};
+use crate::{files, image, install, probe, program};
+
+/// How often a condition is booted at most in deterministic mode.
+const MOST_BOOTS: usize = 6;
 
 /// Runs `bench join-latency` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    by_plan(&table::TABLE, words, Plan::new, |plan| {
+    by_plan(&plan::TABLE, words, Plan::new, |plan| {
         measure_all(plan).map(|()| true)
     })
 }
@@ -71,51 +68,59 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
         plan.jobs,
         plan.mode_name(),
         plan.cores,
-        provenance.qemu
+        provenance.version
     );
     println!("time: {}", plan.meaning());
     if let Some(why) = why {
         println!("mode {mode} because {why}");
     }
-    let mut progress = Progress::new(plan.conditions.len());
-    let mut measured = Measured::new();
-    for condition in &plan.conditions {
+    let folder = plan.out.join("conditions");
+    let made = fs::create_dir_all(&folder);
+    made.map_err(|error| format!("cannot make `{}`: {error}", folder.display()))?;
+    let mut progress = Progress::new(plan.conditions.len() as u64, "conditions");
+    let mut measured = Vec::new();
+    for (condition, over) in plan.conditions.iter().zip(0..) {
+        progress.show(over);
         let statement = provenance.statement(plan, condition);
-        let file = plan.file(condition);
+        let file = folder.join(format!("{}.csv", condition.file_stem()));
+        let read = |text: &str| times::read(text, &statement, condition.subtasks);
         let kept = fs::read_to_string(&file).ok();
-        let kept = kept.and_then(|text| times::from_csv(&text, &statement, condition.subtasks));
-        let samples = match kept {
-            Some(samples) => {
-                progress.skip(condition.to_string());
-                samples
-            }
+        let samples = match kept.and_then(|text| read(&text)) {
+            Some(samples) => samples,
             None => {
-                progress.begin(condition.to_string());
-                let samples = measure(plan, condition, &image.path, &mut progress)?;
-                write_whole(&file, &times::to_csv(&samples, &statement))?;
-                progress.end();
-                samples
+                let text = measure(plan, condition, &image.path, &statement)?;
+                write_whole(&file, &text)?;
+                read(&text).ok_or_else(|| format!("{condition}: its times are damaged"))?
             }
         };
         measured.push((*condition, Figures::of(&samples)));
         // After each: an interruption leaves numbers for what was measured.
-        let summary = summary_json(plan, &provenance, &measured);
+        let summary = results::summary_json(plan, &provenance, &measured);
         write_whole(&plan.out.join("summary.json"), &summary)?;
-        write_whole(&plan.out.join("samples.csv"), &samples_csv(&measured))?;
+        write_whole(
+            &plan.out.join("samples.csv"),
+            &results::samples_csv(&measured),
+        )?;
     }
-    if let Err(line) = plots::draw(&plan.out) {
+    progress.end();
+    if let Err(line) = draw("join_latency.py", &plan.out) {
         eprintln!("{line}");
     }
-    print!("{}", report::table(&files::pooled(plan, &measured)));
+    print!("{}", results::table(&measured));
     println!("written: {}", plan.out.display());
     Ok(())
 }
 
-/// How often a condition is booted at most in deterministic mode.
-const MOST_BOOTS: usize = 6;
+/// Writes a file whole or not at all: an interruption leaves the old one.
+fn write_whole(path: &Path, text: &str) -> Result<(), String> {
+    let unfinished = path.with_extension("unfinished");
+    files::write(&unfinished, text)?;
+    let renamed = fs::rename(&unfinished, path);
+    renamed.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
+}
 
-/// Measures one condition: in deterministic mode until two boots agree, or
-/// [`MOST_BOOTS`] have been tried; then it says so and keeps the first.
+/// Measures one condition, and returns its times: in deterministic mode until two boots agree, or
+/// [`MOST_BOOTS`] have been tried; then it says so and returns those of the first.
 ///
 /// Two boots agree as the kernel removes from counted time what depends on the host
 /// (its `machine::counted_time`). That rests on how QEMU 7.2 works, so it is checked
@@ -124,69 +129,56 @@ fn measure(
     plan: &Plan,
     condition: &Condition,
     image: &Path,
-    progress: &mut Progress,
-) -> Result<Samples, String> {
+    statement: &str,
+) -> Result<String, String> {
+    let is_sure = plan.once || plan.on_linux || plan.mode != Mode::Deterministic;
     let mut seen = Vec::new();
     while seen.len() < MOST_BOOTS {
-        let samples = boot_once(plan, condition, image, progress)?;
-        let is_sure =
-            plan.mode_name() != Mode::Deterministic.name() || plan.once || seen.contains(&samples);
-        if is_sure {
+        let times = boot_once(plan, condition, image, statement)?;
+        if is_sure || seen.contains(&times) {
             if seen.len() > 1 {
-                progress.note(&format!("{} boots until two agreed", seen.len() + 1));
+                eprintln!("{condition}: {} boots until two agreed", seen.len() + 1);
             }
-            return Ok(samples);
+            return Ok(times);
         }
-        seen.push(samples);
+        seen.push(times);
     }
-    progress.note(&format!(
-        "no two of {MOST_BOOTS} boots agree to the last nanosecond; the first is kept"
-    ));
+    eprintln!(
+        "{condition}: no two of {MOST_BOOTS} boots agree to the last nanosecond; the first is kept"
+    );
     Ok(seen.swap_remove(0))
 }
 
-/// Boots one condition.
+/// Boots one condition, and returns its times.
 fn boot_once(
     plan: &Plan,
     condition: &Condition,
     image: &Path,
-    progress: &mut Progress,
-) -> Result<Samples, String> {
-    let log = system::new_log("join-latency")?;
+    statement: &str,
+) -> Result<String, String> {
     let limit = Duration::from_secs(120 + plan.jobs);
-    let mut follow = |line: &str| progress.follow(line);
-    let outcome = match plan.on_linux {
-        true => {
+    judged(
+        condition,
+        "join-latency",
+        |log| {
+            if !plan.on_linux {
+                return boot(&plan.qemu(condition), image, log, limit, |_| {});
+            }
             let words = plan.linux_words(condition);
             let words: Vec<OsString> = words.split(' ').map(OsString::from).collect();
-            let order = program::Order {
+            let order = Order {
                 program: image,
                 words: &words,
                 is_live: false,
                 stops: false,
-                log: &log,
+                log,
                 limit,
             };
-            program::run(&order, &mut follow)?
-        }
-        false => boot(&plan.qemu(condition), image, &log, limit, follow)?,
-    };
-    if let Err(fault) = outcome.judge() {
-        return Err(format!(
-            "{condition} failed: {}\n{}",
-            fault.reason,
-            outcome.tail()
-        ));
-    }
-    let samples = times::read_transcript(&outcome.transcript, condition.subtasks)?;
-    if samples.source.len() as u64 != plan.jobs {
-        let jobs = samples.source.len();
-        return Err(format!(
-            "{condition}: the guest printed {jobs} of {} jobs",
-            plan.jobs
-        ));
-    }
-    // It is ours, and in the way of no one if it cannot be removed.
-    let _ = fs::remove_file(&log);
-    Ok(samples)
+            program::run(&order, &mut |_| {})
+        },
+        |outcome| {
+            let transcript = &outcome.transcript;
+            times::write(transcript, statement, condition.subtasks, plan.jobs)
+        },
+    )
 }

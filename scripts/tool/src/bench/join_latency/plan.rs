@@ -2,23 +2,64 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-
-use replay::repeated;
+use std::process::Command as Process;
 
 use super::condition::{Condition, Policy};
 use crate::files;
-use crate::options::Parsed;
-use crate::qemu::{Machine, Mode, PROGRAM, Qemu};
+use crate::options::{Command, Parsed, Takes, options};
+use crate::qemu::{Mode, PROGRAM, Qemu};
 use crate::system;
+
+/// The table of `bench join-latency`.
+pub(super) static TABLE: Command = Command {
+    invocation: "./scripts/bench join-latency",
+    about: "Reproduces the paper's evaluation: joins by a DAG, by equal and by close stamps.",
+    positional: None,
+    options: options! {
+        /// The folder for all results; what is there already is not measured again. If not given,
+        /// target/join-latency, or target/join-latency-on-linux.
+        "out" 'o': Takes::File("DIR");
+        /// Jobs of each condition.
+        "jobs": Takes::number(1..=100_000), or "2000";
+        /// Parallel subtasks N; a condition has two processors more than the largest.
+        "subtasks": Takes::numbers(1..=16), or "2,4,6";
+        /// What joins: fass, exact, approximate-MS with the longest interval.
+        "policies": Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
+        /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
+        /// every policy.
+        "repeat": Takes::number(1..=1000), or "1";
+        /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
+        /// there are fewer.
+        "on": Takes::OneOf(&["machine", "linux"]), or "machine";
+        /// Queue size of the synchronizers.
+        "queue": Takes::number(1..=100_000), or "1000";
+        /// What time means, see ./scripts/run --help; kvm where it works, else deterministic.
+        "mode": Takes::OneOf(Mode::NAMES);
+        /// The same as --mode deterministic.
+        "deterministic": Takes::Nothing;
+        /// Boot each deterministic condition once, not until two boots agree.
+        "once": Takes::Nothing;
+    },
+    notes: "\
+writes into DIR:
+  summary.json        counts, median, mean, p99, max of each condition
+  samples.csv         each sample of each metric
+  conditions/*.csv    each condition's raw times, written when it is complete
+  plots/*.svg         if python3 has matplotlib
+
+Interrupted, it keeps the conditions that are complete; run again with the same
+options, it measures the others only. docs/evaluation.md explains the metrics.
+
+exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command line
+",
+};
 
 /// Everything that all conditions have in common, and the conditions.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
     pub(super) out: PathBuf,
+    /// For each N all policies, for each of them all seeds.
     pub(super) conditions: Vec<Condition>,
-    pub(super) policies: Vec<Policy>,
-    pub(super) subtasks: Vec<usize>,
     pub(super) seeds: Vec<u64>,
     pub(super) jobs: u64,
     pub(super) queue: u64,
@@ -40,79 +81,68 @@ impl Plan {
     ///
     /// What the options ask for cannot be: one line that says why.
     pub(super) fn new(options: &Parsed) -> Result<Plan, String> {
-        let number = |name| options.number(name).unwrap_or(1);
         let on_linux = options.text("on") == Some("linux");
-        let of_guests = ["mode", "deterministic", "once"].into_iter();
-        if let Some(name) = of_guests
-            .filter(|_| on_linux)
-            .find(|name| options.is_given(name))
-        {
+        let of_guests = options.given_of(&["mode", "deterministic", "once"]);
+        if let Some(name) = of_guests.filter(|_| on_linux) {
             return Err(format!(
                 "`--{name}` is for guests; leave it or `--on linux` out"
             ));
         }
-        let usual = match on_linux {
-            true => "target/join-latency-on-linux",
-            false => options.text("out").unwrap_or_default(),
-        };
-        let out = options.path("out").filter(|_| options.is_given("out"));
         (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
+        options.check_distinct(&["policies", "subtasks"])?;
         let policies = Policy::list(options.text("policies").unwrap_or_default())?;
-        let subtasks: Vec<usize> = options.numbers("subtasks");
-        if let Some((_, second)) = repeated(&subtasks) {
-            let parallel = subtasks[second];
-            return Err(format!("`--subtasks`: {parallel} stands twice"));
-        }
-        let most_parallel = subtasks.iter().max().map_or(1, |most| *most as u64);
-        let least_cores = most_parallel + 2;
-        let cores = options.number("cores").unwrap_or(least_cores);
-        if cores < least_cores {
-            return Err(format!(
-                "`--cores {cores}`: source, join and {most_parallel} parallel subtasks need \
-                 {least_cores}, so that none waits for a core; give more, or fewer subtasks"
-            ));
-        }
-        let seed = number("seed");
-        let last_seed = seed.checked_add(number("repeat") - 1);
-        let last_seed =
-            last_seed.ok_or("`--repeat`: there are not so many seeds after `--seed`")?;
-        let seeds: Vec<u64> = (seed..=last_seed).collect();
-        let jobs = number("jobs");
-        let named = named_mode(options)?;
-        let mut conditions = Vec::new();
-        for &subtasks in &subtasks {
-            for &policy in &policies {
-                let with_seed = |&seed| Condition {
-                    policy,
-                    subtasks,
-                    seed,
-                };
-                conditions.extend(seeds.iter().map(with_seed));
+        let mut named = options.text("mode").and_then(Mode::from_name);
+        if options.is_given("deterministic") {
+            let other = named.filter(|mode| *mode != Mode::Deterministic);
+            if let Some(mode) = other {
+                return Err(format!(
+                    "`--mode {mode}` and `--deterministic` exclude each other; give one"
+                ));
             }
+            named = Some(Mode::Deterministic);
         }
-        if options.is_given("once")
-            && let Some(mode) = named.filter(|mode| *mode != Mode::Deterministic)
-        {
+        let once = options.is_given("once");
+        if let Some(mode) = named.filter(|mode| once && *mode != Mode::Deterministic) {
             return Err(format!(
                 "`--once` is for deterministic conditions, and the mode is {mode}, in which each \
                  is booted once; leave it out"
             ));
         }
+        let number = |name| options.number(name).unwrap_or(1);
+        let subtasks: Vec<usize> = options.numbers("subtasks");
+        let seeds: Vec<u64> = (1..=number("repeat")).collect();
+        let of_size = |&subtasks: &usize| {
+            let seeds = &seeds;
+            let of_policy = move |&policy: &Policy| {
+                seeds.iter().map(move |&seed| Condition {
+                    policy,
+                    subtasks,
+                    seed,
+                })
+            };
+            policies.iter().flat_map(of_policy)
+        };
+        let conditions = subtasks.iter().flat_map(of_size).collect();
+        // Source, join and parallel subtasks: none waits for a core.
+        let cores = subtasks.iter().max().map_or(1, |most| *most as u64) + 2;
+        let folder = match on_linux {
+            true => "target/join-latency-on-linux",
+            false => "target/join-latency",
+        };
+        let jobs = number("jobs");
         Ok(Plan {
-            out: out.unwrap_or(Path::new(usual)).into(),
+            out: options.path("out").unwrap_or(Path::new(folder)).into(),
             conditions,
-            policies,
-            subtasks,
             seeds,
             jobs,
             queue: number("queue"),
             cores,
             // The kernel records each instance, and the app its joins: half a KiB.
-            memory_mib: 64 + (jobs * least_cores).div_ceil(2048),
+            memory_mib: 64 + (jobs * cores).div_ceil(2048),
             on_linux,
             named,
             mode: named.unwrap_or(Mode::Deterministic),
-            once: options.is_given("once"),
+            once,
         })
     }
 
@@ -143,29 +173,11 @@ impl Plan {
         let words = condition.guest_words(self.jobs, self.queue);
         Qemu {
             mode: self.mode,
-            machine: Machine::Microvm,
             cores: self.cores,
             memory_mib: self.memory_mib,
             guest_words: format!("mode={} {words}", self.mode),
             ..Qemu::default()
         }
-    }
-
-    /// Returns where a condition's raw times are kept.
-    pub(super) fn file(&self, condition: &Condition) -> PathBuf {
-        let name = format!("{}.csv", condition.file_stem());
-        self.out.join("conditions").join(name)
-    }
-}
-
-fn named_mode(options: &Parsed) -> Result<Option<Mode>, String> {
-    let named = options.text("mode").and_then(Mode::from_name);
-    match (named, options.is_given("deterministic")) {
-        (None | Some(Mode::Deterministic), true) => Ok(Some(Mode::Deterministic)),
-        (Some(mode), true) => Err(format!(
-            "`--mode {mode}` and `--deterministic` exclude each other; give one"
-        )),
-        (named, false) => Ok(named),
     }
 }
 
@@ -173,7 +185,7 @@ fn named_mode(options: &Parsed) -> Result<Option<Mode>, String> {
 #[derive(Debug)]
 pub(super) struct Provenance {
     /// QEMU's version, or Linux's.
-    pub(super) qemu: String,
+    pub(super) version: String,
     /// The commit, with a mark if the tree differs from it.
     pub(super) commit: String,
     /// A checksum of the image: other code, other times.
@@ -183,50 +195,43 @@ pub(super) struct Provenance {
 impl Provenance {
     /// Finds out.
     pub(super) fn of(image: &Path, on_linux: bool) -> Provenance {
-        let first_line = |text: String| text.lines().next().unwrap_or("unknown").to_string();
-        let version = match on_linux {
-            true => output("uname", &["-sr"]),
-            false => output(PROGRAM, &["--version"]),
-        };
-        let qemu = version.map_or("unknown".into(), first_line);
-        let commit = output("git", &["rev-parse", "--short=12", "HEAD"]);
-        let changes = output("git", &["status", "--porcelain"]);
-        let commit = match (commit, changes) {
-            (Some(commit), Some(changes)) if changes.is_empty() => commit.trim().to_string(),
-            (Some(commit), _) => format!("{} and uncommitted changes", commit.trim()),
-            (None, _) => "unknown".into(),
-        };
         let bytes = fs::read(image).unwrap_or_default();
         Provenance {
-            qemu,
-            commit,
+            version: match on_linux {
+                true => first_line("uname", &["-sr"]),
+                false => first_line(PROGRAM, &["--version"]),
+            },
+            commit: first_line("git", &["describe", "--always", "--abbrev=12", "--dirty"]),
             image: format!("{:016x}", checksum(&bytes)),
         }
     }
 
     /// States everything that a condition's times depend on.
     pub(super) fn statement(&self, plan: &Plan, condition: &Condition) -> String {
+        let (version, image) = (&self.version, &self.image);
         if plan.on_linux {
             let words = plan.linux_words(condition);
-            return format!("{}; program {}; {words}", self.qemu, self.image);
+            return format!("{version}; program {image}; {words}");
         }
         let qemu = plan.qemu(condition);
         format!(
-            "{}; image {}; machine {}, {} cores, {} MiB; {}",
-            self.qemu, self.image, qemu.machine, qemu.cores, qemu.memory_mib, qemu.guest_words
+            "{version}; image {image}; machine {}, {} cores, {} MiB; {}",
+            qemu.machine, qemu.cores, qemu.memory_mib, qemu.guest_words
         )
     }
 }
 
-fn output(program: &str, words: &[&str]) -> Option<String> {
-    let mut command = Command::new(program);
-    let output = command
+/// Returns the first line that a program says, if it is there and content.
+fn first_line(program: &str, words: &[&str]) -> String {
+    let mut process = Process::new(program);
+    let output = process
         .args(words)
         .current_dir(system::workspace())
-        .output()
-        .ok()?;
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    output.status.success().then_some(text)
+        .output();
+    let output = output.ok().filter(|output| output.status.success());
+    let said = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned());
+    let line = said.as_deref().and_then(|said| said.lines().next());
+    line.unwrap_or("unknown").into()
 }
 
 /// FNV-1a with 64 bits (Fowler, Noll, Vo; draft-eastlake-fnv).
@@ -238,8 +243,7 @@ fn checksum(bytes: &[u8]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Path, Plan, checksum};
-    use crate::bench::join_latency::table::TABLE;
+    use super::{Path, Plan, TABLE, checksum};
 
     fn plan(line: &str) -> Result<Plan, String> {
         Plan::new(&TABLE.right(line))
@@ -247,16 +251,16 @@ mod tests {
 
     #[test]
     fn every_combination_is_a_condition() {
-        let plan = plan("--deterministic --repeat 2 --policies fass,exact --seed 5").unwrap();
+        let plan = plan("--deterministic --repeat 2 --policies fass,exact").unwrap();
         assert_eq!(plan.conditions.len(), 3 * 2 * 2);
-        assert_eq!((plan.cores, plan.seeds), (8, vec![5, 6]));
+        assert_eq!((plan.cores, plan.seeds), (8, vec![1, 2]));
     }
 
     #[test]
     fn what_cannot_be_is_refused() {
         let refusal = |line: &str| plan(line).unwrap_err();
-        assert!(refusal("--cores 7 --deterministic").contains("need 8"));
         assert!(refusal("--subtasks 2,2 --deterministic").contains("twice"));
+        assert!(refusal("--policies exact,exact").contains("twice"));
         assert!(refusal("--mode threads --deterministic").contains("exclude"));
         assert!(refusal("--on linux --once").contains("`--once` is for guests"));
     }

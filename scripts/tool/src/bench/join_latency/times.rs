@@ -1,120 +1,73 @@
-//! A condition's raw times: read from the guest's lines, kept as a CSV file.
+//! A condition's raw times: from the guest's lines into a CSV file, and back.
 //!
 //! The file's first line is a comment that states everything the times depend on.
 //! A file whose first line differs is another condition's, and is measured anew.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use join_latency::{Joined, Samples, Span};
 
 use crate::json::Value;
-use crate::protocol::{MachineLine, Transcript};
+use crate::protocol::Transcript;
 
-/// The columns. `subtask` 0 is the source, 1 to N are the parallel ones.
+/// The columns. `subtask` 0 is the source, 1 to N are the parallel ones, the next one is the join.
 const COLUMNS: &str = "what,subtask,index,ready_ns,start_ns,finish_ns,joined_indices";
 
-/// Gathers the times that a guest has printed.
+/// Returns the times that a guest has printed as CSV, under a first line `# {statement}`.
 ///
 /// # Errors
 ///
-/// In words: a line is not as it should be.
-pub(super) fn read_transcript(transcript: &Transcript, subtasks: usize) -> Result<Samples, String> {
-    let mut samples = Samples {
-        parallel: vec![Vec::new(); subtasks],
-        ..Samples::default()
-    };
-    for line in transcript.of_kind("executions") {
-        let damaged = || format!("serial line {} has no times as it should", line.number);
-        let subtask = line.number_at("subtask").ok_or_else(damaged)?;
-        let subtask = usize::try_from(subtask).map_err(|_| damaged())?;
-        let spans = spans_of(&mut samples, subtask).ok_or_else(damaged)?;
-        check_batch(line, spans.len())?;
-        for times in line.value.get("times").ok_or_else(damaged)?.elements() {
-            spans.push(span(numbers(times).try_into().map_err(|_| damaged())?));
-        }
-    }
-    for line in transcript.of_kind("joins") {
-        let damaged = || format!("serial line {} has no joins as it should", line.number);
-        check_batch(line, samples.joins.len())?;
-        for times in line.value.get("times").ok_or_else(damaged)?.elements() {
-            let numbers = numbers(times);
-            let [ready_ns, start_ns, finish_ns, indices @ ..] = &numbers[..] else {
-                return Err(damaged());
-            };
-            add_join(&mut samples, [*ready_ns, *start_ns, *finish_ns], indices)
-                .ok_or_else(damaged)?;
-        }
-    }
-    Ok(samples)
-}
-
-/// Makes sure that a batch begins where the one before has ended.
-fn check_batch(line: &MachineLine, before: usize) -> Result<(), String> {
-    match line.number_at("first") == Some(before as u64) {
-        true => Ok(()),
-        false => Err(format!(
-            "a batch before serial line {} is missing",
-            line.number
-        )),
-    }
-}
-
-/// Returns the executions of a subtask; 0 is the source.
-fn spans_of(samples: &mut Samples, subtask: usize) -> Option<&mut Vec<Span>> {
-    match subtask {
-        0 => Some(&mut samples.source),
-        _ => samples.parallel.get_mut(subtask - 1),
-    }
-}
-
-const fn span([start_ns, finish_ns]: [u64; 2]) -> Span {
-    Span {
-        start_ns,
-        finish_ns,
-    }
-}
-
-fn numbers(list: &Value) -> Vec<u64> {
-    list.elements().iter().filter_map(Value::as_u64).collect()
-}
-
-fn add_join(samples: &mut Samples, times_ns: [u64; 3], indices: &[u64]) -> Option<()> {
-    let [ready_ns, times_ns @ ..] = times_ns;
-    if indices.len() != samples.parallel.len() {
-        return None;
-    }
-    let span = span(times_ns);
-    samples.joins.push(Joined { ready_ns, span });
-    samples.indices.extend(indices);
-    Some(())
-}
-
-/// Writes the times as CSV under a first line `# {statement}`.
-pub(super) fn to_csv(samples: &Samples, statement: &str) -> String {
+/// In words: a line is not as it should be, or there are not so many jobs.
+pub(super) fn write(
+    transcript: &Transcript,
+    statement: &str,
+    subtasks: usize,
+    jobs: u64,
+) -> Result<String, String> {
+    let sink = subtasks as u64 + 1;
     let mut text = format!("# {statement}\n{COLUMNS}\n");
-    let subtasks = std::iter::once(&samples.source).chain(&samples.parallel);
-    // Writing into a `String` cannot fail.
-    for (subtask, spans) in subtasks.enumerate() {
-        for (index, span) in spans.iter().enumerate() {
-            let (start_ns, finish_ns) = (span.start_ns, span.finish_ns);
-            let _ = writeln!(text, "execution,{subtask},{index},,{start_ns},{finish_ns},");
+    let mut counts: BTreeMap<u64, u64> = BTreeMap::new();
+    let lines = transcript.machine.iter();
+    for line in lines.filter(|line| ["executions", "joins"].contains(&&*line.kind)) {
+        let number = line.number;
+        let damaged = || format!("serial line {number} has no times as it should");
+        let subtask = match &*line.kind {
+            "joins" => sink,
+            _ => line.number_at("subtask").ok_or_else(damaged)?,
+        };
+        let index = counts.entry(subtask).or_default();
+        if line.number_at("first") != Some(*index) {
+            return Err(format!("a batch before serial line {number} is missing"));
+        }
+        for times in line.value.get("times").ok_or_else(damaged)?.elements() {
+            let numbers = times.elements().iter().filter_map(Value::as_u64);
+            // Writing into a `String` cannot fail.
+            let _ = match numbers.collect::<Vec<_>>()[..] {
+                [start_ns, finish_ns] if subtask < sink => {
+                    writeln!(text, "execution,{subtask},{index},,{start_ns},{finish_ns},")
+                }
+                [ready_ns, start_ns, finish_ns, ref joined @ ..] if joined.len() == subtasks => {
+                    let joined: Vec<String> = joined.iter().map(u64::to_string).collect();
+                    let joined = joined.join(" ");
+                    writeln!(
+                        text,
+                        "join,{sink},{index},{ready_ns},{start_ns},{finish_ns},{joined}"
+                    )
+                }
+                _ => return Err(damaged()),
+            };
+            *index += 1;
         }
     }
-    let sink = samples.parallel.len() + 1;
-    for (index, Joined { ready_ns, span }) in samples.joins.iter().enumerate() {
-        let (start_ns, finish_ns) = (span.start_ns, span.finish_ns);
-        let indices = samples.indices_of(index).iter().map(u64::to_string);
-        let indices = indices.collect::<Vec<_>>().join(" ");
-        let _ = writeln!(
-            text,
-            "join,{sink},{index},{ready_ns},{start_ns},{finish_ns},{indices}"
-        );
+    match counts.get(&0).copied().unwrap_or_default() {
+        all if all == jobs => Ok(text),
+        some => Err(format!("the guest printed {some} of {jobs} jobs")),
     }
-    text
 }
 
-/// Reads what [`to_csv`] wrote, if the statement is this one and nothing is damaged.
-pub(super) fn from_csv(text: &str, statement: &str, subtasks: usize) -> Option<Samples> {
+/// Reads what [`write`] wrote, if the statement is this one and nothing is damaged.
+pub(super) fn read(text: &str, statement: &str, subtasks: usize) -> Option<Samples> {
     let mut lines = text.lines();
     let is_its_own = lines.next()?.strip_prefix("# ")? == statement && lines.next()? == COLUMNS;
     if !is_its_own || !text.ends_with('\n') {
@@ -126,18 +79,25 @@ pub(super) fn from_csv(text: &str, statement: &str, subtasks: usize) -> Option<S
     };
     for line in lines {
         let cells: Vec<&str> = line.split(',').collect();
-        let [what, subtask, _, ready_ns, start_ns, finish_ns, indices] = cells[..] else {
+        let [what, subtask, _, ready_ns, start_ns, finish_ns, joined] = cells[..] else {
             return None;
         };
-        let (start_ns, finish_ns) = (start_ns.parse().ok()?, finish_ns.parse().ok()?);
+        let span = Span {
+            start_ns: start_ns.parse().ok()?,
+            finish_ns: finish_ns.parse().ok()?,
+        };
         if what == "join" {
-            let indices: Option<Vec<u64>> =
-                indices.split(' ').map(|index| index.parse().ok()).collect();
-            let times_ns = [ready_ns.parse().ok()?, start_ns, finish_ns];
-            add_join(&mut samples, times_ns, &indices?)?;
+            let joined = joined.split(' ').map(|index| index.parse().ok());
+            samples
+                .indices
+                .extend(joined.collect::<Option<Vec<u64>>>()?);
+            let ready_ns = ready_ns.parse().ok()?;
+            samples.joins.push(Joined { ready_ns, span });
         } else {
-            let spans = spans_of(&mut samples, subtask.parse().ok()?)?;
-            spans.push(span([start_ns, finish_ns]));
+            match subtask.parse::<usize>().ok()? {
+                0 => samples.source.push(span),
+                parallel => samples.parallel.get_mut(parallel - 1)?.push(span),
+            }
         }
     }
     Some(samples)
@@ -145,7 +105,7 @@ pub(super) fn from_csv(text: &str, statement: &str, subtasks: usize) -> Option<S
 
 #[cfg(test)]
 mod tests {
-    use super::{from_csv, read_transcript, to_csv};
+    use super::{read, write};
     use crate::protocol::Transcript;
 
     const LOG: &str = "\
@@ -158,21 +118,26 @@ mod tests {
 
     #[test]
     fn times_survive_the_way_through_the_file() {
-        let samples = read_transcript(&Transcript::read(LOG), 2).unwrap();
+        let text = write(&Transcript::read(LOG), "jobs=2", 2, 2).unwrap();
+        let samples = read(&text, "jobs=2", 2).unwrap();
+        assert_eq!(samples.source[1].start_ns, 25);
         assert_eq!(samples.parallel[0][1].finish_ns, 40);
+        assert_eq!(samples.joins[1].ready_ns, 41);
         assert_eq!(samples.indices, [0, 0, 1, 1]);
-        let text = to_csv(&samples, "jobs=2");
-        assert_eq!(from_csv(&text, "jobs=2", 2), Some(samples));
-        assert_eq!(from_csv(&text, "jobs=3", 2), None);
+        assert_eq!(read(&text, "jobs=3", 2), None);
         let cut = &text[..text.len() - 4];
-        assert_eq!(from_csv(cut, "jobs=2", 2), None, "a cut file is not taken");
+        assert_eq!(read(cut, "jobs=2", 2), None, "a cut file is not taken");
     }
 
     #[test]
-    fn a_missing_batch_is_noticed() {
+    fn a_missing_batch_or_job_is_noticed() {
         let without: String = LOG.lines().filter(|line| !line.contains("[2,9]")).collect();
         let without = without.replace("}{", "}\n{");
-        let message = read_transcript(&Transcript::read(&without), 2).unwrap_err();
+        let message = write(&Transcript::read(&without), "", 2, 2).unwrap_err();
         assert_eq!(message, "a batch before serial line 2 is missing");
+        let message = write(&Transcript::read(LOG), "", 2, 3).unwrap_err();
+        assert_eq!(message, "the guest printed 2 of 3 jobs");
+        let message = write(&Transcript::read(LOG), "", 3, 2).unwrap_err();
+        assert_eq!(message, "serial line 5 has no times as it should");
     }
 }

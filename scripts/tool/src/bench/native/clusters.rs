@@ -4,12 +4,10 @@
 //! first cluster; what the second one did within the same time counts, too. So nothing is
 //! counted of times at which only one of them had its processor.
 
-use std::time::Instant;
-
 use sched_dag::Policy;
 
-use super::figure::Figure;
-use super::workload::{Graph, Rounds, commit, empty, machine, run};
+use super::graphs::{Graph, Rounds, commit, empty, machine, run};
+use super::{Figure, Row};
 
 /// How often one and two clusters take turns, so that a change of the host's speed meets both.
 const PASSES: usize = 6;
@@ -20,12 +18,15 @@ const INSTANCES_A_ROUND: u64 = 2_000;
 /// How many rounds a window has.
 const WINDOW: usize = 4;
 
+/// Rounds are counted in millionths.
+const PARTS: u64 = 1_000_000;
+
 /// Measures both, with so many windows each at least, adds the figures, and returns for each graph
 /// how many times the instances two clusters do.
 pub(super) fn measure(
     windows: usize,
-    figures: &mut Vec<Figure>,
-) -> Result<Vec<(Graph, f64)>, String> {
+    rows: &mut Vec<Row>,
+) -> Result<Vec<(&'static str, f64)>, String> {
     let mut all = Vec::new();
     for graph in [Graph::CHAIN, Graph::LAYERED] {
         let mut samples = [Vec::new(), Vec::new()];
@@ -34,28 +35,31 @@ pub(super) fn measure(
                 samples.extend(pass(graph, windows, clusters)?);
             }
         }
+        let name = graph.name;
         if samples.iter().any(Vec::is_empty) {
             return Err(format!(
-                "{graph}: the two clusters never ran at one time; ask for more rounds"
+                "{name}: the two clusters never ran at one time; ask for more rounds"
             ));
         }
+        let per = WINDOW as u64 * jobs_a_round(graph) * graph.instances() as u64;
         let [alone, both] = samples;
-        let figure =
-            |what, workers, samples| Figure::new(graph, what, "closures, static", workers, samples);
-        let alone = figure("per instance, one core", 1, alone);
-        let both = figure("per instance, two clusters", 2, both);
-        all.push((graph, alone.min() / both.min()));
-        figures.extend([alone, both]);
+        let alone = Figure::new((1, name, "per instance, one core"), per, alone);
+        let both = Figure::new((2, name, "per instance, two clusters"), per, both);
+        all.push((name, alone.min as f64 / both.min as f64));
+        rows.extend([alone, both].map(|figure| (figure, "closures, static")));
     }
     Ok(all)
 }
 
-/// Runs so many clusters, and returns what an instance took in each window.
-fn pass(graph: Graph, windows: usize, clusters: u32) -> Result<Vec<f64>, String> {
-    let jobs_a_round = INSTANCES_A_ROUND.div_ceil(graph.instances() as u64);
-    let a_round = jobs_a_round as f64 * graph.instances() as f64;
-    let rounds = windows.div_ceil(PASSES) + 2 * WINDOW;
-    let jobs = jobs_a_round * rounds as u64 + 1;
+fn jobs_a_round(graph: Graph) -> u64 {
+    INSTANCES_A_ROUND.div_ceil(graph.instances() as u64)
+}
+
+/// Runs so many clusters, and returns what the instances of a window took.
+fn pass(graph: Graph, windows: usize, clusters: u32) -> Result<Vec<u64>, String> {
+    let jobs_a_round = jobs_a_round(graph);
+    let rounds = (windows.div_ceil(PASSES) + 2 * WINDOW) as u64;
+    let jobs = jobs_a_round * rounds + 1;
     let marks: Vec<Rounds> = (0..clusters).map(|_| Rounds::default()).collect();
     let mut machine = machine(Policy::StaticPriority, clusters)?;
     if clusters > 1 {
@@ -63,60 +67,56 @@ fn pass(graph: Graph, windows: usize, clusters: u32) -> Result<Vec<f64>, String>
     }
     let functions = marks.iter().map(|marks| empty(graph, marks, jobs_a_round));
     commit(graph, jobs, functions.collect());
-    run(&machine, jobs).map_err(|why| format!("{graph}: {why}"))?;
-    let times: Vec<_> = marks.iter().map(Rounds::times).collect();
-    Ok(per_instance(&times, a_round))
+    run(&machine, jobs).map_err(|why| format!("{}: {why}", graph.name))?;
+    let times_ns: Vec<_> = marks.iter().map(Rounds::times_ns).collect();
+    Ok(of_windows(&times_ns))
 }
 
-/// Returns what an instance took, of all clusters, in each window of the first one that lies
-/// within the others' times.
-fn per_instance(times: &[Vec<Instant>], a_round: f64) -> Vec<f64> {
-    let [first, others @ ..] = times else {
+/// Returns in nanoseconds what the instances of [`WINDOW`] rounds took, by all clusters, in each
+/// window of the first one that lies within the others' times.
+fn of_windows(times_ns: &[Vec<u64>]) -> Vec<u64> {
+    let [first, others @ ..] = times_ns else {
         return Vec::new();
     };
     // The first ones warm up.
     let windows = first.windows(WINDOW + 1).skip(WINDOW);
-    let of_window = |window: &[Instant]| {
+    let of_window = |window: &[u64]| {
         let (from, to) = (window[0], window[WINDOW]);
-        let mut rounds = WINDOW as f64;
+        let mut rounds = WINDOW as u64 * PARTS;
         for other in others {
-            rounds += rounds_by(other, to)? - rounds_by(other, from)?;
+            rounds += parts_by(other, to)? - parts_by(other, from)?;
         }
-        Some((to - from).as_secs_f64() * 1e9 / (rounds * a_round))
+        Some((to - from) * WINDOW as u64 * PARTS / rounds)
     };
     windows.filter_map(of_window).collect()
 }
 
-/// Returns how many rounds were over by an instant, in parts of one; `None` before the first one
-/// and after the last.
-fn rounds_by(times: &[Instant], at: Instant) -> Option<f64> {
-    let next = times.partition_point(|&time| time <= at);
-    let (before, after) = (*times.get(next.checked_sub(1)?)?, *times.get(next)?);
-    let part = (at - before).as_secs_f64() / (after - before).as_secs_f64();
-    Some((next - 1) as f64 + part)
+/// Returns how many rounds were over by an instant, in [`PARTS`] of one; `None` before the first
+/// one and after the last.
+fn parts_by(times_ns: &[u64], at_ns: u64) -> Option<u64> {
+    let next = times_ns.partition_point(|&time_ns| time_ns <= at_ns);
+    let over = next.checked_sub(1)?;
+    let (before_ns, after_ns) = (times_ns[over], *times_ns.get(next)?);
+    Some(over as u64 * PARTS + (at_ns - before_ns) * PARTS / (after_ns - before_ns))
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, Instant};
-
-    use super::{WINDOW, per_instance};
+    use super::{WINDOW, of_windows};
 
     #[test]
     fn only_times_at_which_both_run_count() {
-        let zero = Instant::now();
-        let at = |us: u64| zero + Duration::from_micros(us);
-        let first: Vec<Instant> = (0..30).map(|round| at(10 * round)).collect();
+        let at = |us: u64| 1_000 * us;
+        let first: Vec<u64> = (0..30).map(|round| at(10 * round)).collect();
         // The second one stands still from 100 us to 200 us.
         let standing = (0..=10).chain(20..=30);
-        let second: Vec<Instant> = standing.map(|round| at(10 * round)).collect();
-        let alone = per_instance(std::slice::from_ref(&first), 1_000.0);
-        let is_10 = |ns: &f64| (ns - 10.0).abs() < 0.001;
-        assert!(alone.iter().all(is_10), "{alone:?}");
-        let both = per_instance(&[first, second], 1_000.0);
+        let second: Vec<u64> = standing.map(|round| at(10 * round)).collect();
+        let alone = of_windows(std::slice::from_ref(&first));
+        assert!(alone.iter().all(|&ns| ns == at(40)), "{alone:?}");
+        let both = of_windows(&[first, second]);
         assert_eq!(both.len(), 30 - 2 * WINDOW);
-        let least = both.iter().copied().fold(f64::MAX, f64::min);
-        let most = both.iter().copied().fold(0.0, f64::max);
-        assert!((least - 5.0).abs() < 0.001 && most > 9.0, "{both:?}");
+        let (least, most) = (both.iter().min(), both.iter().max());
+        assert_eq!(least, Some(&at(20)), "{both:?}");
+        assert!(most > Some(&at(36)), "{both:?}");
     }
 }

@@ -9,27 +9,24 @@
 //! percentile: the minimum is what the code costs, the others are what the host makes
 //! of it.
 //!
-//! - `workload`: the graphs, as bodies that do nothing;
+//! - `graphs`: the graphs, as bodies that do nothing;
 //! - `throughput`: rounds of jobs, and what one step of them takes;
 //! - `join`: from the last return to the sink's start, across cores;
-//! - `clusters`: what two clusters of one core do, next to one core;
-//! - `figure`: a distribution, for people and for machines.
+//! - `clusters`: what two clusters of one core do, next to one core.
 
 mod clusters;
-mod figure;
+mod graphs;
 mod join;
 mod throughput;
-mod workload;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use figure::Figure;
-use workload::Graph;
-
+use graphs::Graph;
 use replay::shown::quoted;
 
-use super::by_plan;
+use super::frame::{Figure, Table, by_plan};
+use crate::json::Object;
 use crate::options::{Command, Parsed, Takes, options};
 use crate::progress::Progress;
 
@@ -85,16 +82,13 @@ struct Plan {
 impl Plan {
     fn read(options: &Parsed) -> Result<Self, String> {
         options.check_distinct(&["workers", "only"])?;
-        let names: Option<Vec<&str>> = options.text("only").map(|names| names.split(',').collect());
-        let is_wanted = |name: &str| names.as_ref().is_none_or(|names| names.contains(&name));
-        let known: Vec<String> = Graph::ALL.iter().map(Graph::to_string).collect();
-        let of_nothing = names.iter().flatten().find(|name| {
-            let is_graph = known.iter().any(|graph| graph == *name);
-            !is_graph && ![JOIN, CLUSTERS].contains(name)
-        });
-        if let Some(name) = of_nothing {
+        let names = Graph::ALL.iter().map(|graph| graph.name);
+        let known: Vec<&str> = names.chain([JOIN, CLUSTERS]).collect();
+        let chosen = options.text("only").map(|names| names.split(',').collect());
+        let wanted: Vec<&str> = chosen.unwrap_or_else(|| known.clone());
+        if let Some(name) = wanted.iter().find(|name| !known.contains(name)) {
             return Err(format!(
-                "`--only`: no workload is called {}; there are {}, {JOIN} and {CLUSTERS}",
+                "`--only`: no workload is called {}; there are {}",
                 quoted(name),
                 known.join(", ")
             ));
@@ -107,58 +101,104 @@ impl Plan {
             ));
         }
         let rounds = options.number("rounds").unwrap_or(0);
+        let graphs = Graph::ALL.into_iter();
         Ok(Self {
-            with_join: is_wanted(JOIN) && workers.contains(&2),
-            with_clusters: is_wanted(CLUSTERS) && workers.contains(&2),
+            with_join: wanted.contains(&JOIN) && workers.contains(&2),
+            with_clusters: wanted.contains(&CLUSTERS) && workers.contains(&2),
             workers,
             rounds: usize::try_from(rounds).unwrap_or(usize::MAX),
             jobs: options.number("jobs").unwrap_or(0),
-            graphs: Graph::ALL
-                .into_iter()
-                .filter(|graph| is_wanted(&graph.to_string()))
+            graphs: graphs
+                .filter(|graph| wanted.contains(&graph.name))
                 .collect(),
         })
     }
 }
 
+/// A figure in nanoseconds, and what runs the bodies under which policy.
+type Row = (Figure, &'static str);
+
 /// Measures, and prints; returns that nothing has a limit.
 fn measure(plan: &Plan) -> Result<bool, String> {
     let total = throughput::passes(&plan.graphs, &plan.workers);
     let (mut progress, mut over) = (Progress::new(total, "passes"), 0);
-    let mut figures = Vec::new();
+    let mut show = || {
+        over += 1;
+        progress.show(over);
+    };
+    let mut rows = Vec::new();
     for &graph in &plan.graphs {
-        figures.extend(throughput::measure(
-            graph,
-            &plan.workers,
-            plan.rounds,
-            || {
-                over += 1;
-                progress.show(over);
-            },
-        )?);
+        let measured = throughput::measure(graph, &plan.workers, plan.rounds, &mut show)?;
+        rows.extend(measured);
     }
     progress.end();
     if plan.with_join {
-        figures.extend(join::measure(plan.jobs)?);
+        rows.extend(join::measure(plan.jobs)?);
     }
     let together = match plan.with_clusters {
-        true => clusters::measure(plan.rounds, &mut figures)?,
+        true => clusters::measure(plan.rounds, &mut rows)?,
         false => Vec::new(),
     };
-    print!("{}", Figure::table(&figures));
+    print!("{}", table(&rows));
     for (graph, times) in &together {
         println!("{graph}: two clusters of one core each do {times:.2} times what one core does");
     }
-    for figure in &figures {
-        println!("{}", figure.json());
+    for row in &rows {
+        println!("{}", machine_line(row));
     }
     for (graph, times) in &together {
-        println!(
-            "{{\"kind\":\"bench\",\"name\":\"native-clusters\",\"workload\":\"{graph}\",\
-             \"clusters\":2,\"times\":{times:.3}}}"
-        );
+        let line = Object::new().text("kind", "bench");
+        let line = line.text("name", "native-clusters").text("workload", graph);
+        let line = line.number("clusters", 2_u64);
+        println!("{}", line.json("times", &format!("{times:.3}")).end());
     }
     Ok(true)
+}
+
+fn table(rows: &[Row]) -> String {
+    let columns = [
+        ("", -14, 0),
+        ("ns", -38, 0),
+        ("bodies, policy", -18, 0),
+        ("workers", 8, 0),
+        ("min", 10, 1),
+        ("median", 10, 1),
+        ("p99", 10, 1),
+    ];
+    let mut table = Table::new("", &columns);
+    let mut before = "";
+    for (figure, runner) in rows {
+        let is_same = std::mem::replace(&mut before, &figure.workload) == figure.workload;
+        let [min, median, p99] =
+            [figure.min, figure.median, figure.p99].map(|ns| figure.of_step(ns));
+        let name = if is_same { "" } else { before };
+        table.row(&[
+            &name,
+            &figure.figure,
+            runner,
+            &figure.cores,
+            &min,
+            &median,
+            &p99,
+        ]);
+    }
+    table.text()
+}
+
+fn machine_line((figure, runner): &Row) -> String {
+    let one = |ns| format!("{:.2}", figure.of_step(ns));
+    Object::new()
+        .text("kind", "bench")
+        .text("name", "native")
+        .text("workload", &figure.workload)
+        .text("what", &figure.figure)
+        .text("runner", runner)
+        .number("workers", figure.cores)
+        .number("samples", figure.samples)
+        .json("min_ns", &one(figure.min))
+        .json("median_ns", &one(figure.median))
+        .json("p99_ns", &one(figure.p99))
+        .end()
 }
 
 #[cfg(test)]
@@ -185,16 +225,16 @@ mod tests {
     #[test]
     fn a_short_run_measures_every_graph_alone_and_in_clusters() {
         for graph in Graph::ALL {
-            let figures = throughput::measure(graph, &[1], 3, || {}).expect("it runs");
+            let rows = throughput::measure(graph, &[1], 3, &mut || {}).expect("it runs");
             let expected = 3 + usize::from(graph.has_values());
-            assert_eq!(figures.len(), expected, "{graph}");
+            assert_eq!(rows.len(), expected, "{}", graph.name);
         }
-        let mut figures = Vec::new();
+        let mut rows = Vec::new();
         // On a host that never gives us both processors there is nothing to see.
         if linux::processors() > 1
-            && let Ok(together) = clusters::measure(600, &mut figures)
+            && let Ok(together) = clusters::measure(600, &mut rows)
         {
-            assert_eq!((together.len(), figures.len()), (2, 4));
+            assert_eq!((together.len(), rows.len()), (2, 4));
         }
     }
 }

@@ -1,11 +1,9 @@
 //! Job after job, back to back: what a hop, a job, an instance takes.
 
-use std::time::Duration;
-
 use sched_dag::Policy;
 
-use super::figure::Figure;
-use super::workload::{Graph, Rounds, commit, commit_typed, empty, machine, run};
+use super::graphs::{Graph, Rounds, commit, commit_typed, empty, machine, run};
+use super::{Figure, Row};
 
 /// How often each runner gets its turn, so that a change of the host's speed meets all.
 const PASSES: usize = 3;
@@ -46,23 +44,25 @@ pub(super) fn measure(
     graph: Graph,
     workers: &[u32],
     rounds: usize,
-    mut show: impl FnMut(),
-) -> Result<Vec<Figure>, String> {
+    show: &mut impl FnMut(),
+) -> Result<Vec<Row>, String> {
     let runners = runners(graph, workers);
     let mut samples = vec![Vec::new(); runners.len()];
     for _ in 0..PASSES {
         for (samples, &(runner, workers)) in samples.iter_mut().zip(&runners) {
-            let durations = pass(graph, runner, workers, rounds.div_ceil(PASSES));
-            samples.extend(durations.map_err(|why| format!("{graph}, {}: {why}", runner.name()))?);
+            let rounds_ns = pass(graph, runner, workers, rounds.div_ceil(PASSES));
+            samples.extend(rounds_ns.map_err(|why| {
+                let (graph, runner) = (graph.name, runner.name());
+                format!("{graph}, {runner}: {why}")
+            })?);
             show();
         }
     }
     let (step, steps) = graph.steps;
-    let steps = jobs_a_round(graph) as f64 * f64::from(steps);
-    let of_runner = |(&(runner, workers), samples): (&(Runner, u32), Vec<Duration>)| {
-        let per_step = |round: Duration| round.as_secs_f64() * 1e9 / steps;
-        let samples = samples.into_iter().map(per_step).collect();
-        Figure::new(graph, step, runner.name(), workers, samples)
+    let per = jobs_a_round(graph) * steps;
+    let of_runner = |(&(runner, workers), samples): (&(Runner, u32), Vec<u64>)| {
+        let what = (u64::from(workers), graph.name, step);
+        (Figure::new(what, per, samples), runner.name())
     };
     Ok(runners.iter().zip(samples).map(of_runner).collect())
 }
@@ -81,13 +81,8 @@ fn jobs_a_round(graph: Graph) -> u64 {
     (INSTANCES_A_ROUND / graph.instances()) as u64
 }
 
-/// Runs the rounds, and some before to warm up, and returns what each took.
-fn pass(
-    graph: Graph,
-    runner: Runner,
-    workers: u32,
-    rounds: usize,
-) -> Result<Vec<Duration>, String> {
+/// Runs the rounds, and some before to warm up, and returns what each took in nanoseconds.
+fn pass(graph: Graph, runner: Runner, workers: u32, rounds: usize) -> Result<Vec<u64>, String> {
     let jobs_a_round = jobs_a_round(graph);
     let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
     let marks = Rounds::default();
@@ -105,11 +100,11 @@ fn pass(
         }
         Runner::Typed => {
             let machine = machine(Policy::StaticPriority, workers)?;
-            commit_typed(graph, jobs, &marks, jobs_a_round);
+            commit_typed(graph, jobs, marks.source(jobs_a_round));
             run(&machine, jobs)?;
         }
     }
-    let times = marks.times();
-    let durations = times.windows(2).map(|pair| pair[1] - pair[0]);
-    Ok(durations.skip(times.len() / 10).collect())
+    let times_ns = marks.times_ns();
+    let rounds_ns = times_ns.windows(2).map(|pair| pair[1] - pair[0]);
+    Ok(rounds_ns.skip(times_ns.len() / 10).collect())
 }

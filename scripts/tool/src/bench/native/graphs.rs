@@ -2,12 +2,11 @@
 //!
 //! Only the source does something: once a round it reads the clock.
 
-use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use fass::{
-    ConstructionPolicy, Dag, Policy, SubtaskAttributes, create_dag, finish_create_dags,
+    ConstructionPolicy, Policy, SubtaskAttributes, create_dag, finish_create_dags,
     finish_create_dags_with,
 };
 use hand_off::Shape;
@@ -17,19 +16,13 @@ use sched_dag::DagId;
 /// A graph that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Graph {
-    name: &'static str,
+    pub(super) name: &'static str,
     /// The shape of each DAG.
     shape: Shape,
     /// How many DAGs there are: released at once, each with a deadline of its own.
     dags: u16,
     /// What a step is called, and how many a job of all DAGs has.
-    pub(super) steps: (&'static str, u32),
-}
-
-impl fmt::Display for Graph {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name)
-    }
+    pub(super) steps: (&'static str, u64),
 }
 
 impl Graph {
@@ -49,7 +42,7 @@ impl Graph {
         Self::new("dags-1000", Shape::Chain(1), 1_000, ("per job", 1_000)),
     ];
 
-    const fn new(name: &'static str, shape: Shape, dags: u16, steps: (&'static str, u32)) -> Self {
+    const fn new(name: &'static str, shape: Shape, dags: u16, steps: (&'static str, u64)) -> Self {
         Self {
             name,
             shape,
@@ -73,34 +66,40 @@ impl Graph {
     }
 }
 
-/// The times at which rounds begin and end.
+/// Returns a time in nanoseconds.
+pub(super) fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// The times at which rounds begin and end, in nanoseconds since the first one.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Rounds(Arc<Mutex<Vec<Instant>>>);
+pub(super) struct Rounds(Arc<Mutex<Vec<u64>>>);
 
 impl Rounds {
     /// Returns them.
-    pub(super) fn times(&self) -> Vec<Instant> {
-        let times = self.0.lock();
-        times.unwrap_or_else(PoisonError::into_inner).clone()
+    pub(super) fn times_ns(&self) -> Vec<u64> {
+        let times_ns = self.0.lock();
+        times_ns.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Returns what a source does: it reads the clock once in `jobs_a_round` jobs.
     pub(super) fn source(&self, jobs_a_round: u64) -> impl FnMut() + Send + 'static {
+        static EPOCH: LazyLock<Instant> = LazyLock::new(Instant::now);
         let rounds = self.clone();
         let mut left = 1;
         move || {
             left -= 1;
             if left == 0 {
                 left = jobs_a_round;
-                let mut times = rounds.0.lock().unwrap_or_else(PoisonError::into_inner);
-                times.push(Instant::now());
+                let mut times_ns = rounds.0.lock().unwrap_or_else(PoisonError::into_inner);
+                times_ns.push(nanoseconds(EPOCH.elapsed()));
             }
         }
     }
 }
 
 /// A period that no job needs, with which the releases are back to back.
-const PERIOD: Duration = Duration::from_secs(1);
+pub(super) const PERIOD: Duration = Duration::from_secs(1);
 
 /// Takes so many cores of this host by threads that poll. Jobs follow one another as fast as they
 /// go, and nothing is written down. Only one thread of the program may measure at a time.
@@ -165,13 +164,8 @@ pub(super) fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the graphs are right");
 }
 
-/// Commits a graph of one DAG with a value on each edge.
-pub(super) fn commit_typed(graph: Graph, jobs: u64, rounds: &Rounds, jobs_a_round: u64) {
-    let dag = typed(graph.shape, jobs, rounds.source(jobs_a_round));
-    finish_create_dags(&[dag]).expect("the graphs are right");
-}
-
-fn typed(shape: Shape, jobs: u64, mut tick: impl FnMut() + Send + 'static) -> Dag {
+/// Commits a graph of one DAG with a value on each edge; its source does `tick`, too.
+pub(super) fn commit_typed(graph: Graph, jobs: u64, mut tick: impl FnMut() + Send + 'static) {
     let dag = create_dag();
     dag.name("typed").jobs(jobs).in_flight(1);
     let source = move || {
@@ -179,10 +173,10 @@ fn typed(shape: Shape, jobs: u64, mut tick: impl FnMut() + Send + 'static) -> Da
         (1u64,)
     };
     dag.register_periodic_subtask(source, vec!["t0"], PERIOD, named(0));
-    let sink = shape.subtasks() - 1;
+    let sink = graph.shape.subtasks() - 1;
     // Each subtask writes the topic of its number.
     let topics: Vec<String> = (0..sink).map(|number| format!("t{number}")).collect();
-    let is_chain = matches!(shape, Shape::Chain(_));
+    let is_chain = matches!(graph.shape, Shape::Chain(_));
     for number in 1..sink {
         let input = &topics[if is_chain { number - 1 } else { 0 }];
         let body = |(value,): (u64,)| (value,);
@@ -200,5 +194,5 @@ fn typed(shape: Shape, jobs: u64, mut tick: impl FnMut() + Send + 'static) -> Da
             dag.register_sink_subtask(body, inputs, PERIOD, attributes)
         }
     };
-    dag
+    finish_create_dags(&[dag]).expect("the graphs are right");
 }

@@ -10,7 +10,7 @@ use crate::places::{self, Frame};
 use crate::system;
 
 /// Addresses with everything that contains them, the innermost first.
-pub(super) type Frames = BTreeMap<u64, Vec<Frame>>;
+pub(in crate::bench) type Frames = BTreeMap<u64, Vec<Frame>>;
 
 /// The most addresses that fit a command line with room to spare.
 const AT_ONCE: usize = 20_000;
@@ -20,7 +20,7 @@ const AT_ONCE: usize = 20_000;
 /// # Errors
 ///
 /// In words: `objdump` is missing or cannot be started.
-pub(super) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String> {
+pub(in crate::bench) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String> {
     let objdump = program("objdump")?;
     let output = Command::new(&objdump)
         .args(["-d", "-C", "--no-show-raw-insn"])
@@ -41,7 +41,7 @@ pub(super) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String
 /// # Errors
 ///
 /// In words: `addr2line` is missing or has failed.
-pub(super) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames, String> {
+pub(in crate::bench) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames, String> {
     let addr2line = program("addr2line")?;
     let mut all = Frames::new();
     for some in addresses.chunks(AT_ONCE) {
