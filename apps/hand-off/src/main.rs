@@ -1,8 +1,7 @@
 //! Boots, measures the way from a completion to its successor, and reports.
 //!
 //! Words of the command line: `part` is what to measure, `jobs` how many of each
-//! workload; `chain`, `branches` and `layered` are the sizes of the workloads, `seed`
-//! is that of the layered ones.
+//! workload; `chain`, `branches` and `layered` are the sizes of the workloads.
 
 #![no_std]
 #![no_main]
@@ -30,17 +29,13 @@ fn main(machine: &Machine) -> Result<(), Ending> {
             for &subtasks in &plan.chain {
                 measure::budgets(machine, subtasks, plan.jobs)?;
             }
-        }
-        Part::Traced => {
-            for &parallel in &plan.branches {
-                measure::fork_join(machine, parallel, plan.jobs)?;
-            }
-            measure::preemption(machine, plan.jobs)?;
+            wake_ups(machine, &plan)?;
         }
         Part::Elsewhere => {
             measure::woken_cores(machine, plan.jobs)?;
             measure::joins(machine, plan.jobs)?;
             measure::preemption(machine, plan.jobs)?;
+            wake_ups(machine, &plan)?;
         }
     }
     machine.report_memory();
@@ -55,9 +50,14 @@ fn workloads(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
         measure::fork_join(machine, parallel, plan.jobs)?;
     }
     for &subtasks in &plan.layered {
-        measure::layered(machine, subtasks, plan.seed, plan.jobs)?;
+        measure::layered(machine, subtasks, plan.jobs)?;
     }
     Ok(())
+}
+
+fn wake_ups(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
+    let mut branches = plan.branches.iter();
+    branches.try_for_each(|&parallel| measure::wake_ups(machine, parallel))
 }
 
 /// Which measurements are made.
@@ -69,15 +69,12 @@ enum Part {
     Workloads,
     /// What needs a second core.
     Elsewhere,
-    /// What is worth looking at in a trace.
-    Traced,
 }
 
-const PARTS: [(&str, Part); 4] = [
+const PARTS: [(&str, Part); 3] = [
     ("hand-off", Part::HandOff),
     ("workloads", Part::Workloads),
     ("elsewhere", Part::Elsewhere),
-    ("traced", Part::Traced),
 ];
 
 /// What is to be measured.
@@ -87,7 +84,6 @@ struct Plan {
     chain: Vec<usize>,
     branches: Vec<usize>,
     layered: Vec<usize>,
-    seed: u64,
 }
 
 impl Plan {
@@ -105,9 +101,8 @@ impl Plan {
             chain: sizes("chain", 2, 10_000, &[64])?,
             branches: sizes("branches", 1, most_parallel, &[2, 4, 6, 16])?,
             layered: sizes("layered", 3, 100_000, &[1000])?,
-            seed: options.number("seed", 0..=u64::MAX, 1)?,
         };
-        options.finish(&["part", "jobs", "chain", "branches", "layered", "seed"])?;
+        options.finish(&["part", "jobs", "chain", "branches", "layered"])?;
         Ok(plan)
     }
 }

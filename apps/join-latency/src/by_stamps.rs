@@ -11,7 +11,7 @@ use core::time::Duration;
 
 use fass::{Dag, SubtaskAttributes, Untyped, create_dag};
 use join_latency::{Experiment, Message, Part};
-use kernel::{Ending, Event, Lock, Machine, json};
+use kernel::{Ending, Event, Lock, Machine};
 use pub_sub::executor::{Host, work};
 use pub_sub::graph::Graph;
 
@@ -26,11 +26,8 @@ pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, 
         graph: Lock::new(experiment.graph()),
         event: Event::new(),
         epoch_ns: AtomicU64::new(u64::MAX),
-        jobs: experiment.jobs as u64,
-        period_ns: experiment.period_ns,
         has_keeper: AtomicBool::new(false),
         latest_seen: AtomicU64::new(0),
-        shown: AtomicU64::new(0),
     });
     fass::finish_create_dags(&[workers(machine.cores(), &shared)])?;
     let run = machine.run()?;
@@ -77,14 +74,10 @@ struct Cores {
     event: Event,
     /// Time 0 of the graph on the kernel's clock.
     epoch_ns: AtomicU64,
-    jobs: u64,
-    period_ns: u64,
     /// Whether a worker watches the clock for all that wait.
     has_keeper: AtomicBool,
     /// The latest version that a worker had seen when it began to wait.
     latest_seen: AtomicU64,
-    /// The progress that was printed last, in jobs.
-    shown: AtomicU64,
 }
 
 impl Cores {
@@ -102,25 +95,6 @@ impl Cores {
         let epoch_ns = self.epoch_ns.load(Ordering::Relaxed);
         while fass::now_ns() < epoch_ns {
             self.wait(self.version(), 0);
-        }
-    }
-
-    /// Prints, now and then, how many jobs have been released, if there is time.
-    fn show_progress(&self, until_ns: u64) {
-        const TIME_TO_PRINT_NS: u64 = 5_000_000;
-        let now_ns = self.now_ns();
-        let done = (now_ns / self.period_ns).min(self.jobs);
-        let shown = self.shown.load(Ordering::Relaxed);
-        let is_due = done >= shown + (self.jobs / 20).max(1);
-        if is_due && until_ns.saturating_sub(now_ns) > TIME_TO_PRINT_NS {
-            let exchanged =
-                self.shown
-                    .compare_exchange(shown, done, Ordering::Relaxed, Ordering::Relaxed);
-            if exchanged.is_ok() {
-                json::emit("progress", |line| {
-                    line.number("done", done).number("total", self.jobs);
-                });
-            }
         }
     }
 }
@@ -141,7 +115,6 @@ impl Host<Message, Part> for Cores {
     /// As in ROS 2's executor one idle worker at a time watches the clock, the others
     /// wait for a notice. When it leaves, for whatever reason, one of them takes over.
     fn wait(&self, seen: u64, until_ns: u64) {
-        self.show_progress(until_ns);
         self.latest_seen.fetch_max(seen, Ordering::SeqCst);
         if self.has_keeper.swap(true, Ordering::SeqCst) {
             self.event.wait(seen, u64::MAX);

@@ -33,23 +33,19 @@ const WORDS: [&str; 7] = [
     "depth",
 ];
 
-/// What makes the joins.
-#[derive(Clone, Copy, Debug)]
-enum PolicyUnderTest {
-    Fass,
-    Exact,
-    Approximate,
-}
-
 fn main(machine: &Machine) -> Result<(), Ending> {
     let options = machine.options();
-    let policies = [
-        ("fass", PolicyUnderTest::Fass),
-        ("exact", PolicyUnderTest::Exact),
-        ("approximate", PolicyUnderTest::Approximate),
-    ];
-    let policy = options.choice("policy_under_test", &policies)?;
     let max_interval_ms = options.number("max_interval_ms", 1..=1_000_000, 50)?;
+    let max_interval_ns = max_interval_ms * 1_000_000;
+    let policies = [
+        ("fass", None),
+        ("exact", Some(Matching::Exact)),
+        (
+            "approximate",
+            Some(Matching::Approximate { max_interval_ns }),
+        ),
+    ];
+    let matching = options.choice("policy_under_test", &policies)?;
     let parallel = size(options.number("subtasks", 1..=MOST_PARALLEL as u64, 4)?);
     let jobs = options.number("jobs", 1..=1_000_000, 200)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
@@ -65,8 +61,13 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         ))
         .into());
     }
-    let (name, outcome) = match policy {
-        PolicyUnderTest::Fass => {
+    let name = match matching {
+        None => String::from("fass"),
+        Some(Matching::Exact) => String::from("exact"),
+        Some(Matching::Approximate { .. }) => format!("approximate-{max_interval_ms}"),
+    };
+    let outcome = match matching {
+        None => {
             let workload = Workload {
                 parallel,
                 longest: fork_join::WCET,
@@ -74,17 +75,9 @@ fn main(machine: &Machine) -> Result<(), Ending> {
                 seed,
                 work: Work::Simulate(Occupation::Hold),
             };
-            (String::from("fass"), by_dag::run(machine, &workload)?)
+            by_dag::run(machine, &workload)?
         }
-        PolicyUnderTest::Exact | PolicyUnderTest::Approximate => {
-            let (name, matching) = match policy {
-                PolicyUnderTest::Exact => (String::from("exact"), Matching::Exact),
-                _ => {
-                    let max_interval_ns = max_interval_ms * 1_000_000;
-                    let matching = Matching::Approximate { max_interval_ns };
-                    (format!("approximate-{max_interval_ms}"), matching)
-                }
-            };
+        Some(matching) => {
             let experiment = Experiment {
                 parallel,
                 jobs: size(jobs),
@@ -95,7 +88,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
                 period_ns: u64::try_from(PERIOD.as_nanos()).unwrap_or(u64::MAX),
                 execute: hold,
             };
-            (name, by_stamps::run(machine, experiment)?)
+            by_stamps::run(machine, experiment)?
         }
     };
     println!(
@@ -104,7 +97,6 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     );
     output::emit_samples(&outcome.samples);
     output::emit_summary(&name, &outcome);
-    output::print_summary(&outcome);
     machine.report_memory();
     outcome
         .complaint(jobs)

@@ -88,49 +88,42 @@ impl Display for Times<'_> {
     }
 }
 
-/// Prints the counts and distributions as a machine line.
+/// Prints the counts and distributions, as a machine line and for people.
 pub(crate) fn emit_summary(name: &str, outcome: &Outcome) {
     let samples = &outcome.samples;
     let record = samples.record();
+    let [joins, same_index, cross_index, missing] = [
+        record.sets.len(),
+        record.same_index_sets(),
+        record.cross_index_sets(),
+        record.missing_joins(),
+    ];
     let literal = Distribution::new(record.join_latencies_ns());
     let cover = Distribution::new(record.cover_delays_ns());
     json::emit("join_latency", |line| {
         line.text("policy", name)
             .number("subtasks", samples.parallel.len() as u64)
             .number("jobs", samples.source.len() as u64)
-            .number("joins", record.sets.len() as u64)
-            .number("same_index", record.same_index_sets() as u64)
-            .number("cross_index", record.cross_index_sets() as u64)
-            .number("missing", record.missing_joins() as u64)
+            .number("joins", joins as u64)
+            .number("same_index", same_index as u64)
+            .number("cross_index", cross_index as u64)
+            .number("missing", missing as u64)
             .number("lost_inputs", samples.lost_inputs)
             .number("violations", outcome.violations)
             .number("allocations", outcome.allocations)
             .distribution("join_latency_ns", &literal)
             .distribution("cover_delay_ns", &cover);
     });
-}
-
-/// Prints the same for people.
-pub(crate) fn print_summary(outcome: &Outcome) {
-    let record = outcome.samples.record();
     println!(
-        "{} joins: {} of one job, {} across jobs; {} joins never happened",
-        record.sets.len(),
-        record.same_index_sets(),
-        record.cross_index_sets(),
-        record.missing_joins()
+        "{joins} joins: {same_index} of one job, {cross_index} across jobs; {missing} joins never \
+         happened"
     );
-    let rows = [
-        ("join latency", record.join_latencies_ns()),
-        ("cover delay", record.cover_delays_ns()),
-    ];
-    for (name, samples_ns) in rows {
-        let distribution = Distribution::new(samples_ns);
+    for (name, of) in [("join latency", literal), ("cover delay", cover)] {
         println!(
             "  {name:<14} median {:>12}  p99 {:>12}  max {:>12}",
-            Ns(distribution.median()),
-            Ns(distribution.p99()),
-            Ns(distribution.max())
+            Ns(of.median()),
+            Ns(of.p99()),
+            Ns(of.max())
         );
     }
 }

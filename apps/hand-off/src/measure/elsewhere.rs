@@ -7,7 +7,7 @@ use hand_off::{Shape, Stamping};
 use kernel::{Ending, Machine};
 
 use super::{Measured, local, since, workload};
-use crate::row::Row;
+use crate::row::emit;
 
 /// A fork into two on an otherwise idle machine: one branch follows on the
 /// source's core, the other on a core that has to be woken.
@@ -19,9 +19,9 @@ pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), Ending> {
     let elsewhere = || branches().filter(|&(branch, job)| core(branch, job) != core(0, job));
     let first = |(branch, job)| all.stamps.first(branch, job);
     let from_return = elsewhere().filter_map(|at| since(first(at), all.stamps.last(0, at.1)));
-    Row::new("woken core", "return_to_start", from_return).emit();
+    emit("woken core", "return_to_start", 1, from_return);
     let from_ready = elsewhere().filter_map(|at| since(first(at), all.ready_ns(at.0, at.1)));
-    Row::new("woken core", "ready_to_start", from_ready).emit();
+    emit("woken core", "ready_to_start", 1, from_ready);
     Ok(())
 }
 

@@ -1,15 +1,16 @@
 //! From a completion to its successor on the same core.
 
 use alloc::format;
-use alloc::string::String;
 use core::time::Duration;
 
 use fass::{Policy, Preemption};
 use hand_off::{Pen, Shape, Stamping};
 use kernel::{Ending, Machine};
+use sched_dag::SubtaskId;
+use sched_dag::journal::{Event, What};
 
 use super::{Measured, since, workload};
-use crate::row::Row;
+use crate::row::emit;
 
 /// What reading the clock costs, and what a stamp does.
 pub(crate) fn clock() {
@@ -18,12 +19,12 @@ pub(crate) fn clock() {
     for reading in &mut readings {
         *reading = fass::now_ns();
     }
-    Row::new("clock", "reading", differences(readings.into_iter())).emit();
+    emit("clock", "reading", 1, differences(readings.into_iter()));
     let mut pen = Pen::new(READINGS);
     for _ in 0..READINGS {
         pen.stamp();
     }
-    Row::new("clock", "stamp", differences(pen.times())).emit();
+    emit("clock", "stamp", 1, differences(pen.times()));
 }
 
 /// A chain: from each subtask to the next, and from end to end.
@@ -40,7 +41,7 @@ pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(),
             all.stamps.last(later - 1, job),
         )
     };
-    Row::new(&name, "return_to_start", hops.filter_map(hop)).emit();
+    emit(&name, "return_to_start", 1, hops.filter_map(hop));
     let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
     emit_hop(&name, &ends);
     ends.emit_common(&name);
@@ -62,9 +63,7 @@ pub(crate) fn budgets(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(
 
 fn emit_hop(name: &str, ends: &Measured) {
     let hops = ends.workload.shape.subtasks() as u64 - 1;
-    Row::new(name, "hop", ends.source_to_sink())
-        .per(hops)
-        .emit();
+    emit(name, "hop", hops, ends.source_to_sink());
 }
 
 /// A fork and its join: from the last return to the sink.
@@ -74,7 +73,7 @@ pub(crate) fn fork_join(machine: &Machine, parallel: usize, jobs: u64) -> Result
     let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
     emit_join(&name, &all);
     let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
-    Row::new(&name, "source_to_sink", ends.source_to_sink()).emit();
+    emit(&name, "source_to_sink", 1, ends.source_to_sink());
     ends.emit_common(&name);
     Ok(())
 }
@@ -87,30 +86,41 @@ pub(super) fn emit_join(name: &str, all: &Measured) {
     let to_start = all
         .jobs()
         .filter_map(|job| since(first(job), all.last_return(job)));
-    Row::new(name, "return_to_start", to_start).emit();
+    emit(name, "return_to_start", 1, to_start);
     let to_ready = all
         .jobs()
         .filter_map(|job| since(ready(job), all.last_return(job)));
-    Row::new(name, "return_to_ready", to_ready).emit();
+    emit(name, "return_to_ready", 1, to_ready);
     let ready_to_start = all.jobs().filter_map(|job| since(first(job), ready(job)));
-    Row::new(name, "ready_to_start", ready_to_start).emit();
+    emit(name, "ready_to_start", 1, ready_to_start);
+}
+
+/// A fork and its join: how often the scheduler makes the sink ready. A system that wakes a sink for
+/// each of its inputs makes N wake-ups of a join of N.
+pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), Ending> {
+    const JOBS: u64 = 20;
+    let shape = Shape::ForkJoin(parallel);
+    let ends = Measured::run(machine, workload(shape, JOBS, Stamping::Ends))?;
+    let is_sinks = |of: SubtaskId| of.index() == parallel + 1;
+    let wakes = |event: &Event| event.what == What::Ready && event.subtask.is_some_and(is_sinks);
+    let count = ends.run.journal().events().filter(wakes).count() as u64;
+    emit(
+        &format!("fork-join-{parallel}"),
+        "sink_wakeups",
+        JOBS,
+        [count],
+    );
+    Ok(())
 }
 
 /// A layered random graph: from end to end, for each instance.
-pub(crate) fn layered(
-    machine: &Machine,
-    subtasks: usize,
-    seed: u64,
-    jobs: u64,
-) -> Result<(), Ending> {
-    let name: String = format!("layered-{subtasks}");
+pub(crate) fn layered(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), Ending> {
+    let name = format!("layered-{subtasks}");
     // As many instances as a chain has, and a few jobs at least.
     let jobs = (jobs.saturating_mul(64) / subtasks as u64).clamp(3, jobs.max(3));
-    let shape = Shape::Layered { subtasks, seed };
+    let shape = Shape::Layered { subtasks, seed: 1 };
     let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
-    Row::new(&name, "instance", ends.source_to_sink())
-        .per(subtasks as u64)
-        .emit();
+    emit(&name, "instance", subtasks as u64, ends.source_to_sink());
     ends.emit_common(&name);
     Ok(())
 }

@@ -13,10 +13,10 @@ use kernel::{Ending, Machine, Run};
 use sched_dag::law::InstanceRecord;
 use sched_dag::{DagId, Instance, SubtaskId};
 
-use crate::row::Row;
+use crate::row::emit;
 
 pub(crate) use elsewhere::{joins, woken_cores};
-pub(crate) use local::{budgets, chain, clock, fork_join, layered};
+pub(crate) use local::{budgets, chain, clock, fork_join, layered, wake_ups};
 pub(crate) use preemption::preemption;
 
 /// Describes a workload of empty bodies, released seldom enough for each job to be
@@ -72,17 +72,23 @@ impl Measured {
             .collect();
         let least = from_release.iter().copied().min().unwrap_or(0);
         let jitter = from_release.iter().map(|ns| ns - least);
-        Row::new(name, "release_jitter", jitter).emit();
-        Row::new(name, "release_to_start", from_release.iter().copied()).emit();
-        Row::new(name, "commit", [self.commit_ns])
-            .per(self.workload.shape.subtasks() as u64)
-            .emit();
-        Row::new(name, "allocations", [self.run.allocations()])
-            .per(self.workload.jobs)
-            .emit();
+        emit(name, "release_jitter", 1, jitter);
+        emit(name, "release_to_start", 1, from_release.iter().copied());
+        emit(
+            name,
+            "commit",
+            self.workload.shape.subtasks() as u64,
+            [self.commit_ns],
+        );
+        emit(
+            name,
+            "allocations",
+            self.workload.jobs,
+            [self.run.allocations()],
+        );
         let locks = u64::from(self.run.lock_acquisitions());
         let instances = self.workload.jobs * self.workload.shape.subtasks() as u64;
-        Row::new(name, "locks", [locks]).per(instances).emit();
+        emit(name, "locks", instances, [locks]);
     }
 
     fn jobs(&self) -> impl Iterator<Item = u64> + Clone + use<> {

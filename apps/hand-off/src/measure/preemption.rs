@@ -1,17 +1,20 @@
 //! From a release to the preemptor's first instruction, and back.
 //!
 //! A low subtask reads the clock all the time, and keeps the longest time between
-//! two readings of a job: that is when it was preempted. The preemptor stamps.
+//! two readings of a job: that is when it was preempted. The preemptor stamps. The journal has the
+//! kernel's own times of request, suspension, start, finish and continuation, which no body can see.
 
+use alloc::vec::Vec;
 use core::time::Duration;
 
 use fass::{ConstructionPolicy, Dag, SubtaskAttributes, create_dag, finish_create_dags_with};
 use hand_off::{Pen, Stamps};
-use kernel::{Ending, Machine};
-use sched_dag::{CoreId, Instance, SubtaskId};
+use kernel::{Ending, Machine, Run};
+use sched_dag::journal::{Event, What};
+use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 
 use super::{run, since};
-use crate::row::Row;
+use crate::row::emit;
 
 const PERIOD: Duration = Duration::from_millis(4);
 
@@ -60,14 +63,57 @@ pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), Ending> {
         (gap.0 <= first(job)? && last(job)? <= gap.1).then_some(gap)
     };
     let to_start = jobs().filter_map(|job| since(first(job), release_ns(job)));
-    Row::new(name, "release_to_start", to_start).emit();
+    emit(name, "release_to_start", 1, to_start);
     if !is_told {
         let out = jobs().filter_map(|job| since(first(job), Some(gap(job)?.0)));
-        Row::new(name, "preempted_to_start", out).emit();
+        emit(name, "preempted_to_start", 1, out);
     }
     let back = jobs().filter_map(|job| since(Some(gap(job)?.1), last(job)));
-    Row::new(name, "return_to_resumed", back).emit();
+    emit(name, "return_to_resumed", 1, back);
+    let preemptor = run.task_set().find(&dags[0]);
+    for (part, samples) in parts(&run, preemptor, is_told) {
+        emit(name, part, 1, samples);
+    }
     Ok(())
+}
+
+/// Takes preemptions apart by the kernel's own times: those of core 0, or of all others.
+fn parts(run: &Run, preemptor: DagId, is_told: bool) -> [(&'static str, Vec<u64>); 3] {
+    let mut parts = [
+        ("request_to_suspended", Vec::new()),
+        ("suspended_to_start", Vec::new()),
+        ("finish_to_resumed", Vec::new()),
+    ];
+    // They are in order of time only core by core.
+    let mut events: Vec<Event> = run.journal().events().collect();
+    events.sort_by_key(|event| event.time_ns);
+    for (place, request) in events.iter().enumerate() {
+        let is_meant = request.what == What::Request && request.dag == preemptor;
+        if !is_meant || (request.core != CoreId(0)) != is_told {
+            continue;
+        }
+        // What happened next on that core, each after the one before.
+        let mut later = events[place..].iter();
+        let mut next = |what, is_preemptors: bool| {
+            let event = later.find(|event| {
+                (event.what, event.core) == (what, request.core)
+                    && (event.dag == preemptor) == is_preemptors
+            })?;
+            Some(event.time_ns)
+        };
+        let times = [
+            next(What::Suspend, false),
+            next(What::Start, true),
+            next(What::Finish, true),
+            next(What::Resume, false),
+        ];
+        if let [Some(suspended), Some(start), Some(finish), Some(resumed)] = times {
+            parts[0].1.push(suspended - request.time_ns);
+            parts[1].1.push(start - suspended);
+            parts[2].1.push(resumed - finish);
+        }
+    }
+    parts
 }
 
 fn preemptor(jobs: u64, mut pen: Pen) -> Dag {

@@ -13,9 +13,8 @@ use std::process::ExitCode;
 use super::frame::by_plan;
 use super::frame::code::{self, Frames};
 use crate::image;
+use crate::json::Object;
 use crate::options::{Command, Parsed, Takes, options};
-use crate::places::Frame;
-use crate::system;
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench sizes",
@@ -58,21 +57,17 @@ fn weigh(app: &str) -> Result<bool, String> {
     let mut parts: Vec<_> = parts.into_iter().collect();
     parts.sort_by_key(|&(_, bytes)| std::cmp::Reverse(bytes));
     for (part, bytes) in &parts {
-        println!("{bytes:>9} {:>5.1} %  {part}", share(*bytes, stripped));
+        let share = 100.0 * *bytes as f64 / stripped.max(1) as f64;
+        println!("{bytes:>9} {share:>5.1} %  {part}");
     }
     let most = image::most_stripped_bytes(app);
     println!("{stripped:>9} bytes of `{app}` in all, of {most} at most");
     for (part, bytes) in &parts {
-        println!(
-            "{{\"kind\":\"bench\",\"name\":\"size\",\"app\":\"{app}\",\"part\":\"{part}\",\
-             \"bytes\":{bytes}}}"
-        );
+        let line = Object::new().text("kind", "bench").text("name", "size");
+        let line = line.text("app", app).text("part", part);
+        println!("{}", line.number("bytes", *bytes).end());
     }
     Ok(stripped <= most)
-}
-
-fn share(bytes: u64, of: u64) -> f64 {
-    100.0 * bytes as f64 / of.max(1) as f64
 }
 
 /// Returns the bytes of each part. An instruction is as long as it is to the next one; the
@@ -80,7 +75,6 @@ fn share(bytes: u64, of: u64) -> f64 {
 fn parts(addresses: &[u64], frames: &Frames) -> BTreeMap<String, u64> {
     /// No instruction is longer (Intel SDM, volume 2, 2.3.11).
     const LONGEST: u64 = 15;
-    let root = format!("{}/", system::workspace().display());
     let next = addresses.iter().skip(1).chain(addresses.last());
     let mut parts = BTreeMap::new();
     for (address, next) in addresses.iter().zip(next) {
@@ -89,17 +83,15 @@ fn parts(addresses: &[u64], frames: &Frames) -> BTreeMap<String, u64> {
             _ => 1,
         };
         let frames = frames.get(address).map_or(&[][..], |frames| frames);
-        let ours = frames.iter().find_map(|frame| part(frame, &root));
+        let ours = code::own(frames).and_then(|(line, _)| part(line));
         *parts.entry(ours.unwrap_or(LIBRARY.into())).or_default() += bytes;
     }
     parts
 }
 
-/// Returns the part that a frame's file is in, such as `kernel: run`; `None` if the file is
-/// not ours.
-fn part(frame: &Frame, root: &str) -> Option<String> {
-    let path = frame.line.strip_prefix(root)?;
-    let (owner, below) = path.split_once("/src/")?;
+/// Returns the part that a line of ours is in, such as `kernel: run`.
+fn part(line: &str) -> Option<String> {
+    let (owner, below) = line.split_once("/src/")?;
     let room = below.split(['/', ':']).next()?;
     Some(format!("{owner}: {}", room.trim_end_matches(".rs")))
 }

@@ -39,7 +39,7 @@ oracle synchronizer f.dag f.dag | are one file; give it once";
 #[test]
 fn a_refused_command_empties_no_file() {
     let folder = folder("emptied");
-    let files = ["old.log", "old.dot", "base.json"];
+    let files = ["old.log", "old.dot"];
     for name in files {
         fs::write(folder.join(name), "kept").expect("a file");
     }
@@ -49,7 +49,7 @@ fn a_refused_command_empties_no_file() {
         "run --serial old.log --app none",
         "run --serial old.log --dot old.dot --image bad.dag",
         "run --serial old.log --qemu /none",
-        "bench hand-off --save-baseline --baseline base.json --mode threads",
+        "bench hand-off --listing old.log --scale",
         "trace bad.dag -o old.log",
     ] {
         refusal(&folder, line.split(' '));
@@ -74,7 +74,7 @@ run --trace none/x | name another
 run --dot file/x | `--dot file/x`: cannot be written: 
 run --dot file/x | name another
 bench join-latency --deterministic --out file/x | name another
-bench hand-off --save-baseline --mode deterministic --baseline none/x | name another
+bench hand-off --listing none/x | name another
 run --dag /dev/zero | it is a device or a pipe
 run --dag pipe | it is a device or a pipe
 run --dag none | none: cannot be read

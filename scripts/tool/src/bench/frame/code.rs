@@ -51,6 +51,17 @@ pub(in crate::bench) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames
     Ok(all)
 }
 
+/// Returns the innermost of what contains an address that is in a file of ours: its line, from the
+/// workspace's root, such as `fass/src/run/plan.rs:183`, and its function. So what the library does
+/// for a file counts as the file's.
+pub(in crate::bench) fn own(frames: &[Frame]) -> Option<(&str, &str)> {
+    let root = system::workspace().to_str()?;
+    frames.iter().find_map(|frame| {
+        let line = frame.line.strip_prefix(root)?.strip_prefix('/')?;
+        Some((line, &*frame.function))
+    })
+}
+
 fn program(name: &str) -> Result<PathBuf, String> {
     let missing = || format!("`{name}` is not installed; install the package binutils");
     system::find_program(name).ok_or_else(missing)

@@ -7,11 +7,16 @@
 
 use std::fs;
 use std::iter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::bench::frame::{Column, Figure, Table};
+use crate::golden::Golden;
 use crate::json::{self, Object};
 use crate::qemu::Mode;
+use crate::system;
+
+/// The baseline that is kept, from the workspace's root.
+const BASELINE: &str = "tests/baselines/hand-off.json";
 
 /// When a figure has grown, in words; [`margin`] says the same.
 const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
@@ -44,26 +49,48 @@ fn has_grown(now: &Figure, before: &Figure) -> bool {
     grows(now.median, before.median) || (now.cores == 1 && grows(now.p99, before.p99))
 }
 
-/// Reads a baseline.
+/// Returns the file of the baseline.
+pub(super) fn file() -> PathBuf {
+    system::workspace().join(BASELINE)
+}
+
+/// Reads the baseline.
 ///
 /// # Errors
 ///
 /// In words: the file cannot be read, or holds something else.
-pub(super) fn read(file: &Path) -> Result<Vec<Figure>, String> {
-    let figures = || {
-        let text = fs::read_to_string(file).map_err(|error| format!(": {error}"))?;
-        let value = json::parse(&text).map_err(|error| format!(": {error}"))?;
-        let figures = value.get("figures").map_or(&[][..], |list| list.elements());
-        let figures: Option<Vec<Figure>> = figures.iter().map(Figure::from_json).collect();
-        let figures = figures.filter(|figures| !figures.is_empty());
-        figures.ok_or_else(|| " holds no figures".to_string())
-    };
-    figures().map_err(|why| {
-        let place = file.display();
+pub(super) fn read() -> Result<Vec<Figure>, String> {
+    let text = fs::read_to_string(file()).map_err(|error| error.to_string());
+    text.and_then(|text| figures(&text)).map_err(|why| {
         format!(
-            "the baseline `{place}`{why}; `./scripts/bench hand-off --save-baseline` writes it anew"
+            "the baseline `{BASELINE}`: {why}; `./scripts/bench hand-off --save-baseline` writes \
+             it anew"
         )
     })
+}
+
+fn figures(text: &str) -> Result<Vec<Figure>, String> {
+    let value = json::parse(text).map_err(|error| error.to_string())?;
+    let figures = value.get("figures").map_or(&[][..], |list| list.elements());
+    let figures: Option<Vec<Figure>> = figures.iter().map(Figure::from_json).collect();
+    let figures = figures.filter(|figures| !figures.is_empty());
+    figures.ok_or_else(|| "it holds no figures".into())
+}
+
+/// Compares the baseline with new figures as a text; rewrites it if there is a `list` of rewritten
+/// files.
+///
+/// # Errors
+///
+/// In words: they differ, and it was not rewritten.
+pub(super) fn golden(before: &[Figure], now: &[Figure], list: Option<&Path>) -> Result<(), String> {
+    let (file, below, text_before) = (BASELINE, "", text(before));
+    let golden = Golden {
+        file,
+        below,
+        text: &text_before,
+    };
+    golden.compare(&text(now), list)
 }
 
 /// Returns a baseline's text, a line a figure.
@@ -77,53 +104,33 @@ pub(super) fn text(figures: &[Figure]) -> String {
 }
 
 /// The figures, and what a person reads of each.
-const NAMES: &[(&str, &str)] = &[
-    ("reading", "reading the clock"),
-    ("stamp", "a body's stamp"),
-    ("return_to_ready", "last return -> successor ready"),
-    ("ready_to_start", "ready -> first instruction"),
-    ("return_to_start", "last return -> first instruction"),
-    (
-        "return_to_start_recorded",
-        "the same, if the value is recorded",
-    ),
-    ("recording", "recording a value"),
-    ("hop", "start -> start, per hop"),
-    ("source_to_sink", "source start -> sink start"),
-    ("instance", "source start -> sink start, per instance"),
-    ("release_to_start", "release -> first instruction"),
-    ("release_jitter", "release jitter above its minimum"),
-    ("commit", "commit, per subtask"),
-    ("allocations", "heap allocations, per job"),
-    ("locks", "takings of the scheduler's lock, per instance"),
-    ("sink_wakeups", "times the sink was made ready, per job"),
-    (
-        "request_to_suspended",
-        "preemption request -> the preempted suspended",
-    ),
-    (
-        "suspended_to_start",
-        "suspended -> preemptor started: switch of contexts",
-    ),
-    (
-        "finish_to_resumed",
-        "preemptor finished -> the preempted resumed",
-    ),
-    (
-        "preempted_to_start",
-        "preempted -> preemptor's first instruction",
-    ),
-    (
-        "return_to_resumed",
-        "preemptor's return -> the preempted goes on",
-    ),
-];
+const NAMES: &str = "\
+reading | reading the clock
+stamp | a body's stamp
+return_to_ready | last return -> successor ready
+ready_to_start | ready -> first instruction
+return_to_start | last return -> first instruction
+return_to_start_recorded | the same, if the value is recorded
+recording | recording a value
+hop | start -> start, per hop
+source_to_sink | source start -> sink start
+instance | source start -> sink start, per instance
+release_to_start | release -> first instruction
+release_jitter | release jitter above its minimum
+commit | commit, per subtask
+allocations | heap allocations, per job
+locks | takings of the scheduler's lock, per instance
+sink_wakeups | times the sink was made ready, per job
+request_to_suspended | preemption request -> the preempted suspended
+suspended_to_start | suspended -> preemptor started: switch of contexts
+finish_to_resumed | preemptor finished -> the preempted resumed
+preempted_to_start | preempted -> preemptor's first instruction
+return_to_resumed | preemptor's return -> the preempted goes on";
 
 /// Says in words what it is a figure of.
 fn name(figure: &Figure) -> &str {
-    let named = NAMES
-        .iter()
-        .find(|(figure_of, _)| *figure_of == figure.figure);
+    let mut names = NAMES.lines().filter_map(|line| line.split_once(" | "));
+    let named = names.find(|(of, _)| *of == figure.figure);
     named.map_or(&figure.figure, |(_, name)| name)
 }
 
@@ -177,15 +184,8 @@ pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
     table.text()
 }
 
-/// A comparison as text, and what comes of it.
-pub(super) struct Comparison {
-    pub(super) text: String,
-    /// What has grown or is missing, a line each.
-    pub(super) complaints: Vec<String>,
-}
-
-/// Returns the table of baseline, now and their ratio.
-pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> Comparison {
+/// Returns the table of baseline, now and their ratio, and what has grown or is missing, a line each.
+pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> (String, Vec<String>) {
     let columns = [
         ("instructions", -60, 0),
         ("baseline", 12, 0),
@@ -218,7 +218,8 @@ pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> Comparison {
         }
         vec![was, is, format!("{ratio:.3}"), p99_was, p99_is, mark]
     });
-    for gone in missing(now, baseline) {
+    let is_gone = |before: &&Figure| !now.iter().any(|now| now.is_same(before));
+    for gone in baseline.iter().filter(is_gone) {
         let line = format!("{}, {}: not measured any more", heading(gone), name(gone));
         table.line(&line);
         complaints.push(line);
@@ -230,14 +231,7 @@ pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> Comparison {
     table.line(&format!(
         "{verdict} ({MARGIN_RULE}; `./scripts/bench hand-off --save-baseline` accepts it)"
     ));
-    let text = table.text();
-    Comparison { text, complaints }
-}
-
-/// Returns the figures of a baseline that were not measured now.
-fn missing<'a>(now: &'a [Figure], baseline: &'a [Figure]) -> impl Iterator<Item = &'a Figure> {
-    let is_missing = |before: &&Figure| !now.iter().any(|now| now.is_same(before));
-    baseline.iter().filter(is_missing)
+    (table.text(), complaints)
 }
 
 #[cfg(test)]
@@ -284,18 +278,16 @@ mod tests {
 
     #[test]
     fn a_baseline_is_read_back_and_what_it_alone_has_is_found() {
-        let folder = std::env::temp_dir().join(format!("hand-off-{}", std::process::id()));
-        fs::create_dir_all(&folder).unwrap();
-        let file = folder.join("baseline.json");
-        let figures = [figure([1, 2, 3]), figure([4, 5, 6])];
-        fs::write(&file, text(&figures)).unwrap();
-        let before = read(&file).unwrap();
-        assert_eq!(before, figures);
-        assert_eq!(missing(&[], &before).count(), 2);
-        assert_eq!(missing(&figures, &before).count(), 0);
-        fs::write(&file, "{}").unwrap();
-        assert!(read(&file).unwrap_err().contains("holds no figures"));
-        fs::remove_dir_all(folder).unwrap();
-        assert!(read(&file).unwrap_err().contains("--save-baseline"));
+        let other = Figure {
+            figure: "instance".into(),
+            ..figure([4, 5, 6])
+        };
+        let kept = [figure([1, 2, 3]), other];
+        let before = figures(&text(&kept)).unwrap();
+        assert_eq!(before, kept);
+        let complaints = |now: &[Figure]| comparison(now, &before).1.len();
+        assert_eq!([complaints(&[]), complaints(&kept)], [2, 0]);
+        assert!(comparison(&kept, &before).0.contains("nothing has grown"));
+        assert!(figures("{}").unwrap_err().contains("holds no figures"));
     }
 }

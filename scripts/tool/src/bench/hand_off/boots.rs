@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::time::Duration;
 
-use super::traced;
 use crate::bench::frame::{Figure, judged};
 use crate::image;
 use crate::json::Object;
@@ -17,22 +16,17 @@ pub(super) const LIMIT: Duration = Duration::from_secs(300);
 pub(super) const WORKLOADS: &str = "part=workloads chain=64 branches=16 layered=1000";
 pub(super) const MOST_SUBTASKS: u64 = 1000;
 
-/// A trace shows what it shows in a few jobs.
-const TRACED: &str = "part=traced jobs=20 trace=dump";
-
 /// More cores than a host is sure to have: figures of so many say nothing of time.
 const MANY: u64 = 8;
 
-/// What tells what a boot has measured.
+/// Which guest measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Its own figures.
+    /// The app.
     Figures,
-    /// Its trace.
-    Trace,
-    /// Its own figures; it is recorded, for that is what is measured, by a guest of the tests.
+    /// A guest of the tests, which is recorded, for that is what is measured.
     Recorded,
-    /// Its own figures; its cores are divided, in which that guest can, too.
+    /// The same guest, whose cores are divided.
     Divided,
 }
 
@@ -49,10 +43,8 @@ pub(super) struct Boot {
 pub(super) fn of_mode(mode: Mode) -> Vec<Boot> {
     let all = [
         (Kind::Figures, 1, "part=hand-off"),
-        (Kind::Trace, 1, TRACED),
         (Kind::Recorded, 1, "test=values record=1024"),
         (Kind::Figures, 2, "part=elsewhere"),
-        (Kind::Trace, 2, TRACED),
         (Kind::Figures, MANY, WORKLOADS),
         (Kind::Figures, 64, WORKLOADS),
     ];
@@ -99,22 +91,16 @@ impl Boot {
     pub(super) fn measure(&self, mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
         let cores = self.cores;
         let image = match self.kind {
-            Kind::Figures | Kind::Trace => image.to_path_buf(),
+            Kind::Figures => image.to_path_buf(),
             Kind::Recorded | Kind::Divided => image::build("guest-tests")?.path,
         };
         judged(
             format_args!("the guest on {cores} cores, mode {mode},"),
             "hand-off",
             |log| boot(&self.qemu(mode), &image, log, LIMIT, |_| {}),
-            |outcome| {
-                let figures = match self.kind {
-                    Kind::Trace => traced::read_all(&outcome.serial, cores),
-                    _ => Figure::read_all(&outcome.transcript, cores),
-                }?;
-                match figures.is_empty() {
-                    true => Err("it printed no figures".into()),
-                    false => Ok(figures),
-                }
+            |outcome| match Figure::read_all(&outcome.transcript, cores)? {
+                figures if figures.is_empty() => Err("it printed no figures".into()),
+                figures => Ok(figures),
             },
         )
     }

@@ -3,11 +3,10 @@
 //! A chain of 64 empty bodies is booted with every instruction logged. The log is cut at
 //! the calls of subtasks' functions, which are where `Body::run` of `fass` polls a future.
 //! A *hop* is what lies between two of them; told is the one whose length occurs most
-//! often. Each of its instructions belongs to a *step* of the way: of the functions that it
-//! was inlined from, the innermost that is in a file of ours decides.
+//! often. Each of its instructions belongs to a file of ours: that of the innermost of the functions
+//! that it was inlined from.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -16,25 +15,9 @@ use super::boots::{Boot, Kind, LIMIT};
 use crate::bench::frame::code::{self, Frames};
 use crate::places::Frame;
 use crate::qemu::{Ending, Mode};
-use crate::{protocol::Status, system};
+use crate::{files, protocol::Status, system};
 
-/// The steps of the way, and behind each the parts of files' or functions' names by which it is
-/// known; the first that fits counts.
-const STEPS: &str = "\
-clock: three readings | machine/clock.rs time_stamp rdtsc
-interrupts off and on | machine/cpu.rs interrupts_off.rs
-the lock | spinlock.rs
-journal: finish, ready, start | sched-dag/src/kept/ sched-dag/src/journal/
-body: inputs, call, outputs | fass/src/ poll_fn.rs
-scheduler: completion, join, line | sched-dag/src/scheduler/
-places of bodies | sched-dag/src/placement/
-budget and alarm | execution/runner.rs machine/timer.rs machine/context.rs
-execution: the rest | kernel/executive/src/run/execution/
-worker's loop | kernel/executive/src/run/worker.rs
-the app's function | apps/
-";
-
-/// Boots, prints how many instructions each step takes, and writes all of them to a file.
+/// Boots, prints how many instructions each file has on the way, and writes all of them to a file.
 ///
 /// # Errors
 ///
@@ -55,7 +38,7 @@ pub(super) fn list(image: &Path, file: &Path) -> Result<(), String> {
     let frames = frames(hop.iter().copied().collect())?;
     print!("{}", table(hop, &frames));
     let listing = listing(hop, &frames, &instructions);
-    fs::write(file, listing).map_err(|error| format!("`{}`: {error}", file.display()))
+    files::write(file, listing)
 }
 
 /// Boots the image and returns the addresses of all instructions that it executes.
@@ -138,55 +121,42 @@ fn usual_hop(executed: &[u64], call: u64) -> Option<&[u64]> {
     hops.into_iter().find(|hop| hop.len() == usual)
 }
 
-fn step(frames: &[Frame]) -> &'static str {
-    let step_of = |frame: &Frame| {
-        let names = [&frame.line, &frame.function];
-        let is_in = |part: &str| names.iter().any(|name| name.contains(part));
-        let mut steps = STEPS.lines().filter_map(|line| line.split_once(" | "));
-        let step = steps.find(|(_, parts)| parts.split(' ').any(is_in));
-        step.map(|(step, _)| step)
-    };
-    frames.iter().find_map(step_of).unwrap_or("elsewhere")
+/// Returns the line that an instruction is of, and its function.
+fn place<'f>(frames: &'f Frames, address: &u64) -> (&'f str, &'f str) {
+    let frames = frames.get(address).map_or(&[][..], |frames| frames);
+    code::own(frames).unwrap_or(("elsewhere", "?"))
 }
 
 fn table(hop: &[u64], frames: &Frames) -> String {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for address in hop {
-        *counts.entry(step(&frames[address])).or_default() += 1;
+        let (line, _) = place(frames, address);
+        let file = line.split(':').next().unwrap_or(line);
+        *counts.entry(file).or_default() += 1;
     }
     let mut counts: Vec<_> = counts.into_iter().collect();
     counts.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
-    counts.push((
-        "instructions from one subtask's call to its successor's",
-        hop.len(),
-    ));
-    let row = |(step, count): (&str, usize)| format!("{count:6} {step}\n");
+    let all = "instructions from one subtask's call to its successor's";
+    counts.push((all, hop.len()));
+    let row = |(file, count): (&str, usize)| format!("{count:6} {file}\n");
     counts.into_iter().map(row).collect()
 }
 
-/// Returns the hop, an instruction a line: address, text, step, and its innermost line of ours.
+/// Returns the hop, an instruction a line: address, text, and its innermost line of ours.
 fn listing(hop: &[u64], frames: &Frames, instructions: &BTreeMap<u64, String>) -> String {
-    let root = format!("{}/", system::workspace().display());
-    let mut text = String::new();
-    for address in hop {
-        let frames = &frames[address];
-        let ours = frames.iter().find(|frame| frame.line.starts_with(&root));
-        let place = ours.or(frames.first()).map_or_else(
-            || "?".into(),
-            |Frame { function, line }| format!("{}: {function}", line.trim_start_matches(&root)),
-        );
+    let line = |address: &u64| {
+        let (line, function) = place(frames, address);
         let instruction = instructions.get(address).map_or("?", |text| text);
-        let step = step(frames);
-        // Writing into a text cannot fail.
-        let _ = writeln!(text, "{address:x}  {instruction:60} {step}; {place}");
-    }
-    text
+        format!("{address:x}  {instruction:60} {line}: {function}\n")
+    };
+    hop.iter().map(line).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{addresses, step, usual_hop};
+    use super::{Frames, addresses, place, table, usual_hop};
     use crate::places::Frame;
+    use crate::system::workspace;
 
     #[test]
     fn an_address_is_read_from_each_line_that_has_one() {
@@ -203,16 +173,20 @@ mod tests {
 
     #[test]
     fn the_innermost_file_of_ours_decides() {
+        let root = workspace().display();
         let frame = |line: &str| Frame {
             function: "f".into(),
-            line: line.into(),
+            line: format!("{root}{line}").replace(&format!("{root}/rustc"), "/rustc"),
         };
         let inlined = [
             "/rustc/x/core/src/ptr.rs:1",
-            "/w/kernel/executive/src/machine/spinlock.rs:3",
-            "/w/kernel/executive/src/run/worker.rs:4",
+            "/kernel/executive/src/machine/spinlock.rs:3",
+            "/kernel/executive/src/run/worker.rs:4",
         ];
-        assert_eq!(step(&inlined.map(frame)), "the lock");
-        assert_eq!(step(&[]), "elsewhere");
+        let frames = Frames::from([(7, inlined.map(frame).into()), (8, Vec::new())]);
+        let expected = ("kernel/executive/src/machine/spinlock.rs:3", "f");
+        assert_eq!(place(&frames, &7), expected);
+        let counted = table(&[7, 8, 7], &frames);
+        assert!(counted.starts_with("     2 kernel/executive/src/machine/spinlock.rs\n"));
     }
 }

@@ -7,7 +7,6 @@
 //!
 //! - `boots`: what measures them;
 //! - `baseline`: what they were before, and the tables;
-//! - `traced`: what only the trace can tell;
 //! - `scale`: the same on more cores, and with more subtasks;
 //! - `listing`: one hop, instruction by instruction.
 
@@ -15,19 +14,17 @@ mod baseline;
 mod boots;
 mod listing;
 mod scale;
-mod traced;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use super::frame::{Figure, by_plan};
-use crate::files::{self, Named};
-use crate::golden::Golden;
+use crate::files;
 use crate::options::{Command, Parsed, Takes, options};
 use crate::progress::Progress;
 use crate::qemu::Mode;
-use crate::{image, install, probe, system};
+use crate::{image, install, probe};
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench hand-off",
@@ -38,10 +35,8 @@ static TABLE: Command = Command {
         "mode": Takes::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
         /// Compare the instructions with the baseline; one that grew is a failure.
         "compare": Takes::Nothing;
-        /// Write the instructions into the baseline.
+        /// Write the instructions into the baseline, tests/baselines/hand-off.json.
         "save-baseline": Takes::Nothing;
-        /// The baseline; tests/baselines/hand-off.json if not given.
-        "baseline": Takes::File("FILE");
         /// Instead, count what the workloads cost on more cores and with more subtasks.
         "scale": Takes::Nothing;
         /// Instead, log each instruction of one hop, count them by parts of the code, and write
@@ -55,25 +50,18 @@ Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
 ",
 };
 
-/// The baseline that is kept, from the workspace's root.
-const BASELINE: &str = "tests/baselines/hand-off.json";
-
 /// What is to be measured.
 #[derive(Debug)]
-enum Plan {
-    /// All figures.
-    Figures {
-        /// The one mode to measure in; else instructions and time.
-        mode: Option<Mode>,
-        /// The figures of the baseline, if they are to be compared.
-        before: Option<Vec<Figure>>,
-        /// Where the instructions are to be kept.
-        saved: Option<PathBuf>,
-    },
-    /// What cores and subtasks cost.
-    Scale,
-    /// The instructions of one hop, and where to write them.
-    Listing(PathBuf),
+struct Plan {
+    /// The one mode to measure in; else instructions and time.
+    mode: Option<Mode>,
+    /// The figures of the baseline, if they are to be compared.
+    before: Option<Vec<Figure>>,
+    saves: bool,
+    /// Instead, what cores and subtasks cost.
+    scale: bool,
+    /// Instead, the instructions of one hop, to be written there.
+    listing: Option<PathBuf>,
 }
 
 impl Plan {
@@ -83,57 +71,30 @@ impl Plan {
     ///
     /// What the options ask for cannot be: one line that says why.
     fn new(options: &Parsed) -> Result<Self, String> {
-        let mut all = vec![
-            "listing",
-            "scale",
-            "compare",
-            "save-baseline",
-            "baseline",
-            "mode",
-        ];
-        while let Some(own @ ("listing" | "scale")) = all.first().copied() {
-            all.remove(0);
-            if let Some(other) = options.given_of(&all).filter(|_| options.is_given(own)) {
-                return Err(format!(
-                    "`--{own}` with `--{other}`: it is a run of its own; leave `--{other}` out"
-                ));
-            }
-        }
+        let all = ["listing", "scale", "compare", "save-baseline", "mode"].into_iter();
+        let given: Vec<&str> = all.filter(|name| options.is_given(name)).collect();
         let mode = options.text("mode").and_then(Mode::from_name);
-        match options.given_of(&["compare", "save-baseline"]) {
-            Some(name) if mode.is_some_and(|mode| mode != Mode::Deterministic) => {
-                return Err(format!(
+        match given[..] {
+            [own @ ("listing" | "scale"), other, ..] => Err(format!(
+                "`--{own}` with `--{other}`: it is a run of its own; leave `--{other}` out"
+            )),
+            [name @ ("compare" | "save-baseline"), ..]
+                if mode.is_some_and(|mode| mode != Mode::Deterministic) =>
+            {
+                Err(format!(
                     "`--{name}` needs the instructions, which this mode does not count; \
                      leave `--mode` out"
-                ));
+                ))
             }
-            None if options.is_given("baseline") => {
-                let line = "`--baseline` without `--compare` and `--save-baseline`: it has no \
-                            use; give one of them, or leave it out";
-                return Err(line.into());
-            }
-            _ => {}
-        }
-        let kept = || system::workspace().join(BASELINE);
-        let baseline = options.path("baseline").map_or_else(kept, PathBuf::from);
-        let path = &*baseline;
-        let saved = options.is_given("save-baseline").then_some(Named {
-            option: "baseline",
-            path,
-        });
-        let written = options.named(&["listing"]).into_iter().chain(saved);
-        files::check(&[], &written.collect::<Vec<_>>())?;
-        if let Some(file) = options.path("listing") {
-            return Ok(Self::Listing(file.into()));
-        }
-        if options.is_given("scale") {
-            return Ok(Self::Scale);
-        }
-        let before = options.is_given("compare").then(|| baseline::read(path));
-        Ok(Self::Figures {
+            _ => files::check(&[], &options.named(&["listing"])),
+        }?;
+        let before = options.is_given("compare").then(baseline::read);
+        Ok(Self {
             mode,
             before: before.transpose()?,
-            saved: saved.map(|named| named.path.into()),
+            saves: options.is_given("save-baseline"),
+            scale: options.is_given("scale"),
+            listing: options.path("listing").map(PathBuf::from),
         })
     }
 }
@@ -151,37 +112,30 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 /// In words: a guest failed, there is no baseline, or which figures have grown.
 pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     install::ensure_qemu()?;
-    let before = baseline::read(&system::workspace().join(BASELINE))?;
+    let before = baseline::read()?;
     let image = image::build("hand-off")?;
     let now = measure_mode(Mode::Deterministic, &image.path)?;
-    let comparison = baseline::comparison(&now, &before);
-    print!("{}", comparison.text);
-    if comparison.complaints.is_empty() {
-        return Ok(());
+    let (table, complaints) = baseline::comparison(&now, &before);
+    print!("{table}");
+    match (&complaints[..], list) {
+        ([], _) => Ok(()),
+        (_, None) => Err(complaints.join("; ")),
+        (_, Some(_)) => baseline::golden(&before, &now, list),
     }
-    if list.is_none() {
-        return Err(comparison.complaints.join("; "));
-    }
-    let (file, text) = (BASELINE, &*baseline::text(&before));
-    let below = "";
-    Golden { file, below, text }.compare(&baseline::text(&now), list)
 }
 
 /// Measures and reports. Returns whether nothing has grown.
 fn measure(plan: &Plan) -> Result<bool, String> {
     install::ensure_qemu()?;
     let image = &image::build("hand-off")?.path;
-    let (mode, before, saved) = match plan {
-        Plan::Scale => return scale::measure(image).map(|()| true),
-        Plan::Listing(file) => return listing::list(image, file).map(|()| true),
-        Plan::Figures {
-            mode,
-            before,
-            saved,
-        } => (*mode, before, saved),
-    };
+    if plan.scale {
+        return scale::measure(image).map(|()| true);
+    }
+    if let Some(file) = &plan.listing {
+        return listing::list(image, file).map(|()| true);
+    }
     let mut measured = Vec::new();
-    for mode in modes(mode, image)? {
+    for mode in modes(plan.mode, image)? {
         let figures = measure_mode(mode, image)?;
         for figure in &figures {
             println!("{}", boots::machine_line(figure, mode));
@@ -189,18 +143,17 @@ fn measure(plan: &Plan) -> Result<bool, String> {
         measured.push((mode, figures));
     }
     print!("{}", baseline::table(&measured));
+    let (_, first) = &measured[0];
     let mut is_good = true;
-    let instructions = |(mode, _): &&(Mode, _)| *mode == Mode::Deterministic;
-    if let Some((_, figures)) = measured.iter().find(instructions) {
-        if let Some(before) = before {
-            let comparison = baseline::comparison(figures, before);
-            print!("{}", comparison.text);
-            is_good = comparison.complaints.is_empty();
-        }
-        if let Some(file) = saved {
-            files::write(file, baseline::text(figures))?;
-            println!("written: {}", file.display());
-        }
+    if let Some(before) = &plan.before {
+        let (table, complaints) = baseline::comparison(first, before);
+        print!("{table}");
+        is_good = complaints.is_empty();
+    }
+    if plan.saves {
+        let file = baseline::file();
+        files::write(&file, baseline::text(first))?;
+        println!("written: {}", file.display());
     }
     Ok(is_good)
 }
@@ -211,11 +164,11 @@ fn modes(named: Option<Mode>, image: &Path) -> Result<Vec<Mode>, String> {
     let machine = timed.max_by_key(|boot| boot.cores);
     let machine = machine.map_or_else(Default::default, |boot| boot.qemu(Mode::Kvm));
     let (mode, why) = probe::choose(named, Mode::Threads, &machine, image)?;
-    if let Some(why) = why {
-        println!("mode {mode} besides deterministic because {why}");
-        return Ok(vec![Mode::Deterministic, mode]);
-    }
-    Ok(vec![mode])
+    let Some(why) = why else {
+        return Ok(vec![mode]);
+    };
+    println!("mode {mode} besides deterministic because {why}");
+    Ok(vec![Mode::Deterministic, mode])
 }
 
 /// Makes all boots in one mode.
@@ -247,9 +200,7 @@ mod tests {
 --scale --compare | leave `--compare` out
 --listing x --compare | leave `--compare` out
 --listing x --scale | a run of its own
---listing /none/x | cannot be written
---baseline x | without `--compare`
---compare --baseline /none/x --mode deterministic | the baseline `/none/x`: ";
+--listing /none/x | cannot be written";
 
     #[test]
     fn what_cannot_be_is_refused() {

@@ -31,18 +31,13 @@ impl Policy {
     }
 
     fn from_name(name: &str) -> Option<Policy> {
-        match name {
-            "fass" => Some(Policy::Fass),
-            "exact" => Some(Policy::Exact),
-            _ => {
-                let number = name.strip_prefix("approximate-")?;
-                let max_interval_ms = number.parse().ok()?;
-                // `+7` would parse too, and be another name for the same.
-                let is_plain = number == u64::to_string(&max_interval_ms);
-                (is_plain && (1..=1_000_000).contains(&max_interval_ms))
-                    .then_some(Policy::Approximate(max_interval_ms))
-            }
-        }
+        let number = name.strip_prefix("approximate-");
+        let max_interval_ms = number.and_then(|number| number.parse().ok());
+        let close = max_interval_ms.filter(|ms| (1..=1_000_000).contains(ms));
+        let close = close.map(Policy::Approximate);
+        let mut all = [Policy::Fass, Policy::Exact].into_iter().chain(close);
+        // `+7` would parse too, and be another name for the same.
+        all.find(|policy| policy.to_string() == name)
     }
 
     /// Names it for people.

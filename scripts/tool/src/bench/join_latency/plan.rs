@@ -1,14 +1,11 @@
 //! What is to be measured, and on what: settled before anything is built.
 
-use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command as Process;
 
 use super::condition::{Condition, Policy};
 use crate::files;
 use crate::options::{Command, Parsed, Takes, options};
-use crate::qemu::{Mode, PROGRAM, Qemu};
-use crate::system;
+use crate::qemu::Mode;
 
 /// The table of `bench join-latency`.
 pub(super) static TABLE: Command = Command {
@@ -69,7 +66,6 @@ pub(super) struct Plan {
     pub(super) on_linux: bool,
     /// The mode that was named; which one it is, the built image settles.
     pub(super) named: Option<Mode>,
-    pub(super) mode: Mode,
     /// Whether a deterministic condition is booted once only.
     pub(super) once: bool,
 }
@@ -141,109 +137,14 @@ impl Plan {
             memory_mib: 64 + (jobs * cores).div_ceil(2048),
             on_linux,
             named,
-            mode: named.unwrap_or(Mode::Deterministic),
             once,
         })
     }
-
-    /// Returns the words of a condition's program on Linux.
-    pub(super) fn linux_words(&self, condition: &Condition) -> String {
-        let words = condition.guest_words(self.jobs, self.queue);
-        format!("cores={} share=on {words}", self.cores)
-    }
-
-    /// Names what time means.
-    pub(super) fn mode_name(&self) -> &'static str {
-        match self.on_linux {
-            true => "linux",
-            false => self.mode.name(),
-        }
-    }
-
-    /// Says in one sentence what a time is worth.
-    pub(super) fn meaning(&self) -> &'static str {
-        match self.on_linux {
-            true => "real nanoseconds on real processors, whatever else this computer does",
-            false => self.mode.meaning(),
-        }
-    }
-
-    /// Describes the guest of a condition.
-    pub(super) fn qemu(&self, condition: &Condition) -> Qemu {
-        let words = condition.guest_words(self.jobs, self.queue);
-        Qemu {
-            mode: self.mode,
-            cores: self.cores,
-            memory_mib: self.memory_mib,
-            guest_words: format!("mode={} {words}", self.mode),
-            ..Qemu::default()
-        }
-    }
-}
-
-/// What is measured with: versions, for the record.
-#[derive(Debug)]
-pub(super) struct Provenance {
-    /// QEMU's version, or Linux's.
-    pub(super) version: String,
-    /// The commit, with a mark if the tree differs from it.
-    pub(super) commit: String,
-    /// A checksum of the image: other code, other times.
-    pub(super) image: String,
-}
-
-impl Provenance {
-    /// Finds out.
-    pub(super) fn of(image: &Path, on_linux: bool) -> Provenance {
-        let bytes = fs::read(image).unwrap_or_default();
-        Provenance {
-            version: match on_linux {
-                true => first_line("uname", &["-sr"]),
-                false => first_line(PROGRAM, &["--version"]),
-            },
-            commit: first_line("git", &["describe", "--always", "--abbrev=12", "--dirty"]),
-            image: format!("{:016x}", checksum(&bytes)),
-        }
-    }
-
-    /// States everything that a condition's times depend on.
-    pub(super) fn statement(&self, plan: &Plan, condition: &Condition) -> String {
-        let (version, image) = (&self.version, &self.image);
-        if plan.on_linux {
-            let words = plan.linux_words(condition);
-            return format!("{version}; program {image}; {words}");
-        }
-        let qemu = plan.qemu(condition);
-        format!(
-            "{version}; image {image}; machine {}, {} cores, {} MiB; {}",
-            qemu.machine, qemu.cores, qemu.memory_mib, qemu.guest_words
-        )
-    }
-}
-
-/// Returns the first line that a program says, if it is there and content.
-fn first_line(program: &str, words: &[&str]) -> String {
-    let mut process = Process::new(program);
-    let output = process
-        .args(words)
-        .current_dir(system::workspace())
-        .output();
-    let output = output.ok().filter(|output| output.status.success());
-    let said = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned());
-    let line = said.as_deref().and_then(|said| said.lines().next());
-    line.unwrap_or("unknown").into()
-}
-
-/// FNV-1a with 64 bits (Fowler, Noll, Vo; draft-eastlake-fnv).
-fn checksum(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| {
-        (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3)
-    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Path, Plan, TABLE, checksum};
+    use super::{Path, Plan, TABLE};
 
     fn plan(line: &str) -> Result<Plan, String> {
         Plan::new(&TABLE.right(line))
@@ -272,11 +173,5 @@ mod tests {
         let on_linux = "target/join-latency-on-linux";
         assert_eq!(out("--on linux"), Path::new(on_linux));
         assert_eq!(out("--on linux --out x"), Path::new("x"));
-    }
-
-    #[test]
-    fn the_checksum_is_the_published_one() {
-        assert_eq!(checksum(b""), 0xcbf2_9ce4_8422_2325);
-        assert_eq!(checksum(b"a"), 0xaf63_dc4c_8601_ec8c);
     }
 }

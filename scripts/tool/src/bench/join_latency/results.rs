@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::condition::Condition;
 use super::figures::{COUNTS, Figures, METRICS};
-use super::plan::{Plan, Provenance};
+use super::setting::Setting;
 use crate::bench::frame::Table;
 use crate::json::Object;
 
@@ -42,15 +42,16 @@ fn pooled(measured: &Measured) -> impl Iterator<Item = (Condition, Figures)> {
 }
 
 /// Returns the summary, a line for each policy and N.
-pub(super) fn summary_json(plan: &Plan, provenance: &Provenance, measured: &Measured) -> String {
+pub(super) fn summary_json(setting: &Setting<'_>, measured: &Measured) -> String {
+    let plan = setting.plan;
     let results = pooled(measured).map(|(condition, figures)| result_json(condition, &figures));
     let results = results.collect::<Vec<_>>().join(",\n");
     let summary = Object::new()
-        .text("qemu", &provenance.version)
-        .text("commit", &provenance.commit)
-        .text("image", &provenance.image)
-        .text("mode", plan.mode_name())
-        .text("time", plan.meaning())
+        .text("qemu", &setting.version)
+        .text("commit", &setting.commit)
+        .text("image", &setting.checksum)
+        .text("mode", setting.mode_name())
+        .text("time", setting.meaning())
         .number("cores", plan.cores)
         .number("memory_mib", plan.memory_mib)
         .number("jobs", plan.jobs)

@@ -99,7 +99,7 @@ impl Rounds {
 }
 
 /// A period that no job needs, with which the releases are back to back.
-pub(super) const PERIOD: Duration = Duration::from_secs(1);
+const PERIOD: Duration = Duration::from_secs(1);
 
 /// Takes so many cores of this host by threads that poll. Jobs follow one another as fast as they
 /// go, and nothing is written down. Only one thread of the program may measure at a time.

@@ -8,29 +8,25 @@
 use std::hint::{black_box, spin_loop};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use fass::finish_create_dags;
-use hand_off::{Shape, Stamping, Workload, build};
+use hand_off::{Pen, Stamps};
 use sched_dag::Policy;
 
-use super::graphs::{PERIOD, machine, nanoseconds, run};
+use super::graphs::{Graph, Tick, commit, machine, nanoseconds, run};
 use super::{Figure, Row};
 
 const WORKLOAD: &str = "join of 2 us";
 
+/// How long a branch computes.
+const WORK_NS: u64 = 2_000;
+
 /// Measures `jobs` jobs, reading the clock, and what a message costs at least.
 pub(super) fn measure(jobs: u64) -> Result<Vec<Row>, String> {
+    let mut stamps = Stamps::default();
+    let functions = [0, WORK_NS, WORK_NS, 0].map(|work_ns| body(work_ns, stamps.pen(jobs)));
     let machine = machine(Policy::StaticPriority, 2)?;
-    let (dag, stamps) = build(&Workload {
-        shape: Shape::ForkJoin(2),
-        jobs,
-        period: PERIOD,
-        stamping: Stamping::All,
-        work: Duration::from_micros(2),
-        wcet: None,
-    });
-    finish_create_dags(&[dag]).expect("a fork-join is right");
+    commit(Graph::JOIN, jobs, vec![vec![functions.into()]]);
     run(&machine, jobs).map_err(|why| format!("{WORKLOAD}: {why}"))?;
     let clock = clock();
     let reading_ns = clock.median / clock.per;
@@ -54,7 +50,7 @@ pub(super) fn measure(jobs: u64) -> Result<Vec<Row>, String> {
     let row = |what, samples| {
         (
             Figure::new((2, WORKLOAD, what), 1, samples),
-            "typed, static",
+            "closures, static",
         )
     };
     Ok(vec![
@@ -63,6 +59,23 @@ pub(super) fn measure(jobs: u64) -> Result<Vec<Row>, String> {
         (transfer(), ""),
         (clock, ""),
     ])
+}
+
+/// Returns a body that reads the clock until so much time has passed, and stamps its first and its
+/// last reading.
+fn body(work_ns: u64, mut pen: Pen) -> Tick {
+    Box::new(move |_| {
+        let begun_ns = fass::now_ns();
+        pen.put(begun_ns);
+        let ended_ns = loop {
+            let time_ns = fass::now_ns();
+            if time_ns - begun_ns >= work_ns {
+                break time_ns;
+            }
+            spin_loop();
+        };
+        pen.put(ended_ns);
+    })
 }
 
 /// Measures what it takes to tell another core something: two threads write to one another's

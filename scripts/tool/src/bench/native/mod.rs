@@ -35,8 +35,6 @@ static TABLE: Command = Command {
     about: "Measures the scheduler on this host's own processors, with empty bodies.",
     positional: None,
     options: options! {
-        /// The numbers of workers, each a thread with a processor of its own.
-        "workers": Takes::numbers(1..=64), or "1,2";
         /// How many rounds of about 20,000 instances each figure has.
         "rounds": Takes::number(10..=100_000), or "300";
         /// The jobs whose joins across cores are measured.
@@ -47,7 +45,7 @@ static TABLE: Command = Command {
     },
     notes: "\
 `floor` calls the bodies in topological order, in a loop; `closures` are functions under
-the scheduler, without values; `typed` are functions with a u64 on each edge (not of
+the scheduler, without values, on one and two workers; `typed` are functions with a u64 on each edge (not of
 layered-1000 and dags-1000). `static` and `edf` are the policies.
 `clusters` runs a graph in each of two clusters of one core, next to one on one core alone.
 
@@ -71,7 +69,6 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 
 /// What is to be measured.
 struct Plan {
-    workers: Vec<u32>,
     rounds: usize,
     jobs: u64,
     graphs: Vec<Graph>,
@@ -79,38 +76,30 @@ struct Plan {
     with_clusters: bool,
 }
 
+/// The numbers of workers, each a thread with a processor of its own.
+const WORKERS: [u32; 2] = [1, 2];
+
 impl Plan {
     fn read(options: &Parsed) -> Result<Self, String> {
-        options.check_distinct(&["workers", "only"])?;
+        options.check_distinct(&["only"])?;
         let names = Graph::ALL.iter().map(|graph| graph.name);
         let known: Vec<&str> = names.chain([JOIN, CLUSTERS]).collect();
         let chosen = options.text("only").map(|names| names.split(',').collect());
         let wanted: Vec<&str> = chosen.unwrap_or_else(|| known.clone());
         if let Some(name) = wanted.iter().find(|name| !known.contains(name)) {
+            let (name, known) = (quoted(name), known.join(", "));
             return Err(format!(
-                "`--only`: no workload is called {}; there are {}",
-                quoted(name),
-                known.join(", ")
+                "`--only`: no workload is called {name}; there are {known}"
             ));
         }
-        let workers: Vec<u32> = options.numbers("workers");
-        let most = linux::processors();
-        if let Some(count) = workers.iter().find(|count| **count > most) {
-            return Err(format!(
-                "`--workers {count}`: this host has {most} processors for us; ask for at most those"
-            ));
-        }
-        let rounds = options.number("rounds").unwrap_or(0);
-        let graphs = Graph::ALL.into_iter();
+        let number = |name| options.number(name).unwrap_or(0);
+        let is_wanted = |graph: &Graph| wanted.contains(&graph.name);
         Ok(Self {
-            with_join: wanted.contains(&JOIN) && workers.contains(&2),
-            with_clusters: wanted.contains(&CLUSTERS) && workers.contains(&2),
-            workers,
-            rounds: usize::try_from(rounds).unwrap_or(usize::MAX),
-            jobs: options.number("jobs").unwrap_or(0),
-            graphs: graphs
-                .filter(|graph| wanted.contains(&graph.name))
-                .collect(),
+            rounds: usize::try_from(number("rounds")).unwrap_or(usize::MAX),
+            jobs: number("jobs"),
+            graphs: Graph::ALL.into_iter().filter(is_wanted).collect(),
+            with_join: wanted.contains(&JOIN),
+            with_clusters: wanted.contains(&CLUSTERS),
         })
     }
 }
@@ -120,7 +109,10 @@ type Row = (Figure, &'static str);
 
 /// Measures, and prints; returns that nothing has a limit.
 fn measure(plan: &Plan) -> Result<bool, String> {
-    let total = throughput::passes(&plan.graphs, &plan.workers);
+    if linux::processors() < 2 {
+        return Err("this host has one processor for us; two are needed".into());
+    }
+    let total = throughput::passes(&plan.graphs, &WORKERS);
     let (mut progress, mut over) = (Progress::new(total, "passes"), 0);
     let mut show = || {
         over += 1;
@@ -128,7 +120,7 @@ fn measure(plan: &Plan) -> Result<bool, String> {
     };
     let mut rows = Vec::new();
     for &graph in &plan.graphs {
-        let measured = throughput::measure(graph, &plan.workers, plan.rounds, &mut show)?;
+        let measured = throughput::measure(graph, &WORKERS, plan.rounds, &mut show)?;
         rows.extend(measured);
     }
     progress.end();
@@ -211,14 +203,11 @@ mod tests {
 
     #[test]
     fn workloads_are_chosen_by_name_and_unknown_ones_refused_with_those_there_are() {
-        let chosen = plan("--only fork-join-2,chain-64 --workers 1").expect("right");
+        let chosen = plan("--only fork-join-2,chain-64").expect("right");
         assert_eq!(chosen.graphs, [Graph::CHAIN, Graph::JOIN]);
         assert!(!chosen.with_join && !chosen.with_clusters);
         let line = plan("--only chain-65").err().expect("refused");
         assert!(line.contains("called `chain-65`") && line.contains("chain-64, fork-join-2"));
-        let most = linux::processors();
-        let line = plan("--workers 64").err().filter(|_| most < 64);
-        assert!(most == 64 || line.is_some_and(|it| it.contains(&format!("{most} processors"))));
     }
 
     /// One test, since only one thread of a program may measure at a time.
