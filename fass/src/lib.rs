@@ -129,8 +129,8 @@ pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;
 pub use draft::flaw::WordedFault;
 pub use platform::{
-    AlreadyInstalled, Clock, LaunchError, Occupation, Platform, execute_for, install, now_ns,
-    set_clock,
+    AlreadyInstalled, Clock, LaunchError, Occupation, Platform, Terms, execute_for, install,
+    now_ns, set_clock,
 };
 pub use recording::Channel;
 pub use run::crossing::Recorded;

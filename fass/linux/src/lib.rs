@@ -36,7 +36,6 @@
 //!   demoted there and ends meanwhile is reported when that one has ended, or when it is wanted.
 #![deny(unsafe_code)]
 
-mod clusters;
 mod control;
 mod edge;
 mod end_signals;

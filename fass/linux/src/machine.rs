@@ -1,18 +1,16 @@
 //! The machine as an app sees it: so many cores of this computer.
 
-use std::borrow::Cow;
 use std::fmt;
 use std::io;
 use std::os::fd::AsFd;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use fass::{Clusters, Overheads, Plan, Platform as _, Policy, Preemption, Signal};
-use sched_dag::SchedulerOptions;
+use fass::{Plan, Platform as _, Preemption, Signal, Terms};
 
 use crate::control::Control;
 use crate::level::{Levels, USUAL_TOP};
-use crate::platform::{HOST, Terms};
+use crate::platform::{HOST, Threads};
 use crate::run::{self, Run};
 use crate::seats::Seats;
 use crate::sys;
@@ -40,8 +38,8 @@ pub enum Mechanism {
 
 /// Cores of this computer, for the DAGs that are committed next.
 ///
-/// Made with one core, static priorities and preemption; the builder's methods
-/// change that and are to be called before the commit. A program has one at a time.
+/// Made with static priorities and preemption; [`with`](Self::with) changes that, before the
+/// commit. A program has one at a time.
 ///
 /// # Examples
 ///
@@ -163,70 +161,77 @@ impl Linux {
             let is_throttled = mechanism == Mechanism::Fifo;
             found.extend(warnings::look(&processors, is_throttled));
         }
-        let preemption = match levels {
-            Some(_) => Preemption::Enabled,
-            None => Preemption::Disabled,
-        };
         static IS_OURS: OnceLock<bool> = OnceLock::new();
         assert!(
             IS_OURS.get_or_init(|| fass::install(&HOST).is_ok()),
             "another platform is installed; `Linux` must be the program's only one"
         );
-        let mut terms = HOST.terms();
+        let cores = u32::try_from(processors.len()).unwrap_or(u32::MAX);
+        let mut threads = HOST.threads();
         assert!(
-            terms.is_none(),
+            threads.is_none(),
             "this program has a `Linux` already; drop it first"
         );
-        *terms = Some(Terms {
-            policy: Policy::StaticPriority,
-            preemption,
+        *threads = Some(Threads {
+            terms: Terms::of_cores(cores),
             processors: processors.into(),
             levels,
             polls: mechanism == Mechanism::Poll,
             skips_idle: false,
-            most_events: u64::MAX,
-            overheads: Overheads::default(),
-            budget_factor: 0,
-            clusters: Clusters::Undivided,
-            assigns: false,
-            wcets: None,
-            look_at_commit: |_, _, _| (),
+            look_at_commit: |_, _| (),
             allocations: || 0,
         });
-        Ok(Self { warnings: found })
+        drop(threads);
+        Ok(Self { warnings: found }.with(|_| ()))
     }
 
-    fn change(self, change: impl FnOnce(&mut Terms)) -> Self {
-        if let Some(terms) = HOST.terms().as_mut() {
+    /// Returns the terms of the commits to come.
+    #[must_use]
+    pub fn terms(&self) -> Terms {
+        HOST.terms()
+    }
+
+    /// Changes these. Without SCHED_FIFO or `sched_ext` a started instance never loses its core,
+    /// whatever they say.
+    pub fn change(&self, change: impl FnOnce(&mut Terms)) {
+        if let Some(Threads { terms, levels, .. }) = HOST.threads().as_mut() {
             change(terms);
+            if levels.is_none() {
+                terms.scheduler.preemption = Preemption::Disabled;
+            }
         }
+    }
+
+    /// Changes the terms of the commits to come, as [`change`](Self::change) does.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use linux::{Linux, Mechanism};
+    ///
+    /// let machine = Linux::sharing(2, Mechanism::Normal).unwrap();
+    /// let machine = machine.with(|terms| terms.divide(&[1, 1]));
+    /// let dags = [0, 1].map(|cluster| {
+    ///     let (dag, period) = (create_dag(), Duration::from_millis(2));
+    ///     dag.cluster(cluster).jobs(3).period(period).relative_deadline(period);
+    ///     dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
+    ///     dag
+    /// });
+    /// finish_create_dags(&dags).unwrap();
+    /// let run = machine.run().unwrap();
+    /// assert!(run.journal().events().all(|event| event.core.0 == event.dag.0));
+    /// ```
+    #[must_use = "the machine itself is returned"]
+    pub fn with(self, change: impl FnOnce(&mut Terms)) -> Self {
+        self.change(change);
         self
     }
 
-    /// Sets the scheduling policy.
-    #[must_use = "the machine itself is returned"]
-    pub fn policy(self, policy: Policy) -> Self {
-        self.change(|terms| terms.policy = policy)
-    }
-
-    /// Sets whether a started instance may lose its core. Without SCHED_FIFO it never
-    /// does, whatever is set.
-    #[must_use = "the machine itself is returned"]
-    pub fn preemption(self, preemption: Preemption) -> Self {
-        self.change(|terms| terms.prefer(preemption))
-    }
-
-    /// Sets what commits add to WCETs before they answer, as measured on this computer.
-    #[must_use = "the machine itself is returned"]
-    pub fn overheads(self, overheads: Overheads) -> Self {
-        self.change(|terms| terms.overheads = overheads)
-    }
-
-    /// Sets the budget of subtasks that state a WCET only, in WCETs; 0, as at the start,
-    /// for none.
-    #[must_use = "the machine itself is returned"]
-    pub fn budget_factor(self, wcets: u64) -> Self {
-        self.change(|terms| terms.budget_factor = wcets)
+    fn set(self, set: impl FnOnce(&mut Threads)) -> Self {
+        if let Some(threads) = HOST.threads().as_mut() {
+            set(threads);
+        }
+        self
     }
 
     /// Has the run's time skip what would pass idly: when no core has work, the next event is due
@@ -234,42 +239,20 @@ impl Linux {
     /// measuring; it needs one cluster, or clusters that have no instant in common.
     #[must_use = "the machine itself is returned"]
     pub fn skipping_idle_time(self) -> Self {
-        self.change(|terms| terms.skips_idle = true)
+        self.set(|threads| threads.skips_idle = true)
     }
 
-    /// Sets for how many events the journals have room at most; 0: nothing is written down.
+    /// Has each commit looked at: what it hands over, and on what terms.
     #[must_use = "the machine itself is returned"]
-    pub fn most_events(self, most_events: u64) -> Self {
-        self.change(|terms| terms.most_events = most_events)
-    }
-
-    /// Has commits take WCETs from a file's text, as `./scripts/run --observe` writes it.
-    #[must_use = "the machine itself is returned"]
-    pub fn wcets(self, file: impl Into<Cow<'static, str>>) -> Self {
-        self.change(|terms| terms.wcets = Some(file.into()))
-    }
-
-    /// Has each commit looked at: what it hands over, how that is scheduled, and what was
-    /// charged for overheads.
-    #[must_use = "the machine itself is returned"]
-    pub fn at_commit(self, look: fn(&Plan, SchedulerOptions, Overheads)) -> Self {
-        self.change(|terms| terms.look_at_commit = look)
+    pub fn at_commit(self, look: fn(&Plan, &Terms)) -> Self {
+        self.set(|threads| threads.look_at_commit = look)
     }
 
     /// Says how to count what the program has allocated so far, for
     /// [`allocations`](sched_dag::engine::Run::allocations).
     #[must_use = "the machine itself is returned"]
     pub fn allocations(self, count: fn() -> u64) -> Self {
-        self.change(|terms| terms.allocations = count)
-    }
-
-    /// Sets policy and preemption of the commits to come, as [`policy`](Self::policy) and
-    /// [`preemption`](Self::preemption) do.
-    pub fn configure(&self, policy: Policy, preemption: Preemption) {
-        if let Some(terms) = HOST.terms().as_mut() {
-            terms.policy = policy;
-            terms.prefer(preemption);
-        }
+        self.set(|threads| threads.allocations = count)
     }
 
     /// Has the kernel end this program, by SIGKILL, when one of its threads has run at a
@@ -289,18 +272,10 @@ impl Linux {
         &self.warnings
     }
 
-    /// Returns the number of cores.
-    #[must_use]
-    pub fn cores(&self) -> u32 {
-        HOST.cores()
-    }
-
     /// Reports whether started instances may lose their cores.
     #[must_use]
     pub fn is_preemptive(&self) -> bool {
-        let terms = HOST.terms();
-        let preemption = terms.as_ref().map(|terms| terms.preemption);
-        preemption == Some(Preemption::Enabled)
+        self.terms().scheduler.preemption == Preemption::Enabled
     }
 
     /// Returns what changes the committed run from any thread; `None` if nothing is
@@ -366,7 +341,7 @@ impl Linux {
 
 impl Drop for Linux {
     fn drop(&mut self) {
-        *HOST.terms() = None;
+        *HOST.threads() = None;
         HOST.forget();
     }
 }

@@ -1,16 +1,12 @@
 //! Linux as the platform that `fass` runs on: one for the program.
 
-use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
 
 use fass::edge::Begin;
-use fass::{
-    Channel, Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption,
-    Recorded, Runner,
-};
+use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms};
 use sched_dag::lifecycle::{self, Parts, Request, Requests};
-use sched_dag::{DagId, Journal, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::{DagId, Journal, Scheduler, TaskSet};
 
 use crate::edge;
 use crate::level::Levels;
@@ -22,46 +18,29 @@ use crate::team::{Team, with_own_worker};
 
 /// What the commits to come run on.
 #[derive(Clone, Debug)]
-pub(crate) struct Terms {
-    pub(crate) policy: Policy,
-    pub(crate) preemption: Preemption,
+pub(crate) struct Threads {
+    /// What commits are told.
+    pub(crate) terms: Terms,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
     /// Whether idle threads watch instead of sleeping.
     pub(crate) polls: bool,
     /// Whether the run's time skips what would pass idly.
     pub(crate) skips_idle: bool,
-    /// The most events that the journals have room for.
-    pub(crate) most_events: u64,
-    pub(crate) overheads: Overheads,
-    pub(crate) budget_factor: u64,
-    pub(crate) clusters: Clusters,
-    /// Whether the commit divides the cores.
-    pub(crate) assigns: bool,
-    pub(crate) wcets: Option<Cow<'static, str>>,
-    pub(crate) look_at_commit: fn(&Plan, SchedulerOptions, Overheads),
+    pub(crate) look_at_commit: fn(&Plan, &Terms),
     pub(crate) allocations: fn() -> u64,
-}
-
-impl Terms {
-    /// Chooses whether started instances may lose their cores, where there is a choice.
-    pub(crate) const fn prefer(&mut self, preemption: Preemption) {
-        if self.levels.is_some() {
-            self.preemption = preemption;
-        }
-    }
 }
 
 /// The platform of the program.
 pub(crate) struct Host {
-    terms: Mutex<Option<Terms>>,
+    threads: Mutex<Option<Threads>>,
     launched: Mutex<Option<Launched>>,
     /// The run that signals from outside are for.
     office: RwLock<Option<Arc<Office>>>,
 }
 
 pub(crate) static HOST: Host = Host {
-    terms: Mutex::new(None),
+    threads: Mutex::new(None),
     launched: Mutex::new(None),
     office: RwLock::new(None),
 };
@@ -71,8 +50,8 @@ const JOURNAL_BYTES: usize = 1 << 30;
 
 impl Host {
     /// Returns what the next commit runs on; `None` before there is a machine.
-    pub(crate) fn terms(&self) -> MutexGuard<'_, Option<Terms>> {
-        self.terms.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(crate) fn threads(&self) -> MutexGuard<'_, Option<Threads>> {
+        self.threads.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Takes what was committed last.
@@ -87,13 +66,6 @@ impl Host {
         self.office.read().map_or(None, |office| office.clone())
     }
 
-    /// Sets how the cores are divided, or that the commit does it: the last call counts.
-    pub(crate) fn divide(&self, clusters: Clusters, by_commit: bool) {
-        if let Some(terms) = self.terms().as_mut() {
-            (terms.clusters, terms.assigns) = (clusters, by_commit);
-        }
-    }
-
     /// Forgets the run.
     pub(crate) fn forget(&self) {
         self.office.clear_poison();
@@ -101,43 +73,19 @@ impl Host {
             *office = None;
         }
     }
-
-    fn of_terms<T>(&self, look: impl FnOnce(&Terms) -> T, otherwise: T) -> T {
-        self.terms().as_ref().map_or(otherwise, look)
-    }
 }
 
 impl Platform for Host {
-    fn policy(&self) -> Policy {
-        self.of_terms(|terms| terms.policy, Policy::StaticPriority)
-    }
-
-    fn preemption(&self) -> Preemption {
-        self.of_terms(|terms| terms.preemption, Preemption::Disabled)
-    }
-
-    fn cores(&self) -> u32 {
-        let count = |terms: &Terms| u32::try_from(terms.processors.len()).unwrap_or(u32::MAX);
-        self.of_terms(count, 1)
-    }
-
-    fn clusters(&self) -> Clusters {
-        self.of_terms(|terms| terms.clusters.clone(), Clusters::Undivided)
+    fn terms(&self) -> Terms {
+        let threads = self.threads();
+        // Without a machine, those of none.
+        threads
+            .as_ref()
+            .map_or(Terms::of_cores(1), |of| of.terms.clone())
     }
 
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-        match self.of_terms(|terms| terms.assigns, false) {
-            true => fass::assign_clusters(self, task_set),
-            false => Ok(()),
-        }
-    }
-
-    fn overheads(&self) -> Overheads {
-        self.of_terms(|terms| terms.overheads, Overheads::default())
-    }
-
-    fn wcets(&self) -> Option<Cow<'static, str>> {
-        self.of_terms(|terms| terms.wcets.clone(), None)
+        fass::assign_clusters(self, task_set)
     }
 
     #[inline]
@@ -192,7 +140,7 @@ impl Platform for Host {
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
-        let Some(terms) = self.terms().clone() else {
+        let Some(threads) = self.threads().clone() else {
             let line = "there is no `Linux` yet; make one before the commit";
             return Err(LaunchError::new(line));
         };
@@ -201,26 +149,21 @@ impl Platform for Host {
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
         }
-        let options = SchedulerOptions {
-            policy: terms.policy,
-            preemption: terms.preemption,
-            cores: self.cores(),
-        };
         edge::launch(&mut plan)?;
-        (terms.look_at_commit)(&plan, options, terms.overheads);
+        (threads.look_at_commit)(&plan, &threads.terms);
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;
-        let office = Office::new(plan.number, &plan.task_set, letters, terms.levels);
+        let office = Office::new(plan.number, &plan.task_set, letters, threads.levels);
         let office = Arc::new(office);
         if let Ok(mut place) = self.office.write() {
             *place = Some(Arc::clone(&office));
         }
         let launched = Launched {
             proven: plan.proven.clone(),
-            options,
-            budget_factor: terms.budget_factor,
-            allocations: terms.allocations,
-            teams: teams(plan, parts, options, &terms, &office),
+            cores: threads.terms.scheduler.cores,
+            budget_factor: threads.terms.budget_factor,
+            allocations: threads.allocations,
+            teams: teams(plan, parts, &threads, &office),
             office,
         };
         let mut place = self.launched.lock().unwrap_or_else(PoisonError::into_inner);
@@ -230,14 +173,8 @@ impl Platform for Host {
 }
 
 /// Makes what the threads of each cluster share.
-fn teams(
-    plan: Plan,
-    parts: Parts,
-    options: SchedulerOptions,
-    terms: &Terms,
-    office: &Arc<Office>,
-) -> Vec<Arc<Team>> {
-    let task_set = &plan.task_set;
+fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> Vec<Arc<Team>> {
+    let (task_set, options) = (&plan.task_set, threads.terms.scheduler);
     let dags = task_set.dags().len();
     let mut runners: Vec<Vec<Runner>> = task_set.clusters().map(|_| Vec::new()).collect();
     for runner in Runner::all(task_set, plan.bodies) {
@@ -245,7 +182,7 @@ fn teams(
         runners[cluster.index()].push(runner);
     }
     let share = JOURNAL_BYTES / runners.len();
-    let most_events = terms.most_events / runners.len() as u64;
+    let most_events = threads.terms.most_events / runners.len() as u64;
     let clusters = task_set.clusters().zip(runners).zip(parts);
     let team = |((cluster, runners), lifecycle)| {
         let cores = task_set.cores_of(cluster, options.cores);
@@ -256,10 +193,14 @@ fn teams(
             runners,
             (requests, plan.after_fault.clone()),
             Journal::of_cluster(task_set, cluster, share, most_events),
-            terms.processors[cores.start as usize..cores.end as usize].into(),
-            terms.levels,
+            threads.processors[cores.start as usize..cores.end as usize].into(),
+            threads.levels,
         );
-        Arc::new(Team::new(state, office, (terms.polls, terms.skips_idle)))
+        Arc::new(Team::new(
+            state,
+            office,
+            (threads.polls, threads.skips_idle),
+        ))
     };
     clusters.map(team).collect()
 }

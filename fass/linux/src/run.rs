@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
 
-use sched_dag::SchedulerOptions;
 use sched_dag::engine::{self, Proven};
 
 use crate::edge::{self, Sending};
@@ -27,7 +26,7 @@ pub(crate) struct Launched {
     pub(crate) office: Arc<Office>,
     /// By cluster.
     pub(crate) teams: Vec<Arc<Team>>,
-    pub(crate) options: SchedulerOptions,
+    pub(crate) cores: u32,
     pub(crate) proven: Proven,
     pub(crate) budget_factor: u64,
     /// Counts what the program has allocated so far.
@@ -96,10 +95,9 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     sending.into_iter().for_each(Sending::end);
     let mut states: Vec<_> = teams.iter().map(|team| team.lock()).collect();
     let abandoned: Vec<Vec<Number>> = states.iter().map(|state| state.abandoned.clone()).collect();
-    let cores = launched.options.cores;
     let mut parts = states.iter_mut().map(|state| &mut state.engine);
     let first = parts.next().expect("there is a cluster at least");
-    let mut run = engine::Run::of(first, launched.proven, cores);
+    let mut run = engine::Run::of(first, launched.proven, launched.cores);
     // Nobody writes any more: those that were abandoned see that they were.
     parts.for_each(|other| run.absorb(other));
     let mut counts = Counts::default();

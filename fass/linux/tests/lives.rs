@@ -31,7 +31,11 @@ fn a_chain_on_one_core_wakes_nobody() {
 fn the_runs_time_skips_what_is_idle() {
     for sizes in [&[1][..], &[2], &[1, 1]] {
         let share = || Linux::sharing(sizes.iter().sum(), Mechanism::Poll).unwrap();
-        let alone = alone_on(|| share().clusters(sizes).skipping_idle_time());
+        let alone = alone_on(|| {
+            share()
+                .with(|terms| terms.divide(sizes))
+                .skipping_idle_time()
+        });
         let clusters = (0..).take(sizes.len());
         let dags: Vec<_> = clusters
             .map(|cluster| {

@@ -14,8 +14,8 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use fass::{
-    ConstructionPolicy, Dag, Occupation, OverrunPolicy, Policy, Preemption, SubtaskAttributes,
-    create_dag, execute_for, finish_create_dags_with,
+    ConstructionPolicy, Dag, Occupation, OverrunPolicy, Policy, SubtaskAttributes, create_dag,
+    execute_for, finish_create_dags_with,
 };
 use linux::{Control, Linux, Mechanism, Run};
 use random::Random;
@@ -31,7 +31,9 @@ fn random_sets_keep_the_rules() {
         let policy = [Policy::StaticPriority, Policy::Edf][random.below(2)];
         let mechanisms = [Mechanism::Fifo, Mechanism::Poll, Mechanism::Normal];
         let alone = alone(1 + random.small(2), mechanisms[random.below(3)]);
-        alone.machine.configure(policy, Preemption::Enabled);
+        alone
+            .machine
+            .change(|terms| terms.scheduler.policy = policy);
         let run = run(&alone.machine, &mut random);
         let found = breaches(&run);
         assert!(found.is_empty(), "LINUX_SEED={seed}: {found:?}");
@@ -75,11 +77,11 @@ fn run(machine: &Linux, random: &mut Random) -> Run {
     let dags: Vec<Dag> = (0..=random.below(4))
         .map(|number| dag(number, random))
         .collect();
-    let sizes: &[u32] = match machine.cores() {
+    let sizes: &[u32] = match machine.terms().scheduler.cores {
         2 if random.one_in(2) => &[1, 1],
         _ => &[],
     };
-    machine.divide(sizes);
+    machine.change(|terms| terms.divide(sizes));
     if !sizes.is_empty() {
         dags.iter().for_each(|dag| _ = dag.cluster(random.small(2)));
     }

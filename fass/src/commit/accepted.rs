@@ -62,7 +62,7 @@ impl Commit {
     ///
     /// Bounds hold for the platform's policy, preemption and cores, with its
     /// measured overheads added to the WCETs
-    /// ([`Platform::overheads`](crate::Platform::overheads)), and as long as no
+    /// ([`Terms::overheads`](crate::Terms::overheads)), and as long as no
     /// instance executes for longer than its WCET. A DAG that is *not proven*
     /// may meet its deadlines all the same.
     ///

@@ -3,7 +3,7 @@
 use alloc::format;
 
 use sched_dag::TaskSet;
-use sched_dag::analysis::{self, NotAssigned, Settings};
+use sched_dag::analysis::{self, NotAssigned};
 
 use crate::platform::{LaunchError, Platform};
 
@@ -24,18 +24,10 @@ use crate::platform::{LaunchError, Platform};
 /// }
 /// ```
 pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-    analysis::assign(task_set, &settings(platform)).map_err(|NotAssigned { dag, reason }| {
-        let dag = task_set.label(dag);
-        LaunchError::new(format!("{dag} gets no cores: {reason}"))
-    })
-}
-
-/// Returns what the analysis is to know of a platform.
-pub(super) fn settings(platform: &dyn Platform) -> Settings {
-    Settings {
-        policy: platform.policy(),
-        preemption: platform.preemption(),
-        cores: platform.cores(),
-        overheads: platform.overheads(),
-    }
+    analysis::assign(task_set, &platform.terms().settings()).map_err(
+        |NotAssigned { dag, reason }| {
+            let dag = task_set.label(dag);
+            LaunchError::new(format!("{dag} gets no cores: {reason}"))
+        },
+    )
 }

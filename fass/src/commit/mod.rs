@@ -139,16 +139,20 @@ pub fn finish_create_dags_with(
         error.faults.insert(0, Fault::NoPlatform);
         return Err(error);
     };
-    let options = with(platform.policy(), platform.cores()).with_clusters(platform.clusters());
+    let terms = platform.terms();
+    let options = with(terms.scheduler.policy, terms.scheduler.cores);
+    let options = options.with_clusters(terms.clusters.clone());
     let Verified {
         mut task_set,
         mut warnings,
-    } = verify(dags, options, platform.wcets().as_deref())?;
-    if let Err(error) = platform.assign(&mut task_set) {
+    } = verify(dags, options, terms.wcets.as_deref())?;
+    if terms.assigns
+        && let Err(error) = platform.assign(&mut task_set)
+    {
         return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
-    analysis::fix_orders(&mut task_set, &assign::settings(platform));
-    let answers = Answers::new(&task_set, platform);
+    analysis::fix_orders(&mut task_set, &terms.settings());
+    let answers = Answers::new(&task_set, &terms);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
     let faults = lacking_proofs(dags, &answers);

@@ -7,15 +7,14 @@
 
 mod clock;
 mod installed;
+mod terms;
 
-use alloc::borrow::Cow;
 use alloc::string::String;
 use core::fmt;
 use core::time::Duration;
 
 use recording::Channel;
-use sched_dag::analysis::{OverheadSource, Overheads};
-use sched_dag::{Clusters, DagId, Policy, Preemption, TaskSet};
+use sched_dag::{DagId, TaskSet};
 
 use crate::edge::Begin;
 use crate::run::crossing::Recorded;
@@ -24,6 +23,7 @@ use crate::run::plan::Plan;
 pub use clock::{Clock, now_ns, set_clock};
 pub use installed::{AlreadyInstalled, install};
 pub(crate) use installed::{expect_installed, installed, record};
+pub use terms::Terms;
 
 /// A machine that schedules committed DAGs.
 ///
@@ -33,19 +33,13 @@ pub(crate) use installed::{expect_installed, installed, record};
 ///
 /// ```standalone_crate
 /// use core::time::Duration;
-/// use fass::{LaunchError, Occupation, Plan, Platform, Policy, Preemption};
+/// use fass::{LaunchError, Occupation, Plan, Platform, Terms};
 ///
 /// struct OneJob;
 ///
 /// impl Platform for OneJob {
-///     fn policy(&self) -> Policy {
-///         Policy::Edf
-///     }
-///     fn preemption(&self) -> Preemption {
-///         Preemption::Disabled
-///     }
-///     fn cores(&self) -> u32 {
-///         1
+///     fn terms(&self) -> Terms {
+///         Terms::of_cores(1)
 ///     }
 ///     fn now_ns(&self) -> u64 {
 ///         0
@@ -65,25 +59,12 @@ pub(crate) use installed::{expect_installed, installed, record};
 /// assert_eq!(fass::now_ns(), 0);
 /// ```
 pub trait Platform: Sync {
-    /// Returns the scheduling policy, which decides what attributes are needed.
-    fn policy(&self) -> Policy;
+    /// Returns on what terms DAGs run: a commit verifies and answers by these.
+    fn terms(&self) -> Terms;
 
-    /// Returns whether a started instance may lose its core.
-    fn preemption(&self) -> Preemption;
-
-    /// Returns the number of processors that run subtasks, at least 1.
-    fn cores(&self) -> u32;
-
-    /// Returns how these are divided; a platform that cannot divide them does not define
-    /// this. In one that does, DAGs say which cluster is theirs
-    /// ([`Dag::cluster`](crate::Dag::cluster)).
-    fn clusters(&self) -> Clusters {
-        Clusters::Undivided
-    }
-
-    /// Divides the cores for these DAGs, by [`assign_clusters`](crate::assign_clusters); a platform that does not leave
-    /// that to the commit does not define this. (So an image that never
-    /// divides its cores has none of that code.)
+    /// Divides the cores for these DAGs, by [`assign_clusters`](crate::assign_clusters), if the
+    /// terms leave that to the commit; a platform whose terms never do does not define this. (So
+    /// an image that never divides its cores has none of that code.)
     ///
     /// # Errors
     ///
@@ -91,40 +72,6 @@ pub trait Platform: Sync {
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
         let _ = task_set;
         Ok(())
-    }
-
-    /// Returns what the platform's own work costs an instance at most, as
-    /// measured on it. The commit adds it to each WCET before it answers about
-    /// deadlines ([`Commit::answers`](crate::Commit::answers)); it changes
-    /// nothing else. Without measurements, nothing is added: then WCETs have to
-    /// include it.
-    ///
-    /// ```
-    /// use fass::{Overheads, Preemption};
-    ///
-    /// let measured = Overheads {
-    ///     context_switch_ns: 300,
-    ///     dispatch_ns: 900,
-    ///     interrupt_ns: 2_000,
-    ///     ready_ns: 0,
-    /// };
-    /// // Into the instance, out of it, one dispatch, one interrupt to preempt another.
-    /// assert_eq!(measured.of_an_instance_ns(Preemption::Enabled), Some(3_500));
-    /// ```
-    fn overheads(&self) -> Overheads {
-        Overheads::default()
-    }
-
-    /// Returns where these are from, for the answer to say so.
-    fn overhead_source(&self) -> OverheadSource {
-        OverheadSource::default()
-    }
-
-    /// Returns a file of WCETs that were observed, if the platform was given one; the
-    /// commit takes what it has for its DAGs in place of what they state.
-    /// `sched_dag::wcets` has the format.
-    fn wcets(&self) -> Option<Cow<'static, str>> {
-        None
     }
 
     /// Returns the time since the platform's start, in nanoseconds.

@@ -9,7 +9,7 @@ use std::rc::Rc;
 use std::sync::OnceLock;
 
 use fass::{Body, ConstructionPolicy, Dag, LaunchError, Occupation, Plan, Platform, Policy};
-use fass::{Preemption, SubtaskAttributes};
+use fass::{Preemption, SubtaskAttributes, Terms};
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 
@@ -21,14 +21,11 @@ thread_local! {
 struct Keeper;
 
 impl Platform for Keeper {
-    fn policy(&self) -> Policy {
-        Policy::Edf
-    }
-    fn preemption(&self) -> Preemption {
-        Preemption::Disabled
-    }
-    fn cores(&self) -> u32 {
-        1
+    fn terms(&self) -> Terms {
+        let mut terms = Terms::of_cores(1);
+        terms.scheduler.policy = Policy::Edf;
+        terms.scheduler.preemption = Preemption::Disabled;
+        terms
     }
     fn now_ns(&self) -> u64 {
         0

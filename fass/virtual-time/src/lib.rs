@@ -51,7 +51,7 @@ mod wires;
 use std::rc::Rc;
 use std::time::Duration;
 
-use fass::{Clusters, Overheads, Policy, Preemption, Signal};
+use fass::{Overheads, Policy, Preemption, Signal};
 pub use recording::Malformed;
 pub use sched_dag::law::{Rule, Violation};
 pub use sched_dag::{
@@ -144,34 +144,33 @@ impl VirtualTime {
     /// Sets the number of cores. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn cores(self, cores: u32) -> Self {
-        self.set(|settings| settings.scheduler.cores = cores)
+        self.set(|settings| settings.terms.scheduler.cores = cores)
     }
 
     /// Divides the cores into clusters of so many each, from core 0 on. Each schedules its own
     /// DAGs; all have one clock. See [`fass::Dag::cluster`].
     #[must_use = "the machine itself is returned"]
     pub fn clusters(self, sizes: &[u32]) -> Self {
-        let clusters = Clusters::Of(sizes.to_vec());
-        self.set(|settings| (settings.clusters, settings.assigns) = (clusters, false))
+        self.set(|settings| settings.terms.divide(sizes))
     }
 
     /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
     /// others share clusters of one core each. All subtasks need WCETs. See [`fass::Placement`].
     #[must_use = "the machine itself is returned"]
     pub fn assign_clusters(self) -> Self {
-        self.set(|settings| (settings.clusters, settings.assigns) = (Clusters::Undivided, true))
+        self.set(|settings| settings.terms.divide_by_commit())
     }
 
     /// Sets the scheduling policy. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn policy(self, policy: Policy) -> Self {
-        self.set(|settings| settings.scheduler.policy = policy)
+        self.set(|settings| settings.terms.scheduler.policy = policy)
     }
 
     /// Sets whether a started instance may lose its core. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn preemption(self, preemption: Preemption) -> Self {
-        self.set(|settings| settings.scheduler.preemption = preemption)
+        self.set(|settings| settings.terms.scheduler.preemption = preemption)
     }
 
     /// Sets the costs that the commit adds to each WCET before it answers about
@@ -179,7 +178,7 @@ impl VirtualTime {
     /// itself stays without overheads. See [`VirtualTime`].
     #[must_use = "the machine itself is returned"]
     pub fn overheads(self, overheads: Overheads) -> Self {
-        self.set(|settings| settings.overheads = overheads)
+        self.set(|settings| settings.terms.overheads = overheads)
     }
 
     /// Gives the commit a file of WCETs that were observed, as `./scripts/run --observe`
@@ -203,7 +202,8 @@ impl VirtualTime {
     /// ```
     #[must_use = "the machine itself is returned"]
     pub fn wcets(self, file: &str) -> Self {
-        self.set(|settings| settings.wcets = Some(file.into()))
+        let file = file.to_owned();
+        self.set(|settings| settings.terms.wcets = Some(file.into()))
     }
 
     /// Contains panics: one in a function ends its DAG only, or costs a job of it

@@ -5,16 +5,13 @@
 //! runs, it is taken out of there, so that a function's calls into the platform
 //! meet nothing borrowed but the settings, which no function changes.
 
-use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
 use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
 use std::time::Duration;
 
 use fass::edge::Begin;
-use fass::{
-    Clusters, LaunchError, Occupation, Overheads, Plan, Platform, Policy, Preemption, Recorded,
-};
+use fass::{LaunchError, Occupation, Plan, Platform, Recorded, Terms};
 
 use recording::Channel;
 use sched_dag::{DagId, TaskSet};
@@ -24,7 +21,6 @@ use crate::job::JobShown;
 use crate::nanoseconds;
 use crate::report::Report;
 use crate::session::Session;
-use crate::settings::Settings;
 use crate::surroundings::Surroundings;
 
 /// What one thread's virtual machine is and does.
@@ -106,35 +102,14 @@ impl Machine {
 struct HostPlatform;
 
 impl Platform for HostPlatform {
-    fn policy(&self) -> Policy {
-        settings().scheduler.policy
-    }
-
-    fn preemption(&self) -> Preemption {
-        settings().scheduler.preemption
-    }
-
-    fn cores(&self) -> u32 {
-        settings().scheduler.cores
-    }
-
-    fn clusters(&self) -> Clusters {
-        settings().clusters
+    fn terms(&self) -> Terms {
+        let terms = |machine: Rc<Machine>| machine.surroundings.settings.borrow().terms.clone();
+        // Without a machine, those that one has at first.
+        current().map(terms).unwrap_or_default()
     }
 
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-        match settings().assigns {
-            true => fass::assign_clusters(self, task_set),
-            false => Ok(()),
-        }
-    }
-
-    fn overheads(&self) -> Overheads {
-        settings().overheads
-    }
-
-    fn wcets(&self) -> Option<Cow<'static, str>> {
-        settings().wcets.map(Cow::Owned)
+        fass::assign_clusters(self, task_set)
     }
 
     fn now_ns(&self) -> u64 {
@@ -215,7 +190,7 @@ impl Platform for HostPlatform {
         let launched = surroundings.edge.launch(&mut plan, settings.most_jobs);
         launched.map_err(LaunchError::new)?;
         machine.plan.set(Some(plan.number));
-        let session = Session::new(plan, settings.scheduler, surroundings);
+        let session = Session::new(plan, settings.terms.scheduler, surroundings);
         machine.session.replace(Some(session));
         Ok(())
     }
@@ -231,10 +206,4 @@ fn expect_current() -> Rc<Machine> {
 
 fn surroundings() -> Rc<Surroundings> {
     Rc::clone(&expect_current().surroundings)
-}
-
-/// Returns the settings of this thread's machine, or those that one has at first.
-fn settings() -> Settings {
-    let settings = |machine: Rc<Machine>| machine.surroundings.settings.borrow().clone();
-    current().map(settings).unwrap_or_default()
 }

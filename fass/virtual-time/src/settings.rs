@@ -1,21 +1,15 @@
 //! What a machine is asked to be, by the builder's methods, before the commit.
 
-use fass::{Clusters, Overheads, Policy, Preemption};
-use sched_dag::SchedulerOptions;
+use fass::Terms;
 
 use crate::disturbed::{Fault, Late};
 use crate::silent::Silent;
 
 /// What a machine is asked to be.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Settings {
-    pub(crate) scheduler: SchedulerOptions,
-    pub(crate) clusters: Clusters,
-    /// Whether the commit divides the cores.
-    pub(crate) assigns: bool,
-    pub(crate) overheads: Overheads,
-    /// A file of observed WCETs.
-    pub(crate) wcets: Option<String>,
+    /// What commits are told.
+    pub(crate) terms: Terms,
     /// How long calls take that do not say.
     pub(crate) silent: Silent,
     /// How late interrupts are.
@@ -26,25 +20,4 @@ pub(crate) struct Settings {
     pub(crate) contains_panics: bool,
     /// How many jobs' inputs are kept, if not all is.
     pub(crate) most_jobs: Option<u32>,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            scheduler: SchedulerOptions {
-                policy: Policy::StaticPriority,
-                preemption: Preemption::Enabled,
-                cores: 1,
-            },
-            clusters: Clusters::Undivided,
-            assigns: false,
-            overheads: Overheads::default(),
-            wcets: None,
-            silent: Silent::default(),
-            late: Late::default(),
-            faults: Vec::new(),
-            contains_panics: false,
-            most_jobs: None,
-        }
-    }
 }

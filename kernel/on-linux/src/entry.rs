@@ -62,12 +62,12 @@ fn run(
     // Who sees the first line may ask for an end.
     let signals = EndSignals::catch_first();
     let options = Options::parse(line)?;
-    let (linux, terms, module) = words::apply(name, &options)?;
+    let (linux, chosen, module) = words::apply(name, &options)?;
     json::report("boot", |object| {
         object
             .text("version", env!("CARGO_PKG_VERSION"))
             .text("app", name)
-            .number("cpus", linux.cores())
+            .number("cpus", linux.terms().scheduler.cores)
             .number("memory_kib", memory_kib())
             .text("clock", "linux")
             .flag("preemptive", linux.is_preemptive())
@@ -78,7 +78,6 @@ fn run(
     }
     let system = LinuxSystem {
         linux,
-        overheads: terms.overheads,
         wire: RefCell::new(None),
         refusal: RefCell::new(None),
         signals,
@@ -86,7 +85,7 @@ fn run(
         is_closed: Cell::new(false),
     };
     let bounds = BoundVerdict::new(false, false);
-    let result = Machine::serve(system, options, &terms, module, bounds, app);
+    let result = Machine::serve(system, options, chosen, module, bounds, app);
     let [refusal, complaint] = Linux::objections();
     match refusal {
         Some(refusal) => Err(UsageError::new(refusal).into()),

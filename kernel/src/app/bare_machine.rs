@@ -7,7 +7,7 @@ use core::time::Duration;
 
 use alloc::boxed::Box;
 
-use fass::{Overheads, Platform, Policy, Preemption, Signal, Wire};
+use fass::{Platform, Signal, Terms, Wire};
 
 use super::overheads;
 use crate::options::{Options, UsageError};
@@ -53,17 +53,12 @@ impl System for BareMachine {
         self.wishes.console.is_some()
     }
 
-    fn cores(&self) -> u32 {
-        KERNEL.cores()
+    fn terms(&self) -> Terms {
+        KERNEL.terms()
     }
 
-    fn configure(&self, policy: Policy, preemption: Preemption) {
-        KERNEL.set_policy(policy);
-        KERNEL.set_preemption(preemption);
-    }
-
-    fn overheads(&self) -> Overheads {
-        KERNEL.overheads()
+    fn change(&self, change: impl FnOnce(&mut Terms)) {
+        KERNEL.change(change);
     }
 
     fn set_coincidence(&self, window: Duration) {
@@ -171,22 +166,8 @@ impl System for BareMachine {
 }
 
 #[cfg(feature = "clusters")]
-impl front::app::division::Divisible for BareMachine {
-    fn divide(&self, sizes: Option<alloc::vec::Vec<u32>>) {
-        use execution::{Division, set_division};
-        set_division(match sizes {
-            None => Division::ByCommit,
-            Some(sizes) if sizes.is_empty() => Division::Into(fass::Clusters::Undivided),
-            Some(sizes) => Division::Into(fass::Clusters::Of(sizes)),
-        });
-    }
+impl front::app::division::Divisible for BareMachine {}
 
-    fn clusters(&self) -> fass::Clusters {
-        KERNEL.clusters()
-    }
-}
-
-/// Prints the longest section of a run without interrupts.
 fn report_interrupts_off(longest_ns: u64, place: &Location<'_>) {
     let place = fmt::from_fn(|f| write!(f, "{}:{}", place.file(), place.line()));
     crate::println!(

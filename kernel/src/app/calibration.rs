@@ -59,7 +59,7 @@ pub(super) fn run() -> Result<Costs, Ending> {
 
 fn dags() -> Vec<Dag> {
     let busy = dag(Duration::ZERO, PERIOD * 2);
-    for _ in 0..KERNEL.cores() {
+    for _ in 0..KERNEL.terms().scheduler.cores {
         subtask(&busy, 1, BUSY);
     }
     let wide = dag(INTO_IT, PERIOD);

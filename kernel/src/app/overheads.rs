@@ -1,6 +1,6 @@
 //! Charging commits with what the kernel has measured of its own costs.
 
-use fass::Overheads;
+use fass::{OverheadSource, Overheads};
 
 use super::calibration;
 use executive::run::platform::KERNEL;
@@ -11,8 +11,13 @@ use front::json;
 pub(super) fn charge(margin_percent: u32) -> Result<(), Ending> {
     let costs = calibration::run()?;
     let overheads = Overheads::measured(&costs, margin_percent, calibration::AT_ONCE);
-    KERNEL.set_overheads(overheads);
-    KERNEL.set_measured(costs.dispatches, margin_percent);
+    KERNEL.change(|terms| {
+        terms.overheads = overheads;
+        terms.overhead_source = OverheadSource::Measured {
+            dispatches: costs.dispatches,
+            margin_percent,
+        };
+    });
     crate::println!(
         "overheads measured: {costs}; with a margin of {margin_percent} %: overheads_ns={},{},{},{}",
         overheads.context_switch_ns,

@@ -1,5 +1,6 @@
 //! From the handover by `boot` to the app's function, and its end.
 
+use alloc::borrow::Cow;
 use alloc::format;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -349,20 +350,18 @@ fn run_app(
     let options = Options::parse(line)?;
     let settings = settings::apply(&options, processors)?;
     let (wcets, module) = terms::split_wcets(&options, module_bytes(info))?;
-    if let Some(wcets) = wcets {
-        KERNEL.set_wcets(wcets);
-    }
+    KERNEL.change(|terms| terms.wcets = wcets.map(Cow::Borrowed));
     let module = settings.set_wish(name, module)?;
     let mode = info.value("mode");
     let bounds = BoundVerdict::new(
-        settings.terms.judges_bounds && mode != Some("threads"),
+        settings.chosen.judges_bounds && mode != Some("threads"),
         mode == Some("deterministic") && this_core::all().len() > 1,
     );
     let wishes = settings.wishes;
     let result = Machine::serve(
         BareMachine::new(wishes),
         options,
-        &settings.terms,
+        settings.chosen,
         module,
         bounds,
         app,

@@ -35,13 +35,13 @@ use crate::watch::background::{Echo, Wishes};
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
 use executive::run::{edge, stacks, worker};
-use front::app::terms::{self, Terms};
+use front::app::terms::{self, Chosen};
 
 /// What the words say about runs to come; all else is set where it belongs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
     /// What they say everywhere.
-    pub(crate) terms: Terms,
+    pub(crate) chosen: Chosen,
     /// How many bytes of the loader's module, behind the WCETs, are a recording to replay.
     replay_bytes: u64,
     /// How many KiB of memory a recording may wait in; 0: nothing is recorded.
@@ -90,11 +90,12 @@ impl Settings {
 ///
 /// The machine has so many `processors`, cores or not.
 pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings, UsageError> {
-    let terms = Terms::read(options)?;
-    KERNEL.set_policy(terms.policy);
-    KERNEL.set_preemption(terms.preemption);
-    KERNEL.set_budget_factor(terms.budget_factor);
-    KERNEL.set_overheads(terms.overheads);
+    let chosen = Chosen::read(options)?;
+    let most_events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;
+    KERNEL.change(|terms| {
+        chosen.apply(terms);
+        terms.most_events = most_events;
+    });
     if options.choice("idle", &[("halt", false), ("poll", true)])? {
         worker::watch_when_idle();
     }
@@ -122,7 +123,6 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
     }
     // `on` never comes here: the probe runs in place of all this.
     options.choice("probe", &[("off", ()), ("on", ())])?;
-    KERNEL.set_most_events(options.number("trace_events", 0..=u64::MAX, u64::MAX)?);
     let status_s = options.number("status", 0..=86_400, 0)?;
     let consoles = [
         ("off", (None, false)),
@@ -141,7 +141,7 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
         ));
     }
     Ok(Settings {
-        terms,
+        chosen,
         replay_bytes,
         record_kib,
         keep_kib,

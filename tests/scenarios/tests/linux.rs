@@ -5,10 +5,11 @@ use scenarios::Scenario;
 
 fn judge(scenario: &Scenario, mechanism: Mechanism) -> Vec<String> {
     let machine = Linux::sharing(scenario.cores, mechanism).expect("a machine");
-    let machine = machine
-        .policy(scenario.policy)
-        .preemption(scenario.preemption)
-        .clusters(&scenario.clusters);
+    machine.change(|terms| {
+        terms.scheduler.policy = scenario.policy;
+        terms.scheduler.preemption = scenario.preemption;
+        terms.divide(&scenario.clusters);
+    });
     let judged = scenario.judge_commit(scenario.commit());
     judged.unwrap_or_else(|| scenario.judge_run(&machine.run().expect("it is committed")))
 }

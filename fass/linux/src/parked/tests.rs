@@ -30,7 +30,7 @@ struct Stage {
 impl Stage {
     fn new(cores: u32, urgent_keeps_its_core: bool) -> Self {
         let machine = Linux::sharing(cores, Mechanism::Normal).unwrap();
-        HOST.terms().as_mut().unwrap().preemption = Preemption::Enabled;
+        HOST.threads().as_mut().unwrap().terms.scheduler.preemption = Preemption::Enabled;
         let dags = DAGS.map(|name| {
             let dag = create_dag();
             dag.name(name).jobs(1);

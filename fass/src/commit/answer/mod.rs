@@ -33,8 +33,7 @@ use sched_dag::engine::Proven;
 use sched_dag::wcets::WcetSource;
 use sched_dag::{ClusterId, DagId, DagLabel, Subtask, SubtaskId, SubtaskLabel, TaskSet, Why};
 
-use super::assign::settings;
-use crate::platform::Platform;
+use crate::platform::Terms;
 
 /// What is known at commit about the deadlines of one DAG.
 ///
@@ -281,9 +280,9 @@ pub(crate) struct Answers {
 }
 
 impl Answers {
-    /// Analyses what a platform will run.
-    pub(crate) fn new(task_set: &TaskSet, platform: &dyn Platform) -> Self {
-        let settings = settings(platform);
+    /// Analyses what a platform will run on these terms.
+    pub(crate) fn new(task_set: &TaskSet, terms: &Terms) -> Self {
+        let settings = terms.settings();
         let answer = analysis::answer(task_set, &settings);
         let found = answer.bounds.iter().zip(&answer.reasons);
         let of_dags = (0..).map(DagId).zip(found).map(|(dag, (bound, reason))| {
@@ -309,7 +308,7 @@ impl Answers {
                     .map(Subtask::wcet_source)
                     .collect(),
                 dag: task_set.label(dag),
-                overheads: platform.overhead_source(),
+                overheads: terms.overhead_source,
                 verdict,
             }
         });

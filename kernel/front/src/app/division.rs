@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use fass::{Clusters, Dag};
+use fass::{Clusters, Dag, Terms};
 
 use super::machine::{Machine, System};
 use crate::options::UsageError;
@@ -11,13 +11,7 @@ use crate::options::UsageError;
 /// that an image has none of the code that divided cores need, and pays nothing for them.
 ///
 /// See [`Machine`].
-pub trait Divisible: System {
-    /// Divides the cores in the commits to come; `None`: each commit does.
-    fn divide(&self, sizes: Option<Vec<u32>>);
-
-    /// Returns how the cores are divided, unless the commit is to find that.
-    fn clusters(&self) -> Clusters;
-}
+pub trait Divisible: System {}
 
 impl<S: Divisible> Machine<S> {
     /// Divides the cores, from core 0 on, into clusters of so many each in the commits to come;
@@ -31,7 +25,7 @@ impl<S: Divisible> Machine<S> {
     /// }
     /// ```
     pub fn divide(&self, sizes: &[u32]) {
-        self.system.divide(Some(sizes.to_vec()));
+        self.system.change(|terms| terms.divide(sizes));
     }
 
     /// Leaves that to the command line's word `clusters`: `clusters=2,2` divides the cores so;
@@ -53,15 +47,15 @@ impl<S: Divisible> Machine<S> {
     /// ```
     pub fn offer_clusters(&self) -> Result<(), UsageError> {
         if self.options.text("clusters") == Some("auto") {
-            self.system.divide(None);
+            self.system.change(Terms::divide_by_commit);
             return Ok(());
         }
         let sizes = self
             .options
             .numbers("clusters", 0..=u64::from(u32::MAX), &[])?;
         let sizes = sizes.into_iter().map(u32::try_from);
-        self.system
-            .divide(Some(sizes.filter_map(Result::ok).collect()));
+        let sizes: Vec<u32> = sizes.filter_map(Result::ok).collect();
+        self.divide(&sizes);
         Ok(())
     }
 
@@ -91,6 +85,6 @@ impl<S: Divisible> Machine<S> {
     /// ```
     #[must_use]
     pub fn clusters(&self) -> Clusters {
-        self.system.clusters()
+        self.system.terms().clusters
     }
 }

@@ -7,14 +7,14 @@
 use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
-use fass::{Overheads, Policy, Preemption, Signal, Wire};
+use fass::{Policy, Preemption, Signal, Terms, Wire};
 use sched_dag::engine::Run;
 
 use super::bound_verdict::BoundVerdict;
 use super::ending::Ending;
 use super::fault_verdict::FaultVerdict;
 use super::offered::Parameters;
-use super::terms::Terms;
+use super::terms::Chosen;
 use super::wcet_notes;
 use crate::options::Options;
 use crate::report::memory::Memory;
@@ -29,14 +29,11 @@ pub trait System: Sized {
         false
     }
 
-    /// Returns the number of cores that run subtasks.
-    fn cores(&self) -> u32;
+    /// Returns the terms of the commits to come.
+    fn terms(&self) -> Terms;
 
-    /// Chooses policy and preemption of the commits to come.
-    fn configure(&self, policy: Policy, preemption: Preemption);
-
-    /// Returns what a commit charges.
-    fn overheads(&self) -> Overheads;
+    /// Changes these, as far as the system allows it.
+    fn change(&self, change: impl FnOnce(&mut Terms));
 
     /// Makes events that are less than `window` apart count as one instant.
     fn set_coincidence(&self, window: Duration);
@@ -101,10 +98,8 @@ pub struct Machine<S> {
     pub(super) module: Cell<Option<&'static [u8]>>,
     /// Whether the app has asked for that.
     has_asked: Cell<bool>,
-    /// Whether each run's trace is printed after it.
-    dumps_trace: bool,
-    /// Whether each run's statistics are printed after it.
-    dumps_times: bool,
+    /// What the words say that are not the app's.
+    chosen: Chosen,
     /// What bytes of input raise during a run.
     input: RefCell<Option<Signal>>,
     /// How many runs have ended.
@@ -124,7 +119,7 @@ impl<S: System> Machine<S> {
     pub fn serve(
         system: S,
         options: Options<'static>,
-        terms: &Terms,
+        chosen: Chosen,
         module: Option<&'static [u8]>,
         bound_verdict: BoundVerdict,
         app: fn(&Self) -> Result<(), Ending>,
@@ -134,8 +129,7 @@ impl<S: System> Machine<S> {
             options,
             module: Cell::new(module),
             has_asked: Cell::new(false),
-            dumps_trace: terms.dumps_trace,
-            dumps_times: terms.dumps_times,
+            chosen,
             input: RefCell::new(None),
             runs: Cell::new(0),
             fault_verdict: FaultVerdict::default(),
@@ -193,7 +187,7 @@ impl<S: System> Machine<S> {
     /// See [`Machine`].
     #[must_use]
     pub fn cores(&self) -> u32 {
-        self.system.cores()
+        self.system.terms().scheduler.cores
     }
 
     /// Chooses policy and preemption of the commits to come, instead of what the
@@ -212,7 +206,9 @@ impl<S: System> Machine<S> {
     /// }
     /// ```
     pub fn configure(&self, policy: Policy, preemption: Preemption) {
-        self.system.configure(policy, preemption);
+        self.system.change(|terms| {
+            (terms.scheduler.policy, terms.scheduler.preemption) = (policy, preemption);
+        });
     }
 
     /// Makes events that are less than `window` apart count as one instant in the
@@ -310,11 +306,11 @@ impl<S: System> Machine<S> {
         let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
         self.fault_verdict.note(run.task_set(), faults);
         self.bound_verdict.note(&run);
-        wcet_notes::note(&run, self.system.overheads());
-        if self.dumps_times {
+        wcet_notes::note(&run, self.system.terms().overheads);
+        if self.chosen.dumps_times {
             times::dump(&run);
         }
-        if self.dumps_trace {
+        if self.chosen.dumps_trace {
             trace::dump(&run, self.runs.replace(self.runs.get() + 1));
         }
         if self.system.is_shut_down() {

@@ -3,7 +3,7 @@
 
 use alloc::format;
 
-use fass::{Overheads, Policy, Preemption};
+use fass::{Overheads, Policy, Preemption, Terms};
 
 use crate::options::{Options, UsageError};
 use crate::text::graph;
@@ -24,15 +24,11 @@ const TIMES: [(&str, (bool, bool)); 3] = [
 
 /// What these words say.
 #[derive(Clone, Copy, Debug)]
-pub struct Terms {
-    /// How ready instances are ordered.
-    pub policy: Policy,
-    /// Whether a started instance may lose its core.
-    pub preemption: Preemption,
-    /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
-    pub budget_factor: u64,
-    /// What a commit charges.
-    pub overheads: Overheads,
+pub struct Chosen {
+    policy: Policy,
+    preemption: Preemption,
+    budget_factor: u64,
+    overheads: Overheads,
     /// Whether each run's trace is printed after it.
     pub dumps_trace: bool,
     /// Whether each run's statistics are printed after it.
@@ -41,7 +37,7 @@ pub struct Terms {
     pub judges_bounds: bool,
 }
 
-impl Terms {
+impl Chosen {
     /// Takes the words. If they say so, commits print their DAGs from now on.
     pub fn read(options: &Options<'_>) -> Result<Self, UsageError> {
         if options.choice("graph", &KEEP_OR_DUMP)? {
@@ -57,6 +53,14 @@ impl Terms {
             dumps_times,
             judges_bounds,
         })
+    }
+
+    /// Puts what commits are told where a platform keeps it.
+    pub const fn apply(&self, terms: &mut Terms) {
+        terms.scheduler.policy = self.policy;
+        terms.scheduler.preemption = self.preemption;
+        terms.budget_factor = self.budget_factor;
+        terms.overheads = self.overheads;
     }
 }
 

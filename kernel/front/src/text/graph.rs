@@ -7,7 +7,7 @@
 use core::fmt;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use fass::{Overheads, OverrunPolicy, Plan, Policy, Preemption};
+use fass::{OverrunPolicy, Plan, Policy, Preemption, Terms};
 use sched_dag::{Dag, DagId, OnFault, SchedulerOptions, SubtaskId, TaskSet};
 
 use super::json::{self, Object};
@@ -23,20 +23,21 @@ pub fn enable() {
     DUMPS.store(true, Ordering::Relaxed);
 }
 
-/// Prints the DAGs of a commit, if commits do. They were charged `overheads`.
-pub fn dump(plan: &Plan, options: SchedulerOptions, overheads: Overheads) {
+/// Prints the DAGs of a commit on these terms, if commits do.
+pub fn dump(plan: &Plan, terms: &Terms) {
     if !DUMPS.load(Ordering::Relaxed) {
         return;
     }
     let commit = COMMITS.fetch_add(1, Ordering::Relaxed);
     let dags = plan.task_set.dags().iter().zip(&plan.proven.bounds_ns);
+    let (options, overheads) = (&terms.scheduler, &terms.overheads);
     let charge_ns = overheads.of_an_instance_ns(options.preemption);
     let ready_ns = Some(overheads.ready_ns).filter(|&ready_ns| ready_ns > 0);
     let overhead_ns = || charge_ns.into_iter().chain(ready_ns);
     for (number, (dag, bound_ns)) in (0u32..).zip(dags) {
         json::emit("graph", |line| {
             line.number("commit", commit);
-            scheduling(line, &options, &plan.task_set);
+            scheduling(line, options, &plan.task_set);
             line.list("overhead_ns", overhead_ns())
                 .list("bound_ns", bound_ns.iter());
             describe(line, number, dag);

@@ -5,7 +5,7 @@ use std::fs;
 use std::io;
 use std::time::Duration;
 
-use fass::{Clusters, Overheads, Policy, Preemption, Signal, Wire};
+use fass::{Signal, Terms, Wire};
 use linux::{EndSignals, Linux};
 
 use super::console;
@@ -28,7 +28,6 @@ pub type Machine = front::app::machine::Machine<LinuxSystem>;
 #[derive(Debug)]
 pub struct LinuxSystem {
     pub(crate) linux: Linux,
-    pub(crate) overheads: Overheads,
     pub(crate) wire: RefCell<Option<Ends>>,
     /// What the app has asked for that Linux does not have.
     pub(crate) refusal: RefCell<Option<UsageError>>,
@@ -45,20 +44,14 @@ impl System for LinuxSystem {
         self.has_console
     }
 
-    fn cores(&self) -> u32 {
-        self.linux.cores()
+    fn terms(&self) -> Terms {
+        self.linux.terms()
     }
 
-    /// Without the right to use SCHED_FIFO nothing is preempted.
-    fn configure(&self, policy: Policy, preemption: Preemption) {
-        self.linux.configure(policy, preemption);
+    fn change(&self, change: impl FnOnce(&mut Terms)) {
+        self.linux.change(change);
     }
 
-    fn overheads(&self) -> Overheads {
-        self.overheads
-    }
-
-    /// Is refused, at the next run, unless it is 0: on Linux events are as far apart as they are.
     fn set_coincidence(&self, window: Duration) {
         if window > Duration::ZERO {
             let line = "events are taken together on the machine only; choose a window of 0";
@@ -181,18 +174,7 @@ impl System for LinuxSystem {
     }
 }
 
-impl Divisible for LinuxSystem {
-    fn divide(&self, sizes: Option<Vec<u32>>) {
-        match sizes {
-            Some(sizes) => self.linux.divide(&sizes),
-            None => self.linux.divide_by_commit(),
-        }
-    }
-
-    fn clusters(&self) -> Clusters {
-        self.linux.division()
-    }
-}
+impl Divisible for LinuxSystem {}
 
 /// Says which faults there were, as the kernel does at once.
 fn tell_faults(run: &linux::Run) {

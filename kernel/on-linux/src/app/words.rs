@@ -17,13 +17,14 @@
 //! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `trace`, `times` and `graph`
 //! mean what they mean on the machine.
 
+use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::time::Duration;
 
 use linux::{Linux, Mechanism};
 
-use front::app::terms::{self, Terms};
+use front::app::terms::{self, Chosen};
 use front::graph;
 use front::options::{Options, UsageError};
 
@@ -51,7 +52,7 @@ const FOREIGN: [(&str, &str); 12] = [
 pub(crate) fn apply(
     app: &'static str,
     options: &Options<'static>,
-) -> Result<(Linux, Terms, Option<&'static [u8]>), UsageError> {
+) -> Result<(Linux, Chosen, Option<&'static [u8]>), UsageError> {
     if let Some((word, why)) = FOREIGN
         .iter()
         .find(|(word, _)| options.text(word).is_some())
@@ -59,7 +60,7 @@ pub(crate) fn apply(
         let line = format!("`{word}` is for the bare machine: on Linux {why}; leave it out");
         return Err(UsageError::new(line));
     }
-    let terms = Terms::read(options)?;
+    let chosen = Chosen::read(options)?;
     let mechanisms = [
         ("fifo", Mechanism::Fifo),
         ("sched_ext", Mechanism::SchedExt),
@@ -81,16 +82,13 @@ pub(crate) fn apply(
         ],
     )?;
     let machine = make(cores, mechanism).map_err(|error| UsageError::new(error.to_string()))?;
-    let mut machine = machine
-        .policy(terms.policy)
-        .preemption(terms.preemption)
-        .budget_factor(terms.budget_factor)
-        .overheads(terms.overheads)
+    let machine = machine
+        .with(|terms| {
+            chosen.apply(terms);
+            terms.wcets = wcets.map(Cow::Borrowed);
+        })
         .at_commit(graph::dump)
         .allocations(crate::heap::allocations);
-    if let Some(wcets) = wcets {
-        machine = machine.wcets(wcets);
-    }
     let named = ["record", "keep"].map(|word| options.text(word).map(|path| (word, path)));
     let [recorded, kept] = named;
     match (recorded.or(kept), options.text("replay")) {
@@ -113,7 +111,7 @@ pub(crate) fn apply(
         let limited = machine.limit_real_time(Duration::from_millis(limit_ms));
         limited.map_err(|why| UsageError::new(format!("`limit_ms={limit_ms}`: {why}")))?;
     }
-    Ok((machine, terms, module))
+    Ok((machine, chosen, module))
 }
 
 /// Reads the file that a word names. It stays as long as the program, as the loader's does.

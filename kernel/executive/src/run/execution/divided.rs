@@ -7,38 +7,12 @@ use core::sync::atomic::Ordering;
 
 use fass::LaunchError;
 use sched_dag::lifecycle::{self, Lifecycle, Parts};
-use sched_dag::{Clusters, DagId, TaskSet};
+use sched_dag::{DagId, TaskSet};
 
 use super::cluster::{BESIDES, Cluster, MAY_DIVIDE, OTHERS, nth};
 use super::letters::Letters;
 use super::{Execution, cluster};
-use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core;
-
-/// How cores are divided.
-#[derive(Clone, Debug)]
-pub enum Division {
-    /// So.
-    Into(Clusters),
-    /// As the commit finds.
-    ByCommit,
-}
-
-static DIVISION: SpinLock<Division> = SpinLock::new(Division::Into(Clusters::Undivided));
-
-/// Chooses how the cores are divided in the commits to come.
-pub fn set_division(division: Division) {
-    let before = core::mem::replace(&mut *DIVISION.lock(), division);
-    drop(before);
-}
-
-/// Returns how the cores are divided in the commits to come.
-pub fn division() -> Division {
-    match MAY_DIVIDE {
-        true => DIVISION.lock().clone(),
-        false => Division::Into(Clusters::Undivided),
-    }
-}
 
 /// Divides the cores as a task set says, and what serves requests. None of them runs anything.
 pub(super) fn divide(

@@ -33,16 +33,16 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use fass::{LaunchError, Plan};
+use fass::{LaunchError, Plan, Terms};
 use sched_dag::engine::{Engine, Proven, Run};
 use sched_dag::lifecycle::Requests;
-use sched_dag::{Journal, Scheduler, SchedulerOptions, TaskSet};
+use sched_dag::{Journal, Scheduler, TaskSet};
 
 use crate::machine::context::Parked;
 use crate::machine::this_core;
 pub use cluster::{count as clusters, first_core};
 pub use control::{control, nominal_end_ns, snapshot, task_set};
-pub use divided::{Division, division, is_finished, set_division};
+pub use divided::is_finished;
 pub use ended::look_at_clearing;
 pub use events::{complete, fail, find_work, interrupt};
 pub use loans::Loan;
@@ -92,19 +92,10 @@ struct Execution {
 /// Time 0 of the run, on the clock.
 static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
-/// What the platform says about a run, besides the scheduler's options.
-#[derive(Clone, Copy, Debug)]
-pub struct Terms {
-    /// How long a dispatch waits for further events of the same instant.
-    pub coincidence_ns: u64,
-    /// The budget of a subtask that has a WCET only, in WCETs; 0 for none.
-    pub budget_factor: u64,
-    /// The most events that the journal has room for; `u64::MAX`: as many as make sense.
-    pub most_events: u64,
-}
-
-/// Prepares a plan to be run. Takes all memory that the run will need.
-pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Result<(), LaunchError> {
+/// Prepares a plan to be run; a dispatch waits for so long for further events of the same
+/// instant. Takes all memory that the run will need.
+pub fn prepare(mut plan: Plan, terms: &Terms, coincidence_ns: u64) -> Result<(), LaunchError> {
+    let options = terms.scheduler;
     if cluster::nth(0).execution.lock().is_some() {
         return Err(LaunchError::new(
             "other DAGs are committed already; run them first, or commit all in one call",
@@ -137,9 +128,9 @@ pub fn prepare(mut plan: Plan, options: SchedulerOptions, terms: Terms) -> Resul
             cluster: cluster::nth(id.index()),
             background: None,
             dispatch_due_ns: None,
-            coincidence_ns: terms.coincidence_ns,
+            coincidence_ns,
             budget_factor: terms.budget_factor,
-            may_hand_off: terms.coincidence_ns == 0,
+            may_hand_off: coincidence_ns == 0,
             signals: Signals::new(&plan, &letters),
             proven: Proven::default(),
         })

@@ -63,7 +63,7 @@ fn pass(graph: Graph, windows: usize, clusters: u32) -> Result<Vec<u64>, String>
     let marks: Vec<Rounds> = (0..clusters).map(|_| Rounds::default()).collect();
     let mut machine = machine(Policy::StaticPriority, clusters)?;
     if clusters > 1 {
-        machine = machine.clusters(&vec![1; clusters as usize]);
+        machine = machine.with(|terms| terms.divide(&vec![1; clusters as usize]));
     }
     let functions = marks.iter().map(|marks| empty(graph, marks, jobs_a_round));
     commit(graph, jobs, functions.collect());

@@ -105,7 +105,8 @@ const PERIOD: Duration = Duration::from_secs(1);
 /// go, and nothing is written down. Only one thread of the program may measure at a time.
 pub(super) fn machine(policy: Policy, workers: u32) -> Result<Linux, String> {
     let linux = Linux::new(workers, Mechanism::Poll).map_err(|why| why.to_string())?;
-    Ok(linux.policy(policy).skipping_idle_time().most_events(0))
+    let linux = linux.with(|to| (to.scheduler.policy, to.most_events) = (policy, 0));
+    Ok(linux.skipping_idle_time())
 }
 
 /// Runs what is committed, and makes sure that each DAG has completed so many jobs.
