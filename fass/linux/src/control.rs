@@ -1,16 +1,20 @@
-//! What changes a run while it goes on, from any thread.
+//! The handle of a run: what changes it while it goes on, from any thread, and shows it to people.
 
 use std::io;
 use std::sync::{Arc, Barrier};
 use std::thread;
 
+use fass::edge::Seen;
 use sched_dag::lifecycle::Request;
-use sched_dag::{DagId, DagKey};
+use sched_dag::{DagId, DagKey, Scheduler, TaskSet};
 
+use crate::edge;
 use crate::end_signals::{self, EndSignals};
 use crate::level::Role;
 use crate::office::Office;
+use crate::platform::HOST;
 use crate::sys;
+use crate::team::Team;
 
 /// The handle of a committed run. What it asks for is done by the release thread of the DAG's
 /// cluster, at once; after the run it does nothing.
@@ -34,8 +38,15 @@ use crate::sys;
 /// let run = machine.run().unwrap();
 /// assert_eq!(run.violations().count(), 0);
 /// ```
+///
+/// A thread that asks it how the run does takes a cluster's lock for a moment, so it has to be one
+/// that nobody preempts meanwhile: [`raise`](Self::raise).
 #[derive(Clone)]
-pub struct Control(Arc<Office>);
+pub struct Control {
+    pub(crate) office: Arc<Office>,
+    /// By cluster.
+    pub(crate) teams: Arc<[Arc<Team>]>,
+}
 
 impl std::fmt::Debug for Control {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -44,8 +55,14 @@ impl std::fmt::Debug for Control {
 }
 
 impl Control {
-    pub(crate) const fn new(office: Arc<Office>) -> Self {
-        Self(office)
+    /// Returns the handle of the run that is committed, unless it is over.
+    ///
+    /// ```
+    /// assert!(linux::Control::get().is_none()); // nothing is committed
+    /// ```
+    #[must_use]
+    pub fn get() -> Option<Self> {
+        HOST.control().filter(|control| !control.office.is_over())
     }
 
     /// Has a DAG's due jobs skipped until it is resumed.
@@ -78,9 +95,53 @@ impl Control {
         self.change(dag, Request::Stop);
     }
 
+    /// Makes a change to a DAG.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG.
     #[track_caller]
-    fn change(&self, dag: impl DagKey, request: fn(DagId) -> Request) {
-        self.0.send(None, request(self.0.task_set.find(dag)));
+    pub fn change(&self, dag: impl DagKey, request: fn(DagId) -> Request) {
+        let dag = self.office.task_set.find(dag);
+        self.office.send(None, request(dag));
+    }
+
+    /// Has nothing more released, and what is in flight go on to its end.
+    pub fn close(&self) {
+        self.office.send_of_all(Request::Close);
+    }
+
+    /// Puts the calling thread before all that compute.
+    pub fn raise(&self) {
+        if let Some(levels) = self.office.levels {
+            levels.bring(sys::thread(), Role::Release);
+        }
+    }
+
+    /// Returns the model.
+    #[must_use]
+    pub fn task_set(&self) -> &Arc<TaskSet> {
+        &self.office.task_set
+    }
+
+    /// Looks at the scheduler of a cluster, shortly, or changes what its journal records.
+    pub fn with_scheduler<T>(
+        &self,
+        cluster: usize,
+        look: impl FnOnce(&mut Scheduler) -> T,
+    ) -> Option<T> {
+        let mut state = self.teams.get(cluster)?.lock();
+        Some(look(&mut state.engine.scheduler))
+    }
+
+    /// Has the values of a topic kept to be seen, or none; reports whether it is recorded.
+    pub fn see(&self, topic: Option<&str>) -> bool {
+        edge::get().watch(topic)
+    }
+
+    /// Takes the latest value that is to be seen, if there is a new one.
+    pub fn take_seen(&self, into: &mut [u8]) -> Option<Seen> {
+        edge::get().take_seen(into)
     }
 
     /// Has the run end in order when a signal that is caught asks for it, or has: nothing more is
@@ -92,10 +153,10 @@ impl Control {
     pub fn close_when_asked(self, _caught: &EndSignals) -> io::Result<()> {
         /// How long the thread outlives its run.
         const MOST_NS: u64 = 1_000_000_000;
-        self.watch("fass-ends", |office| {
+        self.watch("fass-ends", |control| {
             let has_come = end_signals::wait(sys::now_ns() + MOST_NS);
             if has_come {
-                office.send_of_all(Request::Close);
+                control.close();
             }
             !has_come
         })
@@ -104,9 +165,9 @@ impl Control {
     pub(crate) fn raise_on_input(self, dag: DagId, arrivals: sys::Arrivals) -> io::Result<()> {
         /// How long the thread outlives its run.
         const MOST_MS: i32 = 200;
-        self.watch("fass-input", move |office| {
+        self.watch("fass-input", move |control| {
             if arrivals.wait(MOST_MS) {
-                office.send(None, Request::Signal(dag));
+                control.office.send(None, Request::Signal(dag));
             }
             true
         })
@@ -114,16 +175,13 @@ impl Control {
 
     /// Starts a thread that waits for something outside, again and again while there is a run and
     /// `look` wants more. What it allocates it has when this returns.
-    fn watch(self, name: &str, look: impl Fn(&Office) -> bool + Send + 'static) -> io::Result<()> {
-        let office = self.0;
+    fn watch(self, name: &str, look: impl Fn(&Self) -> bool + Send + 'static) -> io::Result<()> {
         let has_begun = Arc::new(Barrier::new(2));
         let begun = Arc::clone(&has_begun);
         let watch = move || {
-            if let Some(levels) = office.levels {
-                levels.bring(sys::thread(), Role::Release);
-            }
+            self.raise();
             begun.wait();
-            while !office.is_over() && look(&office) {}
+            while !self.office.is_over() && look(&self) {}
         };
         thread::Builder::new().name(name.into()).spawn(watch)?;
         has_begun.wait();

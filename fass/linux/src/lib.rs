@@ -41,7 +41,6 @@ mod edge;
 mod end_signals;
 mod lead;
 mod level;
-mod live;
 mod look_out;
 mod machine;
 mod office;
@@ -64,8 +63,7 @@ mod worker;
 
 pub use control::Control;
 pub use end_signals::EndSignals;
-pub use live::Live;
-pub use machine::{Linux, Mechanism, StartError, own_core, processors};
+pub use machine::{Linux, Mechanism, StartError, now_ns, own_core, processors};
 pub use run::{Counts, Run};
 pub use state::Fault;
 pub use wires::Connection;

@@ -86,6 +86,12 @@ pub fn own_core() -> Option<u32> {
     with_own_worker(Worker::seat).flatten().map(|core| core.0)
 }
 
+/// Returns the time on the clock, whatever functions are told.
+#[must_use]
+pub fn now_ns() -> u64 {
+    sys::now_ns()
+}
+
 /// Returns how many processors this program may use.
 #[must_use]
 pub fn processors() -> u32 {
@@ -282,7 +288,7 @@ impl Linux {
     /// committed.
     #[must_use]
     pub fn control(&self) -> Option<Control> {
-        HOST.office().map(Control::new)
+        HOST.control()
     }
 
     /// Raises a signal whenever something arrives in a file that `poll` can wait for (a

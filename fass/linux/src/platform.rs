@@ -8,6 +8,7 @@ use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, Runner, T
 use sched_dag::lifecycle::{self, Parts, Request, Requests};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
 
+use crate::control::Control;
 use crate::edge;
 use crate::level::Levels;
 use crate::office::Office;
@@ -36,13 +37,13 @@ pub(crate) struct Host {
     threads: Mutex<Option<Threads>>,
     launched: Mutex<Option<Launched>>,
     /// The run that signals from outside are for.
-    office: RwLock<Option<Arc<Office>>>,
+    control: RwLock<Option<Control>>,
 }
 
 pub(crate) static HOST: Host = Host {
     threads: Mutex::new(None),
     launched: Mutex::new(None),
-    office: RwLock::new(None),
+    control: RwLock::new(None),
 };
 
 /// How much memory a journal may take its quarter of.
@@ -62,15 +63,15 @@ impl Host {
     }
 
     /// Returns the run that was committed last, until it has ended.
-    pub(crate) fn office(&self) -> Option<Arc<Office>> {
-        self.office.read().map_or(None, |office| office.clone())
+    pub(crate) fn control(&self) -> Option<Control> {
+        self.control.read().map_or(None, |control| control.clone())
     }
 
     /// Forgets the run.
     pub(crate) fn forget(&self) {
-        self.office.clear_poison();
-        if let Ok(mut office) = self.office.write() {
-            *office = None;
+        self.control.clear_poison();
+        if let Ok(mut control) = self.control.write() {
+            *control = None;
         }
     }
 }
@@ -110,8 +111,9 @@ impl Platform for Host {
             "a subtask raises a signal that it was not registered with; register it by \
              `dag.using(signal.raising())`"
         );
-        if let Some(office) = self.office().filter(|office| office.plan == plan) {
-            office.send(None, Request::Signal(dag));
+        let is_its = |control: &Control| control.office.plan == plan;
+        if let Some(control) = self.control().filter(is_its) {
+            control.office.send(None, Request::Signal(dag));
         }
     }
 
@@ -144,7 +146,7 @@ impl Platform for Host {
             let line = "there is no `Linux` yet; make one before the commit";
             return Err(LaunchError::new(line));
         };
-        if self.office().is_some() {
+        if self.control().is_some() {
             let line =
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
@@ -155,16 +157,20 @@ impl Platform for Host {
         let (letters, parts) = divided.map_err(LaunchError::new)?;
         let office = Office::new(plan.number, &plan.task_set, letters, threads.levels);
         let office = Arc::new(office);
-        if let Ok(mut place) = self.office.write() {
-            *place = Some(Arc::clone(&office));
+        let proven = plan.proven.clone();
+        let control = Control {
+            teams: teams(plan, parts, &threads, &office),
+            office,
+        };
+        if let Ok(mut place) = self.control.write() {
+            *place = Some(control.clone());
         }
         let launched = Launched {
-            proven: plan.proven.clone(),
+            control,
+            proven,
             cores: threads.terms.scheduler.cores,
             budget_factor: threads.terms.budget_factor,
             allocations: threads.allocations,
-            teams: teams(plan, parts, &threads, &office),
-            office,
         };
         let mut place = self.launched.lock().unwrap_or_else(PoisonError::into_inner);
         *place = Some(launched);
@@ -173,7 +179,7 @@ impl Platform for Host {
 }
 
 /// Makes what the threads of each cluster share.
-fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> Vec<Arc<Team>> {
+fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> Arc<[Arc<Team>]> {
     let (task_set, options) = (&plan.task_set, threads.terms.scheduler);
     let dags = task_set.dags().len();
     let mut runners: Vec<Vec<Runner>> = task_set.clusters().map(|_| Vec::new()).collect();

@@ -7,9 +7,8 @@ use std::thread::{self, JoinHandle};
 
 use sched_dag::engine::{self, Proven};
 
+use crate::control::Control;
 use crate::edge::{self, Sending};
-use crate::live::Live;
-use crate::office::Office;
 use crate::release::Budgets;
 use crate::state::{Fault, Number, RunTime};
 use crate::sys;
@@ -23,9 +22,7 @@ const LEAD_NS: u64 = 1_000_000;
 
 /// A plan that was committed.
 pub(crate) struct Launched {
-    pub(crate) office: Arc<Office>,
-    /// By cluster.
-    pub(crate) teams: Vec<Arc<Team>>,
+    pub(crate) control: Control,
     pub(crate) cores: u32,
     pub(crate) proven: Proven,
     pub(crate) budget_factor: u64,
@@ -66,7 +63,7 @@ impl Deref for Run {
 /// Starts the threads of a committed plan, waits for the end of all its jobs, and
 /// returns what happened. Releases count from `epoch_ns`, or from right now.
 pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
-    let (office, teams) = (&launched.office, &launched.teams);
+    let Control { office, teams } = &launched.control;
     let workers = teams.iter().map(|team| {
         let numbers = 0..team.workers.len();
         numbers.map(|number| worker(team, number)).collect()
@@ -80,16 +77,14 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     for (team, workers) in teams.iter().zip(&workers) {
         team.wait_until_ready(workers.len() + 1);
     }
-    Live::begin(office, teams);
     let allocations = (launched.allocations)();
     let epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
-    for team in teams {
+    for team in &**teams {
         team.lock().time = RunTime::beginning(epoch_ns);
     }
     let sending = edge::begin_run(epoch_ns);
     teams.iter().for_each(|team| office.ring(team.cluster));
     office.wait_until_over();
-    Live::end();
     let allocations = (launched.allocations)() - allocations;
     releases.into_iter().for_each(join);
     sending.into_iter().for_each(Sending::end);

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::thread;
 
 use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
-use linux::{Linux, Live, Mechanism};
+use linux::{Control, Linux, Mechanism};
 use support::{alone, alone_on, breaches, chain, mechanisms, ms};
 
 #[test]
@@ -183,12 +183,12 @@ fn a_topic_is_seen_and_what_is_set_is_for_the_jobs_to_come() {
         finish_create_dags(&[dag]).unwrap();
         let person = thread::spawn(move || {
             let live = loop {
-                match Live::get() {
+                match Control::get() {
                     Some(live) => break live,
                     None => thread::sleep(ms(1)),
                 }
             };
-            assert!(!live.watch(Some("gian")) && live.watch(Some("scaled")));
+            assert!(!live.see(Some("gian")) && live.see(Some("scaled")));
             let wait_for = |gain: u64| {
                 let mut buffer = [0; 64];
                 loop {

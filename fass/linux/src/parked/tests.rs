@@ -49,7 +49,7 @@ impl Stage {
         dags[1].register_untyped_subtask(|_| (), urgent);
         dags[2].register_untyped_subtask(|_| (), priority(0));
         finish_create_dags(&dags).unwrap();
-        let team = HOST.take_launched().unwrap().teams.remove(0);
+        let team = Arc::clone(&HOST.take_launched().unwrap().control.teams[0]);
         drop(machine);
         team.workers.iter().for_each(|worker| worker.begin());
         let mut state = team.lock();

@@ -9,24 +9,23 @@
 //! Each command is answered by lines for people and by one machine line of kind
 //! `console`; `dags` and `stats` print a line of kind `dag_status` for each DAG.
 
-mod command;
 mod input;
 mod parameters;
 pub mod topics;
 
 use alloc::sync::Arc;
-use core::fmt::Display;
+use core::fmt::{self, Display};
 use core::marker::PhantomData;
 
 use fass::edge::Seen;
+use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
-use sched_dag::{Dag, DagId, Journal, Snapshot, TaskSet};
+use sched_dag::{Dag, DagId, Scheduler, Snapshot, TaskSet};
 
 use crate::options::whole_number;
 use crate::println;
 use crate::report::counts;
 use crate::text::json;
-use command::{Command, HELP, parse};
 use input::{Input, Typed};
 
 /// How often a platform looks for bytes, at least.
@@ -38,13 +37,28 @@ pub const END: u8 = 3;
 /// The most bytes that a slice takes: what the FIFO of a serial port holds.
 const MOST_BYTES: usize = 16;
 
+/// The commands for people: how each is typed, and what it does.
+const HELP: [(&str, &str); 8] = [
+    ("help", "list the commands"),
+    ("dags", "list the DAGs"),
+    ("stats [DAG]", "show the counts of a DAG, or of all"),
+    (
+        "stop DAG",
+        "release no more jobs of it; those in flight finish",
+    ),
+    ("start DAG", "release its jobs again, from the next one due"),
+    ("trace off", "forget the events so far and record no more"),
+    ("trace on", "record events from now on"),
+    (
+        "shutdown",
+        "release nothing more, wait for what is in flight, and end",
+    ),
+];
+
 /// A run that goes on, as the shell sees it: what a platform has for it.
 pub trait LiveRun {
     /// Returns the model of the run, if one goes on.
     fn task_set() -> Option<Arc<TaskSet>>;
-
-    /// Returns how a DAG does, if a run goes on that has it.
-    fn snapshot(dag: DagId) -> Option<Snapshot>;
 
     /// Makes a change to a DAG.
     fn control(dag: DagId, change: fn(DagId) -> Request);
@@ -53,11 +67,8 @@ pub trait LiveRun {
     /// may be written down for them, and the shell speaks in the middle of theirs.
     fn now_ns() -> u64;
 
-    /// Returns the number of clusters.
-    fn clusters() -> usize;
-
-    /// Looks at the journal of a cluster, shortly, or changes what it records.
-    fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> Option<R>;
+    /// Looks at the scheduler of a cluster, shortly, or changes what its journal records.
+    fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T>;
 
     /// Takes a byte that a person has typed.
     fn receive() -> Option<u8>;
@@ -75,6 +86,37 @@ pub trait LiveRun {
     fn extra() -> Extra;
 }
 
+/// Returns how a DAG does, if a run goes on.
+pub fn snapshot<R: LiveRun>(task_set: &TaskSet, dag: DagId) -> Option<Snapshot> {
+    let cluster = task_set.dag(dag).cluster().index();
+    R::with_scheduler(cluster, |scheduler| scheduler.snapshot(dag))
+}
+
+/// Shows the events that the journal of a cluster has last, the latest one first, at most so many
+/// and until `take` has seen enough.
+pub fn look_back<R: LiveRun>(cluster: usize, most: u64, take: &mut dyn FnMut(&Event) -> bool) {
+    /// How many events are copied under the lock at a time.
+    const AT_ONCE: usize = 64;
+    let written = R::with_scheduler(cluster, |scheduler| scheduler.log.journal.written());
+    let mut end = written.unwrap_or(0);
+    let last = end.saturating_sub(most);
+    while end > last {
+        let mut buffer = [None; AT_ONCE];
+        let look = |of: &mut Scheduler| of.log.journal.copy_back(end, &mut buffer);
+        let copied = R::with_scheduler(cluster, look);
+        if !buffer.iter().flatten().all(&mut *take) {
+            return;
+        }
+        match copied {
+            Some(oldest) if oldest < end => end = oldest,
+            _ => break,
+        }
+    }
+}
+
+/// What a command tells why it does not do what a line says.
+pub type Refuse<'r> = &'r mut dyn FnMut(&dyn Display);
+
 /// The commands that an app can call for: those about its parameters, and about topics.
 pub type Extra = [Option<&'static dyn Commands>; 2];
 
@@ -85,7 +127,7 @@ pub trait Commands: Sync {
 
     /// Does what a line says, of its first word and the rest, or tells why not; `false`: it is
     /// none of these commands. Allocates nothing.
-    fn answer(&self, name: &str, rest: &str, refuse: &mut dyn FnMut(&dyn Display)) -> bool;
+    fn answer(&self, name: &str, rest: &str, refuse: Refuse<'_>) -> bool;
 
     /// Does a little of what a command has begun.
     fn step(&self) {}
@@ -148,10 +190,16 @@ impl<R: LiveRun> Session<R> {
             }
             match self.input.take(byte) {
                 Typed::Nothing => continue,
-                Typed::Line(line) => match answer::<R>(line, &task_set) {
-                    Answer::Given => {}
-                    Answer::List(listing) => self.listing = Some(listing),
-                },
+                Typed::Line(line) => {
+                    let mut is_refused = false;
+                    self.listing = answer::<R>(line, &task_set, &mut |why| {
+                        is_refused = true;
+                        refuse(line, why);
+                    });
+                    if !is_refused && self.listing.is_none() {
+                        accept(line);
+                    }
+                }
                 Typed::TooLong => refuse("", &"the line is too long: no command is as long"),
                 Typed::NotText => refuse("", &"the line is not UTF-8"),
             }
@@ -165,7 +213,7 @@ impl Listing {
     /// Prints the next DAG's lines and returns what is left to be listed.
     fn print_one<R: LiveRun>(self, task_set: &TaskSet) -> Option<Listing> {
         let (dag, model) = (self.next, task_set.dag(self.next));
-        if let Some(snapshot) = R::snapshot(dag) {
+        if let Some(snapshot) = snapshot::<R>(task_set, dag) {
             counts::show(&snapshot, dag, model, self.print);
         }
         let next = DagId(dag.0 + 1);
@@ -173,95 +221,88 @@ impl Listing {
     }
 }
 
-/// What has become of a line.
-enum Answer {
-    /// It was answered.
-    Given,
-    /// The DAGs are to be listed.
-    List(Listing),
-}
-
-/// Answers a line.
-fn answer<R: LiveRun>(line: &str, task_set: &TaskSet) -> Answer {
-    let command = match parse(line) {
-        Ok(command) => command,
-        Err(refusal) => {
-            let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
-            let mut is_refused = false;
-            let refuse = &mut |why: &dyn Display| {
-                is_refused = true;
-                refuse(line, why);
-            };
-            let extra = R::extra();
-            let mut others = extra.iter().flatten();
-            if !others.any(|commands| commands.answer(name, rest.trim(), refuse)) {
-                refuse(&refusal.told(extra));
-            }
-            if !is_refused {
-                accept(line);
-            }
-            return Answer::Given;
-        }
-    };
-    match command {
-        Command::Help => {
+/// Does what a line says, or tells why not. Returns what is to be listed for it.
+fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Option<Listing> {
+    let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+    let rest = rest.trim();
+    let wants = |what: &str, refuse: Refuse<'_>| refuse(&format_args!("`{name}` wants {what}"));
+    match (name, rest) {
+        ("help", "") => {
             let extra = R::extra();
             let extra = extra.iter().flatten().flat_map(|extra| extra.help());
             for (command, what) in HELP.iter().chain(extra) {
                 println!("  {command:15}{what}");
             }
-            accept(line);
         }
-        Command::Dags => return list(line, task_set, None, describe),
-        Command::Stats(name) => return list(line, task_set, name, counts::print),
-        Command::Trace(true)
-            if !R::with_journal(0, |journal| journal.has_room()).unwrap_or(false) =>
-        {
-            let why = "there is no room for events; boot without `trace_events=0`";
-            refuse(line, &why);
+        ("dags", "") => return list(task_set, rest, describe, refuse),
+        ("stats", _) => return list(task_set, rest, counts::print, refuse),
+        ("trace", "on" | "off") => record::<R>(rest == "on", task_set, refuse),
+        ("stop" | "start", "") => {
+            wants("the name or the number of a DAG; `dags` lists them", refuse)
         }
-        Command::Trace(on) => {
-            for cluster in 0..R::clusters() {
-                R::with_journal(cluster, |journal| journal.record_events(on));
+        ("stop", dag) => {
+            let what = "releases no more jobs";
+            change::<R>(task_set, dag, Request::Pause, what, refuse);
+        }
+        ("start", dag) => change::<R>(task_set, dag, Request::Resume, "releases jobs", refuse),
+        ("shutdown", "") => R::shut_down(),
+        ("help" | "dags" | "shutdown", _) => wants("nothing after it", refuse),
+        ("trace", _) => wants("`on` or `off`", refuse),
+        _ => {
+            let extra = R::extra();
+            let mut others = extra.iter().flatten();
+            if !others.any(|commands| commands.answer(name, rest, refuse)) {
+                refuse(&no_command(name, extra));
             }
-            let what = if on { "events" } else { "no events" };
-            println!("{what} are recorded");
-            accept(line);
-        }
-        Command::Stop(name) => {
-            change::<R>(
-                line,
-                task_set,
-                name,
-                Request::Pause,
-                "releases no more jobs",
-            );
-        }
-        Command::Start(name) => change::<R>(line, task_set, name, Request::Resume, "releases jobs"),
-        Command::Shutdown => {
-            R::shut_down();
-            accept(line);
         }
     }
-    Answer::Given
+    None
 }
 
-/// Begins a list of all DAGs, or of the one that is named.
-fn list(line: &str, task_set: &TaskSet, name: Option<&str>, print: fn(&Snapshot, &Dag)) -> Answer {
-    let chosen = match name.map(|name| find(task_set, name).ok_or(name)) {
-        None => None,
-        Some(Ok(dag)) => Some(dag),
-        Some(Err(name)) => {
-            unknown(line, name);
-            return Answer::Given;
+/// Says that a word is no command, and which there are.
+fn no_command(name: &str, extra: Extra) -> impl Display {
+    fmt::from_fn(move |f| {
+        write!(f, "`{name}` is no command; there are ")?;
+        let others = extra.iter().flatten().flat_map(|extra| extra.help());
+        for (index, (command, _)) in HELP.iter().chain(others).enumerate() {
+            let separator = if index == 0 { "" } else { ", " };
+            write!(f, "{separator}{command}")?;
+        }
+        Ok(())
+    })
+}
+
+/// Has events recorded from now on, or forgotten.
+fn record<R: LiveRun>(on: bool, task_set: &TaskSet, refuse: Refuse<'_>) {
+    let has_room = R::with_scheduler(0, |scheduler| scheduler.log.journal.has_room());
+    if on && !has_room.unwrap_or(false) {
+        return refuse(&"there is no room for events; boot without `trace_events=0`");
+    }
+    for cluster in task_set.clusters() {
+        R::with_scheduler(cluster.index(), |scheduler| {
+            scheduler.log.journal.record_events(on);
+        });
+    }
+    let what = if on { "events" } else { "no events" };
+    println!("{what} are recorded");
+}
+
+/// Begins a list of the DAG that is named, or of all.
+fn list(
+    task_set: &TaskSet,
+    name: &str,
+    print: fn(&Snapshot, &Dag),
+    refuse: Refuse<'_>,
+) -> Option<Listing> {
+    let all = u32::try_from(task_set.dags().len()).unwrap_or(u32::MAX);
+    let (next, end) = match name {
+        "" => (DagId(0), DagId(all)),
+        name => {
+            let dag = find(task_set, name, refuse)?;
+            (dag, DagId(dag.0 + 1))
         }
     };
-    let all = u32::try_from(task_set.dags().len()).unwrap_or(u32::MAX);
-    Answer::List(Listing {
-        next: chosen.unwrap_or(DagId(0)),
-        end: chosen.map_or(DagId(all), |dag| DagId(dag.0 + 1)),
-        print,
-    })
+    Some(Listing { next, end, print })
 }
 
 fn describe(snapshot: &Snapshot, dag: &Dag) {
@@ -278,40 +319,33 @@ fn describe(snapshot: &Snapshot, dag: &Dag) {
 
 /// Makes a change to the DAG that is named.
 fn change<R: LiveRun>(
-    line: &str,
     task_set: &TaskSet,
     name: &str,
     how: fn(DagId) -> Request,
     what: &str,
+    refuse: Refuse<'_>,
 ) {
-    let Some(dag) = find(task_set, name) else {
-        return unknown(line, name);
+    let Some(dag) = find(task_set, name, refuse) else {
+        return;
     };
-    if R::snapshot(dag).is_some_and(|snapshot| snapshot.is_final()) {
-        let of = task_set.dag(dag).name();
-        return refuse(line, &format_args!("dag `{of}` has ended and stays so"));
+    let of = task_set.dag(dag).name();
+    if snapshot::<R>(task_set, dag).is_some_and(|snapshot| snapshot.is_final()) {
+        return refuse(&format_args!("dag `{of}` has ended and stays so"));
     }
     R::control(dag, how);
-    println!("dag `{}` {what}", task_set.dag(dag).name());
-    accept(line);
+    println!("dag `{of}` {what}");
 }
 
 /// Finds a DAG by its name or, if none has it, by its number.
-fn find(task_set: &TaskSet, name: &str) -> Option<DagId> {
-    let by_name = ids(task_set).find(|dag| task_set.dag(*dag).name() == name);
+fn find(task_set: &TaskSet, name: &str, refuse: Refuse<'_>) -> Option<DagId> {
+    let ids = || (0..).map(DagId).take(task_set.dags().len());
+    let by_name = ids().find(|dag| task_set.dag(*dag).name() == name);
     let number = whole_number(name);
-    by_name.or_else(|| ids(task_set).find(|dag| number == Some(u64::from(dag.0))))
-}
-
-fn ids(task_set: &TaskSet) -> impl Iterator<Item = DagId> {
-    (0..).map(DagId).take(task_set.dags().len())
-}
-
-fn unknown(line: &str, name: &str) {
-    refuse(
-        line,
-        &format_args!("there is no dag `{name}`; `dags` lists them"),
-    );
+    let found = by_name.or_else(|| ids().find(|dag| number == Some(u64::from(dag.0))));
+    if found.is_none() {
+        refuse(&format_args!("there is no dag `{name}`; `dags` lists them"));
+    }
+    found
 }
 
 fn accept(line: &str) {

@@ -1,10 +1,8 @@
 //! What a person says of parameters at the console.
 
-use core::fmt::Display;
-
 use fass::Tunable;
 
-use super::Commands;
+use super::{Commands, Refuse};
 use crate::app::offered::Parameters;
 use crate::println;
 
@@ -16,7 +14,7 @@ impl Commands for Parameters {
         ]
     }
 
-    fn answer(&self, name: &str, rest: &str, refuse: &mut dyn FnMut(&dyn Display)) -> bool {
+    fn answer(&self, name: &str, rest: &str, refuse: Refuse<'_>) -> bool {
         match name {
             "params" if rest.is_empty() => self.0.iter().for_each(|of| show(&**of)),
             "params" => refuse(&"`params` wants nothing after it"),

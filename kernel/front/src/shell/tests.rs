@@ -45,10 +45,6 @@ impl LiveRun for NoRun {
         Some(Arc::new(verified.expect("it is sound").task_set))
     }
 
-    fn snapshot(_: DagId) -> Option<Snapshot> {
-        None
-    }
-
     fn control(dag: DagId, change: fn(DagId) -> Request) {
         asked(format!("{:?}", change(dag)));
     }
@@ -58,11 +54,7 @@ impl LiveRun for NoRun {
         1_000_000_000
     }
 
-    fn clusters() -> usize {
-        1
-    }
-
-    fn with_journal<R>(_: usize, _: impl FnOnce(&mut Journal) -> R) -> Option<R> {
+    fn with_scheduler<T>(_: usize, _: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
         None
     }
 
@@ -107,4 +99,49 @@ fn what_is_typed_is_asked_of_the_run_and_no_function_is_told_the_time_for_it() {
         "shut down",
     ];
     assert_eq!(ASKED.take(), expected);
+}
+
+/// Returns what a line is refused with, and nothing if it is not.
+fn refusal(line: &str) -> Option<String> {
+    let task_set = NoRun::task_set().expect("it is there");
+    let mut refusal = None;
+    answer::<NoRun>(line, &task_set, &mut |why| refusal = Some(why.to_string()));
+    ASKED.take();
+    refusal
+}
+
+#[test]
+fn each_command_of_the_help_is_one() {
+    for (line, _) in HELP.iter().filter(|(line, _)| *line != "trace on") {
+        let line = line.replace(['[', ']'], "").replace("DAG", "lidar");
+        assert_eq!(refusal(&line), None, "{line}");
+    }
+    assert_eq!(refusal("stats"), None);
+    assert_eq!(refusal("stats  0"), None);
+    let no_room = "there is no room for events; boot without `trace_events=0`";
+    assert_eq!(refusal("trace on").as_deref(), Some(no_room));
+}
+
+#[test]
+fn what_is_no_command_is_told_the_commands() {
+    for (line, expected) in [
+        ("trace", "`trace` wants `on` or `off`"),
+        ("help me", "`help` wants nothing after it"),
+        (
+            "stop",
+            "`stop` wants the name or the number of a DAG; `dags` lists them",
+        ),
+        (
+            "stats left eye",
+            "there is no dag `left eye`; `dags` lists them",
+        ),
+    ] {
+        assert_eq!(refusal(line).as_deref(), Some(expected));
+    }
+    assert_eq!(
+        no_command("stpo", [None; 2]).to_string(),
+        "`stpo` is no command; there are help, dags, stats [DAG], stop DAG, start DAG, \
+         trace off, trace on, shutdown"
+    );
+    assert!(refusal("stpo lidar").is_some_and(|why| why.starts_with("`stpo` is no command")));
 }

@@ -9,11 +9,11 @@ use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::journal::{Event, What};
-use sched_dag::{DagId, Journal, SubtaskId, TaskSet, Topic, nearest_of};
+use sched_dag::{DagId, SubtaskId, TaskSet, Topic, nearest_of};
 
 use fass::edge::Excerpt;
 
-use super::{Commands, LiveRun};
+use super::{Commands, LiveRun, Refuse, look_back};
 use crate::println;
 use crate::text::json;
 
@@ -28,9 +28,6 @@ const MOST_TEXT_BYTES: usize = 200;
 
 /// How many events of the journal are looked at.
 const MOST_EVENTS: u64 = 2048;
-
-/// How many events are copied under the lock at a time.
-const AT_ONCE: usize = 64;
 
 /// Stands for no topic.
 const NONE: u64 = u64::MAX;
@@ -58,7 +55,7 @@ impl<R: LiveRun> Topics<R> {
     }
 
     /// Begins to echo a topic, or tells why not.
-    fn echo(&self, name: &str, task_set: &TaskSet, refuse: &mut dyn FnMut(&dyn Display)) {
+    fn echo(&self, name: &str, task_set: &TaskSet, refuse: Refuse<'_>) {
         let Some((dag, place)) = find(name, task_set, refuse) else {
             return;
         };
@@ -114,7 +111,7 @@ impl<R: LiveRun> Commands for Topics<R> {
         ]
     }
 
-    fn answer(&self, name: &str, rest: &str, refuse: &mut dyn FnMut(&dyn Display)) -> bool {
+    fn answer(&self, name: &str, rest: &str, refuse: Refuse<'_>) -> bool {
         let Some(task_set) = R::task_set() else {
             return false;
         };
@@ -150,12 +147,12 @@ impl<R: LiveRun> Commands for Topics<R> {
 }
 
 /// Says how often a topic was written lately, or why it cannot.
-fn hz<R: LiveRun>(name: &str, task_set: &TaskSet, refuse: &mut dyn FnMut(&dyn Display)) {
+fn hz<R: LiveRun>(name: &str, task_set: &TaskSet, refuse: Refuse<'_>) {
     let Some((dag, topic)) = find(name, task_set, refuse) else {
         return;
     };
     let writer = task_set.dag(dag).topics()[topic].writer;
-    let rate = Rate::look::<R>(dag, writer);
+    let rate = Rate::look::<R>(task_set, dag, writer);
     let Some(mean_ns) = rate.mean_ns() else {
         return refuse(&format_args!(
             "of topic `{name}` there are {} values among the latest {MOST_EVENTS} events; \
@@ -200,24 +197,16 @@ struct Rate {
 
 impl Rate {
     /// Looks at the latest events of the journal.
-    fn look<R: LiveRun>(dag: DagId, writer: SubtaskId) -> Self {
+    fn look<R: LiveRun>(task_set: &TaskSet, dag: DagId, writer: SubtaskId) -> Self {
         let mut rate = Self::default();
-        let cluster = |task_set: &TaskSet| task_set.dag(dag).cluster().index();
-        let cluster = R::task_set().map_or(0, |task_set| cluster(&task_set));
-        let written = R::with_journal(cluster, |journal| journal.written());
-        let mut end = written.unwrap_or(0);
-        let last = end.saturating_sub(MOST_EVENTS);
-        while end > last {
-            let mut buffer = [None; AT_ONCE];
-            let look = |journal: &mut Journal| journal.copy_back(end, &mut buffer);
-            let copied = R::with_journal(cluster, look);
-            let events = buffer.iter().flatten();
-            events.for_each(|event| rate.take(event, dag, writer));
-            match copied {
-                Some(oldest) if oldest < end => end = oldest,
-                _ => break,
-            }
-        }
+        look_back::<R>(
+            task_set.dag(dag).cluster().index(),
+            MOST_EVENTS,
+            &mut |event| {
+                rate.take(event, dag, writer);
+                true
+            },
+        );
         rate
     }
 
@@ -248,11 +237,7 @@ impl Rate {
 }
 
 /// Finds a topic of any DAG, or tells that there is none: its DAG, and its place there.
-fn find(
-    name: &str,
-    task_set: &TaskSet,
-    refuse: &mut dyn FnMut(&dyn Display),
-) -> Option<(DagId, usize)> {
+fn find(name: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Option<(DagId, usize)> {
     let dags = || (0..).map(DagId).zip(task_set.dags());
     let found = dags().find_map(|(dag, model)| {
         let place = model.topics().iter().position(|topic| topic.name == name)?;

@@ -10,9 +10,9 @@ use std::time::Duration;
 use fass::edge::Seen;
 use front::shell::topics::Topics;
 use front::shell::{Commands, END, Extra, LiveRun, PERIOD_NS, Session};
-use linux::Live;
+use linux::Control;
 use sched_dag::lifecycle::Request;
-use sched_dag::{DagId, Journal, Snapshot, TaskSet};
+use sched_dag::{DagId, Scheduler, TaskSet};
 
 /// What comes on standard input; the thread that reads it lasts as long as the program.
 static INPUT: OnceLock<Mutex<Receiver<u8>>> = OnceLock::new();
@@ -30,29 +30,21 @@ struct LinuxRun;
 
 impl LiveRun for LinuxRun {
     fn task_set() -> Option<Arc<TaskSet>> {
-        Some(Arc::clone(Live::get()?.task_set()))
-    }
-
-    fn snapshot(dag: DagId) -> Option<Snapshot> {
-        Live::get()?.snapshot(dag)
+        Some(Arc::clone(Control::get()?.task_set()))
     }
 
     fn control(dag: DagId, change: fn(DagId) -> Request) {
-        if let Some(live) = Live::get() {
+        if let Some(live) = Control::get() {
             live.change(dag, change);
         }
     }
 
     fn now_ns() -> u64 {
-        Live::now_ns()
+        linux::now_ns()
     }
 
-    fn clusters() -> usize {
-        Live::get().map_or(0, |live| live.clusters())
-    }
-
-    fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
-        Live::get()?.with_journal(cluster, look)
+    fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
+        Control::get()?.with_scheduler(cluster, look)
     }
 
     fn receive() -> Option<u8> {
@@ -66,7 +58,7 @@ impl LiveRun for LinuxRun {
     }
 
     fn shut_down() {
-        if let Some(live) = Live::get() {
+        if let Some(live) = Control::get() {
             front::println!("shutting down: nothing more is released; what is in flight goes on");
             IS_SHUT_DOWN.store(true, Ordering::Relaxed);
             live.close();
@@ -74,11 +66,11 @@ impl LiveRun for LinuxRun {
     }
 
     fn watch(topic: Option<&str>) -> bool {
-        Live::get().is_some_and(|live| live.watch(topic))
+        Control::get().is_some_and(|live| live.see(topic))
     }
 
     fn take_seen(into: &mut [u8]) -> Option<Seen> {
-        Live::get()?.take_seen(into)
+        Control::get()?.take_seen(into)
     }
 
     fn extra() -> Extra {
@@ -88,13 +80,13 @@ impl LiveRun for LinuxRun {
 
 /// Reports whether a run goes on that does not end by itself.
 fn is_endless() -> bool {
-    let has_end = |live: Live| {
+    let has_end = |live: Control| {
         live.task_set()
             .dags()
             .iter()
             .all(|dag| dag.jobs().is_some())
     };
-    !IS_SHUT_DOWN.load(Ordering::Relaxed) && !Live::get().is_none_or(has_end)
+    !IS_SHUT_DOWN.load(Ordering::Relaxed) && !Control::get().is_none_or(has_end)
 }
 
 /// Lets people look at topics.
@@ -125,7 +117,7 @@ pub(crate) fn talk_during<R>(run: impl FnOnce() -> R) -> (R, bool) {
             let mut session = Session::<LinuxRun>::new(false);
             let mut is_raised = false;
             while !is_over.load(Ordering::Acquire) {
-                if let Some(live) = Live::get().filter(|_| !is_raised) {
+                if let Some(live) = Control::get().filter(|_| !is_raised) {
                     live.raise();
                     is_raised = true;
                 }

@@ -8,7 +8,7 @@ use executive::run::{edge, execution};
 use fass::edge::Seen;
 use front::shell::{Commands, Extra, LiveRun};
 use sched_dag::lifecycle::Request;
-use sched_dag::{DagId, Journal, Snapshot, TaskSet};
+use sched_dag::{DagId, Scheduler, TaskSet};
 
 use super::stop;
 
@@ -27,10 +27,6 @@ impl LiveRun for KernelRun {
         execution::task_set()
     }
 
-    fn snapshot(dag: DagId) -> Option<Snapshot> {
-        execution::snapshot(dag)
-    }
-
     fn control(dag: DagId, change: fn(DagId) -> Request) {
         execution::control(dag, change);
     }
@@ -39,12 +35,8 @@ impl LiveRun for KernelRun {
         clock::now_ns()
     }
 
-    fn clusters() -> usize {
-        execution::clusters()
-    }
-
-    fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
-        execution::with_journal(cluster, look)
+    fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
+        execution::with_scheduler(cluster, look)
     }
 
     fn receive() -> Option<u8> {

@@ -3,14 +3,13 @@
 //! The events of the time in question are read from the latest one back, a few at a
 //! time: only while they are copied is the scheduler's lock held.
 
-use sched_dag::Journal;
 use sched_dag::journal::{Event, What};
 
 use executive::machine::this_core;
 use executive::run::execution;
+use front::shell::look_back;
 
-/// How many events are copied under the lock at a time.
-const AT_ONCE: usize = 64;
+use super::live_run::KernelRun;
 
 /// The most cores.
 const CORES: usize = 64;
@@ -46,22 +45,13 @@ pub(crate) fn loads_permille(
 
 /// Takes the events of a cluster's journal; nothing if they are not recorded.
 fn of_cluster(cluster: usize, mut loads: Loads, most: u64) -> Option<Loads> {
-    let recorded = execution::with_journal(cluster, |journal| {
-        let is_on = journal.is_recording();
-        is_on.then(|| journal.written())
+    let is_on =
+        execution::with_scheduler(cluster, |scheduler| scheduler.log.journal.is_recording());
+    is_on.filter(|is_on| *is_on)?;
+    look_back::<KernelRun>(cluster, most, &mut |event| {
+        loads.take(event);
+        !loads.is_over
     });
-    let mut end = recorded.flatten()?;
-    let last = end.saturating_sub(most);
-    while end > last && !loads.is_over {
-        let mut buffer = [None; AT_ONCE];
-        let look = |journal: &mut Journal| journal.copy_back(end, &mut buffer);
-        let copied = execution::with_journal(cluster, look);
-        buffer.iter().flatten().for_each(|event| loads.take(event));
-        match copied {
-            Some(oldest) if oldest < end => end = oldest,
-            _ => break,
-        }
-    }
     Some(loads)
 }
 

@@ -7,11 +7,13 @@
 
 use sched_dag::DagId;
 
+use super::live_run::KernelRun;
 use super::load;
 use super::patience::Patience;
 use executive::machine::clock;
 use executive::run::execution;
 use front::json;
+use front::shell::snapshot;
 
 /// How many events are read where time is short.
 const FEW_EVENTS: u64 = 128;
@@ -49,8 +51,13 @@ impl Status {
         }
         let [from_ns, to_ns] = [self.last_ns, now_ns].map(execution::since_epoch);
         self.last_ns = now_ns;
+        let Some(task_set) = execution::task_set() else {
+            return;
+        };
         let misses = (0..)
-            .map_while(|dag| execution::snapshot(DagId(dag)))
+            .map(DagId)
+            .take(task_set.dags().len())
+            .filter_map(|dag| snapshot::<KernelRun>(&task_set, dag))
             .map(|dag| dag.statistics.misses)
             .sum::<u64>();
         // In an interrupt's handler there is no time to read many events.

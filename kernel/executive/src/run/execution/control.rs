@@ -7,7 +7,7 @@ use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
 use sched_dag::lifecycle::Request;
-use sched_dag::{Dag, DagId, Snapshot, TaskSet};
+use sched_dag::{Dag, DagId, TaskSet};
 
 use super::core_set::CoreSet;
 use super::{cluster, divided};
@@ -18,14 +18,6 @@ use crate::machine::{clock, this_core};
 pub fn task_set() -> Option<Arc<TaskSet>> {
     let place = cluster::nth(0).execution.lock();
     place.as_ref().map(|execution| execution.task_set().clone())
-}
-
-/// Returns how a DAG does, if a run goes on that has it.
-pub fn snapshot(dag: DagId) -> Option<Snapshot> {
-    let place = divided::of_dag(dag).execution.lock();
-    let scheduler = &place.as_ref()?.engine.scheduler;
-    scheduler.task_set().dags().get(dag.index())?;
-    Some(scheduler.snapshot(dag))
 }
 
 /// Returns the latest deadline of any job, on the run's time; `None` if there is

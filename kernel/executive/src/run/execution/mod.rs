@@ -41,7 +41,7 @@ use sched_dag::{Journal, Scheduler, TaskSet};
 use crate::machine::context::Parked;
 use crate::machine::this_core;
 pub use cluster::{count as clusters, first_core};
-pub use control::{control, nominal_end_ns, snapshot, task_set};
+pub use control::{control, nominal_end_ns, task_set};
 pub use divided::is_finished;
 pub use ended::look_at_clearing;
 pub use events::{complete, fail, find_work, interrupt};
@@ -53,7 +53,7 @@ use signals::Signals;
 pub use signals::{raise, raise_in_interrupt};
 pub use status::{
     budget_ns, cost_of_fault, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal,
-    try_names, with_journal,
+    try_names, with_scheduler,
 };
 pub use time::{arm_all, arm_next_event, keeps_time, since_epoch};
 

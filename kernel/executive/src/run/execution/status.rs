@@ -5,7 +5,7 @@ use core::sync::atomic::Ordering;
 
 use sched_dag::engine::Cost;
 use sched_dag::journal::Subject;
-use sched_dag::{DagId, Instance, Journal, SubtaskId, TaskSet};
+use sched_dag::{DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet};
 
 use super::cluster::{self, FIRST_SEAT};
 use crate::machine::this_core::{self, Core};
@@ -92,14 +92,10 @@ pub fn cost_of_fault(instance: Instance) -> Option<(Cost, Arc<TaskSet>)> {
     })
 }
 
-/// Looks at the journal of a cluster, by its number, or changes what it records, if a run goes
-/// on. Its cores count from [`first_core`](super::first_core). To be done shortly: nothing is
-/// completed there meanwhile.
-pub fn with_journal<R>(cluster: usize, look: impl FnOnce(&mut Journal) -> R) -> Option<R> {
+/// Looks at the scheduler of a cluster, shortly, if there is one.
+pub fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
     let mut place = cluster::nth(cluster).execution.lock();
-    place
-        .as_mut()
-        .map(|execution| look(&mut execution.engine.scheduler.log.journal))
+    (place.as_mut()).map(|execution| look(&mut execution.engine.scheduler))
 }
 
 /// Looks at the journal of this core's cluster, if there is one and nobody is at work on it.
