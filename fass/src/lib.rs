@@ -133,6 +133,7 @@ pub use platform::{
     now_ns, set_clock,
 };
 pub use recording::Channel;
+pub use run::cell::SetOnce;
 pub use run::crossing::Recorded;
 pub use run::latest_jobs::LatestJobs;
 pub use run::message::{Message, MessageType, Unique};

@@ -5,14 +5,12 @@ use core::fmt;
 use core::panic::Location;
 use core::time::Duration;
 
-use alloc::boxed::Box;
-
 use fass::{Platform, Signal, Terms, Wire};
 
 use super::overheads;
 use crate::options::{Options, UsageError};
 use crate::report::{self, Ns};
-use crate::watch::background::live_run::{KernelRun, PARAMETERS, TOPICS};
+use crate::watch::background::live_run::KernelRun;
 use crate::watch::background::{Background, LINE, Wishes, wire};
 use executive::machine::{self, interrupts_off, this_core};
 use executive::memory::heap;
@@ -21,10 +19,8 @@ use executive::run::{contexts, edge, execution, worker};
 use executive::text::console;
 use front::app::ending::Ending;
 use front::app::machine::System;
-use front::app::offered::Parameters;
 use front::json;
 use front::report::memory::Memory;
-use front::shell::topics::Topics;
 use sched_dag::engine::{Counts, Run};
 
 /// The machine, lent to the app's function for the time of the run.
@@ -49,6 +45,8 @@ impl BareMachine {
 }
 
 impl System for BareMachine {
+    type Run = KernelRun;
+
     fn has_console(&self) -> bool {
         self.wishes.console.is_some()
     }
@@ -129,19 +127,8 @@ impl System for BareMachine {
         wire::connect(wire, script)
     }
 
-    fn offer(parameters: Parameters) -> Result<(), Ending> {
-        let offered = PARAMETERS.set(Box::leak(Box::new(parameters)));
-        let twice = |_| Ending::Failure("parameters are offered twice; offer all at once".into());
-        offered.map(drop).map_err(twice)
-    }
-
-    fn show_topics(&self) {
-        static ALL: Topics<KernelRun> = Topics::new();
-        if self.has_console() {
-            edge::get().let_look();
-            // Once is enough.
-            let _ = TOPICS.set(&ALL);
-        }
+    fn let_look(&self) {
+        edge::get().let_look();
     }
 
     fn measure_overheads(margin_percent: u32) -> Result<(), Ending> {

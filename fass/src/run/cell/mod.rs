@@ -341,4 +341,4 @@ mod set_once;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use set_once::SetOnce;
+pub use set_once::SetOnce;

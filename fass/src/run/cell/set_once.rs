@@ -14,7 +14,15 @@ const WRITING: u8 = 1;
 const SET: u8 = 2;
 
 /// A value that is set at most once and then read by everybody.
-pub(crate) struct SetOnce<T> {
+///
+/// ```
+/// static PLACE: fass::SetOnce<u32> = fass::SetOnce::new();
+/// assert_eq!(PLACE.get(), None);
+/// assert!(PLACE.set(1) && !PLACE.set(2));
+/// assert_eq!(PLACE.get(), Some(&1));
+/// ```
+#[derive(Debug)]
+pub struct SetOnce<T> {
     state: AtomicU8,
     value: UnsafeCell<MaybeUninit<T>>,
 }
@@ -24,7 +32,10 @@ pub(crate) struct SetOnce<T> {
 unsafe impl<T: Send + Sync> Sync for SetOnce<T> {}
 
 impl<T> SetOnce<T> {
-    pub(crate) const fn new() -> Self {
+    /// Makes an empty place.
+    #[must_use]
+    #[allow(clippy::new_without_default, reason = "it is for statics")]
+    pub const fn new() -> Self {
         Self {
             state: AtomicU8::new(EMPTY),
             value: UnsafeCell::new(MaybeUninit::uninit()),
@@ -32,7 +43,7 @@ impl<T> SetOnce<T> {
     }
 
     /// Sets the value, and reports whether this call was the one that did.
-    pub(crate) fn set(&self, value: T) -> bool {
+    pub fn set(&self, value: T) -> bool {
         let claim =
             self.state
                 .compare_exchange(EMPTY, WRITING, Ordering::Relaxed, Ordering::Relaxed);
@@ -49,7 +60,7 @@ impl<T> SetOnce<T> {
 
     /// Returns the value, or `None` while none is set.
     #[inline]
-    pub(crate) fn get(&self) -> Option<&T> {
+    pub fn get(&self) -> Option<&T> {
         if self.state.load(Ordering::Acquire) != SET {
             return None;
         }

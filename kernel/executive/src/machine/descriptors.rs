@@ -5,8 +5,8 @@ use core::arch::asm;
 
 use alloc::boxed::Box;
 
-use super::once::Once;
 use super::vector::{OTHER, TIMER};
+use fass::SetOnce;
 
 /// The code segment's selector.
 pub(super) const CODE: u16 = 0x08;
@@ -118,13 +118,12 @@ pub(super) fn load_segments(task_state: *mut TaskState) {
     unsafe { asm!("ltr {:x}", in(reg) TASK_STATE) };
 }
 
-static INTERRUPT_TABLE: Once<Box<[[u64; 2]; 256]>> = Once::new();
+static INTERRUPT_TABLE: SetOnce<Box<[[u64; 2]; 256]>> = SetOnce::new();
 
 /// Loads the interrupt table for this core. From `stubs` on, 16 bytes each, lie those of exceptions,
 /// those of the vectors in use, and one for all others.
 pub(crate) fn load_interrupts(stubs: u64) {
-    let table = INTERRUPT_TABLE.get().unwrap_or_else(|| {
-        // Only the boot processor gets here, before it starts any other.
+    if INTERRUPT_TABLE.get().is_none() {
         let table = Box::new(core::array::from_fn(|vector| {
             let place = match u8::try_from(vector) {
                 Ok(exception @ 0..32) => exception,
@@ -133,10 +132,11 @@ pub(crate) fn load_interrupts(stubs: u64) {
             };
             gate(stubs + 16 * u64::from(place), vector)
         }));
-        INTERRUPT_TABLE
-            .set(table)
-            .unwrap_or_else(|_| unreachable!("one processor boots"))
-    });
+        INTERRUPT_TABLE.set(table);
+    }
+    let table = INTERRUPT_TABLE
+        .get()
+        .expect("it is set by the processor that boots");
     let pointer = TablePointer::to(&**table);
     // SAFETY: every gate leads to a stub that saves and restores all state.
     unsafe { asm!("lidt [{}]", in(reg) &pointer) };

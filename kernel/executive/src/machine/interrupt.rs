@@ -10,12 +10,12 @@ use core::panic::Location;
 use super::abandoned::Abandoned;
 use super::context::{Parked, Registers, VECTOR_BYTES};
 use super::fault::{self, Exception};
-use super::once::Once;
 use super::this_core::Core;
 use super::{
     cpu, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core, timer,
     turns, vector,
 };
+use fass::SetOnce;
 
 global_asm!(
     include_str!("interrupt.s"),
@@ -86,12 +86,12 @@ impl Interrupted {
     }
 }
 
-static HANDLERS: Once<Handlers> = Once::new();
+static HANDLERS: SetOnce<Handlers> = SetOnce::new();
 
 /// Names the functions that handle interrupts. The first call counts.
 pub fn install(handlers: Handlers) {
     // A second call would come from a second boot, which there is not.
-    let _ = HANDLERS.set(handlers);
+    HANDLERS.set(handlers);
 }
 
 /// Loads the interrupt table for this core.

@@ -29,7 +29,6 @@ pub mod local_apic;
 mod machine_check;
 mod meter;
 pub mod non_maskable;
-pub mod once;
 pub(crate) mod paging;
 pub mod paint;
 pub(crate) mod port;

@@ -4,8 +4,8 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use boot::power::{Off, Power, Register};
 
-use super::once::Once;
 use super::port;
+use fass::SetOnce;
 
 /// What to do after the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub enum End {
 }
 
 static END: AtomicU8 = AtomicU8::new(End::Halt as u8);
-static POWER: Once<Power> = Once::new();
+static POWER: SetOnce<Power> = SetOnce::new();
 
 /// Settles what is done after the verdict.
 pub fn set_end(end: End) {
@@ -34,7 +34,7 @@ pub fn set_end(end: End) {
 /// writable at their addresses.
 pub unsafe fn set_registers(power: Power) {
     // They are found once.
-    let _ = POWER.set(power);
+    POWER.set(power);
 }
 
 /// Does what was settled. Returns where that is to halt, or nothing has come of it.

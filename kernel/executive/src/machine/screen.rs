@@ -9,10 +9,10 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use boot::Framebuffer;
 use boot::screen::{Grid, Screen};
 
-use super::once::Once;
+use fass::SetOnce;
 
 static GRID: Grid = Grid::new();
-static SCREEN: Once<Screen> = Once::new();
+static SCREEN: SetOnce<Screen> = SetOnce::new();
 /// Whether a core draws.
 static IS_DRAWING: AtomicBool = AtomicBool::new(false);
 
@@ -28,7 +28,7 @@ pub unsafe fn initialize(buffer: Framebuffer) {
     let screen = unsafe { Screen::new(buffer) };
     screen.blank();
     if screen.columns > 0 && screen.rows > 0 {
-        let _ = SCREEN.set(screen);
+        SCREEN.set(screen);
     }
 }
 

@@ -14,7 +14,7 @@ use super::context::{Context, Parked, Registers};
 use super::cpu;
 use super::descriptors::{self, TaskState};
 use super::meter::Meter;
-use super::once::Once;
+use fass::SetOnce;
 
 /// What a core needs to begin: the tops of stacks, each with a guard page below,
 /// and the context that it runs first.
@@ -92,7 +92,7 @@ pub struct Core {
 /// Where `interrupt.s` finds the handler stack.
 pub(super) const HANDLER_STACK_OFFSET: usize = core::mem::offset_of!(Core, handler_stack);
 
-static CORES: Once<Box<[Core]>> = Once::new();
+static CORES: SetOnce<Box<[Core]>> = SetOnce::new();
 
 /// Creates the cores' data, the boot processor's first.
 pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
@@ -124,7 +124,7 @@ pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
         running: [const { AtomicU64::new(u64::MAX) }; 2],
     });
     // A second call would come from a second boot, which there is not.
-    let _ = CORES.set(cores.collect());
+    CORES.set(cores.collect());
 }
 
 /// Makes the processor that executes this the core with APIC id `apic_id`: loads its

@@ -13,17 +13,20 @@ use sched_dag::engine::Run;
 use super::bound_verdict::BoundVerdict;
 use super::ending::Ending;
 use super::fault_verdict::FaultVerdict;
-use super::offered::Parameters;
 use super::terms::Chosen;
 use super::wcet_notes;
 use crate::options::Options;
 use crate::report::memory::Memory;
 use crate::report::{times, trace};
+use crate::shell::LiveRun;
 
 /// What an app's machine is made of: the bare machine, or Linux.
 ///
 /// See [`Machine`].
 pub trait System: Sized {
+    /// The run that a person can talk to.
+    type Run: LiveRun + 'static;
+
     /// Reports whether a person can talk to a run.
     fn has_console(&self) -> bool {
         false
@@ -54,13 +57,8 @@ pub trait System: Sized {
         module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), Ending>;
 
-    /// Lets people set parameters during runs, too.
-    fn offer(_parameters: Parameters) -> Result<(), Ending> {
-        Ok(())
-    }
-
-    /// Lets people look at topics during runs.
-    fn show_topics(&self) {}
+    /// Has the topics of the runs to come be there to be looked at.
+    fn let_look(&self);
 
     /// Measures what it takes itself, and charges that with so many hundredths more.
     fn measure_overheads(margin_percent: u32) -> Result<(), Ending>;

@@ -2,6 +2,8 @@
 //!
 //! An image has the code of those services alone that its app asks for.
 
+use alloc::boxed::Box;
+
 use fass::{Tunable, Wire};
 
 use super::ending::Ending;
@@ -9,6 +11,8 @@ use super::machine::{Machine, System};
 use super::offered::Parameters;
 use crate::options::UsageError;
 use crate::report::memory::Resources;
+use crate::shell::topics::Topics;
+use crate::shell::{PARAMETERS, TOPICS};
 
 /// The margin if nobody states one, in hundredths.
 const MARGIN_PERCENT: u64 = 20;
@@ -65,7 +69,11 @@ impl<S: System> Machine<S> {
     /// }
     /// ```
     pub fn show_topics(&self) {
-        self.system.show_topics();
+        if self.has_console() {
+            self.system.let_look();
+            // Once is enough.
+            TOPICS.set(Box::leak(Box::new(Topics::<S::Run>::new())));
+        }
     }
 
     /// Lets people set parameters: at the console by `set NAME VALUE`, before the first run by the
@@ -93,7 +101,12 @@ impl<S: System> Machine<S> {
         if let Some(word) = self.options.text("set") {
             offered.set_all(word)?;
         }
-        S::offer(offered)
+        match PARAMETERS.set(Box::leak(Box::new(offered))) {
+            true => Ok(()),
+            false => Err(Ending::Failure(
+                "parameters are offered twice; offer all at once".into(),
+            )),
+        }
     }
 
     /// Takes the word `overheads`. With `overheads=measured` the kernel runs DAGs of its own

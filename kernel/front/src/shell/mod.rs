@@ -16,7 +16,9 @@ pub mod topics;
 use alloc::sync::Arc;
 use core::fmt::{self, Display};
 use core::marker::PhantomData;
+use core::sync::atomic::{AtomicBool, Ordering};
 
+use fass::SetOnce;
 use fass::edge::Seen;
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
@@ -73,17 +75,11 @@ pub trait LiveRun {
     /// Takes a byte that a person has typed.
     fn receive() -> Option<u8>;
 
-    /// Has nothing more released, and what is in flight go on to its end.
-    fn shut_down();
-
     /// Has the values of a topic kept to be seen, or none; reports whether it is recorded.
     fn watch(topic: Option<&str>) -> bool;
 
     /// Takes the latest value that is to be seen, if there is a new one.
     fn take_seen(into: &mut [u8]) -> Option<Seen>;
-
-    /// Returns the commands that the app has called for.
-    fn extra() -> Extra;
 }
 
 /// Returns how a DAG does, if a run goes on.
@@ -117,8 +113,32 @@ pub fn look_back<R: LiveRun>(cluster: usize, most: u64, take: &mut dyn FnMut(&Ev
 /// What a command tells why it does not do what a line says.
 pub type Refuse<'r> = &'r mut dyn FnMut(&dyn Display);
 
-/// The commands that an app can call for: those about its parameters, and about topics.
-pub type Extra = [Option<&'static dyn Commands>; 2];
+/// The commands about parameters, if the app has called for them.
+pub(crate) static PARAMETERS: SetOnce<&'static dyn Commands> = SetOnce::new();
+
+/// The commands about topics, if the app has called for them.
+pub(crate) static TOPICS: SetOnce<&'static dyn Commands> = SetOnce::new();
+
+/// Returns the commands that the app has called for.
+fn extra() -> impl Iterator<Item = &'static dyn Commands> {
+    [&PARAMETERS, &TOPICS]
+        .into_iter()
+        .filter_map(|commands| commands.get().copied())
+}
+
+/// Whether a person has ended the run.
+pub static IS_SHUT_DOWN: AtomicBool = AtomicBool::new(false);
+
+/// Has nothing more released, and what is in flight go on to its end.
+pub fn shut_down<R: LiveRun>() {
+    let Some(task_set) = R::task_set() else {
+        return;
+    };
+    println!("shutting down: nothing more is released; what is in flight goes on");
+    IS_SHUT_DOWN.store(true, Ordering::Relaxed);
+    let dags = (0..).map(DagId).take(task_set.dags().len());
+    dags.for_each(|dag| R::control(dag, Request::Close));
+}
 
 /// Some commands of the shell.
 pub trait Commands: Sync {
@@ -176,13 +196,13 @@ impl<R: LiveRun> Session<R> {
             }
             return true;
         }
-        R::extra().iter().flatten().for_each(|extra| extra.step());
+        extra().for_each(Commands::step);
         for _ in 0..MOST_BYTES {
             let Some(byte) = R::receive() else {
                 return false;
             };
             if byte == END {
-                R::shut_down();
+                shut_down::<R>();
                 break;
             }
             if self.echoes {
@@ -228,9 +248,7 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Opt
     let wants = |what: &str, refuse: Refuse<'_>| refuse(&format_args!("`{name}` wants {what}"));
     match (name, rest) {
         ("help", "") => {
-            let extra = R::extra();
-            let extra = extra.iter().flatten().flat_map(|extra| extra.help());
-            for (command, what) in HELP.iter().chain(extra) {
+            for (command, what) in HELP.iter().chain(extra().flat_map(Commands::help)) {
                 println!("  {command:15}{what}");
             }
         }
@@ -245,13 +263,11 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Opt
             change::<R>(task_set, dag, Request::Pause, what, refuse);
         }
         ("start", dag) => change::<R>(task_set, dag, Request::Resume, "releases jobs", refuse),
-        ("shutdown", "") => R::shut_down(),
+        ("shutdown", "") => shut_down::<R>(),
         ("help" | "dags" | "shutdown", _) => wants("nothing after it", refuse),
         ("trace", _) => wants("`on` or `off`", refuse),
         _ => {
-            let extra = R::extra();
-            let mut others = extra.iter().flatten();
-            if !others.any(|commands| commands.answer(name, rest, refuse)) {
+            if !extra().any(|commands| commands.answer(name, rest, refuse)) {
                 refuse(&no_command(name, extra));
             }
         }
@@ -260,11 +276,14 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Opt
 }
 
 /// Says that a word is no command, and which there are.
-fn no_command(name: &str, extra: Extra) -> impl Display {
+fn no_command<E: Iterator<Item = &'static dyn Commands>>(
+    name: &str,
+    extra: impl Fn() -> E,
+) -> impl Display {
     fmt::from_fn(move |f| {
         write!(f, "`{name}` is no command; there are ")?;
-        let others = extra.iter().flatten().flat_map(|extra| extra.help());
-        for (index, (command, _)) in HELP.iter().chain(others).enumerate() {
+        let all = HELP.iter().chain(extra().flat_map(Commands::help));
+        for (index, (command, _)) in all.enumerate() {
             let separator = if index == 0 { "" } else { ", " };
             write!(f, "{separator}{command}")?;
         }

@@ -19,8 +19,6 @@ fn asked(what: String) {
 
 struct NoRun;
 
-static TOPICS: Topics<NoRun> = Topics::new();
-
 impl LiveRun for NoRun {
     fn task_set() -> Option<Arc<TaskSet>> {
         let ports = Vec::from([TopicPort {
@@ -62,10 +60,6 @@ impl LiveRun for NoRun {
         TYPED.with_borrow_mut(VecDeque::pop_front)
     }
 
-    fn shut_down() {
-        asked("shut down".into());
-    }
-
     fn watch(topic: Option<&str>) -> bool {
         asked(format!("watch {topic:?}"));
         true
@@ -74,16 +68,13 @@ impl LiveRun for NoRun {
     fn take_seen(_: &mut [u8]) -> Option<Seen> {
         None
     }
-
-    fn extra() -> Extra {
-        [None, Some(&TOPICS)]
-    }
 }
 
 #[test]
 fn what_is_typed_is_asked_of_the_run_and_no_function_is_told_the_time_for_it() {
     static TOLD: fass::Clock = || panic!("it is told to the function that is interrupted");
     fass::set_clock(&TOLD);
+    TOPICS.set(Box::leak(Box::new(Topics::<NoRun>::new())));
     let typed =
         b"stop lidar\nstart 0\nstop radar\necho points\necho off\nhz points\n\x03shutdown\n";
     TYPED.with_borrow_mut(|bytes| bytes.extend(typed));
@@ -95,8 +86,8 @@ fn what_is_typed_is_asked_of_the_run_and_no_function_is_told_the_time_for_it() {
         "watch Some(\"points\")",
         "the time",
         "watch None",
-        "shut down",
-        "shut down",
+        "Close(DagId(0))",
+        "Close(DagId(0))",
     ];
     assert_eq!(ASKED.take(), expected);
 }
@@ -139,7 +130,7 @@ fn what_is_no_command_is_told_the_commands() {
         assert_eq!(refusal(line).as_deref(), Some(expected));
     }
     assert_eq!(
-        no_command("stpo", [None; 2]).to_string(),
+        no_command("stpo", core::iter::empty).to_string(),
         "`stpo` is no command; there are help, dags, stats [DAG], stop DAG, start DAG, \
          trace off, trace on, shutdown"
     );

@@ -8,8 +8,7 @@ use std::thread;
 use std::time::Duration;
 
 use fass::edge::Seen;
-use front::shell::topics::Topics;
-use front::shell::{Commands, END, Extra, LiveRun, PERIOD_NS, Session};
+use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, Session};
 use linux::Control;
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Scheduler, TaskSet};
@@ -17,16 +16,9 @@ use sched_dag::{DagId, Scheduler, TaskSet};
 /// What comes on standard input; the thread that reads it lasts as long as the program.
 static INPUT: OnceLock<Mutex<Receiver<u8>>> = OnceLock::new();
 
-/// Commands about parameters, and about topics.
-pub(crate) static PARAMETERS: OnceLock<&'static dyn Commands> = OnceLock::new();
-static TOPICS: OnceLock<&'static dyn Commands> = OnceLock::new();
-
-/// Whether a person has ended the run.
-static IS_SHUT_DOWN: AtomicBool = AtomicBool::new(false);
-
 /// The run of this program.
 #[derive(Debug)]
-struct LinuxRun;
+pub struct LinuxRun;
 
 impl LiveRun for LinuxRun {
     fn task_set() -> Option<Arc<TaskSet>> {
@@ -57,24 +49,12 @@ impl LiveRun for LinuxRun {
         }
     }
 
-    fn shut_down() {
-        if let Some(live) = Control::get() {
-            front::println!("shutting down: nothing more is released; what is in flight goes on");
-            IS_SHUT_DOWN.store(true, Ordering::Relaxed);
-            live.close();
-        }
-    }
-
     fn watch(topic: Option<&str>) -> bool {
         Control::get().is_some_and(|live| live.see(topic))
     }
 
     fn take_seen(into: &mut [u8]) -> Option<Seen> {
         Control::get()?.take_seen(into)
-    }
-
-    fn extra() -> Extra {
-        [&PARAMETERS, &TOPICS].map(|once| once.get().copied())
     }
 }
 
@@ -87,12 +67,6 @@ fn is_endless() -> bool {
             .all(|dag| dag.jobs().is_some())
     };
     !IS_SHUT_DOWN.load(Ordering::Relaxed) && !Control::get().is_none_or(has_end)
-}
-
-/// Lets people look at topics.
-pub(crate) fn show_topics() {
-    static ALL: Topics<LinuxRun> = Topics::new();
-    TOPICS.get_or_init(|| &ALL);
 }
 
 /// Talks, from another thread, as long as `run` takes. Reports whether the person has ended it.

@@ -14,7 +14,6 @@ use crate::heap;
 use front::app::division::Divisible;
 use front::app::ending::Ending;
 use front::app::machine::System;
-use front::app::offered::Parameters;
 use front::json;
 use front::options::{Options, UsageError};
 use front::report;
@@ -40,6 +39,8 @@ pub struct LinuxSystem {
 }
 
 impl System for LinuxSystem {
+    type Run = console::LinuxRun;
+
     fn has_console(&self) -> bool {
         self.has_console
     }
@@ -145,17 +146,8 @@ impl System for LinuxSystem {
         }
     }
 
-    fn offer(parameters: Parameters) -> Result<(), Ending> {
-        let offered = console::PARAMETERS.set(Box::leak(Box::new(parameters)));
-        let twice = |_| Ending::Failure("parameters are offered twice; offer all at once".into());
-        offered.map_err(twice)
-    }
-
-    fn show_topics(&self) {
-        if self.has_console {
-            self.linux.let_look();
-            console::show_topics();
-        }
+    fn let_look(&self) {
+        self.linux.let_look();
     }
 
     fn measure_overheads(_margin_percent: u32) -> Result<(), Ending> {

@@ -1,22 +1,43 @@
-//! Bytes from the serial port as events: each raises the signal of a sporadic DAG.
+//! Bytes from the serial port where no conversation takes them: as events, each of which raises
+//! the signal of a sporadic DAG, and the one that ends the run in order before its time.
 //!
-//! The port is looked at by core 0's background, each time that the core wakes up
-//! and has nothing else to do, and at least every [`PERIOD_NS`] if it is
-//! idle. What the byte is does not matter, but for the one that ends the run ([`stop`]). How fast
-//! the bytes come does not either:
-//! the DAG's minimum inter-arrival time is enforced by the scheduler.
+//! That byte is what ctrl-C is on a serial line (ETX in ASCII). With `console=stop` core 0's
+//! heartbeat looks for it, four times a second, so it counts however busy the cores are.
+//!
+//! For events the port is looked at by core 0's background, each time that the core wakes up and
+//! has nothing else to do, and at least every [`PERIOD_NS`] if it is idle. What the byte is does
+//! not matter, but for the one that ends the run. How fast the bytes come does not either: the
+//! DAG's minimum inter-arrival time is enforced by the scheduler.
 //!
 //! [`PERIOD_NS`]: front::shell::PERIOD_NS
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use sched_dag::DagId;
 
-use super::stop;
+use super::live_run::KernelRun;
 use executive::machine::serial;
 use executive::run::execution;
-use front::shell::END;
+use front::shell::{END, shut_down};
 
-/// The most bytes that are taken at a time: the port may not end to have some.
-const MOST_BYTES: usize = 256;
+/// Whether the heartbeat looks.
+static IS_WATCHED: AtomicBool = AtomicBool::new(false);
+
+/// Has the heartbeat look for the byte that ends the run, or not.
+pub(super) fn watch(is_watched: bool) {
+    IS_WATCHED.store(is_watched, Ordering::Relaxed);
+}
+
+/// Looks for that byte. In core 0's heartbeat.
+pub(super) fn beat() {
+    /// What the port's FIFO holds.
+    const MOST_BYTES: usize = 16;
+    let is_watched = IS_WATCHED.load(Ordering::Relaxed);
+    let mut bytes = (0..MOST_BYTES).map_while(|_| serial::FIRST.receive());
+    if is_watched && bytes.any(|byte| byte == END) {
+        shut_down::<KernelRun>();
+    }
+}
 
 /// The DAG that bytes are for.
 #[derive(Debug)]
@@ -34,10 +55,12 @@ impl Listener {
 
     /// Raises the signal for each byte that has come.
     pub(super) fn step(&self) {
+        /// The port may not end to have some.
+        const MOST_BYTES: usize = 256;
         for _ in 0..MOST_BYTES {
             match serial::FIRST.receive() {
                 None => return,
-                Some(END) if self.stops => stop::shut_down(),
+                Some(END) if self.stops => shut_down::<KernelRun>(),
                 Some(_) => execution::raise(self.plan, self.dag),
             }
         }

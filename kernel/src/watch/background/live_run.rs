@@ -1,26 +1,17 @@
-//! The run that goes on, as the shell sees it, and the commands that the app has called for.
+//! The run that goes on, as the shell sees it.
 
 use alloc::sync::Arc;
 
-use executive::machine::once::Once;
 use executive::machine::{clock, serial};
 use executive::run::{edge, execution};
 use fass::edge::Seen;
-use front::shell::{Commands, Extra, LiveRun};
+use front::shell::LiveRun;
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Scheduler, TaskSet};
 
-use super::stop;
-
 /// The kernel's run.
 #[derive(Debug)]
-pub(crate) struct KernelRun;
-
-/// Commands about parameters.
-pub(crate) static PARAMETERS: Once<&'static dyn Commands> = Once::new();
-
-/// Commands about topics.
-pub(crate) static TOPICS: Once<&'static dyn Commands> = Once::new();
+pub struct KernelRun;
 
 impl LiveRun for KernelRun {
     fn task_set() -> Option<Arc<TaskSet>> {
@@ -43,19 +34,11 @@ impl LiveRun for KernelRun {
         serial::FIRST.receive()
     }
 
-    fn shut_down() {
-        stop::shut_down();
-    }
-
     fn watch(topic: Option<&str>) -> bool {
         edge::get().watch(topic)
     }
 
     fn take_seen(into: &mut [u8]) -> Option<Seen> {
         edge::get().take_seen(into)
-    }
-
-    fn extra() -> Extra {
-        [&PARAMETERS, &TOPICS].map(|once| once.get().copied())
     }
 }

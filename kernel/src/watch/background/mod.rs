@@ -21,17 +21,16 @@ mod patience;
 mod progress;
 mod stall;
 mod status;
-mod stop;
 pub(crate) mod watchdog;
 pub(crate) mod wire;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use executive::machine::clock;
-use executive::machine::once::Once;
 use executive::machine::spinlock::SpinLock;
 use executive::run::heartbeat;
 use executive::text::console;
+use fass::SetOnce;
 use front::shell::{self, Session};
 use listener::Listener;
 use live_run::KernelRun;
@@ -79,7 +78,7 @@ pub(crate) trait Line: Sync {
 }
 
 /// The device, if the app has connected one.
-pub(crate) static LINE: Once<&'static dyn Line> = Once::new();
+pub(crate) static LINE: SetOnce<&'static dyn Line> = SetOnce::new();
 
 /// For how long the background may not run before the heartbeat helps out.
 const STARVED_NS: u64 = 200_000_000;
@@ -116,7 +115,7 @@ pub(crate) fn beat(now_ns: u64) {
         line.beat(now_ns);
     }
     stall::beat(now_ns);
-    stop::beat();
+    listener::beat();
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
         return;
     }
@@ -161,7 +160,7 @@ impl Background {
         // What a person says to the console is no event.
         let input = input.filter(|_| wishes.console.is_none());
         let listener = input.map(|input| Listener::new(input, wishes.stops));
-        stop::begin(wishes.stops && wishes.console.is_none() && listener.is_none());
+        listener::watch(wishes.stops && wishes.console.is_none() && listener.is_none());
         if let Some(line) = LINE.get() {
             line.begin(clock::now_ns());
         }
@@ -198,6 +197,7 @@ impl Background {
         let mut sliced = SLICED.lock();
         sliced.status = None;
         sliced.session = None;
-        stop::end()
+        listener::watch(false);
+        shell::IS_SHUT_DOWN.swap(false, Ordering::Relaxed)
     }
 }

@@ -55,11 +55,12 @@ pub(crate) fn connect(wire: &Wire, script: Option<&'static [u8]>) -> Result<(), 
         port: &SECOND,
         script,
     }));
-    LINE.set(connection).map(drop).map_err(|_| {
-        Ending::Failure(format!(
+    match LINE.set(connection) {
+        true => Ok(()),
+        false => Err(Ending::Failure(format!(
             "wire `{name}` finds the second serial port taken; connect one wire"
-        ))
-    })
+        ))),
+    }
 }
 
 /// Returns the first entry of a script, its time before its bytes, and the entries after it.

@@ -9,10 +9,10 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 
+use fass::SetOnce;
 use sched_dag::CoreId;
 
 use super::Execution;
-use crate::machine::once::Once;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core::{self, Core};
 
@@ -40,7 +40,7 @@ pub(super) const MAY_DIVIDE: bool = cfg!(feature = "clusters");
 pub(super) static FIRST: Cluster = Cluster::new();
 
 /// The other ones that there can be, made when cores are divided for the first time.
-pub(super) static OTHERS: Once<alloc::boxed::Box<[Cluster]>> = Once::new();
+pub(super) static OTHERS: SetOnce<alloc::boxed::Box<[Cluster]>> = SetOnce::new();
 
 /// How many there are besides cluster 0.
 pub(super) static BESIDES: AtomicUsize = AtomicUsize::new(0);

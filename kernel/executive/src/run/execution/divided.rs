@@ -31,7 +31,7 @@ pub(super) fn divide(
     let count = task_set.clusters().count();
     if count > 1 && OTHERS.get().is_none() {
         // Each has a core at least; and the cores that no cluster has are one, too.
-        let _ = OTHERS.set((1..cores.len()).map(|_| Cluster::new()).collect());
+        OTHERS.set((1..cores.len()).map(|_| Cluster::new()).collect());
     }
     BESIDES.store(count - 1, Ordering::Relaxed);
     let mut rest = cores.iter();
