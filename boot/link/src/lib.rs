@@ -1,9 +1,9 @@
 //! Linker arguments that make an app's binary a bootable image, and the application of UEFI
 //! that brings an image into memory.
 //!
-//! An app's `build.rs` calls [`link_image`], that of `boot-efi` [`link_efi`]. The arguments apply to the
-//! package's binaries alone, so the host tests, examples and docs of the same
-//! package link as any other Rust program does.
+//! An app's build script calls [`link_image`] (that of all apps here is `boot/link/image.rs`), that
+//! of `boot-efi` [`link_efi`]. The arguments apply to the package's binaries alone, so the host
+//! tests, examples and docs of the same package link as any other Rust program does.
 
 #![forbid(unsafe_code)]
 
@@ -81,7 +81,8 @@ fn link(kind: [&str; 2], script: &str) {
     for argument in arguments(kind, &copy.display().to_string()) {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
-    println!("cargo::rerun-if-changed=build.rs");
+    // Nothing else of the package counts, and this one is there.
+    println!("cargo::rerun-if-changed=Cargo.toml");
 }
 
 /// Returns the attributes that an image's file must have and this one has not.
