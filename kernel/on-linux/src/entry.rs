@@ -4,16 +4,16 @@ use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
-use linux::{EndSignals, Linux};
+use linux::EndSignals;
 
 pub use crate::output::write_as;
 pub use front::output;
 
 use crate::app::linux_system::{LinuxSystem, Machine, memory_kib};
 use crate::app::words;
-use crate::options::{Options, UsageError};
-use front::app::bound_verdict::BoundVerdict;
+use crate::options::Options;
 use front::app::ending::{self, Ending, Told};
+use front::app::verdict::Verdict;
 use front::json;
 
 /// Makes an app's function the one that the program runs: the function `program`, for the file
@@ -84,11 +84,6 @@ fn run(
         has_console: options.choice("console", &[("off", false), ("on", true)])?,
         is_closed: Cell::new(false),
     };
-    let bounds = BoundVerdict::new(false, false);
-    let result = Machine::serve(system, options, chosen, module, bounds, app);
-    let [refusal, complaint] = Linux::objections();
-    match refusal {
-        Some(refusal) => Err(UsageError::new(refusal).into()),
-        None => Ending::or_complaint(result, complaint),
-    }
+    let verdict = Verdict::new(false, false);
+    Machine::serve(system, options, chosen, module, verdict, app)
 }

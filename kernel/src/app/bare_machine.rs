@@ -1,5 +1,6 @@
 //! What the kernel does for an app's machine.
 
+use alloc::string::String;
 use core::cell::Cell;
 use core::fmt;
 use core::panic::Location;
@@ -7,7 +8,7 @@ use core::time::Duration;
 
 use fass::{Platform, Signal, Terms, Wire};
 
-use super::overheads;
+use super::calibration;
 use crate::options::{Options, UsageError};
 use crate::report::{self, Ns};
 use crate::watch::background::live_run::KernelRun;
@@ -132,13 +133,17 @@ impl System for BareMachine {
     }
 
     fn measure_overheads(margin_percent: u32) -> Result<(), Ending> {
-        overheads::charge(margin_percent)
+        calibration::charge(margin_percent)
     }
 
     fn contexts() -> (usize, usize) {
         let (contexts, in_stock) = contexts::count();
         let spare = this_core::all().iter().filter(|core| core.has_spare());
         (contexts, in_stock + spare.count())
+    }
+
+    fn objections() -> [Option<String>; 2] {
+        edge::objections()
     }
 
     fn memory() -> Memory {

@@ -15,8 +15,8 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use fass::{
-    ConstructionPolicy, Dag, Occupation, Platform, SubtaskAttributes, Untyped, create_dag,
-    execute_for, finish_create_dags_with,
+    ConstructionPolicy, Dag, Occupation, OverheadSource, Overheads, Platform, SubtaskAttributes,
+    Untyped, create_dag, execute_for, finish_create_dags_with,
 };
 use sched_dag::law::Costs;
 
@@ -24,6 +24,7 @@ use executive::machine::clock;
 use executive::run::platform::KERNEL;
 use executive::run::{execution, worker};
 use front::app::ending::Ending;
+use front::json;
 
 const PERIOD: Duration = Duration::from_millis(1);
 const JOBS: u64 = 20;
@@ -33,7 +34,7 @@ const INTO_IT: Duration = Duration::from_micros(100);
 const WIDE: usize = 16;
 const LONG: usize = 16;
 /// How many DAGs are released at one instant.
-pub(super) const AT_ONCE: u64 = 10;
+const AT_ONCE: u64 = 10;
 /// How many are due while that is being decided, and how far from each other.
 const DURING_IT: u32 = 4;
 const APART: Duration = Duration::from_micros(2);
@@ -42,8 +43,36 @@ const BUDGET: Duration = Duration::from_secs(10);
 /// Time for the cores to get ready.
 const LEAD_NS: u64 = 100_000;
 
+/// Measures, and has the commits to come charge it with this margin.
+pub(super) fn charge(margin_percent: u32) -> Result<(), Ending> {
+    let costs = run()?;
+    let overheads = Overheads::measured(&costs, margin_percent, AT_ONCE);
+    KERNEL.change(|terms| {
+        terms.overheads = overheads;
+        terms.overhead_source = OverheadSource::Measured {
+            dispatches: costs.dispatches,
+            margin_percent,
+        };
+    });
+    crate::println!(
+        "overheads measured: {costs}; with a margin of {margin_percent} %: overheads_ns={},{},{},{}",
+        overheads.context_switch_ns,
+        overheads.dispatch_ns,
+        overheads.interrupt_ns,
+        overheads.ready_ns
+    );
+    json::emit("overheads", |line| {
+        line.number("dispatches", costs.dispatches)
+            .number("owed_ns", costs.owed_ns)
+            .number("releases", costs.releases)
+            .number("late_ns", costs.late_ns)
+            .number("margin_percent", margin_percent);
+    });
+    Ok(())
+}
+
 /// Runs them, and returns what they have shown.
-pub(super) fn run() -> Result<Costs, Ending> {
+fn run() -> Result<Costs, Ending> {
     KERNEL.set_calibration(true);
     let committed = finish_create_dags_with(&dags(), ConstructionPolicy::any_graph());
     KERNEL.set_calibration(false);

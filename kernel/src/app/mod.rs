@@ -9,4 +9,3 @@ pub(crate) mod bare_machine;
 mod calibration;
 pub(crate) mod event;
 pub(crate) mod lock;
-mod overheads;

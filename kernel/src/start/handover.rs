@@ -18,19 +18,20 @@ use crate::watch::{self, panic};
 use executive::interrupts;
 use executive::machine::calibration::{self, Rate};
 use executive::machine::known_clock::KnownClock;
+use executive::machine::paging::MapError;
 use executive::machine::power::{self, End};
 use executive::machine::this_core::{self, Stacks};
 use executive::machine::{
     agreement, avx, clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic,
     processors, screen, serial, topology,
 };
-use executive::memory::{self, OutOfMemory};
+use executive::memory;
 use executive::run::platform::KERNEL;
-use executive::run::{containment, contexts, edge, heartbeat, worker};
+use executive::run::{containment, contexts, heartbeat, worker};
 use executive::text::console;
-use front::app::bound_verdict::BoundVerdict;
-use front::app::ending::{self, Ending, Told};
+use front::app::ending::{self, Ending};
 use front::app::terms;
+use front::app::verdict::Verdict;
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
@@ -316,7 +317,7 @@ fn with_stacks(ids: Vec<u32>) -> impl Iterator<Item = (u32, Stacks)> {
     })
 }
 
-fn stacks(is_boot_processor: bool) -> Result<Stacks, OutOfMemory> {
+fn stacks(is_boot_processor: bool) -> Result<Stacks, MapError> {
     let small = || memory::new_stack(HANDLER_STACK, 0);
     Ok(Stacks {
         first_context: contexts::create_first(is_boot_processor)?,
@@ -351,35 +352,26 @@ fn run_app(
     let settings = settings::apply(&options, processors)?;
     let (wcets, module) = terms::split_wcets(&options, module_bytes(info))?;
     KERNEL.change(|terms| terms.wcets = wcets.map(Cow::Borrowed));
-    let module = settings.set_wish(name, module)?;
+    let module = settings::set_wish(&options, name, module)?;
     let mode = info.value("mode");
-    let bounds = BoundVerdict::new(
+    let verdict = Verdict::new(
         settings.chosen.judges_bounds && mode != Some("threads"),
         mode == Some("deterministic") && this_core::all().len() > 1,
     );
     let wishes = settings.wishes;
-    let result = Machine::serve(
+    Machine::serve(
         BareMachine::new(wishes),
         options,
         settings.chosen,
         module,
-        bounds,
+        verdict,
         app,
-    );
-    let [refusal, complaint] = edge::objections();
-    if let Some(refusal) = refusal {
-        return Err(usage(&refusal));
-    }
-    Ending::or_complaint(result, complaint)
+    )
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.
 fn end(result: Result<(), Ending>) -> ! {
-    let status = match ending::tell(&result) {
-        Told::Success => exit::Status::Success,
-        Told::Usage => exit::Status::Usage,
-        Told::Failure => exit::Status::Failure,
-    };
+    let told = ending::tell(&result);
     console::resume();
-    exit::exit(status)
+    exit::exit(told)
 }

@@ -42,48 +42,45 @@ use front::app::terms::{self, Chosen};
 pub(crate) struct Settings {
     /// What they say everywhere.
     pub(crate) chosen: Chosen,
-    /// How many bytes of the loader's module, behind the WCETs, are a recording to replay.
-    replay_bytes: u64,
-    /// How many KiB of memory a recording may wait in; 0: nothing is recorded.
-    record_kib: u64,
-    /// The same, also where no topic is recorded.
-    keep_kib: u64,
-    /// Of how many jobs the inputs are kept, where nothing is recorded or replayed.
-    latest_jobs: u64,
     /// What else people want to see, and say.
     pub(crate) wishes: Wishes,
 }
 
-impl Settings {
-    /// Has the runs to come recorded or replayed, if the words say so. Returns what is left of
-    /// the module.
-    pub(crate) fn set_wish(
-        &self,
-        app: &'static str,
-        mut module: Option<&'static [u8]>,
-    ) -> Result<Option<&'static [u8]>, UsageError> {
-        if self.replay_bytes > 0 {
+/// Has the runs to come recorded or replayed, if the words say so. Returns what is left of the
+/// module.
+pub(crate) fn set_wish(
+    options: &Options<'_>,
+    app: &'static str,
+    mut module: Option<&'static [u8]>,
+) -> Result<Option<&'static [u8]>, UsageError> {
+    let replay_bytes = options.number("replay", 0..=1 << 32, 0)?;
+    let record_kib = options.number("record", 0..=1 << 20, 0)?;
+    let kib = record_kib.max(options.number("keep", 0..=1 << 20, 0)?);
+    let jobs = options.number("latest", 0..=64, 16)?;
+    let wish = match (replay_bytes, kib, jobs) {
+        (1.., 1.., _) => {
+            let line = "`record` and `keep` exclude `replay`; give one";
+            return Err(UsageError::new(line));
+        }
+        (1.., 0, _) => {
             let shorter = || UsageError::new("`replay`: the module is shorter than that");
-            let (recording, rest) = terms::split(module, self.replay_bytes).ok_or_else(shorter)?;
-            edge::set_wish(Wish::Replay(recording)).map_err(UsageError::new)?;
+            let (recording, rest) = terms::split(module, replay_bytes).ok_or_else(shorter)?;
             module = rest;
+            Wish::Replay(recording)
         }
-        let kib = self.record_kib.max(self.keep_kib);
-        if kib > 0 {
-            let bytes = usize::try_from(kib * 1024).unwrap_or(0);
-            let is_needed = self.record_kib > 0;
-            let wish = Wish::Record {
-                app,
-                bytes,
-                is_needed,
-            };
-            edge::set_wish(wish).map_err(UsageError::new)?;
-        } else if self.replay_bytes == 0 && self.latest_jobs > 0 {
-            let jobs = u32::try_from(self.latest_jobs).unwrap_or(0);
-            edge::set_wish(Wish::Latest { app, jobs }).map_err(UsageError::new)?;
-        }
-        Ok(module)
-    }
+        (0, 1.., _) => Wish::Record {
+            app,
+            bytes: usize::try_from(kib * 1024).unwrap_or(0),
+            is_needed: record_kib > 0,
+        },
+        (0, 0, 1..) => Wish::Latest {
+            app,
+            jobs: u32::try_from(jobs).unwrap_or(0),
+        },
+        (0, 0, 0) => return Ok(module),
+    };
+    edge::set_wish(wish).map_err(UsageError::new)?;
+    Ok(module)
 }
 
 /// Takes the kernel's words and does what they say.
@@ -131,21 +128,8 @@ pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings
         ("echo", (Some(Echo::On), true)),
     ];
     let (console, stops) = options.choice("console", &consoles)?;
-    let replay_bytes = options.number("replay", 0..=1 << 32, 0)?;
-    let record_kib = options.number("record", 0..=1 << 20, 0)?;
-    let keep_kib = options.number("keep", 0..=1 << 20, 0)?;
-    let latest_jobs = options.number("latest", 0..=64, 16)?;
-    if replay_bytes > 0 && record_kib.max(keep_kib) > 0 {
-        return Err(UsageError::new(
-            "`record` and `keep` exclude `replay`; give one",
-        ));
-    }
     Ok(Settings {
         chosen,
-        replay_bytes,
-        record_kib,
-        keep_kib,
-        latest_jobs,
         wishes: Wishes {
             console,
             stops,

@@ -20,6 +20,7 @@ use executive::run::execution;
 use executive::text::backtrace::Spot;
 use executive::text::console::{write_in_emergency, write_line_in_emergency};
 use fass::edge::Excerpt;
+use front::app::ending::Told;
 use front::json;
 
 /// The most recent events of this core that a report shows.
@@ -76,7 +77,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
             ));
             give_verdict(&what)
         }
-        Err(FAILED) => exit::exit(exit::Status::Failure),
+        Err(FAILED) => exit::exit(Told::Failure),
         // Another core reports, and is about to stop this one.
         Err(_) => cpu::halt_forever(),
     }
@@ -138,5 +139,5 @@ fn give_verdict(what: &dyn Display) -> ! {
         line.text("status", "failure").text("reason", what);
     });
     write_line_in_emergency(&verdict);
-    exit::exit(exit::Status::Failure)
+    exit::exit(Told::Failure)
 }

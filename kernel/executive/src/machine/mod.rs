@@ -29,7 +29,7 @@ pub mod local_apic;
 mod machine_check;
 mod meter;
 pub mod non_maskable;
-pub(crate) mod paging;
+pub mod paging;
 pub mod paint;
 pub(crate) mod port;
 pub mod power;

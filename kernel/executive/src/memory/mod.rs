@@ -22,16 +22,6 @@ const STACK_WINDOW: u64 = MEMORY_END;
 /// Where the module is: its physical address beyond this one.
 pub const MODULE_WINDOW: u64 = 1 << 40;
 
-/// There is not enough memory for what was asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OutOfMemory;
-
-impl From<MapError> for OutOfMemory {
-    fn from(_: MapError) -> Self {
-        Self
-    }
-}
-
 /// The physical memory and the address space over it.
 #[derive(Debug)]
 struct Memory {
@@ -204,9 +194,9 @@ fn take_zeroed(frames: &mut Frames) -> Option<u64> {
 
 /// Creates a stack of `bytes`, whole pages, with a guard page below it, and returns its top.
 /// Below that it can grow to `room`.
-pub fn new_stack(bytes: u64, room: u64) -> Result<u64, OutOfMemory> {
+pub fn new_stack(bytes: u64, room: u64) -> Result<u64, MapError> {
     let mut memory = MEMORY.lock();
-    let memory = memory.as_mut().ok_or(OutOfMemory)?;
+    let memory = memory.as_mut().ok_or(MapError::OutOfFrames)?;
     let top = memory.next_stack + PAGE + bytes.max(room);
     memory.map_stack(top - bytes..top)?;
     memory.next_stack = top;
@@ -214,18 +204,21 @@ pub fn new_stack(bytes: u64, room: u64) -> Result<u64, OutOfMemory> {
 }
 
 /// Makes a stack reach down from `from`, where it has room, to `to`.
-pub fn grow_stack(from: u64, to: u64) -> Result<(), OutOfMemory> {
+pub fn grow_stack(from: u64, to: u64) -> Result<(), MapError> {
     let mut memory = MEMORY.lock();
-    memory.as_mut().ok_or(OutOfMemory)?.map_stack(to..from)
+    memory
+        .as_mut()
+        .ok_or(MapError::OutOfFrames)?
+        .map_stack(to..from)
 }
 
 impl Memory {
     /// Puts frames below a part of the window, whole pages.
     #[inline(never)]
-    fn map_stack(&mut self, part: Range<u64>) -> Result<(), OutOfMemory> {
+    fn map_stack(&mut self, part: Range<u64>) -> Result<(), MapError> {
         let Memory { frames, table, .. } = self;
         let pages = (part.end - part.start) / PAGE;
-        let physical = frames.take(pages).ok_or(OutOfMemory)?;
+        let physical = frames.take(pages).ok_or(MapError::OutOfFrames)?;
         table.map(part, physical, Access::Data, &mut || take_zeroed(frames))?;
         Ok(())
     }

@@ -15,9 +15,10 @@ use alloc::vec::Vec;
 use sched_dag::TaskSet;
 
 use crate::machine::context::Parked;
+use crate::machine::paging::MapError;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::{interrupt, this_core};
-use crate::memory::{self, OutOfMemory};
+use crate::memory;
 
 /// The stack of a context for subtasks that state none, in bytes.
 const STACK_BYTES: u64 = 64 * 1024;
@@ -42,7 +43,7 @@ static STOCK: SpinLock<Stock> = SpinLock::new(Stock {
 });
 
 /// Makes the context that a core begins with.
-pub fn create_first(is_background: bool) -> Result<Parked, OutOfMemory> {
+pub fn create_first(is_background: bool) -> Result<Parked, MapError> {
     let (bytes, room) = match is_background {
         true => (MAIN_STACK_BYTES, 0),
         false => (STACK_BYTES, *sched_dag::STACK_BYTES.end()),
@@ -50,7 +51,7 @@ pub fn create_first(is_background: bool) -> Result<Parked, OutOfMemory> {
     create(bytes, room, is_background)
 }
 
-fn create(bytes: u64, room: u64, is_background: bool) -> Result<Parked, OutOfMemory> {
+fn create(bytes: u64, room: u64, is_background: bool) -> Result<Parked, MapError> {
     let top = memory::new_stack(bytes, room)?;
     Ok(Parked::new(top, bytes, is_background))
 }
@@ -65,7 +66,7 @@ pub fn stack_bytes(task_set: &TaskSet) -> u64 {
 /// Makes sure that all stacks have so many bytes, which the first call settles; returns how many
 /// they have. No core runs anything of a DAG.
 #[inline(never)]
-pub fn settle(bytes: u64) -> Result<u64, OutOfMemory> {
+pub fn settle(bytes: u64) -> Result<u64, MapError> {
     let settled = STOCK.lock().stack_bytes;
     if settled > 0 {
         return Ok(settled);
@@ -83,7 +84,7 @@ pub fn settle(bytes: u64) -> Result<u64, OutOfMemory> {
 }
 
 /// Makes sure that there are `total` contexts in the stock or in use from it.
-pub fn provide(total: usize) -> Result<(), OutOfMemory> {
+pub fn provide(total: usize) -> Result<(), MapError> {
     let stock = STOCK.lock();
     let (existing, bytes) = (stock.total, stock.stack_bytes);
     drop(stock);

@@ -4,18 +4,18 @@
 //! What a system does itself is in its [`System`], by which each crate that apps know as `kernel`
 //! names its own `Machine`.
 
+use alloc::string::String;
 use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
 use fass::{Policy, Preemption, Signal, Terms, Wire};
 use sched_dag::engine::Run;
 
-use super::bound_verdict::BoundVerdict;
 use super::ending::Ending;
-use super::fault_verdict::FaultVerdict;
 use super::terms::Chosen;
+use super::verdict::Verdict;
 use super::wcet_notes;
-use crate::options::Options;
+use crate::options::{Options, UsageError};
 use crate::report::memory::Memory;
 use crate::report::{times, trace};
 use crate::shell::LiveRun;
@@ -68,6 +68,10 @@ pub trait System: Sized {
         (0, 0)
     }
 
+    /// Returns what was wrong with a recording: why it could not be replayed, and what makes the app
+    /// fail, if anything was.
+    fn objections() -> [Option<String>; 2];
+
     /// Returns what memory is needed.
     fn memory() -> Memory;
 }
@@ -102,10 +106,8 @@ pub struct Machine<S> {
     input: RefCell<Option<Signal>>,
     /// How many runs have ended.
     runs: Cell<u64>,
-    /// Whether faults in them make the app fail.
-    fault_verdict: FaultVerdict,
-    /// Whether response times beyond their bounds do.
-    bound_verdict: BoundVerdict,
+    /// Whether what they were like makes the app fail.
+    verdict: Verdict,
 }
 
 impl<S: System> Machine<S> {
@@ -119,7 +121,7 @@ impl<S: System> Machine<S> {
         options: Options<'static>,
         chosen: Chosen,
         module: Option<&'static [u8]>,
-        bound_verdict: BoundVerdict,
+        verdict: Verdict,
         app: fn(&Self) -> Result<(), Ending>,
     ) -> Result<(), Ending> {
         let machine = Self {
@@ -130,8 +132,7 @@ impl<S: System> Machine<S> {
             chosen,
             input: RefCell::new(None),
             runs: Cell::new(0),
-            fault_verdict: FaultVerdict::default(),
-            bound_verdict,
+            verdict,
         };
         let result = app(&machine);
         if result.is_ok() && machine.module.get().is_some() && !machine.has_asked.get() {
@@ -139,8 +140,11 @@ impl<S: System> Machine<S> {
                 "warning: the app takes no file, and has not looked at the one it was given"
             );
         }
-        let result = machine.fault_verdict.judge(result);
-        machine.bound_verdict.judge(result)
+        let complaint = machine.verdict.complaint();
+        match S::objections() {
+            [Some(refusal), _] => Err(UsageError::new(refusal).into()),
+            [None, other] => Ending::or_complaint(result, complaint.or(other)),
+        }
     }
 
     /// Returns the words of the command line that the kernel left to the app.
@@ -245,7 +249,7 @@ impl<S: System> Machine<S> {
     /// }
     /// ```
     pub fn accept_faults(&self) {
-        self.fault_verdict.accept();
+        self.verdict.accept_faults();
     }
 
     /// Leaves it to the app to judge response times beyond their proven bounds. Unless
@@ -259,7 +263,7 @@ impl<S: System> Machine<S> {
     /// }
     /// ```
     pub fn accept_exceeded_bounds(&self) {
-        self.bound_verdict.accept();
+        self.verdict.accept_exceeded_bounds();
     }
 
     /// Runs the committed DAGs until each has ended all its jobs.
@@ -301,9 +305,7 @@ impl<S: System> Machine<S> {
     #[inline(never)]
     fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, Ending> {
         let run = self.system.run(epoch_ns, self.input.borrow().as_ref())?;
-        let faults = |dag| run.statistics(dag).faults - run.statistics(dag).restarts;
-        self.fault_verdict.note(run.task_set(), faults);
-        self.bound_verdict.note(&run);
+        self.verdict.note(&run);
         wcet_notes::note(&run, self.system.terms().overheads);
         if self.chosen.dumps_times {
             times::dump(&run);

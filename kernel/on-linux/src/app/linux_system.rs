@@ -1,15 +1,14 @@
 //! What Linux does for an app's machine: so many cores of this computer.
 
 use std::cell::{Cell, RefCell};
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
 use std::time::Duration;
 
 use fass::{Signal, Terms, Wire};
-use linux::{EndSignals, Linux};
+use linux::{Connection, EndSignals, Linux};
 
 use super::console;
-use super::ends::Ends;
 use crate::heap;
 use front::app::division::Divisible;
 use front::app::ending::Ending;
@@ -36,6 +35,35 @@ pub struct LinuxSystem {
     pub(crate) has_console: bool,
     /// Whether a person has ended the latest run at the console.
     pub(crate) is_closed: Cell<bool>,
+}
+
+/// The ends of an app's wire: where bytes come from, and where they go.
+#[derive(Clone, Debug)]
+pub(crate) struct Ends {
+    wire: Wire,
+    /// Whether bytes come on standard input.
+    is_live: bool,
+    /// The file that bytes go to.
+    output: Option<&'static str>,
+}
+
+impl Ends {
+    /// Connects them for a run that is committed.
+    fn connect(&self, machine: &Linux) -> Result<Connection, Ending> {
+        let input: Box<dyn Read + Send> = match self.is_live {
+            true => Box::new(io::stdin()),
+            false => Box::new(io::empty()),
+        };
+        let output: Box<dyn Write + Send> = match self.output {
+            Some(path) => Box::new(
+                File::create(path)
+                    .map_err(|why| UsageError::new(format!("`output={path}`: {why}")))?,
+            ),
+            None => Box::new(io::sink()),
+        };
+        let connected = machine.connect(&self.wire, input, output);
+        connected.map_err(|why| Ending::Failure(format!("wire `{}`: {why}", self.wire.name())))
+    }
 }
 
 impl System for LinuxSystem {
@@ -154,6 +182,10 @@ impl System for LinuxSystem {
         let line = "`overheads`: what Linux costs is not measured; state it by `overheads_ns=`, \
                     or run the app on the machine";
         Err(UsageError::new(line).into())
+    }
+
+    fn objections() -> [Option<String>; 2] {
+        Linux::objections()
     }
 
     fn memory() -> Memory {

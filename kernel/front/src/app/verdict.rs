@@ -1,4 +1,8 @@
-//! Whether a response time beyond its proven bound makes the app fail.
+//! Whether faults, and response times beyond their proven bounds, make the app fail.
+//!
+//! An app that ignores a fault in one of its DAGs has failed, and so says its verdict. An
+//! app to which faults belong says so
+//! (`Machine::accept_faults`) and judges them by itself.
 //!
 //! A bound holds as long as no instance takes longer than its WCET, and the machine no
 //! longer than the overheads that the commit was told. So a job that took longer shows
@@ -15,24 +19,26 @@ use alloc::string::String;
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use sched_dag::engine::Run;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
-use super::ending::Ending;
 use crate::report::Ns;
 use crate::text::json;
-use sched_dag::engine::Run;
 
 /// Whether the app was compiled without optimization, as its entry says.
 pub static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
 
-/// What is known of bounds in the runs so far.
+/// What is known of faults and bounds in the runs so far.
 #[derive(Debug)]
-pub struct BoundVerdict {
-    are_judged: Cell<bool>,
+pub struct Verdict {
+    judges_faults: Cell<bool>,
+    judges_bounds: Cell<bool>,
     /// Whether several cores share one clock.
     shares_clock: bool,
-    /// Why the app fails, if it does.
-    complaint: RefCell<Option<String>>,
+    /// Why the app fails for a fault, if it does.
+    fault: RefCell<Option<String>>,
+    /// Why the app fails for a bound, if it does.
+    exceeded: RefCell<Option<String>>,
 }
 
 /// The jobs of a DAG that took longer than is proven, until all of them or one sink had
@@ -47,25 +53,35 @@ struct Exceeded {
     bound_ns: u64,
 }
 
-impl BoundVerdict {
+impl Verdict {
     /// Begins without a run. `shares_clock`: several cores share one clock.
     #[must_use]
-    pub const fn new(are_judged: bool, shares_clock: bool) -> Self {
+    pub const fn new(judges_bounds: bool, shares_clock: bool) -> Self {
         Self {
-            are_judged: Cell::new(are_judged),
+            judges_faults: Cell::new(true),
+            judges_bounds: Cell::new(judges_bounds),
             shares_clock,
-            complaint: RefCell::new(None),
+            fault: RefCell::new(None),
+            exceeded: RefCell::new(None),
         }
     }
 
-    /// Leaves the bounds of all runs to the app.
-    pub fn accept(&self) {
-        self.are_judged.set(false);
+    /// Leaves the faults of all runs to the app.
+    pub fn accept_faults(&self) {
+        self.judges_faults.set(false);
     }
 
-    /// Says which DAGs of a run took longer than is proven, and notes it. Allocates
-    /// only if there are any.
+    /// Leaves the bounds of all runs to the app.
+    pub fn accept_exceeded_bounds(&self) {
+        self.judges_bounds.set(false);
+    }
+
+    /// Notes which DAGs of a run have been ended by faults, and says and notes which took longer
+    /// than is proven. Allocates only if there are any.
     pub fn note(&self, run: &Run) {
+        self.note_faults(run.task_set(), |dag| {
+            run.statistics(dag).faults - run.statistics(dag).restarts
+        });
         let dags = (0..).map(DagId).take(run.task_set().dags().len());
         let ends = dags.flat_map(|dag| {
             let sinks = run.task_set().dag(dag).sinks();
@@ -77,16 +93,36 @@ impl BoundVerdict {
             let also = causes(is_unoptimized, self.shares_clock);
             let text = exceeded.report(run.task_set(), also);
             // What the app judges itself is not kept: it would count as in use.
-            if self.are_judged.get() {
-                self.complaint.borrow_mut().get_or_insert(text);
+            if self.judges_bounds.get() {
+                self.exceeded.borrow_mut().get_or_insert(text);
             }
         }
     }
 
-    /// Returns how an app ends whose function has returned `result`.
-    pub fn judge(&self, result: Result<(), Ending>) -> Result<(), Ending> {
-        let complaint = self.complaint.take().filter(|_| self.are_judged.get());
-        Ending::or_complaint(result, complaint)
+    fn note_faults(&self, task_set: &TaskSet, faults: impl Fn(DagId) -> u64) {
+        let dags = (0..).map(DagId).zip(task_set.dags());
+        let mut ended = dags.filter(|(dag, _)| faults(*dag) > 0);
+        let mut complaint = self.fault.borrow_mut();
+        if complaint.is_some() {
+            return;
+        }
+        *complaint = ended.next().map(|(_, dag)| {
+            let others = match ended.count() {
+                0 => String::new(),
+                count => format!(", and {count} more"),
+            };
+            format!(
+                "a fault ended dag `{}`{others}; the line that begins with `fault:` says which",
+                dag.name()
+            )
+        });
+    }
+
+    /// Takes why the app fails, if it does.
+    pub fn complaint(&self) -> Option<String> {
+        let fault = self.fault.take().filter(|_| self.judges_faults.get());
+        let exceeded = self.exceeded.take();
+        fault.or(exceeded.filter(|_| self.judges_bounds.get()))
     }
 }
 
@@ -174,5 +210,54 @@ impl Exceeded {
                 .number("bound_ns", self.bound_ns);
         });
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::ending::Ending;
+    use fass::Policy;
+    use sched_dag::{CommitOptions, DagSpec, SubtaskSpec, verify};
+
+    /// Judges an app that had one run of the DAGs `a`, `b` and `c`.
+    fn judged(faults: [u64; 3], accepts: bool, result: Result<(), Ending>) -> String {
+        let dags = ["a", "b", "c"].map(|name| DagSpec {
+            name: name.into(),
+            period_ns: Some(10),
+            relative_deadline_ns: Some(10),
+            subtasks: alloc::vec![SubtaskSpec::default()],
+            ..DagSpec::default()
+        });
+        let options = CommitOptions::new(Policy::Edf, 1);
+        let task_set = verify(&dags, &options).expect("sound DAGs").task_set;
+        let verdict = Verdict::new(true, false);
+        verdict.note_faults(&task_set, |dag| faults[dag.index()]);
+        if accepts {
+            verdict.accept_faults();
+        }
+        match Ending::or_complaint(result, verdict.complaint()) {
+            Ok(()) => "success".into(),
+            Err(ending) => format!("{ending}"),
+        }
+    }
+
+    #[test]
+    fn faults_that_nobody_has_accepted_are_a_failure() {
+        assert_eq!(judged([0; 3], false, Ok(())), "success");
+        let one = "a fault ended dag `b`; the line that begins with `fault:` says which";
+        assert_eq!(judged([0, 2, 0], false, Ok(())), one);
+        assert_eq!(judged([0, 2, 0], false, Err(Ending::Shutdown)), one);
+        assert_eq!(
+            judged([1, 0, 1], false, Ok(())),
+            "a fault ended dag `a`, and 1 more; the line that begins with `fault:` says which"
+        );
+    }
+
+    #[test]
+    fn the_app_has_the_last_word() {
+        assert_eq!(judged([1; 3], true, Ok(())), "success");
+        let own = || Err(Ending::Failure("late".into()));
+        assert_eq!(judged([1; 3], false, own()), "late");
     }
 }
