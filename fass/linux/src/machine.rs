@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use fass::{Plan, Platform as _, Preemption, Signal, Terms};
 
-use crate::control::Control;
+use crate::control::{self, Control};
 use crate::level::{Levels, USUAL_TOP};
 use crate::platform::{HOST, Threads};
 use crate::run::{self, Run};
@@ -288,7 +288,7 @@ impl Linux {
     /// committed.
     #[must_use]
     pub fn control(&self) -> Option<Control> {
-        HOST.control()
+        control::latest()
     }
 
     /// Raises a signal whenever something arrives in a file that `poll` can wait for (a
@@ -340,7 +340,7 @@ impl Linux {
             StartError("nothing is committed; call finish_create_dags first".to_owned())
         })?;
         let run = run::run(launched, epoch_ns);
-        HOST.forget();
+        control::set(None);
         Ok(run)
     }
 }
@@ -348,6 +348,6 @@ impl Linux {
 impl Drop for Linux {
     fn drop(&mut self) {
         *HOST.threads() = None;
-        HOST.forget();
+        control::set(None);
     }
 }

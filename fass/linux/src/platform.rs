@@ -1,6 +1,6 @@
 //! Linux as the platform that `fass` runs on: one for the program.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use fass::edge::Begin;
@@ -8,7 +8,7 @@ use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, Runner, T
 use sched_dag::lifecycle::{self, Parts, Request, Requests};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
 
-use crate::control::Control;
+use crate::control::{self, Control};
 use crate::edge;
 use crate::level::Levels;
 use crate::office::Office;
@@ -36,14 +36,11 @@ pub(crate) struct Threads {
 pub(crate) struct Host {
     threads: Mutex<Option<Threads>>,
     launched: Mutex<Option<Launched>>,
-    /// The run that signals from outside are for.
-    control: RwLock<Option<Control>>,
 }
 
 pub(crate) static HOST: Host = Host {
     threads: Mutex::new(None),
     launched: Mutex::new(None),
-    control: RwLock::new(None),
 };
 
 /// How much memory a journal may take its quarter of.
@@ -60,19 +57,6 @@ impl Host {
         let mut launched = self.launched.lock();
         let launched = launched.as_deref_mut();
         launched.map_or(None, Option::take)
-    }
-
-    /// Returns the run that was committed last, until it has ended.
-    pub(crate) fn control(&self) -> Option<Control> {
-        self.control.read().map_or(None, |control| control.clone())
-    }
-
-    /// Forgets the run.
-    pub(crate) fn forget(&self) {
-        self.control.clear_poison();
-        if let Ok(mut control) = self.control.write() {
-            *control = None;
-        }
     }
 }
 
@@ -112,7 +96,7 @@ impl Platform for Host {
              `dag.using(signal.raising())`"
         );
         let is_its = |control: &Control| control.office.plan == plan;
-        if let Some(control) = self.control().filter(is_its) {
+        if let Some(control) = control::latest().filter(is_its) {
             control.office.send(None, Request::Signal(dag));
         }
     }
@@ -146,7 +130,7 @@ impl Platform for Host {
             let line = "there is no `Linux` yet; make one before the commit";
             return Err(LaunchError::new(line));
         };
-        if self.control().is_some() {
+        if control::latest().is_some() {
             let line =
                 "other DAGs are committed already; run them first, or commit all in one call";
             return Err(LaunchError::new(line));
@@ -162,9 +146,7 @@ impl Platform for Host {
             teams: teams(plan, parts, &threads, &office),
             office,
         };
-        if let Ok(mut place) = self.control.write() {
-            *place = Some(control.clone());
-        }
+        control::set(Some(control.clone()));
         let launched = Launched {
             control,
             proven,

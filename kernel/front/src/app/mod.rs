@@ -4,7 +4,6 @@
 pub mod division;
 pub mod ending;
 pub mod machine;
-pub mod offered;
 mod services;
 pub mod terms;
 pub mod verdict;

@@ -10,6 +10,7 @@
 //! `console`; `dags` and `stats` print a line of kind `dag_status` for each DAG.
 
 mod input;
+pub mod offered;
 mod parameters;
 pub mod topics;
 

@@ -2,8 +2,8 @@
 
 use fass::Tunable;
 
+use super::offered::Parameters;
 use super::{Commands, Refuse};
-use crate::app::offered::Parameters;
 use crate::println;
 
 impl Commands for Parameters {

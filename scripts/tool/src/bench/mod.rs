@@ -21,8 +21,8 @@ pub mod sizes;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use crate::progress::Lasting;
 use crate::options::{Menu, choices};
+use crate::progress::Lasting;
 
 static BENCH: Menu = Menu {
     invocation: "./scripts/bench",
