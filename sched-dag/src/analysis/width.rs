@@ -25,7 +25,7 @@ use alloc::vec::Vec;
 use super::task::Task;
 
 /// Returns the width, or `None` for a DAG of more than
-/// [`SUBTASK_LIMIT`](super::SUBTASK_LIMIT) subtasks.
+/// [`SUBTASK_LIMIT`] subtasks.
 #[must_use]
 pub fn width(task: &Task) -> Option<u64> {
     let closure = Closure::of(task)?;

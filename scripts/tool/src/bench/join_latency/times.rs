@@ -66,7 +66,7 @@ pub(super) fn write(
     }
 }
 
-/// Reads what [`write`] wrote, if the statement is this one and nothing is damaged.
+/// Reads what [`write()`] wrote, if the statement is this one and nothing is damaged.
 pub(super) fn read(text: &str, statement: &str, subtasks: usize) -> Option<Samples> {
     let mut lines = text.lines();
     let is_its_own = lines.next()?.strip_prefix("# ")? == statement && lines.next()? == COLUMNS;
