@@ -116,7 +116,7 @@ impl Members for MachineLine {
 #[track_caller]
 pub fn lawful_runs(outcome: &Outcome, bound_ns: u64) -> Vec<Run> {
     let runs = trace::read(&outcome.serial);
-    let runs = runs.unwrap_or_else(|fault| panic!("line {}: {}", fault.line, fault.reason));
+    let runs = runs.unwrap_or_else(|fault| panic!("{fault}"));
     assert!(!runs.is_empty(), "no trace\n{}", outcome.tail());
     for run in &runs {
         let breaches = trace::check(run, bound_ns).breaches;

@@ -24,7 +24,7 @@ fn the_hot_path_keeps_its_bounds() {
 #[test]
 fn its_trace_tells_the_ages_that_its_values_tell() {
     let guest = Guest::new("autoware").cores(4);
-    let outcome = guest.word("jobs=40 trace=dump graph=dump").succeed();
+    let outcome = guest.word("jobs=40 events=on").succeed();
     let line = outcome.line("autoware");
 
     let mut runs = tool::trace::read(&outcome.serial).expect("a trace");
@@ -34,7 +34,7 @@ fn its_trace_tells_the_ages_that_its_values_tell() {
         place("lidar/FrontLidarDriver"),
         place("behaviour/VehicleDBWSystem"),
     );
-    let chains = Chain::between(&run.task_set, &run.committed.samplings, ends.0, ends.1);
+    let chains = Chain::between(&run.task_set, &run.samplings, ends.0, ends.1);
     // By the obstacles, by the pose, and by four topics of `route`, which samples the pose.
     assert_eq!(chains.len(), 6, "{chains:?}");
     let by_obstacles = |chain: &&Chain| {
@@ -43,7 +43,7 @@ fn its_trace_tells_the_ages_that_its_values_tell() {
     };
     let chain = chains.iter().find(by_obstacles).expect("the hot path");
     let times = chain.latencies(&run.task_set, run.events.iter().copied());
-    let bounds_ns = &run.committed.bounds_ns;
+    let bounds_ns = &run.bounds_ns;
     let bound_ns = chain.output_age_bound_ns(&run.task_set, bounds_ns);
     assert_eq!(bound_ns.ok(), line.number_at("to_vehicle_bound_ns"));
     let reaction_ns = times.reaction_ns.iter().max().copied().expect("some");

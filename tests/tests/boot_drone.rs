@@ -60,7 +60,7 @@ fn a_camera_that_fails_costs_a_frame_within_its_limit_and_beyond_it_the_drone_is
 
 #[test]
 fn a_reserve_that_is_set_at_boot_sends_it_down_early_in_the_mode_of_the_landing() {
-    let outcome = drone("seconds=2 set=reserve=95 trace=dump").succeed();
+    let outcome = drone("seconds=2 set=reserve=95 events=on").succeed();
     let line = outcome.line("drone");
     line.has([
         ("landed", 1),

@@ -53,7 +53,7 @@ fn every_job_joins() {
 fn every_job_joins_while_its_subtasks_compute() {
     // Some 300 million instructions each: all cores compute in one clock.
     for cores in [1, 2, 4, 8] {
-        let words = "jobs=6 subtasks=2 work=compute trace=dump";
+        let words = "jobs=6 subtasks=2 work=compute events=on";
         let outcome = demo(cores, words).succeed();
         joins_are_right(&outcome, 6, &[2]);
         assert_eq!(lawful_runs(&outcome, bound::COUNTED_NS)[0].lost, 0);

@@ -55,7 +55,7 @@ fn longest_of_the_source(run: &Run) -> u64 {
 fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
     for cores in [1, 2, 4, 8] {
         for policy in ["static", "edf"] {
-            let words = format!("ms=500 rounds=6 budgets=yes trace=dump policy={policy}");
+            let words = format!("ms=500 rounds=6 budgets=yes events=on policy={policy}");
             let guest = preemption(Mode::Deterministic, cores).word(&words);
             let outcome = guest.succeed();
             keeps_all(&outcome, true, 100);

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
-use harness::{Guest, Members, Said};
+use harness::{Guest, Members, Said, lawful_runs};
 use recording::{Entry, Recordable, Recording, What};
 use tool::protocol::Status;
 use tool::{Machine, recordings, system};
@@ -188,5 +188,14 @@ fn a_recording_that_does_not_fit_is_refused() {
         Guest::test("overrun").replays(&file.0),
         "`replay`: no topic of the app is recorded",
     );
-    refused(guest("record=64"), "there is no debug port at 0x402");
+}
+
+#[test]
+fn without_a_debug_port_the_record_goes_to_the_console() {
+    let outcome = guest("record=256").cores(2).succeed();
+    let bytes = tool::record::bytes_of_log(&outcome.serial).expect("whole lines");
+    let recording = Recording::read(&bytes).expect("it is whole");
+    assert_eq!((recording.lost(), recording.is_cut()), (0, false));
+    assert!(recording.count() > 100, "{}", recording.count());
+    assert_eq!(lawful_runs(&outcome, u64::MAX).len(), 1);
 }

@@ -27,7 +27,7 @@ fn run(mut run: impl FnMut(u64) -> Transcript) {
 #[test]
 fn each_scenario_is_as_it_says() {
     run(|cores| {
-        let guest = Guest::test("scenarios").word("trace=dump").cores(cores);
+        let guest = Guest::test("scenarios").word("events=on").cores(cores);
         let outcome = guest.succeed();
         let runs = lawful_runs(&outcome, COUNTED_NS);
         assert!(runs.iter().all(|run| run.complete && run.lost == 0));

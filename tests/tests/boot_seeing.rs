@@ -2,6 +2,7 @@
 //! guest that runs until it is told to end, its status, and its graph.
 
 use harness::{Guest, Members, Said, lawful_runs};
+use recording::Counted;
 use tool::Outcome;
 use tool::json::Value;
 use tool::protocol::MachineLine;
@@ -92,7 +93,7 @@ fn a_trace_that_was_off_for_a_while_holds_what_came_after() {
         (endless(), 1_000_000_000),
         (endless().in_real_time(), u64::MAX),
     ] {
-        let guest = guest.word("trace=dump").conversation(&conversation);
+        let guest = guest.word("events=on").conversation(&conversation);
         let runs = lawful_runs(&guest.succeed(), bound_ns);
         let [run] = &runs[..] else {
             panic!("{} runs", runs.len());
@@ -133,29 +134,27 @@ fn elements<'l>(line: &'l MachineLine, list: &str) -> &'l [Value] {
     line.value.get(list).expect(list).elements()
 }
 
-/// The names that begin the elements of a list.
-fn names<'l>(line: &'l MachineLine, list: &str) -> Vec<&'l str> {
-    let name = |element: &'l Value| element.elements()[0].as_text();
-    elements(line, list).iter().filter_map(name).collect()
-}
-
 #[test]
-fn each_commit_prints_its_dags_if_asked() {
+fn each_commit_is_in_the_record() {
     let guest = Guest::new("fork-join").word("jobs=2 subtasks=2,3");
-    let outcome = guest.cores(4).word("graph=dump").succeed();
-    let lines = outcome.lines("graph");
-    let [first, second] = lines[..] else {
-        panic!("{} lines\n{}", lines.len(), outcome.tail());
+    let outcome = guest.cores(4).word("events=on").succeed();
+    let record = outcome.record().expect("it is whole");
+    let [first, second] = &record.commits[..] else {
+        panic!("{} commits\n{}", record.commits.len(), outcome.tail());
     };
-    first.has([("commit", 0)]);
-    second.has([("commit", 1)]);
-    let subtasks = ["source", "parallel-0", "parallel-1", "sink"];
-    assert_eq!(names(first, "subtasks"), subtasks);
-    assert_eq!(names(first, "topics"), ["job", "part-0", "part-1"]);
-    let expected = tool::json::parse(r#"["job","u64",0,[1,2],0]"#).expect("JSON");
-    assert_eq!(elements(first, "topics")[0], expected);
+    assert_eq!((first.number, second.number), (0, 1));
+    let dag = &first.told.dags[0];
+    let names: Vec<&str> = dag.subtasks.iter().map(|subtask| &*subtask.name).collect();
+    assert_eq!(names, ["source", "parallel-0", "parallel-1", "sink"]);
+    let names: Vec<&str> = dag.topics.iter().map(|topic| &*topic.name).collect();
+    assert_eq!(names, ["job", "part-0", "part-1"]);
+    let job = &dag.topics[0];
+    assert_eq!(
+        (&*job.type_name, job.writer, &job.readers[..]),
+        ("u64", 0, &[1, 2][..])
+    );
 
-    let dot = tool::dot::text(&outcome.transcript).expect("good lines");
+    let dot = tool::dot::text(&record).expect("a commit");
     for part in [
         "c0_d0_s0 -> c0_d0_s2 [label=\"job: u64\"];",
         "label=\"parallel-0\\nWCET 50 ms\\npriority 1\"",
@@ -168,24 +167,16 @@ fn each_commit_prints_its_dags_if_asked() {
 /// `dot` draws an arrow for each.
 #[test]
 fn each_dag_tells_what_it_samples_of_others() {
-    let guest = Guest::new("autoware").cores(4).word("jobs=1 graph=dump");
+    let guest = Guest::new("autoware").cores(4).word("jobs=1 events=on");
     let outcome = guest.succeed();
-    let lines = outcome.lines("graph");
-    let name = |dag: u64, list: &str, index: u64| {
-        let line = lines.iter().find(|line| line.number_at("dag") == Some(dag));
-        names(line.expect("the DAG"), list)[usize::try_from(index).expect("small")]
-    };
+    let record = outcome.record().expect("it is whole");
+    let dags = &record.commits[0].told.dags;
     let mut samples = Vec::new();
-    for line in &lines {
-        for sample in elements(line, "samples") {
-            let numbers = sample.elements().iter().map(Value::as_u64);
-            let numbers: Option<Vec<u64>> = numbers.collect();
-            let [reader, writer_dag, topic, _] = numbers.expect("all are proven")[..] else {
-                panic!("{}", line.text);
-            };
-            let topic = name(writer_dag, "topics", topic);
-            let reader = name(line.number("dag"), "subtasks", reader);
-            samples.push(format!("{topic} {reader}"));
+    for dag in dags {
+        for &(reader, writer, topic, bound_ns) in &dag.samples {
+            assert!(bound_ns.is_some(), "all are proven");
+            let topic = &dags[writer as usize].topics[topic as usize].name;
+            samples.push(format!("{topic} {}", dag.subtasks[reader as usize].name));
         }
     }
     assert_eq!(
@@ -233,24 +224,17 @@ fn a_fast_dag_without_end_hides_no_progress_and_makes_none() {
 #[test]
 fn a_run_longer_than_its_journal_keeps_its_latest_jobs_and_all_statistics() {
     let guest = Guest::new("fork-join").cores(4).word("subtasks=2 jobs=300");
-    let guest = guest.word("trace_events=1000 trace=dump times=dump");
+    let guest = guest.word("trace_events=1000 events=on");
     let outcome = guest.succeed();
-    let line = outcome.line("times_dag");
-    let first = line.number("first_recorded_job");
-    assert!((1..300).contains(&first), "{first}");
-    line.has([
-        ("response_time_ns.count", 300),
-        ("release_jitter_ns.count", 300),
-    ]);
-    let subtasks = outcome.lines("times_subtask");
-    assert_eq!(subtasks.len(), 4);
-    for (number, line) in subtasks.into_iter().enumerate() {
-        let joins = if number == 0 { 0 } else { 300 };
-        line.has([
-            ("execution_time_ns.count", 300),
-            ("join_latency_ns.count", joins),
-        ]);
-    }
+    let record = outcome.record().expect("it is whole");
+    let (_, times) = &record.times[0];
+    let count = |of: &Counted| -> u64 { of.buckets.iter().map(|(_, count)| count).sum() };
+    let [dag] = &times.dags[..] else { panic!() };
+    assert_eq!([&dag.response, &dag.release_jitter].map(count), [300, 300]);
+    let subtasks = dag.subtasks.iter();
+    let counts = subtasks.map(|of| (count(&of.execution), count(&of.join_latency)));
+    let joins: Vec<(u64, u64)> = counts.collect();
+    assert_eq!(joins, [(300, 0), (300, 300), (300, 300), (300, 300)]);
     let runs = lawful_runs(&outcome, 1_000_000);
     assert_eq!(runs[0].events.len(), 1000);
     assert!(runs[0].lost > 1000, "{}", runs[0].lost);

@@ -129,6 +129,13 @@ impl Control {
         }
     }
 
+    /// Puts it behind them again.
+    pub(crate) fn lower(&self) {
+        if let Some(levels) = self.office.levels {
+            levels.bring(sys::thread(), Role::Abandoned);
+        }
+    }
+
     /// Returns the model.
     #[must_use]
     pub fn task_set(&self) -> &Arc<TaskSet> {

@@ -11,14 +11,19 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use fass::edge::{Edge, Outgoing};
-use fass::{Clock, LaunchError, Plan, Recorded};
+use fass::edge::{Drain, Edge, Kept, Outgoing, Sink};
+use fass::{Clock, LaunchError, Plan, Recorded, Terms};
+use sched_dag::engine::Run;
 use sched_dag::{Instance, Notice};
 
+use crate::control::Control;
 use crate::sys;
 
 /// The time between two looks for what waits.
 const LOOK: Duration = Duration::from_millis(1);
+
+/// Events are looked for each so many times.
+const EVENTS: u64 = 10;
 
 static EDGE: Mutex<Edge> = Mutex::new(Edge::new());
 
@@ -28,8 +33,11 @@ static IS_ON: AtomicBool = AtomicBool::new(false);
 /// When the run's time begins, on the clock.
 static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
-/// Where a recording goes.
-pub(crate) static FILE: Mutex<Option<File>> = Mutex::new(None);
+/// The record, if one is kept.
+pub(crate) static FILE: Mutex<Option<Kept<File>>> = Mutex::new(None);
+
+/// Whether it is written during a run, too, so that it is there if the program dies.
+pub(crate) static IS_LIVE: AtomicBool = AtomicBool::new(false);
 
 /// What is left to send of the latest run.
 pub(crate) static LEFT: Mutex<Outgoing> = Mutex::new(None);
@@ -45,6 +53,23 @@ pub(crate) struct File {
     pub(crate) failure: Option<io::Error>,
 }
 
+impl File {
+    /// Leaves nothing in memory, so that it is there if the program dies.
+    pub(crate) fn flush(&mut self) {
+        if self.failure.is_none() {
+            self.failure = self.writer.flush().err();
+        }
+    }
+}
+
+impl Sink for File {
+    fn put(&mut self, bytes: &[u8]) {
+        if self.failure.is_none() {
+            self.failure = self.writer.write_all(bytes).err();
+        }
+    }
+}
+
 pub(crate) fn unpoisoned<T>(lock: &'static Mutex<T>) -> MutexGuard<'static, T> {
     lock.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -52,14 +77,6 @@ pub(crate) fn unpoisoned<T>(lock: &'static Mutex<T>) -> MutexGuard<'static, T> {
 /// Returns the edge.
 pub(crate) fn get() -> MutexGuard<'static, Edge> {
     unpoisoned(&EDGE)
-}
-
-pub(crate) fn send(bytes: &[u8]) {
-    if let Some(file) = &mut *unpoisoned(&FILE)
-        && file.failure.is_none()
-    {
-        file.failure = file.writer.write_all(bytes).err();
-    }
 }
 
 fn of_run(clock_ns: u64) -> u64 {
@@ -75,11 +92,20 @@ static TOLD: Clock = || {
 /// Makes a plan one that is recorded or replayed, if that is wished.
 pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     let mut edge = get();
-    if edge.launch(plan, &mut send).map_err(LaunchError::new)? {
+    let mut file = unpoisoned(&FILE);
+    let launched = edge.launch(plan, file.as_mut().map(Kept::file));
+    if launched.map_err(LaunchError::new)? {
         fass::set_clock(&TOLD);
     }
     IS_ON.store(edge.is_on(), Ordering::Relaxed);
     Ok(())
+}
+
+/// Takes what is committed.
+pub(crate) fn commit(plan: &Plan, terms: &Terms) {
+    if let Some(file) = &mut *unpoisoned(&FILE) {
+        file.commit(plan, terms);
+    }
 }
 
 /// Takes note of what this thread runs from now on.
@@ -116,21 +142,56 @@ pub(crate) struct Sending {
 }
 
 /// Begins to send, if there is anything.
-pub(crate) fn begin_run(epoch_ns: u64) -> Option<Sending> {
+pub(crate) fn begin_run(epoch_ns: u64, control: Control) -> Option<Sending> {
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
-    let mut outgoing = get().begin_run(epoch_ns)?;
+    let mut outgoing = get().begin_run(epoch_ns);
+    let takes_events = IS_LIVE.load(Ordering::Relaxed);
+    if outgoing.is_none() && !takes_events {
+        return None;
+    }
     let is_over = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&is_over);
     let work = move || {
-        while !seen.load(Ordering::Acquire) {
-            while outgoing.step(&mut send) {}
+        for look in 0_u64.. {
+            let was_over = seen.load(Ordering::Acquire);
+            let step =
+                |drain: &mut Box<dyn Drain>| drain.step(unpoisoned(&FILE).as_mut().map(Kept::file));
+            while outgoing.as_mut().is_some_and(step) {}
+            if takes_events && (was_over || look % EVENTS == 0) {
+                take_events(&control);
+            }
+            if let Some(file) = &mut *unpoisoned(&FILE) {
+                file.sink().flush();
+            }
+            if was_over {
+                break;
+            }
             thread::sleep(LOOK);
         }
-        Some(outgoing)
+        outgoing
     };
     let thread = thread::Builder::new().name("fass-recording".into());
     let thread = thread.spawn(work).expect("the system has a thread to send");
     Some(Sending { is_over, thread })
+}
+
+/// Copies events with the level of who releases jobs, so that nobody who waits for the lock waits
+/// for those that compute.
+fn take_events(control: &Control) {
+    if let Some(file) = &mut *unpoisoned(&FILE) {
+        control.raise();
+        while file.take_events(|cluster, take| {
+            control.with_scheduler(cluster, |scheduler| take(&scheduler.log.journal));
+        }) {}
+        control.lower();
+    }
+}
+
+/// Writes how a run has ended.
+pub(crate) fn end_run(run: &Run) {
+    if let Some(file) = &mut *unpoisoned(&FILE) {
+        file.end_run(run);
+    }
 }
 
 impl Sending {

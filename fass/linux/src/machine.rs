@@ -6,7 +6,7 @@ use std::os::fd::AsFd;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use fass::{Plan, Platform as _, Preemption, Signal, Terms};
+use fass::{Platform as _, Preemption, Signal, Terms};
 
 use crate::control::{self, Control};
 use crate::level::{Levels, USUAL_TOP};
@@ -184,7 +184,6 @@ impl Linux {
             levels,
             polls: mechanism == Mechanism::Poll,
             skips_idle: false,
-            look_at_commit: |_, _| (),
             allocations: || 0,
         });
         drop(threads);
@@ -246,12 +245,6 @@ impl Linux {
     #[must_use = "the machine itself is returned"]
     pub fn skipping_idle_time(self) -> Self {
         self.set(|threads| threads.skips_idle = true)
-    }
-
-    /// Has each commit looked at: what it hands over, and on what terms.
-    #[must_use = "the machine itself is returned"]
-    pub fn at_commit(self, look: fn(&Plan, &Terms)) -> Self {
-        self.set(|threads| threads.look_at_commit = look)
     }
 
     /// Says how to count what the program has allocated so far, for

@@ -28,7 +28,6 @@ pub(crate) struct Threads {
     pub(crate) polls: bool,
     /// Whether the run's time skips what would pass idly.
     pub(crate) skips_idle: bool,
-    pub(crate) look_at_commit: fn(&Plan, &Terms),
     pub(crate) allocations: fn() -> u64,
 }
 
@@ -136,7 +135,7 @@ impl Platform for Host {
             return Err(LaunchError::new(line));
         }
         edge::launch(&mut plan)?;
-        (threads.look_at_commit)(&plan, &threads.terms);
+        edge::commit(&plan, &threads.terms);
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;
         let office = Office::new(plan.number, &plan.task_set, letters, threads.levels);

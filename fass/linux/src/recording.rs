@@ -1,17 +1,19 @@
 //! Recording and replaying, as a program asks for it.
 
 use std::io::{self, Write};
+use std::sync::atomic::Ordering;
 
-use fass::edge::{Drained, Outcome, Wish, send_rest};
+use fass::edge::{Drained, Kept, Outcome, Wish};
 
-use crate::edge::{self, FILE, File, LEFT, send, unpoisoned};
+use crate::edge::{self, FILE, File, IS_LIVE, LEFT, unpoisoned};
 use crate::machine::Linux;
 
 /// How much may wait to be sent.
 const ROOM_BYTES: usize = 8 << 20;
 
 impl Linux {
-    /// Has the run to come recorded, by the name of an app.
+    /// Keeps a record of the commits and runs to come, with the values that are recorded, by the
+    /// name of an app. What is there is written while a run goes on, too.
     ///
     /// ```no_run
     /// use std::fs::File;
@@ -21,28 +23,37 @@ impl Linux {
     /// machine.record("pump", File::create("pump.rec").expect("a file"));
     /// // build DAGs, name topics by `Dag::record`, commit
     /// machine.run().expect("it is committed");
-    /// machine.end_recording(true).expect("the file is written");
+    /// machine.end_recording(true);
+    /// Linux::end_record().expect("the file is written");
     /// ```
     pub fn record(&self, app: &'static str, to: impl Write + Send + 'static) {
         self.record_as(app, true, to);
     }
 
-    /// Works like [`record`](Self::record), and takes also a run of which nothing is recorded.
+    /// Works like [`record`](Self::record), and takes also a run of which no value is recorded.
     pub fn keep(&self, app: &'static str, to: impl Write + Send + 'static) {
         self.record_as(app, false, to);
     }
 
     fn record_as(&self, app: &'static str, is_needed: bool, to: impl Write + Send + 'static) {
-        *unpoisoned(&FILE) = Some(File {
-            writer: Box::new(to),
-            failure: None,
-        });
+        self.keep_events(to);
+        IS_LIVE.store(true, Ordering::Relaxed);
         let wish = Wish::Record {
             app,
             bytes: ROOM_BYTES,
             is_needed,
         };
         edge::get().set_wish(Box::leak(Box::new(wish)));
+    }
+
+    /// Keeps a record without values, each run of it when that is over.
+    ///
+    /// See [`record`](Self::record).
+    pub fn keep_events(&self, to: impl Write + Send + 'static) {
+        *unpoisoned(&FILE) = Some(Kept::new(File {
+            writer: Box::new(to),
+            failure: None,
+        }));
     }
 
     /// Has the run to come replay a recording.
@@ -55,23 +66,31 @@ impl Linux {
         edge::get().let_look();
     }
 
-    /// Writes the end of a recording, and returns what a replay has found, and how complete the
-    /// recording is. `is_over`: the run has not been ended before its time.
+    /// Writes the rest of what a run has recorded. Returns what a replay has found, and how
+    /// complete the recording is. `is_over`: the run has not been ended before its time.
+    ///
+    /// See [`record`](Self::record).
+    pub fn end_recording(&self, is_over: bool) -> (Option<Outcome>, Option<Drained>) {
+        let outcome = edge::get().end_run(is_over);
+        let left = unpoisoned(&LEFT).take();
+        let end = |file: &mut Kept<File>| file.end_recording(left);
+        (outcome, unpoisoned(&FILE).as_mut().and_then(end))
+    }
+
+    /// Writes the end of the record.
     ///
     /// # Errors
     ///
-    /// Why the recording could not be written.
-    pub fn end_recording(&self, is_over: bool) -> io::Result<(Option<Outcome>, Option<Drained>)> {
-        let outcome = edge::get().end_run(is_over);
-        let drained = send_rest(unpoisoned(&LEFT).take(), &mut send);
-        match unpoisoned(&FILE).take() {
-            Some(File {
-                failure: Some(failure),
-                ..
-            }) => Err(failure),
-            Some(mut file) => file.writer.flush().map(|()| (outcome, drained)),
-            None => Ok((outcome, drained)),
-        }
+    /// Why it could not be written.
+    ///
+    /// See [`record`](Self::record).
+    pub fn end_record() -> io::Result<()> {
+        let Some(file) = unpoisoned(&FILE).take() else {
+            return Ok(());
+        };
+        let mut file = file.end();
+        file.flush();
+        file.failure.map_or(Ok(()), Err)
     }
 
     /// Returns why a recording or a replay could not be, and how a replay differed from its

@@ -82,7 +82,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     for team in &**teams {
         team.lock().time = RunTime::beginning(epoch_ns);
     }
-    let sending = edge::begin_run(epoch_ns);
+    let sending = edge::begin_run(epoch_ns, launched.control.clone());
     teams.iter().for_each(|team| office.ring(team.cluster));
     office.wait_until_over();
     let allocations = (launched.allocations)() - allocations;
@@ -116,6 +116,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
         allocations,
         ..engine::Counts::default()
     });
+    edge::end_run(&run);
     Run {
         run,
         faults,

@@ -53,12 +53,13 @@ extern crate alloc;
 mod file;
 mod value;
 
+pub use file::commit::{Commit, CommittedDag, CommittedSubtask, CommittedTopic};
 pub use file::entry::{Entry, What};
 pub use file::header::{Channel, DagHeader, Header, Role};
-pub use file::read::{Entries, Recording, mended};
-pub use file::stream::Stream;
+pub use file::read::{Chunk, Entries, Events, Recording, mended};
+pub use file::stream::{Sink, Stream, Writer};
+pub use file::times::{Counted, DagTimes, SubtaskTimes, Times};
 pub use file::values::{Mismatch, Values};
-pub use file::write::Writer;
 pub use file::{MAGIC, VERSION};
 #[doc(hidden)]
 pub use value::containers::deepest;

@@ -7,8 +7,9 @@ use std::collections::BTreeSet;
 
 use random::Random;
 use recording::{
-    Channel, Crc, DagHeader, Entry, Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable,
-    Recording, Role, Schema, VERSION, What, Writer, mended, to_bytes,
+    Channel, Chunk, Commit, CommittedDag, Counted, Crc, DagHeader, DagTimes, Entry, Header, MAGIC,
+    MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Times, VERSION, What, Writer,
+    mended, to_bytes,
 };
 
 fn header() -> Header {
@@ -38,9 +39,34 @@ fn header() -> Header {
     }
 }
 
+fn commit() -> Commit {
+    Commit {
+        cores: 2,
+        dags: vec![CommittedDag {
+            name: "camera".into(),
+            edges: vec![(0, 1)],
+            bound_ns: Some(7),
+            ..CommittedDag::default()
+        }],
+        ..Commit::default()
+    }
+}
+
+fn times() -> Times {
+    let buckets = vec![(3, 1), (9, 2)];
+    Times {
+        written: vec![20],
+        dags: vec![DagTimes {
+            response: Counted { min_ns: 2, buckets },
+            ..DagTimes::default()
+        }],
+    }
+}
+
 /// Returns a recording of some jobs, a job of which is lost.
 fn recording() -> Vec<u8> {
     let mut writer = Writer::new(&header());
+    writer.commit(&commit());
     for job in 0..10 {
         let samples = vec![0.5; usize::try_from(job % 4).expect("it is small")];
         let value = to_bytes(&samples);
@@ -62,8 +88,10 @@ fn recording() -> Vec<u8> {
             _ => entry(What::Value, 0, 0, &value),
         });
         writer.write(&entry(What::Value, 1, 1, &sample));
+        writer.events(0, 2 * job, &[[job, 1, 2], [job, 3, 4]]);
     }
-    writer.finish()
+    writer.times(&times());
+    writer.end()
 }
 
 #[test]
@@ -76,6 +104,19 @@ fn what_is_written_is_read() {
     assert_eq!(entries.len(), 20);
     assert_eq!((entries[10].what, entries[10].job), (What::Lost, 5));
     assert_eq!(Vec::<f64>::from_bytes(entries[6].value), Ok(vec![0.5; 3]));
+    let mut events = Vec::new();
+    for chunk in recording.chunks() {
+        match chunk {
+            Chunk::Commit(read) => assert_eq!(read, commit()),
+            Chunk::Times(read) => assert_eq!(read, times()),
+            Chunk::Events(read) => {
+                assert_eq!(read.before, events.len() as u64);
+                events.extend(read.words());
+            }
+            _ => {}
+        }
+    }
+    assert_eq!((events.len(), events[19]), (20, [9, 3, 4]));
 }
 
 #[test]
@@ -146,7 +187,7 @@ fn what_was_written_wrongly_is_refused_in_spite_of_its_checksum() {
     let refused = |entry: Entry<'_>| {
         let mut writer = Writer::new(&header());
         writer.write(&entry);
-        Recording::read(&writer.finish()).expect_err("it is wrong")
+        Recording::read(&writer.end()).expect_err("it is wrong")
     };
     let value = to_bytes(&vec![1.0]);
     let right = Entry {
@@ -177,12 +218,12 @@ fn what_was_written_wrongly_is_refused_in_spite_of_its_checksum() {
     }
     let mut of_no_dag = header();
     of_no_dag.channels[1].dag = 2;
-    let malformed = Recording::read(&Writer::new(&of_no_dag).finish()).unwrap_err();
+    let malformed = Recording::read(&Writer::new(&of_no_dag).end()).unwrap_err();
     assert_eq!(malformed.expected, "channels of DAGs that the header has");
     let mut more_than_numbers = header();
     let channel = more_than_numbers.channels[0].clone();
     more_than_numbers.channels = vec![channel; usize::from(u16::MAX)];
-    let malformed = Recording::read(&Writer::new(&more_than_numbers).finish()).unwrap_err();
+    let malformed = Recording::read(&Writer::new(&more_than_numbers).end()).unwrap_err();
     assert_eq!(malformed.expected, "fewer than 65,535 DAGs and channels");
 }
 
@@ -192,10 +233,10 @@ fn foreign_and_newer_files_are_told() {
     let foreign = "at byte 0: expected the mark of a recording, 0x89 and `FASSREC`";
     assert_eq!(said(b""), foreign);
     assert_eq!(said(b"sample,upper_acc_x\n0,1.5\n"), foreign);
-    let newer = [&MAGIC[..], &[5, 0]].concat();
+    let newer = [&MAGIC[..], &[6, 0]].concat();
     assert_eq!(
         said(&newer),
-        "at byte 8: expected version 1 to 4 of recordings, which are those that are read"
+        "at byte 8: expected version 1 to 5 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);
@@ -219,7 +260,7 @@ fn of_weightless_parts(parts: usize) -> Vec<u8> {
             value: &[],
         });
     }
-    writer.finish()
+    writer.end()
 }
 
 #[test]

@@ -6,12 +6,12 @@
 use alloc::vec::Vec;
 use core::sync::atomic::Ordering;
 
-use recording::{Encoder, Entry, Header, Recordable, Stream, What};
+use recording::{Encoder, Entry, Header, Recordable, What};
 use sched_dag::{Instance, TaskSet};
 
 use super::guard::narrow;
 use super::lost::Lost;
-use super::{Drain, Drained};
+use super::{Drain, Drained, Record};
 use crate::run::cell::outbox::{OutboxReader, Published};
 
 /// An event in its record: the place of what it is among [`EVENTS`], DAG and subtask, and when the
@@ -58,7 +58,6 @@ pub(super) struct OfTape {
     records: Vec<OutboxReader>,
     lost: Lost,
     header: Header,
-    stream: Option<Stream>,
     releases: Vec<Releases>,
     /// When the run's time begins, on the clock, on which values were complete.
     epoch_ns: u64,
@@ -130,7 +129,6 @@ impl OfTape {
             records,
             lost,
             header,
-            stream: None,
             releases: Releases::of_all(task_set),
             epoch_ns: 0,
         }
@@ -158,7 +156,7 @@ impl OfTape {
     }
 
     /// Tells of the values of a channel that are lost, before the next one, or at the end.
-    fn tell_lost(&mut self, channel: u16, next: Option<(u64, u64)>, send: &mut dyn FnMut(&[u8])) {
+    fn tell_lost(&mut self, channel: u16, next: Option<(u64, u64)>, to: &mut Record) {
         let before = next.map(|(job, _)| job);
         while let Some((first, last)) = self.lost.values[usize::from(channel)].take(before) {
             for job in first..=last {
@@ -174,24 +172,22 @@ impl OfTape {
                     at_ns: next.map_or(release_ns, |(_, at_ns)| at_ns),
                     value: &[],
                 };
-                if let Some(stream) = &mut self.stream {
-                    stream.write(&lost, send);
-                }
+                to.write(&lost);
             }
         }
     }
 
     /// Writes the next value of a channel.
-    fn write_value(&mut self, channel: u16, at_ns: u64, send: &mut dyn FnMut(&[u8])) {
+    fn write_value(&mut self, channel: u16, at_ns: u64, to: &mut Record) {
         let number = usize::from(channel);
         let Some(job) = self.records[number].next().map(|record| record.job) else {
             return;
         };
-        self.tell_lost(channel, Some((job, at_ns)), send);
+        self.tell_lost(channel, Some((job, at_ns)), to);
         let dag = self.header.channels[number].dag;
         let release_ns = self.release_ns(dag, job).unwrap_or(at_ns);
         let records = &mut self.records[number];
-        if let (Some(stream), Some(record)) = (&mut self.stream, records.next()) {
+        if let Some(record) = records.next() {
             let value = Entry {
                 what: What::Value,
                 dag,
@@ -201,13 +197,13 @@ impl OfTape {
                 at_ns,
                 value: record.bytes,
             };
-            stream.write(&value, send);
+            to.write(&value);
         }
         records.forget();
     }
 
     /// Writes the next event.
-    fn write_event(&mut self, send: &mut dyn FnMut(&[u8])) {
+    fn write_event(&mut self, to: &mut Record) {
         let Some(Published { job, at_ns, bytes }) = self.events.next() else {
             return;
         };
@@ -235,9 +231,7 @@ impl OfTape {
                 _ => &[],
             },
         };
-        if let Some(stream) = &mut self.stream {
-            stream.write(&entry, send);
-        }
+        to.write(&entry);
     }
 
     /// Reports whether the recording has ended before that time, for something had no room.
@@ -247,42 +241,37 @@ impl OfTape {
 }
 
 impl Drain for OfTape {
-    fn begin(&mut self, send: &mut dyn FnMut(&[u8])) {
-        self.stream = Some(Stream::begin(&self.header, send));
+    fn begin(&mut self, to: &mut Record) {
+        to.header(&self.header);
     }
 
     fn begin_run(&mut self, epoch_ns: u64) {
         self.epoch_ns = epoch_ns;
     }
 
-    fn step(&mut self, send: &mut dyn FnMut(&[u8])) -> bool {
+    fn step(&mut self, to: Option<&mut Record>) -> bool {
+        let Some(to) = to else {
+            return false;
+        };
         match self.earliest() {
             Some((at_ns, _)) if self.has_ended(at_ns) => return false,
-            Some((at_ns, Some(channel))) => self.write_value(channel, at_ns, send),
-            Some((_, None)) => self.write_event(send),
+            Some((at_ns, Some(channel))) => self.write_value(channel, at_ns, to),
+            Some((_, None)) => self.write_event(to),
             None => return false,
         }
         true
     }
 
-    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Option<Drained> {
+    fn end(&mut self, to: &mut Record) -> Option<Drained> {
         let is_cut = self.has_ended(u64::MAX);
         if !is_cut {
             (0..)
                 .take(self.records.len())
-                .for_each(|channel| self.tell_lost(channel, None, send));
-        }
-        let (mut entries, mut lost) = (0, 0);
-        if let Some(stream) = self.stream.take() {
-            (entries, lost) = (stream.entries(), stream.lost());
-            match is_cut {
-                true => stream.cut(send),
-                false => stream.end(send),
-            }
+                .for_each(|channel| self.tell_lost(channel, None, to));
         }
         Some(Drained {
-            entries,
-            lost,
+            entries: to.entries(),
+            lost: to.lost(),
             is_cut,
         })
     }

@@ -9,14 +9,14 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::mem;
 
-use recording::{Channel, Entry, Header, Stream, What};
+use recording::{Channel, Entry, Header, What};
 use sched_dag::journal;
 use sched_dag::{DagId, Instance, Notice};
 
 use super::drain::{Releases, SIGNALS};
 use super::guard::narrow;
 use super::replay::Outcome;
-use super::{Crossing, Drain, Drained, name, open};
+use super::{Crossing, Drain, Drained, Record, name, open};
 use crate::run::crossing::Recorded;
 use crate::run::latest_jobs::LatestJobs;
 use crate::run::line::LineOf;
@@ -117,7 +117,7 @@ impl Crossing for Latest {
 
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
         let kept = self.kept.take_if(|kept| !kept.faults.is_empty())?;
-        Some(Box::new(OfLatest { kept, stream: None }))
+        Some(Box::new(OfLatest(kept)))
     }
 
     fn outcome(&self, _is_over: bool) -> Option<Outcome> {
@@ -126,21 +126,18 @@ impl Crossing for Latest {
 }
 
 /// Makes the file.
-struct OfLatest {
-    kept: Kept,
-    stream: Option<Stream>,
-}
+struct OfLatest(Kept);
 
 impl Drain for OfLatest {
-    fn begin(&mut self, send: &mut dyn FnMut(&[u8])) {
+    fn begin(&mut self, to: &mut Record) {
         let Kept {
             header,
             latest,
             releases,
             faults,
             ..
-        } = &self.kept;
-        let mut stream = Stream::begin(header, send);
+        } = &self.0;
+        to.header(header);
         let mut write = |what, dag, place, job, at_ns, value: &[u8]| {
             let release_ns = releases[usize::from(dag)].of(job).unwrap_or(at_ns);
             let entry = Entry {
@@ -152,7 +149,7 @@ impl Drain for OfLatest {
                 at_ns,
                 value,
             };
-            stream.write(&entry, send);
+            to.write(&entry);
         };
         for (dag, of_dag) in (0_u16..).zip(releases) {
             if let Releases::Periodic { .. } = of_dag {
@@ -175,23 +172,17 @@ impl Drain for OfLatest {
                 write(What::Fault, dag, place, instance.job, at_ns, &[]);
             }
         }
-        self.stream = Some(stream);
     }
 
     /// All has been sent at the beginning.
-    fn step(&mut self, _send: &mut dyn FnMut(&[u8])) -> bool {
+    fn step(&mut self, _to: Option<&mut Record>) -> bool {
         false
     }
 
-    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Option<Drained> {
-        let (mut entries, mut lost) = (0, 0);
-        if let Some(stream) = self.stream.take() {
-            (entries, lost) = (stream.entries(), stream.lost());
-            stream.cut(send);
-        }
+    fn end(&mut self, to: &mut Record) -> Option<Drained> {
         Some(Drained {
-            entries,
-            lost,
+            entries: to.entries(),
+            lost: to.lost(),
             is_cut: true,
         })
     }

@@ -14,6 +14,7 @@ mod drain;
 mod echo;
 mod excerpt;
 mod guard;
+mod kept;
 mod latest;
 mod lost;
 mod machine;
@@ -27,7 +28,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use core::fmt;
 
-use recording::{Channel, DagHeader, Header, Schema};
+use recording::{Channel, DagHeader, Header, Schema, Stream};
 use sched_dag::journal::What;
 use sched_dag::{DagId, Instance, Notice, TaskSet};
 
@@ -35,7 +36,9 @@ use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
 
 pub use excerpt::Excerpt;
-pub use of_run::{Edge, Outgoing, send_rest};
+pub use kept::Kept;
+pub use of_run::{Edge, Outgoing};
+pub use recording::Sink;
 pub use replay::{Divergence, Outcome, Replay};
 
 /// What a platform is to do with what crosses.
@@ -177,24 +180,27 @@ impl Seen {
     }
 }
 
+/// The file that what is recorded goes into.
+pub type Record = Stream<dyn Sink + Send>;
+
 /// What core 0 does of it when it has nothing else to do: it makes a file of what is recorded, and
 /// allocates nothing but for the header; or it raises the signals of a replay.
 ///
 /// See [`Crossing`].
 pub trait Drain: Send {
     /// Sends the header.
-    fn begin(&mut self, send: &mut dyn FnMut(&[u8]));
+    fn begin(&mut self, to: &mut Record);
 
     /// Takes when the time of the run begins, on the clock of [`crate::now_ns`].
     fn begin_run(&mut self, epoch_ns: u64) {
         let _ = epoch_ns;
     }
 
-    /// Sends the next entry; `false`: there is none.
-    fn step(&mut self, send: &mut dyn FnMut(&[u8])) -> bool;
+    /// Sends the next entry, if the file can take it now; `false`: nothing was sent.
+    fn step(&mut self, to: Option<&mut Record>) -> bool;
 
-    /// Sends the end, when the run is over and nothing is left; `None`: there is no file.
-    fn end(&mut self, send: &mut dyn FnMut(&[u8])) -> Option<Drained>;
+    /// Sends what is lost, when the run is over and nothing is left; `None`: there is no file.
+    fn end(&mut self, to: &mut Record) -> Option<Drained>;
 }
 
 /// How complete a recording is.

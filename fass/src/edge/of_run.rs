@@ -10,7 +10,7 @@ use core::fmt;
 
 use sched_dag::{DagId, Instance, Notice};
 
-use super::{Begin, Channel, Crossing, Drain, Drained, Outcome, Seen, Wish};
+use super::{Begin, Channel, Crossing, Drain, Outcome, Record, Seen, Wish};
 use crate::run::crossing::Recorded;
 use crate::run::plan::Plan;
 
@@ -108,13 +108,13 @@ impl Edge {
         crossing.open(dag, graph, channels)
     }
 
-    /// Makes a plan one that is recorded or replayed, if there is a wish, and sends the begin of a
-    /// recording. Reports whether that goes for the times, too, that functions are told.
+    /// Makes a plan one that is recorded or replayed, if there is a wish, and begins a
+    /// recording in the file, if there is one. Reports whether that goes for the times, too, that functions are told.
     ///
     /// # Errors
     ///
     /// If nothing of the plan is recorded, it does not fit a replay, or it is a second one.
-    pub fn launch(&mut self, plan: &mut Plan, send: &mut dyn FnMut(&[u8])) -> Result<bool, String> {
+    pub fn launch(&mut self, plan: &mut Plan, to: Option<&mut Record>) -> Result<bool, String> {
         let word = match self.wish {
             None => {
                 let launched = self.crossing.as_mut().map(|crossing| crossing.launch(plan));
@@ -131,6 +131,8 @@ impl Edge {
         };
         let launched = match &mut self.crossing {
             None if !is_needed => return Ok(false),
+            // Of the other commits all is kept but values.
+            Some(_) if !is_needed && self.is_on && is_asked_for => return Ok(false),
             None => Err(format!(
                 "`{word}`: no topic of the app is recorded; name topics by `Dag::record`"
             )),
@@ -146,9 +148,9 @@ impl Edge {
                 return Err(why);
             }
         }
-        if let Some(drain) = &mut self.outgoing {
+        if let (Some(drain), Some(to)) = (&mut self.outgoing, to) {
             // Not during the run: it takes long where a byte does.
-            drain.begin(send);
+            drain.begin(to);
         }
         self.is_on = true;
         Ok(is_asked_for)
@@ -183,16 +185,11 @@ impl Edge {
         Some(outcome)
     }
 
-    /// Begins to send what is kept of the jobs before a fault, if there was one; once, for there
-    /// is one file.
-    pub fn before_fault(&mut self, send: &mut dyn FnMut(&[u8])) -> Outgoing {
-        let mut drain = self.crossing.as_mut()?.drain()?;
-        if self.has_sent_latest {
-            return None;
-        }
-        self.has_sent_latest = true;
-        drain.begin(send);
-        Some(drain)
+    /// Takes what sends the jobs before a fault, if there was one; once, for there is one file.
+    pub fn before_fault(&mut self) -> Outgoing {
+        let drain = self.crossing.as_mut()?.drain()?;
+        let is_first = !core::mem::replace(&mut self.has_sent_latest, true);
+        is_first.then_some(drain)
     }
 
     /// Takes note that an instance has failed, on the run's time and the clock's.
@@ -251,13 +248,6 @@ impl Edge {
     pub fn complaint(&self) -> Option<&str> {
         self.complaint.as_deref()
     }
-}
-
-/// Sends the rest of a recording, and its end. Returns how complete it is, if there is one.
-pub fn send_rest(mut outgoing: Outgoing, send: &mut dyn FnMut(&[u8])) -> Option<Drained> {
-    let drain = outgoing.as_mut()?;
-    while drain.step(send) {}
-    drain.end(send)
 }
 
 impl fmt::Debug for Edge {

@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use sched_dag::DagId;
 
 use super::replay::Replay;
-use super::{Drain, Drained, Host};
+use super::{Drain, Drained, Host, Record};
 use crate::run::plan::Plan;
 
 /// The number of a plan whose signals are a replay's: no signal of the app knows it.
@@ -76,13 +76,13 @@ struct Raiser {
 }
 
 impl Drain for Raiser {
-    fn begin(&mut self, _send: &mut dyn FnMut(&[u8])) {}
+    fn begin(&mut self, _to: &mut Record) {}
 
     fn begin_run(&mut self, epoch_ns: u64) {
         self.epoch_ns = epoch_ns;
     }
 
-    fn step(&mut self, _send: &mut dyn FnMut(&[u8])) -> bool {
+    fn step(&mut self, _to: Option<&mut Record>) -> bool {
         if let Some(now_ns) = (self.host.now_ns)().checked_sub(self.epoch_ns) {
             for dag in self.signals.due(now_ns) {
                 (self.host.raise)(REPLAYED, dag);
@@ -91,7 +91,7 @@ impl Drain for Raiser {
         false
     }
 
-    fn end(&mut self, _send: &mut dyn FnMut(&[u8])) -> Option<Drained> {
+    fn end(&mut self, _to: &mut Record) -> Option<Drained> {
         None
     }
 }

@@ -9,8 +9,8 @@
 use std::cell::RefCell;
 
 use fass::edge::{self, Replay};
-use fass::{LatestJobs, Plan, Recorded};
-use recording::{Channel, Entry, Header, Malformed, What, Writer};
+use fass::{LatestJobs, Plan, Recorded, Terms};
+use recording::{Channel, Entry, Header, Malformed, What};
 use sched_dag::engine::Run;
 use sched_dag::journal::{self, Event};
 use sched_dag::{DagId, Instance, TaskSet};
@@ -29,6 +29,8 @@ pub(crate) struct Edge {
     /// The inputs of the last jobs, if not all is kept.
     latest: RefCell<Option<LatestJobs>>,
     replay: RefCell<Option<Replay>>,
+    /// The begin of the record: what was committed.
+    committed: RefCell<Option<edge::Kept<Vec<u8>>>>,
 }
 
 /// An entry of the recording to be, without its value, and the value.
@@ -120,6 +122,13 @@ impl Edge {
         Ok(())
     }
 
+    /// Takes what is committed.
+    pub(crate) fn commit(&self, plan: &Plan, terms: &Terms) {
+        let mut record = edge::Kept::new(Vec::new());
+        record.commit(plan, terms);
+        self.committed.replace(Some(record));
+    }
+
     /// Begins an instance.
     pub(crate) fn begin(&self, instance: Instance) {
         let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
@@ -177,7 +186,7 @@ impl Edge {
         self.of_replay(|replay| replay.value(channel, job).into_iter().for_each(take));
     }
 
-    /// Returns the recording of the run so far.
+    /// Returns the record of the run so far.
     pub(crate) fn recording(&self, run: &Run) -> Vec<u8> {
         let (header, values) = (self.header.borrow(), self.values.borrow());
         let latest = self.latest.borrow();
@@ -205,9 +214,13 @@ impl Edge {
         let replay = self.replay.borrow();
         entries.extend(replay.iter().flat_map(Replay::events));
         entries.sort_by_key(|entry| entry.at_ns);
-        let mut writer = Writer::new(&header);
-        entries.iter().for_each(|entry| writer.write(entry));
-        writer.finish()
+        let Some(mut record) = self.committed.borrow().clone() else {
+            return Vec::new();
+        };
+        record.file().header(&header);
+        entries.iter().for_each(|entry| record.file().write(entry));
+        record.end_run(run);
+        record.end()
     }
 
     /// Returns what a recording says of an event, if anything; what was skipped or cut in the

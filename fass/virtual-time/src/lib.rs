@@ -280,9 +280,9 @@ impl VirtualTime {
         self.set(|settings| settings.most_jobs = Some(jobs))
     }
 
-    /// Returns the recording of all that was run since the commit: the values of the topics
-    /// that [`Dag::record`](fass::Dag::record) names, signals, and jobs that were skipped or
-    /// cut. It is empty if nothing was committed.
+    /// Returns the record of all that was run since the commit: the model, the values of the
+    /// topics that [`Dag::record`](fass::Dag::record) names, signals, jobs that were skipped or
+    /// cut, and the events of the schedule with their times. It is empty if nothing was committed.
     ///
     /// See [`Dag::record`](fass::Dag::record).
     #[must_use]

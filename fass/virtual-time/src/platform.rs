@@ -189,6 +189,7 @@ impl Platform for HostPlatform {
         }
         let launched = surroundings.edge.launch(&mut plan, settings.most_jobs);
         launched.map_err(LaunchError::new)?;
+        (surroundings.edge).commit(&plan, &settings.terms);
         machine.plan.set(Some(plan.number));
         let session = Session::new(plan, settings.terms.scheduler, surroundings);
         machine.session.replace(Some(session));

@@ -54,7 +54,7 @@ fn altered<'e>(bytes: &'e [u8], alter: impl Fn(Entry<'e>, Role) -> Vec<Entry<'e>
         let entries = alter(entry, role);
         entries.iter().for_each(|entry| writer.write(entry));
     }
-    writer.finish()
+    writer.end()
 }
 
 /// A signal at the place of an entry.

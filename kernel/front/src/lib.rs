@@ -33,7 +33,7 @@ pub mod report;
 pub mod shell;
 pub mod text;
 
-pub use text::{console, graph, json};
+pub use text::{console, json};
 
 /// The modules that apps know by these names, with what is theirs in them.
 pub mod named {

@@ -13,16 +13,15 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The kernel's own words, which every app has: `settings` takes them.
-const KERNELS: [&str; 21] = [
+const KERNELS: [&str; 20] = [
     "policy",
     "preemption",
     "budget_factor",
     "overheads_ns",
     "wcets",
-    "trace",
     "trace_events",
-    "times",
-    "graph",
+    "bounds",
+    "events",
     "measure",
     "idle",
     "console",

@@ -4,7 +4,7 @@ use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
 
-use linux::EndSignals;
+use linux::{EndSignals, Linux};
 
 pub use crate::output::write_as;
 pub use front::output;
@@ -62,7 +62,7 @@ fn run(
     // Who sees the first line may ask for an end.
     let signals = EndSignals::catch_first();
     let options = Options::parse(line)?;
-    let (linux, chosen, module) = words::apply(name, &options)?;
+    let (linux, module) = words::apply(name, &options)?;
     json::report("boot", |object| {
         object
             .text("version", env!("CARGO_PKG_VERSION"))
@@ -85,5 +85,7 @@ fn run(
         is_closed: Cell::new(false),
     };
     let verdict = Verdict::new(false, false);
-    Machine::serve(system, options, chosen, module, verdict, app)
+    let result = Machine::serve(system, options, module, verdict, app);
+    let kept = Linux::end_record();
+    result.and_then(|()| kept.map_err(|why| Ending::Failure(format!("the record: {why}"))))
 }

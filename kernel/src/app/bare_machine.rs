@@ -16,7 +16,7 @@ use crate::watch::background::{Background, LINE, Wishes, wire};
 use executive::machine::{self, interrupts_off, this_core};
 use executive::memory::heap;
 use executive::run::platform::KERNEL;
-use executive::run::{contexts, edge, execution, worker};
+use executive::run::{contexts, edge, execution, record, worker};
 use executive::text::console;
 use front::app::ending::Ending;
 use front::app::machine::System;
@@ -78,7 +78,7 @@ impl System for BareMachine {
         let mut background = Background::begin(self.wishes, input.and_then(Signal::target), total);
         // What was measured before, while booting and printing, does not count.
         let _ = interrupts_off::take_longest();
-        worker::wait_in_background(|| edge::send(&mut outgoing) | background.step());
+        worker::wait_in_background(|| record::step(&mut outgoing) | background.step());
         self.is_shut_down.set(background.end());
         let longest = interrupts_off::take_longest();
         let allocations = heap::usage().allocations - allocations_before;
@@ -88,13 +88,14 @@ impl System for BareMachine {
             // What was cut off has most likely lost the end of its line.
             crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
         }
-        let run = execution::end().ok_or_else(nothing)?;
         edge::end(outgoing, !self.is_shut_down());
+        let run = execution::end().ok_or_else(nothing)?;
         let run = run.with_counts(Counts {
             epoch_ns,
             allocations,
             lock_acquisitions: locks,
         });
+        record::end_run(&run);
         report::left::dump(&run);
         if let Some(line) = LINE.get() {
             line.report();

@@ -27,7 +27,7 @@ use executive::machine::{
 };
 use executive::memory;
 use executive::run::platform::KERNEL;
-use executive::run::{containment, contexts, heartbeat, worker};
+use executive::run::{containment, contexts, heartbeat, record, worker};
 use executive::text::console;
 use front::app::ending::{self, Ending};
 use front::app::terms;
@@ -359,14 +359,9 @@ fn run_app(
         mode == Some("deterministic") && this_core::all().len() > 1,
     );
     let wishes = settings.wishes;
-    Machine::serve(
-        BareMachine::new(wishes),
-        options,
-        settings.chosen,
-        module,
-        verdict,
-        app,
-    )
+    let result = Machine::serve(BareMachine::new(wishes), options, module, verdict, app);
+    record::end();
+    result
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.

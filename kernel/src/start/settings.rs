@@ -7,13 +7,13 @@
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
 //! | `overheads_ns=S,D,I,R` | what a commit charges: context switch, dispatch, interrupt, and for each instance that becomes ready | 0,0,0,0 |
 //! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
-//! | `record=N` | what crosses the edge of the run is sent to QEMU's debug port, from a buffer of N KiB; 0: nothing is | 0 |
+//! | `keep=N` | the record of the boot is sent, to QEMU's debug port or in lines: commits, events, times, and what crosses the edge of the run, from a buffer of N KiB; 0: it is not | 0 |
+//! | `record=N` | the same, and it is an error if no topic is recorded | 0 |
+//! | `events=off\|on` | if neither is given: commits, events and times are sent, when a run is over | `off` |
 //! | `latest=N` | if neither is given and there is a debug port: the inputs of each DAG's last N jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |
 //! | `replay=N` | the next N bytes of the loader's module are a recording, which is replayed | 0 |
-//! | `trace=keep\|dump` | whether each run's trace is printed after it | `keep` |
 //! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
-//! | `times=keep\|dump` | whether each run's statistics are printed after it | `keep` |
-//! | `graph=keep\|dump` | whether each commit prints its DAGs | `keep` |
+//! | `bounds=judge\|observe` | whether a run fails that exceeds a proven bound | `judge` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
 //! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or how much each subtask uses of its stack | `nothing` |
 //! | `console=off\|stop\|on\|echo` | whether a person can end a run by ctrl-C (`stop`), and talk to the kernel; `echo` sends back what is typed | `off` |
@@ -34,7 +34,7 @@ use crate::options::{Options, UsageError};
 use crate::watch::background::{Echo, Wishes};
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
-use executive::run::{edge, stacks, worker};
+use executive::run::{edge, record, stacks, worker};
 use front::app::terms::{self, Chosen};
 
 /// What the words say about runs to come; all else is set where it belongs.
@@ -57,6 +57,9 @@ pub(crate) fn set_wish(
     let record_kib = options.number("record", 0..=1 << 20, 0)?;
     let kib = record_kib.max(options.number("keep", 0..=1 << 20, 0)?);
     let jobs = options.number("latest", 0..=64, 16)?;
+    if options.choice("events", &[("off", false), ("on", true)])? {
+        record::begin(false);
+    }
     let wish = match (replay_bytes, kib, jobs) {
         (1.., 1.., _) => {
             let line = "`record` and `keep` exclude `replay`; give one";
@@ -79,7 +82,10 @@ pub(crate) fn set_wish(
         },
         (0, 0, 0) => return Ok(module),
     };
-    edge::set_wish(wish).map_err(UsageError::new)?;
+    if matches!(wish, Wish::Record { .. }) {
+        record::begin(true);
+    }
+    edge::set_wish(wish);
     Ok(module)
 }
 

@@ -216,6 +216,21 @@ impl Journal {
         self.lost + self.events.len() as u64
     }
 
+    /// Copies the words of events from number `from` on, the oldest first, and returns the number
+    /// of the first one that is left, and how many were copied.
+    pub fn copy_from(&self, from: u64, buffer: &mut [[u64; 3]]) -> (u64, usize) {
+        let first = from.max(self.lost);
+        let skipped = usize::try_from(first - self.lost).unwrap_or(usize::MAX);
+        let left = self.events.len().saturating_sub(skipped);
+        let count = left.min(buffer.len());
+        for (place, number) in buffer[..count].iter_mut().zip(skipped..) {
+            let place_of = self.oldest + number;
+            let place_of = place_of.checked_sub(self.events.len()).unwrap_or(place_of);
+            *place = self.events[place_of];
+        }
+        (first, count)
+    }
+
     /// Copies the events before number `end`, from the latest of them back, and returns
     /// the number of the oldest one copied.
     pub fn copy_back(&self, end: u64, buffer: &mut [Option<Event>]) -> u64 {

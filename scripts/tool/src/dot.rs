@@ -1,7 +1,6 @@
 //! Committed DAGs as a picture: text for Graphviz.
 //!
-//! A guest that is booted with `graph=dump` prints each committed DAG in a line of
-//! kind `graph`. Here the lines of a run become one `digraph` in the DOT language: a
+//! The commits of a record become one `digraph` in the DOT language: a
 //! cluster for each DAG with its period and deadline; a box for each subtask with
 //! its WCET and priority; an arrow for each edge, with the topic and the message's
 //! type, dotted where a state makes the edge. A topic whose latest value is sampled
@@ -11,18 +10,18 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use crate::json::Value;
-use crate::protocol::{MachineLine, Transcript};
+use recording::{CommittedDag, CommittedSubtask};
 
-/// Returns the text for all DAGs that a run has committed.
+use crate::record::Record;
+use crate::record::model::Committed;
+
+/// Returns the committed DAGs of a record as a graph.
 ///
 /// # Errors
 ///
-/// In words: the run has committed none, or a line is not as
-/// `docs/serial-protocol.md` says.
-pub fn text(transcript: &Transcript) -> Result<String, String> {
-    let lines: Vec<&MachineLine> = transcript.of_kind("graph").collect();
-    if lines.is_empty() {
+/// In words: nothing was committed.
+pub fn text(record: &Record) -> Result<String, String> {
+    if record.commits.is_empty() {
         return Err("the guest has committed no DAG".into());
     }
     let mut text = String::from(
@@ -32,166 +31,137 @@ pub fn text(transcript: &Transcript) -> Result<String, String> {
     );
     // An arrow between two clusters stands outside both.
     let mut between = String::new();
-    for line in lines {
-        let dag = Dag(line);
-        let parts = dag.text().zip(dag.samples());
-        let (cluster, samples) = parts.ok_or_else(|| {
-            format!(
-                "serial line {}: a line of kind `graph` is malformed",
-                line.number
-            )
-        })?;
-        text += &cluster;
-        between += &samples;
+    for commit in &record.commits {
+        for (number, dag) in (0..).zip(&commit.told.dags) {
+            let dag = Dag {
+                commit,
+                number,
+                dag,
+            };
+            text += &dag.text();
+            between += &dag.samples();
+        }
     }
     text += &between;
     text += "}\n";
     Ok(text)
 }
 
-/// One DAG's line.
-struct Dag<'l>(&'l MachineLine);
+/// A DAG of a commit.
+struct Dag<'r> {
+    commit: &'r Committed,
+    number: u32,
+    dag: &'r CommittedDag,
+}
 
+// Writing into a `String` cannot fail.
 impl Dag<'_> {
-    fn text(&self) -> Option<String> {
-        let line = self.0;
-        let id = self.id(line.number_at("dag")?)?;
-        let mut text = format!(
-            "  subgraph cluster_{id} {{\n    label={};\n",
-            quoted(&self.label()?)
-        );
-        // Writing into a `String` cannot fail.
-        for (number, subtask) in line.value.get("subtasks")?.elements().iter().enumerate() {
-            let label = self.subtask_label(number, subtask)?;
-            let _ = writeln!(text, "    {id}_s{number} [label={}];", quoted(&label));
+    fn text(&self) -> String {
+        let id = self.id(self.number);
+        let label = quoted(&self.label());
+        let mut text = format!("  subgraph cluster_{id} {{\n    label={label};\n");
+        for (number, subtask) in self.dag.subtasks.iter().enumerate() {
+            let label = quoted(&self.subtask_label(number, subtask));
+            let _ = writeln!(text, "    {id}_s{number} [label={label}];");
         }
-        self.add_edges(&id, &mut text)?;
+        self.add_edges(&id, &mut text);
         text += "  }\n";
-        Some(text)
+        text
     }
 
-    /// What the names of a DAG of this commit begin with.
-    fn id(&self, dag: u64) -> Option<String> {
-        Some(format!("c{}_d{dag}", self.0.number_at("commit")?))
+    fn id(&self, dag: u32) -> String {
+        format!("c{}_d{dag}", self.commit.number)
     }
 
-    /// The arrows to this DAG's subtasks from the topics that they sample.
-    fn samples(&self) -> Option<String> {
-        let line = self.0;
-        let id = self.id(line.number_at("dag")?)?;
+    fn samples(&self) -> String {
+        let id = self.id(self.number);
         let mut text = String::new();
-        for sample in line.value.get("samples")?.elements() {
-            let [reader, writer, topic, staleness_ns] = sample.elements() else {
-                return None;
-            };
-            let (reader, topic) = (reader.as_u64()?, topic.as_u64()?);
-            let writer = self.id(writer.as_u64()?)?;
-            let label = staleness_ns.as_u64().map_or(String::new(), |ns| {
+        for &(reader, writer, topic, staleness_ns) in &self.dag.samples {
+            let writer = self.id(writer);
+            let label = staleness_ns.map_or(String::new(), |ns| {
                 format!(", label=\"less than {} old\"", time(ns))
             });
-            // Writing into a `String` cannot fail.
             let _ = writeln!(
                 text,
                 "  {writer}_t{topic} -> {id}_s{reader} [style=dashed{label}];"
             );
         }
-        Some(text)
+        text
     }
 
-    fn label(&self) -> Option<String> {
-        let line = self.0;
-        let name = match line.text_at("name")? {
-            "" => format!("dag {}", line.number_at("dag")?),
+    fn label(&self) -> String {
+        let dag = self.dag;
+        let name = match &*dag.name {
+            "" => format!("dag {}", self.number),
             name => name.to_string(),
         };
-        let period = match line.value.get("sporadic")?.as_bool()? {
+        let period = match dag.is_sporadic {
             true => "sporadic, at least T",
             false => "T",
         };
-        let jobs = line.value.get("jobs")?.elements().first();
-        let jobs = jobs.and_then(Value::as_u64);
-        let jobs = jobs.map_or("without end".into(), |jobs| format!("{jobs} jobs"));
+        let jobs = (dag.jobs).map_or("without end".into(), |jobs| format!("{jobs} jobs"));
         let mut label = format!(
             "{name}\n{period} = {}, D = {}",
-            time(line.number_at("period_ns")?),
-            time(line.number_at("relative_deadline_ns")?)
+            time(dag.period_ns),
+            time(dag.relative_deadline_ns)
         );
-        if let Some(offset_ns) = line.number_at("offset_ns").filter(|&ns| ns > 0) {
-            label += &format!(", O = {}", time(offset_ns));
+        if dag.offset_ns > 0 {
+            label += &format!(", O = {}", time(dag.offset_ns));
         }
-        label += &format!(
-            "\n{jobs}, {} in flight, overrun: {}",
-            line.number_at("in_flight")?,
-            line.text_at("overrun")?
-        );
-        Some(label)
+        let overrun = match dag.overrun {
+            0 => "queue",
+            1 => "skip",
+            _ => "abort",
+        };
+        label += &format!("\n{jobs}, {} in flight, overrun: {overrun}", dag.in_flight);
+        label
     }
 
-    fn subtask_label(&self, number: usize, subtask: &Value) -> Option<String> {
-        let [name, priority, non_preemptive, wcet_ns] = subtask.elements() else {
-            return None;
-        };
-        let mut label = match name.as_text()? {
+    fn subtask_label(&self, number: usize, subtask: &CommittedSubtask) -> String {
+        let mut label = match &*subtask.name {
             "" => format!("subtask {number}"),
             name => name.to_string(),
         };
-        if let Some(wcet_ns) = wcet_ns.as_u64() {
+        if let Some(wcet_ns) = subtask.wcet_ns {
             label += &format!("\nWCET {}", time(wcet_ns));
         }
         // Under EDF the priority is of no effect.
-        if self.0.text_at("policy")? == "static" {
-            label += &format!("\npriority {}", priority.as_u64()?);
+        if !self.commit.told.is_edf {
+            label += &format!("\npriority {}", subtask.priority);
         }
-        if non_preemptive.as_u64()? == 1 {
+        if subtask.is_non_preemptive {
             label += "\nnon-preemptive";
         }
-        Some(label)
+        label
     }
 
-    fn add_edges(&self, id: &str, text: &mut String) -> Option<()> {
-        let line = self.0;
+    /// Adds an arrow for each reader of a topic, for each state, and for each other edge.
+    fn add_edges(&self, id: &str, text: &mut String) {
         let mut explained = BTreeSet::new();
-        // Writing into a `String` cannot fail.
-        for (number, topic) in line.value.get("topics")?.elements().iter().enumerate() {
-            let [name, kind, writer, readers, is_sampled] = topic.elements() else {
-                return None;
-            };
-            let label = format!("{}: {}", name.as_text()?, without_paths(kind.as_text()?));
-            let (label, writer) = (quoted(&label), writer.as_u64()?);
-            for reader in readers.elements() {
-                let reader = reader.as_u64()?;
+        for (number, topic) in self.dag.topics.iter().enumerate() {
+            let label = format!("{}: {}", topic.name, without_paths(&topic.type_name));
+            let (label, writer) = (quoted(&label), topic.writer);
+            for &reader in &topic.readers {
                 explained.insert((writer, reader));
-                let _ = writeln!(
-                    text,
-                    "    {id}_s{writer} -> {id}_s{reader} [label={label}];"
-                );
+                let edge = format!("{id}_s{writer} -> {id}_s{reader}");
+                let _ = writeln!(text, "    {edge} [label={label}];");
             }
-            if is_sampled.as_u64()? == 1 {
+            if topic.is_sampled {
                 let note = format!("{id}_t{number}");
                 let _ = writeln!(text, "    {note} [shape=note, label={label}];");
                 let _ = writeln!(text, "    {id}_s{writer} -> {note} [style=dashed];");
             }
         }
-        for state in line.value.get("states")?.elements() {
-            let [name, earlier, later] = state.elements() else {
-                return None;
-            };
-            let (label, earlier, later) =
-                (quoted(name.as_text()?), earlier.as_u64()?, later.as_u64()?);
-            explained.insert((earlier, later));
+        for (name, earlier, later) in &self.dag.states {
+            explained.insert((*earlier, *later));
             let edge = format!("{id}_s{earlier} -> {id}_s{later}");
-            let _ = writeln!(text, "    {edge} [style=dotted, label={label}];");
+            let _ = writeln!(text, "    {edge} [style=dotted, label={}];", quoted(name));
         }
-        for edge in line.value.get("edges")?.elements() {
-            let [from, to] = edge.elements() else {
-                return None;
-            };
-            let (from, to) = (from.as_u64()?, to.as_u64()?);
-            if !explained.contains(&(from, to)) {
+        for (from, to) in &self.dag.edges {
+            if !explained.contains(&(*from, *to)) {
                 let _ = writeln!(text, "    {id}_s{from} -> {id}_s{to};");
             }
         }
-        Some(())
     }
 }
 
@@ -226,57 +196,68 @@ fn quoted(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use recording::{Commit, CommittedTopic};
+
     use super::{quoted, text, time, without_paths};
-    use crate::protocol::Transcript;
+    use crate::made::commit;
+    use crate::record::Record;
+    use crate::record::model::Committed;
 
-    const LINE: &str = concat!(
-        r#"{"kind":"graph","commit":0,"policy":"static","preemption":"on","cores":2,"#,
-        r#""overhead_ns":[0],"bound_ns":[],"hash":1,"dag":1,"name":"the \"eye\"","#,
-        r#""period_ns":25000000,"relative_deadline_ns":100000000,"offset_ns":500,"in_flight":5,"#,
-        r#""overrun":"queue","subtasks":[["camera",1,0,1000000],["",2,1,null],["fuse",3,0,null]],"#,
-        r#""edges":[[0,1],[0,2],[1,2]],"sporadic":false,"jobs":[20],"#,
-        r#""topics":[["frame","alloc::sync::Arc<[vision::Frame]>",0,[1],1]],"#,
-        r#""states":[["map",1,2]],"samples":[[0,1,0,12000000],[2,1,0,null]]}"#
-    );
+    const EYE: &str = "static 2
+eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 1>2";
 
-    const DRAWN: &str = r#"  subgraph cluster_c0_d1 {
-    label="the \"eye\"\nT = 25 ms, D = 100 ms, O = 500 ns\n20 jobs, 5 in flight, overrun: queue";
-    c0_d1_s0 [label="camera\nWCET 1 ms\npriority 1"];
-    c0_d1_s1 [label="subtask 1\npriority 2\nnon-preemptive"];
-    c0_d1_s2 [label="fuse\npriority 3"];
-    c0_d1_s0 -> c0_d1_s1 [label="frame: Arc<[Frame]>"];
-    c0_d1_t0 [shape=note, label="frame: Arc<[Frame]>"];
-    c0_d1_s0 -> c0_d1_t0 [style=dashed];
-    c0_d1_s1 -> c0_d1_s2 [style=dotted, label="map"];
-    c0_d1_s0 -> c0_d1_s2;
-  }
-  c0_d1_t0 -> c0_d1_s0 [style=dashed, label="less than 12 ms old"];
-  c0_d1_t0 -> c0_d1_s2 [style=dashed];
-"#;
-
-    fn drawn(line: &str) -> Result<String, String> {
-        text(&Transcript::read(line))
+    fn committed(is_edf: bool) -> Record {
+        let mut told = commit(EYE);
+        let eye = &mut told.dags[0];
+        eye.jobs = Some(20);
+        eye.subtasks[1].is_non_preemptive = true;
+        eye.topics = vec![CommittedTopic {
+            name: "frame".into(),
+            type_name: "alloc::sync::Arc<[vision::Frame]>".into(),
+            writer: 0,
+            readers: vec![1],
+            is_sampled: true,
+        }];
+        eye.states = vec![("map".into(), 1, 2)];
+        eye.samples = vec![(0, 0, 0, Some(12_000_000)), (2, 0, 0, None)];
+        let told = Commit { is_edf, ..told };
+        let mut committed = Committed::new(0, told).expect("it is right");
+        // A commit refuses both, and a picture shows them.
+        committed.told.dags[0].name = "the \"eye\"".into();
+        committed.told.dags[0].subtasks[1].name.clear();
+        Record {
+            commits: vec![committed],
+            ..Record::default()
+        }
     }
+
+    const DRAWN: &str = r#"  subgraph cluster_c0_d0 {
+    label="the \"eye\"\nT = 25 ms, D = 100 ms, O = 500 ns\n20 jobs, 5 in flight, overrun: queue";
+    c0_d0_s0 [label="camera\nWCET 1 ms\npriority 1"];
+    c0_d0_s1 [label="subtask 1\npriority 2\nnon-preemptive"];
+    c0_d0_s2 [label="fuse\npriority 3"];
+    c0_d0_s0 -> c0_d0_s1 [label="frame: Arc<[Frame]>"];
+    c0_d0_t0 [shape=note, label="frame: Arc<[Frame]>"];
+    c0_d0_s0 -> c0_d0_t0 [style=dashed];
+    c0_d0_s1 -> c0_d0_s2 [style=dotted, label="map"];
+    c0_d0_s0 -> c0_d0_s2;
+  }
+  c0_d0_t0 -> c0_d0_s0 [style=dashed, label="less than 12 ms old"];
+  c0_d0_t0 -> c0_d0_s2 [style=dashed];
+"#;
 
     /// Samples of other DAGs are shown by `tests/tests/boot_seeing.rs`.
     #[test]
     fn a_dag_is_a_cluster_with_all_that_was_committed() {
-        let dot = drawn(LINE).expect("a good line");
+        let dot = text(&committed(false)).expect("a commit");
         let (head, _) = dot.split_once("  subgraph").expect("a cluster");
         assert!(head.starts_with("digraph committed {\n"));
         assert_eq!(&dot[head.len()..], format!("{DRAWN}}}\n"));
         // Under EDF no priority is shown.
-        let dot = drawn(&LINE.replace("\"static\"", "\"edf\"")).expect("a good line");
+        let dot = text(&committed(true)).expect("a commit");
         assert!(!dot.contains("priority"), "{dot}");
-    }
-
-    #[test]
-    fn a_run_without_dags_or_a_damaged_line_is_told() {
-        assert_eq!(drawn("").unwrap_err(), "the guest has committed no DAG");
-        for (right, wrong) in [("[1,2]]", "[1,\"x\"]]"), ("[2,1,0,null]", "[2,1,0]")] {
-            let error = drawn(&LINE.replace(right, wrong)).unwrap_err();
-            assert_eq!(error, "serial line 1: a line of kind `graph` is malformed");
-        }
+        let nothing = text(&Record::default()).unwrap_err();
+        assert_eq!(nothing, "the guest has committed no DAG");
     }
 
     #[test]

@@ -61,6 +61,7 @@ pub mod proof;
 pub mod protocol;
 pub mod qemu;
 pub mod random;
+pub mod record;
 pub mod recordings;
 pub mod run;
 pub mod soak;
@@ -73,3 +74,7 @@ pub mod wire_script;
 
 pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};
+
+#[cfg(test)]
+#[path = "../tests/support/made.rs"]
+mod made;

@@ -17,6 +17,7 @@ use crate::medium::Medium;
 use crate::places::Places;
 use crate::protocol::{MachineLine, Status, Transcript};
 use crate::qemu::{Ending, Qemu};
+use crate::record::Record;
 use crate::system;
 
 /// How many of the last serial lines are shown at a failure.
@@ -31,6 +32,8 @@ pub struct Outcome {
     pub serial: String,
     /// The log taken apart.
     pub transcript: Transcript,
+    /// What came of the record, whatever way it took; empty if none was kept.
+    pub sent: Vec<u8>,
     /// Where the log lies.
     pub log: PathBuf,
     /// Where the image lies that was booted.
@@ -140,12 +143,25 @@ pub fn judge_lines(transcript: &Transcript) -> Result<(), Fault> {
 }
 
 impl Outcome {
+    /// Returns the record of the boot, read.
+    ///
+    /// # Errors
+    ///
+    /// In words: what is wrong with it.
+    pub fn record(&self) -> Result<Record, String> {
+        match self.sent.is_empty() {
+            true => Record::of_log(&self.serial),
+            false => Record::sent(&self.sent, &self.serial),
+        }
+    }
+
     /// Takes the log of a guest apart that has ended, without being asked and without complaints.
     pub(crate) fn of(ending: Ending, serial: String, log: &Path, image: &Path) -> Outcome {
         Outcome {
             ending,
             transcript: Transcript::read(&serial),
             serial,
+            sent: Vec::new(),
             log: log.into(),
             image: image.into(),
             asked: None,
@@ -210,7 +226,10 @@ impl Outcome {
     /// a fault at an address it adds the function.
     #[must_use]
     pub fn tail(&self) -> String {
-        let lines: Vec<&str> = self.serial.lines().collect();
+        // The record says nothing to people.
+        let lines = self.serial.lines();
+        let lines = lines.filter(|line| !line.starts_with("{\"kind\":\"record\""));
+        let lines: Vec<&str> = lines.collect();
         let shown = &lines[lines.len().saturating_sub(SHOWN_LINES)..];
         let mut text = String::new();
         let log = self.log.display();

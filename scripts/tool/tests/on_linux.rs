@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use support::{Called, call, command, folder, succeed};
 use tool::protocol::{MachineLine, Transcript};
+use tool::record::Record;
 use tool::system::workspace;
 
 /// Returns the numbers of machine lines of kind `fork_join`, one row a line.
@@ -22,7 +23,7 @@ fn fork_joins<const N: usize>(said: &str, members: [&str; N]) -> Vec<[Option<u64
 
 /// Asserts that a trace breaks no rule. The bound is for a host that has much else to do.
 fn check_trace(folder: &Path, runs: usize) {
-    let judged = succeed(folder, "check-trace --bound-us 5000000 trace.log");
+    let judged = succeed(folder, "check-trace --bound-us 5000000 trace.rec");
     let checks = Transcript::read(&judged);
     assert_eq!(checks.of_kind("trace_check").count(), runs, "{judged}");
 }
@@ -31,7 +32,7 @@ fn check_trace(folder: &Path, runs: usize) {
 fn fork_join_says_what_it_says_on_the_machine_and_its_trace_is_judged_and_drawn() {
     let folder = folder("on-linux");
     let run =
-        "run --app fork-join --on linux --subtasks 2,4 --longest 3 --jobs 10 --trace trace.log";
+        "run --app fork-join --on linux --subtasks 2,4 --longest 3 --jobs 10 --trace trace.rec";
     let said = succeed(&folder, run);
     let members = ["subtasks", "jobs", "joins", "violations", "allocations"];
     let expected = [[2, 10, 10, 0, 0], [4, 10, 10, 0, 0]];
@@ -41,7 +42,7 @@ fn fork_join_says_what_it_says_on_the_machine_and_its_trace_is_judged_and_drawn(
     );
     assert!(said.contains("N = 4: 10 jobs, 10 joins, 0 semantic violations"));
     check_trace(&folder, 2);
-    succeed(&folder, "trace trace.log -o drawing.json");
+    succeed(&folder, "trace trace.rec -o drawing.json");
     assert!(folder.join("drawing.json").is_file());
 }
 
@@ -63,7 +64,7 @@ fn a_dag_file_is_run_and_drawn_with_its_cores_divided_as_on_the_machine() {
             format!("dag {name} period 20ms{cluster}\nsubtask a wcet 12ms\nsubtask b wcet 1ms\n")
         });
         fs::write(folder.join("divided.dag"), dags.concat() + "end\n").expect("a file of ours");
-        let run = "run --on linux --jobs 5 --occupy hold --dag divided.dag --trace trace.log --dot \
+        let run = "run --on linux --jobs 5 --occupy hold --dag divided.dag --trace trace.rec --dot \
                    drawn.dot";
         let said = succeed(&folder, &format!("{run} {words}"));
         let transcript = Transcript::read(&said);
@@ -71,12 +72,10 @@ fn a_dag_file_is_run_and_drawn_with_its_cores_divided_as_on_the_machine() {
         assert_eq!(transcript.of_kind("verdict").count(), 1, "{said}");
         let drawn = fs::read_to_string(folder.join("drawn.dot")).expect("it was written");
         assert!(drawn.starts_with("digraph"), "{drawn}");
-        let written = fs::read_to_string(folder.join("trace.log")).expect("it was written");
-        let begin = written
-            .lines()
-            .find(|line| line.contains("\"trace_begin\""));
-        let is_divided = begin.is_some_and(|line| line.contains("\"clusters\":[1,1]"));
-        assert_eq!(is_divided, cores > 1, "{written}");
+        let written = fs::read(folder.join("trace.rec")).expect("it was written");
+        let record = Record::read(&written).expect("it is whole");
+        let clusters = &record.commits[0].told.clusters[..];
+        assert_eq!(clusters == [1, 1], cores > 1, "{clusters:?}");
         check_trace(&folder, 1);
     }
 }
@@ -145,7 +144,7 @@ fn in_a_guest_both_mechanisms_keep_the_rules() {
     let folder = folder("in-guest");
     for mechanism in ["fifo", "sched_ext"] {
         let run = "run --on debian --app fork-join --subtasks 2,4,6 --longest 5 --jobs 10 --trace \
-                   trace.log --mechanism";
+                   trace.rec --mechanism";
         let said = succeed(&folder, &format!("{run} {mechanism}"));
         let rows = fork_joins(&said, ["joins", "violations"]);
         assert_eq!(rows, [[Some(10), Some(0)]; 3]);

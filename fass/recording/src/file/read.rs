@@ -2,10 +2,12 @@
 
 use alloc::vec::Vec;
 
+use super::commit::Commit;
 use super::entry::{Entry, What};
 use super::header::{Channel, Header};
 use super::stream::Stream;
-use super::{CUT, END, ENTRY, HEADER, MAGIC, READ, TEXT};
+use super::times::Times;
+use super::{COMMIT, CUT, END, ENTRY, EVENTS, HEADER, MAGIC, READ, TEXT, TIMES};
 use crate::value::crc::Crc;
 use crate::value::decode::{Decoder, Malformed};
 use crate::value::recordable::Recordable;
@@ -17,7 +19,7 @@ use crate::value::recordable::Recordable;
 pub struct Recording<'b> {
     bytes: &'b [u8],
     header: Header,
-    /// Where the first entry stands.
+    /// Where the first frame stands.
     first: usize,
     count: u64,
     lost: u64,
@@ -27,7 +29,7 @@ pub struct Recording<'b> {
 /// How far a recording was read.
 struct Progress {
     header: Option<Header>,
-    /// Where the first entry stands, and what is behind the last whole frame.
+    /// Where the first frame stands, and what is behind the last whole frame.
     first: usize,
     last: usize,
     crc: Crc,
@@ -115,14 +117,109 @@ impl<'b> Recording<'b> {
         Entries(Decoder::new(&self.bytes[self.first..]))
     }
 
-    /// Returns the texts.
+    /// Returns all that is in the recording, in the order in which it was written.
     ///
-    /// See [`Stream::text`].
-    pub fn texts(&self) -> impl Iterator<Item = &'b str> + use<'b> {
+    /// See [`Commit`], [`Events`], [`Times`].
+    pub fn chunks(&self) -> impl Iterator<Item = Chunk<'b>> + use<'b> {
         let mut input = Decoder::new(&self.bytes[self.first..]);
         let frames = core::iter::from_fn(move || frame(&mut input).ok());
-        let texts = frames.filter(|frame| frame.kind == TEXT);
-        texts.filter_map(|frame| core::str::from_utf8(frame.payload).ok())
+        // Whatever could be wrong was found when the recording was read.
+        frames.map_while(|frame| Chunk::read(&frame).ok().flatten())
+    }
+}
+
+/// Something of a recording.
+///
+/// See [`Recording::parts`].
+#[derive(Clone, Debug)]
+pub enum Chunk<'b> {
+    /// What the recording says of itself.
+    Header(Header),
+    /// A value, or what became of a job.
+    Entry(Entry<'b>),
+    /// What else is known, in lines.
+    Text(&'b str),
+    /// What was committed; what follows is of it.
+    Commit(Commit),
+    /// Events of a journal.
+    Events(Events<'b>),
+    /// The end of a run.
+    Times(Times),
+}
+
+/// Events of a cluster's journal, one after the other.
+///
+/// ```
+/// use recording::{Chunk, Recording, Stream};
+///
+/// let mut record = Stream::begin(Vec::new());
+/// record.events(1, 40, &[[1, 2, 3], [4, 5, 6]]);
+/// let bytes = record.end();
+/// let recording = Recording::read(&bytes).unwrap();
+/// let Some(Chunk::Events(events)) = recording.chunks().next() else { panic!() };
+/// assert_eq!((events.cluster, events.before), (1, 40));
+/// assert!(events.words().eq([[1, 2, 3], [4, 5, 6]]));
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Events<'b> {
+    /// The number of the cluster.
+    pub cluster: u16,
+    /// How many events of the run its journal has taken before these.
+    pub before: u64,
+    words: &'b [[u8; 24]],
+}
+
+impl<'b> Events<'b> {
+    /// Returns the words of each event.
+    ///
+    /// See [`Events`].
+    pub fn words(&self) -> impl Iterator<Item = [u64; 3]> + use<'b> {
+        let words = self.words.iter();
+        words.map(|bytes| {
+            let (words, _) = bytes.as_chunks::<8>();
+            core::array::from_fn(|word| u64::from_le_bytes(words[word]))
+        })
+    }
+
+    fn read(payload: &'b [u8]) -> Result<Self, Malformed> {
+        let mut input = Decoder::new(payload);
+        let (cluster, before) = Recordable::decode(&mut input)?;
+        let malformed = input.expected("events of 24 bytes each");
+        match input.take(input.remaining(), "events")?.as_chunks() {
+            (words, []) => Ok(Self {
+                cluster,
+                before,
+                words,
+            }),
+            _ => Err(malformed),
+        }
+    }
+}
+
+impl<'b> Chunk<'b> {
+    /// Reads a frame, if it is no end.
+    fn read(frame: &Frame<'b>) -> Result<Option<Self>, Malformed> {
+        let payload = frame.payload;
+        let chunk = match frame.kind {
+            HEADER => Header::from_bytes(payload).map(Chunk::Header),
+            ENTRY => Entry::decode(payload).map(Chunk::Entry),
+            TEXT => {
+                let malformed = Decoder::new(payload).expected("a text of UTF-8");
+                let text = core::str::from_utf8(payload).map_err(|_| malformed);
+                text.map(Chunk::Text)
+            }
+            COMMIT => Commit::from_bytes(payload).map(Chunk::Commit),
+            EVENTS => Events::read(payload).map(Chunk::Events),
+            TIMES => Times::from_bytes(payload).map(Chunk::Times),
+            END | CUT => return Ok(None),
+            _ => {
+                let kinds = "an entry, text, commit, events or times, frame kind 2 or 5 to 8, or \
+                             an end, 3 or 4";
+                return Err(frame.expected(kinds));
+            }
+        };
+        let inside = |malformed: Malformed| malformed.behind(frame.offset);
+        chunk.map(Some).map_err(inside)
     }
 }
 
@@ -146,44 +243,37 @@ impl Progress {
             return Err(Decoder::new(bytes).expected(mark));
         }
         let malformed =
-            input.expected("version 1 to 4 of recordings, which are those that are read");
+            input.expected("version 1 to 5 of recordings, which are those that are read");
         if !READ.contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
             return Err(malformed);
         }
         let mut crc = Crc::new();
         crc.update(&bytes[..input.offset()]);
 
-        let frame = checked(&mut input, &mut crc)?;
-        if frame.kind != HEADER {
-            return Err(frame.expected("a header, frame kind 1"));
-        }
-        let header =
-            Header::from_bytes(frame.payload).map_err(|error| error.behind(frame.offset))?;
-        check_header(&header).map_err(|expected| Malformed {
-            offset: frame.offset,
-            expected,
-        })?;
-        let header = self.header.insert(header);
-
         (self.first, self.last, self.crc) = (input.offset(), input.offset(), crc);
         loop {
             let frame = checked(&mut input, &mut crc)?;
             let inside = |malformed: Malformed| malformed.behind(frame.offset);
-            match frame.kind {
-                ENTRY => {
-                    let entry = Entry::decode(frame.payload).map_err(inside)?;
+            match Chunk::read(&frame)? {
+                Some(Chunk::Header(header)) => {
+                    if self.header.is_some() || self.count > 0 {
+                        return Err(frame.expected("no other header"));
+                    }
+                    let wrong = |expected| Malformed {
+                        offset: frame.offset,
+                        expected,
+                    };
+                    check_header(&header).map_err(wrong)?;
+                    self.header = Some(header);
+                }
+                Some(Chunk::Entry(entry)) => {
+                    let header = self.header.get_or_insert_default();
                     entry.check(header).map_err(inside)?;
                     self.count += 1;
                     self.lost += u64::from(entry.what == What::Lost);
-                    (self.last, self.crc) = (input.offset(), crc);
                 }
-                TEXT => {
-                    if core::str::from_utf8(frame.payload).is_err() {
-                        return Err(frame.expected("a text of UTF-8"));
-                    }
-                    (self.last, self.crc) = (input.offset(), crc);
-                }
-                END | CUT => {
+                Some(_) => {}
+                None => {
                     let said = <(u64, u64)>::from_bytes(frame.payload).map_err(inside)?;
                     if said != (self.count, self.lost) {
                         return Err(inside(Malformed {
@@ -196,12 +286,8 @@ impl Progress {
                     }
                     return Ok(frame.kind == CUT);
                 }
-                _ => {
-                    return Err(
-                        frame.expected("an entry or a text, frame kind 2 or 5, or an end, 3 or 4")
-                    );
-                }
             }
+            (self.last, self.crc) = (input.offset(), crc);
         }
     }
 }
@@ -211,12 +297,12 @@ impl Progress {
 ///
 /// # Errors
 ///
-/// Not even the header is whole: what is wrong with it.
+/// Not even the first bytes are those of a recording: what is wrong with them.
 ///
 /// ```
 /// use recording::{Header, Recording, Writer};
 ///
-/// let mut bytes = Writer::new(&Header::default()).finish();
+/// let mut bytes = Writer::new(&Header::default()).end();
 /// bytes.pop();
 /// assert!(Recording::read(&bytes).is_err());
 /// let mended = recording::mended(&bytes).unwrap();
@@ -226,14 +312,13 @@ pub fn mended(bytes: &[u8]) -> Result<Vec<u8>, Malformed> {
     let mut progress = Progress::none();
     let malformed = progress.read(bytes).err();
     if let Some(malformed) = malformed
-        && progress.header.is_none()
+        && progress.last == 0
     {
         return Err(malformed);
     }
-    let mut whole = bytes[..progress.last].to_vec();
-    let stream = Stream::behind(progress.crc, progress.count, progress.lost);
-    stream.cut(&mut |part| whole.extend_from_slice(part));
-    Ok(whole)
+    let whole = bytes[..progress.last].to_vec();
+    let stream = Stream::behind(progress.crc, (progress.count, progress.lost), whole);
+    Ok(stream.cut())
 }
 
 impl<'b> Iterator for Entries<'b> {
@@ -245,8 +330,8 @@ impl<'b> Iterator for Entries<'b> {
             let frame = frame(&mut self.0).ok()?;
             match frame.kind {
                 ENTRY => return Entry::decode(frame.payload).ok(),
-                TEXT => {}
-                _ => return None,
+                END | CUT => return None,
+                _ => {}
             }
         }
     }

@@ -36,7 +36,7 @@ impl<'b> Recording<'b> {
     /// ```
     /// use recording::{Header, Recording, Writer};
     ///
-    /// let bytes = Writer::new(&Header::default()).finish();
+    /// let bytes = Writer::new(&Header::default()).end();
     /// let recording = Recording::read(&bytes).unwrap();
     /// let refused = recording.values::<u8>("lidar", "points").unwrap_err();
     /// assert_eq!(

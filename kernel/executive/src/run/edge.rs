@@ -9,10 +9,11 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::edge::{Edge, Outgoing, Wish, send_rest};
+use fass::edge::{Edge, Kept, Outgoing, Wish};
 use fass::{LaunchError, Plan, Recorded};
 use sched_dag::{Instance, Notice};
 
+use super::record;
 use crate::machine::debug_port;
 use crate::machine::spinlock::{SpinLock, SpinLockGuard};
 use front::report::crossing;
@@ -28,36 +29,20 @@ pub fn get() -> SpinLockGuard<'static, Edge> {
 }
 
 /// Takes what the command line says.
-pub fn set_wish(wish: Wish) -> Result<(), &'static str> {
-    match wish {
-        Wish::Record {
-            is_needed: true, ..
-        } if !debug_port::is_there() => {
-            return Err(
-                "`record`: there is no debug port at 0x402 to send it to; run it in QEMU, by \
-                 `./scripts/run --record FILE`",
-            );
-        }
-        // Nobody has asked for it, or for more than there is.
-        Wish::Latest { .. } | Wish::Record { .. } if !debug_port::is_there() => return Ok(()),
-        _ => {}
+pub fn set_wish(wish: Wish) {
+    // Nobody has asked for the latest jobs, so they do not fill a console.
+    if !matches!(wish, Wish::Latest { .. }) || debug_port::is_there() {
+        EDGE.lock().set_wish(Box::leak(Box::new(wish)));
     }
-    EDGE.lock().set_wish(Box::leak(Box::new(wish)));
-    Ok(())
 }
 
 /// Makes a plan one that is recorded or replayed, if there is a wish. Reports whether that goes for
 /// the times, too, that functions are told.
 pub fn launch(plan: &mut Plan) -> Result<bool, LaunchError> {
     let mut edge = EDGE.lock();
-    let launched = edge.launch(plan, &mut debug_port::send);
+    let launched = edge.launch(plan, record::get().as_mut().map(Kept::file));
     IS_ON.store(edge.is_on(), Ordering::Relaxed);
     launched.map_err(LaunchError::new)
-}
-
-/// Sends an entry, if there is one; `false`: there was none.
-pub fn send(outgoing: &mut Outgoing) -> bool {
-    (outgoing.as_mut()).is_some_and(|drain| drain.step(&mut debug_port::send))
 }
 
 /// Sends what is left when the run is over, or what is kept of jobs before a fault, and says what
@@ -65,14 +50,12 @@ pub fn send(outgoing: &mut Outgoing) -> bool {
 pub fn end(outgoing: Outgoing, is_over: bool) {
     let mut edge = EDGE.lock();
     let outcome = edge.end_run(is_over);
-    let outgoing = outgoing.or_else(|| edge.before_fault(&mut debug_port::send));
+    let before_fault = edge.before_fault();
     drop(edge);
     if let Some(outcome) = outcome {
         crossing::replayed(&outcome);
     }
-    if let Some(drained) = send_rest(outgoing, &mut debug_port::send) {
-        crossing::recorded(&drained);
-    }
+    record::end_recording(outgoing, before_fault);
 }
 
 /// Takes note that an instance has failed, on the run's time and the clock's. The scheduler's

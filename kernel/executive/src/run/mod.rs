@@ -11,5 +11,6 @@ pub mod execution;
 pub mod heartbeat;
 pub(crate) mod occupation;
 pub mod platform;
+pub mod record;
 pub mod stacks;
 pub mod worker;

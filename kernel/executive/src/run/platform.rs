@@ -7,10 +7,9 @@ use fass::edge::Begin;
 use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, Recorded, Terms};
 use sched_dag::DagId;
 
-use super::{edge, execution, occupation, stacks};
+use super::{edge, execution, occupation, record, stacks};
 use crate::machine::spinlock::SpinLock;
 use crate::machine::{clock, this_core};
-use front::graph;
 
 /// The one kernel, as `fass` sees it.
 pub struct Kernel {
@@ -119,7 +118,7 @@ impl Platform for Kernel {
                 fass::set_clock(&TOLD);
             }
             stacks::watch(&mut plan);
-            graph::dump(&plan, &terms);
+            record::commit(&plan, &terms);
         }
         execution::prepare(plan, &terms, coincidence_ns)
     }

@@ -12,12 +12,10 @@ use fass::{Policy, Preemption, Signal, Terms, Wire};
 use sched_dag::engine::Run;
 
 use super::ending::Ending;
-use super::terms::Chosen;
 use super::verdict::Verdict;
 use super::wcet_notes;
 use crate::options::{Options, UsageError};
 use crate::report::memory::Memory;
-use crate::report::{times, trace};
 use crate::shell::LiveRun;
 
 /// What an app's machine is made of: the bare machine, or Linux.
@@ -100,12 +98,8 @@ pub struct Machine<S> {
     pub(super) module: Cell<Option<&'static [u8]>>,
     /// Whether the app has asked for that.
     has_asked: Cell<bool>,
-    /// What the words say that are not the app's.
-    chosen: Chosen,
     /// What bytes of input raise during a run.
     input: RefCell<Option<Signal>>,
-    /// How many runs have ended.
-    runs: Cell<u64>,
     /// Whether what they were like makes the app fail.
     verdict: Verdict,
 }
@@ -119,7 +113,6 @@ impl<S: System> Machine<S> {
     pub fn serve(
         system: S,
         options: Options<'static>,
-        chosen: Chosen,
         module: Option<&'static [u8]>,
         verdict: Verdict,
         app: fn(&Self) -> Result<(), Ending>,
@@ -129,9 +122,7 @@ impl<S: System> Machine<S> {
             options,
             module: Cell::new(module),
             has_asked: Cell::new(false),
-            chosen,
             input: RefCell::new(None),
-            runs: Cell::new(0),
             verdict,
         };
         let result = app(&machine);
@@ -307,12 +298,6 @@ impl<S: System> Machine<S> {
         let run = self.system.run(epoch_ns, self.input.borrow().as_ref())?;
         self.verdict.note(&run);
         wcet_notes::note(&run, self.system.terms().overheads);
-        if self.chosen.dumps_times {
-            times::dump(&run);
-        }
-        if self.chosen.dumps_trace {
-            trace::dump(&run, self.runs.replace(self.runs.get() + 1));
-        }
         if self.system.is_shut_down() {
             return Err(Ending::after_shutdown(&run));
         }

@@ -6,21 +6,11 @@ use alloc::format;
 use fass::{Overheads, Policy, Preemption, Terms};
 
 use crate::options::{Options, UsageError};
-use crate::text::graph;
 
 const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
 
 const PREEMPTIONS: [(&str, Preemption); 2] =
     [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
-
-const KEEP_OR_DUMP: [(&str, bool); 2] = [("keep", false), ("dump", true)];
-
-/// The values of `times`: whether statistics are printed, and whether bounds are judged.
-const TIMES: [(&str, (bool, bool)); 3] = [
-    ("keep", (false, true)),
-    ("dump", (true, true)),
-    ("observe", (true, false)),
-];
 
 /// What these words say.
 #[derive(Clone, Copy, Debug)]
@@ -29,10 +19,6 @@ pub struct Chosen {
     preemption: Preemption,
     budget_factor: u64,
     overheads: Overheads,
-    /// Whether each run's trace is printed after it.
-    pub dumps_trace: bool,
-    /// Whether each run's statistics are printed after it.
-    pub dumps_times: bool,
     /// Whether a response time beyond its bound is the app's fault.
     pub judges_bounds: bool,
 }
@@ -40,18 +26,12 @@ pub struct Chosen {
 impl Chosen {
     /// Takes the words. If they say so, commits print their DAGs from now on.
     pub fn read(options: &Options<'_>) -> Result<Self, UsageError> {
-        if options.choice("graph", &KEEP_OR_DUMP)? {
-            graph::enable();
-        }
-        let (dumps_times, judges_bounds) = options.choice("times", &TIMES)?;
         Ok(Self {
             policy: options.choice("policy", &POLICIES)?,
             preemption: options.choice("preemption", &PREEMPTIONS)?,
             budget_factor: options.number("budget_factor", 0..=1_000_000, 10)?,
             overheads: overheads(options)?,
-            dumps_trace: options.choice("trace", &KEEP_OR_DUMP)?,
-            dumps_times,
-            judges_bounds,
+            judges_bounds: options.choice("bounds", &[("judge", true), ("observe", false)])?,
         })
     }
 

@@ -1,12 +1,11 @@
-//! What is told of a run when it is over: its trace, its statistics, and figures over many
-//! samples. All of it is computed from the journal.
+//! What is told of a run when it is over: what became of its jobs, its memory, its wires and its
+//! recording, and how times are written.
 
 pub mod counts;
 pub mod crossing;
 pub mod memory;
+pub mod record;
 mod time;
-pub mod times;
-pub mod trace;
 pub mod wire;
 
 pub use sched_dag::law::Distribution;

@@ -19,14 +19,15 @@
 
 use std::borrow::Cow;
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{self, BufWriter, Write};
 use std::time::Duration;
 
 use linux::{Linux, Mechanism};
 
+use fass::edge::Sink;
 use front::app::terms::{self, Chosen};
-use front::graph;
 use front::options::{Options, UsageError};
+use front::report::record::Lines;
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
 const FOREIGN: [(&str, &str); 12] = [
@@ -52,7 +53,7 @@ const FOREIGN: [(&str, &str); 12] = [
 pub(crate) fn apply(
     app: &'static str,
     options: &Options<'static>,
-) -> Result<(Linux, Chosen, Option<&'static [u8]>), UsageError> {
+) -> Result<(Linux, Option<&'static [u8]>), UsageError> {
     if let Some((word, why)) = FOREIGN
         .iter()
         .find(|(word, _)| options.text(word).is_some())
@@ -87,31 +88,35 @@ pub(crate) fn apply(
             chosen.apply(terms);
             terms.wcets = wcets.map(Cow::Borrowed);
         })
-        .at_commit(graph::dump)
         .allocations(crate::heap::allocations);
-    let named = ["record", "keep"].map(|word| options.text(word).map(|path| (word, path)));
-    let [recorded, kept] = named;
-    match (recorded.or(kept), options.text("replay")) {
-        (Some(_), Some(_)) => {
+    let replayed = options.text("replay");
+    let words = ["record", "keep", "events"].map(|word| Some((word, options.text(word)?)));
+    match (words.into_iter().flatten().next(), replayed) {
+        (Some(("record" | "keep", _)), Some(_)) => {
             let line = "`record` and `keep` exclude `replay`; give one";
             return Err(UsageError::new(line));
         }
-        (Some((word, path)), None) => {
+        (Some(("events", "on")), _) => machine.keep_events(ToConsole(Lines::new())),
+        (Some((word, path)), _) => {
             let file = File::create(path);
             let file = file.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
-            match recorded {
-                Some(_) => machine.record(app, BufWriter::new(file)),
-                None => machine.keep(app, BufWriter::new(file)),
+            let file = BufWriter::new(file);
+            match word {
+                "record" => machine.record(app, file),
+                "keep" => machine.keep(app, file),
+                _ => machine.keep_events(file),
             }
         }
-        (None, Some(path)) => machine.replay(read("replay", path)?),
-        (None, None) => {}
+        (None, _) => {}
+    }
+    if let Some(path) = replayed {
+        machine.replay(read("replay", path)?);
     }
     if limit_ms > 0 {
         let limited = machine.limit_real_time(Duration::from_millis(limit_ms));
         limited.map_err(|why| UsageError::new(format!("`limit_ms={limit_ms}`: {why}")))?;
     }
-    Ok((machine, chosen, module))
+    Ok((machine, module))
 }
 
 /// Reads the file that a word names. It stays as long as the program, as the loader's does.
@@ -119,4 +124,19 @@ fn read(word: &str, path: &str) -> Result<&'static [u8], UsageError> {
     let bytes = fs::read(path);
     let bytes = bytes.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
     Ok(bytes.leak())
+}
+
+/// The record as lines of the program's output.
+struct ToConsole(Lines);
+
+impl Write for ToConsole {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.put(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush();
+        Ok(())
+    }
 }

@@ -19,11 +19,7 @@ pub struct Measured(pub Costs);
 /// # Errors
 ///
 /// In words: the log has no trace, or a damaged one.
-pub fn measure(log: &str) -> Result<Measured, String> {
-    let runs = trace::read(log).map_err(|malformed| {
-        let (line, reason) = (malformed.line, malformed.reason);
-        format!("serial line {line}: {reason}")
-    })?;
+pub fn measure(runs: &[Run]) -> Result<Measured, String> {
     let costs = runs.iter().map(of_run).reduce(|one, other| Costs {
         dispatches: one.dispatches + other.dispatches,
         owed_ns: one.owed_ns.max(other.owed_ns),

@@ -4,18 +4,18 @@ use std::fmt::Write;
 
 use sched_dag::DagId;
 
-use super::commits::Commit;
 use super::observed::OfDag;
 use super::slack::{self, Slack};
 use super::wcets::shown;
 use crate::json::Object;
+use crate::record::model::Committed;
 
 /// One DAG of one commit.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// The file that the DAG is from, if there are several.
     file: Option<String>,
-    commit: u64,
+    commit: usize,
     dag: String,
     bound_ns: Option<u64>,
     longest_ns: u64,
@@ -27,22 +27,21 @@ pub struct Row {
 /// # Errors
 ///
 /// In words: a DAG was committed and not run.
-pub fn rows(commits: &[Commit], observed: &[OfDag]) -> Result<Vec<Row>, String> {
+pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<Row>, String> {
     let mut rows = Vec::new();
     for commit in commits {
-        let dags = commit.task_set.dags().iter().zip(&commit.hashes);
-        for (number, (dag, &hash)) in (0..).map(DagId).zip(dags) {
-            let of_dag = observed.iter().find(|observed| observed.hash == hash);
+        for (number, dag) in (0..).map(DagId).zip(&commit.told.dags) {
+            let of_dag = observed.iter().find(|observed| observed.hash == dag.hash);
             let longest_ns = of_dag.and_then(|dag| dag.longest_responses_ns.get(&commit.number));
             let longest_ns = longest_ns.ok_or_else(|| {
-                let (name, commit) = (dag.name(), commit.number);
+                let (name, commit) = (&dag.name, commit.number);
                 format!("dag `{name}` of commit {commit} has not run")
             })?;
             rows.push(Row {
                 file: None,
                 commit: commit.number,
-                dag: dag.name().into(),
-                bound_ns: commit.bounds_ns[number.index()],
+                dag: dag.name.clone(),
+                bound_ns: dag.bound_ns,
                 longest_ns: *longest_ns,
                 slack: slack::of(commit, number),
             });
@@ -97,7 +96,7 @@ impl Row {
             line = line.text("file", file);
         }
         line = line
-            .number("commit", self.commit)
+            .number("commit", self.commit as u64)
             .text("dag", &self.dag)
             .number("longest_ns", self.longest_ns);
         let permille = [

@@ -15,8 +15,7 @@
 use sched_dag::analysis::{self, Overheads, Settings};
 use sched_dag::{Clusters, Dag, DagId, DagSpec, Preemption, SchedulerOptions, SubtaskSpec};
 
-use super::commits::Commit;
-use crate::trace::dag;
+use crate::record::model::{self, Committed};
 
 /// The parts of a bound, in nanoseconds. Each is `None` if a bound that it is the
 /// difference of is not proven.
@@ -36,15 +35,14 @@ pub struct Slack {
 
 /// Takes the bound of a DAG of a commit apart.
 #[must_use]
-pub fn of(commit: &Commit, dag: DagId) -> Slack {
+pub fn of(commit: &Committed, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &Settings, dag: usize| -> Option<u64> {
         let options = SchedulerOptions {
             policy: settings.policy,
             preemption: settings.preemption,
             cores: settings.cores,
         };
-        let options = (options, &Clusters::Undivided);
-        let task_set = dag::task_set("graph", options, dags, &[]).ok()?;
+        let task_set = model::task_set(options, Clusters::Undivided, dags).ok()?;
         let answer = analysis::answer(&task_set, settings);
         answer.bounds[dag].map(|bound| bound.bound_ns)
     };
@@ -55,8 +53,8 @@ pub fn of(commit: &Commit, dag: DagId) -> Slack {
     let here = || task_set.dags().iter().enumerate().filter(is_here);
     let mut all: Vec<DagSpec> = here().map(|(_, model)| spec(model)).collect();
     let index = here().take_while(|(place, _)| *place < dag.index()).count();
-    let full = commit.bounds_ns[dag.index()];
-    let mut settings = commit.settings;
+    let full = commit.told.dags[dag.index()].bound_ns;
+    let mut settings = commit.settings();
     let cores = task_set.cores_of(cluster, settings.cores).len();
     settings.cores = u32::try_from(cores).unwrap_or(u32::MAX);
     settings.overheads = Overheads::default();

@@ -1,49 +1,68 @@
-//! What is made of the lines of a guest: of one that has proven a DAG and run it three times.
+//! What is made of the record of a guest that has proven a DAG and run it three times.
 
 use std::fs;
 use std::path::Path;
 
+use recording::{Commit, Counted, DagTimes, SubtaskTimes, Times, Writer};
 use sched_dag::DagId;
 use sched_dag::law::Costs;
 
-use super::commits::{self, Commit};
 use super::observed::{self, OfDag};
 use super::report::{Row, complaint, rows, summary, table};
 use super::{overheads, slack, wcets, witness};
-use crate::protocol::Transcript;
+use crate::made::{commit, record_of};
+use crate::record::Record;
+use crate::record::model::Committed;
 
-/// A chain of 2 and 3 ms, each charged 1 us; of `a` it says what three calls took.
-const LOG: &str = r#"{"kind":"graph","commit":0,"policy":"static","preemption":"on","cores":2,"overhead_ns":[1000],"bound_ns":[5002000],"dag":0,"name":"demo","period_ns":10000000,"relative_deadline_ns":10000000,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,2000000],["b",1,0,3000000]],"edges":[[0,1]],"hash":5,"sporadic":false,"jobs":[],"topics":[],"states":[],"samples":[]}
-{"kind":"times_dag","dag":0,"name":"demo","first_recorded_job":0,"response_time_ns":{"count":3,"min":4,"median":5,"p99":9,"p999":9,"max":9},"release_jitter_ns":{}}
-{"kind":"times_subtask","dag":0,"subtask":0,"name":"a","join_latency_ns":{},"execution_time_ns":{"count":3,"min":4,"median":5,"p99":9,"p999":9,"max":9},"execution_histogram":[[4,1],[5,1],[9,1]]}
-"#;
+/// A chain of 2 and 3 ms, each charged 1 us.
+const CHAIN: &str = "static 2
+demo T=10000000 D=10000000 O=0 bound=5002000 hash=5: a/0/2000000 b/1/3000000; 0>1";
 
-/// The log of a run whose longest call and response take so long.
-fn log(longest: u64) -> String {
-    let max = LOG.replace("\"max\":9", &format!("\"max\":{longest}"));
-    max.replace("[9,1]", &format!("[{longest},1]"))
+/// The record of that chain, which says of `a` what three calls took; the longest call and
+/// response took so long.
+fn record(longest_ns: u64) -> Record {
+    let commit = Commit {
+        charge_ns: Some(1000),
+        ..commit(CHAIN)
+    };
+    let calls = Counted {
+        min_ns: 4,
+        buckets: vec![(4, 1), (5, 1), (longest_ns, 1)],
+    };
+    let subtask = |execution: &Counted| SubtaskTimes {
+        execution: execution.clone(),
+        ..SubtaskTimes::default()
+    };
+    let mut record = Writer::begin(Vec::new());
+    record.commit(&commit);
+    record.times(&Times {
+        written: Vec::new(),
+        dags: vec![DagTimes {
+            response: calls.clone(),
+            subtasks: vec![subtask(&calls), subtask(&Counted::default())],
+            ..DagTimes::default()
+        }],
+    });
+    Record::read(&record.end()).unwrap()
 }
 
-fn commits(log: &str) -> Vec<Commit> {
-    commits::read(&Transcript::read(log)).unwrap()
-}
-
-fn observed(logs: &[String]) -> Vec<OfDag> {
+fn observed(longest_ns: &[u64]) -> Vec<OfDag> {
     let mut all = Vec::new();
-    for log in logs {
-        observed::add(&mut all, &Transcript::read(log)).unwrap();
+    for longest_ns in longest_ns {
+        observed::add(&mut all, &record(*longest_ns)).unwrap();
     }
     all
 }
 
 fn rows_with(longest_ns: u64) -> Vec<Row> {
-    rows(&commits(LOG), &observed(&[log(longest_ns)])).unwrap()
+    rows(record(9).proven().unwrap(), &observed(&[longest_ns])).unwrap()
 }
 
 #[test]
 fn the_model_is_made_again_and_bounded_alike() {
-    let commits = commits(LOG);
-    assert_eq!(commits[0].bounds_ns, [Some(5_002_000)]);
+    let record = record(9);
+    let commits = record.proven().unwrap();
+    assert_eq!(commits[0].told.dags[0].bound_ns, Some(5_002_000));
     assert_eq!(commits[0].task_set.dags()[0].name(), "demo");
     // The parts of a bound are the bound.
     let expected = slack::Slack {
@@ -57,25 +76,25 @@ fn the_model_is_made_again_and_bounded_alike() {
 }
 
 #[test]
-fn another_bound_a_damaged_line_and_no_times_are_refused() {
-    let refused = |log: &str| commits::read(&Transcript::read(log)).unwrap_err();
-    let other = refused(&LOG.replace("5002000", "5001000"));
-    let words = "dag `demo` in commit 0 is Some(5001000) ns";
-    assert!(other.contains(words), "{other}");
-    let damaged = refused(&LOG.replace("\"on\"", "\"maybe\""));
-    let words = "serial line 1: `graph`: `preemption` is `maybe` and must be on or off";
-    assert_eq!(damaged, words);
-    let refused = |log: &str| observed::add(&mut Vec::new(), &Transcript::read(log)).unwrap_err();
-    assert!(refused("").starts_with("the guest has run no DAG"));
-    let other = refused(&LOG.replace("[9,1]", "[8,1]"));
-    assert!(other.contains("a line of kind `times_subtask` is malformed"));
-    let orphan = LOG.split_once('\n').map_or("", |(_, rest)| rest);
-    assert!(refused(orphan).contains("serial line 1: a line of kind `times_dag`"));
+fn another_bound_and_no_times_are_refused() {
+    let mut other = record(9);
+    other.commits[0].told.dags[0].bound_ns = Some(5_001_000);
+    let said = other.proven().unwrap_err();
+    let words = "the bound of dag `demo` in commit 0 is Some(5001000) ns";
+    assert!(said.starts_with(words), "{said}");
+    let refused = |record: &Record| observed::add(&mut Vec::new(), record).unwrap_err();
+    assert!(refused(&Record::default()).starts_with("the guest has run no DAG"));
+    let mut fewer = record(9);
+    fewer.times[0].1.dags[0].subtasks.pop();
+    assert_eq!(
+        refused(&fewer),
+        "the times of dag `demo` are not of its subtasks"
+    );
 }
 
 #[test]
 fn runs_of_one_graph_are_added() {
-    let all = observed(&[log(9), log(12)]);
+    let all = observed(&[9, 12]);
     let [dag] = &all[..] else { panic!("{all:?}") };
     assert_eq!((dag.hash, dag.longest_responses_ns[&0]), (5, 12));
     let (name, times) = &dag.subtasks[0];
@@ -97,7 +116,7 @@ fn a_response_above_its_bound_is_a_complaint_and_one_that_was_not_is_no_proof() 
     assert!(said.starts_with(words), "{said}");
     let words = "1 of 1 DAGs proven, 1 responses above a bound";
     assert_eq!(summary(&late), words);
-    let not_run = rows(&commits(LOG), &[]).unwrap_err();
+    let not_run = rows(record(9).proven().unwrap(), &[]).unwrap_err();
     assert!(not_run.contains("has not run"), "{not_run}");
 }
 
@@ -108,8 +127,12 @@ fn what_is_of_one_of_several_files_or_commits_has_its_name() {
     assert!(row.line().starts_with(begin));
     assert!(table(&[row]).contains("\na.dag: demo  "));
     let path = std::env::temp_dir().join(format!("witness-{}", std::process::id()));
-    let two = commits(&format!("{LOG}{}", LOG.replace("commit\":0", "commit\":2")));
-    let said = witness::write(&path, &two).unwrap();
+    let first = record(9).commits.remove(0);
+    let third = Committed {
+        number: 2,
+        ..first.clone()
+    };
+    let said = witness::write(&path, &[first, third]).unwrap();
     let (first, second) = (path.display(), format!("{}.2", path.display()));
     assert!(said.starts_with(&format!("{first} {second}: ")), "{said}");
     fs::remove_file(&path).and(fs::remove_file(second)).unwrap();
@@ -128,7 +151,7 @@ dag 5 demo/ |  | 6 | a WCET before the first DAG";
 
 #[test]
 fn wcets_that_are_written_are_read_and_have_the_margin() {
-    let text = wcets::text(&observed(&[log(9)]), 20);
+    let text = wcets::text(&observed(&[9]), 20);
     let end = "margin 20\ndag 5 demo\nwcet 11 0 a\nend\n";
     assert!(text.ends_with(end), "{text}");
     let path = std::env::temp_dir().join(format!("wcets-{}", std::process::id()));
@@ -155,7 +178,7 @@ fn wcets_that_are_written_are_read_and_have_the_margin() {
 
 #[test]
 fn the_table_of_wcets_shows_figures_and_a_histogram() {
-    let table = wcets::table(&observed(&[log(9)]), 20);
+    let table = wcets::table(&observed(&[9]), 20);
     let row = table.lines().nth(2).unwrap();
     let words: Vec<&str> = row.split_whitespace().collect();
     assert_eq!(words[..6], ["a", "3", "4", "ns", "5", "ns"], "{table}");
@@ -166,12 +189,13 @@ fn the_table_of_wcets_shows_figures_and_a_histogram() {
 
 #[test]
 fn the_longest_waits_of_a_run_are_what_is_charged() {
-    let log = r#"{"kind":"trace_begin","policy":"edf","preemption":"on","cores":1,"run":0}
-{"kind":"trace_dag","dag":0,"name":"x","period_ns":100,"relative_deadline_ns":100,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,50]],"edges":[]}
-{"kind":"trace","events":[[2,"released",0,0,0,-1],[2,"ready",0,0,0,0],[5,"start",0,0,0,0],[20,"finish",0,0,0,0],[20,"completed",0,0,0,-1]]}
-{"kind":"trace","events":[[101,"released",0,0,1,-1],[101,"ready",0,0,1,0],[108,"start",0,0,1,0],[120,"finish",0,0,1,0],[120,"completed",0,0,1,-1]]}
-{"kind":"trace_end","events":10,"lost":0,"complete":true}"#;
-    let measured = overheads::measure(log).unwrap();
+    let events = "
+        2 released c0 0.0\n 2 ready c0 0.0.0\n 5 start c0 0.0.0
+        20 finish c0 0.0.0\n 20 completed c0 0.0
+        101 released c0 0.1\n 101 ready c0 0.1.0\n 108 start c0 0.1.0
+        120 finish c0 0.1.0\n 120 completed c0 0.1";
+    let record = record_of("", &commit("edf 1\nx T=100 D=100 O=0: a/0/50"), events);
+    let measured = overheads::measure(&Record::read(&record).unwrap().runs).unwrap();
     let expected = Costs {
         dispatches: 2,
         owed_ns: 7,
@@ -181,6 +205,6 @@ fn the_longest_waits_of_a_run_are_what_is_charged() {
     assert_eq!(measured.0, expected);
     assert_eq!(measured.word(0), "overheads_ns=0,9,7");
     assert_eq!(measured.word(50), "overheads_ns=0,14,11");
-    let nothing = overheads::measure("").unwrap_err();
+    let nothing = overheads::measure(&[]).unwrap_err();
     assert_eq!(nothing, "the guest has run nothing");
 }

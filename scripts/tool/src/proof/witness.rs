@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use sched_dag::analysis;
 
-use super::commits::Commit;
 use crate::files;
+use crate::record::model::Committed;
 
 /// Writes the witness of each commit, and returns what to say of them. Those of later
 /// commits go to files of their own, with the commit's number as their last extension.
@@ -13,11 +13,11 @@ use crate::files;
 /// # Errors
 ///
 /// In words: nothing was committed, or a file cannot be written.
-pub fn write(path: &Path, commits: &[Commit]) -> Result<String, String> {
+pub fn write(path: &Path, commits: &[Committed]) -> Result<String, String> {
     let mut names = Vec::new();
     for commit in commits {
         let path = file(path, commit.number);
-        let text = analysis::witness(&commit.task_set, &commit.settings);
+        let text = analysis::witness(&commit.task_set, &commit.settings());
         files::write_named("witness", &path, text)?;
         names.push(files::place(&path));
     }
@@ -29,7 +29,7 @@ pub fn write(path: &Path, commits: &[Commit]) -> Result<String, String> {
     }
 }
 
-fn file(path: &Path, commit: u64) -> PathBuf {
+fn file(path: &Path, commit: usize) -> PathBuf {
     match commit {
         0 => path.into(),
         later => {

@@ -20,8 +20,7 @@ console: command accepted
 wire: name packets bytes lost_packets malformed sent_bytes unsent_bytes
 dag_status: dag name state released completed in_flight waiting misses skips aborts faults failed \
     restarts
-graph: commit policy preemption cores overhead_ns bound_ns dag name period_ns relative_deadline_ns \
-    offset_ns in_flight overrun subtasks edges hash sporadic jobs topics states
+record: bytes
 recorded: entries lost complete
 replayed: compared uncompared
 memory: heap_peak_bytes heap_bytes allocations
@@ -37,13 +36,6 @@ proof: commit dag longest_ns
 panic: cpu place message
 exception: cpu place message
 backtrace: cpu calls
-times_dag: dag name first_recorded_job response_time_ns release_jitter_ns
-times_subtask: dag subtask name join_latency_ns execution_time_ns execution_histogram
-times_sink: dag subtask name relative_deadline_ns misses response_time_ns
-trace_begin: policy preemption cores run
-trace_dag: dag name period_ns relative_deadline_ns offset_ns in_flight overrun subtasks edges
-trace: events
-trace_end: events lost
 trace_check: file run events lost judged_from_ns span_ns instances preemptions breaches \
     finish_to_ready_max_ns ready_to_start_ns preemption_latency_ns longest_inversion_ns \
     load_permille

@@ -14,10 +14,7 @@
 
 mod kinds;
 
-use std::borrow::Cow;
 use std::fmt;
-
-use recording::{Malformed, Recording};
 
 use crate::json::{self, Value};
 use kinds::kinds;
@@ -48,19 +45,6 @@ impl MachineLine {
     pub fn text_at(&self, name: &str) -> Option<&str> {
         self.value.get(name).and_then(Value::as_text)
     }
-}
-
-/// Returns the lines that a log has, or a run that was kept.
-///
-/// # Errors
-///
-/// It is a recording, and not whole: where not.
-pub fn lines(bytes: &[u8]) -> Result<Cow<'_, str>, Malformed> {
-    if bytes.starts_with(&recording::MAGIC) {
-        return Recording::read(bytes).map(|recording| recording.texts().collect());
-    }
-    // A person's line may be damaged; a machine line then is found to be.
-    Ok(String::from_utf8_lossy(bytes))
 }
 
 /// A line that looks like a machine line and is none.

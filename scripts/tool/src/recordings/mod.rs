@@ -23,11 +23,11 @@ use recording::Recording;
 use crate::dot;
 use crate::files::{self, Named};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
-use crate::proof::{commits, observed, wcets, witness};
-use crate::protocol::Transcript;
+use crate::proof::{observed, wcets, witness};
+use crate::record::Record;
 
-/// The options that want something of the lines of a run that was kept.
-const OF_LINES: [&str; 3] = ["dot", "witness", "observe"];
+/// The options that want something of the runs of a record.
+const OF_RUNS: [&str; 3] = ["dot", "witness", "observe"];
 
 /// The table of `recording`.
 pub static RECORDING: Command = Command {
@@ -98,7 +98,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     }
     let bytes = read(file).map_err(Refusal::Usage)?;
     let recording = parse(file, &bytes).map_err(Refusal::Usage)?;
-    of_lines(&recording, options).map_err(Refusal::Usage)?;
+    of_runs(&recording, options).map_err(Refusal::Usage)?;
     match options.text("until") {
         Some(job) => print!("{}", until::of(&recording, job).map_err(Refusal::Usage)?),
         None => print!("{}", summary::of(&recording)),
@@ -121,27 +121,26 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Writes what the options want of the machine lines of a run that was kept.
-fn of_lines(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
-    let Some(name) = options.given_of(&OF_LINES) else {
+/// Writes what the options want of the commits and runs of a record.
+fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
+    let Some(name) = options.given_of(&OF_RUNS) else {
         return Ok(());
     };
-    let lines: String = recording.texts().collect();
-    if lines.is_empty() {
+    let record = Record::of(recording, String::new())?;
+    if record.commits.is_empty() {
         let line = "it has values alone; `./scripts/run --keep FILE` keeps all of a run";
         return Err(format!("`--{name}`: {line}"));
     }
-    let transcript = Transcript::read(&lines);
     if let Some(path) = options.path("dot") {
-        files::write_named("dot", path, dot::text(&transcript)?)?;
+        files::write_named("dot", path, dot::text(&record)?)?;
         println!("{}", files::place(path));
     }
     if let Some(path) = options.path("witness") {
-        println!("{}", witness::write(path, &commits::read(&transcript)?)?);
+        println!("{}", witness::write(path, record.proven()?)?);
     }
     if let Some(path) = options.path("observe") {
         let mut observed = Vec::new();
-        observed::add(&mut observed, &transcript)?;
+        observed::add(&mut observed, &record)?;
         let text = wcets::text(&observed, wcets::MARGIN_PERCENT);
         files::write_named("observe", path, text)?;
         println!("{}", files::place(path));
@@ -157,7 +156,7 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
             return Err(format!("`--from-csv` needs `--{name}`; give it, too"));
         }
         let views = options.given_of(&["csv", "mcap", "until"]);
-        if let Some(name) = views.or(options.given_of(&OF_LINES)) {
+        if let Some(name) = views.or(options.given_of(&OF_RUNS)) {
             let line = "`--from-csv` exclude each other; convert what it has written";
             return Err(format!("`--{name}` and {line}"));
         }

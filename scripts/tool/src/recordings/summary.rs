@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
-use recording::{Recording, What};
+use recording::{Chunk, Commit, Counted, Recording, Times, What};
 use replay::shown::visible;
+
+use crate::proof::{observed, wcets};
 
 /// Returns the lines.
 pub(super) fn of(recording: &Recording<'_>) -> String {
@@ -53,9 +55,32 @@ pub(super) fn of(recording: &Recording<'_>) -> String {
             let _ = writeln!(text, "  {count} times {}", what.name());
         }
     }
-    let lines = recording.texts().flat_map(str::lines).count();
-    if lines > 0 {
-        let _ = writeln!(text, "  {lines} machine lines of the run");
+    let (mut commits, mut events, mut runs, mut lines) = (Vec::new(), 0, 0, 0);
+    let mut tables = String::new();
+    for chunk in recording.chunks() {
+        match chunk {
+            Chunk::Header(_) | Chunk::Entry(_) => {}
+            Chunk::Text(text) => lines += text.lines().count(),
+            Chunk::Commit(commit) => commits.push(commit),
+            Chunk::Events(some) => events += some.words().count(),
+            Chunk::Times(times) => {
+                tables += &commits
+                    .last()
+                    .map_or(String::new(), |of| table(runs, of, &times));
+                runs += 1;
+            }
+        }
+    }
+    let counts = [
+        (commits.len(), "commits"),
+        (events, "events"),
+        (runs, "runs that have ended"),
+        (lines, "machine lines"),
+    ];
+    for (count, what) in counts {
+        if count > 0 {
+            let _ = writeln!(text, "  {count} {what}");
+        }
     }
     let _ = match recording.lost() {
         _ if recording.is_cut() => writeln!(
@@ -65,5 +90,42 @@ pub(super) fn of(recording: &Recording<'_>) -> String {
         0 => writeln!(text, "complete"),
         lost => writeln!(text, "incomplete: {lost} values are lost"),
     };
-    text
+    text + &tables
+}
+
+/// Shows what all jobs of a run took, also those whose events are lost.
+fn table(run: usize, commit: &Commit, times: &Times) -> String {
+    let mut text = String::new();
+    let mut row = |name: &str, counted: &Counted| {
+        let times = observed::distribution(counted);
+        let figures = [times.min(), times.median(), times.p99(), times.max()];
+        let figures = figures
+            .map(|ns| format!("{:>12}", wcets::shown(ns)))
+            .concat();
+        // Writing into a `String` cannot fail.
+        let _ = match times.count() {
+            0 => Ok(()),
+            count => writeln!(text, "  {name:<34}{count:>8}{figures}"),
+        };
+    };
+    for (dag, times) in commit.dags.iter().zip(&times.dags) {
+        let name = visible(&dag.name).to_string();
+        row(&format!("`{name}` response"), &times.response);
+        row(&format!("`{name}` release jitter"), &times.release_jitter);
+        for (subtask, times) in dag.subtasks.iter().zip(&times.subtasks) {
+            let name = visible(&subtask.name).to_string();
+            row(&format!("  `{name}` join latency"), &times.join_latency);
+            row(&format!("  `{name}` execution"), &times.execution);
+            if let Some((response, ..)) = &times.sink {
+                row(&format!("  `{name}` response"), response);
+            }
+        }
+    }
+    match text.is_empty() {
+        true => text,
+        false => format!(
+            "run {run}{:>39}         min      median         p99         max\n{text}",
+            "count"
+        ),
+    }
 }

@@ -112,7 +112,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         });
         row += 1;
     }
-    Ok(writer.finish())
+    Ok(writer.end())
 }
 
 /// What the columns are, by their numbers.

@@ -8,6 +8,7 @@ use crate::dag_file::Prepared;
 use crate::files::{self, Temporary};
 use crate::options::{Parsed, Refusal};
 use crate::proof::wcets;
+use crate::recordings;
 use crate::system;
 
 /// Files on their way to the guest.
@@ -28,7 +29,7 @@ impl Handed {
         let read = |path: &Path| wcets::read(path).map_err(Refusal::Usage);
         let text = options.path("wcets").map(read).transpose()?;
         let text = text.unwrap_or_default();
-        let replayed = super::recording::read(options)?;
+        let replayed = read_replayed(options)?;
         let own = options.named(&["module"]).first().map(files::read_named);
         let own = own.transpose().map_err(Refusal::Usage)?;
         let input = wire::script(options)?;
@@ -72,6 +73,21 @@ impl Handed {
         parts
             .map(|(name, bytes)| format!(" {name}={bytes}"))
             .collect()
+    }
+}
+
+/// Returns the recording to replay that belongs into the module, if there is one; a program of
+/// Linux reads the file itself.
+fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
+    let Some(path) = options.path("replay") else {
+        return Ok(Vec::new());
+    };
+    let refused = |why| Refusal::Usage(format!("`--replay` {why}"));
+    let bytes = recordings::read(path).map_err(refused)?;
+    recordings::parse(path, &bytes).map_err(refused)?;
+    match options.is_given("on") {
+        true => Ok(Vec::new()),
+        false => Ok(bytes),
     }
 }
 

@@ -1,77 +1,203 @@
-//! All of a run in one file: a recording with the run's machine lines.
+//! The record of a boot: it comes while the guest runs, is completed with what the guest has
+//! said, and is written where the options want it, or views of it are.
 //!
-//! So one file has the DAGs, what was answered to their commit, each event, and the values, and
-//! every command that reads a log or a recording reads it. A run that died leaves what it had
-//! said and sent until then.
+//! Also if nobody has asked for it, a guest sends what it keeps of its last jobs before a fault;
+//! then the file lies beside the log.
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
-use recording::{Header, Recording, Stream};
+use recording::{Chunk, Header, Recording, Writer};
 
-use crate::files;
+use crate::dot;
+use crate::files::{self, Temporary};
 use crate::options::Parsed;
 use crate::outcome::Outcome;
+use crate::proof::witness;
 use crate::protocol::Status;
 use crate::qemu::Ending;
 use crate::recordings;
+use crate::system;
 
-/// The kinds of lines that say how far a run is, and nothing of it.
-const PASSING: [&str; 2] = ["progress", "status"];
+/// The kinds of lines that say how far a run is, and nothing of what it was, or what the record
+/// itself is made of.
+const PASSING: [&str; 3] = ["progress", "record", "status"];
 
-/// Writes the file that the options name, if they do, and returns what to say of it.
-///
-/// # Errors
-///
-/// In words: what was sent cannot be read, or the file cannot be written.
-pub(super) fn write(
-    options: &Parsed,
-    sent: Option<&Path>,
-    app: &str,
-    outcome: &Outcome,
-) -> Result<Option<String>, String> {
-    let Some(path) = options.path("keep") else {
-        return Ok(None);
-    };
-    if outcome.ending == Ending::Guest(Status::Usage) {
-        return Ok(None);
-    }
-    let file = files::place(path);
-    let sent = sent.map_or(Ok(Vec::new()), recordings::received);
-    let sent = sent.map_err(|error| format!("`--keep {file}`: {error}"))?;
-    // Where nothing was recorded, there is no header either.
-    let sent = match Recording::read(&sent) {
-        Ok(_) => sent,
-        Err(_) => recording::mended(&sent).unwrap_or_default(),
-    };
-    let recording = Recording::read(&sent).ok();
-    let header = match &recording {
-        Some(recording) => recording.header().clone(),
-        None => Header {
+/// The options that name a file for the record.
+const FILES: [&str; 3] = ["keep", "record", "trace"];
+
+/// How many KiB values may wait in for the background to send them.
+const ROOM_KIB: &str = "1024";
+
+/// What a boot keeps.
+pub(super) struct Kept {
+    /// Where the bytes go while they come.
+    raw: Temporary,
+    app: String,
+    /// The guest's word for what is kept, if anything is.
+    word: Option<&'static str>,
+}
+
+/// Returns the guest's word for what the options want.
+pub(super) fn word(options: &Parsed) -> Option<&'static str> {
+    let views = ["trace", "dot", "witness", "observe", "prove"];
+    let all = ["record", "keep"].into_iter();
+    let mut all = all.filter(|name| options.is_given(name));
+    all.next().or(options.given_of(&views).map(|_| "events"))
+}
+
+impl Kept {
+    pub(super) fn new(options: &Parsed, app: &str) -> Result<Self, String> {
+        let path = system::new_log(app)?.with_extension("sent");
+        Ok(Self {
+            raw: Temporary(Some(path)),
             app: app.into(),
-            ..Header::default()
-        },
-    };
-    let mut bytes = Vec::new();
-    let mut send = |part: &[u8]| bytes.extend_from_slice(part);
-    let mut stream = Stream::begin(&header, &mut send);
-    for entry in recording.iter().flat_map(Recording::entries) {
-        stream.write(&entry, &mut send);
+            word: word(options),
+        })
     }
-    let lines = outcome.transcript.machine.iter();
-    let lasting = lines.filter(|line| !PASSING.contains(&line.kind.as_str()));
-    let lines: String = lasting.map(|line| line.text.clone() + "\n").collect();
-    stream.text(&lines, &mut send);
-    let is_whole = outcome.transcript.verdict().is_ok();
-    match is_whole && !recording.is_some_and(|recording| recording.is_cut()) {
-        true => stream.end(&mut send),
-        false => stream.cut(&mut send),
+
+    /// Returns where what is sent is to go.
+    pub(super) fn raw(&self) -> Option<PathBuf> {
+        self.raw.0.clone()
     }
-    files::write_named("keep", path, &bytes)?;
-    let how = if is_whole { "" } else { "until it died, " };
-    Ok(Some(format!(
-        "{file}: all of the run, {how}{} bytes; `./scripts/check-trace {file}` judges it, \
-         `./scripts/trace {file} -o {file}.json` draws it, `./scripts/recording {file}` shows what \
-         is recorded, and `--replay {file}` repeats it",
-        bytes.len()
-    )))
+
+    /// Returns the word with that file, for a program that writes it itself.
+    pub(super) fn word_with_file(&self) -> Option<(&'static str, PathBuf)> {
+        self.word.zip(self.raw())
+    }
+
+    /// Returns the word for the machine.
+    pub(super) fn guest_word(&self) -> String {
+        match self.word {
+            Some("events") => " events=on".into(),
+            Some(word) => format!(" {word}={ROOM_KIB}"),
+            None => String::new(),
+        }
+    }
+
+    /// Takes what has come.
+    pub(super) fn receive(&self, outcome: &mut Outcome) -> Result<(), String> {
+        // No guest, no file.
+        let sent = self.raw.0.as_deref().map(recordings::received);
+        outcome.sent = sent.and_then(Result::ok).unwrap_or_default();
+        if outcome.sent.is_empty() {
+            outcome.sent = crate::record::bytes_of_log(&outcome.serial)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the record where it is wanted. Returns the words that announce it.
+    pub(super) fn write(&self, options: &Parsed, outcome: &Outcome) -> Result<Vec<String>, String> {
+        if outcome.ending == Ending::Guest(Status::Usage) {
+            return Ok(Vec::new());
+        }
+        if self.word.is_none() {
+            return self.write_crash(&outcome.sent);
+        }
+        let wanted = FILES
+            .into_iter()
+            .filter_map(|name| Some((name, options.path(name)?)));
+        let wanted: Vec<_> = wanted.collect();
+        if wanted.is_empty() {
+            return Ok(Vec::new());
+        }
+        let bytes = self.completed(outcome);
+        let how = match outcome.transcript.verdict().is_ok() {
+            true => "",
+            false => "until it died, ",
+        };
+        let announce = |(name, path): (&str, &Path)| {
+            files::write_named(name, path, &bytes)?;
+            let file = files::place(path);
+            Ok(format!(
+                "{file}: all of the run, {how}{} bytes; `./scripts/check-trace {file}` judges it, \
+                 `./scripts/trace {file} -o {file}.json` draws it, `./scripts/recording {file}` \
+                 shows what is recorded, and `--replay {file}` repeats it",
+                bytes.len()
+            ))
+        };
+        wanted.into_iter().map(announce).collect()
+    }
+
+    /// Returns the record with what the guest has said, and with a header.
+    fn completed(&self, outcome: &Outcome) -> Vec<u8> {
+        let sent = match Recording::read(&outcome.sent) {
+            Ok(_) => outcome.sent.clone(),
+            Err(_) => recording::mended(&outcome.sent).unwrap_or_default(),
+        };
+        let recording = Recording::read(&sent).ok();
+        let mut header = recording
+            .as_ref()
+            .map_or(Header::default(), |of| of.header().clone());
+        if header.app.is_empty() {
+            header.app.clone_from(&self.app);
+        }
+        let mut record = Writer::new(&header);
+        for chunk in recording.iter().flat_map(Recording::chunks) {
+            match chunk {
+                Chunk::Header(_) => {}
+                Chunk::Entry(entry) => record.write(&entry),
+                Chunk::Text(text) => record.text(text),
+                Chunk::Commit(commit) => record.commit(&commit),
+                Chunk::Events(events) => {
+                    let words: Vec<_> = events.words().collect();
+                    record.events(events.cluster, events.before, &words);
+                }
+                Chunk::Times(times) => record.times(&times),
+            }
+        }
+        let lines = outcome.transcript.machine.iter();
+        let lasting = lines.filter(|line| !PASSING.contains(&line.kind.as_str()));
+        let lines: String = lasting.map(|line| line.text.clone() + "\n").collect();
+        record.text(&lines);
+        let is_whole = outcome.transcript.verdict().is_ok();
+        match is_whole && !recording.is_some_and(|recording| recording.is_cut()) {
+            true => record.end(),
+            false => record.cut(),
+        }
+    }
+
+    fn write_crash(&self, bytes: &[u8]) -> Result<Vec<String>, String> {
+        let (Ok(_), Some(raw)) = (Recording::read(bytes), &self.raw.0) else {
+            return Ok(Vec::new());
+        };
+        let path = raw.with_extension("rec");
+        let file = files::place(&path);
+        fs::write(&path, bytes).map_err(|error| format!("{file}: cannot be written: {error}"))?;
+        let shown = self.replay_package().map_or(String::new(), |package| {
+            format!(
+                ", and `cargo run --profile host{package} --example replay -- {file}` shows the job \
+                 that crashed"
+            )
+        });
+        Ok(vec![format!(
+            "{file}: the inputs of the last jobs before the fault; `./scripts/recording {file}` \
+             lists them{shown}"
+        )])
+    }
+
+    /// Returns which package has the app's own replay, as cargo is told; `None` if none has.
+    fn replay_package(&self) -> Option<String> {
+        const EXAMPLE: &str = "examples/replay.rs";
+        let app = &self.app;
+        let is_ours = (system::workspace().join("apps").join(app).join(EXAMPLE)).is_file();
+        let in_its_own = || Path::new(EXAMPLE).is_file().then(String::new);
+        is_ours.then(|| format!(" -p {app}")).or_else(in_its_own)
+    }
+}
+
+/// Writes the views that the options want. Returns the words that announce them.
+pub(super) fn write_views(options: &Parsed, outcome: &Outcome) -> Result<Vec<String>, String> {
+    let mut announced = Vec::new();
+    if let Some(path) = options.path("dot") {
+        files::write_named("dot", path, dot::text(&outcome.record()?)?)?;
+        let file = files::place(path);
+        announced.push(format!(
+            "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
+        ));
+    }
+    if let Some(path) = options.path("witness") {
+        announced.push(witness::write(path, outcome.record()?.proven()?)?);
+    }
+    Ok(announced)
 }

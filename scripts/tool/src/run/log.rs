@@ -11,7 +11,7 @@ use crate::options::Parsed;
 use crate::system;
 
 /// The options that name the log, of which one may be given.
-const NAMES: [&str; 2] = ["serial", "trace"];
+const NAMES: [&str; 1] = ["serial"];
 
 /// The serial log of a run.
 pub(super) struct Log {

@@ -21,7 +21,6 @@ mod log;
 mod on_linux;
 mod params;
 mod prove;
-mod recording;
 mod screen;
 mod seeing;
 mod status;
@@ -47,8 +46,8 @@ use crate::probe;
 use crate::qemu::{Mode, Qemu};
 use conclusion::{conclude, go_on};
 use handed::Handed;
+use kept::Kept;
 use log::Log;
-use recording::Recorded;
 use screen::Screen;
 
 pub use boot::boot;
@@ -56,10 +55,7 @@ pub use debug::debug;
 pub use table::RUN;
 
 /// Options that exclude each other, whatever is run, and in one run that is not observed.
-const APART: [(&str, &str, &str); 2] = [
-    ("json", "plain", "exclude each other"),
-    ("trace", "serial", "both name the serial log"),
-];
+const APART: [(&str, &str, &str); 1] = [("json", "plain", "exclude each other")];
 const APART_IN_ONE: [(&str, &str, &str); 3] = [
     (
         "dag",
@@ -142,13 +138,13 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
 
     let handed = Handed::read(options, dags)?;
     let parameters = params::guest_word(options)?;
-    let recorded = Recorded::new(options, &app)?;
+    let kept = Kept::new(options, &app)?;
     let describe = |mode| {
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
         qemu.guest_words += &handed.guest_words();
         qemu.guest_words += &parameters;
-        qemu.guest_words += &recorded.guest_word();
-        qemu.records = recorded.raw();
+        qemu.guest_words += &kept.guest_word();
+        qemu.records = kept.raw();
         qemu.module = handed.module();
         qemu
     };
@@ -185,7 +181,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let talk = seeing::relay(options, &log.path);
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
-    written::write(options, &recorded, outcome?, log, screen)
+    written::write(options, &kept, outcome?, log, screen)
 }
 
 /// Settles which app runs: the one that the options name, which a given image must be of,
@@ -235,7 +231,7 @@ fn describe(
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
     words.extend(seeing::guest_words(options));
-    words.extend(seeing::dumps(options));
+    words.extend(prove::bounds_word(options));
     words.extend(options.text("append").map(String::from));
     Qemu {
         program: program.into(),

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use super::{Booted, limit, seeing, table, wire, written};
+use super::{Booted, limit, prove, table, wire, written};
 use crate::dag_file::Prepared;
 use crate::debian::{Guest, Order};
 use crate::image;
@@ -15,8 +15,8 @@ use crate::program;
 use crate::qemu::{Ending, Mode};
 
 use super::handed::Handed;
+use super::kept::{self, Kept};
 use super::log::Log;
-use super::recording::Recorded;
 use super::screen::Screen;
 
 /// The options that are about QEMU, its guest, or what the kernel alone does.
@@ -96,19 +96,21 @@ pub(super) fn run_app(
     let handed = Handed::read(options, dags)?;
     let mut words = words(options, dags);
     words.extend(handed.guest_words().split_whitespace().map(OsString::from));
-    let recorded = Recorded::new(options, app)?;
-    let raw = recorded.raw().filter(|_| recorded.word().is_some());
+    let kept = Kept::new(options, app)?;
     let replayed = options.path("replay").map(Path::to_path_buf);
-    for (name, path) in [
-        ("module=", handed.module()),
-        (&*format!("{}=", recorded.word().unwrap_or_default()), raw),
-        ("replay=", replayed),
-    ] {
+    for (name, path) in [("module=", handed.module()), ("replay=", replayed)] {
         if let Some(path) = path {
             let mut word = OsString::from(name);
             word.push(path);
             words.push(word);
         }
+    }
+    if is_in_guest(options) {
+        words.extend(kept::word(options).map(|word| format!("{word}=on").into()));
+    } else if let Some((word, path)) = kept.word_with_file() {
+        let mut word = OsString::from(format!("{word}="));
+        word.push(path);
+        words.push(word);
     }
     let log = Log::choose(options, app)?;
     let image = match given {
@@ -171,7 +173,7 @@ pub(super) fn run_app(
     if let (Some(guest), Ending::Program(why)) = (&guest, &mut outcome.ending) {
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
-    written::write(options, &recorded, outcome, log, screen)
+    written::write(options, &kept, outcome, log, screen)
 }
 
 /// Says which program is run, and what its times are worth.
@@ -214,7 +216,7 @@ fn words(options: &Parsed, dags: Option<&Prepared>) -> Vec<OsString> {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
-    words.extend(seeing::dumps(options));
+    words.extend(prove::bounds_word(options));
     words.extend(options.is_given("console").then(|| "console=on".into()));
     words.extend(wire::is_live(options).then(|| "input=-".into()));
     words.extend(options.text("output").map(|path| format!("output={path}")));

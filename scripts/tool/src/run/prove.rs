@@ -15,8 +15,9 @@ use crate::options::{Parsed, Refusal};
 use crate::progress::Progress;
 use crate::proof::observed::{self, OfDag};
 use crate::proof::overheads::{self, Measured};
-use crate::proof::{commits, report, wcets};
+use crate::proof::{report, wcets};
 use crate::protocol::Status;
+use crate::record::Record;
 use crate::system;
 
 /// What the platform costs; an error in words if no trace was kept.
@@ -137,10 +138,7 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
     if options.is_given("wcets") && !measures {
         return Ok(Some(options.clone()));
     }
-    let mut first = options.with("quiet", "yes").with("plain", "yes");
-    if measures {
-        first = first.with("append", format!("{append} trace=dump"));
-    }
+    let first = options.with("quiet", "yes").with("plain", "yes");
     let file = options.path("observe").or(own);
     let Some(seen) = observe(&first, file.filter(|_| !options.is_given("wcets")))? else {
         return Ok(None);
@@ -160,11 +158,10 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
 }
 
 fn compare(booted: &Booted) -> Result<Vec<report::Row>, String> {
-    let transcript = &booted.outcome.transcript;
-    let commits = commits::read(transcript)?;
+    let record = booted.outcome.record()?;
     let mut all = Vec::new();
-    observed::add(&mut all, transcript)?;
-    report::rows(&commits, &all)
+    observed::add(&mut all, &record)?;
+    report::rows(record.proven()?, &all)
 }
 
 /// Observes a run for each seed, says what the calls took, and writes the file of WCETs.
@@ -175,7 +172,7 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
     let first = options.number("seed").unwrap_or(1);
     let seeds = options.number("seeds").unwrap_or(1);
     let mut all: Vec<OfDag> = Vec::new();
-    let mut log = String::new();
+    let mut latest = Record::default();
     for seed in first..first.saturating_add(seeds) {
         let one = match seeds {
             1 => observing.clone(),
@@ -189,8 +186,8 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         if !is_well {
             return Ok(None);
         }
-        observed::add(&mut all, &booted.outcome.transcript)?;
-        log = booted.outcome.serial;
+        latest = booted.outcome.record()?;
+        observed::add(&mut all, &latest)?;
     }
     let margin = options.number("margin").unwrap_or(wcets::MARGIN_PERCENT);
     say(options, &wcets::table(&all, margin), observed::lines(&all));
@@ -202,7 +199,7 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         }
     }
     // Those of the last seed stand for all.
-    Ok(Some(overheads::measure(&log)))
+    Ok(Some(overheads::measure(&latest.runs)))
 }
 
 /// Says a table to people and lines to programs, as the options want it.
@@ -215,14 +212,11 @@ fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
     }
 }
 
-/// Returns the word for statistics, if they are asked for. A run that only observes judges no
-/// bound: what its WCETs and overheads should be is what it is to show.
-pub(super) fn times_word(options: &Parsed) -> Option<String> {
-    if options.is_given("observe") && !options.is_given("prove") {
-        return Some("times=observe".into());
-    }
-    let is_wanted = options.given_of(&["prove", "keep"]).is_some();
-    is_wanted.then(|| "times=dump".into())
+/// A run that only observes judges no bound: what its WCETs and overheads should be is what it is
+/// to show.
+pub(super) fn bounds_word(options: &Parsed) -> Option<String> {
+    let observes = options.is_given("observe") && !options.is_given("prove");
+    observes.then(|| "bounds=observe".into())
 }
 
 /// Says what a guest has refused of a file of WCETs, by its name and line.

@@ -24,9 +24,6 @@ pub(super) struct Screen {
     people: bool,
     machine: bool,
     quiet: bool,
-    traces: bool,
-    graphs: bool,
-    times: bool,
     on_terminal: bool,
     bar_is_shown: bool,
     status: StatusLine,
@@ -36,17 +33,11 @@ pub(super) struct Screen {
 
 impl Screen {
     pub(super) fn new(options: &Parsed, image: &Path) -> Screen {
-        let is_kept = options.is_given("keep");
         Screen {
             people: !options.is_given("json"),
             machine: !options.is_given("plain")
                 && (options.is_given("json") || !options.is_given("console")),
             quiet: options.is_given("quiet"),
-            // A person who wants these in a file does not want megabytes of them here.
-            traces: !is_kept && !options.is_given("trace") && !super::prove::is_asked_for(options),
-            // Nor does one who wants something made of them.
-            graphs: !super::seeing::needs_graphs(options),
-            times: !is_kept && !super::prove::is_asked_for(options),
             on_terminal: system::stderr_moves(),
             bar_is_shown: false,
             status: StatusLine::default(),
@@ -74,16 +65,11 @@ impl Screen {
         if let Some(Ok(machine)) = &read {
             match machine.kind.as_str() {
                 "progress" => return self.advance(machine),
+                // What it says is in a file, or nobody has asked for it here.
+                "record" => return,
                 "status" if self.on_terminal => return self.show_status(machine),
                 _ => {}
             }
-        }
-        if let Some(Ok(machine)) = &read
-            && (machine.kind.starts_with("trace") && !self.traces
-                || machine.kind.starts_with("times") && !self.times
-                || machine.kind == "graph" && !self.graphs)
-        {
-            return;
         }
         let wanted = if read.is_some() {
             self.machine

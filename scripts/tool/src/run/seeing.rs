@@ -12,12 +12,8 @@ use std::process::ChildStdin;
 use std::thread;
 use std::time::Duration;
 
-use super::{prove, wire};
-use crate::dot;
-use crate::files;
+use super::wire;
 use crate::options::Parsed;
-use crate::outcome::Outcome;
-use crate::proof::{commits, witness};
 use crate::system;
 
 /// Returns the guest's words for what the options ask for.
@@ -41,57 +37,10 @@ pub(super) fn can_stop(options: &Parsed) -> bool {
     !wire::is_live(options) && !says_otherwise
 }
 
-/// Returns the words by which runs print what the options need: commits their DAGs, and runs
-/// their trace and the statistics of all jobs.
-pub(super) fn dumps(options: &Parsed) -> Vec<String> {
-    let mut words = Vec::new();
-    words.extend(needs_graphs(options).then(|| "graph=dump".into()));
-    let traces = options.given_of(&["trace", "keep"]);
-    words.extend(traces.map(|_| "trace=dump".into()));
-    words.extend(prove::times_word(options));
-    words
-}
-
-/// Reports whether the options ask for what needs the committed DAGs.
-pub(super) fn needs_graphs(options: &Parsed) -> bool {
-    let names = ["dot", "trace", "keep", "witness", "observe", "prove"];
-    options.given_of(&names).is_some()
-}
-
 /// Reports whether a person watches, and does not talk meanwhile.
 fn is_watched(options: &Parsed) -> bool {
     let is_silent = options.given_of(&["quiet", "json", "gdb"]).is_some();
     stdout().is_terminal() && system::stderr_moves() && !is_silent
-}
-
-/// Writes the DAGs that a run has committed, if the options ask for it, and returns
-/// what to say of the file.
-///
-/// # Errors
-///
-/// In words: there are none, or the file cannot be written.
-pub(super) fn write_dot(options: &Parsed, outcome: &Outcome) -> Result<Option<String>, String> {
-    let Some(path) = options.path("dot") else {
-        return Ok(None);
-    };
-    files::write_named("dot", path, dot::text(&outcome.transcript)?)?;
-    let file = files::place(path);
-    Ok(Some(format!(
-        "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
-    )))
-}
-
-/// Writes the witnesses of a run's bounds, if the options ask for it, and returns what to
-/// say of them.
-///
-/// # Errors
-///
-/// In words: there are none, or a file cannot be written.
-pub(super) fn write_witness(options: &Parsed, outcome: &Outcome) -> Result<Option<String>, String> {
-    let Some(path) = options.path("witness") else {
-        return Ok(None);
-    };
-    witness::write(path, &commits::read(&outcome.transcript)?).map(Some)
 }
 
 /// Hands standard input on to the guest's serial port, until either ends. At its end a console's

@@ -75,11 +75,10 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "set": Takes::Text("NAME=VALUE,...");
         /// Set those of this file, a line NAME=VALUE for each; --set prevails.
         "params": Takes::File("FILE");
-        /// Write what crosses the edge of the run to this file: the values of the topics that the
-        /// app records, see docs/recordings.md.
+        /// As --keep; it is an error if the app records no topic.
         "record": Takes::File("FILE");
-        /// Keep all of the run in one file: its machine lines, with graphs, bounds, trace and
-        /// statistics, which are not shown, and what crosses its edge; docs/recordings.md.
+        /// Keep all of the run in one file, while it goes on: model, events, times, the values of
+        /// the topics that the app records, and machine lines; docs/recordings.md.
         "keep": Takes::File("FILE");
         /// Without --record, --keep and --replay: of how many jobs of each DAG the inputs are kept, for a
         /// file that shows a crash; 0: of none; the default is 16.
@@ -116,8 +115,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "timeout": Takes::number(1..=86_400);
         /// Keep the serial log in this file.
         "serial": Takes::File("FILE");
-        /// Keep the serial log in this file, with the trace of each run, which is not shown;
-        /// ./scripts/check-trace FILE judges it.
+        /// Keep the same without values, when a run is over; ./scripts/check-trace FILE judges it.
         "trace": Takes::File("FILE");
         /// Write the committed DAGs to this file, for Graphviz: `dot -Tsvg FILE`.
         "dot": Takes::File("FILE");

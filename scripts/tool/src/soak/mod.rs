@@ -178,7 +178,7 @@ fn boot(plan: &Plan, qemu: &Qemu, image: &Path, rounds: &Range<u64>) -> Result<O
     };
     let qemu = Qemu {
         guest_words: format!(
-            "mode={} test=soak first={} rounds={count} round_ms={} seed={} trace=dump \
+            "mode={} test=soak first={} rounds={count} round_ms={} seed={} events=on \
              budget_factor={budget_factor}",
             plan.mode, rounds.start, plan.round_ms, plan.seed
         ),
@@ -196,8 +196,7 @@ impl Report {
         let (mut ending, log) = (outcome.judge().err(), outcome.log.display());
         let lines: Vec<_> = outcome.transcript.of_kind("scenario").collect();
         let runs = read(&outcome.serial).unwrap_or_else(|fault| {
-            let (line, reason) = (fault.line, fault.reason);
-            (self.failures).push(format!("trace, serial line {line} of {log}: {reason}"));
+            self.failures.push(format!("the trace in {log}: {fault}"));
             Vec::new()
         });
         let mut both = lines.into_iter().zip(&runs);

@@ -33,7 +33,7 @@ pub(super) fn of(run: &Run, options: &Parsed) -> u64 {
 
 /// Returns the bound of the runs of a boot, by what its line says: the tool tells each guest its
 /// mode, and a program on Linux says whether it can preempt, and by which mechanism.
-pub(super) fn usual_ns(boot: &MachineLine) -> u64 {
+pub(crate) fn usual_ns(boot: &MachineLine) -> u64 {
     let words = boot.text_at("command_line").unwrap_or_default();
     let word = |name: &str| words.split(' ').find_map(|word| word.strip_prefix(name));
     match word("mode=").and_then(Mode::from_name) {

@@ -31,7 +31,7 @@ pub(super) struct Measured {
 ///
 /// In words: there is no such subtask, or no chain between the two.
 pub(super) fn measure(run: &Run, options: &Parsed) -> Result<Vec<Measured>, String> {
-    let samplings = &run.committed.samplings;
+    let samplings = &run.samplings;
     let ends = (options.text("from"), options.text("to"));
     let chains = match ends {
         (None, None) => Chain::all(&run.task_set, samplings),
@@ -53,7 +53,7 @@ pub(super) fn measure(run: &Run, options: &Parsed) -> Result<Vec<Measured>, Stri
     let events: Vec<_> = view.in_the_order_of_the_log().collect();
     let measured = |chain: &Chain| {
         let times = chain.latencies(&run.task_set, events.iter().copied());
-        let bounds = &run.committed.bounds_ns;
+        let bounds = &run.bounds_ns;
         let reaction = chain.reaction_bound_ns(&run.task_set, bounds);
         let names = chain.names(&run.task_set).map(|name| name.to_string());
         Measured {

@@ -9,10 +9,10 @@ use std::process::ExitCode;
 
 use super::chains::Measured;
 use super::model::Run;
-use super::{bound, chains, check, read, report};
+use super::{bound, chains, check, report};
 use crate::files;
 use crate::options::{Command, Parsed, Refusal, Takes, options};
-use crate::protocol;
+use crate::record::Record;
 
 /// The table of `check-trace`.
 pub static CHECK_TRACE: Command = Command {
@@ -92,18 +92,17 @@ fn judge_all(options: &Parsed) -> Result<usize, String> {
 pub(super) fn read_file(path: &Path) -> Result<Vec<Run>, String> {
     let file = files::place(path);
     let bytes = files::read(path).map_err(|why| format!("{file}: {why}; name another file"))?;
-    let text = protocol::lines(&bytes).map_err(|why| format!("{file}: {why}"))?;
-    let runs = read(&text).map_err(|fault| format!("{file}:{}: {}", fault.line, fault.reason))?;
-    let last = text.lines().count().max(1);
-    match runs.first() {
-        None => Err(format!(
-            "{file}:{last}: the file ends without a trace; `./scripts/run --trace FILE` makes one"
+    let runs = Record::read(&bytes)
+        .map_err(|why| format!("{file}: {why}"))?
+        .runs;
+    match &runs[..] {
+        [] => Err(format!(
+            "{file}: there is no run in it; `./scripts/run --trace FILE` keeps one"
         )),
-        Some(first) if runs.iter().all(|run| run.events.is_empty()) => Err(format!(
-            "{file}:{}: no run of the file has an event",
-            first.line
-        )),
-        Some(_) => Ok(runs),
+        runs if runs.iter().all(|run| run.events.is_empty()) => {
+            Err(format!("{file}: no run of the file has an event"))
+        }
+        _ => Ok(runs),
     }
 }
 

@@ -1,11 +1,8 @@
 //! The trace checker: what happened in a run, held against the model's rules.
 //!
-//! A guest that is booted with `trace=dump` prints the trace of each run on its
-//! serial port, as `docs/trace-format.md` says. [`read()`] takes a log apart; [`model`]
-//! is what it finds: the model that was run, and its journal. The judge is
+//! A [record](crate::record) has the model that was run, and its journal: a [`model`]. The judge is
 //! [`sched_dag::law`], which judges all runs, within a stated *bound*, because a decision
-//! takes effect after an interrupt. What a run cannot be and a file can, malformed or cut
-//! off, is the reader's affair.
+//! takes effect after an interrupt.
 //!
 //! Here are besides: the [`figures`], from `view`, which puts a run in the order of
 //! time; `chains`, how long effects take from DAG to DAG; [`command`], the subcommand, and [`report`], what it prints; and [`viewer`],
@@ -18,12 +15,8 @@
 pub mod bound;
 mod chains;
 pub mod command;
-pub mod commit;
-pub mod dag;
 pub mod figures;
-pub mod line;
 pub mod model;
-mod read;
 pub mod report;
 #[cfg(test)]
 mod tests;
@@ -32,12 +25,12 @@ pub mod viewer;
 
 use sched_dag::law::{self, Violation};
 
+use crate::record::Record;
 use figures::Figures;
 use model::Run;
 use view::View;
 
 pub use command::{CHECK_TRACE, check_trace};
-pub use read::read;
 pub use viewer::{TRACE, trace};
 
 /// What a run's trace shows.
@@ -47,6 +40,15 @@ pub struct Findings {
     pub breaches: Vec<Violation>,
     /// The figures.
     pub figures: Figures,
+}
+
+/// Reads the runs of the record that stands in a log.
+///
+/// # Errors
+///
+/// In words: what is wrong with it.
+pub fn read(log: &str) -> Result<Vec<Run>, String> {
+    Record::of_log(log).map(|record| record.runs)
 }
 
 /// Holds a run against the rules. Nothing waits longer than `bound_ns` for what

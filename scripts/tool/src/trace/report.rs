@@ -22,13 +22,13 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: u
         Preemption::Enabled => "on",
         Preemption::Disabled => "off",
     };
-    let (number, line, cores) = (run.number, run.line, run.options.cores);
+    let (number, cores) = (run.number, run.options.cores);
     let mut say = |line: &str| {
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "{line}");
     };
     say(&format!(
-        "{file}:{line}: run {number}, policy {policy}, preemption {preemption}, {cores} cores"
+        "{file}: run {number}, policy {policy}, preemption {preemption}, {cores} cores"
     ));
     for breach in breaches.iter().take(shown) {
         say(&format!("  breach {}", breach.with_names(&run.task_set)));

@@ -52,8 +52,8 @@ fn every_command_explains_itself_and_names_an_unknown_option() {
 #[test]
 fn that_no_one_reads_is_no_failure_and_that_there_is_no_room_is_one() {
     let folder = folder("unread");
-    fs::write(folder.join("good.log"), crate::traces::GOOD).expect("a file");
-    let log = folder.join("good.log").display().to_string();
+    fs::write(folder.join("good.rec"), crate::traces::good()).expect("a file");
+    let log = folder.join("good.rec").display().to_string();
     for line in [
         "run --print-dag --dag apps/dag-file/examples/rd-gen/gnp_01.yaml",
         "oracle synchronizer tests/oracle/synchronizer.txt",

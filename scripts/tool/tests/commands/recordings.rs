@@ -49,7 +49,7 @@ fn recording() -> Vec<u8> {
             value: &bytes,
         });
     }
-    writer.finish()
+    writer.end()
 }
 
 /// A folder with that recording.

@@ -22,7 +22,6 @@ pub(crate) use support::random;
 use sched_dag::TaskSet;
 use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
 use tool::trace::check;
-use tool::trace::commit::Committed;
 use tool::trace::model::Run;
 
 use random::Random;
@@ -60,11 +59,11 @@ fn record(set: &Set) -> Run {
     let _ = run.run(&mut ExecutionTimes(|instance| set.execution_ns(instance)));
     Run {
         number: 0,
-        line: 1,
         options: set.options,
         usual_bound_ns: 0,
         task_set: TaskSet::clone(&task_set),
-        committed: Committed::default(),
+        samplings: Vec::new(),
+        bounds_ns: Vec::new(),
         events: run.events(),
         lost: 0,
         complete: true,

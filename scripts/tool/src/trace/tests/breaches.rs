@@ -8,9 +8,9 @@ use crate::system::workspace;
 
 /// One DAG on two cores: `a` precedes `b` and `c`, which precede `d`; T = 100,
 /// D = 90, O = 10.
-const FORK: &str = r#"
-{"kind":"trace_begin","policy":"static","preemption":"on","cores":2,"run":0}
-{"kind":"trace_dag","dag":0,"name":"fork","period_ns":100,"relative_deadline_ns":90,"offset_ns":10,"in_flight":2,"overrun":"queue","subtasks":[["a",0,0,null],["b",1,0,null],["c",2,0,10],["d",3,0,null]],"edges":[[0,1],[0,2],[1,3],[2,3]]}"#;
+const FORK: &str = "
+static 2
+fork T=100 D=90 O=10 flight=2: a/0 b/1 c/2/10 d/3; 0>1 0>2 1>3 2>3";
 
 /// Two jobs; the second one misses its deadline.
 const GOOD: &str = "
@@ -176,9 +176,9 @@ fn one_life_and_one_core_each_at_a_time() {
 }
 
 /// One subtask on one core, T = 100, D = 20, O = 0; jobs due at 7 and 107.
-const SPORADIC: &str = r#"
-{"kind":"trace_begin","policy":"edf","preemption":"on","cores":1,"run":0}
-{"kind":"trace_dag","dag":0,"name":"brake","period_ns":100,"relative_deadline_ns":20,"offset_ns":0,"in_flight":2,"overrun":"queue","subtasks":[["a",0,0,null]],"edges":[],"sporadic":true}"#;
+const SPORADIC: &str = "
+edf 1
+brake sporadic T=100 D=20 O=0 flight=2: a/0";
 
 const SIGNALLED: &str = "
 7 signalled c0 0.0
@@ -217,10 +217,10 @@ fn r1_and_r4_a_sporadic_dag_has_its_distance_and_deadlines_without_a_grid() {
 }
 
 /// Two DAGs of one subtask each on one core. `high` goes first.
-const TWO: &str = r#"
-{"kind":"trace_begin","policy":"static","preemption":"on","cores":1,"run":0}
-{"kind":"trace_dag","dag":0,"name":"high","period_ns":1000,"relative_deadline_ns":300,"offset_ns":50,"in_flight":1,"overrun":"queue","subtasks":[["h",1,0,null]],"edges":[]}
-{"kind":"trace_dag","dag":1,"name":"low","period_ns":1000,"relative_deadline_ns":900,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["l",2,0,null]],"edges":[]}"#;
+const TWO: &str = "
+static 1
+high T=1000 D=300 O=50: h/1
+low T=1000 D=900 O=0: l/2";
 
 /// `high` preempts `low`, three nanoseconds after the request.
 const PREEMPTED: &str = "
@@ -252,7 +252,7 @@ fn r5_the_more_urgent_one_waits_within_the_bound() {
     // On two cores, the other one could have taken `low`.
     let idle = "
 = at 54 ns, R5 dispatch: subtask `l` of dag `low` job 0 should run and waits 28 ns while core 1 is idle";
-    assert_each(&TWO.replace("cores\":1", "cores\":2"), PREEMPTED, idle);
+    assert_each(&TWO.replace("static 1", "static 2"), PREEMPTED, idle);
 }
 
 #[test]
@@ -270,9 +270,9 @@ fn a_preemption_is_measured_from_the_latest_request() {
     assert_eq!((overtaken.count(), overtaken.max()), (1, 30));
 }
 
-const CHAIN: &str = r#"
-{"kind":"trace_begin","policy":"static","preemption":"on","cores":2,"run":0}
-{"kind":"trace_dag","dag":0,"name":"chain","period_ns":100,"relative_deadline_ns":100,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[["a",0,0,null],["b",1,0,null]],"edges":[[0,1]]}"#;
+const CHAIN: &str = "
+static 2
+chain T=100 D=100 O=0: a/0 b/1; 0>1";
 
 /// How `a` was started is lost.
 const REST: &str = "

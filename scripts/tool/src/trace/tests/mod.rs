@@ -1,52 +1,27 @@
 //! Traces by hand: one good one for each part of the rules, and each breach.
 //!
-//! A trace is written in the order of time, one event a line: time in ns, word,
-//! core as `cN`, and `dag.job` or `dag.job.subtask`. A breach is made by
+//! A trace is written in the order of time, one event a line. A breach is made by
 //! replacing lines of a good trace. Times and bounds are a few nanoseconds.
 
 mod breaches;
-mod malformed;
 
-use super::model::Run;
-use super::{check, read};
-use sched_dag::journal::Event;
 use sched_dag::law::Violation;
-use sched_dag::{CoreId, DagId, SubtaskId};
+
+use super::check;
+use super::model::Run;
+use crate::made::{self, event, lines_of, record_of};
+use crate::record::Record;
 
 /// How long one may wait in these traces.
 const BOUND_NS: u64 = 5;
 
-/// Makes a run of events in the order of time, under the given header lines.
-pub(super) fn run_of(header: &str, events: &str) -> Run {
-    let log = format!("{header}\n{{\"kind\":\"trace_end\",\"events\":0,\"lost\":0}}\n");
-    let mut run = read(&log).unwrap().remove(0);
+/// Makes a run of a commit, and of events in the order of time.
+pub(super) fn run_of(commit: &str, events: &str) -> Run {
+    let record = record_of("", &made::commit(commit), "");
+    let mut run = Record::read(&record).unwrap().runs.remove(0);
     run.events = lines_of(events).into_iter().map(event).collect();
+    run.complete = false;
     run
-}
-
-/// Returns the lines that are not empty.
-fn lines_of(text: &str) -> Vec<&str> {
-    let lines = text.lines().map(str::trim);
-    lines.filter(|line| !line.is_empty()).collect()
-}
-
-fn event(line: &str) -> Event {
-    let [time, word, core, of] = line.split(' ').collect::<Vec<_>>()[..] else {
-        panic!("`{line}` is no event");
-    };
-    let of: Vec<u64> = of
-        .split('.')
-        .map(|number| number.parse().unwrap())
-        .collect();
-    let small = |number: u64| u32::try_from(number).unwrap();
-    Event {
-        time_ns: time.parse().unwrap(),
-        what: word.parse().unwrap(),
-        core: CoreId(core.strip_prefix('c').unwrap().parse().unwrap()),
-        dag: DagId(small(of[0])),
-        job: of[1],
-        subtask: of.get(2).map(|&subtask| SubtaskId(small(subtask))),
-    }
 }
 
 /// Changes a good trace, and asserts what that shows.

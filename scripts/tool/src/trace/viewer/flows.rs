@@ -59,7 +59,7 @@ impl Flows {
             }
         }
         flows.edges = flows.count;
-        let samplings = &view.run.committed.samplings;
+        let samplings = &view.run.samplings;
         let sampled = SampledJobs::new(samplings, view.in_the_order_of_the_log());
         for (reader, writer) in sampled.all() {
             flows.add(writer, reader);

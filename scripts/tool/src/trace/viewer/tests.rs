@@ -2,16 +2,19 @@
 
 use std::collections::BTreeMap;
 
+use sched_dag::chains::Sampling;
+use sched_dag::{DagId, SubtaskId};
+
 use super::super::model::Run;
 use super::super::tests::run_of;
 use super::convert;
 use crate::json::{Value, parse};
 
 /// A diamond of DAG `a`, `s` before `l` and `r` before `j`, under `b`, on two cores.
-const HEADER: &str = r#"
-{"kind":"trace_begin","policy":"static","preemption":"on","cores":2,"run":0}
-{"kind":"trace_dag","dag":0,"name":"a","period_ns":1000,"relative_deadline_ns":1500,"offset_ns":0,"in_flight":2,"overrun":"queue","subtasks":[["s",2,0,null],["l",2,0,null],["r",2,0,null],["j",2,0,null]],"edges":[[0,1],[0,2],[1,3],[2,3]]}
-{"kind":"trace_dag","dag":1,"name":"\"b\"","period_ns":5000,"relative_deadline_ns":100,"offset_ns":150,"in_flight":1,"overrun":"queue","subtasks":[["x",1,0,null]],"edges":[]}"#;
+const HEADER: &str = "
+static 2
+a T=1000 D=1500 O=0 flight=2: s/2 l/2 r/2 j/2; 0>1 0>2 1>3 2>3
+\"b\" T=5000 D=100 O=150: x/1";
 
 /// In job 0, `b` preempts `r` on core 1, where `r` goes on later; job 1 begins
 /// before job 0 is complete, is late, and has not ended when the trace ends.
@@ -195,10 +198,14 @@ fn an_arrow_leads_along_each_edge_whose_ends_ran() {
 #[test]
 fn an_arrow_leads_from_a_value_to_each_instance_that_samples_it() {
     // `b/x` samples what `a/s` writes.
-    let graph = r#"
-{"kind":"graph","commit":0,"policy":"edf","preemption":"on","cores":2,"overhead_ns":[],"period_ns":1,"relative_deadline_ns":1,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[],"edges":[],"hash":1,"sporadic":false,"jobs":[],"states":[],"dag":0,"name":"a","bound_ns":[],"topics":[["t","u8",0,[1,2],1]],"samples":[]}
-{"kind":"graph","commit":0,"policy":"edf","preemption":"on","cores":2,"overhead_ns":[],"period_ns":1,"relative_deadline_ns":1,"offset_ns":0,"in_flight":1,"overrun":"queue","subtasks":[],"edges":[],"hash":1,"sporadic":false,"jobs":[],"states":[],"dag":1,"name":"\"b\"","bound_ns":[9],"topics":[],"samples":[[0,0,0,null]]}"#;
-    let run = run_of(&format!("{graph}{HEADER}"), EVENTS);
+    let sampling = Sampling {
+        writer: (DagId(0), SubtaskId(0)),
+        reader: (DagId(1), SubtaskId(0)),
+    };
+    let run = Run {
+        samplings: vec![sampling],
+        ..diamond()
+    };
     assert_drawn(&run, "sampled by: ", &"\n90 > 152".repeat(2));
 }
 

@@ -1,0 +1,111 @@
+//! What a run commits: its model, as it was accepted, and what was proven of it.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+crate::recordable! {
+    /// DAGs that were committed together, and how they are scheduled.
+    ///
+    /// Numbers are those of the kernel: DAGs, subtasks and clusters count from 0, and times are
+    /// in nanoseconds.
+    ///
+    /// ```
+    /// use recording::{Commit, Chunk, Recording, Stream};
+    ///
+    /// let mut record = Stream::begin(Vec::new());
+    /// record.commit(&Commit { cores: 2, ..Commit::default() });
+    /// let bytes = record.end();
+    /// let recording = Recording::read(&bytes).unwrap();
+    /// let Some(Chunk::Commit(commit)) = recording.chunks().next() else { panic!() };
+    /// assert_eq!(commit.cores, 2);
+    /// ```
+    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    pub struct Commit {
+        /// Whether instances are ordered by deadline rather than by priority.
+        pub is_edf: bool,
+        /// Whether an instance that has started may lose its core.
+        pub is_preemptive: bool,
+        /// All cores.
+        pub cores: u32,
+        /// The number of cores of each cluster; empty if cores are not divided.
+        pub clusters: Vec<u32>,
+        /// What the analysis charges an instance with, if that has an end.
+        pub charge_ns: Option<u64>,
+        /// What it charges for making another one ready.
+        pub ready_ns: u64,
+        /// The DAGs, in the order of their numbers.
+        pub dags: Vec<CommittedDag>,
+    }
+
+    /// A DAG of a [`Commit`].
+    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    pub struct CommittedDag {
+        /// Its name.
+        pub name: String,
+        /// The hash of its names and edges.
+        pub hash: u64,
+        /// Whether signals release it, rather than time.
+        pub is_sporadic: bool,
+        /// The period, or the least time between releases.
+        pub period_ns: u64,
+        /// From the nominal release to the deadline.
+        pub relative_deadline_ns: u64,
+        /// The nominal release of job 0.
+        pub offset_ns: u64,
+        /// The number of jobs, if it has an end.
+        pub jobs: Option<u64>,
+        /// The most jobs at a time.
+        pub in_flight: u32,
+        /// What becomes of a job that is due while as many are in flight: 0 it waits, 1 it is
+        /// skipped, 2 the oldest one is aborted.
+        pub overrun: u8,
+        /// If a fault costs a job only: the most faults within a window of jobs, the window, and
+        /// the most in all.
+        pub survives: Option<(u32, u64, u32)>,
+        /// The cluster, if the app has chosen it.
+        pub cluster: Option<u32>,
+        /// The subtasks, in the order of their numbers.
+        pub subtasks: Vec<CommittedSubtask>,
+        /// The precedence edges, from a subtask to another one.
+        pub edges: Vec<(u32, u32)>,
+        /// The sinks with their relative deadlines.
+        pub sinks: Vec<(u32, u64)>,
+        /// The proven bound on its response time.
+        pub bound_ns: Option<u64>,
+        /// The topics.
+        pub topics: Vec<CommittedTopic>,
+        /// Of each state that orders two subtasks its name, the earlier and the later one.
+        pub states: Vec<(String, u32, u32)>,
+        /// The latest values that it samples: the subtask, the DAG that writes them, the number
+        /// of the topic there, and how old they may be.
+        pub samples: Vec<(u32, u32, u32, Option<u64>)>,
+    }
+
+    /// A subtask of a [`Commit`].
+    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    pub struct CommittedSubtask {
+        /// Its name.
+        pub name: String,
+        /// Its priority; 0 is the highest.
+        pub priority: u32,
+        /// Whether it keeps its core once it has started.
+        pub is_non_preemptive: bool,
+        /// Its WCET, if it is stated.
+        pub wcet_ns: Option<u64>,
+    }
+
+    /// A topic of a [`Commit`].
+    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    pub struct CommittedTopic {
+        /// Its name.
+        pub name: String,
+        /// The type of its values.
+        pub type_name: String,
+        /// The subtask that writes it.
+        pub writer: u32,
+        /// The subtasks of the DAG that read it.
+        pub readers: Vec<u32>,
+        /// Whether DAGs sample its latest value.
+        pub is_sampled: bool,
+    }
+}

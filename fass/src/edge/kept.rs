@@ -1,0 +1,262 @@
+//! The record of a boot: the values that are recorded, and with them its commits, the events of
+//! its runs, and what they took.
+//!
+//! A platform keeps one, behind a lock of its own that no instance waits for: what takes bytes
+//! may be slow. Events are copied out of a journal under the cluster's lock, and sent outside of
+//! it.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use recording::{
+    Commit, CommittedDag, CommittedSubtask, CommittedTopic, Counted, DagTimes, Sink, Stream,
+    SubtaskTimes, Times,
+};
+use sched_dag::analysis::Overheads;
+use sched_dag::engine::Run;
+use sched_dag::law::Histogram;
+use sched_dag::{
+    Dag, DagId, Instance, Journal, OnFault, OverrunPolicy, Policy, Preemption, SchedulerOptions,
+    SubtaskId, TaskSet, Vertex,
+};
+
+use super::{Drained, Outgoing, Record};
+use crate::platform::Terms;
+use crate::run::plan::Plan;
+
+/// How many events are copied at once.
+const AT_ONCE: usize = 64;
+
+/// The record of a boot, and what takes its bytes.
+///
+/// ```
+/// use fass::edge::Kept;
+///
+/// let kept = Kept::new(Vec::new());
+/// assert!(recording::Recording::read(&kept.end()).is_ok());
+/// ```
+#[derive(Clone, Debug)]
+pub struct Kept<S> {
+    stream: Stream<S>,
+    is_cut: bool,
+    /// By cluster, how many events of this run were looked at.
+    taken: Vec<u64>,
+}
+
+impl<S: Sink + Send + 'static> Kept<S> {
+    /// Begins a record.
+    ///
+    /// See [`Kept`].
+    pub fn new(to: S) -> Self {
+        Self {
+            stream: Stream::begin(to),
+            is_cut: false,
+            taken: Vec::new(),
+        }
+    }
+
+    /// Lends the file.
+    pub const fn file(&mut self) -> &mut Record {
+        &mut self.stream
+    }
+
+    /// Lends what takes the bytes.
+    pub const fn sink(&mut self) -> &mut S {
+        self.stream.sink()
+    }
+
+    /// Adds what is committed.
+    pub fn commit(&mut self, plan: &Plan, terms: &Terms) {
+        self.stream
+            .commit(&committed(plan, &terms.scheduler, terms.overheads));
+        self.taken = plan.task_set.clusters().map(|_| 0).collect();
+    }
+
+    /// Adds the events that clusters' journals have taken since; `look` lends the journal of a
+    /// cluster. Reports whether there were any.
+    pub fn take_events(&mut self, mut look: impl FnMut(usize, &mut dyn FnMut(&Journal))) -> bool {
+        let mut are_there = false;
+        for (cluster, taken) in (0_u16..).zip(&mut self.taken) {
+            let (mut words, mut count, mut before) = ([[0; 3]; AT_ONCE], 0, *taken);
+            look(cluster.into(), &mut |journal| {
+                (before, count) = journal.copy_from(*taken, &mut words);
+            });
+            *taken = before + count as u64;
+            if count > 0 {
+                self.stream.events(cluster, before, &words[..count]);
+                are_there = true;
+            }
+        }
+        are_there
+    }
+
+    /// Adds the events of a run whose clusters' journals were not looked at, and what the run
+    /// took.
+    pub fn end_run(&mut self, run: &Run) {
+        // Where nothing was committed, there is only what was kept before a fault.
+        if self.taken.is_empty() {
+            return;
+        }
+        let journal = run.journal();
+        let clusters = self.taken.len();
+        if self.taken.iter().all(|taken| *taken == 0) {
+            self.taken = vec![0];
+            while self.take_events(|_, take| take(journal)) {}
+        }
+        self.stream.times(&times(run, &self.taken));
+        self.taken = vec![0; clusters];
+    }
+
+    /// Adds the rest of what is recorded. Returns how complete it is, if it is recorded.
+    pub fn end_recording(&mut self, mut outgoing: Outgoing) -> Option<Drained> {
+        let drain = outgoing.as_mut()?;
+        while drain.step(Some(&mut self.stream)) {}
+        let drained = drain.end(&mut self.stream)?;
+        self.is_cut |= drained.is_cut;
+        Some(drained)
+    }
+
+    /// Ends the record, and returns what has taken it.
+    ///
+    /// See [`Kept`].
+    pub fn end(self) -> S {
+        match self.is_cut {
+            true => self.stream.cut(),
+            false => self.stream.end(),
+        }
+    }
+}
+
+fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> Commit {
+    let task_set = &*plan.task_set;
+    let cores = |cluster| {
+        let cores = task_set.cores_of(cluster, options.cores);
+        u32::try_from(cores.len()).unwrap_or(u32::MAX)
+    };
+    let clusters = task_set.clusters().filter(|_| task_set.is_divided());
+    let ids = (0..).map(DagId);
+    let dags = ids.zip(task_set.dags()).zip(&plan.proven.bounds_ns);
+    Commit {
+        is_edf: options.policy == Policy::Edf,
+        is_preemptive: options.preemption == Preemption::Enabled,
+        cores: options.cores,
+        clusters: clusters.map(cores).collect(),
+        charge_ns: overheads.of_an_instance_ns(options.preemption),
+        ready_ns: overheads.ready_ns,
+        dags: dags
+            .map(|((id, dag), bound_ns)| CommittedDag {
+                bound_ns: *bound_ns,
+                samples: samples(plan, id),
+                ..of_dag(dag)
+            })
+            .collect(),
+    }
+}
+
+fn of_dag(dag: &Dag) -> CommittedDag {
+    let subtasks = dag.subtasks().iter().map(|subtask| CommittedSubtask {
+        name: subtask.name().into(),
+        priority: subtask.priority().0,
+        is_non_preemptive: subtask.is_non_preemptive(),
+        wcet_ns: subtask.wcet_ns(),
+    });
+    let ids = (0..).map(SubtaskId).take(dag.subtasks().len());
+    let edges = ids.flat_map(|from| dag.successors(from).iter().map(move |to| (from.0, to.0)));
+    let sinks = dag.sinks().iter();
+    let topics = dag.topics().iter().map(|topic| CommittedTopic {
+        name: topic.name.clone(),
+        type_name: topic.type_name.into(),
+        writer: topic.writer.0,
+        readers: topic.readers.iter().map(|reader| reader.0).collect(),
+        is_sampled: topic.is_sampled,
+    });
+    let states = dag.state_precedences().iter();
+    CommittedDag {
+        name: dag.name().into(),
+        hash: dag.graph_hash(),
+        is_sporadic: dag.is_sporadic(),
+        period_ns: dag.period_ns(),
+        relative_deadline_ns: dag.relative_deadline_ns(),
+        offset_ns: dag.offset_ns(),
+        jobs: dag.jobs(),
+        in_flight: dag.in_flight(),
+        overrun: match dag.overrun() {
+            OverrunPolicy::Queue => 0,
+            OverrunPolicy::Skip => 1,
+            OverrunPolicy::Abort => 2,
+        },
+        survives: match dag.on_fault() {
+            OnFault::DropJob(limit) => Some((limit.faults, limit.window, limit.in_all)),
+            _ => None,
+        },
+        cluster: dag.states_cluster().then_some(dag.cluster().0),
+        subtasks: subtasks.collect(),
+        edges: edges.collect(),
+        sinks: sinks
+            .map(|sink| (sink.0, dag.subtask(*sink).relative_deadline_ns()))
+            .collect(),
+        topics: topics.collect(),
+        states: states
+            .map(|edge| (edge.state.clone(), edge.earlier.0, edge.later.0))
+            .collect(),
+        ..CommittedDag::default()
+    }
+}
+
+fn samples(plan: &Plan, reader: DagId) -> Vec<(u32, u32, u32, Option<u64>)> {
+    let all = plan.staleness.iter();
+    let of_reader = all.filter(|sample| sample.reader_dag.id == reader);
+    let samples = of_reader.filter_map(|sample| {
+        let writer = sample.writer_dag.id;
+        let mut topics = plan.task_set.dag(writer).topics().iter();
+        let topic = topics.position(|topic| topic.name == sample.topic)?;
+        let bound = sample.bound.map(|bound| bound.as_nanos());
+        let bound_ns = bound.and_then(|bound_ns| u64::try_from(bound_ns).ok());
+        let topic = u32::try_from(topic).ok()?;
+        Some((sample.reader.id.0, writer.0, topic, bound_ns))
+    });
+    samples.collect()
+}
+
+fn times(run: &Run, written: &[u64]) -> Times {
+    let ids = (0..).map(DagId).zip(run.task_set().dags());
+    let of_dag = |(dag, model): (DagId, &Dag)| {
+        let times = run.times()?;
+        let of_dag = times.dag(dag);
+        let subtasks = (0..).map(SubtaskId).take(model.subtasks().len());
+        let subtasks = subtasks.map(|subtask| {
+            let of_subtask = times.subtask(vertex(run.task_set(), dag, subtask));
+            let sink = of_subtask.response_time.as_ref();
+            SubtaskTimes {
+                join_latency: counted(&of_subtask.join_latency),
+                execution: counted(&of_subtask.execution_time),
+                sink: sink.map(|times| {
+                    let misses = run.sink_misses(dag, subtask);
+                    (counted(times), misses, run.sink_bound_ns(dag, subtask))
+                }),
+            }
+        });
+        Some(DagTimes {
+            response: counted(&of_dag.response_time),
+            release_jitter: counted(&of_dag.release_jitter),
+            subtasks: subtasks.collect(),
+        })
+    };
+    Times {
+        written: written.into(),
+        dags: ids.map_while(of_dag).collect(),
+    }
+}
+
+fn vertex(task_set: &TaskSet, dag: DagId, subtask: SubtaskId) -> Vertex {
+    let job = 0;
+    task_set.vertex(Instance { dag, job, subtask })
+}
+
+fn counted(times: &Histogram) -> Counted {
+    let times = times.distribution();
+    Counted {
+        min_ns: times.min(),
+        buckets: times.values().collect(),
+    }
+}

@@ -1,0 +1,111 @@
+//! Records made by hand, for tests.
+//!
+//! A commit is a line `static 2` or `edf 1`, with the number of cores, and a line for each DAG:
+//! `fork T=100 D=90 O=10 flight=2: a/0 b/1 c/2/10 d/3; 0>1 0>2 1>3 2>3`, with `sporadic` after the
+//! name if it is; a subtask has its name, priority, and WCET if that is known. Events are lines as
+//! `24 start c1 0.0.2`: time in ns, word, core, and DAG, job and subtask if it is of one.
+
+use recording::{Commit, CommittedDag, CommittedSubtask, Times, Writer};
+use sched_dag::journal::{Event, Subject};
+use sched_dag::{CoreId, DagId, SubtaskId};
+
+/// Returns the lines that are not empty.
+pub(crate) fn lines_of(text: &str) -> Vec<&str> {
+    let lines = text.lines().map(str::trim);
+    lines.filter(|line| !line.is_empty()).collect()
+}
+
+fn number<T: std::str::FromStr>(text: &str) -> T {
+    text.parse()
+        .ok()
+        .unwrap_or_else(|| panic!("`{text}` is no number"))
+}
+
+/// Makes a commit.
+pub(crate) fn commit(text: &str) -> Commit {
+    let lines = lines_of(text);
+    let (policy, cores) = lines[0].split_once(' ').expect("policy and cores");
+    Commit {
+        is_edf: policy == "edf",
+        is_preemptive: true,
+        cores: number(cores),
+        charge_ns: Some(0),
+        dags: lines[1..].iter().map(|line| dag(line)).collect(),
+        ..Commit::default()
+    }
+}
+
+fn dag(line: &str) -> CommittedDag {
+    let (head, rest) = line.split_once(": ").expect(line);
+    let (subtasks, edges) = rest.split_once(';').unwrap_or((rest, ""));
+    let mut words = head.split(' ');
+    let mut dag = CommittedDag {
+        name: words.next().expect("a name").into(),
+        in_flight: 1,
+        ..CommittedDag::default()
+    };
+    for word in words {
+        match word.split_once('=').unwrap_or((word, "")) {
+            ("T", ns) => dag.period_ns = number(ns),
+            ("D", ns) => dag.relative_deadline_ns = number(ns),
+            ("O", ns) => dag.offset_ns = number(ns),
+            ("flight", jobs) => dag.in_flight = number(jobs),
+            ("bound", ns) => dag.bound_ns = Some(number(ns)),
+            ("hash", hash) => dag.hash = number(hash),
+            _ => dag.is_sporadic = word == "sporadic",
+        }
+    }
+    let subtask = |text: &str| {
+        let parts: Vec<&str> = text.split('/').collect();
+        CommittedSubtask {
+            name: parts[0].into(),
+            priority: number(parts[1]),
+            wcet_ns: parts.get(2).map(|ns| number(ns)),
+            ..CommittedSubtask::default()
+        }
+    };
+    dag.subtasks = subtasks.split_whitespace().map(subtask).collect();
+    let edge = |text: &str| {
+        let (from, to) = text.split_once('>').expect(text);
+        (number(from), number(to))
+    };
+    dag.edges = edges.split_whitespace().map(edge).collect();
+    dag
+}
+
+/// Makes an event of its line.
+pub(crate) fn event(line: &str) -> Event {
+    let [time, word, core, of] = line.split(' ').collect::<Vec<_>>()[..] else {
+        panic!("`{line}` is no event");
+    };
+    let of: Vec<u64> = of.split('.').map(number).collect();
+    let small = |number: u64| u32::try_from(number).expect("it is small");
+    Event {
+        time_ns: number(time),
+        what: word.parse().expect(line),
+        core: CoreId(number(&core[1..])),
+        dag: DagId(small(of[0])),
+        job: of[1],
+        subtask: of.get(2).map(|&subtask| SubtaskId(small(subtask))),
+    }
+}
+
+/// Makes a record of one run, with a text before it.
+pub(crate) fn record_of(text: &str, commit: &Commit, events: &str) -> Vec<u8> {
+    let mut record = Writer::begin(Vec::new());
+    record.text(text);
+    record.commit(commit);
+    let words = lines_of(events).into_iter().map(|line| {
+        let event = event(line);
+        let of_job = Subject::of_job(event.dag, event.job);
+        let subject = event.instance().map_or(of_job, Subject::of);
+        Event::words(event.time_ns, event.what, event.core, subject)
+    });
+    let words: Vec<[u64; 3]> = words.collect();
+    record.events(0, 0, &words);
+    record.times(&Times {
+        written: vec![words.len() as u64],
+        ..Times::default()
+    });
+    record.end()
+}
