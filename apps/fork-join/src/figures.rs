@@ -104,7 +104,7 @@ impl Figures {
         );
         if self.first_recorded_job > 0 {
             println!(
-                "  of the jobs from {} on; `times=dump` prints statistics of all",
+                "  of the jobs from {} on; `events=on` keeps the statistics of all",
                 self.first_recorded_job
             );
         }

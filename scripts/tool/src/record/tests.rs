@@ -3,7 +3,7 @@
 use recording::{Chunk, Commit, Recordable, Recording, Stream, Times, Writer};
 
 use super::Record;
-use crate::made::{commit, record_of};
+use crate::made::{commit, line_of, record_of};
 use crate::trace::bound::{COUNTED_NS, FIFO_NS, NORMAL_NS, REAL_NS, SCHED_EXT_NS};
 
 const COMMIT: &str = "edf 2\nx T=10 D=10 O=0: a/0 b/1/7; 0>1";
@@ -20,7 +20,7 @@ fn good() -> Vec<u8> {
 #[test]
 fn a_good_record_is_read_as_a_file_and_in_lines() {
     let bytes = good();
-    let log = "hello\n{\"kind\":\"record\",\"bytes\":\"".to_string() + &to_base64(&bytes) + "\"}\n";
+    let log = "hello\n".to_string() + &line_of(&bytes);
     for record in [Record::read(&bytes), Record::read(log.as_bytes())] {
         let record = record.unwrap();
         let [run] = &record.runs[..] else { panic!() };
@@ -29,20 +29,6 @@ fn a_good_record_is_read_as_a_file_and_in_lines() {
         assert_eq!(run.task_set.dags()[0].name(), "x");
     }
     assert_eq!(Record::read(b"hello\n").unwrap().runs.len(), 0);
-}
-
-fn to_base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let of_three = |three: &[u8]| {
-        let byte = |place: usize| u32::from(three.get(place).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-        let digit = |place| match place <= three.len() {
-            true => char::from(DIGITS[(bits >> (18 - 6 * place) & 63) as usize]),
-            false => '=',
-        };
-        (0..4).map(digit).collect::<String>()
-    };
-    bytes.chunks(3).map(of_three).collect()
 }
 
 /// What is put in the place of what in the good one, and what is said.

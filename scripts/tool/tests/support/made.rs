@@ -109,3 +109,19 @@ pub(crate) fn record_of(text: &str, commit: &Commit, events: &str) -> Vec<u8> {
     });
     record.end()
 }
+
+/// Makes the line by which bytes of a record are printed.
+pub(crate) fn line_of(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let of_three = |three: &[u8]| {
+        let byte = |place: usize| u32::from(three.get(place).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        let digit = |place| match place <= three.len() {
+            true => char::from(DIGITS[(bits >> (18 - 6 * place) & 63) as usize]),
+            false => '=',
+        };
+        (0..4).map(digit).collect::<String>()
+    };
+    let text: String = bytes.chunks(3).map(of_three).collect();
+    format!("{{\"kind\":\"record\",\"bytes\":\"{text}\"}}\n")
+}

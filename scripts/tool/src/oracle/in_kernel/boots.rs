@@ -107,7 +107,7 @@ fn boot_with(
         memory_mib: MEMORY_MIB,
         guest_words: format!(
             "mode={mode} unit_us={unit_us} guard_us={guard_us} window_us={window_us} \
-             work={work} trace=dump"
+             work={work} events=on"
         ),
         module: Some(module.clone()),
         ..Qemu::default()
