@@ -7,10 +7,13 @@ use fass::{Dag, SubtaskAttributes, create_dag};
 use recording::{Mismatch, Recording};
 
 use crate::filter::{Quaternion, START, after, conjugate, product};
-use crate::{DAG, PERIOD, Sample, TOPIC, Walk};
+use crate::{DAG, PERIOD, Sample, Sensor, TOPIC, Walk};
 
 /// Each WCET: several times what was observed on two cores in mode `deterministic`.
 const WCET: Duration = Duration::from_micros(50);
+
+/// Takes what one sensor measured.
+type Take = fn(&Sample) -> &Sensor;
 
 /// Builds the DAG, which runs the jobs of a recording up to its last sample, and the place of its
 /// results.
@@ -35,19 +38,23 @@ pub fn build(recording: &Recording<'static>) -> Result<(Dag, Walk), Mismatch> {
     };
     dag.register_periodic_subtask(read, vec![TOPIC], PERIOD, taking("read"));
 
-    let mut orientation = START;
-    let upper = move |(sample,): (Sample,)| {
-        orientation = after(orientation, &sample.upper);
-        (orientation,)
-    };
-    dag.register_subtask(upper, vec![TOPIC], vec!["upper"], taking("upper"));
-
-    let mut orientation = START;
-    let lower = move |(sample,): (Sample,)| {
-        orientation = after(orientation, &sample.lower);
-        (orientation,)
-    };
-    dag.register_subtask(lower, vec![TOPIC], vec!["lower"], taking("lower"));
+    let legs: [(_, Take); 2] = [
+        ("upper", |sample| &sample.upper),
+        ("lower", |sample| &sample.lower),
+    ];
+    for (leg, sensor) in legs {
+        let orientation = dag.state(leg, START);
+        orientation.record();
+        let filter = move |orientation: &mut Quaternion, (sample,): (Sample,)| {
+            *orientation = after(*orientation, sensor(&sample));
+            (*orientation,)
+        };
+        dag.using(orientation.update())
+            .subtask(filter)
+            .reads(&[TOPIC])
+            .writes(&[leg])
+            .register(taking(leg));
+    }
 
     let (results, mut row) = (walk.clone(), 0);
     let knee = move |(upper, lower): (Quaternion, Quaternion)| {

@@ -6,10 +6,11 @@
 //! | `upper`, `lower` | the sample | the orientation of that sensor |
 //! | `knee`, the sink | both orientations | the turn from one to the other |
 //!
-//! The orientations are those of a filter that each branch keeps the state of; [`filter`] has
-//! it. The input is a recording, as `./scripts/recording --from-csv` makes it of
-//! `data/walking.csv`, whose licence is next to it. The code here knows no kernel: the tests
-//! run it in virtual time, and compare every value with those of an independent implementation.
+//! The orientations are those of a filter, [`filter`], whose state is recorded, too, so that a
+//! replay can begin with each job that has it. The input is a recording, as
+//! `./scripts/recording --from-csv` makes it of `data/walking.csv`, whose licence is next to it.
+//! The code here knows no kernel: the tests run it in virtual time, and compare every value with
+//! those of an independent implementation.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -56,11 +56,11 @@ fn the_machine_computes_the_bits_of_the_host_and_both_replay_what_it_recorded() 
     let outcome = guest.word("policy=edf").succeed();
     let _ = fs::remove_file(&run);
     assert_eq!(number(&outcome, "gait", "digest"), wanted);
-    assert_eq!(number(&outcome, "replayed", "compared"), 7_022);
+    assert_eq!(number(&outcome, "replayed", "compared"), 7_132);
     assert_eq!(number(&outcome, "replayed", "uncompared"), 0);
     for cores in [1, 2, 4, 8] {
         for policy in [Policy::StaticPriority, Policy::Edf] {
-            replay(&file, &bytes, cores, policy, 7_022, wanted);
+            replay(&file, &bytes, cores, policy, 7_132, wanted);
         }
     }
 }
@@ -94,10 +94,10 @@ fn a_walk_that_linux_recorded_is_replayed_on_linux_on_the_machine_and_on_the_hos
         "--cores 4",
     ] {
         let found = digest(&format!("{place} --replay {recorded}"));
-        assert_eq!(found, (wanted, Some(480)), "{place}");
+        assert_eq!(found, (wanted, Some(488)), "{place}");
     }
     let bytes = fs::read(&run).expect("the recording");
-    replay(&file, &bytes, 1, Policy::StaticPriority, 480, wanted);
+    replay(&file, &bytes, 1, Policy::StaticPriority, 488, wanted);
     for path in [&table, &run] {
         let _ = fs::remove_file(path);
     }

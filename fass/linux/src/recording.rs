@@ -56,9 +56,10 @@ impl Linux {
         }));
     }
 
-    /// Has the run to come replay a recording.
-    pub fn replay(&self, recording: &'static [u8]) {
-        edge::get().set_wish(Box::leak(Box::new(Wish::Replay(recording))));
+    /// Has the run to come replay a recording, which may begin with this job of a DAG, or before.
+    pub fn replay(&self, recording: &'static [u8], from: Option<(&'static str, u64)>) {
+        let bytes = recording;
+        edge::get().set_wish(Box::leak(Box::new(Wish::Replay { bytes, from })));
     }
 
     /// Lets people look at what crosses, by [`watch`](fass::edge::Edge::watch).

@@ -50,7 +50,7 @@ fn part() {
     let machine = alone(2, mechanism.expect("this computer has it")).machine;
     let replays = step != "1";
     if replays {
-        machine.replay(fs::read(path).expect("it is recorded").leak());
+        machine.replay(fs::read(path).expect("it is recorded").leak(), None);
     } else {
         machine.record("recordings", File::create(path).expect("a file"));
     }

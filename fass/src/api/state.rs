@@ -20,6 +20,7 @@
 //! # What is not
 //!
 //! - A subtask that is registered before the updater sees what the job before left.
+//! - A recording has nothing of a state unless that is asked for ([`State::record`]).
 //! - Jobs do not overlap as in a pipeline. Where they must, let one subtask own the
 //!   state and send what others need along an edge.
 //! - A state does not leave its DAG. Between DAGs there is the [latest
@@ -33,12 +34,14 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::fmt;
 
+use recording::Recordable;
 use sched_dag::{StateSpec, StateUser};
 
 use super::dag::Dag;
 use super::uses::{ResettableUses, Uses, sealed};
 use crate::draft::Draft;
 use crate::run::cell::{Changing, Looking};
+use crate::run::kept::KeptState;
 use crate::run::reset::{Reset, Resettable};
 
 /// What can be a state: any type that several cores may use in turn.
@@ -151,6 +154,82 @@ impl<T: StateValue> State<T> {
         let mut draft = dag.open();
         draft.resets.retain(|(state, _)| *state != self.position);
         draft.resets.push((self.position, Box::new(provide)));
+        drop(draft);
+        self
+    }
+
+    /// Records the state every 64 jobs, where the platform records: before the first function is
+    /// called that may change it in such a job. It does so if topics of the DAG are recorded
+    /// ([`Dag::record`]), too; then a replay can begin there.
+    ///
+    /// What a closure keeps for itself is not recorded, so what shall be is to be a state. A value
+    /// that takes more than 4 KiB, or twice the least of its type if that is more, is lost, as one
+    /// of a topic is.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// fn commit() {
+    ///     let (dag, period) = (create_dag(), Duration::from_millis(10));
+    ///     dag.name("odometry").jobs(1_000).record::<u32>("step").record::<u64>("moved");
+    ///     let distance = dag.state("distance", 0_u64);
+    ///     distance.record();
+    ///     let wheel = SubtaskAttributes::named("wheel");
+    ///     dag.register_periodic_subtask(|| (5_u32,), vec!["step"], period, wheel);
+    ///     let add = |distance: &mut u64, (step,): (u32,)| {
+    ///         *distance += u64::from(step);
+    ///         (*distance,)
+    ///     };
+    ///     let add = dag.using(distance.update()).subtask(add).reads(&["step"]);
+    ///     add.writes(&["moved"]).due(period).register(SubtaskAttributes::named("add"));
+    ///     finish_create_dags(&[dag]).unwrap();
+    /// }
+    ///
+    /// let machine = VirtualTime::new();
+    /// commit();
+    /// machine.run();
+    /// let recording = machine.recording();
+    ///
+    /// let machine = VirtualTime::new().replay(&recording).unwrap().from("odometry", 900);
+    /// commit();
+    /// let report = machine.run();
+    /// assert_eq!(report.dag("odometry").jobs().count(), 1_000 - 896); // 14 times 64
+    /// assert_eq!((report.divergence, report.lacking), (None, None));
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If the DAG is committed.
+    #[track_caller]
+    pub fn record(&self) -> &Self
+    where
+        T: Recordable,
+    {
+        self.record_every(64)
+    }
+
+    /// Records the state every so many jobs.
+    ///
+    /// See [`record`](Self::record).
+    ///
+    /// # Panics
+    ///
+    /// If the DAG is committed.
+    #[track_caller]
+    pub fn record_every(&self, jobs: u32) -> &Self
+    where
+        T: Recordable,
+    {
+        let value = Arc::<Resettable<T>>::clone(&self.value);
+        let dag = Dag {
+            draft: Rc::clone(&self.draft),
+        };
+        let mut draft = dag.open();
+        draft.states.retain(|(state, _)| *state != self.position);
+        let kept = Arc::new(KeptState::new(value, jobs));
+        draft.states.push((self.position, kept));
         drop(draft);
         self
     }

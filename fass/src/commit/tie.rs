@@ -18,7 +18,7 @@ use super::staleness::writer_of;
 use crate::api::dag::Dag;
 use crate::draft::Draft;
 use crate::run::plan::{Body, Plan};
-use crate::run::record::{AnyRecorded, Sampled};
+use crate::run::record::{AnyRecorded, OfDag, Sampled};
 use crate::run::staleness::Staleness;
 use crate::run::subtask::MakeBody;
 use crate::run::topic::Wiring;
@@ -46,7 +46,7 @@ pub(crate) fn tie(
         .zip(task_set.dags())
         .zip(&recorded))
     .map(|(((id, dag), verified), of_dag)| {
-        let (spec, make_bodies, latest, effects, resets) = {
+        let (spec, make_bodies, latest, effects, resets, states) = {
             let mut draft = dag.draft.borrow_mut();
             draft.is_committed = true;
             let name = draft.spec.name.clone();
@@ -65,11 +65,19 @@ pub(crate) fn tie(
             let make_bodies = core::mem::take(&mut draft.make_bodies);
             let resets = core::mem::take(&mut draft.resets);
             let latest = draft.latest.clone();
-            (spec, make_bodies, latest, effects, resets)
+            let states = core::mem::take(&mut draft.states);
+            (spec, make_bodies, latest, effects, resets, states)
         };
-        let sampled = any.map(|any| {
-            let samples = samples(dags, dag, &recorded);
-            any.open_all(of_dag, &samples, (id, &spec), &mut lines)
+        let around = any.map(|any| {
+            let of_dag = OfDag {
+                dag: id,
+                spec: &spec,
+                order: verified.topological_order(),
+                recorded: of_dag,
+                samples: &samples(dags, dag, &recorded),
+                states: &states,
+            };
+            any.open_all(&of_dag, &mut lines)
         });
         let slots = usize::try_from(verified.in_flight()).unwrap_or(usize::MAX);
         let faults = match verified.on_fault() {
@@ -95,8 +103,8 @@ pub(crate) fn tie(
                 bodies[writer].add_effects(latest.effects());
             }
         }
-        if let (Some(any), Some(sampled)) = (any, sampled) {
-            any.attach(sampled, &mut bodies);
+        if let (Some(any), Some(around)) = (any, around) {
+            any.attach(around, &mut bodies);
         }
         bodies
     })

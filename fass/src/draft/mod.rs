@@ -27,6 +27,7 @@ use sched_dag::{Activation, DagSpec, LatestSpec, Priority, SubtaskId};
 use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
 use crate::run::effect::Effect;
+use crate::run::kept::KeptState;
 use crate::run::latest::AnyLatest;
 use crate::run::message::MessageType;
 use crate::run::record::AnyRecorded;
@@ -62,6 +63,8 @@ pub(crate) struct Draft {
     pub(crate) latest: Vec<Rc<dyn AnyLatest>>,
     /// The topics that are recorded; they stand in `latest`, too.
     pub(crate) recorded: Vec<Rc<dyn AnyRecorded>>,
+    /// The states that are recorded, by their positions.
+    pub(crate) states: Vec<(usize, Arc<KeptState>)>,
     /// The latest values that subtasks sample, of whatever DAG, and the number that the subtask
     /// has there.
     pub(crate) samples: Vec<(usize, Rc<dyn AnyLatest>, usize)>,

@@ -12,7 +12,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
 
-use recording::{Channel, Role, Schema, Shown};
+use recording::{Channel, Schema, Shown};
 use sched_dag::{DagId, Instance, Notice};
 
 use super::replay::Outcome;
@@ -90,7 +90,10 @@ impl Crossing for Echo {
         }
         self.topics.extend(channels.iter().map(|channel| {
             let schema = || Arc::new(channel.schema.clone());
-            (channel.role != Role::Sample).then(|| (channel.topic.clone(), schema()))
+            channel
+                .role
+                .is_written()
+                .then(|| (channel.topic.clone(), schema()))
         }));
         if let Some(inner) = &mut self.inner {
             inner.open(dag, graph, channels);
@@ -163,7 +166,7 @@ impl Crossing for Echo {
 mod tests {
     use super::*;
     use alloc::string::ToString;
-    use recording::Recordable;
+    use recording::{Recordable, Role};
 
     fn open(echo: &mut Echo, topics: &[(&str, Role)]) {
         let channels = topics.iter().map(|(topic, role)| Channel {

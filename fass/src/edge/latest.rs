@@ -63,6 +63,7 @@ impl Crossing for Latest {
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
         let mut header = mem::take(&mut self.header);
         name(&mut header, self.app, &plan.task_set);
+        plan.keep_states_of(self.jobs);
         // Without memory the app runs as if nothing was kept, for nobody has asked for it.
         let latest = LatestJobs::new(&header.channels, self.jobs);
         self.kept = latest.map(|latest| Kept {
@@ -99,7 +100,7 @@ impl Crossing for Latest {
 
     fn failed(&mut self, instance: Instance, at_ns: u64, _clock_ns: u64) {
         if let Some(kept) = &mut self.kept {
-            for of in kept.lines.iter().filter(|of| of.is_sample_of(instance)) {
+            for of in kept.lines.iter().filter(|of| of.is_found_by(instance)) {
                 of.line.show(at_ns, |sample| kept.latest.take(sample));
             }
             kept.latest.hold(instance.dag.index(), instance.job);

@@ -3,6 +3,8 @@
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::String;
+use alloc::vec::Vec;
+use core::mem;
 
 use recording::{Channel, Header};
 use sched_dag::journal::What;
@@ -12,24 +14,29 @@ use super::replay::{Outcome, Replay};
 use super::signals::Signals;
 use super::{Crossing, Drain, Host, name, open};
 use crate::run::crossing::Recorded;
+use crate::run::line::LineOf;
 use crate::run::plan::Plan;
 
 /// A replay of what the loader has left in memory.
 pub(super) struct OfMachine {
     bytes: &'static [u8],
+    from: Option<(&'static str, u64)>,
     host: Host,
     own: Header,
+    lines: Vec<LineOf>,
     /// From the launch on.
     replay: Option<Replay>,
     signals: Option<Signals>,
 }
 
 impl OfMachine {
-    pub(super) fn new(bytes: &'static [u8], host: Host) -> Self {
+    pub(super) fn new(bytes: &'static [u8], from: Option<(&'static str, u64)>, host: Host) -> Self {
         Self {
             bytes,
+            from,
             host,
             own: Header::default(),
+            lines: Vec::new(),
             replay: None,
             signals: None,
         }
@@ -46,9 +53,13 @@ impl Crossing for OfMachine {
         name(&mut self.own, "", &plan.task_set);
         let read = Replay::read(self.bytes);
         let mut replay = read.map_err(|malformed| format!("the recording, {malformed}"))?;
+        if let Some((dag, job)) = self.from {
+            replay.begin_before(dag, job);
+        }
         replay.fit(&self.own, &plan.task_set)?;
-        replay.prepare(plan);
+        replay.prepare(plan)?;
         replay.guard(plan);
+        self.lines = mem::take(&mut plan.lines);
         self.signals = Some(Signals::take_over(plan, &mut replay));
         self.replay = Some(replay);
         Ok(())
@@ -69,8 +80,11 @@ impl Crossing for OfMachine {
         }
     }
 
-    fn failed(&mut self, instance: Instance, _at_ns: u64, _clock_ns: u64) {
+    fn failed(&mut self, instance: Instance, at_ns: u64, _clock_ns: u64) {
         if let Some(replay) = &mut self.replay {
+            for of in self.lines.iter().filter(|of| of.is_found_by(instance)) {
+                of.line.show(at_ns, |found| replay.compare(found));
+            }
             replay.meet_fault(instance);
         }
     }

@@ -39,7 +39,7 @@ pub use excerpt::Excerpt;
 pub use kept::Kept;
 pub use of_run::{Edge, Outgoing};
 pub use recording::Sink;
-pub use replay::{Divergence, Outcome, Replay};
+pub use replay::{Divergence, Outcome, Replay, job_of};
 
 /// What a platform is to do with what crosses.
 ///
@@ -56,7 +56,12 @@ pub enum Wish {
         is_needed: bool,
     },
     /// Replay these bytes.
-    Replay(&'static [u8]),
+    Replay {
+        /// A recording.
+        bytes: &'static [u8],
+        /// The job of a DAG to begin with, or before it, if that is not the first one.
+        from: Option<(&'static str, u64)>,
+    },
     /// Keep the inputs of the last jobs, and give them away if one fails.
     Latest {
         /// What is recorded, by its name.
@@ -87,7 +92,7 @@ pub type Begin = fn(Wish) -> Box<dyn Crossing>;
 ///
 /// /// What a platform does in `open_channels`, once.
 /// fn crossing(begin: Begin, file: &'static [u8]) -> Box<dyn Crossing> {
-///     begin(Wish::Replay(file))
+///     begin(Wish::Replay { bytes: file, from: None })
 /// }
 /// ```
 pub trait Crossing: Send {
@@ -220,7 +225,7 @@ pub struct Drained {
 pub(crate) fn begin(wish: Wish, host: Host) -> Box<dyn Crossing> {
     match wish {
         Wish::Record { app, bytes, .. } => Box::new(tape::Tape::new(app, bytes)),
-        Wish::Replay(bytes) => Box::new(machine::OfMachine::new(bytes, host)),
+        Wish::Replay { bytes, from } => Box::new(machine::OfMachine::new(bytes, from, host)),
         Wish::Latest { app, jobs } => Box::new(latest::Latest::new(app, jobs)),
         Wish::Echo(other) => Box::new(echo::Echo::new(other.map(|other| begin(*other, host)))),
     }

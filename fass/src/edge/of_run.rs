@@ -87,7 +87,7 @@ impl Edge {
     /// Reports whether a replay is wished.
     #[must_use]
     pub const fn is_replay(&self) -> bool {
-        matches!(self.wish, Some(Wish::Replay(_)))
+        matches!(self.wish, Some(Wish::Replay { .. }))
     }
 
     /// Reports whether a plan has been launched with a wish, so that events are of interest.
@@ -121,7 +121,7 @@ impl Edge {
                 return launched.unwrap_or(Ok(())).map(|()| false);
             }
             Some(Wish::Record { .. }) => "record",
-            Some(Wish::Replay(_)) => "replay",
+            Some(Wish::Replay { .. }) => "replay",
             Some(Wish::Latest { .. } | Wish::Echo(_)) => "latest",
         };
         let is_asked_for = !matches!(self.wish, Some(Wish::Latest { .. }));

@@ -131,7 +131,7 @@ impl Crossing for Tape {
     }
 
     fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
-        for of in self.lines.iter().filter(|of| of.is_sample_of(instance)) {
+        for of in self.lines.iter().filter(|of| of.is_found_by(instance)) {
             (of.line).end(clock_ns, |sample| {
                 take(&self.given, &self.lost, sample, at_ns);
             });

@@ -2,8 +2,9 @@
 //!
 //! A recording of a whole run needs memory or a way out for all of it. To compute a fault again,
 //! the inputs of the last jobs mostly suffice: what sources returned and what subtasks sampled,
-//! of topics that are recorded. Each such channel has a place for each of so many jobs, made at
-//! the commit; a value takes the place of the one so many jobs before.
+//! of topics that are recorded, and what they found in recorded states. Each such channel has a
+//! place for each of so many jobs, made at the commit; a value takes the place of the one so many
+//! jobs before.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -70,7 +71,7 @@ impl LatestJobs {
         let mut places = Vec::with_capacity(channels.len());
         for channel in channels {
             let count = match channel.role {
-                Role::Source | Role::Sample => count,
+                Role::Source | Role::Sample | Role::State => count,
                 Role::Result => 0,
             };
             let room = room_for(channel.schema.least_bytes());

@@ -17,6 +17,7 @@ use super::cell::SetOnce;
 use super::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
 use super::crossing::{Edge, Recorded, room_for};
 use super::effect::Effect;
+use super::kept::KeptState;
 
 /// The number of a channel while it has none.
 const NO_CHANNEL: u16 = u16::MAX;
@@ -162,19 +163,35 @@ impl Effect for Giving {
     }
 }
 
+/// Publishes or gives what an instance has found, also if it has failed: without that nobody
+/// could compute its fault again.
+pub(super) struct Found(pub(super) Arc<Line>);
+
+impl Effect for Found {
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        self.0.give(completed_ns);
+    }
+
+    fn fail(&mut self, failed_ns: u64) {
+        self.0.give(failed_ns);
+    }
+}
+
 /// The line of a channel of a plan, and of which subtask it is.
 pub(crate) struct LineOf {
     pub(crate) dag: DagId,
     pub(crate) subtask: usize,
     pub(crate) role: Role,
     pub(crate) line: Arc<Line>,
+    /// The state whose values they are, if they are of one.
+    pub(crate) state: Option<Arc<KeptState>>,
 }
 
 impl LineOf {
-    /// Reports whether it has what an instance has sampled.
-    pub(crate) fn is_sample_of(&self, instance: Instance) -> bool {
-        let of = (self.dag, self.subtask, self.role);
-        of == (instance.dag, instance.subtask.index(), Role::Sample)
+    /// Reports whether it has what an instance has found: samples, or a state.
+    pub(crate) fn is_found_by(&self, instance: Instance) -> bool {
+        let of = (self.dag, self.subtask);
+        !self.role.is_written() && of == (instance.dag, instance.subtask.index())
     }
 }
 

@@ -12,6 +12,7 @@
 pub(crate) mod cell;
 pub(crate) mod crossing;
 pub(crate) mod effect;
+pub(crate) mod kept;
 pub(crate) mod latest;
 pub(crate) mod latest_jobs;
 pub(crate) mod line;
@@ -23,7 +24,7 @@ pub(crate) mod request;
 pub(crate) mod reset;
 pub(crate) mod runner;
 pub(crate) mod sample;
-mod sampling;
+pub(crate) mod sampling;
 pub(crate) mod signal;
 pub(crate) mod staleness;
 pub(crate) mod subtask;

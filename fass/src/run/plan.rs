@@ -55,6 +55,17 @@ pub struct Plan {
     pub(crate) lines: Vec<LineOf>,
 }
 
+impl Plan {
+    /// Has recorded states written down twice in so many jobs at least, for a platform that keeps
+    /// no more than what enters these.
+    ///
+    /// See [`LatestJobs`](crate::LatestJobs).
+    pub fn keep_states_of(&self, jobs: u32) {
+        let states = self.lines.iter().filter_map(|of| of.state.as_ref());
+        states.for_each(|state| state.keep_every(jobs / 2));
+    }
+}
+
 /// The executable part of a subtask: its function with its ends of the topics.
 ///
 /// A body may move between threads or processors from one call to the next;

@@ -15,16 +15,17 @@ use core::marker::PhantomData;
 
 use recording::{Channel, Recordable, Role, Schema};
 use sched_dag::wcets::graph_hash;
-use sched_dag::{DagId, DagSpec, TopicPort};
+use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
 
 use super::crossing::Edge;
 use super::effect::Effect;
+use super::kept::KeptState;
 use super::latest::{AnyLatest, SharedLatest};
 use super::line::{Line, LineOf};
 use super::message::{Message, MessageType};
 use super::plan::{Body, Subtask};
 use super::sample::{self, SampleLine};
-use super::sampling;
+use super::sampling::{self, Around};
 use super::topic::{Ports, Publisher, Relay, Wiring, Wrap};
 
 /// A recorded topic while DAGs are built.
@@ -50,28 +51,24 @@ pub(crate) trait AnyRecorded {
     /// probe's line; none if the latest value is of another type.
     fn probe(&self, latest: &dyn AnyLatest, sampler: usize) -> Option<(Schema, Arc<SampleLine>)>;
 
-    /// Numbers all recorded topics of a DAG, and what its subtasks sample of such topics, tells
-    /// the platform, and adds their lines to those before. Returns those of the samples, with
-    /// their subtasks.
-    fn open_all(
-        &self,
-        all: &[Rc<dyn AnyRecorded>],
-        samples: &[Sampled],
-        (dag, spec): (DagId, &DagSpec),
-        lines: &mut Vec<LineOf>,
-    ) -> Vec<(usize, Arc<SampleLine>)> {
+    /// Numbers all recorded topics of a DAG, what its subtasks sample of such topics, and its
+    /// recorded states, tells the platform, and adds their lines to those before. Returns what is
+    /// put around subtasks for that.
+    fn open_all(&self, of: &OfDag<'_>, lines: &mut Vec<LineOf>) -> Vec<(usize, Around)> {
+        let (dag, spec) = (of.dag, of.spec);
         if !(self.edge().crosses)() {
             return Vec::new();
         }
         let first = lines.len();
         let mut channels = Vec::new();
-        let mut open = |subtask, role, topic: &str, (schema, line): (Schema, Arc<Line>)| {
+        let mut open = |subtask, role, topic: &str, (schema, line): (Schema, Arc<Line>), state| {
             line.set_number(narrow(lines.len()));
             lines.push(LineOf {
                 dag,
                 subtask,
                 role,
                 line,
+                state,
             });
             channels.push(Channel {
                 dag: narrow(dag.index()),
@@ -82,19 +79,40 @@ pub(crate) trait AnyRecorded {
             });
         };
         let has_results = (self.edge().has_results)();
-        for topic in all {
+        for topic in of.recorded {
             let (subtask, role) = writer(&**topic, spec);
             if has_results || role != Role::Result {
-                open(subtask, role, topic.topic(), topic.line());
+                open(subtask, role, topic.topic(), topic.line(), None);
             }
         }
-        let mut sampled = Vec::new();
-        for sample in samples {
+        let mut around = Vec::new();
+        for sample in of.samples {
             let latest = &*sample.latest;
             if let Some((schema, line)) = sample.of.probe(latest, sample.sampler) {
                 let way = (schema, Arc::clone(&line.way));
-                open(sample.subtask, Role::Sample, latest.topic(), way);
-                sampled.push((sample.subtask, line));
+                open(sample.subtask, Role::Sample, latest.topic(), way, None);
+                around.push((sample.subtask, sampling::around(line)));
+            }
+        }
+        for (position, kept) in of.states {
+            let state = &spec.states[*position];
+            let changes = |subtask: &usize| {
+                let mut users = state.users.iter();
+                users.any(|user| user.updates && user.subtask == *subtask)
+            };
+            // The users take turns in that order.
+            let mut subtasks = of.order.iter().map(|subtask| subtask.index());
+            if let Some(subtask) = subtasks.find(changes) {
+                let line = Arc::new(Line::new(self.edge()));
+                let way = (kept.state.schema(), Arc::clone(&line));
+                open(
+                    subtask,
+                    Role::State,
+                    &state.name,
+                    way,
+                    Some(Arc::clone(kept)),
+                );
+                around.push((subtask, Arc::clone(kept).around(line)));
             }
         }
         if !channels.is_empty() {
@@ -103,12 +121,12 @@ pub(crate) trait AnyRecorded {
                 of.line.open(is_read, channel.schema.least_bytes());
             }
         }
-        sampled
+        around
     }
 
-    /// Lets the bodies of sampling subtasks tell their lines which job they run.
-    fn attach(&self, lines: Vec<(usize, Arc<SampleLine>)>, bodies: &mut Vec<Body>) {
-        sampling::attach(lines, bodies);
+    /// Puts these around the bodies of subtasks.
+    fn attach(&self, around: Vec<(usize, Around)>, bodies: &mut Vec<Body>) {
+        sampling::attach(around, bodies);
     }
 
     /// Returns the body of a source in a replay, if there is one and the source is recorded.
@@ -134,6 +152,18 @@ pub(crate) trait AnyRecorded {
         let outputs = outputs.map(|recorded| recorded.replayed(&mut ports));
         Some(Body::new(Box::new(ReplayedSource(outputs.collect()))))
     }
+}
+
+/// A DAG whose topics are recorded.
+pub(crate) struct OfDag<'d> {
+    pub(crate) dag: DagId,
+    pub(crate) spec: &'d DagSpec,
+    /// The subtasks, each behind those that it waits for.
+    pub(crate) order: &'d [SubtaskId],
+    pub(crate) recorded: &'d [Rc<dyn AnyRecorded>],
+    pub(crate) samples: &'d [Sampled],
+    /// Its recorded states, by their positions.
+    pub(crate) states: &'d [(usize, Arc<KeptState>)],
 }
 
 /// A latest value of a recorded topic, as a subtask samples it.

@@ -10,10 +10,8 @@ use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use recording::{Recordable, Schema};
-use sched_dag::lifecycle::Request;
 
 use super::crossing::Edge;
-use super::effect::Effect;
 use super::latest::{Entry, Probe, SharedLatest, Slot};
 use super::line::Line;
 
@@ -94,15 +92,5 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
                 entry.value.encode(out);
             }
         });
-    }
-}
-
-impl Effect for Arc<SampleLine> {
-    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
-        self.way.give(completed_ns);
-    }
-
-    fn fail(&mut self, failed_ns: u64) {
-        self.way.give(failed_ns);
     }
 }

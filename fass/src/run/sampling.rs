@@ -1,25 +1,34 @@
-//! The bodies of subtasks that sample recorded topics.
+//! The bodies of subtasks whose findings are recorded: samples of recorded topics, and states.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::effect::Effect;
+use super::line::Found;
 use super::plan::{Body, Subtask};
 use super::sample::SampleLine;
 
-/// Lets the bodies of sampling subtasks tell their lines which job they run.
-pub(super) fn attach(lines: Vec<(usize, Arc<SampleLine>)>, bodies: &mut Vec<Body>) {
+/// Puts something around a body.
+pub(crate) type Around = Box<dyn FnOnce(Body) -> Body>;
+
+/// Puts these around the bodies of the subtasks with these numbers.
+pub(super) fn attach(around: Vec<(usize, Around)>, bodies: &mut Vec<Body>) {
     let mut all: Vec<Option<Body>> = core::mem::take(bodies).into_iter().map(Some).collect();
-    for (subtask, line) in lines {
-        all[subtask] = all[subtask].take().map(|body| {
-            let (of, effect) = (Arc::clone(&line), Box::new(line) as Box<dyn Effect>);
-            let mut body = body.wrapped(|subtask| Box::new(Sampling { subtask, line: of }));
-            body.add_effects([effect]);
-            body
-        });
+    for (subtask, around) in around {
+        all[subtask] = all[subtask].take().map(around);
     }
     bodies.extend(all.into_iter().flatten());
+}
+
+/// Returns what lets the body of a sampling subtask tell its line which job it runs.
+pub(super) fn around(line: Arc<SampleLine>) -> Around {
+    Box::new(|body| {
+        let effect: Box<dyn Effect> = Box::new(Found(Arc::clone(&line.way)));
+        let mut body = body.wrapped(|subtask| Box::new(Sampling { subtask, line }));
+        body.add_effects([effect]);
+        body
+    })
 }
 
 /// A subtask that samples recorded topics. (None such can be replaced after a fault.)

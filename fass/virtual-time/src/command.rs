@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use std::{env, fs, panic};
 
 use fass::Policy;
+use fass::edge::job_of;
 
 use crate::VirtualTime;
 use crate::report::Report;
@@ -13,9 +14,10 @@ use crate::report::Report;
 const USAGE: &str = "\
 Replays a recording of this app in virtual time, and compares what it computes.
 
-usage: FILE [--until DAG/JOB] [--cores N] [--policy edf|static]
+usage: FILE [--from DAG/JOB] [--until DAG/JOB] [--cores N] [--policy edf|static]
 
---until shows what the subtasks of a job got and gave, as far as it is recorded. Without it the
+--from begins with that job, or with the last one before it of which all states of the DAG are
+recorded. --until shows what the subtasks of a job got and gave, as far as it is recorded. Without it the
 first job is shown in which a function panics, if one does.
 
 exit codes: 0 nothing differs; 1 something does, a function panics, or there is no such job;
@@ -24,14 +26,15 @@ exit codes: 0 nothing differs; 1 something does, a function panics, or there is 
 /// What the words of the command line say.
 struct Words {
     file: OsString,
+    from: Option<(String, u64)>,
     until: Option<(String, u64)>,
     cores: u32,
     policy: Policy,
 }
 
 /// Replays the recording that the command line names, in the `main` of an app's example;
-/// `--until DAG/JOB` stops at a job and shows what its subtasks got and gave, and `--help` says
-/// the rest. `commit` gets the file's bytes, builds the app's DAGs and commits them.
+/// `--until DAG/JOB` stops at a job and shows what its subtasks got and gave, `--from DAG/JOB` begins
+/// late, and `--help` says the rest. `commit` gets the file's bytes, builds the app's DAGs and commits them.
 ///
 /// ```no_run
 /// use std::process::ExitCode;
@@ -63,6 +66,7 @@ pub fn replay_command(
 fn read(words: Vec<OsString>) -> Result<Words, String> {
     let mut read = Words {
         file: OsString::new(),
+        from: None,
         until: None,
         cores: 1,
         policy: Policy::Edf,
@@ -78,10 +82,13 @@ fn read(words: Vec<OsString>) -> Result<Words, String> {
         let value = value.to_string_lossy();
         let refused = |wanted| format!("`{text} {value}`: {wanted} is wanted");
         match &*text {
-            "--until" => {
-                let parts = value.rsplit_once('/');
-                let parts = parts.and_then(|(dag, job)| Some((dag.into(), job.parse().ok()?)));
-                read.until = Some(parts.ok_or_else(|| refused("DAG/JOB"))?);
+            "--from" | "--until" => {
+                let (dag, job) = job_of(&value).ok_or_else(|| refused("DAG/JOB"))?;
+                let named = Some((dag.into(), job));
+                match &*text {
+                    "--from" => read.from = named,
+                    _ => read.until = named,
+                }
             }
             "--cores" => {
                 let cores = value.parse().ok().filter(|cores| (1..=64).contains(cores));
@@ -117,6 +124,10 @@ fn replay(
     }
     let machine = machine.contain_panics().replay(bytes);
     let machine = machine.map_err(|malformed| format!("{place}: {malformed}"))?;
+    let machine = match &words.from {
+        Some((dag, job)) => machine.from(dag, *job),
+        None => machine,
+    };
     commit(bytes).map_err(|error| error.to_string())?;
     if let Some((dag, job)) = &words.until {
         let shown = machine.until(dag, *job);

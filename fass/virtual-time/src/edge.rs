@@ -17,6 +17,8 @@ use sched_dag::{DagId, Instance, TaskSet};
 
 pub use fass::edge::Divergence;
 
+use crate::VirtualTime;
+
 /// The edge of one machine.
 #[derive(Debug, Default)]
 pub(crate) struct Edge {
@@ -74,6 +76,70 @@ impl Kept {
     }
 }
 
+impl VirtualTime {
+    /// Replays a recording: what [`Dag::record`](fass::Dag::record) says of sources is taken
+    /// from it in place of calling them, and so are samples and times; jobs of which it has no
+    /// values are passed over, and signals come when they came, from nowhere else. To be called
+    /// before the commit, which is refused if the recording is of another graph or of other types,
+    /// has a source that is not recorded now, or has lost a source's value.
+    ///
+    /// What other subtasks write to recorded topics is compared, as are recorded states:
+    /// [`Report::compared`](crate::Report::compared) says how many values were,
+    /// [`Report::uncompared`](crate::Report::uncompared) how many not, as the run is not over or
+    /// the topic is recorded no more, and [`Report::divergence`](crate::Report::divergence) which
+    /// is the first that differs.
+    ///
+    /// # Errors
+    ///
+    /// The bytes are no recording, or are not those that were written.
+    ///
+    /// See [`Dag::record`](fass::Dag::record) for an example.
+    pub fn replay(self, recording: &[u8]) -> Result<Self, Malformed> {
+        self.machine.surroundings.edge.replay(recording)?;
+        Ok(self)
+    }
+
+    /// Has the replay begin as late as may be, so that this job is computed of what was recorded:
+    /// with the last job up to it of which all states of its DAG are
+    /// ([`State::record`](fass::State::record)), or, of a DAG without recorded states, with the job
+    /// itself. Other DAGs begin with what they did then. To be called before the commit, which is
+    /// refused if no inputs of such a DAG are recorded.
+    ///
+    /// See [`State::record`](fass::State::record) for an example.
+    #[must_use = "the machine itself is returned"]
+    pub fn from(self, dag: &str, job: u64) -> Self {
+        let edge = &self.machine.surroundings.edge;
+        edge.of_replay(|replay| replay.begin_before(dag, job));
+        self
+    }
+
+    /// Keeps no more than the inputs of each DAG's last jobs, in memory that is made at the
+    /// commit, as a machine does that records nothing else; so
+    /// [`recording`](Self::recording) has what led to a fault, and no results. Of what a
+    /// function remembers of earlier jobs it says nothing, but in recorded states, which are
+    /// written down twice in so many jobs at least.
+    ///
+    /// ```
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new().contain_panics().keep_latest(16);
+    /// ```
+    #[must_use = "the machine itself is returned"]
+    pub fn keep_latest(self, jobs: u32) -> Self {
+        self.set(|settings| settings.most_jobs = Some(jobs))
+    }
+
+    /// Returns the record of all that was run since the commit: the model, the values of the
+    /// topics that [`Dag::record`](fass::Dag::record) names, signals, jobs that were skipped or
+    /// cut, and the events of the schedule with their times. It is empty if nothing was committed.
+    ///
+    /// See [`Dag::record`](fass::Dag::record).
+    #[must_use]
+    pub fn recording(&self) -> Vec<u8> {
+        self.machine.recording()
+    }
+}
+
 fn narrow(number: u32) -> u16 {
     u16::try_from(number).unwrap_or(u16::MAX)
 }
@@ -112,9 +178,10 @@ impl Edge {
         edge::name(&mut header, "virtual time", &plan.task_set);
         if let Some(replay) = self.replay.borrow_mut().as_mut() {
             replay.fit(&header, &plan.task_set)?;
-            replay.prepare(plan);
+            replay.prepare(plan)?;
         }
         if let Some(jobs) = most_jobs {
+            plan.keep_states_of(jobs);
             let latest = LatestJobs::new(&header.channels, jobs);
             let latest = latest.ok_or("there is no memory for the inputs of so many jobs")?;
             self.latest.replace(Some(latest));

@@ -245,51 +245,6 @@ impl VirtualTime {
         self.set(|settings| settings.contains_panics = true)
     }
 
-    /// Replays a recording: what [`Dag::record`](fass::Dag::record) says of sources is taken
-    /// from it in place of calling them, and so are samples and times; jobs of which it has no
-    /// values are passed over, and signals come when they came, from nowhere else. To be called
-    /// before the commit, which is refused if the recording is of another graph or of other types,
-    /// has a source that is not recorded now, or has lost a source's value.
-    ///
-    /// What other subtasks write to recorded topics is compared: [`Report::compared`] says how
-    /// many values were, [`Report::uncompared`] how many not, as the run is not over or the topic
-    /// is recorded no more, and [`Report::divergence`] which is the first that differs.
-    ///
-    /// # Errors
-    ///
-    /// The bytes are no recording, or are not those that were written.
-    ///
-    /// See [`Dag::record`](fass::Dag::record) for an example.
-    pub fn replay(self, recording: &[u8]) -> Result<Self, Malformed> {
-        self.machine.surroundings.edge.replay(recording)?;
-        Ok(self)
-    }
-
-    /// Keeps no more than the inputs of each DAG's last jobs, in memory that is made at the
-    /// commit, as a machine does that records nothing else; so
-    /// [`recording`](Self::recording) has what led to a fault, and no results. Of what a
-    /// function remembers of earlier jobs it says nothing.
-    ///
-    /// ```
-    /// use virtual_time::VirtualTime;
-    ///
-    /// let machine = VirtualTime::new().contain_panics().keep_latest(16);
-    /// ```
-    #[must_use = "the machine itself is returned"]
-    pub fn keep_latest(self, jobs: u32) -> Self {
-        self.set(|settings| settings.most_jobs = Some(jobs))
-    }
-
-    /// Returns the record of all that was run since the commit: the model, the values of the
-    /// topics that [`Dag::record`](fass::Dag::record) names, signals, jobs that were skipped or
-    /// cut, and the events of the schedule with their times. It is empty if nothing was committed.
-    ///
-    /// See [`Dag::record`](fass::Dag::record).
-    #[must_use]
-    pub fn recording(&self) -> Vec<u8> {
-        self.machine.recording()
-    }
-
     /// Raises a signal from outside at a time of the run, counted from the start of
     /// scheduling; at once if that is past. To be called after the commit.
     ///

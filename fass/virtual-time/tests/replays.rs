@@ -16,7 +16,7 @@ use fass::{
     Sample, Signal, Uses, create_dag, execute_for, finish_create_dags_with,
 };
 use random::Random;
-use recording::{Recording, What};
+use recording::{Entry, Recording, Role, What};
 use support::{ms, named};
 use virtual_time::{PanicRecord, Report, VirtualTime};
 
@@ -99,49 +99,56 @@ fn build(seed: u64, salt: u64) -> Set {
     set
 }
 
-/// Registers a subtask that does something at random.
+/// Registers a subtask that does something at random, and remembers something, which is recorded.
 fn register(set: &Set, number: usize, inputs: [&str; 2], output: &str, random: &mut Random) {
     let (dag, names) = (&set.dags[number], [inputs[0], output]);
     dag.record::<u64>(output);
-    let (longest, mut state) = (random.between(1, 800), random.next());
+    let (longest, first) = (random.between(1, 800), random.next());
+    let state = dag.state(output, first);
+    state.record_every(pick(random, &[1, 2, 5]));
+    state.reset_to(move || first);
+    let state = state.update();
     let other = (number + 1) % set.dags.len();
     let latest = || set.dags[other].latest::<u64>(&format!("s{other}"));
     match random.below(8) {
-        0 | 1 => using(dag, latest().sample(), names, move |sample, value| {
-            work(&mut state, &[value, of_sample(sample)], longest)
-        }),
-        2 => using(dag, latest().sample(), names, move |sample, value| {
-            let sampled = of_sample(sample);
-            assert!(!sampled.is_multiple_of(40), "for good");
-            work(&mut state, &[value, sampled], longest)
-        }),
+        0 | 1 => using(
+            dag,
+            (latest().sample(), state),
+            names,
+            move |used, value| {
+                let (sample, state) = used;
+                work(state, &[value, of_sample(sample)], longest)
+            },
+        ),
+        2 => using(
+            dag,
+            (latest().sample(), state),
+            names,
+            move |used, value| {
+                let (sample, state) = used;
+                let sampled = of_sample(sample);
+                assert!(!sampled.is_multiple_of(40), "for good");
+                work(state, &[value, sampled], longest)
+            },
+        ),
         3 if !set.signals.is_empty() => {
             let raising = set.signals[random.below(set.signals.len())].raising();
-            using(dag, raising, names, move |mut raiser: Raiser<'_>, value| {
+            using(dag, (raising, state), names, move |used, value| {
+                let (mut raiser, state): (Raiser<'_>, _) = used;
                 if value.is_multiple_of(2) {
                     raiser.raise();
                 }
-                work(&mut state, &[value], longest)
+                work(state, &[value], longest)
             });
         }
-        4 => using(
-            dag,
-            dag.state(output, state).update(),
-            names,
-            move |state, value| work(state, &[value], longest),
-        ),
+        4 => using(dag, state, names, move |state, value| {
+            let before_ns = fass::now_ns();
+            work(state, &[value, before_ns], longest) ^ fass::now_ns()
+        }),
         5 => {
-            let ask = move |(value,): (u64,)| {
-                let before_ns = fass::now_ns();
-                (work(&mut state, &[value, before_ns], longest) ^ fass::now_ns(),)
-            };
-            dag.register_subtask(ask, vec![names[0]], vec![output], named(output));
-        }
-        6 => {
             let make = move || {
-                let mut state = state;
-                move |(value,): (u64,)| {
-                    let value = work(&mut state, &[value], longest);
+                move |state: &mut u64, (value,): (u64,)| {
+                    let value = work(state, &[value], longest);
                     assert!(!value.is_multiple_of(5), "unlucky");
                     (value,)
                 }
@@ -151,16 +158,18 @@ fn register(set: &Set, number: usize, inputs: [&str; 2], output: &str, random: &
                 window: 1,
                 in_all: 40,
             });
-            let subtask = dag.restarting(make).reads(&names[..1]);
+            let subtask = dag.using(state).restarting(make).reads(&names[..1]);
             subtask.writes(&names[1..]).register(named(output));
         }
-        _ if inputs[0] == inputs[1] => {
-            let pass = move |(value,): (u64,)| (work(&mut state, &[value], longest),);
-            dag.register_subtask(pass, vec![inputs[0]], vec![output], named(output));
-        }
+        _ if inputs[0] == inputs[1] => using(dag, state, names, move |state, value| {
+            work(state, &[value], longest)
+        }),
         _ => {
-            let join = move |(one, other): (u64, u64)| (work(&mut state, &[one, other], longest),);
-            dag.register_subtask(join, inputs.to_vec(), vec![output], named(output));
+            let join = move |state: &mut u64, (one, other): (u64, u64)| {
+                (work(state, &[one, other], longest),)
+            };
+            let subtask = dag.using(state).subtask(join).reads(&inputs);
+            subtask.writes(&names[1..]).register(named(output));
         }
     }
 }
@@ -188,7 +197,13 @@ fn run(machine: &VirtualTime, set: &Set, raises: &[(usize, Duration)]) -> (Repor
     assert_eq!(report.violations(), []);
     let bytes = machine.recording();
     let recording = Recording::read(&bytes).expect("whole");
-    let said = recording.entries().map(|entry| {
+    // A replay looks at states in more jobs, and compares what is recorded of them.
+    let is_state = |entry: &Entry<'_>| {
+        let channel = recording.header().channels.get(usize::from(entry.place));
+        entry.what == What::Value && channel.is_some_and(|it| it.role == Role::State)
+    };
+    let others = recording.entries().filter(|entry| !is_state(entry));
+    let said = others.map(|entry| {
         let of = (entry.dag, entry.place, entry.job);
         (entry.what.name(), of, entry.value.to_vec())
     });
@@ -201,7 +216,8 @@ fn run(machine: &VirtualTime, set: &Set, raises: &[(usize, Duration)]) -> (Repor
 type Said = (&'static str, (u16, u16, u64), Vec<u8>);
 
 /// Runs a case, and returns how much of what there was.
-fn case(seed: u64) -> [usize; 5] {
+fn case(seed: u64) -> [usize; 6] {
+    let mut later = 0;
     let mut random = Random::new(!seed);
     let set = build(seed, 1);
     let preemptions = [Preemption::Enabled, Preemption::Disabled];
@@ -236,6 +252,26 @@ fn case(seed: u64) -> [usize; 5] {
             assert_eq!(sorted(&again.panics), sorted(&report.panics));
             assert!(repeated == said);
         }
+        // One that begins later computes the same from there on.
+        let (dag, job) = (random.below(set.dags.len()), random.between(0, 19));
+        let machine = VirtualTime::new().cores(cores).contain_panics();
+        let machine = machine.replay(&recording).expect("whole");
+        let set = build(seed, 3);
+        let (again, repeated) = run(&machine.from(&format!("dag {dag}"), job), &set, &[]);
+        assert_eq!((again.divergence.clone(), again.uncompared), (None, 0));
+        let firsts: Vec<u64> = again
+            .task_set()
+            .dags()
+            .iter()
+            .map(|dag| dag.first_job())
+            .collect();
+        assert!(firsts[dag] <= job);
+        let is_after = |(_, (dag, _, job), _): &&Said| *job >= firsts[usize::from(*dag)];
+        assert!(
+            said.iter().filter(is_after).eq(&repeated),
+            "from {firsts:?}"
+        );
+        later += usize::from(firsts[dag] > 0);
     }
     let counted = [
         What::Clock,
@@ -244,12 +280,14 @@ fn case(seed: u64) -> [usize; 5] {
         What::Restart,
         What::Signal,
     ];
-    counted.map(|what| said.iter().filter(|it| it.0 == what.name()).count())
+    let [clock, skip, cut, restart, signal] =
+        counted.map(|what| said.iter().filter(|it| it.0 == what.name()).count());
+    [clock, skip, cut, restart, signal, later]
 }
 
 #[test]
 fn what_is_recorded_is_computed_to_the_byte_on_other_machines() {
-    let mut sums = [0; 5];
+    let mut sums = [0; 6];
     for seed in 0..CASES {
         let counts = catch_unwind(AssertUnwindSafe(|| case(seed))).unwrap_or_else(|payload| {
             eprintln!("the case with seed {seed} failed");

@@ -12,6 +12,7 @@
 //! | `events=off\|on` | if neither is given: commits, events and times are sent, when a run is over | `off` |
 //! | `latest=N` | if neither is given and there is a debug port: the inputs of each DAG's last N jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |
 //! | `replay=N` | the next N bytes of the loader's module are a recording, which is replayed | 0 |
+//! | `from=DAG/JOB` | the replay begins with that job, or with the last one before it of which all states are recorded | all jobs |
 //! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
 //! | `bounds=judge\|observe` | whether a run fails that exceeds a proven bound | `judge` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
@@ -49,7 +50,7 @@ pub(crate) struct Settings {
 /// Has the runs to come recorded or replayed, if the words say so. Returns what is left of the
 /// module.
 pub(crate) fn set_wish(
-    options: &Options<'_>,
+    options: &Options<'static>,
     app: &'static str,
     mut module: Option<&'static [u8]>,
 ) -> Result<Option<&'static [u8]>, UsageError> {
@@ -69,7 +70,10 @@ pub(crate) fn set_wish(
             let shorter = || UsageError::new("`replay`: the module is shorter than that");
             let (recording, rest) = terms::split(module, replay_bytes).ok_or_else(shorter)?;
             module = rest;
-            Wish::Replay(recording)
+            Wish::Replay {
+                bytes: recording,
+                from: terms::from(options)?,
+            }
         }
         (0, 1.., _) => Wish::Record {
             app,

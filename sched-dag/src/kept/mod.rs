@@ -319,7 +319,8 @@ fn events_of<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> Option<usize> {
     let of_dag = |dag: &Dag| {
         // Released, due, queued or skipped, aborted, missed, completed, signalled.
         let a_job = dag.subtasks().len().checked_mul(6)?.checked_add(7)?;
-        let jobs = usize::try_from(dag.jobs()?).ok()?;
+        let jobs = dag.jobs()?.saturating_sub(dag.first_job());
+        let jobs = usize::try_from(jobs).ok()?;
         jobs.checked_mul(a_job)?.checked_add(1)
     };
     dags.try_fold(0usize, |sum, dag| sum.checked_add(of_dag(dag)?))

@@ -137,7 +137,10 @@ fn jobs(
             What::Due => due_ns[event.dag.index()] = event.time_ns,
             What::Signalled | What::Dropped => {}
             what if what.is_of_dag() => {}
-            _ if is_whole => *of_dag = (0, of_dag.1.max(event.job + 1)),
+            _ if is_whole => {
+                let first = task_set.dag(event.dag).first_job();
+                *of_dag = (first, of_dag.1.max(event.job + 1));
+            }
             What::Released => {
                 let model = task_set.dag(event.dag);
                 let release_ns = model.release_ns(event.job, due_ns[event.dag.index()]);

@@ -8,6 +8,7 @@ mod suspended;
 
 use alloc::boxed::Box;
 use alloc::string::String;
+use core::ops::Range;
 
 use crate::clusters::Why;
 use crate::graph::Graph;
@@ -43,6 +44,7 @@ pub struct Dag {
     pub(crate) cluster: Option<ClusterId>,
     pub(crate) why_there: Option<Why>,
     pub(crate) order: Order,
+    pub(crate) first_job: u64,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
     /// Its sinks are also those that state a deadline.
@@ -76,12 +78,13 @@ pub struct Subtask {
 }
 
 impl TaskSet {
-    /// Lets a DAG lose no job, for a replay: due releases queue, whatever it has stated. It ends
-    /// after so many jobs, as its recording does.
-    pub fn replay(&mut self, dag: DagId, jobs: u64) {
+    /// Lets a DAG lose no job, for a replay: due releases queue, whatever it has stated. It has
+    /// these jobs only, as its recording does; those before them are not released.
+    pub fn replay(&mut self, dag: DagId, jobs: Range<u64>) {
         let dag = &mut self.dags[dag.index()];
         dag.overrun = OverrunPolicy::Queue;
-        dag.jobs = Some(dag.jobs.map_or(jobs, |stated| stated.min(jobs)));
+        dag.first_job = jobs.start;
+        dag.jobs = Some(dag.jobs.map_or(jobs.end, |stated| stated.min(jobs.end)));
     }
 
     /// Returns a DAG's graph with more edges, which close no cycle.
@@ -237,7 +240,13 @@ impl Dag {
         self.on_fault
     }
 
-    /// Returns the number of jobs to release, or `None` if there is no end.
+    /// Returns the first job to release: 0, but in a replay that begins later.
+    #[must_use]
+    pub const fn first_job(&self) -> u64 {
+        self.first_job
+    }
+
+    /// Returns the number of jobs to release, counted from job 0 on, or `None` if there is no end.
     #[must_use]
     pub const fn jobs(&self) -> Option<u64> {
         self.jobs

@@ -133,6 +133,7 @@ fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
         cluster: spec.cluster,
         order: spec.order,
         why_there: None,
+        first_job: 0,
         jobs: spec.jobs,
         subtasks: subtasks.collect(),
         graph,

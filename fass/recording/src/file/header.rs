@@ -33,18 +33,19 @@ crate::recordable! {
         pub graph: u64,
     }
 
-    /// Values of one type and one place: what a subtask writes to a topic, or samples.
+    /// Values of one type and one place: what a subtask writes to a topic, or samples, or finds in
+    /// a state.
     ///
     /// See [`Writer`](crate::Writer).
     #[derive(Clone, Debug, PartialEq, Eq)]
     pub struct Channel {
         /// The number of the DAG.
         pub dag: u16,
-        /// The number of the subtask that writes or samples the values.
+        /// The number of the subtask that writes the values, or finds them.
         pub subtask: u16,
         /// What the values are to the DAG.
         pub role: Role,
-        /// The topic.
+        /// The topic, or the state.
         pub topic: String,
         /// The type.
         pub schema: Schema,
@@ -66,10 +67,14 @@ pub enum Role {
     /// `(u64, u64, T)?`, with the job that the value is of, and when that was complete. A
     /// replay takes them.
     Sample,
+    /// A subtask found them in a state, before it changed that in the job. A replay that begins
+    /// with a job takes what is recorded of it, and compares the others. Since version 5 of the
+    /// format.
+    State,
 }
 
 impl Role {
-    const ALL: [Self; 3] = [Self::Source, Self::Result, Self::Sample];
+    const ALL: [Self; 4] = [Self::Source, Self::Result, Self::Sample, Self::State];
 
     /// Returns the word for it.
     ///
@@ -80,17 +85,18 @@ impl Role {
             Self::Source => "source",
             Self::Result => "result",
             Self::Sample => "sample",
+            Self::State => "state",
         }
     }
 
-    /// Reports whether the DAG writes the values itself.
+    /// Reports whether a subtask writes the values to a topic of its DAG.
     ///
     /// ```
     /// assert!(!recording::Role::Sample.is_written());
     /// ```
     #[must_use]
     pub const fn is_written(self) -> bool {
-        !matches!(self, Self::Sample)
+        matches!(self, Self::Source | Self::Result)
     }
 }
 
@@ -109,7 +115,8 @@ impl Recordable for Role {
     }
 
     fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
-        let malformed = input.expected("what the values are: 0 source, 1 result, 2 sample");
+        let malformed =
+            input.expected("what the values are: 0 source, 1 result, 2 sample, 3 state");
         let number = u8::decode(input)?;
         (Self::ALL.get(usize::from(number)).copied()).ok_or(malformed)
     }

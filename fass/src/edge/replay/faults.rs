@@ -6,7 +6,6 @@
 
 use alloc::string::String;
 
-use recording::What;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 use super::{Divergence, Replay};
@@ -14,7 +13,7 @@ use super::{Divergence, Replay};
 /// A fault of the recorded run.
 #[derive(Debug)]
 pub(super) struct Fault {
-    instance: Instance,
+    pub(super) instance: Instance,
     /// The name of the subtask, once it is known.
     subtask: String,
 }
@@ -48,31 +47,19 @@ impl Replay {
     /// recording is of a whole run, only those count whose function is called.
     #[must_use]
     pub fn unmet_fault(&self, of: Option<(DagId, u64)>) -> Option<Divergence> {
-        let is_only_a_part = self.lacking().is_some();
         let is_unmet = |Fault { instance, .. }: &&Fault| {
             let is_of = of.is_none_or(|of| of == (instance.dag, instance.job));
+            let is_only_a_part = self.begins[instance.dag.index()] > 0;
             is_of && self.is_of(instance.dag) && (is_only_a_part || !self.passes_over(*instance))
         };
         let Fault { instance, subtask } = self.faults.iter().find(is_unmet)?;
         Some(Divergence {
             dag: self.own.dags[instance.dag.index()].name.clone(),
             topic: subtask.clone(),
+            is_state: false,
             job: instance.job,
             recorded: None,
             computed: None,
         })
-    }
-
-    /// Returns the first DAG of whose first jobs nothing is recorded, and its first job of which
-    /// something is.
-    pub(super) fn lacking(&self) -> Option<(String, u64)> {
-        let is_skipped = |dag| {
-            let mut events = self.events.iter();
-            events.any(|event| (event.what, event.dag, event.job) == (What::Skip, dag, 0))
-        };
-        let mut of_dags = self.passed.jobs.chunk_by(|one, other| one.0 == other.0);
-        let jobs = of_dags.find(|jobs| jobs[0].1 > 0 && !is_skipped(jobs[0].0))?;
-        let (dag, first) = jobs[0];
-        Some((self.own.dags[usize::from(dag)].name.clone(), first))
     }
 }

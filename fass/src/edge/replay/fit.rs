@@ -6,13 +6,10 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use recording::{Channel, Header, Role};
-use sched_dag::{DagId, SubtaskId, TaskSet};
+use sched_dag::{SubtaskId, TaskSet};
 
-use super::Replay;
+use super::{Replay, is_compared};
 use crate::edge::guard::Passed;
-
-/// The most jobs of a DAG that a replay goes through: everything of them is kept.
-const MOST_JOBS: u64 = 10_000_000;
 
 impl Replay {
     /// Finds the channels of the plan.
@@ -54,8 +51,13 @@ impl Replay {
             let before = before.filter(|before| is_same(before, channel)).count();
             match others.nth(before) {
                 Some((_, other)) if other.schema != *schema => {
+                    let kind = if other.role == Role::State {
+                        "state"
+                    } else {
+                        "topic"
+                    };
                     return Err(format!(
-                        "topic `{topic}` was recorded with values of type {}, and is of type \
+                        "{kind} `{topic}` was recorded with values of type {}, and is of type \
                          {schema} now; record it again",
                         other.schema
                     ));
@@ -68,43 +70,14 @@ impl Replay {
                 found => self.channels.push(found.map(|(number, _)| number)),
             }
         }
-        self.check_jobs()?;
-        // Nothing but signals releases a sporadic DAG, and nothing else takes any.
-        let is_sporadic = |dag: &DagId| task_set.dags()[dag.index()].is_sporadic();
-        self.signals.retain(|dag, _| is_sporadic(dag));
-        for (dag, signals) in &mut self.signals {
-            // Where only the last jobs are recorded, the ones before are passed over. They were
-            // as far apart as the DAG says, so there is time for them.
-            let (dag, first) = (task_set.dag(*dag), self.first_signals.get(dag));
-            for job in (0..first.copied().unwrap_or(0)).rev() {
-                signals.push_front(dag.grid_ns(job));
-            }
-        }
         self.find_inputs(task_set);
+        self.find_begins(task_set)?;
         self.name_faults(task_set);
-        let is_result = |((place, _), _): &&((u16, u64), _)| {
-            self.header.channels[usize::from(*place)].role == Role::Result
+        let is_compared = |((place, _), _): &&((u16, u64), _)| {
+            is_compared(self.header.channels[usize::from(*place)].role)
         };
-        self.to_compare = self.values.iter().filter(is_result).count() as u64;
+        self.to_compare = self.values.iter().filter(is_compared).count() as u64;
         Ok(())
-    }
-
-    /// Makes sure that a replay can go through all jobs up to the last one.
-    fn check_jobs(&self) -> Result<(), String> {
-        let of_values = self.values.iter().map(|((place, job), _)| {
-            let channel = &self.header.channels[usize::from(*place)];
-            (channel.dag, *job)
-        });
-        let of_signals = self.first_signals.iter();
-        let of_signals = of_signals.filter_map(|(dag, job)| Some((dag.0.try_into().ok()?, *job)));
-        match of_values.chain(of_signals).max_by_key(|(_, job)| *job) {
-            Some((dag, job)) if job >= MOST_JOBS => Err(format!(
-                "the recording has job {job} of dag `{}`, and a replay goes through all jobs from 0 \
-                 on, which may be {MOST_JOBS} at most; record a shorter run",
-                self.header.dags[usize::from(dag)].name
-            )),
-            _ => Ok(()),
-        }
     }
 
     /// Finds the DAGs whose inputs are recorded, and the jobs that have some: values that
@@ -126,7 +99,7 @@ impl Replay {
             match channel.role {
                 Role::Source => true,
                 Role::Sample => is_source(channel) && !has_sources(),
-                Role::Result => false,
+                Role::Result | Role::State => false,
             }
         };
         let inputs: Vec<bool> = channels.iter().map(is_input).collect();

@@ -1,5 +1,6 @@
 //! What a replay takes from a recording, and what it finds.
 
+mod begin;
 mod faults;
 mod fit;
 
@@ -14,9 +15,9 @@ use core::ops::Range;
 use recording::{Channel, Entry, Header, Malformed, Recordable, Recording, Role, Shown, What};
 use sched_dag::{DagId, Instance, TaskSet};
 
-use super::guard::{Passed, guard, narrow};
+use super::guard::{Passed, narrow};
 use crate::run::crossing::Recorded;
-use crate::run::plan::Plan;
+pub use begin::job_of;
 use faults::Fault;
 
 /// A recording that takes the place of what enters.
@@ -42,6 +43,12 @@ pub struct Replay {
     faults: Vec<Fault>,
     /// The first value of a source that is lost: its channel and job.
     lost: Option<(u16, u64)>,
+    /// The job that shall be computed, if the person names one.
+    from: Option<(String, u64)>,
+    /// For each DAG of the plan the job that it begins with.
+    begins: Vec<u64>,
+    /// See [`Outcome`].
+    lacking: Option<(String, u64)>,
     /// What the plan says of itself.
     own: Header,
     /// For each channel of the plan that of the recording, if it has one.
@@ -73,8 +80,8 @@ pub struct Outcome {
     pub uncompared: u64,
     /// The first value that is not the recorded one.
     pub divergence: Option<Divergence>,
-    /// The first DAG of whose first jobs nothing is recorded, and its first job of which something
-    /// is: what its functions remember of jobs before is lacking.
+    /// The first DAG that begins with a later job than 0, and that job, unless all of its states
+    /// are recorded there: what its functions remember of jobs before is lacking.
     pub lacking: Option<(String, u64)>,
 }
 
@@ -86,8 +93,10 @@ pub struct Outcome {
 pub struct Divergence {
     /// The name of the DAG.
     pub dag: String,
-    /// The topic; of a fault, the subtask.
+    /// The topic or the state; of a fault, the subtask.
     pub topic: String,
+    /// Whether it is a state.
+    pub is_state: bool,
     /// The job.
     pub job: u64,
     /// The recorded value, as JSON; none for a fault.
@@ -101,10 +110,12 @@ impl fmt::Display for Divergence {
         let Self {
             dag,
             topic,
+            is_state,
             job,
             recorded,
             computed,
         } = self;
+        let kind = if *is_state { "state" } else { "topic" };
         let Some(recorded) = recorded else {
             return write!(
                 f,
@@ -115,7 +126,7 @@ impl fmt::Display for Divergence {
         };
         write!(
             f,
-            "topic `{topic}` of dag `{dag}` diverges in job {job}: {recorded} is recorded, and {} is \
+            "{kind} `{topic}` of dag `{dag}` diverges in job {job}: {recorded} is recorded, and {} is \
              computed; does a function share something behind the scheduler's back?",
             computed.as_deref().unwrap_or("nothing")
         )
@@ -203,6 +214,9 @@ impl Replay {
             events,
             faults,
             lost,
+            from: None,
+            begins: Vec::new(),
+            lacking: None,
             own: Header::default(),
             channels: Vec::new(),
             to_compare: 0,
@@ -270,7 +284,7 @@ impl Replay {
 
     /// Compares a value of the run with the recorded one.
     pub fn compare(&mut self, value: &Recorded<'_>) {
-        if self.own.channels[usize::from(value.channel)].role != Role::Result {
+        if !is_compared(self.own.channels[usize::from(value.channel)].role) {
             // It is where the value is from.
             return;
         }
@@ -301,7 +315,7 @@ impl Replay {
             compared: self.compared,
             uncompared: self.to_compare - self.compared,
             divergence: differs.or_else(missing).or_else(unmet),
-            lacking: self.lacking(),
+            lacking: self.lacking.clone(),
         }
     }
 
@@ -331,6 +345,7 @@ impl Replay {
         Divergence {
             dag: self.own.dags[usize::from(channel.dag)].name.clone(),
             topic: channel.topic.clone(),
+            is_state: channel.role == Role::State,
             job,
             recorded: Some(shown(&self.bytes[recorded.clone()])),
             computed: computed.map(shown),
@@ -349,40 +364,9 @@ impl Replay {
             }
         }
     }
+}
 
-    /// Makes what is replayed release the jobs that are recorded, and lose none on the way.
-    pub fn prepare(&self, plan: &mut Plan) {
-        let task_set = Arc::make_mut(&mut plan.task_set);
-        for dag in (0..).map(DagId).take(task_set.dags().len()) {
-            // No other signals come: without a last job, it would end no run, or keep none going.
-            let of_signals = || {
-                self.signals
-                    .get(&dag)
-                    .map_or(0, |signals| signals.len() as u64)
-            };
-            let jobs = match task_set.dag(dag).is_sporadic() {
-                true => Some(of_signals()),
-                false => self.jobs_of(dag),
-            };
-            if let Some(jobs) = jobs {
-                task_set.replay(dag, jobs);
-                if let Some(lifecycle) = &mut plan.lifecycle {
-                    lifecycle.leave_alone(dag);
-                }
-            }
-        }
-    }
-
-    /// Returns how many jobs of a DAG the recording is of, from job 0 on, if its inputs are
-    /// recorded.
-    fn jobs_of(&self, dag: DagId) -> Option<u64> {
-        let dag = u16::try_from(dag.0).ok().filter(|_| self.is_of(dag))?;
-        let of_dag = self.passed.jobs.iter().rev().find(|(of, _)| *of == dag);
-        Some(of_dag.map_or(1, |(_, last)| last.saturating_add(1)))
-    }
-
-    /// Makes the bodies of a plan pass over what is not called.
-    pub(super) fn guard(&self, plan: &mut Plan) {
-        guard(plan, &self.passed);
-    }
+/// Reports whether values are compared, rather than taken.
+const fn is_compared(role: Role) -> bool {
+    matches!(role, Role::Result | Role::State)
 }

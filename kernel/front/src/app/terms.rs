@@ -3,6 +3,7 @@
 
 use alloc::format;
 
+use fass::edge::job_of;
 use fass::{Overheads, Policy, Preemption, Terms};
 
 use crate::options::{Options, UsageError};
@@ -42,6 +43,15 @@ impl Chosen {
         terms.budget_factor = self.budget_factor;
         terms.overheads = self.overheads;
     }
+}
+
+/// Takes the job that the word `from` says a replay shall begin with, or before it.
+pub fn from<'a>(options: &Options<'a>) -> Result<Option<(&'a str, u64)>, UsageError> {
+    let Some(text) = options.text("from") else {
+        return Ok(None);
+    };
+    let refused = || UsageError::new(format!("`from={text}`: DAG/JOB is wanted"));
+    job_of(text).map(Some).ok_or_else(refused)
 }
 
 /// Takes the WCETs that the word `wcets` says the app's file begins with. Returns them, if there

@@ -12,6 +12,7 @@
 //! | `console=off\|on` | whether a person at standard input can talk with a run | `off` |
 //! | `record=FILE` | what crosses the edge of the run is recorded there |
 //! | `replay=FILE` | the run replays that recording |
+//! | `from=DAG/JOB` | from that job on, or the last one before it of which all states are recorded |
 //! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
 //!
 //! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `trace`, `times` and `graph`
@@ -110,7 +111,7 @@ pub(crate) fn apply(
         (None, _) => {}
     }
     if let Some(path) = replayed {
-        machine.replay(read("replay", path)?);
+        machine.replay(read("replay", path)?, terms::from(options)?);
     }
     if limit_ms > 0 {
         let limited = machine.limit_real_time(Duration::from_millis(limit_ms));

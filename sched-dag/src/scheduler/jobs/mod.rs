@@ -97,11 +97,11 @@ impl Jobs {
             oldest: 0,
             next: 0,
             phase: DagPhase::Running,
-            next_due: 0,
-            next_due_ns: due_ns(dag, 0),
+            next_due: dag.first_job(),
+            next_due_ns: due_ns(dag, dag.first_job()),
             last_due_ns: 0,
-            first_waiting: 0,
-            announced: 0,
+            first_waiting: dag.first_job(),
+            announced: dag.first_job(),
             deadlines: Deadline::all(dag),
         }
     }

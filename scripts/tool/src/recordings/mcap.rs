@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use recording::{Crc, Entry, Header, Recording, What};
+use recording::{Crc, Entry, Header, Recording, Role, What};
 
 use super::mcap_json::{of_message, write_message};
 use crate::json::Object;
@@ -100,11 +100,12 @@ fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
     let event = recording::Schema::parse(event).expect("it is a schema");
     let dag = |number: u16| &header.dags[usize::from(number)].name;
     let of_values = header.channels.iter().map(|channel| {
-        let of_sample = match channel.role.is_written() {
-            true => "",
-            false => "/sampled",
+        let found = match channel.role {
+            Role::Sample => "/sampled",
+            Role::State => "/state",
+            Role::Source | Role::Result => "",
         };
-        let topic = format!("/{}/{}{of_sample}", dag(channel.dag), channel.topic);
+        let topic = format!("/{}/{}{found}", dag(channel.dag), channel.topic);
         (topic, channel.role.name(), &channel.schema)
     });
     let of_events =

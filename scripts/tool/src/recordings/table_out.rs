@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use recording::{
-    Decoder, Entry, Field, Malformed, Part, Recording, Scalar, Schema, What, write_json,
+    Decoder, Entry, Field, Malformed, Part, Recording, Role, Scalar, Schema, What, write_json,
 };
 
 /// The most columns that an array becomes.
@@ -22,11 +22,12 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
     let mut tables: Vec<(String, String)> = Vec::new();
     for channel in &header.channels {
         let dag = &header.dags[usize::from(channel.dag)].name;
-        let of_sample = match channel.role.is_written() {
-            true => "",
-            false => ".sampled",
+        let found = match channel.role {
+            Role::Sample => ".sampled",
+            Role::State => ".state",
+            Role::Source | Role::Result => "",
         };
-        let name = format!("{}.{}{of_sample}", plain(dag), plain(&channel.topic));
+        let name = format!("{}.{}{found}", plain(dag), plain(&channel.topic));
         let same = names.entry(name.clone()).or_default();
         *same += 1;
         let name = if *same > 1 {

@@ -56,6 +56,7 @@ static DEBUG: Command = Command {
         of_run("module"),
         of_run("input"),
         of_run("replay"),
+        of_run("from"),
         of_run("image"),
         of_run("qemu"),
     ],

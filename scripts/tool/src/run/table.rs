@@ -10,6 +10,7 @@ pub(super) const GUEST_WORDS: &[&str] = &[
     "policy",
     "preemption",
     "clusters",
+    "from",
     "jobs",
     "latest",
     "seconds",
@@ -86,6 +87,9 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// Take the values of sources from this recording, compare the others with it, and fail
         /// where one differs.
         "replay": Takes::File("FILE");
+        /// --replay: begin with this job, or with the last one before it of which all states of the
+        /// DAG are recorded.
+        "from": Takes::Text("DAG/JOB");
         /// --dag: print the file in our text format; run nothing.
         "print-dag": Takes::Nothing;
         /// --dag: the one graph to take of a set of task graphs; else each is run.

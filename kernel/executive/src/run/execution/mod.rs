@@ -36,7 +36,7 @@ use alloc::vec::Vec;
 use fass::{LaunchError, Plan, Terms};
 use sched_dag::engine::{Engine, Proven, Run};
 use sched_dag::lifecycle::Requests;
-use sched_dag::{Journal, Scheduler, TaskSet};
+use sched_dag::{Dag, Journal, Scheduler, TaskSet};
 
 use crate::machine::context::Parked;
 use crate::machine::this_core;
@@ -160,8 +160,8 @@ pub fn begin(epoch_ns: u64) -> Option<u64> {
             execution.publish();
         }
     }
-    let jobs = task_set.dags().iter().map(|dag| dag.jobs().unwrap_or(0));
-    Some(jobs.sum())
+    let jobs_of = |dag: &Dag| dag.jobs().unwrap_or(0).saturating_sub(dag.first_job());
+    Some(task_set.dags().iter().map(jobs_of).sum())
 }
 
 /// Takes the run out when it has ended, and drops what it has left behind.
