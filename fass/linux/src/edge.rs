@@ -16,7 +16,6 @@ use fass::{Clock, LaunchError, Plan, Recorded, Terms};
 use sched_dag::engine::Run;
 use sched_dag::{Instance, Notice};
 
-use crate::control::Control;
 use crate::sys;
 
 /// The time between two looks for what waits.
@@ -141,12 +140,15 @@ pub(crate) struct Sending {
     thread: JoinHandle<Outgoing>,
 }
 
-/// Begins to send, if there is anything.
-pub(crate) fn begin_run(epoch_ns: u64, control: Control) -> Option<Sending> {
+/// Begins to send, if there is anything. `take_events` adds the events that there are.
+pub(crate) fn begin_run(
+    epoch_ns: u64,
+    take_events: impl Fn(&mut Kept<File>) + Send + 'static,
+) -> Option<Sending> {
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
     let mut outgoing = get().begin_run(epoch_ns);
-    let takes_events = IS_LIVE.load(Ordering::Relaxed);
-    if outgoing.is_none() && !takes_events {
+    let is_live = IS_LIVE.load(Ordering::Relaxed);
+    if outgoing.is_none() && !is_live {
         return None;
     }
     let is_over = Arc::new(AtomicBool::new(false));
@@ -157,10 +159,10 @@ pub(crate) fn begin_run(epoch_ns: u64, control: Control) -> Option<Sending> {
             let step =
                 |drain: &mut Box<dyn Drain>| drain.step(unpoisoned(&FILE).as_mut().map(Kept::file));
             while outgoing.as_mut().is_some_and(step) {}
-            if takes_events && (was_over || look % EVENTS == 0) {
-                take_events(&control);
-            }
             if let Some(file) = &mut *unpoisoned(&FILE) {
+                if is_live && (was_over || look % EVENTS == 0) {
+                    take_events(file);
+                }
                 file.sink().flush();
             }
             if was_over {
@@ -173,18 +175,6 @@ pub(crate) fn begin_run(epoch_ns: u64, control: Control) -> Option<Sending> {
     let thread = thread::Builder::new().name("fass-recording".into());
     let thread = thread.spawn(work).expect("the system has a thread to send");
     Some(Sending { is_over, thread })
-}
-
-/// Copies events with the level of who releases jobs, so that nobody who waits for the lock waits
-/// for those that compute.
-fn take_events(control: &Control) {
-    if let Some(file) = &mut *unpoisoned(&FILE) {
-        control.raise();
-        while file.take_events(|cluster, take| {
-            control.with_scheduler(cluster, |scheduler| take(&scheduler.log.journal));
-        }) {}
-        control.lower();
-    }
 }
 
 /// Writes how a run has ended.

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
 
+use fass::edge::Kept;
 use sched_dag::engine::{self, Proven};
 
 use crate::control::Control;
-use crate::edge::{self, Sending};
+use crate::edge::{self, File, Sending};
 use crate::release::Budgets;
 use crate::state::{Fault, Number, RunTime};
 use crate::sys;
@@ -82,7 +83,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     for team in &**teams {
         team.lock().time = RunTime::beginning(epoch_ns);
     }
-    let sending = edge::begin_run(epoch_ns, launched.control.clone());
+    let sending = edge::begin_run(epoch_ns, events(launched.control.clone()));
     teams.iter().for_each(|team| office.ring(team.cluster));
     office.wait_until_over();
     let allocations = (launched.allocations)() - allocations;
@@ -121,6 +122,18 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
         run,
         faults,
         counts,
+    }
+}
+
+/// Copies events into the record, with the level of who releases jobs, so that nobody who waits for
+/// the lock waits for those that compute.
+fn events(control: Control) -> impl Fn(&mut Kept<File>) {
+    move |record| {
+        control.raise();
+        while record.take_events(|cluster, take| {
+            control.with_scheduler(cluster, |scheduler| take(&scheduler.log.journal));
+        }) {}
+        control.lower();
     }
 }
 
