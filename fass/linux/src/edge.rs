@@ -7,7 +7,7 @@
 use std::cell::Cell;
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Barrier, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -153,7 +153,10 @@ pub(crate) fn begin_run(
     }
     let is_over = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&is_over);
+    let has_begun = Arc::new(Barrier::new(2));
+    let begun = Arc::clone(&has_begun);
     let work = move || {
+        begun.wait();
         for look in 0_u64.. {
             let was_over = seen.load(Ordering::Acquire);
             let step =
@@ -174,6 +177,8 @@ pub(crate) fn begin_run(
     };
     let thread = thread::Builder::new().name("fass-recording".into());
     let thread = thread.spawn(work).expect("the system has a thread to send");
+    // What it allocates it has by now.
+    has_begun.wait();
     Some(Sending { is_over, thread })
 }
 

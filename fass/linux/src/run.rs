@@ -78,12 +78,12 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     for (team, workers) in teams.iter().zip(&workers) {
         team.wait_until_ready(workers.len() + 1);
     }
-    let allocations = (launched.allocations)();
     let epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
     for team in &**teams {
         team.lock().time = RunTime::beginning(epoch_ns);
     }
     let sending = edge::begin_run(epoch_ns, events(launched.control.clone()));
+    let allocations = (launched.allocations)();
     teams.iter().for_each(|team| office.ring(team.cluster));
     office.wait_until_over();
     let allocations = (launched.allocations)() - allocations;

@@ -7,7 +7,9 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 
 use linux::EndSignals;
+use sched_dag::journal::What;
 use tool::protocol::Transcript;
+use tool::record::Record;
 use tool::system::workspace;
 
 use crate::support::{call, command, folder, succeed};
@@ -45,9 +47,11 @@ fn end(mut child: Child, mut said: BufReader<impl Read>) -> (String, Option<i32>
 
 /// Makes sure that the trace in a folder breaks no rule; returns how many of its events close a DAG.
 fn closings(folder: &Path) -> usize {
-    succeed(folder, "check-trace --bound-us 5000000 trace.log");
-    let text = fs::read_to_string(folder.join("trace.log")).expect("it is there");
-    text.matches("\"closed\"").count()
+    succeed(folder, "check-trace --bound-us 5000000 trace.rec");
+    let bytes = fs::read(folder.join("trace.rec")).expect("it is there");
+    let record = Record::read(&bytes).expect("it is whole");
+    let events = record.runs.iter().flat_map(|run| &run.events);
+    events.filter(|event| event.what == What::Closed).count()
 }
 
 #[test]
@@ -56,10 +60,10 @@ fn the_first_ctrl_c_ends_a_run_in_order() {
     let gaps = workspace().join("apps/cruise/gaps.txt");
     let machine = format!(
         "run --app cruise --mode deterministic --jobs 100000 --append trace_events=2000 --input {} \
-         --record ended.rec --trace trace.log",
+         --record ended.rec --trace trace.rec",
         gaps.display()
     );
-    let linux = "run --app fork-join --on linux --cores 1 --jobs 5000 --trace trace.log";
+    let linux = "run --app fork-join --on linux --cores 1 --jobs 5000 --trace trace.rec";
     for line in [&machine, linux] {
         let (child, said) = start(&folder, line);
         EndSignals::send(child.id());
@@ -84,7 +88,7 @@ fn so_does_the_timeout_which_is_a_failure() {
         "--mode deterministic --jobs 100000 --append trace_events=2000",
         "--on linux --jobs 5000",
     ] {
-        let run = "run --app fork-join --cores 1 --longest 1 --timeout 3 --trace trace.log";
+        let run = "run --app fork-join --cores 1 --longest 1 --timeout 3 --trace trace.rec";
         let called = call(&folder, format!("{run} {on}").split(' '));
         let said = called.complaint;
         assert_eq!(called.code, Some(1), "{on}: {said}");

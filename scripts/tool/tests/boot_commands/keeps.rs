@@ -27,7 +27,7 @@ fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
         "recording run.kept --dot dags --witness proof --observe wcets --csv tables",
     );
     assert!(
-        shown.contains(" machine lines of the run\ncomplete\n"),
+        shown.contains(" machine lines\n") && shown.contains("\ncomplete\n"),
         "{shown}"
     );
     assert!(read(&folder, "wcets").starts_with(b"# WCETs that were observed"));
@@ -78,9 +78,9 @@ fn of_a_run_that_died_what_it_said_until_then_is_kept() {
         "{}",
         run.events.len()
     );
-    succeed(&folder, "check-trace died");
+    succeed(&folder, "check-trace --bound-us 5000000 died");
     let shown = succeed(&folder, "recording died");
-    assert!(shown.ends_with("incomplete: it says nothing of what came after its last entry\n"));
+    assert!(shown.contains("\nincomplete: it says nothing of what came after its last entry\n"));
 }
 
 #[test]
