@@ -3,7 +3,8 @@
 
 use tool::Outcome;
 use tool::protocol::{MachineLine, Transcript};
-use tool::trace::{self, model::Run};
+use tool::record::Run;
+use tool::trace;
 
 /// What a run has to tell.
 pub trait Said {

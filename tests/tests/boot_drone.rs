@@ -2,7 +2,7 @@
 
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::What;
-use tool::trace::bound::COUNTED_NS;
+use tool::record::bound::COUNTED_NS;
 
 /// Describes the drone on two cores.
 fn drone(words: &str) -> Guest {

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use harness::{Guest, Members, Said, lawful_runs};
-use tool::trace::bound;
+use tool::record::bound;
 use tool::{Outcome, system};
 
 fn demo(cores: u64, words: &str) -> Guest {

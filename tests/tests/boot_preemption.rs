@@ -5,7 +5,7 @@
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::{Event, What};
 use tool::protocol::{MachineLine, Status};
-use tool::trace::model::Run;
+use tool::record::Run;
 use tool::{Mode, Outcome};
 
 /// For how long a core waits for others' turns, and for what the kernel executes meanwhile

@@ -6,7 +6,7 @@ use harness::{Guest, lawful_runs};
 use scenarios::Scenario;
 use tool::image;
 use tool::protocol::Transcript;
-use tool::trace::bound::COUNTED_NS;
+use tool::record::bound::COUNTED_NS;
 
 /// Runs those for 1 to 5 cores, which are all.
 fn run(mut run: impl FnMut(u64) -> Transcript) {

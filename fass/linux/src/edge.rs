@@ -103,7 +103,7 @@ pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
 /// Takes what is committed.
 pub(crate) fn commit(plan: &Plan, terms: &Terms) {
     if let Some(file) = &mut *unpoisoned(&FILE) {
-        file.commit(plan, terms);
+        file.commit(plan, &terms.scheduler, terms.overheads);
     }
 }
 

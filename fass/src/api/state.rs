@@ -41,7 +41,7 @@ use super::dag::Dag;
 use super::uses::{ResettableUses, Uses, sealed};
 use crate::draft::Draft;
 use crate::run::cell::{Changing, Looking};
-use crate::run::kept::KeptState;
+use crate::run::line::KeptState;
 use crate::run::reset::{Reset, Resettable};
 
 /// What can be a state: any type that several cores may use in turn.

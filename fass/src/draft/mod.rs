@@ -27,8 +27,8 @@ use sched_dag::{Activation, DagSpec, LatestSpec, Priority, SubtaskId};
 use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
 
 use crate::run::effect::Effect;
-use crate::run::kept::KeptState;
 use crate::run::latest::AnyLatest;
+use crate::run::line::KeptState;
 use crate::run::message::MessageType;
 use crate::run::record::AnyRecorded;
 use crate::run::request::{Asked, Of, Wish, wish};

@@ -21,7 +21,6 @@ use sched_dag::{
 };
 
 use super::{Drained, Outgoing, Record};
-use crate::platform::Terms;
 use crate::run::plan::Plan;
 
 /// How many events are copied at once.
@@ -66,9 +65,8 @@ impl<S: Sink + Send + 'static> Kept<S> {
     }
 
     /// Adds what is committed.
-    pub fn commit(&mut self, plan: &Plan, terms: &Terms) {
-        self.stream
-            .commit(&committed(plan, &terms.scheduler, terms.overheads));
+    pub fn commit(&mut self, plan: &Plan, options: &SchedulerOptions, overheads: Overheads) {
+        self.stream.commit(&committed(plan, options, overheads));
         self.taken = plan.task_set.clusters().map(|_| 0).collect();
     }
 

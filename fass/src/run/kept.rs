@@ -6,26 +6,14 @@
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
-use core::sync::atomic::{AtomicU32, Ordering};
 
 use recording::{Recordable, Schema};
 
 use super::effect::Effect;
-use super::line::{Found, Line};
+use super::line::{AnyState, Found, KeptState, Line};
 use super::plan::{Replacement, Subtask};
 use super::reset::Resettable;
 use super::sampling::Around;
-
-/// A state that is written down, of whatever type.
-pub(crate) trait AnyState: Send + Sync {
-    fn schema(&self) -> Schema;
-
-    /// Writes down what it is now, unless somebody changes it.
-    fn stage(&self, line: &Line, job: u64);
-
-    /// Makes it what was written down; `false`: it cannot be.
-    fn restore(&self, bytes: &[u8]) -> bool;
-}
 
 impl<T: Recordable + Send + Sync> AnyState for Resettable<T> {
     fn schema(&self) -> Schema {
@@ -45,42 +33,21 @@ impl<T: Recordable + Send + Sync> AnyState for Resettable<T> {
     }
 }
 
-/// A state that is written down, and how often.
-pub(crate) struct KeptState {
-    pub(crate) state: Arc<dyn AnyState>,
-    /// It is written down in each job whose number is a multiple of that.
-    every: AtomicU32,
-}
-
-impl KeptState {
-    pub(crate) fn new(state: Arc<dyn AnyState>, every: u32) -> Self {
-        Self {
-            state,
-            every: AtomicU32::new(every.max(1)),
-        }
-    }
-
-    /// Has it written down every so many jobs, if that is more often.
-    pub(crate) fn keep_every(&self, jobs: u32) {
-        self.every.fetch_min(jobs.max(1), Ordering::Relaxed);
-    }
-
-    /// Returns what is put around the first subtask that may change it in a job.
-    pub(super) fn around(self: Arc<Self>, line: Arc<Line>) -> Around {
-        Box::new(move |body| {
-            let effect: Box<dyn Effect> = Box::new(Found(Arc::clone(&line)));
-            let keep = |subtask| {
-                Box::new(Keeping {
-                    subtask,
-                    kept: self,
-                    line,
-                }) as _
-            };
-            let mut body = body.wrapped(keep);
-            body.add_effects([effect]);
-            body
-        })
-    }
+/// Returns what is put around the first subtask that may change a state in a job.
+pub(super) fn around(kept: Arc<KeptState>, line: Arc<Line>) -> Around {
+    Box::new(move |body| {
+        let effect: Box<dyn Effect> = Box::new(Found(Arc::clone(&line)));
+        let keep = |subtask| {
+            Box::new(Keeping {
+                subtask,
+                kept,
+                line,
+            }) as _
+        };
+        let mut body = body.wrapped(keep);
+        body.add_effects([effect]);
+        body
+    })
 }
 
 /// A subtask that writes a state down before it may change that.
@@ -92,7 +59,7 @@ struct Keeping {
 
 impl Subtask for Keeping {
     fn take_turn(&mut self, job: u64) {
-        if job.is_multiple_of(self.kept.every.load(Ordering::Relaxed).into()) {
+        if self.kept.is_due(job) {
             self.kept.state.stage(&self.line, job);
         }
         self.subtask.take_turn(job);

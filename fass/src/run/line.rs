@@ -7,9 +7,9 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::fmt;
-use core::sync::atomic::{AtomicBool, AtomicU16, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering};
 
-use recording::{Encoder, Recordable, Role};
+use recording::{Encoder, Recordable, Role, Schema};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Instance};
 
@@ -17,7 +17,6 @@ use super::cell::SetOnce;
 use super::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
 use super::crossing::{Edge, Recorded, room_for};
 use super::effect::Effect;
-use super::kept::KeptState;
 
 /// The number of a channel while it has none.
 const NO_CHANNEL: u16 = u16::MAX;
@@ -174,6 +173,43 @@ impl Effect for Found {
 
     fn fail(&mut self, failed_ns: u64) {
         self.0.give(failed_ns);
+    }
+}
+
+/// A state that is written down, of whatever type.
+pub(crate) trait AnyState: Send + Sync {
+    fn schema(&self) -> Schema;
+
+    /// Writes down what it is now, unless somebody changes it.
+    fn stage(&self, line: &Line, job: u64);
+
+    /// Makes it what was written down; `false`: it cannot be.
+    fn restore(&self, bytes: &[u8]) -> bool;
+}
+
+/// A state that is written down, and how often.
+pub(crate) struct KeptState {
+    pub(crate) state: Arc<dyn AnyState>,
+    /// It is written down in each job whose number is a multiple of that.
+    every: AtomicU32,
+}
+
+impl KeptState {
+    pub(crate) fn new(state: Arc<dyn AnyState>, every: u32) -> Self {
+        Self {
+            state,
+            every: AtomicU32::new(every.max(1)),
+        }
+    }
+
+    /// Reports whether it is written down in a job.
+    pub(super) fn is_due(&self, job: u64) -> bool {
+        job.is_multiple_of(self.every.load(Ordering::Relaxed).into())
+    }
+
+    /// Has it written down every so many jobs, if that is more often.
+    pub(crate) fn keep_every(&self, jobs: u32) {
+        self.every.fetch_min(jobs.max(1), Ordering::Relaxed);
     }
 }
 

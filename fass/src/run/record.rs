@@ -19,9 +19,9 @@ use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
 
 use super::crossing::Edge;
 use super::effect::Effect;
-use super::kept::KeptState;
+use super::kept;
 use super::latest::{AnyLatest, SharedLatest};
-use super::line::{Line, LineOf};
+use super::line::{KeptState, Line, LineOf};
 use super::message::{Message, MessageType};
 use super::plan::{Body, Subtask};
 use super::sample::{self, SampleLine};
@@ -94,7 +94,7 @@ pub(crate) trait AnyRecorded {
                 around.push((sample.subtask, sampling::around(line)));
             }
         }
-        for (position, kept) in of.states {
+        for (position, of_state) in of.states {
             let state = &spec.states[*position];
             let changes = |subtask: &usize| {
                 let mut users = state.users.iter();
@@ -104,15 +104,15 @@ pub(crate) trait AnyRecorded {
             let mut subtasks = of.order.iter().map(|subtask| subtask.index());
             if let Some(subtask) = subtasks.find(changes) {
                 let line = Arc::new(Line::new(self.edge()));
-                let way = (kept.state.schema(), Arc::clone(&line));
+                let way = (of_state.state.schema(), Arc::clone(&line));
                 open(
                     subtask,
                     Role::State,
                     &state.name,
                     way,
-                    Some(Arc::clone(kept)),
+                    Some(Arc::clone(of_state)),
                 );
-                around.push((subtask, Arc::clone(kept).around(line)));
+                around.push((subtask, kept::around(Arc::clone(of_state), line)));
             }
         }
         if !channels.is_empty() {

@@ -192,7 +192,7 @@ impl Edge {
     /// Takes what is committed.
     pub(crate) fn commit(&self, plan: &Plan, terms: &Terms) {
         let mut record = edge::Kept::new(Vec::new());
-        record.commit(plan, terms);
+        record.commit(plan, &terms.scheduler, terms.overheads);
         self.committed.replace(Some(record));
     }
 

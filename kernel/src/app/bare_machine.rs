@@ -88,7 +88,7 @@ impl System for BareMachine {
             // What was cut off has most likely lost the end of its line.
             crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
         }
-        edge::end(outgoing, !self.is_shut_down());
+        record::end_recording(outgoing, !self.is_shut_down());
         let run = execution::end().ok_or_else(nothing)?;
         let run = run.with_counts(Counts {
             epoch_ns,

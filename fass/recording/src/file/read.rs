@@ -130,7 +130,7 @@ impl<'b> Recording<'b> {
 
 /// Something of a recording.
 ///
-/// See [`Recording::parts`].
+/// See [`Recording::chunks`].
 #[derive(Clone, Debug)]
 pub enum Chunk<'b> {
     /// What the recording says of itself.

@@ -139,7 +139,7 @@ impl<S: Sink> Stream<S> {
     /// Ends the recording, and returns what has taken its bytes. One in which something is lost
     /// says so.
     ///
-    /// See [`Writer`](crate::Writer).
+    /// See [`Writer`].
     pub fn end(mut self) -> S {
         self.finish(END);
         self.to
@@ -168,7 +168,7 @@ impl<S: Sink + ?Sized> Stream<S> {
     ///
     /// If the value has 4 GiB or more.
     ///
-    /// See [`Writer`](crate::Writer).
+    /// See [`Writer`].
     pub fn write(&mut self, entry: &Entry<'_>) {
         self.entries += 1;
         self.lost += u64::from(entry.what == What::Lost);

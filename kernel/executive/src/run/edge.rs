@@ -9,14 +9,12 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::edge::{Edge, Kept, Outgoing, Wish};
+use fass::edge::{Edge, Record, Wish};
 use fass::{LaunchError, Plan, Recorded};
 use sched_dag::{Instance, Notice};
 
-use super::record;
 use crate::machine::debug_port;
 use crate::machine::spinlock::{SpinLock, SpinLockGuard};
-use front::report::crossing;
 
 static EDGE: SpinLock<Edge> = SpinLock::new(Edge::new());
 
@@ -38,24 +36,12 @@ pub fn set_wish(wish: Wish) {
 
 /// Makes a plan one that is recorded or replayed, if there is a wish. Reports whether that goes for
 /// the times, too, that functions are told.
-pub fn launch(plan: &mut Plan) -> Result<bool, LaunchError> {
+/// Its header goes into the record.
+pub fn launch(plan: &mut Plan, record: Option<&mut Record>) -> Result<bool, LaunchError> {
     let mut edge = EDGE.lock();
-    let launched = edge.launch(plan, record::get().as_mut().map(Kept::file));
+    let launched = edge.launch(plan, record);
     IS_ON.store(edge.is_on(), Ordering::Relaxed);
     launched.map_err(LaunchError::new)
-}
-
-/// Sends what is left when the run is over, or what is kept of jobs before a fault, and says what
-/// came of it.
-pub fn end(outgoing: Outgoing, is_over: bool) {
-    let mut edge = EDGE.lock();
-    let outcome = edge.end_run(is_over);
-    let before_fault = edge.before_fault();
-    drop(edge);
-    if let Some(outcome) = outcome {
-        crossing::replayed(&outcome);
-    }
-    record::end_recording(outgoing, before_fault);
 }
 
 /// Takes note that an instance has failed, on the run's time and the clock's. The scheduler's

@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::edge::Begin;
+use fass::edge::{Begin, Kept};
 use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, Recorded, Terms};
 use sched_dag::DagId;
 
@@ -114,11 +114,18 @@ impl Platform for Kernel {
         let terms = self.terms();
         let coincidence_ns = self.coincidence_ns.load(Ordering::Relaxed);
         if !self.calibrates.load(Ordering::Relaxed) {
-            if edge::launch(&mut plan)? {
+            let launched = record::with(|record| {
+                let mut record = record;
+                let launched = edge::launch(&mut plan, record.as_deref_mut().map(Kept::file))?;
+                if let Some(record) = record {
+                    record.commit(&plan, &terms.scheduler, terms.overheads);
+                }
+                Ok(launched)
+            });
+            if launched? {
                 fass::set_clock(&TOLD);
             }
             stacks::watch(&mut plan);
-            record::commit(&plan, &terms);
         }
         execution::prepare(plan, &terms, coincidence_ns)
     }

@@ -7,12 +7,11 @@ use alloc::boxed::Box;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::edge::{Drain, Kept, Outgoing, Sink};
-use fass::{Plan, Terms};
 use sched_dag::engine::Run;
 
-use super::execution;
+use super::{edge, execution};
 use crate::machine::debug_port;
-use crate::machine::spinlock::{SpinLock, SpinLockGuard};
+use crate::machine::spinlock::SpinLock;
 use crate::text::console;
 use front::report::crossing;
 use front::report::record::Lines;
@@ -48,28 +47,25 @@ pub fn begin(is_live: bool) {
     }));
 }
 
-/// Returns the record, if one is kept. It is not locked under another lock but that of what
-/// crosses.
-pub(super) fn get() -> SpinLockGuard<'static, Option<File>> {
-    RECORD.lock()
-}
-
-/// Takes what is committed.
-pub(super) fn commit(plan: &Plan, terms: &Terms) {
-    if let Some(record) = &mut *get() {
-        record.commit(plan, terms);
-    }
+/// Lends the record, if one is kept. Meanwhile it is out of its lock, which has interrupts off, for
+/// sending takes long.
+pub(super) fn with<T>(work: impl FnOnce(Option<&mut File>) -> T) -> T {
+    let mut record = RECORD.lock().take();
+    let result = work(record.as_mut());
+    *RECORD.lock() = record;
+    result
 }
 
 /// Sends something of a run that goes on, or has the signals of a replay raised; `false`: there
 /// is nothing.
 pub fn step(outgoing: &mut Outgoing) -> bool {
-    let mut record = get();
     let has_port = debug_port::is_there();
-    let to = record.as_mut().filter(|_| has_port).map(Kept::file);
-    let is_sent = (outgoing.as_mut()).is_some_and(|drain| drain.step(to));
-    let has_room = IS_LIVE.load(Ordering::Relaxed) && (has_port || !console::has_pending());
-    is_sent | (record.as_mut()).is_some_and(|record| has_room && take_events(record))
+    with(|mut record| {
+        let to = record.as_deref_mut().filter(|_| has_port).map(Kept::file);
+        let is_sent = (outgoing.as_mut()).is_some_and(|drain| drain.step(to));
+        let has_room = IS_LIVE.load(Ordering::Relaxed) && (has_port || !console::has_pending());
+        is_sent | record.is_some_and(|record| has_room && take_events(record))
+    })
 }
 
 fn take_events(record: &mut File) -> bool {
@@ -79,12 +75,20 @@ fn take_events(record: &mut File) -> bool {
 }
 
 /// Sends what is left of a run that is over, but whose journals are still there, or what is kept
-/// of jobs before a fault, and says how complete its recording is.
-pub(super) fn end_recording(outgoing: Outgoing, before_fault: Outgoing) {
-    if before_fault.is_some() && get().is_none() {
+/// of jobs before a fault, and says what came of a replay, and how complete the recording is.
+pub fn end_recording(outgoing: Outgoing, is_over: bool) {
+    let mut edge = edge::get();
+    let outcome = edge.end_run(is_over);
+    let before_fault = edge.before_fault();
+    drop(edge);
+    if let Some(outcome) = outcome {
+        crossing::replayed(&outcome);
+    }
+    if before_fault.is_some() && RECORD.lock().is_none() {
         begin(false);
     }
-    if let Some(record) = &mut *get() {
+    with(|record| {
+        let Some(record) = record else { return };
         let is_live = IS_LIVE.load(Ordering::Relaxed);
         while is_live && take_events(record) {}
         let begin = |mut drain: Box<dyn Drain>| {
@@ -95,19 +99,21 @@ pub(super) fn end_recording(outgoing: Outgoing, before_fault: Outgoing) {
         if let Some(drained) = record.end_recording(outgoing) {
             crossing::recorded(&drained);
         }
-    }
+    });
 }
 
 /// Sends how a run has ended.
 pub fn end_run(run: &Run) {
-    if let Some(record) = &mut *get() {
-        record.end_run(run);
-    }
+    with(|record| {
+        if let Some(record) = record {
+            record.end_run(run);
+        }
+    });
 }
 
 /// Ends the record.
 pub fn end() {
-    let record = get().take();
+    let record = RECORD.lock().take();
     if let Some(To::Console(mut lines)) = record.map(Kept::end) {
         lines.flush();
     }

@@ -7,8 +7,8 @@ use sched_dag::analysis::Overheads;
 use sched_dag::law::Costs;
 
 use crate::json::Object;
+use crate::record::Run;
 use crate::trace;
-use crate::trace::model::Run;
 
 /// What was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

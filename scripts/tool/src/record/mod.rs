@@ -3,7 +3,9 @@
 //! It comes as a file, or as lines of a serial log, each with some of the file's bytes. All that
 //! is shown, judged, drawn or computed of a run is a view of what is here.
 
+pub mod bound;
 pub mod model;
+mod run;
 #[cfg(test)]
 mod tests;
 
@@ -15,9 +17,9 @@ use sched_dag::journal::{Event, What};
 use sched_dag::{ClusterId, CoreId};
 
 use crate::protocol::{Transcript, read_line};
-use crate::trace::bound;
-use crate::trace::model::Run;
 use model::Committed;
+
+pub use run::Run;
 
 /// What a boot has left.
 #[derive(Clone, Debug, Default)]

@@ -3,8 +3,8 @@
 use recording::{Chunk, Commit, Recordable, Recording, Stream, Times, Writer};
 
 use super::Record;
+use super::bound::{COUNTED_NS, FIFO_NS, NORMAL_NS, REAL_NS, SCHED_EXT_NS};
 use crate::made::{commit, line_of, record_of};
-use crate::trace::bound::{COUNTED_NS, FIFO_NS, NORMAL_NS, REAL_NS, SCHED_EXT_NS};
 
 const COMMIT: &str = "edf 2\nx T=10 D=10 O=0: a/0 b/1/7; 0>1";
 

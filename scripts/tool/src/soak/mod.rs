@@ -23,8 +23,8 @@ use crate::outcome::{self, Outcome};
 use crate::progress::SILENCE;
 use crate::protocol::MachineLine;
 use crate::qemu::{Mode, Qemu};
-use crate::trace::model::Run;
-use crate::trace::{bound, check, read};
+use crate::record::{Run, bound};
+use crate::trace::{check, read};
 use crate::{image, install, probe, system};
 
 pub use command::soak;

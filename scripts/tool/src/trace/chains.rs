@@ -8,11 +8,11 @@ use sched_dag::DagId;
 use sched_dag::chains::{Chain, Place};
 use sched_dag::law::Distribution;
 
-use super::model::Run;
 use super::report::{distribution, microseconds, object};
 use super::view::View;
 use crate::json::{Object, quoted};
 use crate::options::{Parsed, nearest};
+use crate::record::Run;
 
 /// The most chains that are shown of a run, unless one is named.
 const SHOWN: usize = 8;

@@ -8,11 +8,11 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use super::chains::Measured;
-use super::model::Run;
-use super::{bound, chains, check, report};
+use super::{chains, check, report};
 use crate::files;
 use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::record::Record;
+use crate::record::{Run, bound};
 
 /// The table of `check-trace`.
 pub static CHECK_TRACE: Command = Command {

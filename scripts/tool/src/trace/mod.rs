@@ -1,6 +1,6 @@
 //! The trace checker: what happened in a run, held against the model's rules.
 //!
-//! A [record](crate::record) has the model that was run, and its journal: a [`model`]. The judge is
+//! A [record](crate::record) has the model that was run, and its journal: a [`Run`]. The judge is
 //! [`sched_dag::law`], which judges all runs, within a stated *bound*, because a decision
 //! takes effect after an interrupt.
 //!
@@ -12,11 +12,9 @@
 //! first one that is left is judged. An instance that has not finished when the trace
 //! ends breaks no rule, unless the run says that it is complete.
 
-pub mod bound;
 mod chains;
 pub mod command;
 pub mod figures;
-pub mod model;
 pub mod report;
 #[cfg(test)]
 mod tests;
@@ -25,9 +23,8 @@ pub mod viewer;
 
 use sched_dag::law::{self, Violation};
 
-use crate::record::Record;
+use crate::record::{Record, Run};
 use figures::Figures;
-use model::Run;
 use view::View;
 
 pub use command::{CHECK_TRACE, check_trace};

@@ -6,8 +6,8 @@ use sched_dag::law::Distribution;
 use sched_dag::{Policy, Preemption};
 
 use super::Findings;
-use super::model::Run;
 use crate::json::Object;
+use crate::record::Run;
 
 /// Returns the text for people: at most `shown` breaches, then the figures.
 #[must_use]

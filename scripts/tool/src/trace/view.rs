@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use sched_dag::journal::{Event, What};
 use sched_dag::{CoreId, DagId, Instance};
 
-use super::model::Run;
+use crate::record::Run;
 
 /// A run in the order of time.
 #[derive(Debug)]

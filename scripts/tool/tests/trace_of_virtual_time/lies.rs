@@ -4,7 +4,7 @@
 //! instant, is never told.
 
 use sched_dag::journal::{Event, What};
-use tool::trace::model::Run;
+use tool::record::Run;
 
 use crate::random::Random;
 

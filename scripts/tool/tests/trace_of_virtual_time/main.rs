@@ -21,8 +21,8 @@ pub(crate) use support::random;
 
 use sched_dag::TaskSet;
 use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
+use tool::record::Run;
 use tool::trace::check;
-use tool::trace::model::Run;
 
 use random::Random;
 use set::{Overruns, Set};

@@ -13,7 +13,8 @@ use crate::outcome::{Outcome, boot};
 use crate::progress::Progress;
 use crate::protocol::MachineLine;
 use crate::qemu::Qemu;
-use crate::trace::{self, model::Run};
+use crate::record::Run;
+use crate::trace;
 use crate::{files, image, install, probe, system};
 
 /// The most cases of one boot: the guest has them all in memory.

@@ -8,9 +8,9 @@ mod breaches;
 use sched_dag::law::Violation;
 
 use super::check;
-use super::model::Run;
 use crate::made::{self, event, lines_of, record_of};
 use crate::record::Record;
+use crate::record::Run;
 
 /// How long one may wait in these traces.
 const BOUND_NS: u64 = 5;

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use super::convert;
 use crate::files;
 use crate::options::{Command, Parsed, Refusal, Takes, options};
-use crate::trace::bound;
+use crate::record::bound;
 use crate::trace::command::read_file;
 
 /// The table of `trace`.

@@ -36,9 +36,9 @@ use sched_dag::Instance;
 use sched_dag::law::Violation;
 
 use super::check;
-use super::model::Run;
 use super::view::View;
 use crate::json::Object;
+use crate::record::Run;
 use flows::Flows;
 use output::{Output, Track};
 

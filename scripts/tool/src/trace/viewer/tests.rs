@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use sched_dag::chains::Sampling;
 use sched_dag::{DagId, SubtaskId};
 
-use super::super::model::Run;
 use super::super::tests::run_of;
 use super::convert;
 use crate::json::{Value, parse};
+use crate::record::Run;
 
 /// A diamond of DAG `a`, `s` before `l` and `r` before `j`, under `b`, on two cores.
 const HEADER: &str = "

@@ -4,7 +4,7 @@
 //! do something else meanwhile. In mode `deterministic` that cannot happen, so there a log
 //! is judged more strictly: its first line tells the mode.
 
-use super::model::Run;
+use super::Run;
 use crate::options::Parsed;
 use crate::protocol::MachineLine;
 use crate::qemu::Mode;
@@ -26,7 +26,7 @@ pub const SCHED_EXT_NS: u64 = 10_000_000;
 pub const NORMAL_NS: u64 = 100_000_000;
 
 /// Returns the bound that a person has chosen, or else that of the run's mode.
-pub(super) fn of(run: &Run, options: &Parsed) -> u64 {
+pub fn of(run: &Run, options: &Parsed) -> u64 {
     let chosen = options.number("bound-us");
     chosen.map_or(run.usual_bound_ns, |bound_us| bound_us.saturating_mul(1000))
 }
