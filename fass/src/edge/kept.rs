@@ -5,7 +5,6 @@
 //! may be slow. Events are copied out of a journal under the cluster's lock, and sent outside of
 //! it.
 
-use alloc::vec;
 use alloc::vec::Vec;
 
 use recording::{
@@ -25,6 +24,9 @@ use crate::run::plan::Plan;
 
 /// How many events are copied at once.
 const AT_ONCE: usize = 64;
+
+/// Room for so many clusters is made at the start, so that no commit changes what is allocated.
+const MOST_CLUSTERS: usize = 64;
 
 /// The record of a boot, and what takes its bytes.
 ///
@@ -50,7 +52,7 @@ impl<S: Sink + Send + 'static> Kept<S> {
         Self {
             stream: Stream::begin(to),
             is_cut: false,
-            taken: Vec::new(),
+            taken: Vec::with_capacity(MOST_CLUSTERS),
         }
     }
 
@@ -67,7 +69,13 @@ impl<S: Sink + Send + 'static> Kept<S> {
     /// Adds what is committed.
     pub fn commit(&mut self, plan: &Plan, options: &SchedulerOptions, overheads: Overheads) {
         self.stream.commit(&committed(plan, options, overheads));
-        self.taken = plan.task_set.clusters().map(|_| 0).collect();
+        self.expect(plan.task_set.clusters().count());
+    }
+
+    /// Expects events of so many clusters, from the first one on.
+    fn expect(&mut self, clusters: usize) {
+        self.taken.clear();
+        self.taken.resize(clusters, 0);
     }
 
     /// Adds the events that clusters' journals have taken since; `look` lends the journal of a
@@ -98,11 +106,11 @@ impl<S: Sink + Send + 'static> Kept<S> {
         let journal = run.journal();
         let clusters = self.taken.len();
         if self.taken.iter().all(|taken| *taken == 0) {
-            self.taken = vec![0];
+            self.expect(1);
             while self.take_events(|_, take| take(journal)) {}
         }
         self.stream.times(&times(run, &self.taken));
-        self.taken = vec![0; clusters];
+        self.expect(clusters);
     }
 
     /// Adds the rest of what is recorded. Returns how complete it is, if it is recorded.

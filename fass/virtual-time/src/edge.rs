@@ -286,7 +286,10 @@ impl Edge {
         };
         record.file().header(&header);
         entries.iter().for_each(|entry| record.file().write(entry));
-        record.end_run(run);
+        // A machine that keeps no more than the latest jobs keeps no events, either.
+        if self.latest.borrow().is_none() {
+            record.end_run(run);
+        }
         record.end()
     }
 

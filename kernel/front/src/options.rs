@@ -287,8 +287,8 @@ mod tests {
         assert_eq!(
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
-             budget_factor, overheads_ns, wcets, trace, trace_events, times, graph, measure, \
-             idle, console, status, mode, probe, end, clock, avx, x2apic, cores, smt"
+             budget_factor, overheads_ns, wcets, trace_events, bounds, events, measure, idle, \
+             console, status, mode, probe, end, clock, avx, x2apic, cores, smt"
         );
     }
 
