@@ -38,6 +38,7 @@ impl Joins {
 
     fn join(&self, parts: &[u64]) {
         let job = self.0.total.fetch_add(1, Ordering::Relaxed);
+        fass::log!(Debug, "joins", parts = parts.len());
         if parts.iter().any(|part| *part != job) {
             self.0.mixed.fetch_add(1, Ordering::Relaxed);
         }

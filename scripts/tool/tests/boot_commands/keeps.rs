@@ -84,15 +84,19 @@ fn of_a_run_that_died_what_it_said_until_then_is_kept() {
 }
 
 #[test]
-fn a_run_on_linux_of_which_no_topic_is_recorded_is_kept_too() {
+fn a_run_of_which_no_topic_is_recorded_is_kept_too_with_what_it_says_in_the_log() {
     let folder = folder("kept-on-linux");
-    let line = "run --on linux --app fork-join --cores 1 --jobs 3 --subtasks 2 --keep run.kept";
-    succeed(&folder, line);
-    let bytes = read(&folder, "run.kept");
-    let kept = Recording::read(&bytes).expect("it is whole");
-    assert_eq!((kept.count(), kept.header().app.as_str()), (0, "fork-join"));
-    let record = Record::read(&bytes).expect("it is whole");
-    let counts = (record.commits.len(), record.runs.len(), record.times.len());
-    assert_eq!(counts, (1, 1, 1));
-    assert!(record.lines.contains("\"kind\":\"verdict\""));
+    let line = "run --app fork-join --cores 1 --jobs 3 --subtasks 2 --append log=debug";
+    for on in ["--on linux", "--mode deterministic"] {
+        succeed(&folder, &format!("{line} {on} --keep run.kept"));
+        let bytes = read(&folder, "run.kept");
+        let kept = Recording::read(&bytes).expect("it is whole");
+        assert_eq!((kept.count(), kept.header().app.as_str()), (0, "fork-join"));
+        let record = Record::read(&bytes).expect("it is whole");
+        let counts = (record.commits.len(), record.runs.len(), record.times.len());
+        assert_eq!(counts, (1, 1, 1));
+        let transcript = record.transcript();
+        let jobs = transcript.of_kind("log").map(|line| line.number_at("job"));
+        assert!(jobs.eq([0, 1, 2].map(Some)) && record.lines.contains("\"kind\":\"verdict\""));
+    }
 }
