@@ -29,20 +29,36 @@ impl Random {
         number
     }
 
-    /// Draws a number from `range`, each with the same probability.
-    pub fn within(&mut self, range: RangeInclusive<u64>) -> u64 {
+    /// Draws a number from `range`, none of which is below 0, each with the same probability.
+    pub fn within<N: Copy + TryFrom<u64> + TryInto<u64>>(&mut self, range: RangeInclusive<N>) -> N {
         scale(self.number(), range)
     }
 
     /// Draws an index into a list of `length` items, which is not empty.
     pub fn index(&mut self, length: usize) -> usize {
-        let last = (length as u64).saturating_sub(1);
-        usize::try_from(self.within(0..=last)).unwrap_or(0)
+        self.within(0..=length.saturating_sub(1))
+    }
+
+    /// Draws one of some items, of which there is one at least.
+    pub fn one_of<T: Copy>(&mut self, items: &[T]) -> T {
+        items[self.index(items.len())]
     }
 
     /// Is true once in `count` times.
     pub fn once_in(&mut self, count: u64) -> bool {
         self.within(1..=count) == 1
+    }
+
+    /// Is true in `percent` of 100 cases.
+    pub fn chance(&mut self, percent: u64) -> bool {
+        self.within(1..=100) <= percent
+    }
+
+    /// Draws the edges of a graph, from vertices to later ones: of all that there can be,
+    /// `percent` of 100.
+    pub fn edges(&mut self, vertices: usize, percent: u64) -> impl Iterator<Item = (usize, usize)> {
+        let pairs = (1..vertices).flat_map(|to| (0..to).map(move |from| (from, to)));
+        pairs.filter(move |_| self.chance(percent))
     }
 }
 
@@ -58,11 +74,11 @@ pub const fn nth(seed: u64, n: u64) -> u64 {
 /// Maps a number of 64 bits to a range: the high part of the product has not
 /// the bias of a remainder.
 #[must_use]
-pub fn scale(number: u64, range: RangeInclusive<u64>) -> u64 {
-    let (least, most) = range.into_inner();
+pub fn scale<N: Copy + TryFrom<u64> + TryInto<u64>>(number: u64, range: RangeInclusive<N>) -> N {
+    let [least, most] = [range.start(), range.end()].map(|&it| it.try_into().unwrap_or(0));
     let choices = u128::from(most.saturating_sub(least)) + 1;
-    let drawn = (u128::from(number) * choices) >> 64;
-    least + u64::try_from(drawn).unwrap_or(0)
+    let drawn = u64::try_from((u128::from(number) * choices) >> 64).unwrap_or(0);
+    N::try_from(least + drawn).unwrap_or(*range.start())
 }
 
 #[cfg(test)]
@@ -91,7 +107,7 @@ mod tests {
         let mut seen = [false; 5];
         for _ in 0..1000 {
             seen[random.index(5)] = true;
-            assert!((3..=4).contains(&random.within(3..=4)));
+            assert!((3..=4).contains(&random.within(3_u8..=4)));
         }
         assert_eq!(seen, [true; 5]);
         assert_eq!(scale(u64::MAX, 0..=u64::MAX), u64::MAX);

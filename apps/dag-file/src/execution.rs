@@ -90,7 +90,7 @@ pub(crate) struct Times {
 impl Times {
     /// Returns how long a job's instance executes, in nanoseconds.
     pub(crate) fn of_job(&self, job: u64) -> u64 {
-        let draw = |range| scale(nth(self.seed, job), range);
+        let drawn = nth(self.seed, job);
         match self.execution {
             Execution::Wcet => self.wcet_ns,
             Execution::Uniform { least, most } => {
@@ -98,12 +98,11 @@ impl Times {
                     let ns = u128::from(self.wcet_ns) * u128::from(of) / u128::from(WHOLE);
                     u64::try_from(ns).unwrap_or(self.wcet_ns)
                 };
-                draw(part(least)..=part(most))
+                scale(drawn, part(least)..=part(most))
             }
             Execution::Samples => {
-                let last = (self.samples_ns.len() as u64).saturating_sub(1);
-                let drawn = usize::try_from(draw(0..=last)).ok();
-                let sample = drawn.and_then(|drawn| self.samples_ns.get(drawn));
+                let last = self.samples_ns.len().saturating_sub(1);
+                let sample = self.samples_ns.get(scale(drawn, 0..=last));
                 sample.copied().unwrap_or(self.wcet_ns)
             }
         }

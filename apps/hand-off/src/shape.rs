@@ -75,11 +75,8 @@ fn layered(sink: usize, seed: u64) -> Vec<(usize, usize)> {
             edges.push((0, subtask));
             continue;
         }
-        let mut predecessors = [0; DRAWS].map(|_: usize| {
-            // The high 5 bits: a number below 32.
-            let place = usize::try_from(random.number() >> 59).unwrap_or(0);
-            1 + (layer - 1) * LAYER + place
-        });
+        let (first, last) = (1 + (layer - 1) * LAYER, layer * LAYER);
+        let mut predecessors = [(); DRAWS].map(|()| random.within(first..=last));
         predecessors.sort_unstable();
         for (number, &earlier) in predecessors.iter().enumerate() {
             if number == 0 || predecessors[number - 1] != earlier {

@@ -31,7 +31,8 @@ pub struct DagText {
     pub(crate) is_paused: bool,
     /// The DAG that a fault releases.
     pub(crate) on_fault: Option<String>,
-    pub(crate) subtasks: Vec<SubtaskText>,
+    /// Its subtasks.
+    pub subtasks: Vec<SubtaskText>,
 }
 
 /// A subtask: `NAME TIMES`, then any of
@@ -48,13 +49,15 @@ pub struct SubtaskText {
     pub(crate) name: String,
     pub(crate) takes: Vec<Duration>,
     pub(crate) after: Vec<String>,
-    pub(crate) priority: Option<u32>,
+    /// Its priority, if it is not the one that its DAG's deadline gives it.
+    pub priority: Option<u32>,
     pub(crate) wcet: Option<Duration>,
-    pub(crate) budget: Option<Duration>,
+    /// How long a call of it may compute.
+    pub budget: Option<Duration>,
     pub(crate) due: Option<Duration>,
     pub(crate) is_non_preemptive: bool,
     /// Whether it computes and does not hold its core; one with a budget does so in any case.
-    pub(crate) computes: bool,
+    pub computes: bool,
     pub(crate) fails: Vec<u64>,
     pub(crate) replaced: Replaced,
     pub(crate) uses: Use,
