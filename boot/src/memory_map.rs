@@ -94,6 +94,7 @@ impl MemoryMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use common::random::Random;
 
     /// Adds ranges (start, end, whether usable) and puts them in order.
     fn ordered(told: impl IntoIterator<Item = (u64, u64, bool)>) -> (Vec<(u64, u64, bool)>, bool) {
@@ -137,17 +138,14 @@ mod tests {
     /// Compares with a map that is kept byte by byte.
     #[test]
     fn any_map_is_what_its_bytes_say() {
-        let mut seed = 1_u64;
-        let mut random = |below: u64| {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (seed >> 33) % below
-        };
+        let mut random = Random::new(1);
         for _ in 0..1000 {
-            let one = |random: &mut dyn FnMut(u64) -> u64| {
-                let start = random(40);
-                (start, start + random(20), random(2) == 0)
+            let count = random.index(12);
+            let one = |_| {
+                let start = random.within(0..=39);
+                (start, start + random.within(0..=19), random.once_in(2))
             };
-            let told: Vec<_> = (0..random(12)).map(|_| one(&mut random)).collect();
+            let told: Vec<_> = (0..count).map(one).collect();
             let kind = |at: u64, map: &[(u64, u64, bool)]| {
                 let here = map.iter().filter(|it| it.0 <= at && at < it.1);
                 here.map(|it| it.2).min()

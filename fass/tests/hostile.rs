@@ -2,8 +2,6 @@
 //! completes what it likes. It gets panics in plain words; values are never torn, mixed
 //! between jobs, or lost track of.
 
-#[path = "../../sched-dag/tests/support/random.rs"]
-mod random;
 mod support;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,8 +9,8 @@ use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
+use common::random::Random;
 use fass::{Body, Dag, create_dag};
-use random::Random;
 use support::{PERIOD, commit, named};
 
 /// A value that knows its job and is counted while it lives.
@@ -100,17 +98,17 @@ fn misuse(places: &[Place], running: &[AtomicU64; 4], turns: u32, random: &mut R
     for _ in 0..turns {
         for number in 0..places.len() {
             let is_wrong = random.chance(3);
-            let number = if is_wrong { random.below(4) } else { number };
+            let number = if is_wrong { random.index(4) } else { number };
             let mut place = places[number]
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner);
             let (body, next) = &mut *place;
-            let job = match random.below(6) {
+            let job = match random.index(6) {
                 0 if is_wrong => u64::MAX,
-                1 | 2 if is_wrong => random.between(0, 2 * *next),
+                1 | 2 if is_wrong => random.within(0..=2 * *next),
                 _ => *next,
             };
-            let what = if is_wrong { random.below(4) } else { 0 };
+            let what = if is_wrong { random.index(4) } else { 0 };
             running[number].store(job, Ordering::Relaxed);
             let done = catch_unwind(AssertUnwindSafe(|| match what {
                 0 | 1 => body.run(job),

@@ -2,13 +2,11 @@
 
 #[path = "support/counting.rs"]
 mod counting;
-#[path = "support/random.rs"]
-mod random;
 
 use std::sync::Arc;
 
+use common::random::Random;
 use counting::allocated;
-use random::Random;
 use sched_dag::virtual_time::{End, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, DagStatistics, Instance, OverrunPolicy,
@@ -18,11 +16,11 @@ use sched_dag::{
 /// A layered DAG of 40 subtasks that overruns now and then.
 fn dag(random: &mut Random, overrun: OverrunPolicy) -> DagSpec {
     let edges = (1..40)
-        .flat_map(|to| [(random.below(to), to), (random.below(to), to)])
+        .flat_map(|to| [(random.index(to), to), (random.index(to), to)])
         .collect();
     DagSpec {
-        period_ns: Some(random.between(50, 200)),
-        relative_deadline_ns: Some(random.between(50, 400)),
+        period_ns: Some(random.within(50..=200)),
+        relative_deadline_ns: Some(random.within(50..=400)),
         in_flight: Some(3),
         overrun,
         jobs: Some(300),
@@ -40,11 +38,11 @@ struct Work {
 
 impl Workload for Work {
     fn execute(&mut self, _instance: &mut Instance, _now_ns: u64) -> Option<u64> {
-        Some(self.random.between(0, 50))
+        Some(self.random.within(0..=50))
     }
 
     fn fails(&mut self, _instance: Instance) -> bool {
-        self.may_fail && self.random.between(0, 2_999) == 0
+        self.may_fail && self.random.within(0..=2_999) == 0
     }
 }
 

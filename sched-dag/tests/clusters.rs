@@ -8,11 +8,9 @@
 mod set;
 mod support;
 
-pub(crate) use support::random;
-
 use std::sync::Arc;
 
-use random::Random;
+use common::random::Random;
 use sched_dag::analysis::{self, Answer, Overheads, Reason, Settings};
 use sched_dag::journal::Event;
 use sched_dag::virtual_time::VirtualTime;
@@ -59,13 +57,13 @@ fn a_cluster_runs_as_if_it_were_alone() {
     for seed in first_seed..first_seed + count {
         let mut random = Random::new(seed);
         let mut set = set::draw(&mut random, set::Overruns::Often);
-        let sizes: Vec<u32> = (0..random.between(1, 3))
-            .map(|_| u32::try_from(random.between(1, 3)).expect("few cores"))
+        let sizes: Vec<u32> = (0..random.within(1..=3))
+            .map(|_| random.within(1..=3))
             .collect();
         set.options.cores = sizes.iter().sum();
         let mut specs = set.specs();
         for spec in &mut specs {
-            let cluster = u32::try_from(random.below(sizes.len())).expect("few clusters");
+            let cluster = u32::try_from(random.index(sizes.len())).expect("few clusters");
             spec.cluster = Some(ClusterId(cluster));
         }
         let all: Vec<u32> = (0..).take(specs.len()).collect();

@@ -11,10 +11,8 @@ mod events;
 mod set;
 mod support;
 
-pub(crate) use support::random;
-
+use common::random::Random;
 use events::events;
-use random::Random;
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{
     Histogram, InstanceRecord, JobRecord, Record, Tally, Terms, Violation, dispatch_violations,
@@ -29,10 +27,7 @@ fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
     println!("{count} sets from seed {first_seed} on");
     for seed in first_seed..first_seed + count {
         let mut random = Random::new(seed);
-        let overruns = match random.chance(50) {
-            true => Overruns::Often,
-            false => Overruns::Never,
-        };
+        let overruns = random.one_of(&[Overruns::Often, Overruns::Never]);
         let set = set::draw(&mut random, overruns);
         let driver = driver(&set.specs(), set.options);
         let run = Script::new(|instance| set.execution_ns(instance)).run(driver);
@@ -65,7 +60,7 @@ fn the_latest_events_have_the_latest_jobs_whole() {
     let mut kept = 0;
     for_each_run(|seed, random, set, run| {
         let whole = record(run, true, 0);
-        let from = random.below(run.events.len());
+        let from = random.index(run.events.len());
         let rest = record(run, false, from);
         for (dag, _) in (0..).map(DagId).zip(run.task_set.dags()) {
             for (job, times) in rest.numbered(dag) {

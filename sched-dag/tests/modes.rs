@@ -6,10 +6,10 @@ mod support;
 
 use std::collections::BTreeSet;
 
+use common::random::Random;
 use sched_dag::journal::{Event, What};
 use sched_dag::lifecycle::{Changes, Entry, Lifecycle, Request};
 use sched_dag::{DagId, DagSpec, ModeId};
-use support::random::Random;
 use support::{Run, Script, Spec, TWO_CORES, Takes, dag, driver, number};
 
 /// Runs all jobs of DAGs on two cores.
@@ -134,13 +134,13 @@ fn listed(bits: u32) -> Vec<DagId> {
 }
 
 /// Returns requests in the order of their times.
-fn requests(random: &mut Random, dags: u32, modes: usize) -> Vec<(u64, Request)> {
+fn requests(random: &mut Random, dags: u32, modes: u32) -> Vec<(u64, Request)> {
     let mut at_ns = 1;
     let mut request = |_| {
-        at_ns += random.between(0, 60);
-        let mode = u32::try_from(random.below(modes)).expect("few");
-        let dag = DagId(u32::try_from(random.below(dags as usize)).expect("few"));
-        let request = match random.between(0, 9) {
+        at_ns += random.within(0..=60);
+        let mode = random.within(0..=modes - 1);
+        let dag = DagId(random.within(0..=dags - 1));
+        let request = match random.within(0..=9) {
             0 => Request::Pause(dag),
             1 => Request::Resume(dag),
             2..=4 => enter(mode, Entry::AtOnce),
@@ -158,19 +158,20 @@ fn random_modes_are_entered_as_the_rules_say() {
     for seed in first..first + sets {
         println!("SCHED_DAG_SEED={seed}");
         let mut random = Random::new(seed);
-        let dags = u32::try_from(random.between(1, 5)).expect("few");
+        let dags = random.within(1..=5);
         let specs = (0..dags).map(|_| {
-            let (period_ns, jobs) = (random.between(20, 60), random.between(1, 20));
-            dag(period_ns, 1000, jobs, &[1], &[]).offset(random.between(0, 40))
+            let (period_ns, jobs) = (random.within(20..=60), random.within(1..=20));
+            dag(period_ns, 1000, jobs, &[1], &[]).offset(random.within(0..=40))
         });
         let specs: Vec<DagSpec> = specs.collect();
-        let modes: Vec<u32> = (0..random.between(1, 4))
-            .map(|_| u32::try_from(random.between(1, (1 << dags) - 1)).expect("few"))
+        let count = random.within(1..=4);
+        let modes: Vec<u32> = (0..count)
+            .map(|_| random.within(1..=(1 << dags) - 1))
             .collect();
-        let requests = requests(&mut random, dags, modes.len());
+        let requests = requests(&mut random, dags, count);
         let lists = modes.iter().copied().map(listed).collect();
         let lifecycle = Changes::new(dags, false).with_modes(lists);
-        let script = Script::new(|_| random.between(1, 70)).asking(requests.iter().copied());
+        let script = Script::new(|_| random.within(1..=70)).asking(requests.iter().copied());
         let run = run(&specs, lifecycle, script);
         let events = run.events.iter();
         entered += events.filter(|event| event.what == What::Entered).count();

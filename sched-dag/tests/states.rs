@@ -2,12 +2,12 @@
 
 mod support;
 
+use common::random::Random;
 use sched_dag::{
     CommitOptions, DagId, DagSpec, Fault, LatestSpec, Policy, StateSpec, StateUser, SubtaskId,
     SubtaskSpec, TopicPort, verify,
 };
-use support::random::Random;
-use support::{PREEMPTIVE, commit, dag};
+use support::{PREEMPTIVE, commit, dag, shuffled_edges};
 
 /// A state with its users, and whether each updates it.
 fn state(name: &str, users: &[(usize, bool)]) -> StateSpec {
@@ -74,17 +74,9 @@ fn users_of_a_state_get_the_edges_that_order_them() {
 fn several_states_never_close_a_cycle() {
     for seed in 0..500 {
         let mut random = Random::new(seed);
-        let count = 2 + random.below(11);
-        // Edges along a random order, so that registration is not topological.
-        let mut order: Vec<usize> = (0..count).collect();
-        for last in (1..count).rev() {
-            order.swap(last, random.below(last + 1));
-        }
-        let pairs = (1..count).flat_map(|later| (0..later).map(move |earlier| (earlier, later)));
-        let edges: Vec<_> = pairs
-            .filter(|_| random.chance(25))
-            .map(|(earlier, later)| (order[earlier], order[later]))
-            .collect();
+        let count = 2 + random.index(11);
+        // So registration is not topological.
+        let edges = shuffled_edges(&mut random, count, 25);
         let states = ["one", "two", "three"].map(|name| {
             let others = (1..count).filter(|_| random.chance(50));
             let others: Vec<usize> = others.collect();

@@ -1,16 +1,13 @@
 //! What must hold of any trace, on random ones, of stamps that repeat and go backwards.
 //! A failing test's last line of output is the seed that repeats it.
 
-#[path = "../../../sched-dag/tests/support/random.rs"]
-mod random;
-
 use std::collections::HashSet;
 use std::num::NonZeroUsize;
 
+use common::random::Random;
 use pub_sub::{
     AgePenalty, ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer,
 };
-use random::Random;
 
 const SEEDS: u64 = 300;
 
@@ -37,12 +34,12 @@ impl Outlet<usize> for Departures {
 
 fn approximate(random: &mut Random, topics: usize, queue_size: usize) -> ApproximateTime<usize> {
     let queue_size = NonZeroUsize::new(queue_size).expect("not 0");
-    let factor = random.between(4, 12);
+    let factor = random.within(4..=12);
     let mut parameters = Parameters::new(topics, queue_size)
         .age_penalty(AgePenalty::from_factor(factor, 2).expect("in range"))
-        .lower_bound_ns(random.below(topics), random.between(0, 5));
+        .lower_bound_ns(random.index(topics), random.within(0..=5));
     if random.chance(50) {
-        parameters = parameters.max_interval_ns(random.between(0, 10));
+        parameters = parameters.max_interval_ns(random.within(0..=10));
     }
     ApproximateTime::new(parameters)
 }
@@ -52,8 +49,8 @@ fn every_message_leaves_once_or_is_held_and_approximate_sets_are_in_order() {
     for seed in 0..SEEDS {
         println!("seed {seed}");
         let mut random = Random::new(seed);
-        let topics = 1 + random.below(5);
-        let queue_size = 1 + random.below(8);
+        let topics = 1 + random.index(5);
+        let queue_size = 1 + random.index(8);
         let is_exact = random.chance(33);
         let mut synchronizer: Box<dyn Synchronizer<usize>> = match is_exact {
             true => Box::new(ExactTime::new(topics, queue_size)),
@@ -63,9 +60,9 @@ fn every_message_leaves_once_or_is_held_and_approximate_sets_are_in_order() {
         let mut last_set: Option<Vec<usize>> = None;
         let mut topic_of = Vec::new();
         for message in 0..200 {
-            let topic = random.below(topics);
+            let topic = random.index(topics);
             topic_of.push(topic);
-            let stamp_ns = (message / topics) as u64 + random.between(0, 12);
+            let stamp_ns = (message / topics) as u64 + random.within(0..=12);
             let mut departures = Departures::default();
             synchronizer.arrive(topic, Stamped { stamp_ns, message }, &mut departures);
             for set in &departures.sets {

@@ -3,15 +3,12 @@
 //! queue 1000. Seeds differ, so figures agree as far as samples do: over seeds, the
 //! sets per job have a standard deviation of at most 0.009.
 
-#[path = "../../../sched-dag/tests/support/random.rs"]
-mod random;
-
 use std::num::NonZeroUsize;
 
+use common::random::Random;
 use pub_sub::metrics::Record;
 use pub_sub::workload::{self, Stamping};
 use pub_sub::{ApproximateTime, ExactTime, Parameters, Synchronizer};
-use random::Random;
 
 const JOBS: usize = 2000;
 const QUEUE_SIZE: usize = 1000;
@@ -19,10 +16,10 @@ const SEEDS: u64 = 20;
 
 fn run(synchronizer: &mut dyn Synchronizer<usize>, stamping: Stamping, seed: u64) -> Record {
     let mut seeds = Random::new(seed);
-    let topics = (0..synchronizer.topics()).map(|_| Random::new(seeds.next()));
+    let topics = (0..synchronizer.topics()).map(|_| Random::new(seeds.number()));
     let mut times: Vec<Random> = topics.collect();
     workload::run(synchronizer, stamping, JOBS, |topic, _| {
-        times[topic].between(1_000_000, 50_000_000)
+        times[topic].within(1_000_000..=50_000_000)
     })
 }
 

@@ -1,11 +1,8 @@
 //! Recordings that were altered: each is refused.
 
-#[path = "../../../sched-dag/tests/support/random.rs"]
-mod random;
-
 use std::collections::BTreeSet;
 
-use random::Random;
+use common::random::Random;
 use recording::{
     Channel, Chunk, Commit, CommittedDag, Counted, Crc, DagHeader, DagTimes, Entry, Header, MAGIC,
     MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Times, VERSION, What, Writer,
@@ -160,11 +157,11 @@ fn parts_that_are_left_out_doubled_or_turned_are_found() {
     let mut expected = BTreeSet::new();
     for _ in 0..10_000 {
         let mut altered = bytes.clone();
-        for _ in 0..=random.below(3) {
-            let place = random.below(altered.len());
-            let end = place + 1 + random.below(60);
+        for _ in 0..=random.index(3) {
+            let place = random.index(altered.len());
+            let end = place + 1 + random.index(60);
             let part = place..end.min(altered.len());
-            match random.below(3) {
+            match random.index(3) {
                 0 => _ = altered.drain(part),
                 1 => {
                     let part = altered[part].to_vec();

@@ -5,14 +5,12 @@
 
 #[path = "../../../sched-dag/tests/support/counting.rs"]
 mod counting;
-#[path = "../../../sched-dag/tests/support/random.rs"]
-mod random;
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
+use common::random::Random;
 use counting::allocated;
-use random::Random;
 use recording::{Decoder, Encoder, MOST_DEPTH, MOST_GROWTH, Recordable, Schema, Shown, to_bytes};
 
 recording::recordable! {
@@ -40,53 +38,57 @@ recording::recordable! {
     }
 }
 
-impl Random {
-    fn text(&mut self) -> String {
-        let letters = ['a', '"', '\\', '\n', 'é', '😀', '\0'];
-        (0..self.below(6)).map(|_| letters[self.below(7)]).collect()
-    }
+fn text(random: &mut Random) -> String {
+    let letters = ['a', '"', '\\', '\n', 'é', '😀', '\0'];
+    (0..random.index(6))
+        .map(|_| random.one_of(&letters))
+        .collect()
+}
 
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_possible_wrap,
-        reason = "any bits will do"
-    )]
-    fn value(&mut self) -> All {
-        let some = self.next();
-        let list = |own: &mut Self| (0..own.below(4)).map(|_| own.next() as u16).collect();
-        All {
-            numbers: (
-                some as u8,
-                some as u16,
-                some as u32,
-                some,
-                u128::from(some) << 60,
-                some as i8,
-                some as i16,
-            ),
-            others: (
-                some as i32,
-                some as i64,
-                -i128::from(some),
-                (some as f32).sqrt(),
-                1.0 / some as f64,
-            ),
-            truth: some & 1 == 1,
-            letter: ['x', '\u{10ffff}'][self.below(2)],
-            name: self.text(),
-            maybe: [None, Some(None), Some(Some(0.1))][self.below(3)],
-            lists: (0..self.below(4)).map(|_| list(self)).collect(),
-            parts: (0..self.below(3))
-                .map(|_| Part {
-                    id: self.next() as u32,
-                    label: self.text(),
-                    place: (self.below(2) == 1).then(|| Box::new((1.0, f32::INFINITY))),
-                })
-                .collect(),
-            array: [Some(1), None, Some(self.next() as u8), None, None],
-            shared: Arc::new([0.5, f64::MIN]),
-            nothing: (),
-        }
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "any bits will do"
+)]
+fn value(random: &mut Random) -> All {
+    let some = random.number();
+    let list = |random: &mut Random| {
+        (0..random.index(4))
+            .map(|_| random.number() as u16)
+            .collect()
+    };
+    All {
+        numbers: (
+            some as u8,
+            some as u16,
+            some as u32,
+            some,
+            u128::from(some) << 60,
+            some as i8,
+            some as i16,
+        ),
+        others: (
+            some as i32,
+            some as i64,
+            -i128::from(some),
+            (some as f32).sqrt(),
+            1.0 / some as f64,
+        ),
+        truth: some & 1 == 1,
+        letter: random.one_of(&['x', '\u{10ffff}']),
+        name: text(random),
+        maybe: random.one_of(&[None, Some(None), Some(Some(0.1))]),
+        lists: (0..random.index(4)).map(|_| list(random)).collect(),
+        parts: (0..random.index(3))
+            .map(|_| Part {
+                id: random.number() as u32,
+                label: text(random),
+                place: random.once_in(2).then(|| Box::new((1.0, f32::INFINITY))),
+            })
+            .collect(),
+        array: [Some(1), None, Some(random.number() as u8), None, None],
+        shared: Arc::new([0.5, f64::MIN]),
+        nothing: (),
     }
 }
 
@@ -122,7 +124,7 @@ fn read<T: Recordable + Debug>(schema: &Schema, bytes: &[u8]) -> Option<T> {
 fn values_come_back() {
     let mut random = Random::new(1);
     for _ in 0..2_000 {
-        let value = random.value();
+        let value = value(&mut random);
         let bytes = to_bytes(&value);
         assert_eq!(read(&All::schema(), &bytes), Some(value));
         assert!(bytes.len() >= All::LEAST_BYTES);
@@ -139,15 +141,15 @@ fn hostile_bytes_are_refused_or_are_the_value_that_they_say() {
     let schema = All::schema();
     let (mut accepted, mut refused) = (0, 0);
     for _ in 0..20_000 {
-        let mut bytes = to_bytes(&random.value());
-        for _ in 0..=random.below(3) {
-            let place = random.below(bytes.len());
-            match random.below(5) {
+        let mut bytes = to_bytes(&value(&mut random));
+        for _ in 0..=random.index(3) {
+            let place = random.index(bytes.len());
+            match random.index(5) {
                 0 => bytes.truncate(place.max(1)),
-                1 => bytes.insert(place, random.next().to_le_bytes()[0]),
+                1 => bytes.insert(place, random.number().to_le_bytes()[0]),
                 2 => _ = bytes.remove(place),
-                3 => bytes[place] = [0, 1, 0x7f, 0xff][random.below(4)],
-                _ => bytes[place] ^= 1 << random.below(8),
+                3 => bytes[place] = random.one_of(&[0, 1, 0x7f, 0xff]),
+                _ => bytes[place] ^= 1 << random.index(8),
             }
             if bytes.is_empty() {
                 bytes.push(0);
@@ -167,9 +169,9 @@ fn hostile_schemas_are_refused_or_are_what_they_say() {
     let mut random = Random::new(3);
     for _ in 0..20_000 {
         let mut bytes = to_bytes(&All::schema());
-        for _ in 0..=random.below(3) {
-            let place = random.below(bytes.len());
-            bytes[place] = [0, 1, 31, 32, 33, 34, 35, 36, 0xff][random.below(9)];
+        for _ in 0..=random.index(3) {
+            let place = random.index(bytes.len());
+            bytes[place] = random.one_of(&[0, 1, 31, 32, 33, 34, 35, 36, 0xff]);
         }
         let Ok(schema) = Schema::from_bytes(&bytes) else {
             continue;
@@ -221,7 +223,7 @@ fn schemas_are_read_as_they_are_shown() {
 
 #[test]
 fn writing_into_a_buffer_allocates_nothing_and_tells_what_it_needs() {
-    let value = Random::new(4).value();
+    let value = value(&mut Random::new(4));
     let bytes = to_bytes(&value);
     let mut buffer = vec![0; bytes.len()];
     for room in 0..=bytes.len() {

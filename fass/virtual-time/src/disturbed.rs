@@ -5,9 +5,9 @@
 
 use std::time::Duration;
 
+use common::random::{nth, scale};
 use sched_dag::{Dag, Instance, Subtask, TaskSet};
 
-use crate::silent::{mix, share};
 use crate::{VirtualTime, nanoseconds};
 
 /// How late a timer's interrupt is.
@@ -90,8 +90,7 @@ impl VirtualTime {
 impl Late {
     /// Returns how late the interrupt is that is due then.
     pub(crate) fn of_interrupt_ns(self, due_ns: u64) -> u64 {
-        let drawn = mix(mix(self.seed) ^ due_ns);
-        share(drawn, self.most_ns.saturating_add(1))
+        scale(nth(nth(self.seed, 0) ^ due_ns, 0), 0..=self.most_ns)
     }
 }
 

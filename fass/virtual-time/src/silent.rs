@@ -1,5 +1,6 @@
 //! Calls whose functions do not say how long they take.
 
+use common::random::{nth, scale};
 use sched_dag::Instance;
 
 use crate::VirtualTime;
@@ -52,8 +53,8 @@ impl Silent {
             Self::Drawn { seed } => {
                 let Instance { dag, subtask, job } = instance;
                 let numbers = [dag.0.into(), subtask.0.into(), job].into_iter();
-                let drawn = numbers.fold(mix(seed), |drawn, n| mix(drawn ^ n));
-                (share(drawn, wcet_ns) + 1).min(wcet_ns)
+                let drawn = numbers.fold(nth(seed, 0), |drawn, n| nth(drawn ^ n, 0));
+                scale(drawn, wcet_ns.min(1)..=wcet_ns)
             }
         }
     }
@@ -69,19 +70,4 @@ impl VirtualTime {
     pub fn silent(self, silent: Silent) -> Self {
         self.set(|settings| settings.silent = silent)
     }
-}
-
-/// Returns a number below `end`, which is as far from 0 as `drawn` is among all numbers; 0 if
-/// there is none below.
-pub(crate) fn share(drawn: u64, end: u64) -> u64 {
-    // The upper half of a product is less than each factor.
-    u64::try_from((u128::from(drawn) * u128::from(end)) >> 64).unwrap_or(0)
-}
-
-/// The step of the generator SplitMix64 (Steele, Lea and Flood 2014).
-pub(crate) fn mix(state: u64) -> u64 {
-    let z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

@@ -3,12 +3,10 @@
 //!
 //! More or other sets: `CHAINS=100000 CHAIN_SEED=7 cargo test -p virtual-time --test chains`.
 
-#[path = "../../../sched-dag/tests/support/random.rs"]
-mod random;
 mod support;
 
+use common::random::Random;
 use fass::{ConstructionPolicy, Dag, EndToEnd, Latest, Policy, Sample, finish_create_dags_with};
-use random::Random;
 use support::{Seen, every, ms, taking, work};
 use virtual_time::{InstanceRecord, Report, VirtualTime};
 
@@ -17,10 +15,10 @@ type Origin = Option<u64>;
 
 /// Draws a WCET, and what takes up to it.
 fn times(random: &mut Random) -> (u64, impl FnMut() + Send + use<>) {
-    let wcet = random.between(1, 4);
-    let least = random.between(0, wcet);
-    let mut random = Random::new(random.next());
-    (wcet, move || work(random.between(least, wcet)))
+    let wcet = random.within(1..=4);
+    let least = random.within(0..=wcet);
+    let mut random = Random::new(random.number());
+    (wcet, move || work(random.within(least..=wcet)))
 }
 
 /// Draws a DAG, of which the first subtask samples, or begins the chain; the second one ends it.
@@ -30,9 +28,9 @@ fn draw(
     from: Option<&Latest<Origin>>,
     seen: &Seen<Origin>,
 ) -> (Dag, Latest<Origin>) {
-    let period = random.between(20, 60);
+    let period = random.within(20..=60);
     let dag = every(period, name);
-    dag.offset(ms(random.between(0, 30))).jobs(3000 / period);
+    dag.offset(ms(random.within(0..=30))).jobs(3000 / period);
     let (into, out_of) = (format!("into {name}"), format!("out of {name}"));
     let (wcet, mut enter) = times(random);
     let attributes = taking("enter", wcet);
@@ -66,8 +64,8 @@ fn draw(
 
 /// Runs three DAGs in a chain, and returns what its last subtask saw, too.
 fn run(random: &mut Random) -> (Report, EndToEnd, Vec<Origin>) {
-    let policy = [Policy::StaticPriority, Policy::Edf][random.below(2)];
-    let cores = [1, 2][random.below(2)];
+    let policy = random.one_of(&[Policy::StaticPriority, Policy::Edf]);
+    let cores = random.within(1..=2);
     let machine = VirtualTime::new().cores(cores).policy(policy);
     let (seen, ignored) = (Seen::default(), Seen::default());
     let (camera, out) = draw(random, "camera", None, &ignored);

@@ -4,40 +4,29 @@
 //!
 //! Each case has its seed; a failure prints it, and `case(SEED)` repeats it.
 
-#[path = "../../../sched-dag/tests/support/random.rs"]
-mod random;
 mod support;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
+use common::random::{Random, nth};
 use fass::{
     ConstructionPolicy, Dag, FaultLimit, Occupation, OverrunPolicy, Policy, Preemption, Raiser,
     Sample, Signal, Uses, create_dag, execute_for, finish_create_dags_with,
 };
-use random::Random;
 use recording::{Entry, Recording, Role, What};
 use support::{ms, named};
 use virtual_time::{PanicRecord, Report, VirtualTime};
 
 const CASES: u64 = 80;
 
-fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
-    choices[random.below(choices.len())]
-}
-
 fn micros(random: &mut Random, least: u64, most: u64) -> Duration {
-    Duration::from_micros(random.between(least, most))
-}
-
-/// Returns a number that follows from another one, and from each of its bits.
-fn mix(number: u64) -> u64 {
-    Random::new(number).next()
+    Duration::from_micros(random.within(least..=most))
 }
 
 /// Computes something of what a function got, which takes a time that follows from it.
 fn work(state: &mut u64, got: &[u64], longest_us: u64) -> u64 {
-    *state = got.iter().fold(*state, |state, part| mix(state ^ part));
+    *state = got.iter().fold(*state, |state, part| nth(state ^ part, 0));
     let time = Duration::from_micros(*state % longest_us);
     execute_for(time, Occupation::Hold);
     *state
@@ -45,7 +34,7 @@ fn work(state: &mut u64, got: &[u64], longest_us: u64) -> u64 {
 
 fn of_sample(sample: Option<Sample<'_, u64>>) -> u64 {
     sample.map_or(1, |sample| {
-        mix(*sample.value ^ sample.job) ^ sample.age_ns()
+        nth(*sample.value ^ sample.job, 0) ^ sample.age_ns()
     })
 }
 
@@ -61,7 +50,7 @@ fn build(seed: u64, salt: u64) -> Set {
         dags: Vec::new(),
         signals: Vec::new(),
     };
-    for number in 0..random.between(2, 4) {
+    for number in 0..random.within(2..=4) {
         let dag = create_dag();
         let policies = [
             OverrunPolicy::Queue,
@@ -69,11 +58,11 @@ fn build(seed: u64, salt: u64) -> Set {
             OverrunPolicy::Abort,
         ];
         dag.name(&format!("dag {number}")).relative_deadline(ms(3));
-        dag.overrun(pick(&mut random, &policies));
-        dag.in_flight(pick(&mut random, &[1, 2, 3]));
+        dag.overrun(random.one_of(&policies));
+        dag.in_flight(random.one_of(&[1, 2, 3]));
         let topic = format!("s{number}");
         dag.record::<u64>(&topic);
-        let (period, longest) = (micros(&mut random, 500, 2_000), random.between(1, 600));
+        let (period, longest) = (micros(&mut random, 500, 2_000), random.within(1..=600));
         if random.chance(33) {
             set.signals.push(dag.sporadic(period));
         } else {
@@ -86,9 +75,9 @@ fn build(seed: u64, salt: u64) -> Set {
     }
     for number in 0..set.dags.len() {
         let mut topics = vec![format!("s{number}")];
-        for of_dag in 0..random.between(1, 4) {
+        for of_dag in 0..random.within(1..=4) {
             let output = format!("m{number} {of_dag}");
-            let inputs = [0; 2].map(|_| &*topics[random.below(topics.len())]);
+            let inputs = [0; 2].map(|_| &*topics[random.index(topics.len())]);
             register(&set, number, inputs, &output, &mut random);
             topics.push(output);
         }
@@ -103,14 +92,14 @@ fn build(seed: u64, salt: u64) -> Set {
 fn register(set: &Set, number: usize, inputs: [&str; 2], output: &str, random: &mut Random) {
     let (dag, names) = (&set.dags[number], [inputs[0], output]);
     dag.record::<u64>(output);
-    let (longest, first) = (random.between(1, 800), random.next());
+    let (longest, first) = (random.within(1..=800), random.number());
     let state = dag.state(output, first);
-    state.record_every(pick(random, &[1, 2, 5]));
+    state.record_every(random.one_of(&[1, 2, 5]));
     state.reset_to(move || first);
     let state = state.update();
     let other = (number + 1) % set.dags.len();
     let latest = || set.dags[other].latest::<u64>(&format!("s{other}"));
-    match random.below(8) {
+    match random.index(8) {
         0 | 1 => using(
             dag,
             (latest().sample(), state),
@@ -132,7 +121,7 @@ fn register(set: &Set, number: usize, inputs: [&str; 2], output: &str, random: &
             },
         ),
         3 if !set.signals.is_empty() => {
-            let raising = set.signals[random.below(set.signals.len())].raising();
+            let raising = set.signals[random.index(set.signals.len())].raising();
             using(dag, (raising, state), names, move |used, value| {
                 let (mut raiser, state): (Raiser<'_>, _) = used;
                 if value.is_multiple_of(2) {
@@ -222,13 +211,13 @@ fn case(seed: u64) -> [usize; 6] {
     let set = build(seed, 1);
     let preemptions = [Preemption::Enabled, Preemption::Disabled];
     let machine = VirtualTime::new()
-        .cores(pick(&mut random, &[1, 2, 3]))
-        .preemption(pick(&mut random, &preemptions))
+        .cores(random.one_of(&[1, 2, 3]))
+        .preemption(random.one_of(&preemptions))
         .late(Duration::from_micros(seed % 3 * 50), seed)
         .contain_panics();
     let mut raises = Vec::new();
     for signal in 0..set.signals.len() {
-        let times = (0..random.below(25)).map(|_| (signal, micros(&mut random, 0, 30_000)));
+        let times = (0..random.index(25)).map(|_| (signal, micros(&mut random, 0, 30_000)));
         raises.extend(times);
     }
     let (report, said) = run(&machine, &set, &raises);
@@ -253,7 +242,7 @@ fn case(seed: u64) -> [usize; 6] {
             assert!(repeated == said);
         }
         // One that begins later computes the same from there on.
-        let (dag, job) = (random.below(set.dags.len()), random.between(0, 19));
+        let (dag, job) = (random.index(set.dags.len()), random.within(0..=19));
         let machine = VirtualTime::new().cores(cores).contain_panics();
         let machine = machine.replay(&recording).expect("whole");
         let set = build(seed, 3);

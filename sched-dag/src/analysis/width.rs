@@ -230,6 +230,7 @@ fn first_common(one: &[u64], other: &[u64]) -> Option<usize> {
 mod tests {
     use super::{parallelism, width};
     use crate::analysis::{SUBTASK_LIMIT, Task};
+    use common::random::Random;
 
     fn task(count: usize, edges: &[(usize, usize)]) -> Task {
         Task::new(1000, 1000, vec![1; count], edges).unwrap()
@@ -237,23 +238,10 @@ mod tests {
 
     #[test]
     fn agrees_with_all_subsets_of_small_graphs() {
-        let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut random = Random::new(1);
         for _ in 0..300 {
-            let mut next = |bound: u64| {
-                seed ^= seed << 13;
-                seed ^= seed >> 7;
-                seed ^= seed << 17;
-                seed % bound
-            };
-            let count = usize::try_from(next(11)).unwrap();
-            let mut edges = Vec::new();
-            for to in 0..count {
-                for from in 0..to {
-                    if next(4) == 0 {
-                        edges.push((from, to));
-                    }
-                }
-            }
+            let count = random.index(11);
+            let edges: Vec<_> = random.edges(count, 25).collect();
             let mut reach = vec![vec![false; count]; count];
             for from in (0..count).rev() {
                 for &(_, to) in edges.iter().filter(|edge| edge.0 == from) {

@@ -124,7 +124,7 @@ fn unsound(text: &str, lines: &[String]) -> Option<String> {
 /// Returns the DAGs that a witness states, and on what they run; if verification takes them.
 fn stated(text: &str) -> Option<(TaskSet, Settings)> {
     let mut dags: Vec<DagSpec> = Vec::new();
-    let mut machine = (0, Policy::Edf, 0);
+    let (mut machine, mut ready_ns) = ((0, Policy::Edf, 0), 0);
     for line in text.lines().take_while(|line| !line.starts_with("hash ")) {
         let words: Vec<&str> = line.split(' ').collect();
         let number = |at: usize| words[at].parse::<u64>().expect("a number");
@@ -135,6 +135,7 @@ fn stated(text: &str) -> Option<(TaskSet, Settings)> {
                 machine = (small(1), Policy::StaticPriority, number(3));
             }
             ("machine", _) => machine = (small(1), Policy::Edf, number(3)),
+            ("bursts", _) => ready_ns = number(1),
             ("dag", _) => dags.push(DagSpec {
                 in_flight: Some(small(4)),
                 ..spec(number(2), number(3), &[], &[], 0)
@@ -163,6 +164,6 @@ fn stated(text: &str) -> Option<(TaskSet, Settings)> {
     // Only a shared state makes a sink precede another subtask.
     let task_set = sample.task_set()?;
     let mut settings = sample.settings();
-    settings.overheads.dispatch_ns = dispatch_ns;
+    (settings.overheads.dispatch_ns, settings.overheads.ready_ns) = (dispatch_ns, ready_ns);
     Some((task_set, settings))
 }

@@ -3,6 +3,8 @@
 //! [`kinds`] holds bounds of random sets of every kind against virtual time. The other tests
 //! are worked examples, and the counterexamples to forms that look like bounds and are not.
 
+#[path = "../../../scripts/tool/src/random.rs"]
+mod drawn;
 mod forged;
 mod kinds;
 mod one_core;
@@ -13,6 +15,7 @@ mod support;
 mod witnesses;
 mod worked;
 
+use common::random::Random;
 use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer, fix_orders};
 use sched_dag::{
     ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, DagSpec, Order, Policy,
@@ -20,7 +23,7 @@ use sched_dag::{
 };
 
 use kinds::breach;
-use random::{Random, sample};
+use random::sample;
 use simulate::{commit, responses, spec};
 
 const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
@@ -43,10 +46,10 @@ fn no_bound_rests_on_a_wcet_of_zero() {
     for seed in 1..3_000 {
         let mut random = Random::new(seed);
         let mut sample = sample(&mut random);
-        let dag = usize::try_from(random.within(0, sample.specs.len() as u64 - 1)).unwrap();
+        let dag = random.index(sample.specs.len());
         let subtasks = &mut sample.specs[dag].subtasks;
-        let subtask = random.within(0, subtasks.len() as u64 - 1);
-        subtasks[usize::try_from(subtask).unwrap()].wcet_ns = Some(0);
+        let subtask = random.index(subtasks.len());
+        subtasks[subtask].wcet_ns = Some(0);
         let Some(task_set) = sample.task_set() else {
             continue;
         };

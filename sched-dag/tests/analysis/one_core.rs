@@ -1,9 +1,9 @@
 //! The tests of one core are exact: in virtual time their worst case comes.
 
+use common::random::Random;
 use sched_dag::analysis::{Answer, Test, answer};
 use sched_dag::{DagSpec, Policy, Preemption, TaskSet};
 
-use crate::random::Random;
 use crate::simulate::{commit, responses, spec};
 use crate::{FP, settings};
 
@@ -11,17 +11,17 @@ use crate::{FP, settings};
 /// overload in the long run; answers, and observes the longest responses.
 fn one_set(random: &mut Random, policy: Policy) -> (TaskSet, Answer, Vec<u64>) {
     const PERIODS: [u64; 10] = [4, 5, 6, 8, 10, 12, 20, 30, 60, 120];
-    let count = u32::try_from(random.within(2, 5)).expect("small");
-    let (mut most, mut left) = (random.within(2, 8), 120);
+    let count = random.within(2..=5);
+    let (mut most, mut left) = (random.within(2..=8), 120);
     let specs: Vec<DagSpec> = (0..count)
         .filter_map(|priority| {
-            let period = PERIODS[usize::try_from(random.within(0, 9)).expect("an index")];
+            let period = random.one_of(&PERIODS);
             most += period / 10;
             most = most.min(period * left / 120);
-            let wcet = (most > 0).then(|| random.within(1, most))?;
+            let wcet = (most > 0).then(|| random.within(1..=most))?;
             left -= wcet * 120 / period;
-            let latest = period * random.within(1, 3);
-            let deadline = random.within(wcet, latest);
+            let latest = period * random.within(1..=3);
+            let deadline = random.within(wcet..=latest);
             Some(spec(period, deadline, &[wcet], &[], priority))
         })
         .collect();

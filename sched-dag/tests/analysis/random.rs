@@ -1,35 +1,13 @@
-//! Random task sets from a seed, without any other crate.
+//! Random task sets from a seed.
 
+use common::random::Random;
 use sched_dag::analysis::{Overheads, Settings};
 use sched_dag::{
-    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, Order, Policy, Preemption,
-    Priority, TaskSet, verify,
+    Activation, ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, Order, Policy,
+    Preemption, TaskSet, verify,
 };
 
-use crate::simulate::spec;
-
-/// A small generator (xorshift64*): the same seed gives the same sets everywhere.
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        // Mixed, so that neighbouring seeds differ at once; never 0.
-        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x6a09_e667_f3bc_c909 | 1)
-    }
-
-    /// Returns a number of `least..=most`.
-    pub(crate) fn within(&mut self, least: u64, most: u64) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        let mixed = self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 16;
-        least + mixed % (most - least + 1)
-    }
-
-    fn index(&mut self, below: usize) -> usize {
-        usize::try_from(self.within(0, below as u64 - 1)).expect("fits: it is below an index")
-    }
-}
+use crate::drawn::set;
 
 /// A task set with the platform it runs on.
 #[derive(Debug)]
@@ -94,50 +72,34 @@ pub(crate) fn sample(random: &mut Random) -> Sample {
     sample_of(kind, random)
 }
 
-/// Draws a task set: up to 4 DAGs of up to 8 subtasks, from light to full load,
-/// deadlines below, at and beyond the period, priorities by DAG or by subtask.
+/// Draws a task set for up to 5 cores.
 pub(crate) fn sample_of(kind: Kind, random: &mut Random) -> Sample {
-    let cores = random.within(1 + u64::from(kind.is_divided), 5);
-    let count = random.within(1 + u64::from(kind.is_divided), 4);
-    let pipelined = random.within(0, 2) == 0;
-    let by_subtask = random.within(0, 3) == 0;
-    let load = random.within(1, 8);
-    let first = random.within(1, (cores - 1).max(1));
-    let cores_of = |dag: u64| match (kind.is_divided, dag % 2) {
-        (false, _) => cores,
-        (true, 0) => first,
-        (true, _) => cores - first,
+    let cores = random.within(1 + u32::from(kind.is_divided)..=5);
+    let first = random.within(1..=(cores - 1).max(1));
+    let sizes = match kind.is_divided {
+        true => vec![first, cores - first],
+        false => vec![cores],
     };
-    let mut specs = Vec::new();
-    for dag in 0..count {
-        let own = cores_of(dag);
-        specs.push(draw_dag(random, own, count * load, pipelined));
-        let spec = specs.last_mut().expect("just pushed");
-        spec.name = format!("{dag} of {count}");
-        let levels = random.within(1, 6);
+    let mut specs = set(random, 1, &sizes);
+    for (spec, number) in specs.iter_mut().zip(0..) {
         for (position, subtask) in spec.subtasks.iter_mut().enumerate() {
-            let number = if by_subtask {
-                random.within(0, levels)
-            } else {
-                dag
-            };
-            subtask.priority = u32::try_from(number).ok().map(Priority);
-            let first = dag == 0 && position == 0;
-            subtask.non_preemptive = kind.keeps.is_none() && (first || random.within(0, 1) == 0);
+            let first = number == 0 && position == 0;
+            subtask.non_preemptive = kind.keeps.is_none() && (first || random.once_in(2));
         }
-        if kind.has_sinks && (dag == 0 || random.within(0, 2) == 0) {
+        if kind.has_sinks && (number == 0 || random.once_in(3)) {
             draw_sinks(random, spec);
         }
-        if kind.is_fixed && (dag == 0 || random.within(0, 2) == 0) {
+        if kind.is_fixed && (number == 0 || random.once_in(3)) {
             spec.order = Order::Fixed;
         }
-        if random.within(0, 9) == 0 {
-            spec.in_flight = u32::try_from(random.within(1, 2)).ok();
+        if random.once_in(8) {
+            spec.activation = Activation::Sporadic;
         }
-        let cluster = u32::try_from(dag % 2).expect("0 or 1");
-        spec.cluster = kind.is_divided.then_some(ClusterId(cluster));
+        if random.once_in(10) {
+            spec.in_flight = Some(random.within(1..=2));
+        }
+        spec.cluster = kind.is_divided.then_some(ClusterId(number % 2));
     }
-    let sizes = [first, cores - first].map(|size| u32::try_from(size).expect("at most 5"));
     Sample {
         specs,
         policy: [Policy::StaticPriority, Policy::Edf][usize::from(kind.is_edf)],
@@ -145,44 +107,12 @@ pub(crate) fn sample_of(kind: Kind, random: &mut Random) -> Sample {
             Some(true) => Preemption::Disabled,
             _ => Preemption::Enabled,
         },
-        cores: u32::try_from(cores).expect("at most 5"),
+        cores,
         clusters: match kind.is_divided {
-            true => Clusters::Of(sizes.to_vec()),
+            true => Clusters::Of(sizes),
             false => Clusters::Undivided,
         },
     }
-}
-
-fn draw_dag(random: &mut Random, cores: u64, share: u64, pipelined: bool) -> DagSpec {
-    let subtasks = usize::try_from(random.within(1, 8)).expect("at most 8");
-    // Some DAGs have longer subtasks, which others may have to wait for.
-    let scale = [1, 1, 6][random.index(3)];
-    let wcets: Vec<u64> = (0..subtasks).map(|_| scale * random.within(1, 9)).collect();
-    let density = random.within(1, 6);
-    let mut edges = Vec::new();
-    for to in 1..subtasks {
-        for from in 0..to {
-            if random.within(0, density) == 0 {
-                edges.push((from, to));
-            }
-        }
-    }
-    let volume: u64 = wcets.iter().sum();
-    let longest = wcets.iter().max().copied().unwrap_or(1);
-    let period = (volume * share).div_ceil(cores * 4) + random.within(0, 10);
-    let (period, deadline) = if pipelined {
-        let period = period.max(longest);
-        (
-            period,
-            period * random.within(1, 4) + random.within(0, period),
-        )
-    } else {
-        let period = period.max(volume / cores + longest);
-        (period, period - random.within(0, period / 4))
-    };
-    let mut spec = spec(period, deadline, &wcets, &edges, 0);
-    spec.offset_ns = random.within(0, 2) * random.within(0, period);
-    spec
 }
 
 /// Gives most sinks a deadline of their own.
@@ -191,8 +121,8 @@ fn draw_sinks(random: &mut Random, spec: &mut DagSpec) {
     let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
     let least = wcets.max().unwrap_or(1).min(deadline).max(deadline / 4);
     for (position, subtask) in spec.subtasks.iter_mut().enumerate() {
-        if spec.edges.iter().all(|&(from, _)| from != position) && random.within(0, 2) > 0 {
-            subtask.relative_deadline_ns = Some(random.within(least, deadline));
+        if spec.edges.iter().all(|&(from, _)| from != position) && !random.once_in(3) {
+            subtask.relative_deadline_ns = Some(random.within(least..=deadline));
         }
     }
 }

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use sched_dag::law::Record;
-use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
+use sched_dag::virtual_time::{End, VirtualTime};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, Preemption, Priority,
     SchedulerOptions, SubtaskSpec, TaskSet, verify,
 };
+
+use crate::support::{Script, Takes};
 
 /// Returns the spec of a DAG whose subtasks all have one priority.
 pub(crate) fn spec(
@@ -57,21 +59,16 @@ pub(crate) fn responses(
     until_ns: u64,
     execution_ns: impl FnMut(Instance) -> u64,
 ) -> Vec<u64> {
-    observe(
-        task_set,
-        (policy, preemption, cores),
-        until_ns,
-        execution_ns,
-    )
-    .dags
+    let script = Script::new(execution_ns);
+    observe(task_set, (policy, preemption, cores), until_ns, script).dags
 }
 
-/// Does as [`responses`], and watches subtasks, too.
+/// Does as [`responses`], by a script, and watches subtasks, too.
 pub(crate) fn observe(
     task_set: &TaskSet,
     (policy, preemption, cores): (Policy, Preemption, u32),
     until_ns: u64,
-    execution_ns: impl FnMut(Instance) -> u64,
+    mut script: Script<'_, impl Takes>,
 ) -> Observed {
     let options = SchedulerOptions {
         policy,
@@ -80,7 +77,7 @@ pub(crate) fn observe(
     };
     let driver = VirtualTime::new(&Arc::new(task_set.clone()), options);
     let mut driver = driver.recording();
-    let end = driver.run_until(until_ns, &mut ExecutionTimes(execution_ns));
+    let end = driver.run_until(until_ns, &mut script);
     assert!(!matches!(end, End::TimeOverflow(_)), "{end:?}");
     let events = driver.events().into_iter();
     let record = Record::of_events(task_set, true, events).expect("it fits");

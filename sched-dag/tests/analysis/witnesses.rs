@@ -5,12 +5,13 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use common::random::Random;
 use sched_dag::analysis::{Answer, DagBound, answer, witness};
 use sched_dag::{ClusterId, Clusters, Policy, Preemption, TaskSet};
 
 use crate::forged;
 use crate::kinds::tighter;
-use crate::random::{Random, Sample, sample};
+use crate::random::{Sample, sample};
 use crate::simulate::spec;
 use crate::support::number;
 
@@ -49,7 +50,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
             continue;
         };
         let mut settings = sample.settings();
-        settings.overheads.dispatch_ns = random.within(0, 2.min(seed));
+        settings.overheads.dispatch_ns = random.within(0..=2.min(seed));
         settings.overheads.ready_ns = u64::from(seed % 4 == 2);
         let path = folder.join(seed.to_string());
         fs::write(&path, witness(&task_set, &settings)).unwrap();

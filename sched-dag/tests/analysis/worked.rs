@@ -4,9 +4,10 @@ use sched_dag::analysis::{
     Clip, Reason, Refusal, Task, answer, covers, intra_task, multi_path, multi_path_edf,
     multi_path_fp, width,
 };
-use sched_dag::{DagSpec, Policy, Preemption, Priority};
+use sched_dag::{DagSpec, Instance, Policy, Preemption, Priority};
 
 use crate::simulate::{commit, observe, responses, spec};
+use crate::support::Script;
 use crate::{DIAMOND, FP, settings};
 
 const NON_PREEMPTIVE_EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Disabled);
@@ -181,8 +182,7 @@ fn a_sink_waits_for_what_is_due_later_and_keeps_its_core() {
     );
     let (policy, preemption) = NON_PREEMPTIVE_EDF;
     let task_set = commit(&specs, policy, 1);
-    let observed = observe(&task_set, (policy, preemption, 1), 1000, |instance| {
-        if instance.dag.0 == 0 { 1 } else { 50 }
-    });
+    let script = Script::new(|instance: Instance| [1, 50, 50][instance.dag.index()]);
+    let observed = observe(&task_set, (policy, preemption, 1), 1000, script);
     assert_eq!(observed.subtasks[0], [50, 51]);
 }

@@ -14,14 +14,13 @@ mod set;
 mod support;
 mod walk;
 
+use common::random::Random;
 use releases::SAID;
 use sched_dag::journal::What;
 use sched_dag::law::{Terms, dispatch_violations, violations};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Instance};
 use set::Set;
-pub(crate) use support::random;
-use support::random::Random;
 use support::{Script, driver, number};
 use walk::{Step, Walk};
 
@@ -49,8 +48,8 @@ fn walk(set: &Set, random: &mut Random, is_late: bool, told: &mut [u64]) -> Resu
     let mut way = Vec::new();
     for number in 0..400 {
         let next_ns = walk.scheduler.next_event_ns();
-        let later_ns = walk.now_ns + random.between(1, 8);
-        let now_ns = match (random.between(0, 5), next_ns) {
+        let later_ns = walk.now_ns + random.within(1..=8);
+        let now_ns = match (random.within(0..=5), next_ns) {
             (0, _) => walk.now_ns,
             (1..4, Some(next_ns)) => next_ns,
             (_, Some(next_ns)) if !is_late => later_ns.min(next_ns),
@@ -80,17 +79,17 @@ fn steps(walk: &Walk<'_>, random: &mut Random, is_late: bool, is_calm: bool) -> 
         true => walk.started(),
         false => walk.running().collect(),
     };
-    let dag = DagId(u32::try_from(random.below(walk.set.specs.len())).expect("few DAGs"));
+    let dag = DagId(u32::try_from(random.index(walk.set.specs.len())).expect("few DAGs"));
     let faults = if walk.set.choices.is_multiple_of(2) {
         2
     } else {
         30
     };
     let mut steps = Vec::new();
-    for _ in 0..random.between(0, 2) {
-        let kind = random.between(0, if is_calm { 69 } else { 99 });
+    for _ in 0..random.within(0..=2) {
+        let kind = random.within(0..=if is_calm { 69 } else { 99 });
         if kind < 70 && !may_end.is_empty() {
-            let instance = may_end.swap_remove(random.below(may_end.len()));
+            let instance = may_end.swap_remove(random.index(may_end.len()));
             let fails = !is_calm && random.chance(faults);
             steps.push(match (fails, random.chance(80)) {
                 (false, _) => Step::Complete(instance),
@@ -149,7 +148,7 @@ fn virtual_time_keeps_the_rules_where_instances_fail() {
         let mut signals: Vec<(u64, Request)> = Vec::new();
         let dags = (0..).map(DagId).take(set.specs.len());
         for dag in dags.filter(|&dag| set.is_sporadic(dag)) {
-            let times_ns = (0..random.between(0, 10)).map(|_| random.between(0, 60));
+            let times_ns = (0..random.within(0..=10)).map(|_| random.within(0..=60));
             signals.extend(times_ns.map(|at_ns| (at_ns, Request::Signal(dag))));
         }
         signals.sort_by_key(|&(at_ns, _)| at_ns);

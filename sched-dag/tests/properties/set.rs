@@ -1,11 +1,12 @@
 //! Random sets of DAGs: all that a run depends on comes from one seed.
 
+use common::random::Random;
 use sched_dag::{
     Activation, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
     Priority, SchedulerOptions, SubtaskSpec,
 };
 
-use crate::random::Random;
+use crate::support::shuffled_edges;
 
 /// One set with all that a run depends on.
 #[derive(Clone, Debug)]
@@ -29,10 +30,10 @@ pub(crate) enum Overruns {
 
 /// The most that a set has of everything.
 struct Limits {
-    cores: u64,
+    cores: u32,
     dags: u64,
     subtasks: u64,
-    jobs: u64,
+    jobs: u32,
     period_ns: u64,
     deadline_ns: u64,
     offset_ns: u64,
@@ -97,47 +98,47 @@ fn with_sporadic(mut set: Set, random: &mut Random) -> Set {
 }
 
 fn draw_within(random: &mut Random, limits: &Limits, overruns: Overruns) -> Set {
-    let policies = [Policy::Edf, Policy::StaticPriority];
     let options = SchedulerOptions {
-        policy: policies[random.below(2)],
+        policy: random.one_of(&[Policy::Edf, Policy::StaticPriority]),
         preemption: match random.chance(75) {
             true => Preemption::Enabled,
             false => Preemption::Disabled,
         },
-        cores: small(random.between(1, limits.cores)),
+        cores: random.within(1..=limits.cores),
     };
-    let dags = 0..random.between(1, limits.dags);
+    let dags = 0..random.within(1..=limits.dags);
     let specs = dags.map(|_| draw_dag(random, limits, overruns));
     Set {
         options,
         specs: specs.collect(),
-        choices: random.next(),
+        choices: random.number(),
         has_instances_of_no_length: false,
     }
 }
 
 fn draw_dag(random: &mut Random, limits: &Limits, overruns: Overruns) -> DagSpec {
-    let jobs = random.between(1, limits.jobs);
-    let priorities = random.between(0, 6);
+    let jobs = random.within(1..=limits.jobs);
+    let priorities = random.within(0..=6);
     let often_non_preemptive = if random.chance(30) { 40 } else { 0 };
-    let subtasks = 0..random.between(1, limits.subtasks);
+    let subtasks = 0..random.within(1..=limits.subtasks);
     let subtasks = subtasks.map(|_| SubtaskSpec {
-        priority: Some(Priority(small(random.between(0, priorities)))),
+        priority: Some(Priority(random.within(0..=priorities))),
         non_preemptive: random.chance(often_non_preemptive),
         ..SubtaskSpec::default()
     });
     let mut subtasks: Vec<SubtaskSpec> = subtasks.collect();
-    let period_ns = random.between(1, limits.period_ns);
+    let period_ns = random.within(1..=limits.period_ns);
     let deadline_ns = match random.chance(40) {
         true => period_ns,
-        false => random.between(1, limits.deadline_ns),
+        false => random.within(1..=limits.deadline_ns),
     };
-    let edges = draw_edges(random, subtasks.len());
+    let percent = random.within(5..=70);
+    let edges = shuffled_edges(random, subtasks.len(), percent);
     let has_own_deadlines = random.chance(50);
     for (number, subtask) in subtasks.iter_mut().enumerate() {
         let is_sink = edges.iter().all(|&(from, _)| from != number);
         let is_own = is_sink && has_own_deadlines && random.chance(70);
-        subtask.relative_deadline_ns = is_own.then(|| random.between(1, deadline_ns));
+        subtask.relative_deadline_ns = is_own.then(|| random.within(1..=deadline_ns));
     }
     let policies = [
         OverrunPolicy::Queue,
@@ -146,51 +147,25 @@ fn draw_dag(random: &mut Random, limits: &Limits, overruns: Overruns) -> DagSpec
     ];
     let (in_flight, overrun) = match overruns {
         Overruns::Never => (jobs, OverrunPolicy::Queue),
-        Overruns::Often => (random.between(1, jobs.min(3)), policies[random.below(3)]),
+        Overruns::Often => (random.within(1..=jobs.min(3)), random.one_of(&policies)),
     };
     let limit = FaultLimit {
-        faults: small(random.between(1, 3)),
-        window: random.between(1, 4),
-        in_all: small(random.between(1, 5)),
+        faults: random.within(1..=3),
+        window: random.within(1..=4),
+        in_all: random.within(1..=5),
     };
     DagSpec {
         period_ns: Some(period_ns),
         relative_deadline_ns: Some(deadline_ns),
-        offset_ns: random.between(0, limits.offset_ns) * random.between(0, 1),
-        jobs: Some(jobs),
-        in_flight: Some(small(in_flight)),
+        offset_ns: random.within(0..=limits.offset_ns) * random.within(0..=1),
+        jobs: Some(jobs.into()),
+        in_flight: Some(in_flight),
         overrun,
-        on_fault: match random.chance(50) {
-            true => OnFault::DropJob(limit),
-            false => OnFault::EndDag,
-        },
+        on_fault: random.one_of(&[OnFault::DropJob(limit), OnFault::EndDag]),
         subtasks,
         edges,
         ..DagSpec::default()
     }
-}
-
-/// Draws edges along a random order, so that indices are not sorted by
-/// precedence; transitive and repeated edges occur.
-fn draw_edges(random: &mut Random, count: usize) -> Vec<(usize, usize)> {
-    let mut order: Vec<usize> = (0..count).collect();
-    for position in (1..count).rev() {
-        order.swap(position, random.below(position + 1));
-    }
-    let density = random.between(5, 70);
-    let mut edges = Vec::new();
-    for later in 1..count {
-        for earlier in 0..later {
-            if random.chance(density) {
-                edges.push((order[earlier], order[later]));
-            }
-        }
-    }
-    edges
-}
-
-fn small(number: u64) -> u32 {
-    u32::try_from(number).expect("it is small")
 }
 
 impl Set {
@@ -206,9 +181,9 @@ impl Set {
     /// Returns how long an instance executes: at most 8, or less where its DAG is a short one.
     pub(crate) fn execution_ns(&self, instance: Instance) -> u64 {
         let of_dag = self.choices ^ u64::from(instance.dag.0);
-        let longest_ns = Random::new(of_dag).between(1, 8);
+        let longest_ns = Random::new(of_dag).within(1..=8);
         let mut random = self.of(instance);
-        let execution_ns = random.between(1, longest_ns);
+        let execution_ns = random.within(1..=longest_ns);
         match self.has_instances_of_no_length && random.chance(10) {
             true => 0,
             false => execution_ns,
@@ -218,7 +193,7 @@ impl Set {
     /// Reports whether an instance fails, which one of 50 does.
     pub(crate) fn fails(&self, instance: Instance) -> bool {
         let mut random = self.of(instance);
-        random.next();
+        random.number();
         random.chance(2)
     }
 

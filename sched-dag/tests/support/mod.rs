@@ -9,12 +9,12 @@
 #![allow(dead_code, reason = "each test uses a part of this")]
 
 pub(crate) mod hand;
-pub(crate) mod random;
 pub(crate) mod script;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use common::random::Random;
 use sched_dag::journal::{Event, What};
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
@@ -70,6 +70,21 @@ pub(crate) fn dag(
         edges: edges.to_vec(),
         ..DagSpec::default()
     }
+}
+
+/// Draws `percent` of 100 edges along a random order, so that indices are not sorted by
+/// precedence; transitive ones occur.
+pub(crate) fn shuffled_edges(
+    random: &mut Random,
+    count: usize,
+    percent: u64,
+) -> Vec<(usize, usize)> {
+    let mut order: Vec<usize> = (0..count).collect();
+    for position in (1..count).rev() {
+        order.swap(position, random.index(position + 1));
+    }
+    let edges = random.edges(count, percent);
+    edges.map(|(from, to)| (order[from], order[to])).collect()
 }
 
 /// A DAG with something else.

@@ -1,11 +1,8 @@
 //! Tests of the cells, on real threads. They also serve under Miri, where the
 //! counts shrink so that a run ends.
 
-#[path = "../../../../sched-dag/tests/support/random.rs"]
-mod random;
-
 use super::{SetOnce, Shared, ring};
-use random::Random;
+use common::random::Random;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -41,14 +38,14 @@ impl Drop for Counted {
 fn a_ring_is_a_small_map_from_jobs_to_values() {
     for seed in 0..if cfg!(miri) { 8 } else { 1_000 } {
         let (mut random, alive) = (Random::new(seed), Arc::new(AtomicUsize::new(0)));
-        let (slots, room) = [(1, 1), (2, 2), (3, 3), (4, 5)][random.below(4)];
+        let (slots, room) = [(1, 1), (2, 2), (3, 3), (4, 5)][random.index(4)];
         let (mut writer, mut reader) = ring(slots);
         let mut held = BTreeSet::new();
         for _ in 0..60 {
             // Some are as far apart as they can be, and equal in the numbers of slots.
-            let job = [0, u64::MAX - 7][random.below(2)] + random.between(0, 7);
+            let job = [0, u64::MAX - 7][random.index(2)] + random.within(0..=7);
             let before = alive.load(Ordering::Relaxed);
-            match random.below(4) {
+            match random.index(4) {
                 0 | 1 if !held.contains(&job) => {
                     let put = writer.put(job, Counted::new(&alive, job));
                     assert_eq!(put.is_ok(), held.len() < room, "seed {seed}");

@@ -115,8 +115,8 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::{Format, name_of, parse, rd_gen, stg};
-    use crate::random::Random;
     use crate::system::workspace;
+    use common::random::Random;
     use dag_file::{DagFile, Malformed, is_name};
     use std::path::Path;
 
@@ -140,10 +140,7 @@ mod tests {
     /// Changes, drops or repeats a part of a text, differently for each number.
     fn damaged(text: &str, number: u64) -> String {
         let mut random = Random::new(number);
-        let mut below = |most: usize| {
-            let drawn = random.within(0, most as u64 - 1);
-            usize::try_from(drawn).expect("less than that")
-        };
+        let mut below = |most: usize| random.index(most);
         let from = below(text.len());
         let to = (from + below(12)).min(text.len());
         let (before, part, rest) = (&text[..from], &text[from..to], &text[to..]);

@@ -1,5 +1,6 @@
 //! Records that are right, wrong, cut, and altered.
 
+use common::random::Random;
 use recording::{Chunk, Commit, Recordable, Recording, Stream, Times, Writer};
 
 use super::Record;
@@ -88,23 +89,17 @@ fn events_that_are_missing_are_counted_and_a_run_that_died_is_not_complete() {
 /// record.
 #[test]
 fn of_10_000_altered_records_none_is_more_than_a_line() {
-    let (bytes, mut random, mut refused) = (good(), 1_u64, 0);
+    let (bytes, mut random, mut refused) = (good(), Random::new(1), 0);
     let recording = Recording::read(&bytes).unwrap();
     let chunks: Vec<Chunk<'_>> = recording.chunks().collect();
     for _ in 0..10_000 {
         let mut altered: Stream<Vec<u8>> = Stream::begin(Vec::new());
-        let mut draw = |below: u64| {
-            random = random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (random >> 33) % below
-        };
         for chunk in &chunks {
             match chunk {
                 Chunk::Commit(commit) => {
                     let mut bytes = recording::to_bytes(commit);
-                    let place = usize::try_from(draw(bytes.len() as u64)).unwrap();
-                    bytes[place] ^= 1 << draw(8);
+                    let place = random.index(bytes.len());
+                    bytes[place] ^= 1 << random.index(8);
                     match Commit::from_bytes(&bytes) {
                         Ok(commit) => altered.commit(&commit),
                         Err(malformed) => {
@@ -115,9 +110,9 @@ fn of_10_000_altered_records_none_is_more_than_a_line() {
                 }
                 Chunk::Events(events) => {
                     let mut words: Vec<_> = events.words().collect();
-                    let place = usize::try_from(draw(words.len() as u64)).unwrap();
-                    words[place][usize::try_from(draw(3)).unwrap()] ^= 1 << draw(64);
-                    altered.events(0, draw(2) * draw(2), &words);
+                    let place = random.index(words.len());
+                    words[place][random.index(3)] ^= 1 << random.index(64);
+                    altered.events(0, random.within(0..=1) * random.within(0..=1), &words);
                 }
                 Chunk::Times(times) => altered.times(times),
                 _ => {}

@@ -194,11 +194,11 @@ impl Values<'_, '_> {
 
 #[cfg(test)]
 mod tests {
+    use common::random::Random;
     use recording::{Recordable, Schema, to_bytes};
 
     use super::{of_message, write_message};
     use crate::json::{Value, parse};
-    use crate::random::Random;
 
     /// Returns all types that are made of one another this deep.
     fn types(depth: u32) -> Vec<String> {
@@ -211,7 +211,7 @@ mod tests {
     }
 
     fn draw_value(random: &mut Random, schema: &Schema, bytes: &mut Vec<u8>) {
-        let choice = u16::try_from(random.within(0, 4)).expect("it is small");
+        let choice = random.within(0..=4_u16);
         let number = usize::from(choice);
         let mut draw = |schema| draw_value(random, schema, bytes);
         match schema {

@@ -3,10 +3,9 @@
 //! Each is told where it can be. What would not break a rule, such as moving an event within an
 //! instant, is never told.
 
+use common::random::Random;
 use sched_dag::journal::{Event, What};
 use tool::record::Run;
-
-use crate::random::Random;
 
 /// A lie: its name, of what and of which events it can be told, and how it changes the one at a
 /// place.
@@ -45,7 +44,7 @@ pub(crate) fn tell((_, what, can_be, change): Lie, run: &mut Run, random: &mut R
     if places.is_empty() {
         return false;
     }
-    change(run, places[random.below(places.len())], random);
+    change(run, places[random.index(places.len())], random);
     // The order of a log.
     run.events.sort_by_key(|event| event.time_ns);
     true
@@ -134,7 +133,7 @@ fn miss(run: &mut Run, place: usize, _: &mut Random) {
 fn early(run: &mut Run, place: usize, random: &mut Random) {
     let event = &mut run.events[place];
     let nominal_ns = run.task_set.dag(event.dag).grid_ns(event.job);
-    event.time_ns = random.between(0, nominal_ns - 1);
+    event.time_ns = random.within(0..=nominal_ns - 1);
 }
 
 fn before_join(run: &mut Run, place: usize, _: &mut Random) {

@@ -17,21 +17,14 @@ mod set;
 #[path = "../../../../sched-dag/tests/support/mod.rs"]
 mod support;
 
-pub(crate) use support::random;
-
+use common::random::Random;
 use sched_dag::TaskSet;
 use sched_dag::virtual_time::{ExecutionTimes, VirtualTime};
 use tool::record::Run;
 use tool::trace::check;
 
-use random::Random;
 use set::{Overruns, Set};
-use support::commit;
-
-fn number(variable: &str, default: u64) -> u64 {
-    let given = std::env::var(variable).ok();
-    given.map_or(default, |text| text.parse().expect("a whole number"))
-}
+use support::{commit, number};
 
 /// Draws a set from each seed, runs it, and hands its trace on.
 fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, Run)) {
@@ -40,10 +33,7 @@ fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, Run)) {
     println!("{count} sets from seed {first_seed} on");
     for seed in (first_seed..).take(usize::try_from(count).expect("a count")) {
         let mut random = Random::new(seed);
-        let overruns = match random.chance(50) {
-            true => Overruns::Often,
-            false => Overruns::Never,
-        };
+        let overruns = random.one_of(&[Overruns::Often, Overruns::Never]);
         let mut set = set::draw(&mut random, overruns);
         // An instance of no length has all its events in one instant.
         set.has_instances_of_no_length = true;
@@ -73,7 +63,7 @@ fn record(set: &Set) -> Run {
 /// Loses the oldest events.
 fn lose(run: &mut Run, random: &mut Random) {
     if !run.events.is_empty() {
-        let lost = random.below(run.events.len());
+        let lost = random.index(run.events.len());
         run.events.drain(..lost);
         run.lost = u64::try_from(lost).expect("few events");
         run.complete = lost == 0;

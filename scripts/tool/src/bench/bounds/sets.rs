@@ -5,13 +5,13 @@
 //! under fixed priorities, 53,230 and 30,335 under EDF. How that test drew WCETs, edges, periods
 //! and deadlines is not known, so the ratios can be compared and the counts cannot.
 
+use common::random::Random;
 use sched_dag::analysis::{Task, answer, bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
 use sched_dag::{DagSpec, Policy, verify};
 
 use super::{draw, terms};
 use crate::bench::frame::Table;
 use crate::oracle::bounds::older::{Width, long_paths, melani_edf, melani_fp};
-use crate::random::Random;
 
 /// The policies, and what people call them.
 const POLICIES: [(Policy, &str); 2] = [(Policy::StaticPriority, "G-FP"), (Policy::Edf, "G-EDF")];
@@ -114,7 +114,7 @@ pub(super) fn small(sets: u64, seed: u64) -> ByPolicy {
     let mut random = Random::new(seed);
     let mut proven = ByPolicy::default();
     for _ in 0..sets {
-        let cores = u32::try_from(random.within(2, 4)).unwrap_or(2);
+        let cores = random.within(2..=4);
         add(&mut proven, &draw::small(&mut random), cores);
     }
     proven

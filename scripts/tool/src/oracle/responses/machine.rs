@@ -13,11 +13,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use common::random::Random;
 use sched_dag::analysis::Overheads;
 use sched_dag::journal::What;
 use sched_dag::{Decision, Instance, Notice, Scheduler, SchedulerOptions, TaskSet};
-
-use crate::random::Random;
 
 /// What the platform's own work takes at most.
 #[derive(Clone, Copy, Debug)]
@@ -164,7 +163,7 @@ impl Machine<'_> {
     fn draw(&mut self, most_ns: u64) -> u64 {
         match self.takes {
             Takes::Most => most_ns,
-            Takes::Drawn => self.random.within(0, most_ns),
+            Takes::Drawn => self.random.within(0..=most_ns),
         }
     }
 }

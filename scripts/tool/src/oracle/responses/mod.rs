@@ -12,13 +12,13 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use common::random::Random;
 use sched_dag::analysis::{Settings, answer, fix_orders};
 use sched_dag::{CommitOptions, ConstructionPolicy, verify};
 
 use crate::options::{Command, Takes as Value, options};
 use crate::progress::Progress;
-use crate::random::Random;
-use draw::{Sample, sample};
+use draw::sample;
 use machine::{Takes, longest_responses_ns};
 
 static TABLE: Command = Command {
@@ -81,11 +81,7 @@ impl Seen {
     /// bound.
     fn add(&mut self, seed: u64) -> Vec<String> {
         let mut random = Random::new(seed);
-        let Sample {
-            specs,
-            options,
-            costs,
-        } = sample(&mut random);
+        let (specs, options, costs) = sample(&mut random);
         self.drawn += 1;
         let commit = CommitOptions::new(options.policy, options.cores)
             .with_construction(ConstructionPolicy::any_graph());

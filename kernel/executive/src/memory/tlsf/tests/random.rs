@@ -5,22 +5,20 @@
 //! are returned each region must be one block again. A failing trace prints its
 //! seed, which alone determines it.
 
-#[path = "../../../../../../sched-dag/tests/support/random.rs"]
-mod numbers;
-
 use core::ptr::NonNull;
 use std::collections::BTreeMap;
 
+use common::random::Random;
+
 use super::heap::TestHeap;
-use numbers::Random;
 
 const REGIONS: [usize; 3] = [256 * 1024, 64 * 1024, 5000];
 const STEPS: usize = 3000;
 
 /// Draws a size in bytes: all orders of magnitude up to `2^log2` alike.
 fn size(random: &mut Random, log2: usize) -> usize {
-    let bound = 2 << random.below(log2);
-    1 + random.below(bound)
+    let bound = 2 << random.index(log2);
+    1 + random.index(bound)
 }
 
 struct Held {
@@ -68,7 +66,7 @@ impl Trace {
     fn run(&mut self) {
         for step in 0..STEPS {
             let growing = step / 500 % 2 == 0;
-            match self.random.below(10) {
+            match self.random.index(10) {
                 0 => self.resize(),
                 1..=3 => self.allocate(),
                 4..=6 => self.deallocate(),
@@ -95,7 +93,7 @@ impl Trace {
 
     fn allocate(&mut self) {
         let size = size(&mut self.random, 14);
-        let align = 1 << self.random.below(13);
+        let align = 1 << self.random.index(13);
         let before = self.heap.usage().in_use_bytes;
         let Some(payload) = self.heap.allocate(size, align) else {
             return;
@@ -104,7 +102,7 @@ impl Trace {
         // A header, and less than a smallest block that could not be returned.
         let taken = self.heap.usage().in_use_bytes - before;
         assert!(taken <= size.next_multiple_of(16) + 16 + 16, "{taken}");
-        let pattern = u8::try_from(self.random.below(256)).expect("below 256");
+        let pattern = self.random.within(0..=u8::MAX);
         self.hold(Held {
             payload,
             size,
@@ -152,7 +150,7 @@ impl Trace {
     }
 
     fn pick(&mut self) -> Option<Held> {
-        let index = self.random.below(self.held.len().max(1));
+        let index = self.random.index(self.held.len().max(1));
         let (&start, _) = self.held.iter().nth(index)?;
         self.held.remove(&start)
     }
