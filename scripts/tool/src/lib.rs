@@ -76,5 +76,4 @@ pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};
 
 #[cfg(test)]
-#[path = "../tests/support/made.rs"]
-mod made;
+use record::tests::made;

@@ -7,7 +7,7 @@ pub mod bound;
 pub mod model;
 mod run;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

@@ -4,6 +4,9 @@
 mod dag_files;
 mod files;
 mod lines;
+#[path = "../../src/record/tests/made.rs"]
+#[allow(dead_code, reason = "each program uses a part of this")]
+mod made;
 mod recordings;
 #[path = "../support/mod.rs"]
 mod support;

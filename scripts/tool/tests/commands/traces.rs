@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use recording::CommittedTopic;
 use tool::protocol::{MachineLine, read_line};
 
-use crate::support::made::{commit, record_of};
+use crate::made::{commit, record_of};
 use crate::support::{assert_refused, call, folder, succeed};
 
 const EVENTS: &str = "

@@ -4,8 +4,6 @@
 
 #![allow(dead_code, reason = "each program uses a part of this")]
 
-pub(crate) mod made;
-
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};

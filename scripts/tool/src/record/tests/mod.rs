@@ -1,5 +1,7 @@
 //! Records that are right, wrong, cut, and altered.
 
+pub(crate) mod made;
+
 use common::random::Random;
 use recording::{Chunk, Commit, Recordable, Recording, Stream, Times, Writer};
 
