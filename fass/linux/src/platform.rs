@@ -20,7 +20,7 @@ use crate::team::{Team, with_own_worker};
 /// What the commits to come run on.
 #[derive(Clone, Debug)]
 pub(crate) struct Threads {
-    /// What commits are told.
+    /// The terms of the commits to come.
     pub(crate) terms: Terms,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,

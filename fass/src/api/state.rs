@@ -162,7 +162,7 @@ impl<T: StateValue> State<T> {
     /// called that may change it in such a job. It does so if topics of the DAG are recorded
     /// ([`Dag::record`]), too; then a replay can begin there.
     ///
-    /// What a closure keeps for itself is not recorded, so what shall be is to be a state. A value
+    /// A value that a closure keeps for itself is not recorded, so what shall be is to be a state. A value
     /// that takes more than 4 KiB, or twice the least of its type if that is more, is lost, as one
     /// of a topic is.
     ///

@@ -1,13 +1,12 @@
 //! Functions that a replay does not call.
 
-use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::mem;
 
 use sched_dag::{DagId, Instance, SubtaskId};
 
-use crate::run::plan::{Body, Plan, Replacement, Subtask};
+use crate::run::plan::{Body, Plan};
 
 /// The instances whose functions are not called.
 #[derive(Clone, Debug)]
@@ -54,57 +53,13 @@ pub(super) fn narrow(instance: Instance) -> Option<(u16, u16)> {
     Some((dag, u16::try_from(instance.subtask.0).ok()?))
 }
 
-/// A subtask some of whose instances are passed over.
-struct Guarded {
-    subtask: Box<dyn Subtask>,
-    /// The instance, but for its job.
-    of: Instance,
-    passed: Arc<Passed>,
-}
-
-impl Subtask for Guarded {
-    fn take_turn(&mut self, job: u64) {
-        match self.passed.has(Instance { job, ..self.of }) {
-            true => self.subtask.discard(job),
-            false => self.subtask.take_turn(job),
-        }
-    }
-
-    fn discard(&mut self, job: u64) {
-        self.subtask.discard(job);
-    }
-
-    fn replacement(&self) -> Option<Replacement> {
-        self.subtask.replacement()
-    }
-
-    fn replace(&mut self) {
-        self.subtask.replace();
-    }
-
-    fn forget(self: Box<Self>) {
-        self.subtask.forget();
-    }
-}
-
 /// Makes all bodies of a plan pass over these.
 pub(super) fn guard(plan: &mut Plan, passed: &Arc<Passed>) {
     for (dag, bodies) in (0..).map(DagId).zip(&mut plan.bodies) {
         let of_subtasks = (0..).map(SubtaskId).zip(mem::take(bodies));
         let guarded = of_subtasks.map(|(subtask, body): (_, Body)| {
-            let of = Instance {
-                dag,
-                subtask,
-                job: 0,
-            };
             let passed = Arc::clone(passed);
-            body.wrapped(|subtask| {
-                Box::new(Guarded {
-                    subtask,
-                    of,
-                    passed,
-                })
-            })
+            body.before(move |job| !passed.has(Instance { dag, job, subtask }))
         });
         *bodies = guarded.collect();
     }

@@ -9,7 +9,7 @@ use alloc::borrow::Cow;
 use sched_dag::analysis::{OverheadSource, Overheads, Settings};
 use sched_dag::{Clusters, Policy, Preemption, SchedulerOptions};
 
-/// What a platform runs the DAGs of the commits to come on.
+/// The terms on which a platform runs the DAGs of the commits to come.
 ///
 /// ```
 /// use fass::{Clusters, Policy, Terms};
@@ -29,7 +29,7 @@ pub struct Terms {
     pub clusters: Clusters,
     /// Whether the commit divides them ([`Platform::assign`](crate::Platform::assign)).
     pub assigns: bool,
-    /// What the platform's own work costs an instance at most, as measured on it. The commit adds
+    /// The cost of the platform's own work for an instance at most, as measured on it. The commit adds
     /// it to each WCET before it answers about deadlines
     /// ([`Commit::answers`](crate::Commit::answers)); it changes nothing else. Without
     /// measurements, nothing is added: then WCETs have to include it.

@@ -202,9 +202,11 @@ impl KeptState {
         }
     }
 
-    /// Reports whether it is written down in a job.
-    pub(super) fn is_due(&self, job: u64) -> bool {
-        job.is_multiple_of(self.every.load(Ordering::Relaxed).into())
+    /// Writes it down, if that is due in the job.
+    pub(super) fn keep(&self, line: &Line, job: u64) {
+        if job.is_multiple_of(self.every.load(Ordering::Relaxed).into()) {
+            self.state.stage(line, job);
+        }
     }
 
     /// Has it written down every so many jobs, if that is more often.

@@ -12,7 +12,7 @@
 pub(crate) mod cell;
 pub(crate) mod crossing;
 pub(crate) mod effect;
-pub(crate) mod kept;
+mod kept;
 pub(crate) mod latest;
 pub(crate) mod latest_jobs;
 pub(crate) mod line;

@@ -117,6 +117,37 @@ pub(crate) trait Subtask: Send {
     fn forget(self: Box<Self>);
 }
 
+/// A subtask whose jobs are looked at before their turns.
+struct Looked<F> {
+    subtask: Box<dyn Subtask>,
+    look: F,
+}
+
+impl<F: FnMut(u64) -> bool + Send> Subtask for Looked<F> {
+    fn take_turn(&mut self, job: u64) {
+        match (self.look)(job) {
+            true => self.subtask.take_turn(job),
+            false => self.subtask.discard(job),
+        }
+    }
+
+    fn discard(&mut self, job: u64) {
+        self.subtask.discard(job);
+    }
+
+    fn replacement(&self) -> Option<Replacement> {
+        self.subtask.replacement()
+    }
+
+    fn replace(&mut self) {
+        self.subtask.replace();
+    }
+
+    fn forget(self: Box<Self>) {
+        self.subtask.forget();
+    }
+}
+
 /// The functions to replace one that a fault ends. They can be asked for at any time,
 /// also while the body runs.
 ///
@@ -239,12 +270,10 @@ impl Body {
         }
     }
 
-    /// Puts something around the subtask.
-    pub(crate) fn wrapped(
-        mut self,
-        wrap: impl FnOnce(Box<dyn Subtask>) -> Box<dyn Subtask>,
-    ) -> Self {
-        self.subtask = wrap(self.subtask);
+    /// Has each job looked at before its turn: it is given up where `look` returns false.
+    pub(crate) fn before(mut self, look: impl FnMut(u64) -> bool + Send + 'static) -> Self {
+        let subtask = self.subtask;
+        self.subtask = Box::new(Looked { subtask, look });
         self
     }
 

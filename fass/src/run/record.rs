@@ -19,7 +19,6 @@ use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
 
 use super::crossing::Edge;
 use super::effect::Effect;
-use super::kept;
 use super::latest::{AnyLatest, SharedLatest};
 use super::line::{KeptState, Line, LineOf};
 use super::message::{Message, MessageType};
@@ -89,9 +88,11 @@ pub(crate) trait AnyRecorded {
         for sample in of.samples {
             let latest = &*sample.latest;
             if let Some((schema, line)) = sample.of.probe(latest, sample.sampler) {
-                let way = (schema, Arc::clone(&line.way));
+                let found = Arc::clone(&line.way);
+                let way = (schema, Arc::clone(&found));
                 open(sample.subtask, Role::Sample, latest.topic(), way, None);
-                around.push((sample.subtask, sampling::around(line)));
+                let look = move |job| line.begin(job);
+                around.push((sample.subtask, sampling::around(found, look)));
             }
         }
         for (position, of_state) in of.states {
@@ -112,7 +113,9 @@ pub(crate) trait AnyRecorded {
                     way,
                     Some(Arc::clone(of_state)),
                 );
-                around.push((subtask, kept::around(Arc::clone(of_state), line)));
+                let (found, kept) = (Arc::clone(&line), Arc::clone(of_state));
+                let look = move |job| kept.keep(&line, job);
+                around.push((subtask, sampling::around(found, look)));
             }
         }
         if !channels.is_empty() {

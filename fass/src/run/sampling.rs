@@ -5,9 +5,8 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::effect::Effect;
-use super::line::Found;
-use super::plan::{Body, Subtask};
-use super::sample::SampleLine;
+use super::line::{Found, Line};
+use super::plan::Body;
 
 /// Puts something around a body.
 pub(crate) type Around = Box<dyn FnOnce(Body) -> Body>;
@@ -21,33 +20,16 @@ pub(super) fn attach(around: Vec<(usize, Around)>, bodies: &mut Vec<Body>) {
     bodies.extend(all.into_iter().flatten());
 }
 
-/// Returns what lets the body of a sampling subtask tell its line which job it runs.
-pub(super) fn around(line: Arc<SampleLine>) -> Around {
+/// Has a subtask look for something before each turn, and the line give away what it has found.
+pub(super) fn around(line: Arc<Line>, look: impl Fn(u64) + Send + 'static) -> Around {
+    let found: Box<dyn Effect> = Box::new(Found(line));
+    let look = move |job| {
+        look(job);
+        true
+    };
     Box::new(|body| {
-        let effect: Box<dyn Effect> = Box::new(Found(Arc::clone(&line.way)));
-        let mut body = body.wrapped(|subtask| Box::new(Sampling { subtask, line }));
-        body.add_effects([effect]);
+        let mut body = body.before(look);
+        body.add_effects([found]);
         body
     })
-}
-
-/// A subtask that samples recorded topics. (None such can be replaced after a fault.)
-struct Sampling {
-    subtask: Box<dyn Subtask>,
-    line: Arc<SampleLine>,
-}
-
-impl Subtask for Sampling {
-    fn take_turn(&mut self, job: u64) {
-        self.line.begin(job);
-        self.subtask.take_turn(job);
-    }
-
-    fn discard(&mut self, job: u64) {
-        self.subtask.discard(job);
-    }
-
-    fn forget(self: Box<Self>) {
-        self.subtask.forget();
-    }
 }

@@ -83,7 +83,7 @@ impl VirtualTime {
     /// before the commit, which is refused if the recording is of another graph or of other types,
     /// has a source that is not recorded now, or has lost a source's value.
     ///
-    /// What other subtasks write to recorded topics is compared, as are recorded states:
+    /// Values that other subtasks write to recorded topics are compared, as are recorded states:
     /// [`Report::compared`](crate::Report::compared) says how many values were,
     /// [`Report::uncompared`](crate::Report::uncompared) how many not, as the run is not over or
     /// the topic is recorded no more, and [`Report::divergence`](crate::Report::divergence) which

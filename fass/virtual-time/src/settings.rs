@@ -8,7 +8,7 @@ use crate::silent::Silent;
 /// What a machine is asked to be.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Settings {
-    /// What commits are told.
+    /// The terms of the commits to come.
     pub(crate) terms: Terms,
     /// How long calls take that do not say.
     pub(crate) silent: Silent,

@@ -42,7 +42,7 @@ fn kept() -> Dag {
     filter(6_000, |sums| _ = sums.record())
 }
 
-/// What a crash of it leaves.
+/// The record that a crash of it leaves.
 fn crash(dag: Dag) -> Vec<u8> {
     let machine = VirtualTime::new().contain_panics().keep_latest(16);
     run(&machine, &[dag]);

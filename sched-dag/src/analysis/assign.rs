@@ -39,7 +39,7 @@ texts! {
     pub enum Unassigned {
         /// It states a cluster, and the clusters are not made yet.
         Stated = "it states a cluster, and the commit is to make them; leave its cluster out";
-        /// What it needs is not known.
+        /// Its need of cores is not known.
         Unknown(error: TaskError) = "{error}";
         /// A path of it, overheads included, takes longer than a job has, on any number of cores.
         TooLong { length_ns: u64, within_ns: u64 } =

@@ -124,7 +124,7 @@ impl Releases {
     }
 }
 
-/// What was sampled in a run.
+/// The samples of a run.
 #[derive(Clone, Debug, Default)]
 pub struct SampledJobs {
     /// By instance, and by the writer of what it samples: the job.

@@ -40,7 +40,7 @@ pub struct Event {
     pub subtask: Option<SubtaskId>,
 }
 
-/// What an event happens to, packed: an instance or a whole job.
+/// The subject of an event, packed: an instance or a whole job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Subject {
     /// The DAG in bits 44 to 63, the subtask in bits 24 to 43: at most 2^20 instances

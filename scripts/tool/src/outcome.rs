@@ -32,7 +32,7 @@ pub struct Outcome {
     pub serial: String,
     /// The log taken apart.
     pub transcript: Transcript,
-    /// What came of the record, whatever way it took; empty if none was kept.
+    /// The bytes of the record, whatever way it took; empty if none was kept.
     pub sent: Vec<u8>,
     /// Where the log lies.
     pub log: PathBuf,

@@ -1,4 +1,4 @@
-//! What is shown while something takes long: how far it is, and the time left; or that it goes
+//! Progress while something takes long: how far it is, and the time left; or that it goes
 //! on, if no one knows how far it is.
 
 use std::io::{Write, stderr};

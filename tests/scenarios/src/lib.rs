@@ -98,7 +98,7 @@ pub struct Scenario {
     pub everywhere: Vec<String>,
     /// The faults of its commit.
     pub refused: Vec<String>,
-    /// What the functions have counted since the last commit.
+    /// The functions' counts since the last commit.
     pub(crate) calls: Arc<Calls>,
 }
 

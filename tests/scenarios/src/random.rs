@@ -30,10 +30,10 @@ const LEAST_PERCENT: u64 = 40;
 /// The most times that are drawn for a subtask; later calls take the last one.
 const MOST_TIMES: u64 = 32;
 
-/// What is drawn for all DAGs of a round.
+/// The draw for all DAGs of a round.
 struct Round {
     length: Duration,
-    /// What a subtask's WCETs take on average, in millionths of a core.
+    /// The average of a subtask's WCETs, in millionths of a core.
     share: u64,
     dags: u64,
     computes: bool,

@@ -1,4 +1,4 @@
-//! What a run commits: its model, as it was accepted, and what was proven of it.
+//! A commit of a run: its model, as it was accepted, and what was proven of it.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -29,9 +29,9 @@ crate::recordable! {
         pub cores: u32,
         /// The number of cores of each cluster; empty if cores are not divided.
         pub clusters: Vec<u32>,
-        /// What the analysis charges an instance with, if that has an end.
+        /// The analysis charges an instance with so much, if that has an end.
         pub charge_ns: Option<u64>,
-        /// What it charges for making another one ready.
+        /// It charges so much for making another one ready.
         pub ready_ns: u64,
         /// The DAGs, in the order of their numbers.
         pub dags: Vec<CommittedDag>,
@@ -56,7 +56,7 @@ crate::recordable! {
         pub jobs: Option<u64>,
         /// The most jobs at a time.
         pub in_flight: u32,
-        /// What becomes of a job that is due while as many are in flight: 0 it waits, 1 it is
+        /// The fate of a job that is due while as many are in flight: 0 it waits, 1 it is
         /// skipped, 2 the oldest one is aborted.
         pub overrun: u8,
         /// If a fault costs a job only: the most faults within a window of jobs, the window, and

@@ -133,13 +133,13 @@ impl<'b> Recording<'b> {
 /// See [`Recording::chunks`].
 #[derive(Clone, Debug)]
 pub enum Chunk<'b> {
-    /// What the recording says of itself.
+    /// The recording's statement about itself.
     Header(Header),
     /// A value, or what became of a job.
     Entry(Entry<'b>),
-    /// What else is known, in lines.
+    /// Facts known besides, in lines.
     Text(&'b str),
-    /// What was committed; what follows is of it.
+    /// The model that was committed; what follows is of it.
     Commit(Commit),
     /// Events of a journal.
     Events(Events<'b>),

@@ -11,7 +11,7 @@ use crate::value::crc::Crc;
 use crate::value::encode::Encoder;
 use crate::value::recordable::to_bytes;
 
-/// What takes the bytes of a recording.
+/// A place that takes the bytes of a recording.
 ///
 /// See [`Stream`].
 pub trait Sink {

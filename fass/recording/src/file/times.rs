@@ -1,4 +1,4 @@
-//! What a run that has ended took: the statistics of all its jobs.
+//! The statistics of all jobs of a run that has ended.
 
 use alloc::vec::Vec;
 
@@ -39,7 +39,7 @@ crate::recordable! {
     pub struct SubtaskTimes {
         /// From the last finish of a predecessor to the start.
         pub join_latency: Counted,
-        /// What its calls took, preemptions left out.
+        /// The time that its calls took, preemptions left out.
         pub execution: Counted,
         /// Of a sink of several: from the nominal release to its finish, its deadlines missed,
         /// and the proven bound.

@@ -13,7 +13,7 @@ use crate::machine::{clock, this_core};
 
 /// The one kernel, as `fass` sees it.
 pub struct Kernel {
-    /// What the commits to come are told; the cores are those that have come up.
+    /// The terms of the commits to come; the cores are those that have come up.
     terms: SpinLock<Terms>,
     /// How long a decision waits for further events of the same instant.
     coincidence_ns: AtomicU64,
@@ -114,8 +114,7 @@ impl Platform for Kernel {
         let terms = self.terms();
         let coincidence_ns = self.coincidence_ns.load(Ordering::Relaxed);
         if !self.calibrates.load(Ordering::Relaxed) {
-            let launched = record::with(|record| {
-                let mut record = record;
+            let launched = record::with(|mut record| {
                 let launched = edge::launch(&mut plan, record.as_deref_mut().map(Kept::file))?;
                 if let Some(record) = record {
                     record.commit(&plan, &terms.scheduler, terms.overheads);

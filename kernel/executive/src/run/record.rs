@@ -23,7 +23,7 @@ static RECORD: SpinLock<Option<File>> = SpinLock::new(None);
 /// Whether it is sent during a run, too, so that it is there if the run dies.
 static IS_LIVE: AtomicBool = AtomicBool::new(false);
 
-/// What takes its bytes.
+/// The way of its bytes out of the machine.
 pub(super) enum To {
     Port,
     Console(Box<Lines>),

@@ -28,7 +28,7 @@ use crate::text::json;
 /// Whether the app was compiled without optimization, as its entry says.
 pub static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
 
-/// What is known of faults and bounds in the runs so far.
+/// The faults and exceeded bounds that are known of the runs so far.
 #[derive(Debug)]
 pub struct Verdict {
     judges_faults: Cell<bool>,

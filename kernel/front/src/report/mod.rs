@@ -1,4 +1,4 @@
-//! What is told of a run when it is over: what became of its jobs, its memory, its wires and its
+//! The report of a run that is over: what became of its jobs, its memory, its wires and its
 //! recording, and how times are written.
 
 pub mod counts;

@@ -111,7 +111,7 @@ pub fn look_back<R: LiveRun>(cluster: usize, most: u64, take: &mut dyn FnMut(&Ev
     }
 }
 
-/// What a command tells why it does not do what a line says.
+/// The way of a command to say why it does not do what a line asks.
 pub type Refuse<'r> = &'r mut dyn FnMut(&dyn Display);
 
 /// The commands about parameters, if the app has called for them.

@@ -1,4 +1,4 @@
-//! What goes out as text: machine lines (`json`), and the way of all text to the platform
+//! All text that goes out: machine lines (`json`), and the way of it to the platform
 //! (`console`).
 
 pub mod console;

@@ -10,13 +10,15 @@
 //! | `input=-` | what comes on standard input arrives on the app's wire | |
 //! | `output=FILE` | what the app sends on its wire goes there | |
 //! | `console=off\|on` | whether a person at standard input can talk with a run | `off` |
-//! | `record=FILE` | what crosses the edge of the run is recorded there |
-//! | `replay=FILE` | the run replays that recording |
-//! | `from=DAG/JOB` | from that job on, or the last one before it of which all states are recorded |
+//! | `keep=FILE` | the record of the run is written there, also while it goes on | |
+//! | `record=FILE` | the same, and it is an error if no topic is recorded | |
+//! | `events=FILE\|on` | if neither is given: its commits, events and times are, when a run is over; `on` is for lines of the output | |
+//! | `replay=FILE` | the run replays that recording | |
+//! | `from=DAG/JOB` | from that job on, or the last one before it of which all states are recorded | all jobs |
 //! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
 //!
-//! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `trace`, `times` and `graph`
-//! mean what they mean on the machine.
+//! Besides, `policy`, `preemption`, `budget_factor` and `overheads_ns` mean
+//! what they mean on the machine.
 
 use std::borrow::Cow;
 use std::fs::{self, File};

@@ -30,7 +30,7 @@ pub(super) fn watch(is_watched: bool) {
 
 /// Looks for that byte. In core 0's heartbeat.
 pub(super) fn beat() {
-    /// What the port's FIFO holds.
+    /// The size of the port's FIFO.
     const MOST_BYTES: usize = 16;
     let is_watched = IS_WATCHED.load(Ordering::Relaxed);
     let mut bytes = (0..MOST_BYTES).map_while(|_| serial::FIRST.receive());

@@ -49,7 +49,7 @@ pub enum Waited {
     Killed,
 }
 
-/// What became of a child that was followed.
+/// The end of a child that was followed.
 #[derive(Debug)]
 pub struct Followed {
     /// Why the wait ended.

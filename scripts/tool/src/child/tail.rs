@@ -10,7 +10,7 @@ use crate::protocol::written;
 #[derive(Debug)]
 pub(super) struct Tail<'p> {
     path: &'p Path,
-    /// What has been read, and how much of it was shown.
+    /// The text that has been read, and how much of it was shown.
     read: Vec<u8>,
     shown: usize,
 }

@@ -14,7 +14,7 @@ pub struct Opt {
     pub name: &'static str,
     /// The short form without its dash, such as `q`.
     pub short: Option<char>,
-    /// What must follow.
+    /// The form of what must follow.
     pub takes: Takes,
     /// The value when the option is not given; empty: it has none.
     pub default: &'static str,
@@ -33,7 +33,7 @@ macro_rules! options {
 }
 pub(crate) use options;
 
-/// What follows an option.
+/// A value that follows an option.
 #[derive(Clone, Copy, Debug)]
 pub enum Takes {
     /// Nothing: the option is a flag.

@@ -1,4 +1,4 @@
-//! What is made of the record of a guest that has proven a DAG and run it three times.
+//! Views of the record of a guest that has proven a DAG and run it three times.
 
 use std::fs;
 use std::path::Path;

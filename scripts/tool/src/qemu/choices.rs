@@ -1,4 +1,4 @@
-//! What has a name on command lines: what time means in a guest, the board that QEMU imitates
+//! Choices that have names on command lines: what time means in a guest, the board that QEMU imitates
 //! for it, and what brings the image into its memory: QEMU itself, or a firmware, with GRUB or
 //! without.
 
@@ -49,7 +49,7 @@ macro_rules! named {
 }
 
 named! {
-    /// What time means in the guest.
+    /// The meaning of time in the guest.
     Mode {
         /// Real cores in real time, by the host's virtualization.
         Kvm = "kvm",
@@ -110,7 +110,7 @@ named! {
 }
 
 named! {
-    /// What brings the image into the guest's memory.
+    /// The way of the image into the guest's memory.
     Loader {
         /// QEMU's `-kernel`: the image is there at the reset.
         Pvh = "pvh",

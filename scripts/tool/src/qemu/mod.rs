@@ -32,7 +32,7 @@ pub const LEAST_MEMORY_MIB: u64 = 16;
 /// The most processors that a guest gets.
 pub const MOST_CORES: u64 = replay::lines::MOST_CORES as u64;
 
-/// What a guest's second serial port is connected to.
+/// The other end of a guest's second serial port.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Second {
     /// Hand what is written to [`Running::input`] to this port; then the first one has none.

@@ -21,16 +21,16 @@ use model::Committed;
 
 pub use run::Run;
 
-/// What a boot has left.
+/// The record that a boot has left.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
     /// The machine lines, as far as the record has them.
     pub lines: String,
-    /// What was committed, one after the other.
+    /// The commits, one after the other.
     pub commits: Vec<Committed>,
     /// The runs. The last one may have died.
     pub runs: Vec<Run>,
-    /// What each run took that has ended, and the place of its commit.
+    /// The times of each run that has ended, and the place of its commit.
     pub times: Vec<(usize, Times)>,
 }
 

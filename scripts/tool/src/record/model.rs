@@ -11,12 +11,12 @@ use sched_dag::{
 
 use crate::qemu::MOST_CORES;
 
-/// What was committed together, and what it has proven.
+/// DAGs that were committed together, and what was proven of them.
 #[derive(Clone, Debug, Default)]
 pub struct Committed {
     /// Its number within the boot, from 0.
     pub number: usize,
-    /// What the record says.
+    /// The commit as the record has it.
     pub told: Commit,
     /// The same as a model.
     pub task_set: TaskSet,
@@ -27,7 +27,7 @@ impl Committed {
     ///
     /// # Errors
     ///
-    /// What a commit would say.
+    /// The reasons for which a commit would refuse them.
     pub fn new(number: usize, told: Commit) -> Result<Self, String> {
         let in_commit = |why: String| format!("commit {number}: {why}");
         if !(1..=MOST_CORES).contains(&u64::from(told.cores)) {
@@ -137,7 +137,7 @@ impl Committed {
 ///
 /// # Errors
 ///
-/// What a commit would say.
+/// The reasons for which a commit would refuse them.
 pub fn task_set(
     options: SchedulerOptions,
     clusters: Clusters,

@@ -16,11 +16,11 @@ pub struct Run {
     pub usual_bound_ns: u64,
     /// The DAGs.
     pub task_set: TaskSet,
-    /// What samples what.
+    /// The samplings of subtasks.
     pub samplings: Vec<Sampling>,
-    /// What was proven of each DAG.
+    /// The bound that was proven of each DAG.
     pub bounds_ns: Vec<Option<u64>>,
-    /// What happened, in the order of the journal.
+    /// The events, in the order of the journal.
     pub events: Vec<Event>,
     /// How many events came before these, and are lost.
     pub lost: u64,

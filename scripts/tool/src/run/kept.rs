@@ -29,7 +29,7 @@ const FILES: [&str; 3] = ["keep", "record", "trace"];
 /// How many KiB values may wait in for the background to send them.
 const ROOM_KIB: &str = "1024";
 
-/// What a boot keeps.
+/// The files that a boot keeps.
 pub(super) struct Kept {
     /// Where the bytes go while they come.
     raw: Temporary,

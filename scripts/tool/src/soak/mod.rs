@@ -44,7 +44,7 @@ const ROUNDS_A_BOOT: usize = 2;
 /// How many breaches of a run are told in words.
 const SHOWN: usize = 5;
 
-/// What to run, and on what.
+/// The rounds to run, and on what.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// The numbers of the rounds.
@@ -55,7 +55,7 @@ pub struct Plan {
     pub seed: u64,
     /// The cores of each guest.
     pub cores: u64,
-    /// What time means.
+    /// The meaning of time.
     pub mode: Mode,
     /// For how long an instance may wait for what it is owed.
     pub bound_ns: u64,

@@ -22,7 +22,7 @@ use crate::system;
 /// host makes slow. Each guest has a limit of its own.
 const LIMIT: Duration = Duration::from_secs(3600);
 
-/// What test programs need besides QEMU.
+/// The programs that test programs need besides QEMU.
 const NEEDS: [(&str, &[&Need]); 4] = [
     ("boot_by_efi", &[&install::MTOOLS, &install::OVMF]),
     (

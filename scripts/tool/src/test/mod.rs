@@ -57,7 +57,7 @@ a FILTER by which nothing has run
 ",
 };
 
-/// What shall run.
+/// The tests that shall run.
 struct Plan {
     /// A part of the names of the tests wanted; `None`: all.
     filter: Option<String>,

@@ -45,7 +45,7 @@ Exit code: 0 counted; 1 a set was proven before and is not now; 2 the command li
 ",
 };
 
-/// What all random sets are drawn from.
+/// The seed of all random sets.
 const SEED: u64 = 1;
 
 /// Runs `bench bounds` with the words after its name.

@@ -1,4 +1,4 @@
-//! What is proven of random sets, before and now: by cores and load, and of small ones.
+//! Proofs of random sets, before and now: by cores and load, and of small ones.
 //!
 //! Sizes and cores of small sets are those of the random test that came with the proof of the
 //! multi-path bound, which counted 91,351 sets by it and 47,638 by Melani's form with the width
@@ -70,7 +70,7 @@ impl Proven {
     }
 }
 
-/// What is proven of sets, by policy.
+/// How many sets are proven, by policy.
 type ByPolicy = [Proven; POLICIES.len()];
 
 fn add(all: &mut ByPolicy, specs: &[DagSpec], cores: u32) {
@@ -84,7 +84,7 @@ pub(super) fn lost<'p>(all: impl IntoIterator<Item = &'p ByPolicy>) -> u64 {
     all.into_iter().flatten().map(|proven| proven.lost).sum()
 }
 
-/// What is proven at one load on one number of cores.
+/// The proofs at one load on one number of cores.
 pub(super) struct Point {
     cores: u32,
     /// The load in tenths of the cores.

@@ -1,4 +1,4 @@
-//! What all measurements share.
+//! The frame that all measurements share.
 //!
 //! - [`Figure`]: one measured quantity, and its JSON;
 //! - [`Table`]: figures for people;

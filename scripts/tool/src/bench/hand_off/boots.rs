@@ -30,7 +30,7 @@ pub(super) enum Kind {
     Divided,
 }
 
-/// What one boot measures.
+/// One boot, and its part of the measurement.
 #[derive(Clone, Debug)]
 pub(super) struct Boot {
     kind: Kind,

@@ -31,7 +31,7 @@ static TABLE: Command = Command {
     about: "Measures on the machine the way from a completion to its successor's first instruction.",
     positional: None,
     options: options! {
-        /// What is counted: instructions (deterministic), time (kvm, threads), or both.
+        /// The unit of what is counted: instructions (deterministic), time (kvm, threads), or both.
         "mode": Takes::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
         /// Compare the instructions with the baseline; one that grew is a failure.
         "compare": Takes::Nothing;
@@ -50,7 +50,7 @@ Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
 ",
 };
 
-/// What is to be measured.
+/// The measurement that is asked for.
 #[derive(Debug)]
 struct Plan {
     /// The one mode to measure in; else instructions and time.
@@ -69,7 +69,7 @@ impl Plan {
     ///
     /// # Errors
     ///
-    /// What the options ask for cannot be: one line that says why.
+    /// The options exclude each other: one line that says why.
     fn new(options: &Parsed) -> Result<Self, String> {
         let all = ["listing", "scale", "compare", "save-baseline", "mode"].into_iter();
         let given: Vec<&str> = all.filter(|name| options.is_given(name)).collect();

@@ -1,4 +1,4 @@
-//! What is left of a measurement: `samples.csv` and `summary.json` for programs, a table for people.
+//! The results of a measurement: `samples.csv` and `summary.json` for programs, a table for people.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use super::setting::Setting;
 use crate::bench::frame::Table;
 use crate::json::Object;
 
-/// What has been measured so far, in the order of the plan.
+/// The conditions measured so far, in the order of the plan.
 type Measured = [(Condition, Figures)];
 
 /// Returns each sample of each metric as a line.

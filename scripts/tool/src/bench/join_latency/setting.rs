@@ -19,7 +19,7 @@ use crate::{image, install, outcome, probe, program, system};
 /// How often a condition is booted at most in deterministic mode.
 const MOST_BOOTS: usize = 6;
 
-/// What conditions are measured with, and versions of that, for the record.
+/// The machine that conditions are measured with, and versions of that, for the record.
 #[derive(Debug)]
 pub(super) struct Setting<'p> {
     pub(super) plan: &'p Plan,

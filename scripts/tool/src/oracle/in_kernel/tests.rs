@@ -1,4 +1,4 @@
-//! What a boot prints of a case, held against it: what passes, and what is found out.
+//! The print of a boot of a case, held against it: what passes, and what is found out.
 
 use super::Settings;
 use super::boots::judge;
@@ -31,13 +31,14 @@ const LOG: &str = r#"static 1
 {"kind":"verdict","status":"success","reason":""}
 "#;
 
-/// What stands there, what is put in its place, and the difference that makes.
+/// A part of that, what is put in its place, and the difference that makes.
 const ALTERED: &str = r#"10000 | 20001 | dag 0 job 0 subtask 0: start: expected 0, found 0.020
 990000 finish | 979999 finish | dag 0 job 0 subtask 0: finish: expected 1, found 0.979
 990000 finish | 500000 suspend c0 0.0.0;600000 request c0 0.0.0;600000 resume c0 0.0.0;990000 finish | dag 0 job 0 subtask 0: preemptions: expected 0, found 1
 O=0 | O=1 | dag 0 job 0: release: expected 0, found 1
 990000 completed | 1020001 completed | dag 0 job 0: response: expected 1, found 1.020
 990000 completed | 990000 missed c0 0.0;990000 completed | dag 0 job 0: missed: expected 0, found 1
+0 released c0 | lost 2;0 released c0 | its trace is not whole, before line 2
 "small" | "smart" | its trace is not whole, before line 2
 "allocations":0 | "allocations":1 | the guest itself: allocations: expected 0, found 1
 "violations":0 | "violations":1 | the guest itself: violations: expected 0, found 1

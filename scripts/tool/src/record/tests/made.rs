@@ -3,7 +3,8 @@
 //! A commit is a line `static 2` or `edf 1`, with the number of cores, and a line for each DAG:
 //! `fork T=100 D=90 O=10 flight=2: a/0 b/1 c/2/10 d/3; 0>1 0>2 1>3 2>3`, with `sporadic` after the
 //! name if it is; a subtask has its name, priority, and WCET if that is known. Events are lines as
-//! `24 start c1 0.0.2`: time in ns, word, core, and DAG, job and subtask if it is of one.
+//! `24 start c1 0.0.2`: time in ns, word, core, and DAG, job and subtask if it is of one; a line `lost 2`
+//! before them is of events that are there no more.
 
 use recording::{Commit, CommittedDag, CommittedSubtask, Times, Writer};
 use sched_dag::journal::{Event, Subject};
@@ -95,16 +96,22 @@ pub(crate) fn record_of(text: &str, commit: &Commit, events: &str) -> Vec<u8> {
     let mut record = Writer::begin(Vec::new());
     record.text(text);
     record.commit(commit);
-    let words = lines_of(events).into_iter().map(|line| {
+    let mut lines = lines_of(events);
+    let lost = lines.first().and_then(|line| line.strip_prefix("lost "));
+    let lost = lost.map_or(0, number);
+    if lost > 0 {
+        lines.remove(0);
+    }
+    let words = lines.into_iter().map(|line| {
         let event = event(line);
         let of_job = Subject::of_job(event.dag, event.job);
         let subject = event.instance().map_or(of_job, Subject::of);
         Event::words(event.time_ns, event.what, event.core, subject)
     });
     let words: Vec<[u64; 3]> = words.collect();
-    record.events(0, 0, &words);
+    record.events(0, lost, &words);
     record.times(&Times {
-        written: vec![words.len() as u64],
+        written: vec![lost + words.len() as u64],
         ..Times::default()
     });
     record.end()

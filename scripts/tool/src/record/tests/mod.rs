@@ -34,7 +34,7 @@ fn a_good_record_is_read_as_a_file_and_in_lines() {
     assert_eq!(Record::read(b"hello\n").unwrap().runs.len(), 0);
 }
 
-/// What is put in the place of what in the good one, and what is said.
+/// A part of the good one, what is put in its place, and what is said.
 const WRONG: &str = "
 edf 2 | edf 0 | commit 0: it is for 0 cores; 1 to 64 are possible
 edf 2 | edf 4294967295 | commit 0: it is for 4294967295 cores; 1 to 64 are possible
@@ -67,7 +67,7 @@ fn whatever_is_wrong_is_named() {
     assert_eq!(said, "serial line 1: its bytes are not in base 64");
 }
 
-/// What was lost are the oldest events, and those after the last ones that were sent.
+/// Lost are the oldest events, and those after the last ones that were sent.
 #[test]
 fn events_that_are_missing_are_counted_and_a_run_that_died_is_not_complete() {
     let mut record = Writer::begin(Vec::new());
