@@ -128,6 +128,8 @@ pub use commit::fault::Fault;
 pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
 pub use draft::attributes::SubtaskAttributes;
 pub use draft::flaw::WordedFault;
+#[doc(hidden)]
+pub use platform::say;
 pub use platform::{
     AlreadyInstalled, Clock, LaunchError, Occupation, Platform, Terms, execute_for, install,
     now_ns, set_clock,
@@ -136,6 +138,7 @@ pub use recording::Channel;
 pub use run::cell::SetOnce;
 pub use run::crossing::Recorded;
 pub use run::latest_jobs::LatestJobs;
+pub use run::log;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan, Replacement};
 pub use run::runner::Runner;

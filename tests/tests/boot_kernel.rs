@@ -93,6 +93,27 @@ fn a_fault_that_the_app_does_not_look_at_is_a_failure() {
 }
 
 #[test]
+fn functions_say_lines_in_the_log_also_those_that_fail_afterwards() {
+    let outcome = Guest::test("unnoticed").end_in(Status::Failure);
+    let lines = outcome.lines("log");
+    let [begins, _, last] = lines[..] else {
+        panic!("{} lines", lines.len());
+    };
+    begins.reads([("level", "info"), ("message", "begins")]);
+    assert!(begins.number_at("job").is_none(), "{}", begins.text);
+    last.reads([("level", "warn"), ("message", "counted")]);
+    last.reads([("dag_name", "careless"), ("subtask_name", "panics")]);
+    last.has([("job", 1), ("left_out", 0)]);
+    let fields = r#""fields":{"jobs":2,"of":"careless"}"#;
+    assert!(last.text.contains(fields), "{}", last.text);
+    assert!(last.number("time_ns") >= 10_000_000, "{}", last.text);
+    let shown = "warn careless/panics[1] ";
+    assert!(outcome.serial.lines().any(|line| line.starts_with(shown)));
+    let warns = Guest::test("unnoticed").word("log=warn");
+    assert_eq!(warns.end_in(Status::Failure).lines("log").len(), 2);
+}
+
+#[test]
 fn a_response_beyond_its_proven_bound_is_no_success() {
     let guest = Guest::test("exceeded");
     let outcome = guest.end_in(Status::Failure);

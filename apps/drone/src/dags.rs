@@ -320,6 +320,7 @@ impl Workload {
             left = (left - force.map_or(0.0, |force| force.value.thrust) * 0.1).max(0.0);
             let is_low = left * 100.0 < CHARGE * f64::from(reserve);
             if is_low && !was_low {
+                fass::log!(Warn, "battery low", left = left, reserve = reserve);
                 changed.raise();
             }
             was_low = is_low;

@@ -109,9 +109,12 @@ pub(crate) fn commit(plan: &Plan, terms: &Terms) {
 
 /// Takes note of what this thread runs from now on.
 pub(crate) fn note_running(instance: Option<Instance>) {
-    if IS_ON.load(Ordering::Relaxed) {
-        RUNNING.set(instance);
-    }
+    RUNNING.set(instance);
+}
+
+/// Returns what this thread runs, and the time of the run.
+pub(crate) fn here() -> (Option<Instance>, u64) {
+    (RUNNING.get(), of_run(sys::now_ns()))
 }
 
 /// Takes note that an instance has failed. The cluster's lock is held.

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use fass::edge::Begin;
+use fass::log::Line;
 use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms};
 use sched_dag::lifecycle::{self, Parts, Request, Requests};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
@@ -122,6 +123,11 @@ impl Platform for Host {
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         edge::get().lend(channel, job, take);
+    }
+
+    fn log(&self, mut line: Line) {
+        (line.instance, line.at_ns) = edge::here();
+        line.keep();
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {

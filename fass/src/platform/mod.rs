@@ -7,6 +7,7 @@
 
 mod clock;
 mod installed;
+mod log;
 mod terms;
 
 use alloc::string::String;
@@ -18,11 +19,13 @@ use sched_dag::{DagId, TaskSet};
 
 use crate::edge::Begin;
 use crate::run::crossing::Recorded;
+use crate::run::log::Line;
 use crate::run::plan::Plan;
 
 pub use clock::{Clock, now_ns, set_clock};
 pub use installed::{AlreadyInstalled, install};
 pub(crate) use installed::{expect_installed, installed, record};
+pub use log::say;
 pub use terms::Terms;
 
 /// A machine that schedules committed DAGs.
@@ -132,6 +135,13 @@ pub trait Platform: Sync {
     /// Lends the recorded value of a channel and a job to `take`, if there is one.
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         let _ = (channel, job, take);
+    }
+
+    /// Takes a line of the [log](mod@crate::log) from the function that runs here. Adds which
+    /// instance that is, if it is one, and the time of the run, and [keeps](Line::keep) it for
+    /// what shows it later; without a definition it is forgotten. Must not wait.
+    fn log(&self, line: Line) {
+        let _ = line;
     }
 
     /// Takes a plan over. Its first release is the platform's to time.

@@ -16,6 +16,7 @@ mod kept;
 pub(crate) mod latest;
 pub(crate) mod latest_jobs;
 pub(crate) mod line;
+pub mod log;
 pub(crate) mod message;
 pub(crate) mod plan;
 pub(crate) mod record;

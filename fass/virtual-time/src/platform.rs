@@ -11,6 +11,7 @@ use std::sync::OnceLock;
 use std::time::Duration;
 
 use fass::edge::Begin;
+use fass::log::{Level, Line, set_level};
 use fass::{LaunchError, Occupation, Plan, Platform, Recorded, Terms};
 
 use recording::Channel;
@@ -45,6 +46,7 @@ pub(crate) fn make_current() -> Rc<Machine> {
         IS_OURS.get_or_init(|| fass::install(&HostPlatform).is_ok()),
         "another platform is installed; virtual time must be the program's only platform"
     );
+    set_level(Some(Level::Debug));
     let machine = Rc::new(Machine::default());
     CURRENT.set(Rc::downgrade(&machine));
     machine
@@ -163,6 +165,15 @@ impl Platform for HostPlatform {
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         surroundings().edge.lend(channel, job, take);
+    }
+
+    fn log(&self, mut line: Line) {
+        if let Some(machine) = current() {
+            let surroundings = &machine.surroundings;
+            line.instance = surroundings.running.get();
+            line.at_ns = surroundings.now_ns.get();
+            surroundings.logs.borrow_mut().push(line);
+        }
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {

@@ -3,6 +3,7 @@
 use std::ops::Deref;
 
 use fass::edge::Outcome;
+use fass::log::Line;
 use sched_dag::Instance;
 use sched_dag::engine::Run;
 use sched_dag::journal::{Event, What};
@@ -52,6 +53,9 @@ pub struct Report {
     pub(crate) degraded: Vec<bool>,
     /// All events in the order in which they happened.
     pub events: Vec<Event>,
+    /// The lines of the [log](fass::log!) so far, as people are shown them on other platforms: a
+    /// level, DAG, subtask and job, the time, the text and the fields.
+    pub logs: Vec<String>,
     /// The time of the last event.
     pub end_ns: u64,
     /// In a replay, how many values were compared with recorded ones.
@@ -91,11 +95,14 @@ impl Report {
             })
         });
         let jobs = of(What::Released).filter_map(|event| JobRecord::new(&run, event));
+        let logs = calls.machine.logs.borrow();
+        let shown = |line: &Line| line.shown(Some(run.task_set())).to_string();
         Self {
             instances: instances.collect(),
             jobs: jobs.collect(),
             panics: calls.panics.clone(),
             degraded: calls.degraded.clone(),
+            logs: logs.iter().map(shown).collect(),
             end_ns,
             compared: outcome.compared,
             uncompared: outcome.uncompared,

@@ -4,8 +4,9 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
 use fass::Wire;
-use sched_dag::DagId;
+use fass::log::Line;
 use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, Instance};
 
 use crate::edge::Edge;
 use crate::settings::Settings;
@@ -23,6 +24,10 @@ pub(crate) struct Surroundings {
     pub(crate) now_ns: Cell<u64>,
     /// What the running function has executed; `None` outside functions.
     pub(crate) executed_ns: Cell<Option<u64>>,
+    /// The instance of the running function.
+    pub(crate) running: Cell<Option<Instance>>,
+    /// The lines of the log so far.
+    pub(crate) logs: RefCell<Vec<Line>>,
     /// What is to come, by time and in the order in which it was made.
     arrivals: RefCell<BTreeMap<(u64, u64), Arrival>>,
     /// How much of that there has been.

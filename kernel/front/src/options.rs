@@ -13,7 +13,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// The kernel's own words, which every app has: `settings` takes them.
-const KERNELS: [&str; 20] = [
+const KERNELS: [&str; 21] = [
     "policy",
     "preemption",
     "budget_factor",
@@ -22,6 +22,7 @@ const KERNELS: [&str; 20] = [
     "trace_events",
     "bounds",
     "events",
+    "log",
     "measure",
     "idle",
     "console",
@@ -287,7 +288,7 @@ mod tests {
         assert_eq!(
             wrong,
             "`sed` is no option; there are jobs, seed, and for every app policy, preemption, \
-             budget_factor, overheads_ns, wcets, trace_events, bounds, events, measure, idle, \
+             budget_factor, overheads_ns, wcets, trace_events, bounds, events, log, measure, idle, \
              console, status, mode, probe, end, clock, avx, x2apic, cores, smt"
         );
     }

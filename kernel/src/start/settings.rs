@@ -15,6 +15,7 @@
 //! | `from=DAG/JOB` | the replay begins with that job, or with the last one before it of which all states are recorded | all jobs |
 //! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
 //! | `bounds=judge\|observe` | whether a run fails that exceeds a proven bound | `judge` |
+//! | `log=off\|error\|warn\|info\|debug` | up to which level lines of the log are said | `info` |
 //! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
 //! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or how much each subtask uses of its stack | `nothing` |
 //! | `console=off\|stop\|on\|echo` | whether a person can end a run by ctrl-C (`stop`), and talk to the kernel; `echo` sends back what is typed | `off` |

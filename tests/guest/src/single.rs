@@ -56,13 +56,15 @@ pub(crate) fn talkative(machine: &Machine) -> Result<(), Ending> {
     run(machine, &[single("talkative", 1, named("talks"), talk)])
 }
 
-/// Panics in job 1, and the app does not look at faults.
+/// Panics in job 1, and the app does not look at faults. It says so in the log beforehand.
 pub(crate) fn unnoticed(machine: &Machine) -> Result<(), Ending> {
     let mut jobs = 0;
     let panics = move || {
         jobs += 1;
+        fass::log!(Warn, "counted", jobs = jobs, of = "careless");
         assert_eq!(jobs, 1, "a panic on purpose");
     };
+    fass::log!(Info, "begins");
     run(machine, &[single("careless", 3, named("panics"), panics)])
 }
 

@@ -32,37 +32,40 @@ pub fn write_json(schema: &Schema, bytes: &[u8], out: &mut dyn Write) -> Result<
             let _ = out.write_char(',');
         }
         follows = !matches!(part, Part::Open(_) | Part::Field(_));
-        let _ = write_part(part, out);
+        let _ = write!(out, "{part}");
     })?;
     input.end()
 }
 
-fn write_part(part: Part<'_>, out: &mut dyn Write) -> fmt::Result {
-    match part {
-        Part::Open(None) => out.write_char('['),
-        Part::Close(None) => out.write_char(']'),
-        Part::Open(Some(_)) => out.write_char('{'),
-        Part::Close(Some(_)) => out.write_char('}'),
-        Part::Field(name) => {
-            write_text(name, out)?;
-            out.write_char(':')
+/// A part by itself is shown as JSON.
+impl fmt::Display for Part<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Part::Open(None) => out.write_char('['),
+            Part::Close(None) => out.write_char(']'),
+            Part::Open(Some(_)) => out.write_char('{'),
+            Part::Close(Some(_)) => out.write_char('}'),
+            Part::Field(name) => {
+                write_text(name, out)?;
+                out.write_char(':')
+            }
+            Part::Nothing => out.write_str("null"),
+            Part::Bool(truth) => write!(out, "{truth}"),
+            Part::Char(letter) => write_text(letter.encode_utf8(&mut [0; 4]), out),
+            Part::Text(text) => write_text(text, out),
+            // Most numbers are short, and are faster so.
+            Part::Unsigned(number) => match u64::try_from(number) {
+                Ok(number) => write!(out, "{number}"),
+                Err(_) => write!(out, "{number}"),
+            },
+            Part::Signed(number) => match i64::try_from(number) {
+                Ok(number) => write!(out, "{number}"),
+                Err(_) => write!(out, "{number}"),
+            },
+            Part::Single(number) if number.is_finite() => write!(out, "{number:?}"),
+            Part::Double(number) if number.is_finite() => write!(out, "{number:?}"),
+            Part::Single(_) | Part::Double(_) => out.write_str("null"),
         }
-        Part::Nothing => out.write_str("null"),
-        Part::Bool(truth) => write!(out, "{truth}"),
-        Part::Char(letter) => write_text(letter.encode_utf8(&mut [0; 4]), out),
-        Part::Text(text) => write_text(text, out),
-        // Most numbers are short, and are faster so.
-        Part::Unsigned(number) => match u64::try_from(number) {
-            Ok(number) => write!(out, "{number}"),
-            Err(_) => write!(out, "{number}"),
-        },
-        Part::Signed(number) => match i64::try_from(number) {
-            Ok(number) => write!(out, "{number}"),
-            Err(_) => write!(out, "{number}"),
-        },
-        Part::Single(number) if number.is_finite() => write!(out, "{number:?}"),
-        Part::Double(number) if number.is_finite() => write!(out, "{number:?}"),
-        Part::Single(_) | Part::Double(_) => out.write_str("null"),
     }
 }
 

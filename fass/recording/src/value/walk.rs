@@ -43,6 +43,32 @@ pub enum Part<'p> {
     Double(f64),
 }
 
+macro_rules! part_from {
+    ($($Part:ident: $($type:ty)+;)+) => {
+        $($(impl From<$type> for Part<'_> {
+            fn from(value: $type) -> Self {
+                Self::$Part(value.into())
+            }
+        })+)+
+    };
+}
+
+part_from!(
+    Bool: bool;
+    Char: char;
+    Text: &'static str;
+    Unsigned: u8 u16 u32 u64 u128;
+    Signed: i8 i16 i32 i64 i128;
+    Single: f32;
+    Double: f64;
+);
+
+impl From<usize> for Part<'_> {
+    fn from(value: usize) -> Self {
+        Self::Unsigned(value as u128)
+    }
+}
+
 impl Schema {
     /// Goes through a value of this type, part by part.
     ///

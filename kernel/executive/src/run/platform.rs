@@ -4,12 +4,13 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::edge::{Begin, Kept};
+use fass::log::Line;
 use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, Recorded, Terms};
 use sched_dag::DagId;
 
 use super::{edge, execution, occupation, record, stacks};
 use crate::machine::spinlock::SpinLock;
-use crate::machine::{clock, this_core};
+use crate::machine::{clock, interrupt_flag, this_core};
 
 /// The one kernel, as `fass` sees it.
 pub struct Kernel {
@@ -108,6 +109,16 @@ impl Platform for Kernel {
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
         edge::get().lend(channel, job, take);
+    }
+
+    fn log(&self, mut line: Line) {
+        let were_enabled = interrupt_flag::disable();
+        line.instance = execution::running(this_core::get());
+        if were_enabled {
+            interrupt_flag::enable();
+        }
+        line.at_ns = execution::since_epoch(clock::now_ns());
+        line.keep();
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {

@@ -10,7 +10,7 @@ use sched_dag::DagId;
 use sched_dag::engine::Run;
 
 use crate::options::UsageError;
-use crate::report::counts;
+use crate::report::{counts, log};
 use crate::text::json;
 
 /// Why an app ends other than by success.
@@ -69,6 +69,8 @@ pub enum Told {
 
 /// Prints how the app ended; the verdict is the last line.
 pub fn tell(result: &Result<(), Ending>) -> Told {
+    // What was said outside of runs.
+    log::tell(|| None);
     let (told, word) = match result {
         Ok(()) | Err(Ending::Shutdown) => (Told::Success, "success"),
         Err(Ending::Usage(_)) => (Told::Usage, "usage"),

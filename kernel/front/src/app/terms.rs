@@ -4,6 +4,8 @@
 use alloc::format;
 
 use fass::edge::job_of;
+use fass::log::Level::{Debug, Error, Info, Warn};
+use fass::log::{Level, set_level};
 use fass::{Overheads, Policy, Preemption, Terms};
 
 use crate::options::{Options, UsageError};
@@ -25,8 +27,11 @@ pub struct Chosen {
 }
 
 impl Chosen {
-    /// Takes the words. If they say so, commits print their DAGs from now on.
+    /// Takes the words. The log has its level from now on.
     pub fn read(options: &Options<'_>) -> Result<Self, UsageError> {
+        let levels = [Some(Info), None, Some(Error), Some(Warn), Some(Debug)];
+        let levels = levels.map(|most| (most.map_or("off", Level::word), most));
+        set_level(options.choice("log", &levels)?);
         Ok(Self {
             policy: options.choice("policy", &POLICIES)?,
             preemption: options.choice("preemption", &PREEMPTIONS)?,

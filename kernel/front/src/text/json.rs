@@ -135,7 +135,7 @@ impl Object<'_, '_> {
 
     /// Writes a field whose value is JSON already.
     #[inline(never)]
-    fn shown(&mut self, name: &str, value: &dyn Display) -> &mut Self {
+    pub(crate) fn shown(&mut self, name: &str, value: &dyn Display) -> &mut Self {
         let separator = if self.first { "" } else { "," };
         self.first = false;
         self.result = self

@@ -1,13 +1,15 @@
-//! The console: a person at standard input talks with the run.
+//! What people see and say while a run goes on: the log, and the console, at which a person at
+//! standard input talks with the run.
 
 use std::io::{self, BufReader, Read};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use fass::edge::Seen;
+use front::report::log;
 use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, Session};
 use linux::Control;
 use sched_dag::lifecycle::Request;
@@ -69,9 +71,10 @@ fn is_endless() -> bool {
     !IS_SHUT_DOWN.load(Ordering::Relaxed) && !Control::get().is_none_or(has_end)
 }
 
-/// Talks, from another thread, as long as `run` takes. Reports whether the person has ended it.
-pub(crate) fn talk_during<R>(run: impl FnOnce() -> R) -> (R, bool) {
-    INPUT.get_or_init(|| {
+/// Shows the log and, if there is a console, talks, from another thread, as long as `run` takes.
+/// Reports whether the person has ended it.
+pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, bool) {
+    let listen = || {
         let (bytes, input) = channel();
         thread::spawn(move || {
             let all = BufReader::new(io::stdin()).bytes().map_while(Result::ok);
@@ -83,25 +86,37 @@ pub(crate) fn talk_during<R>(run: impl FnOnce() -> R) -> (R, bool) {
             }
         });
         Mutex::new(input)
-    });
+    };
+    if has_console {
+        INPUT.get_or_init(listen);
+    }
     IS_SHUT_DOWN.store(false, Ordering::Relaxed);
-    let is_over = AtomicBool::new(false);
-    let result = thread::scope(|scope| {
-        scope.spawn(|| {
-            let mut session = Session::<LinuxRun>::new(false);
-            let mut is_raised = false;
-            while !is_over.load(Ordering::Acquire) {
-                if let Some(live) = Control::get().filter(|_| !is_raised) {
-                    live.raise();
+    // It is not scoped: where `run` panics, nobody waits for it.
+    let shared = Arc::new((Barrier::new(2), AtomicBool::new(false)));
+    let (has_begun, is_over) = &*shared;
+    let own = Arc::clone(&shared);
+    let thread = thread::spawn(move || {
+        let (has_begun, is_over) = &*own;
+        let mut session = has_console.then(|| Session::<LinuxRun>::new(false));
+        let mut is_raised = !has_console;
+        has_begun.wait();
+        while !is_over.load(Ordering::Acquire) {
+            if let Some(control) = Control::get() {
+                if !is_raised {
+                    control.raise();
                     is_raised = true;
                 }
-                while session.slice() {}
-                thread::sleep(Duration::from_nanos(PERIOD_NS));
+                log::tell(|| Some(Arc::clone(control.task_set())));
             }
-        });
-        let result = run();
-        is_over.store(true, Ordering::Release);
-        result
+            while session.as_mut().is_some_and(Session::slice) {}
+            thread::park_timeout(Duration::from_nanos(PERIOD_NS));
+        }
     });
+    // What it allocates to begin is not the run's.
+    has_begun.wait();
+    let result = run();
+    is_over.store(true, Ordering::Release);
+    thread.thread().unpark();
+    thread.join().expect("what it prints does not panic");
     (result, IS_SHUT_DOWN.load(Ordering::Relaxed))
 }

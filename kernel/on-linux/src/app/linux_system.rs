@@ -3,6 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
+use std::sync::Arc;
 use std::time::Duration;
 
 use fass::{Signal, Terms, Wire};
@@ -114,13 +115,11 @@ impl System for LinuxSystem {
             Some(epoch_ns) => self.linux.run_from(epoch_ns),
             None => self.linux.run(),
         };
-        let (run, is_closed) = match self.has_console {
-            true => console::talk_during(run),
-            false => (run(), false),
-        };
+        let (run, is_closed) = console::talk_during(self.has_console, run);
         self.is_closed.set(is_closed);
         let run = run.map_err(|why| failure(why.to_string()))?;
         drop(connection);
+        report::log::tell(|| Some(Arc::clone(run.task_set())));
         tell_faults(&run);
         let crossed = self.linux.end_recording(!self.is_shut_down());
         if let Some(outcome) = &crossed.0 {

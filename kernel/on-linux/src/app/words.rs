@@ -17,7 +17,7 @@
 //! | `from=DAG/JOB` | from that job on, or the last one before it of which all states are recorded | all jobs |
 //! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
 //!
-//! Besides, `policy`, `preemption`, `budget_factor` and `overheads_ns` mean
+//! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `bounds` and `log` mean
 //! what they mean on the machine.
 
 use std::borrow::Cow;

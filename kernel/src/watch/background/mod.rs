@@ -1,7 +1,7 @@
 //! What core 0 does for people while a run goes on, when it has nothing else to do.
 //!
-//! It prints progress, the status if the command line asks for it, and holds the
-//! console's conversation. All this is core 0's background, which is suspended
+//! It prints progress, what functions say in the log, and the status if the command line asks for
+//! it, and holds the console's conversation. All this is core 0's background, which is suspended
 //! whenever the core has an instance to run.
 //!
 //! It is not suspended within a *slice* of the status or the console, which holds a lock, with
@@ -28,9 +28,10 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use executive::machine::clock;
 use executive::machine::spinlock::SpinLock;
-use executive::run::heartbeat;
+use executive::run::{execution, heartbeat};
 use executive::text::console;
 use fass::SetOnce;
+use front::report::log;
 use front::shell::{self, Session};
 use listener::Listener;
 use live_run::KernelRun;
@@ -175,6 +176,7 @@ impl Background {
     /// Does what is due. Reports whether there is more to do at once.
     pub(crate) fn step(&mut self) -> bool {
         self.progress.print_when_due();
+        log::tell(execution::task_set);
         if let Some(listener) = &self.listener {
             listener.step();
         }
@@ -193,6 +195,7 @@ impl Background {
         if let Some(line) = LINE.get() {
             line.end();
         }
+        log::tell(execution::task_set);
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;

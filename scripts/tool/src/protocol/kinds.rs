@@ -17,6 +17,7 @@ progress: done total
 status: time_ns done total misses load_permille
 stalled: dag dag_name subtask subtask_name job cpu still_ns
 console: command accepted
+log: level message time_ns fields left_out
 wire: name packets bytes lost_packets malformed sent_bytes unsent_bytes
 dag_status: dag name state released completed in_flight waiting misses skips aborts faults failed \
     restarts

@@ -96,3 +96,25 @@ fn a_run_on_linux_of_which_no_topic_is_recorded_is_kept_too() {
     assert_eq!(counts, (1, 1, 1));
     assert!(record.lines.contains("\"kind\":\"verdict\""));
 }
+
+#[test]
+fn lines_of_the_log_are_kept_wherever_they_are_said() {
+    let folder = folder("kept-log");
+    let line = "run --app drone --cores 2 --append set=reserve=95 --keep run.kept";
+    for on in ["machine", "linux"] {
+        succeed(&folder, &format!("{line} --on {on}"));
+        let record = Record::read(&read(&folder, "run.kept")).expect("it is whole");
+        let transcript = record.transcript();
+        let low = transcript.of_kind("log").next().expect(&record.lines);
+        let said = ["level", "message", "subtask_name"].map(|member| low.text_at(member));
+        assert_eq!(said, ["warn", "battery low", "drain"].map(Some));
+        assert!(low.number_at("fields.reserve") == Some(95), "{}", low.text);
+        // The battery is looked at each 100 ms.
+        let job = low.number_at("job").expect("an instance says it");
+        assert!(
+            low.number_at("time_ns") >= Some(100_000_000 * job),
+            "{}",
+            low.text
+        );
+    }
+}
