@@ -145,7 +145,7 @@ fn an_app_that_ends_the_machine_itself_has_not_succeeded() {
 fn a_core_that_takes_no_interrupts_is_noticed_by_another() {
     let mut cores = ["deaf_alone", "deaf_beside"].map(|test| {
         let outcome = Guest::test(test).cores(2).end_in(Status::Failure);
-        let line = outcome.line("exception");
+        let line = outcome.line("panic");
         line.has([("job", 0)]);
         let message = line.member("message");
         let begins = "interrupts disabled for seconds";

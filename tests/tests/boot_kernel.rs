@@ -203,7 +203,7 @@ fn a_processor_exception_ends_in_failure_and_is_named() {
     ] {
         let guest = Guest::test("crime").word(&format!("crime={crime}"));
         let outcome = guest.end_in(Status::Failure);
-        outcome.only("exception");
+        outcome.only("panic");
         // The host names the function that the address lies in.
         let tail = outcome.tail();
         let named = tail.lines().any(|line| line.starts_with("  = 0x"));

@@ -104,7 +104,7 @@ fn the_same_image_runs_where_avx_is_missing_or_off() {
 fn avx_that_is_off_is_an_undefined_instruction() {
     let guest = Guest::test("crime").word("crime=avx avx=off");
     let outcome = guest.end_in(Status::Failure);
-    let exception = &outcome.line("exception").text;
+    let exception = &outcome.line("panic").text;
     assert!(exception.contains("invalid opcode"), "{exception}");
     let reason = Guest::new("fork-join").word("avx=512").refusal();
     assert_eq!(reason, "`avx=512`: allowed are on, off");

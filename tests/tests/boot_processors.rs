@@ -107,7 +107,7 @@ fn a_machine_check_is_reported() {
         let command = format!("mce {core} 4 0xb400000000000135 5 0x12340 0");
         let guest = guest.typing(&[("\"boot\"", &command)]);
         let outcome = guest.end_in(Status::Failure);
-        let exception = outcome.only("exception");
+        let exception = outcome.only("panic");
         exception.has([("cpu", core)]);
         let message = exception.member("message");
         let says = "machine check, bank 4: 0xb400000000000135 at 0x12340";

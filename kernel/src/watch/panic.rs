@@ -46,7 +46,7 @@ pub(crate) fn exception(exception: &Exception<'_>, interrupted: &mut Interrupted
     if !containment::end_faulty(exception, interrupted) {
         let registers = exception.registers;
         let place = fmt::from_fn(|f| write!(f, "{:#x}", registers.rip));
-        die("exception", exception, &place, Some(registers))
+        die("panic", exception, &place, Some(registers))
     }
 }
 

@@ -205,10 +205,9 @@ pub fn line(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) -> impl Display {
 }
 
 /// The kinds by which a run is judged.
-const KERNELS: [&str; 7] = [
+const KERNELS: [&str; 6] = [
     "boot",
     "commit_fault",
-    "exception",
     "fault",
     "panic",
     "stalled",
@@ -219,8 +218,8 @@ const KERNELS: [&str; 7] = [
 ///
 /// # Panics
 ///
-/// If the kind is the kernel's: `boot`, `commit_fault`, `exception`, `fault`, `panic`,
-/// `stalled` or `verdict`.
+/// If the kind is the kernel's: `boot`, `commit_fault`, `fault`, `panic`, `stalled` or
+/// `verdict`.
 ///
 /// ```no_run
 /// kernel::json::emit("run", |line| {

@@ -2,7 +2,7 @@
 //!
 //! A guest that reports a fault knows the address of the instruction, and its
 //! image has no names in it that it could read. So wherever the tool shows a line
-//! of kind `panic`, `exception` or `fault` whose `place` is an address, it adds one
+//! of kind `panic` or `fault` whose `place` is an address, it adds one
 //! line that names the function, and the app's line there, if there is one. After a line of
 //! kind `backtrace` it tells the calls (`backtrace`). What the guest printed stays as it is.
 //!
@@ -28,7 +28,7 @@ use backtrace::Call;
 const PROGRAM: &str = "addr2line";
 
 /// The kinds whose `place` may be an address.
-const KINDS: [&str; 4] = ["panic", "exception", "fault", BACKTRACE];
+const KINDS: [&str; 3] = ["panic", "fault", BACKTRACE];
 
 /// The kind that has the calls on a stack.
 const BACKTRACE: &str = "backtrace";
@@ -226,7 +226,7 @@ mod tests {
     fn an_address_of_a_fault_is_named_with_the_apps_line_and_nothing_else_is() {
         let places = Places::new(&std::env::current_exe().unwrap());
         let inside = in_file(fuse as *const () as usize);
-        let explained = places.explain(&line("exception", &inside)).unwrap();
+        let explained = places.explain(&line("panic", &inside)).unwrap();
         let (place, found) = explained.rsplit_once(':').unwrap();
         let name = "tool::places::tests::fuse, of scripts/tool/src/places/mod.rs";
         assert_eq!(place, format!("{inside} is {name}"));
