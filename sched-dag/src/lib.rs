@@ -96,7 +96,6 @@ extern crate alloc;
 
 pub mod analysis;
 pub mod chains;
-mod clusters;
 pub mod engine;
 mod fnv;
 mod graph;
@@ -121,7 +120,7 @@ pub mod virtual_time;
 pub mod wcets;
 mod worded;
 
-pub use clusters::{Clusters, Why};
+pub use crate::policy::{Clusters, Why};
 pub use ids::{ClusterId, CoreId, DagId, Instance, ModeId, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use key::{DagKey, SubtaskKey};

@@ -2,7 +2,7 @@
 //!
 //! A subtask that may change what runs says so at its registration, as one that raises a signal
 //! does. What its function asks for takes effect when its instance is complete (R3); the rules L1
-//! to L6 are in `sched-dag/src/lifecycle/`.
+//! to L6 are in `sched-dag/src/lifecycle.rs`.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;

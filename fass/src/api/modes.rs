@@ -1,6 +1,6 @@
 //! Modes: named sets of DAGs, one of which runs, and the functions that change it.
 //!
-//! `sched-dag/src/lifecycle/modes.rs` has the rules, M1 to M7.
+//! `sched-dag/src/lifecycle.rs` has the rules, M1 to M7.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;

@@ -11,7 +11,7 @@
 //!   the DAG's paths and, where there is none, that of registration. Readers
 //!   between two updates may run at the same time. The commit adds the precedence
 //!   edges that this takes, and the analysis sees them
-//!   (`sched-dag/src/verify/states.rs` has the rule).
+//!   (`sched-dag/src/verify/topics.rs` has the rule).
 //! - Job k + 1 finds what job k left: a DAG whose subtasks share a state has one job
 //!   in flight. A `Dag::in_flight` beyond 1 is then refused.
 //! - Nobody waits for a state in mid-function, so there is no blocking to account

@@ -20,10 +20,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::cmp::Reverse;
 
-use super::answer::{Answer, Settings};
 use super::judge::answer;
 use super::multi_path::multi_path;
 use super::task::Task;
+use super::{Answer, Settings};
 use crate::ids::{DagId, to_u32};
 use crate::policy::Order;
 use crate::task_set::{Dag, TaskSet};

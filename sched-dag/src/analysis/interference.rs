@@ -8,11 +8,11 @@
 
 use alloc::vec::Vec;
 
-use super::bursts::Bursts;
 use super::cover::covers_and_parts;
-use super::non_preemptive::{Blocking, largest};
+use super::one_core::{Blocking, largest};
 use super::task::Task;
 use super::width::parallelism;
+use super::workload::Bursts;
 use super::workload::{Piece, Workload};
 
 /// Which interference the multi-path equations count; each is a bound, the later the tighter.

@@ -17,14 +17,11 @@
 //! | `intra_task` | one DAG alone, by its subtasks' priorities | He 2019 |
 //! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
 //! | `set` | the equations of all DAGs, solved exactly | |
-//! | `non_preemptive` | subtasks that keep their core | derived here |
-//! | `one_core` | response times and demand on one core | Joseph and Pandya 1986; Baruah 1990 |
+//! | `one_core` | response times and demand on one core; subtasks that keep their core | Joseph and Pandya 1986; Baruah 1990 |
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
-//! | `capacity`, `bonifaci` | utilisation tests | Li 2014; Bonifaci 2013 |
-//! | `federated` | dedicated cores | Li 2014; Baruah 2015 |
-//! | `sinks` | sinks with deadlines of their own | derived here |
-//! | `judge`, `relation`, `answer`, `overheads` | the verdict at commit | |
-//! | `assign` | the commit's own clusters | Li 2014 |
+//! | `utilisation` | utilisation tests | Li 2014; Bonifaci 2013 |
+//! | `judge`, `overheads` | the verdict at commit, also for sinks with deadlines of their own | |
+//! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
 //! | `fixed_order` | orders that the commit fixes | Graham 1969 |
 //! | `witness` | what it takes to check the bounds | |
 //!
@@ -65,23 +62,16 @@
 //!   evidence, not on a reviewed proof. The multi-path bound is proven in
 //!   `docs/multi-path-bound.md`.
 
-mod answer;
 mod assign;
-mod bursts;
 mod cover;
-mod federated;
 mod fixed_order;
 mod interference;
 mod intra_task;
 mod judge;
 mod multi_path;
-mod multi_path_sets;
-mod non_preemptive;
 mod one_core;
 mod overheads;
 mod pipelined;
-mod ratio;
-mod relation;
 mod set;
 mod task;
 mod utilisation;
@@ -89,19 +79,185 @@ mod width;
 mod witness;
 mod workload;
 
-pub use answer::{Answer, DagBound, NotProven, Reason, Settings, Test};
-pub use assign::{NotAssigned, Unassigned, assign};
+use alloc::vec::Vec;
+use core::fmt;
+use core::time::Duration;
+
+use crate::ids::{DagId, SubtaskId};
+use crate::policy::{Policy, Preemption};
+use crate::worded::texts;
+
+pub use assign::{Federation, NotAssigned, Unassigned, assign, federated};
 pub use cover::covers;
-pub use federated::{Federation, federated};
 pub use fixed_order::fix_orders;
 pub use interference::Clip;
 pub use intra_task::{PATH_LIMIT, intra_task};
 pub use judge::answer;
 pub use multi_path::multi_path;
-pub use multi_path_sets::{multi_path_edf, multi_path_fp};
 pub use overheads::{OverheadSource, Overheads};
 pub use pipelined::Refusal;
+pub use set::{multi_path_edf, multi_path_fp};
 pub use task::{Task, TaskError};
 pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
 pub use width::{SUBTASK_LIMIT, parallelism, width};
 pub use witness::witness;
+
+/// Under what conditions the DAGs will run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// How ready instances are ordered.
+    pub policy: Policy,
+    /// Whether instances of preemptible subtasks may lose their core.
+    pub preemption: Preemption,
+    /// The number of identical cores, all for these DAGs.
+    pub cores: u32,
+    /// Costs of the platform, added to each WCET.
+    pub overheads: Overheads,
+}
+
+/// The response-time bounds of a set of DAGs, as far as they are proven.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// The bound of each DAG, in the order of the commit; `None`: not proven.
+    ///
+    /// A bound stands for itself: DAGs that are not proven do not weaken it.
+    pub bounds: Vec<Option<DagBound>>,
+    /// The bound of each sink of each DAG, in the order of [`Dag::sinks`]: the most time
+    /// from a job's nominal release to the sink's finish. `None`: its DAG is not proven.
+    ///
+    /// [`Dag::sinks`]: crate::Dag::sinks
+    pub sinks_ns: Vec<Vec<Option<u64>>>,
+    /// Why a DAG has no bound, in the order of the commit; `None`: it has one.
+    pub reasons: Vec<Option<Reason>>,
+    /// The first DAG that is not proven, and why; `None` if all are.
+    pub first_failing: Option<NotProven>,
+}
+
+/// A proven response-time bound, at most the relative deadline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DagBound {
+    /// The most time from a job's nominal release to its last finish.
+    pub bound_ns: u64,
+    /// The test that gave it.
+    pub test: Test,
+}
+
+texts! {
+    /// The test that gave a bound.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum Test {
+        /// The multi-path bound: nothing else can delay this DAG.
+        Alone = "multiple paths";
+        /// Intra-task priorities: nothing else can delay this DAG.
+        IntraTask = "intra-task priorities (He et al. 2019)";
+        /// The multi-path bound under global fixed priorities.
+        FixedPriority = "multiple paths under global fixed priorities";
+        /// The multi-path bound under global EDF.
+        Edf = "multiple paths under global EDF";
+        /// The multi-path bound of subtasks that keep their core.
+        NonPreemptive = "multiple paths of non-preemptive subtasks";
+        /// Jobs that overlap, with either policy.
+        Pipelined = "overlapping jobs";
+        /// The multi-path bound in any work-conserving order: all other DAGs count in full.
+        AnyOrder = "multiple paths in any work-conserving order";
+        /// Response-time analysis of one core under static priorities.
+        OneCore = "response times on one core (Joseph and Pandya 1986)";
+        /// Processor demand of one core under EDF; the bound is the deadline itself.
+        Demand = "processor demand of one core (Baruah et al. 1990)";
+        /// Capacity augmentation for EDF or RM; the bound is the deadline itself.
+        Capacity = "capacity augmentation (Li et al. 2014)";
+        /// Speed-up tests for EDF or DM; the bound is the deadline itself.
+        SpeedUp = "speed-up (Bonifaci et al. 2013)";
+    }
+}
+
+/// A DAG without a proven bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NotProven {
+    /// The DAG.
+    pub dag: DagId,
+    /// Why there is no bound.
+    pub reason: Reason,
+}
+
+texts! {
+    /// Why a DAG is not proven to meet its deadlines. Lengths are those with overheads.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Reason {
+        /// The DAG cannot be analysed: a WCET is missing or numbers overflow.
+        Unknown(error: TaskError) = "{error}";
+        /// There are no cores.
+        NoCores = "there are no cores; give it at least one";
+        /// Certain to miss at WCETs: the longest path is longer than the deadline.
+        LengthBeyondDeadline { length_ns: u64 } =
+            "its longest path alone takes {:?}, which is more than its relative deadline; shorten \
+             the path or relax the deadline", Duration::from_nanos(*length_ns);
+        /// Certain to miss at WCETs: the longest path to a sink is longer than its deadline.
+        PathBeyondDeadline { sink: SubtaskId, length_ns: u64 } =
+            "the longest path to subtask {} alone takes {:?}, which is more than the relative \
+             deadline of that sink; shorten the path or relax the deadline",
+            sink.0, Duration::from_nanos(*length_ns);
+        /// The job has a bound, but this sink none that is within its own deadline.
+        NoSinkBound { sink: SubtaskId } =
+            "no test bounds the response time of subtask {} by the relative deadline of that sink \
+             (it may still meet it); add cores or relax the deadline", sink.0;
+        /// Certain to fall behind at WCETs: a subtask needs more than a period.
+        SubtaskBeyondPeriod { subtask: SubtaskId } =
+            "subtask {} alone takes more than a period; split it or lengthen the period", subtask.0;
+        /// Certain to fall behind at WCETs: with this DAG, in order of urgency, the
+        /// DAGs need more than all cores.
+        Overload =
+            "up to it, the DAGs need more time than all cores have; add cores, lengthen periods or \
+             shorten subtasks";
+        /// Another DAG, which may delay this one, is not proven itself.
+        DelayedBy { dag: DagId } =
+            "dag {}, which may delay it, is not proven itself; see to that one first", dag.0;
+        /// No test bounds the response time by the deadline. That does not say
+        /// that deadlines will be missed.
+        NoBound =
+            "no test bounds its response time by its relative deadline (it may still meet it); add \
+             cores, raise its priority or relax the deadline";
+        /// As [`NoBound`](Self::NoBound), but with more jobs allowed in flight
+        /// there might be one.
+        InFlightTooFew { in_flight: u32 } =
+            "no test bounds its response time by {in_flight} periods, the most jobs that it may \
+             have in flight; allow more, or relax the load";
+        /// The analysis reached one of its limits on time or size of numbers.
+        Limit =
+            "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \
+             periods";
+    }
+}
+
+impl Answer {
+    /// Reports whether every DAG has a bound.
+    #[must_use]
+    pub const fn is_proven(&self) -> bool {
+        self.first_failing.is_none()
+    }
+}
+
+impl Reason {
+    /// Reports whether deadlines will be missed when every instance takes its
+    /// WCET, rather than merely not being proven to be met.
+    #[must_use]
+    pub const fn is_certain(&self) -> bool {
+        matches!(
+            self,
+            Self::LengthBeyondDeadline { .. }
+                | Self::PathBeyondDeadline { .. }
+                | Self::SubtaskBeyondPeriod { .. }
+                | Self::Overload
+        )
+    }
+}
+
+impl fmt::Display for NotProven {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "dag {} is not proven to meet its deadlines: {}",
+            self.dag.0, self.reason
+        )
+    }
+}

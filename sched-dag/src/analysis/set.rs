@@ -15,14 +15,17 @@
 //!
 //! A DAG that fails takes those with it that it may outrank, since their
 //! workloads would rest on a bound that does not exist; others keep theirs.
+//!
+//! [`multi_path_fp`] and [`multi_path_edf`] take or refuse a set at once, as the literature compares
+//! tests; a commit asks [`answer()`](super::answer()), which judges each DAG on its own account.
 
 use alloc::vec::Vec;
 
-use super::bursts::Bursts;
 use super::interference::{Clip, Delays, Other, Shape};
 use super::multi_path::{Equations, alone};
 use super::pipelined::{Figures, OWN_STEPS, Refusal, STEP_LIMIT, Unsolved};
 use super::task::Task;
+use super::workload::Bursts;
 use super::workload::Workload;
 
 /// DAGs with what enters their equations.
@@ -304,4 +307,61 @@ impl Steps {
 pub(super) fn constrained(tasks: &[&Task], cores: u32) -> bool {
     let one = |task: &&Task| task.relative_deadline_ns() <= task.period_ns();
     cores > 0 && tasks.iter().all(one)
+}
+
+/// Bounds the response times under global fixed priorities, the DAGs given from the highest
+/// priority to the lowest; also of jobs that overlap.
+///
+/// # Errors
+///
+/// [`Refusal`] if there is no core, or a DAG has no bound within its deadline.
+pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64>, Refusal> {
+    if cores == 0 {
+        return Err(Refusal::DoesNotApply);
+    }
+    let mut set = Set::new(tasks, cores);
+    set.clip = clip;
+    let order: Vec<usize> = (0..tasks.len()).collect();
+    set.solve(&order, |other, dag| other < dag).complete()
+}
+
+/// Bounds the response times under global EDF, in the order given: down from the
+/// deadlines, so it accepts a little less than [`answer()`](super::answer()).
+///
+/// # Errors
+///
+/// [`Refusal`] if a DAG has `D > T`, or no bound within its deadline.
+pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64>, Refusal> {
+    if !constrained(tasks, cores) {
+        return Err(Refusal::DoesNotApply);
+    }
+    let mut set = Set::new(tasks, cores);
+    set.clip = clip;
+    set.deadlines_limit = true;
+    set.down_from_deadlines(|_, _| true)
+        .map_err(|(position, why)| why.at(position))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Clip, multi_path_fp};
+    use crate::analysis::Task;
+
+    #[test]
+    fn nothing_beside_the_chains_is_not_nothing_to_wait_for() {
+        let high = Task::new(100, 100, vec![3, 3], &[]).unwrap();
+        let low = Task::new(100, 100, vec![5], &[]).unwrap();
+        for clip in [Clip::Window, Clip::Waiting, Clip::Chains] {
+            assert_eq!(multi_path_fp(&[&high, &low], 2, clip), Ok(vec![3, 8]));
+        }
+    }
+
+    #[test]
+    fn interference_counts_only_while_the_job_waits() {
+        // One of two cores is always free for the chain, so at most 2 of the 9 matter.
+        let long = Task::new(100, 100, vec![9, 2], &[]).unwrap();
+        let low = Task::new(100, 100, vec![4, 4], &[(0, 1)]).unwrap();
+        let bounds = |clip| multi_path_fp(&[&long, &low], 2, clip).unwrap()[1];
+        assert_eq!((bounds(Clip::Window), bounds(Clip::Chains)), (14, 11));
+    }
 }

@@ -50,14 +50,14 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{self, Write};
 
-use super::answer::{DagBound, Settings, Test};
-use super::bursts::Bursts;
 use super::cover::{Chain, covering, heaviest, peel};
 use super::interference::{Delays, Other};
 use super::intra_task::each_path;
-use super::judge::{self, Case, sinks, with_case};
+use super::judge::{self, Case, with_case};
 use super::one_core::{Response, demand};
 use super::pipelined::{Figures, STEP_LIMIT};
+use super::workload::Bursts;
+use super::{DagBound, Settings, Test};
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::to_u32;
 use crate::policy::{Policy, Preemption};
@@ -91,9 +91,9 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> Stri
         let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
         let responses: Vec<Option<u64>> = responses.collect();
         let by_demand = |bound: &DagBound| bound.test == Test::Demand;
-        let is_asked = case.relation.ranks_sinks && judge::one_core::are_in_time(case);
+        let is_asked = case.relation.ranks_sinks && judge::are_in_time(case);
         if (is_asked || bounds.iter().flatten().any(by_demand))
-            && let Some((busy, times)) = demand(&judge::one_core::all_dues(case), &case.set.bursts)
+            && let Some((busy, times)) = demand(&judge::all_dues(case), &case.set.bursts)
         {
             let numbers = core::iter::once(busy).chain(times);
             text.list("demand", numbers.map(u128::cast_signed));
@@ -246,7 +246,7 @@ impl Text {
 
     /// Writes the bounds of sinks that are below their job's.
     fn sinks(&mut self, case: &Case<'_>, responses: &[Option<u64>], dag: usize, whole_ns: u64) {
-        for (sink, equation) in sinks::equations(case, dag, responses) {
+        for (sink, equation) in judge::equations(case, dag, responses) {
             if let Some((figures, delays)) = equation
                 && let Ok(bound_ns) = figures.solve(&delays, 0, &mut { STEP_LIMIT })
                 && bound_ns < whole_ns
@@ -325,7 +325,7 @@ impl Text {
     }
 
     fn response(&mut self, case: &Case<'_>, dag: usize, bound_ns: u64) {
-        let (id, loads) = (case.members[dag], judge::one_core::loads(case));
+        let (id, loads) = (case.members[dag], judge::loads(case));
         let response = Response::of(&loads, &case.set.bursts, dag);
         let blocked = response.blocking;
         self.line(format_args!("bound {id} {bound_ns} response {blocked}"));

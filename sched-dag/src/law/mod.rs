@@ -29,7 +29,6 @@ mod replay;
 pub mod sweep;
 mod tally;
 mod violation;
-mod words;
 
 use alloc::vec;
 use alloc::vec::Vec;

@@ -34,14 +34,10 @@
 //! It does not know execution times: a subtask that never returns keeps its
 //! core (or, preempted, its place in line). It does not measure, it believes
 //! the driver's times; a time earlier than one before counts as that one.
+//!
 
 mod bits;
-mod by_deadline;
-mod cores;
 mod dispatch;
-mod dropping;
-mod hand_off;
-mod heap;
 mod instances;
 mod jobs;
 mod key;
@@ -51,7 +47,6 @@ mod overrun;
 mod phase;
 mod ready_queue;
 mod signals;
-mod statistics;
 mod vertices;
 
 use alloc::boxed::Box;
@@ -59,24 +54,20 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::hash::{Hash, Hasher};
 
-pub use dispatch::Decision;
-pub use hand_off::HandOff;
-pub use log::{Log, Notice};
-pub use moment::Moment;
-pub use phase::{DagPhase, Snapshot};
-pub use statistics::DagStatistics;
-
-use cores::Cores;
-use dropping::Survived;
-use heap::IndexedHeap;
-use jobs::Jobs;
-use ready_queue::ReadyQueue;
-use vertices::Vertices;
-
 use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
 use crate::journal::What;
 use crate::policy::SchedulerOptions;
+use crate::scheduler::dispatch::Cores;
+use crate::scheduler::jobs::Jobs;
+use crate::scheduler::phase::Survived;
+use crate::scheduler::ready_queue::{IndexedHeap, ReadyQueue};
+use crate::scheduler::vertices::Vertices;
 use crate::task_set::{Dag, TaskSet};
+
+pub use crate::scheduler::dispatch::{Decision, HandOff};
+pub use crate::scheduler::log::{Log, Notice};
+pub use crate::scheduler::moment::Moment;
+pub use crate::scheduler::phase::{DagPhase, Snapshot};
 
 /// The state of all jobs in flight.
 ///
@@ -376,4 +367,54 @@ impl Hash for Scheduler {
 #[inline]
 fn earliest_ns(timers: &IndexedHeap<u64>) -> u64 {
     timers.peek().map_or(u64::MAX, |(event_ns, _)| event_ns)
+}
+
+/// Counts over the jobs of one DAG since the scheduler was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct DagStatistics {
+    /// Jobs released.
+    pub released: u64,
+    /// Jobs of which all subtasks have finished.
+    pub completed: u64,
+    /// Jobs whose deadline has passed before they were complete, whether they
+    /// were released or still waited for their release.
+    pub misses: u64,
+    /// Misses since a job last met its deadline.
+    pub consecutive_misses: u64,
+    /// The most misses without a job between them that met its deadline.
+    pub most_consecutive_misses: u64,
+    /// Releases that did not happen.
+    pub skips: u64,
+    /// Jobs aborted.
+    pub aborts: u64,
+    /// Releases that had to wait for an older job to end.
+    pub queued: u64,
+    /// Signals to a sporadic DAG.
+    pub signals: u64,
+    /// Signals that came while an earlier one was still kept, or no job was left.
+    pub dropped_signals: u64,
+    /// Instances that a fault has ended.
+    pub faults: u64,
+    /// Jobs that a fault has cut while the DAG went on.
+    pub failed: u64,
+    /// Faults after which the DAG went on.
+    pub restarts: u64,
+    /// Jobs that were in flight when the DAG was ended, without those cut before.
+    pub cut_short: u64,
+    /// Releases that still waited for an older job when the DAG was ended.
+    pub dropped: u64,
+}
+
+impl DagStatistics {
+    #[inline]
+    fn count_miss(&mut self) {
+        self.misses += 1;
+        self.consecutive_misses += 1;
+        self.most_consecutive_misses = self.most_consecutive_misses.max(self.consecutive_misses);
+    }
+
+    #[inline]
+    fn count_met(&mut self) {
+        self.consecutive_misses = 0;
+    }
 }

@@ -7,13 +7,13 @@
 
 use alloc::vec::Vec;
 
+use super::CommitOptions;
 use super::MAX_ARITY;
 use super::fault::{Direction, Fault, Time, Warning};
-use super::findings::{Findings, Page};
-use super::interner::Interner;
 use super::label::SubtaskLabel;
-use super::options::CommitOptions;
-use super::states::is_shared;
+use super::names::Interner;
+use super::topics::is_shared;
+use super::{Findings, Page};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};

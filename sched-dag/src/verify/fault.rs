@@ -10,7 +10,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::label::{DagLabel, SubtaskLabel};
-use super::phrases::{list, members, ns, one_up_to, own_input, question, ring, undivided};
+use super::label::{list, members, ns, one_up_to, own_input, question, ring, undivided};
 use crate::MAX_ARITY;
 use crate::ids::ClusterId;
 use crate::policy::Priority;

@@ -7,33 +7,31 @@
 //! Each check goes on after a fault with what the author most likely meant, so
 //! that one slip is one fault and hides no other. The whole costs time linear
 //! in subtasks, ports and edges, but for sorting numbers; nothing recurs.
+//!
+//! Words: the *construction policy* says which shapes of graph are wanted. Its
+//! default is the paper's: exactly one source and one sink, connected, and one
+//! writer a topic. Every relaxation is a choice that the caller writes down.
 
 mod attributes;
-mod cycles;
 mod fault;
-mod findings;
-mod interner;
 mod label;
-mod misspelt;
 mod model;
-mod options;
-mod phrases;
+mod names;
 mod shape;
-mod states;
 mod topics;
 
 use alloc::vec::Vec;
 use core::borrow::Borrow;
 use core::fmt;
 
-pub use fault::{Direction, Fault, Time, Warning};
-pub use label::{DagLabel, SubtaskLabel};
-pub use options::{CommitOptions, ConstructionPolicy, Count};
-
-use findings::Findings;
-
+use crate::order::sorted_by_key;
+use crate::policy::Clusters;
+use crate::policy::Policy;
 use crate::spec::DagSpec;
 use crate::task_set::TaskSet;
+
+pub use fault::{Direction, Fault, Time, Warning};
+pub use label::{DagLabel, SubtaskLabel};
 
 /// The most inputs and the most outputs that a subtask may have.
 pub const MAX_ARITY: usize = 16;
@@ -70,7 +68,7 @@ pub fn verify<S: Borrow<DagSpec>>(
 fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<Verified, Rejected> {
     let (mut findings, policy) = (Findings::new(specs), options.construction);
     attributes::check(options, &mut findings);
-    states::check(&mut findings);
+    topics::check_states(&mut findings);
     let topologies = topics::check(options, &mut findings);
     let shapes = topologies.into_iter().enumerate();
     let shapes = shapes.map(|(dag, topology)| shape::check(dag, topology, policy, &mut findings));
@@ -81,7 +79,7 @@ fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<Verified, R
         model::build(options, shapes, &mut findings)
     };
     let (mut faults, warnings) = findings.into_parts();
-    misspelt::suggest(specs, &mut faults);
+    names::suggest(specs, &mut faults);
     match task_set {
         Some(task_set) => Ok(Verified { task_set, warnings }),
         None => Err(Rejected { faults, warnings }),
@@ -138,3 +136,188 @@ pub fn write_faults(faults: &[impl fmt::Display], f: &mut fmt::Formatter<'_>) ->
 }
 
 impl core::error::Error for Rejected {}
+
+/// The DAGs, and what has been found so far.
+struct Findings<'s> {
+    specs: &'s [&'s DagSpec],
+    /// Each fault with the position of its DAG.
+    faults: Vec<(usize, Fault)>,
+    warnings: Vec<Warning>,
+}
+
+/// The page of one DAG.
+struct Page<'f, 's> {
+    dag: usize,
+    spec: &'s DagSpec,
+    findings: &'f mut Findings<'s>,
+}
+
+impl<'s> Findings<'s> {
+    const fn new(specs: &'s [&'s DagSpec]) -> Self {
+        Self {
+            specs,
+            faults: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Opens the page of a DAG.
+    fn of(&mut self, dag: usize) -> Page<'_, 's> {
+        let spec = self.specs[dag];
+        let findings = self;
+        Page {
+            dag,
+            spec,
+            findings,
+        }
+    }
+
+    fn label(&self, dag: usize) -> DagLabel {
+        DagLabel::new(self.specs, dag)
+    }
+
+    /// Notes a fault of the whole commit, which counts as DAG 0's.
+    fn fault(&mut self, fault: Fault) {
+        self.faults.push((0, fault));
+    }
+
+    fn has_faults(&self) -> bool {
+        !self.faults.is_empty()
+    }
+
+    /// Returns the faults in the order of the DAGs and, within a DAG, in the
+    /// order of the checks.
+    fn into_parts(self) -> (Vec<Fault>, Vec<Warning>) {
+        let order = sorted_by_key(self.faults.len(), |fault| self.faults[fault].0);
+        let faults = self.faults.into_iter().map(|(_, fault)| Some(fault));
+        let mut faults: Vec<Option<Fault>> = faults.collect();
+        let faults = order.into_iter().filter_map(|fault| faults[fault].take());
+        (faults.collect(), self.warnings)
+    }
+}
+
+impl Page<'_, '_> {
+    fn label(&self) -> DagLabel {
+        self.findings.label(self.dag)
+    }
+
+    fn subtask(&self, subtask: usize) -> SubtaskLabel {
+        SubtaskLabel::new(self.spec, subtask)
+    }
+
+    /// Notes a fault, which names the DAG.
+    fn fault(&mut self, fault: impl FnOnce(DagLabel) -> Fault) {
+        let fault = fault(self.label());
+        self.findings.faults.push((self.dag, fault));
+    }
+
+    /// Notes a warning, which names the DAG.
+    fn warn(&mut self, warning: impl FnOnce(DagLabel) -> Warning) {
+        let warning = warning(self.label());
+        self.findings.warnings.push(warning);
+    }
+}
+
+/// What the verification is told besides the DAGs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct CommitOptions {
+    /// How ready instances will be ordered; decides which attributes are needed.
+    pub policy: Policy,
+    /// The number of cores that the scheduler will serve, at least 1.
+    pub cores: u32,
+    /// How these are divided.
+    pub clusters: Clusters,
+    /// Which shapes of graph are wanted.
+    pub construction: ConstructionPolicy,
+    /// The most instances that the jobs in flight of all DAGs may have: the sum
+    /// over the DAGs of jobs in flight times subtasks. It bounds the memory that
+    /// the scheduler and the edges' slots take. Default: 2^20.
+    pub instance_limit: u32,
+}
+
+/// Which shapes of graph a commit accepts.
+///
+/// The default is the paper's: one source, one sink, one writer a topic, and
+/// every subtask connected with every other when the edges' directions are
+/// ignored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub struct ConstructionPolicy {
+    /// How many subtasks may have no predecessor.
+    pub sources: Count,
+    /// How many subtasks may have no successor.
+    pub sinks: Count,
+    /// How many subtasks may write one topic. With [`Count::Several`] a reader
+    /// waits for all of them.
+    pub writers: Count,
+    /// How many parts without an edge between them a DAG may fall into.
+    pub parts: Count,
+}
+
+/// How many of something a DAG may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Count {
+    /// Exactly one.
+    #[default]
+    One,
+    /// One or more.
+    Several,
+}
+
+impl CommitOptions {
+    /// Returns options with the paper's construction policy.
+    #[must_use]
+    pub const fn new(policy: Policy, cores: u32) -> Self {
+        Self {
+            policy,
+            cores,
+            clusters: Clusters::Undivided,
+            construction: ConstructionPolicy::paper(),
+            instance_limit: 1 << 20,
+        }
+    }
+
+    /// Returns the same options with another construction policy.
+    #[must_use]
+    pub const fn with_construction(mut self, construction: ConstructionPolicy) -> Self {
+        self.construction = construction;
+        self
+    }
+
+    /// Returns the same options with the cores divided.
+    #[must_use]
+    pub fn with_clusters(mut self, clusters: Clusters) -> Self {
+        self.clusters = clusters;
+        self
+    }
+
+    /// Returns the same options with another bound on instances in flight.
+    #[must_use]
+    pub const fn with_instance_limit(mut self, instance_limit: u32) -> Self {
+        self.instance_limit = instance_limit;
+        self
+    }
+}
+
+impl ConstructionPolicy {
+    /// Returns the paper's policy, which is the default.
+    #[must_use]
+    pub const fn paper() -> Self {
+        Self::all(Count::One)
+    }
+
+    /// Returns the policy that accepts every acyclic graph.
+    #[must_use]
+    pub const fn any_graph() -> Self {
+        Self::all(Count::Several)
+    }
+
+    const fn all(count: Count) -> Self {
+        Self {
+            sources: count,
+            sinks: count,
+            writers: count,
+            parts: count,
+        }
+    }
+}

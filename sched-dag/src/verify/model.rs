@@ -2,10 +2,10 @@
 
 use alloc::vec::Vec;
 
+use super::CommitOptions;
+use super::Findings;
 use super::attributes::in_flight;
 use super::fault::Fault;
-use super::findings::Findings;
-use super::options::CommitOptions;
 use super::shape::Shape;
 use crate::graph::Graph;
 use crate::ids::SubtaskId;

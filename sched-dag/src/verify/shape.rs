@@ -1,17 +1,32 @@
 //! The checks of one DAG's graph as a whole: edges in range, sources, sinks,
 //! connection, cycles.
+//!
+//! # One shortest cycle for each knot of a graph
+//!
+//! A *knot* is a strongly connected component of two or more subtasks: a set in
+//! which each precedes each, found by Tarjan's algorithm (SIAM Journal on
+//! Computing 1, 1972) without recursion. One cycle a knot is reported, because
+//! the number of cycles may be exponential, and the shortest, because it is the
+//! easiest to read.
+//!
+//! Finding it takes one breadth-first search from each subtask of the knot. So
+//! that a wrong graph of any size is refused in bounded time, the searches of
+//! one graph share a budget of visited edges; beyond it the shortest cycle
+//! found so far is reported. Knots up to about a thousand subtasks stay below.
 
+use alloc::collections::VecDeque;
+use alloc::vec;
 use alloc::vec::Vec;
 
-use super::cycles;
 use super::fault::{Fault, Warning};
-use super::findings::{Findings, Page};
 use super::label::SubtaskLabel;
-use super::options::{ConstructionPolicy, Count};
-use super::states;
+use super::topics;
 use super::topics::Topology;
+use super::{ConstructionPolicy, Count};
+use super::{Findings, Page};
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
+use crate::order::{sorted, sorted_by_key};
 use crate::task_set::StatePrecedence;
 
 /// The graph of a DAG, with the edges that follow from shared states.
@@ -37,7 +52,7 @@ pub(super) fn check(
     check_sinks(&graph, policy, &topology.unread, page);
     check_deadlines(&graph, page);
     if !graph.is_acyclic() {
-        for cycle in cycles::shortest_cycles(&graph) {
+        for cycle in shortest_cycles(&graph) {
             let hops = labels(page, &cycle);
             page.fault(|dag| Fault::Cycle { dag, hops });
         }
@@ -45,7 +60,7 @@ pub(super) fn check(
     // Last, so that all other checks judge the graph that the author stated.
     let mut state_precedences = Vec::new();
     if graph.is_acyclic() {
-        state_precedences = states::order_users(spec, &graph);
+        state_precedences = topics::order_users(spec, &graph);
     }
     if !state_precedences.is_empty() {
         let added = state_precedences.iter();
@@ -187,4 +202,162 @@ fn check_deadlines(graph: &Graph, page: &mut Page<'_, '_>) {
 fn labels(page: &Page<'_, '_>, subtasks: &[SubtaskId]) -> Vec<SubtaskLabel> {
     let labels = subtasks.iter().map(|subtask| page.subtask(subtask.index()));
     labels.collect()
+}
+
+/// How many edges all searches of one graph may visit.
+const BUDGET: usize = 4_000_000;
+
+/// Not numbered yet, or in no knot.
+const NONE: u32 = u32::MAX;
+
+/// Returns one cycle for each knot, each from its smallest subtask on.
+fn shortest_cycles(graph: &Graph) -> Vec<Vec<SubtaskId>> {
+    let knots = knots(graph);
+    let mut knot_of = vec![NONE; graph.len()];
+    for (number, knot) in knots.iter().enumerate() {
+        for subtask in knot {
+            knot_of[subtask.index()] = to_u32(number);
+        }
+    }
+    let mut search = Search {
+        graph,
+        knot_of: &knot_of,
+        found_by: vec![NONE; graph.len()],
+        found_from: vec![SubtaskId(NONE); graph.len()],
+        queue: VecDeque::new(),
+        budget: BUDGET,
+    };
+    knots
+        .iter()
+        .filter_map(|knot| search.shortest_in(knot))
+        .collect()
+}
+
+/// Returns the knots, and within each the subtasks, ascending.
+#[inline(never)]
+fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
+    let mut number = vec![NONE; graph.len()];
+    let mut lowest = vec![NONE; graph.len()];
+    let mut open: Vec<SubtaskId> = Vec::new();
+    let mut is_open = vec![false; graph.len()];
+    let mut path: Vec<(SubtaskId, usize)> = Vec::new();
+    let mut next_number = 0;
+    let mut knots: Vec<Vec<SubtaskId>> = Vec::new();
+
+    for root in graph.subtasks() {
+        if number[root.index()] != NONE {
+            continue;
+        }
+        path.push((root, 0));
+        while let Some(&mut (subtask, ref mut tried)) = path.last_mut() {
+            let index = subtask.index();
+            if *tried == 0 {
+                number[index] = next_number;
+                lowest[index] = next_number;
+                next_number += 1;
+                open.push(subtask);
+                is_open[index] = true;
+            }
+            if let Some(&successor) = graph.successors.of(subtask).get(*tried) {
+                *tried += 1;
+                let to = successor.index();
+                if number[to] == NONE {
+                    path.push((successor, 0));
+                } else if is_open[to] {
+                    lowest[index] = lowest[index].min(number[to]);
+                }
+                continue;
+            }
+            path.pop();
+            if let Some(&(before, _)) = path.last() {
+                lowest[before.index()] = lowest[before.index()].min(lowest[index]);
+            }
+            if lowest[index] == number[index] {
+                let mut knot = Vec::new();
+                while let Some(member) = open.pop() {
+                    is_open[member.index()] = false;
+                    knot.push(member);
+                    if member == subtask {
+                        break;
+                    }
+                }
+                if knot.len() > 1 {
+                    knots.push(sorted(&knot));
+                }
+            }
+        }
+    }
+    // They have no member in common, so the first ones tell them apart.
+    let order = sorted_by_key(knots.len(), |knot| knots[knot].first().copied());
+    order
+        .iter()
+        .map(|&knot| core::mem::take(&mut knots[knot]))
+        .collect()
+}
+
+struct Search<'a> {
+    graph: &'a Graph,
+    knot_of: &'a [u32],
+    /// The root of the last search that found a subtask.
+    found_by: Vec<u32>,
+    /// From where it was found.
+    found_from: Vec<SubtaskId>,
+    queue: VecDeque<(SubtaskId, usize)>,
+    budget: usize,
+}
+
+impl Search<'_> {
+    fn shortest_in(&mut self, knot: &[SubtaskId]) -> Option<Vec<SubtaskId>> {
+        let mut best: Option<Vec<SubtaskId>> = None;
+        for &root in knot {
+            let below = best.as_ref().map_or(usize::MAX, Vec::len);
+            // Two is the length of the shortest cycle there can be.
+            if below == 2 || (self.budget == 0 && best.is_some()) {
+                break;
+            }
+            if let Some(cycle) = self.shortest_through(root, below) {
+                best = Some(cycle);
+            }
+        }
+        let mut cycle = best?;
+        let smallest = (0..cycle.len()).min_by_key(|&position| cycle[position])?;
+        cycle.rotate_left(smallest);
+        Some(cycle)
+    }
+
+    /// Returns a shortest cycle through `root` if it has fewer than `below` hops.
+    fn shortest_through(&mut self, root: SubtaskId, below: usize) -> Option<Vec<SubtaskId>> {
+        self.queue.clear();
+        self.queue.push_back((root, 1));
+        self.found_by[root.index()] = root.0;
+        while let Some((subtask, hops)) = self.queue.pop_front() {
+            if hops >= below {
+                return None;
+            }
+            for &successor in self.graph.successors.of(subtask) {
+                self.budget = self.budget.saturating_sub(1);
+                if successor == root {
+                    return Some(self.way_back(subtask, root));
+                }
+                let to = successor.index();
+                if self.knot_of[to] == self.knot_of[root.index()] && self.found_by[to] != root.0 {
+                    self.found_by[to] = root.0;
+                    self.found_from[to] = subtask;
+                    self.queue.push_back((successor, hops + 1));
+                }
+            }
+        }
+        None
+    }
+
+    fn way_back(&self, last: SubtaskId, root: SubtaskId) -> Vec<SubtaskId> {
+        let mut cycle = vec![last];
+        let mut at = last;
+        while at != root {
+            at = self.found_from[at.index()];
+            cycle.push(at);
+        }
+        cycle.reverse();
+        cycle
+    }
 }

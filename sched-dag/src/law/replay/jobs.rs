@@ -9,11 +9,34 @@
 //! scheduler's step that the last one brings about, within the tolerance. So is one that
 //! was aborted, or cut short by its DAG's end. Whether it is late is the affair of
 //! `deadlines`.
+//!
+//! # R4: when a job is late
+//!
+//! A job has missed a deadline if and only if a sink finishes later than its own. A core
+//! may finish in time while another one is just noticing the miss: that is a breach only
+//! if more than the tolerance lies between. Where times are exact, a miss is noticed at
+//! once: of several sinks, when the first deadline has passed that one of them does not
+//! meet.
+//!
+//! Of a job that was aborted, or cut short by its DAG's end, it is not judged.
+//!
+//! # R2 and R3: what an instance waits for, and what makes it ready
+//!
+//! The *conditions* of an instance are the finish of each predecessor in its job, the end
+//! of its subtask's instance in the precursor and, for a source, its job's release.
+//!
+//! R2: it is neither ready nor started before all of them. As each instance waits for the
+//! one before it, no two of one subtask overlap.
+//!
+//! R3: it becomes ready in the scheduler's step that one of its conditions brings about.
+//! With R2 that is the last one, so all that waits for a finish and for nothing else is
+//! released in one step. Which of two is the last is left open, for two cores may finish
+//! and then take the scheduler's lock in the other order. And it does become ready, within
+//! the tolerance.
 
 use alloc::vec::Vec;
 
-use super::lives::Life;
-use super::{Moment, OfDag, Replay};
+use super::{Life, Moment, OfDag, Replay};
 use crate::ids::{DagId, Instance, SubtaskId};
 use crate::journal::{Event, What};
 use crate::law::sweep::Stage;
@@ -334,5 +357,266 @@ impl Replay<'_> {
             Some(over_ns) => Some(Violation::NeverCompleted { dag, job, over_ns }),
             None => self.terms.is_complete.then_some(unfinished),
         }
+    }
+}
+
+/// The absolute deadline of a sink, and its finish.
+struct Due {
+    deadline_ns: u64,
+    finish_ns: Option<u64>,
+}
+
+impl Due {
+    fn is_met(&self) -> bool {
+        (self.finish_ns).is_some_and(|finish_ns| finish_ns <= self.deadline_ns)
+    }
+}
+
+impl Replay<'_> {
+    /// Returns what is due of a job; `None` if it is not known since when.
+    fn dues(&self, dag: DagId, known: &Job) -> Option<Vec<Due>> {
+        let release_ns = known.release_ns?;
+        let model = self.task_set.dag(dag);
+        let due = |sink: &SubtaskId| Due {
+            deadline_ns: release_ns.saturating_add(model.subtask(*sink).relative_deadline_ns()),
+            finish_ns: (known.life(*sink))
+                .and_then(|life| life.finish)
+                .map(|finish| finish.time_ns),
+        };
+        Some(model.sinks().iter().map(due).collect())
+    }
+
+    /// R4 for the deadlines of a job, as far as it has come.
+    fn missed_wrongly(&self, dag: DagId, job: u64) -> Option<Violation> {
+        let of_dag = &self.dags[dag.index()];
+        let known = of_dag.jobs.get(&job)?;
+        let dues = self.dues(dag, known)?;
+        let Some(missed) = known.missed else {
+            let late = dues
+                .iter()
+                .filter(|due| due.finish_ns.is_some() && !due.is_met());
+            let late = late.max_by_key(|due| due.finish_ns)?;
+            let finish_ns = late.finish_ns?;
+            let may_be_lost = self.may_be_lost(&dues);
+            let is_cut = known.cut.is_some() || of_dag.is_stopped;
+            return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
+                dag,
+                job,
+                finish_ns,
+                deadline_ns: late.deadline_ns,
+            });
+        };
+        // Which of several sinks is meant is not known if a finish may be lost.
+        if known.is_partial && dues.len() > 1 {
+            return None;
+        }
+        let event = Event {
+            time_ns: missed.time_ns,
+            what: What::Missed,
+            core: missed.core,
+            dag,
+            job,
+            subtask: None,
+        };
+        let may_be_meant = |due: &&Due| {
+            let finish_ns = due.finish_ns.filter(|_| due.is_met());
+            finish_ns.is_none_or(|finish_ns| self.is_tolerable(finish_ns, missed.time_ns))
+        };
+        let meant_ns = dues
+            .iter()
+            .filter(may_be_meant)
+            .map(|due| due.deadline_ns)
+            .min();
+        let earliest_ns = dues.iter().map(|due| due.deadline_ns).min()?;
+        let deadline_ns = meant_ns.unwrap_or(earliest_ns);
+        if missed.time_ns <= deadline_ns {
+            return Some(Violation::MissedEarly { event, deadline_ns });
+        }
+        if meant_ns.is_none() {
+            let last = dues.iter().max_by_key(|due| due.finish_ns)?;
+            return Some(Violation::MissedInTime {
+                event,
+                finish_ns: last.finish_ns?,
+                deadline_ns: last.deadline_ns,
+            });
+        }
+        let is_late = self.is_exact() && missed.time_ns > deadline_ns + 1;
+        is_late.then_some(Violation::MissedLate { event, deadline_ns })
+    }
+
+    /// Reports whether what followed from one of the deadlines may be among the events
+    /// that are lost: the job's miss, or an abort before.
+    fn may_be_lost(&self, dues: &[Due]) -> bool {
+        let earliest_ns = dues.iter().map(|due| due.deadline_ns).min();
+        !self.terms.is_whole && earliest_ns < self.first_ns
+    }
+
+    /// R4 at the end, for the deadlines of a job that is not complete.
+    pub(super) fn never_missed(&self, dag: DagId, job: u64) -> Option<Violation> {
+        let of_dag = &self.dags[dag.index()];
+        let known = of_dag.jobs.get(&job)?;
+        if known.completed.is_some() {
+            return None;
+        }
+        let judged = self.missed_wrongly(dag, job);
+        if judged.is_some() || known.missed.is_some() || known.cut.is_some() {
+            return judged;
+        }
+        let dues = self.dues(dag, known)?;
+        let unfinished = dues.iter().filter(|due| due.finish_ns.is_none());
+        let deadline_ns = unfinished.map(|due| due.deadline_ns).min()?;
+        let has_passed = !self.is_tolerable(deadline_ns, self.end_ns);
+        let is_missing = has_passed && !of_dag.is_stopped && !self.may_be_lost(&dues);
+        is_missing.then_some(Violation::NeverMissed {
+            dag,
+            job,
+            deadline_ns,
+            end_ns: self.end_ns,
+        })
+    }
+}
+
+/// A condition of an instance.
+struct Condition {
+    /// The instance that must be over; `None`: the release.
+    awaited: Option<Instance>,
+    /// When it held; `None`: it is not known to have held.
+    held: Option<Moment>,
+    /// Whether it may have held without leaving an event.
+    may_be_lost: bool,
+}
+
+impl Replay<'_> {
+    /// Judges that an instance becomes ready, or starts without having been.
+    pub(super) fn join(&mut self, event: &Event, instance: Instance, moment: Moment) {
+        let too_early = self.before_release(event, instance);
+        self.found.extend(too_early);
+        let too_early = self.before_join(event, instance);
+        let is_early = too_early.is_some();
+        self.found.extend(too_early);
+        if is_early || event.what != What::Ready {
+            return;
+        }
+        let Some(last) = self.last_condition(instance) else {
+            return;
+        };
+        let Some(held) = last.held else {
+            return;
+        };
+        let mut conditions = self.conditions(instance);
+        let is_same_step = |held: Moment| held.is_same_step(moment);
+        let has_cause = conditions.any(|condition| condition.held.is_some_and(is_same_step));
+        drop(conditions);
+        let (event, since_ns) = (*event, held.time_ns);
+        if !has_cause {
+            self.found.push(Violation::ReadyOutOfStep {
+                event,
+                last_ns: held.time_ns,
+                last_core: held.core,
+            });
+        } else if !self.is_tolerable(since_ns, event.time_ns) {
+            self.found.push(Violation::ReadyLate { event, since_ns });
+        }
+        if last.awaited.is_some() {
+            let latency_ns = event.time_ns.saturating_sub(since_ns);
+            self.finish_to_ready_max_ns = self.finish_to_ready_max_ns.max(latency_ns);
+        }
+    }
+
+    fn conditions(&self, instance: Instance) -> impl Iterator<Item = Condition> {
+        let Instance { dag, job, subtask } = instance;
+        let predecessors = self.task_set.dag(dag).predecessors(subtask);
+        let of_dag = &self.dags[dag.index()];
+        let known = of_dag.jobs.get(&job);
+        let is_partial = known.is_none_or(|known| known.is_partial);
+        let of_predecessors = predecessors.iter().map(move |&subtask| {
+            let life = known.and_then(|known| known.life(subtask));
+            Condition {
+                awaited: Some(Instance { dag, job, subtask }),
+                held: life.and_then(|life| life.finish),
+                may_be_lost: life.is_none() && is_partial,
+            }
+        });
+        let precursor = of_dag.jobs.range(..job).next_back();
+        let of_precursor = precursor.map(|(&job, known)| {
+            let life = known.life(subtask);
+            Condition {
+                awaited: Some(Instance { dag, job, subtask }),
+                held: life.and_then(super::Life::over),
+                may_be_lost: life.is_none() && (known.is_partial || of_dag.is_stopped),
+            }
+        });
+        let of_release = predecessors.is_empty().then(|| Condition {
+            awaited: None,
+            held: known.and_then(|known| known.released),
+            may_be_lost: true,
+        });
+        of_predecessors.chain(of_precursor).chain(of_release)
+    }
+
+    /// Returns the condition that held last, if all are known to have held.
+    fn last_condition(&self, instance: Instance) -> Option<Condition> {
+        let mut last: Option<Condition> = None;
+        let rank = |condition: &Condition| {
+            let time_ns = condition.held.map(|held| held.time_ns);
+            (time_ns, condition.awaited.is_some())
+        };
+        for condition in self.conditions(instance) {
+            condition.held?;
+            if last
+                .as_ref()
+                .is_none_or(|last| rank(last) <= rank(&condition))
+            {
+                last = Some(condition);
+            }
+        }
+        last
+    }
+
+    /// R1 for an instance.
+    fn before_release(&self, event: &Event, instance: Instance) -> Option<Violation> {
+        let event = *event;
+        let job = self.dags[instance.dag.index()].jobs.get(&instance.job)?;
+        if let Some(release_ns) = job.release_ns.filter(|&ns| event.time_ns < ns) {
+            return Some(Violation::BeforeRelease { event, release_ns });
+        }
+        let released_ns = job.released?.time_ns;
+        let is_early = event.time_ns < released_ns;
+        is_early.then_some(Violation::BeforeReleased { event, released_ns })
+    }
+
+    /// R2: the first condition that did not hold.
+    fn before_join(&self, event: &Event, instance: Instance) -> Option<Violation> {
+        let mut early = self.conditions(instance).filter_map(|condition| {
+            let awaited = condition.awaited?;
+            let is_early = match condition.held {
+                Some(held) => event.time_ns < held.time_ns,
+                None => !condition.may_be_lost,
+            };
+            let over = condition.held.map(|held| (held.time_ns, held.core));
+            is_early.then_some(Violation::BeforeJoin {
+                event: *event,
+                awaited,
+                over,
+            })
+        });
+        early.next()
+    }
+
+    /// R3 at the end: all conditions hold, and nothing happens.
+    pub(super) fn never_ready(&self, instance: Instance) -> Option<Violation> {
+        let of_dag = &self.dags[instance.dag.index()];
+        let job = of_dag.jobs.get(&instance.job)?;
+        let is_cut = job.cut.is_some() || of_dag.is_stopped;
+        if is_cut || job.life(instance.subtask).is_some() {
+            return None;
+        }
+        let held = self.last_condition(instance)?.held?;
+        let is_tolerable = self.is_tolerable(held.time_ns, self.end_ns);
+        (!is_tolerable || self.terms.is_complete).then_some(Violation::NeverReady {
+            instance,
+            since_ns: held.time_ns,
+            core: held.core,
+        })
     }
 }

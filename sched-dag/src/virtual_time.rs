@@ -39,25 +39,26 @@
 //! assert_eq!(run.now_ns(), 240);
 //! assert_eq!(run.scheduler_of(DagId(0)).statistics(DagId(0)).misses, 0);
 //! ```
-
-mod cluster;
-mod workload;
+//!
+//! The world of a run in virtual time: how long instances execute, what fails, what comes from
+//! outside.
+//!
+//! # One cluster: its engine, and what its cores execute until when
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 
-use crate::engine::{Body, Run};
-use crate::ids::{CoreId, DagId, Instance, SubtaskId};
-use crate::journal::Event;
+use crate::engine::{Body, Continuation, Cost, Engine, Port, Run};
+use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
+use crate::journal::{Event, Subject, What};
 use crate::kept::Journal;
-use crate::lifecycle::{Change, Lifecycle, Request};
+use crate::lifecycle::{Change, Lifecycle, Request, Requests};
+use crate::placement::Next;
 use crate::policy::SchedulerOptions;
-use crate::scheduler::Scheduler;
+use crate::scheduler::{Moment, Notice, Scheduler};
 use crate::task_set::TaskSet;
-use cluster::{Cluster, Now};
-pub use workload::{ExecutionTimes, Workload};
 
 /// A scheduler in virtual time with its bodies, or those of all clusters.
 pub struct VirtualTime<B: Body = Instance> {
@@ -348,5 +349,269 @@ impl<B: Body> fmt::Debug for VirtualTime<B> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("VirtualTime");
         shown.field("now_ns", &self.now_ns).finish_non_exhaustive()
+    }
+}
+
+/// What instances do and how long it takes them.
+pub trait Workload<B = Instance> {
+    /// Returns the execution time of an instance in nanoseconds; 0 is allowed. Called once for
+    /// each instance, at its start. `None`: the run is [stopped](super::End::Stopped) at once.
+    fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
+
+    /// Reports whether an instance fails, instead of finishing, when its
+    /// execution time is over: then its DAG is ended, or its job dropped. Called once for each
+    /// instance, at its end.
+    fn fails(&mut self, instance: Instance) -> bool {
+        let _ = instance;
+        false
+    }
+
+    /// Reports whether the function of an instance that fails could be replaced, if its body says
+    /// so as well. Called once for each, right before the scheduler is told.
+    fn is_replaceable(&mut self, instance: Instance) -> bool {
+        let _ = instance;
+        true
+    }
+
+    /// An instance has ended, what it publishes is published; or a fault ended it that costs this.
+    fn ended(&mut self, instance: Instance, fault: Option<Cost>) {
+        let _ = (instance, fault);
+    }
+
+    /// A job is released, skipped or completed, or a DAG stopped.
+    fn hear(&mut self, notice: &Notice) {
+        let _ = notice;
+    }
+
+    /// Takes a request that has come now, by a completion or a fault.
+    fn request(&mut self, request: Request, now_ns: u64) {
+        let _ = (request, now_ns);
+    }
+
+    /// Returns when the next request comes. Asked again at every instant.
+    fn next_request_ns(&self) -> Option<u64> {
+        None
+    }
+
+    /// Returns the next request that has come by now, and forgets it.
+    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
+        let _ = now_ns;
+        None
+    }
+
+    /// Returns how late the timer's interrupt is that is due then; what comes before it at the
+    /// scheduler does what is due. Asked several times for one interrupt.
+    fn late_ns(&self, due_ns: u64) -> u64 {
+        let _ = due_ns;
+        0
+    }
+
+    /// Reports whether the run is to stop, though jobs are left. Asked before each
+    /// instant.
+    fn stops(&self) -> bool {
+        false
+    }
+}
+
+/// A workload of which only the execution times matter.
+#[derive(Debug)]
+pub struct ExecutionTimes<F>(
+    /// Returns the execution time of an instance in nanoseconds.
+    pub F,
+);
+
+impl<B: Body, F: FnMut(Instance) -> u64> Workload<B> for ExecutionTimes<F> {
+    fn execute(&mut self, body: &mut B, _now_ns: u64) -> Option<u64> {
+        Some((self.0)(body.subject().instance()))
+    }
+}
+
+/// Stands for a body without a function, which can always be replaced.
+impl Body for Instance {
+    type Alternate = ();
+
+    fn set_job(&mut self, job: u64) {
+        self.job = job;
+    }
+
+    fn subject(&self) -> Subject {
+        Subject::of(*self)
+    }
+
+    fn discard(&mut self, _: u64) {}
+
+    fn has_effects(&self) -> bool {
+        false
+    }
+
+    fn complete(&mut self, _: u64, _: &mut dyn FnMut(Request)) {}
+
+    fn alternate(&self) -> Option<()> {
+        Some(())
+    }
+
+    fn replace(&mut self) {}
+}
+
+/// What runs by itself.
+struct Cluster<B: Body> {
+    /// Parked is a body, behind the time that its instance has left.
+    engine: Engine<B, (u64, B)>,
+    /// By core, the body of its instance, and when that finishes if nothing intervenes.
+    running: Box<[Option<(u64, B)>]>,
+}
+
+/// An instant in virtual time.
+struct Now<'a, W> {
+    now_ns: u64,
+    workload: &'a mut W,
+    /// How long the instance that has begun last executes.
+    begun_ns: Result<u64, End>,
+}
+
+impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
+    const HEARS: &'static [What] = &[
+        What::Released,
+        What::Skipped,
+        What::Stopped,
+        What::Completed,
+    ];
+    const SUSPENDS_LATER: bool = false;
+
+    fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    fn start(&mut self, _: CoreId, body: &mut B) -> u64 {
+        let execution_ns = self.workload.execute(body, self.now_ns);
+        self.begun_ns = execution_ns.ok_or(End::Stopped);
+        self.now_ns
+    }
+
+    /// All requests of an instant are served after all its completions.
+    fn forward(&mut self, request: Request) -> bool {
+        let is_asked = request != Request::Step;
+        if is_asked {
+            self.workload.request(request, self.now_ns);
+        }
+        is_asked
+    }
+
+    fn hear(&mut self, notice: &Notice) {
+        self.workload.hear(notice);
+    }
+}
+
+impl<B: Body> Cluster<B> {
+    fn new(scheduler: Scheduler, cluster: ClusterId, after_fault: Vec<Option<DagId>>) -> Self {
+        type Any<'a> = Now<'a, ExecutionTimes<fn(Instance) -> u64>>;
+        let cores = scheduler.options().cores;
+        let (journal, none) = (Journal::none(), Requests::new(0, None));
+        Self {
+            engine: Engine::new::<Any<'_>>(cluster, scheduler, journal, none, after_fault),
+            running: (0..cores).map(|_| None).collect(),
+        }
+    }
+
+    fn next_finish_ns(&self) -> Option<u64> {
+        let running = self.running.iter().flatten();
+        running.map(|(finish_ns, _)| *finish_ns).min()
+    }
+
+    /// Takes what finishes by now from the first core that has such a thing.
+    fn take_finished(&mut self, now_ns: u64) -> Option<(CoreId, B)> {
+        let mut cores = (0..).map(CoreId).zip(&mut self.running);
+        cores.find_map(|(core, running)| {
+            let (_, body) = running.take_if(|(finish_ns, _)| *finish_ns <= now_ns)?;
+            Some((core, body))
+        })
+    }
+
+    /// Makes a change at an instant, which stays open.
+    fn tell(&mut self, now: &mut Now<'_, impl Workload<B>>, change: impl FnOnce(&mut Moment<'_>)) {
+        let here = self.engine.scheduler.log.here;
+        self.engine.tell((now.now_ns, here), now, change);
+    }
+
+    /// Completes what has finished on a core, and reports whether that is all of the instant.
+    fn complete(
+        &mut self,
+        core: CoreId,
+        body: B,
+        is_alone: bool,
+        now: &mut Now<'_, impl Workload<B>>,
+    ) -> Result<bool, End> {
+        let (engine, now_ns) = (&mut self.engine, now.now_ns);
+        let instance = body.subject().instance();
+        let vertex = engine.task_set.vertex(instance);
+        let done = engine.complete((core, vertex), body, now_ns, is_alone, now);
+        now.workload.ended(instance, None);
+        match done {
+            Continuation::Run(body) => self.run(core, body, now_ns, now.begun_ns)?,
+            Continuation::Look { .. } => self.go_on(core, now)?,
+            Continuation::Step(ended) => {
+                if let Some(instance) = ended {
+                    engine.tell((now_ns, core), now, |moment| moment.complete(instance));
+                }
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Ends what has failed on a core.
+    fn fail(&mut self, core: CoreId, body: B, now: &mut Now<'_, impl Workload<B>>) {
+        let instance = body.subject().instance();
+        if let Some(vertex) = self.engine.placement.lose(core.index()) {
+            let body = Some(body).filter(|_| now.workload.is_replaceable(instance));
+            let cost = (self.engine).tell_fault((now.now_ns, core), vertex, body, now);
+            now.workload.ended(instance, Some(cost));
+        }
+    }
+
+    /// Ends the instant, and has its cores follow.
+    fn decide(&mut self, now: &mut Now<'_, impl Workload<B>>) -> Result<(), End> {
+        let now_ns = now.now_ns;
+        self.engine.decide(now_ns, now);
+        for place in 0..self.engine.decisions().len() {
+            let decision = self.engine.decisions()[place];
+            let core = decision.core;
+            if decision.what == What::Suspend {
+                if let Some((finish_ns, body)) = self.running[core.index()].take() {
+                    let parked = (finish_ns - now_ns, body);
+                    self.engine.suspend(core, now_ns, parked);
+                }
+            } else {
+                self.go_on(core, now)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Has a core without an instance begin or continue what it should.
+    fn go_on(&mut self, core: CoreId, now: &mut Now<'_, impl Workload<B>>) -> Result<(), End> {
+        let (engine, now_ns) = (&mut self.engine, now.now_ns);
+        match engine.next(core, now) {
+            Next::Nothing => Ok(()),
+            Next::Start(_, body) => self.run(core, body, now_ns, now.begun_ns),
+            Next::Continue((left_ns, body)) => {
+                let vertex = engine.task_set.vertex(body.subject().instance());
+                engine.note(What::Resume, core, vertex, now_ns);
+                self.run(core, body, now_ns, Ok(left_ns))
+            }
+        }
+    }
+
+    fn run(
+        &mut self,
+        core: CoreId,
+        body: B,
+        now_ns: u64,
+        left_ns: Result<u64, End>,
+    ) -> Result<(), End> {
+        let finish_ns = now_ns.checked_add(left_ns?);
+        let finish_ns = finish_ns.ok_or(End::TimeOverflow(body.subject().instance()))?;
+        self.running[core.index()] = Some((finish_ns, body));
+        Ok(())
     }
 }

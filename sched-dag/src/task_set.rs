@@ -2,17 +2,27 @@
 //!
 //! Only the verification makes a [`TaskSet`], so its holder may rely on
 //! acyclic graphs, non-zero periods and deadlines, and indices in range.
-
-mod clusters;
-mod suspended;
+//!
+//! # How many instances of a DAG can be suspended at once: each keeps a stack
+//!
+//! Only an instance that has started and may be preempted is suspended, and a subtask has one
+//! started instance at a time (R2). Of one job no two started instances precede one another, so
+//! there are as many at most as the graph is wide; and no wider than the number of chains that it
+//! can be cut into (R. P. Dilworth, Annals of Mathematics 51, 1950). Chains are found greedily,
+//! in one pass, which need not find the fewest.
+//!
+//! A job that is aborted, or cut by a fault that its DAG survives, makes room for the next one
+//! while instances of it go on; then the jobs in flight are no limit.
 
 use alloc::boxed::Box;
 use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
 use core::ops::Range;
 
-use crate::clusters::Why;
 use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
+use crate::policy::Why;
 use crate::policy::{Activation, OnFault, Order, OverrunPolicy, Priority};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
@@ -365,5 +375,122 @@ impl Subtask {
     #[must_use]
     pub const fn relative_deadline_ns(&self) -> u64 {
         self.relative_deadline_ns
+    }
+}
+
+impl TaskSet {
+    /// Returns the sum of [`Dag::most_suspended`].
+    #[inline(never)]
+    #[must_use]
+    pub fn most_suspended(&self) -> usize {
+        self.dags().iter().map(Dag::most_suspended).sum()
+    }
+
+    /// Returns the size of a stack that every subtask can run on, if those that state none need
+    /// so many bytes.
+    #[inline(never)]
+    #[must_use]
+    pub fn largest_stack_bytes(&self, unstated: u64) -> u64 {
+        let subtasks = self.dags().iter().flat_map(Dag::subtasks);
+        let bytes = subtasks.map(|subtask| subtask.stack_bytes().unwrap_or(unstated));
+        bytes.max().unwrap_or(unstated)
+    }
+}
+
+impl Dag {
+    /// Returns a number of instances, of all jobs, that is never exceeded by those that are
+    /// suspended at once where started instances may lose their cores.
+    #[must_use]
+    pub fn most_suspended(&self) -> usize {
+        let may_be = self.subtasks.iter().filter(|of| !of.is_non_preemptive());
+        let may_be = may_be.count();
+        let is_left = self.overrun == OverrunPolicy::Abort || self.on_fault != OnFault::EndDag;
+        match is_left {
+            true => may_be,
+            false => may_be.min(self.chains().saturating_mul(self.in_flight as usize)),
+        }
+    }
+
+    /// Returns the number of chains that the graph is cut into: a subtask goes on with the chain
+    /// of the first predecessor that no other has gone on with.
+    fn chains(&self) -> usize {
+        let mut is_continued = vec![false; self.subtasks.len()];
+        let begins_one = |subtask: &&_| {
+            let before = self.predecessors(**subtask).iter();
+            let mut free = before.filter(|before| !is_continued[before.index()]);
+            match free.next() {
+                Some(before) => {
+                    is_continued[before.index()] = true;
+                    false
+                }
+                None => true,
+            }
+        };
+        self.topological_order().iter().filter(begins_one).count()
+    }
+}
+
+impl TaskSet {
+    /// Divides the cores, and puts each DAG into a cluster for a reason.
+    pub(crate) fn divide(&mut self, sizes: &[u32], of_dags: &[(ClusterId, Why)]) {
+        self.clusters = sizes.into();
+        for (dag, (cluster, why)) in self.dags.iter_mut().zip(of_dags) {
+            (dag.cluster, dag.why_there) = (Some(*cluster), Some(*why));
+        }
+    }
+
+    /// Reports whether the cores are divided into clusters.
+    #[must_use]
+    pub const fn is_divided(&self) -> bool {
+        !self.clusters.is_empty()
+    }
+
+    /// Returns the clusters; if the cores are not divided, the one of all cores.
+    pub fn clusters(&self) -> impl Iterator<Item = ClusterId> + use<> {
+        (0..).map(ClusterId).take(self.clusters.len().max(1))
+    }
+
+    /// Returns the cores of a cluster, on a machine of `all`.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such cluster.
+    #[must_use]
+    #[inline(never)]
+    pub fn cores_of(&self, cluster: ClusterId, all: u32) -> Range<u32> {
+        if !self.is_divided() {
+            return 0..all;
+        }
+        let (before, from_it_on) = self.clusters.split_at(cluster.index());
+        let first = before.iter().sum();
+        first..first + from_it_on[0]
+    }
+
+    /// Returns copies of the DAGs of a cluster.
+    pub(crate) fn part(&self, cluster: ClusterId) -> Vec<Dag> {
+        let dags = self.dags.iter();
+        dags.filter(|dag| dag.cluster() == cluster)
+            .cloned()
+            .collect()
+    }
+}
+
+impl Dag {
+    /// Returns the cluster whose cores run it; if the cores are not divided, cluster 0.
+    #[must_use]
+    pub fn cluster(&self) -> ClusterId {
+        self.cluster.unwrap_or_default()
+    }
+
+    /// Returns why the commit has chosen that; `None` if it has not.
+    #[must_use]
+    pub const fn why_there(&self) -> Option<Why> {
+        self.why_there
+    }
+
+    /// Reports whether a cluster is stated, or chosen.
+    #[must_use]
+    pub const fn states_cluster(&self) -> bool {
+        self.cluster.is_some()
     }
 }

@@ -1,0 +1,785 @@
+//! The verdict at commit: from cheap to costly, the first test that is sound.
+//!
+//! [`answer`] looks at what is certain (missing WCETs, a path longer than the
+//! deadline, a subtask longer than the period, more work than cores), then
+//! solves the response-time equations of the set, and finally asks the
+//! capacity tests about what those leave open; these give only the
+//! deadline as the bound, so they come last although they are the cheapest.
+//!
+//! What interferes with DAG `k` is decided for each pair of DAGs:
+//!
+//! - *Static priorities.* DAG `i` may outrank `k` if its most urgent subtask
+//!   wins over `k`'s least urgent one (equal priorities: the DAG committed
+//!   first wins). Priorities may thus interleave: then two DAGs may outrank
+//!   each other and each counts in full for the other. That is safe: while a
+//!   subtask of `k` waits, whatever runs on the cores belongs to `k` or wins
+//!   over that subtask, so its DAG is among those counted.
+//! - *EDF.* Every DAG may outrank every other. If `D <= T` for all DAGs, only
+//!   jobs with a deadline no later are counted: a subtask that waits is due no later than
+//!   its job, so what wins over it is, too. Where sinks have deadlines of their own, a job
+//!   counts as soon as the first of its deadlines is no later.
+//! - *No preemption at all.* Lower-ranked subtasks block besides; those of
+//!   DAGs that count in full are counted already.
+//! - *Preemption for some subtasks and not for others.* A subtask preempted
+//!   again and again may find other non-preemptible ones each time, which the
+//!   blocking term does not cover. Then every other DAG counts in full, in
+//!   whatever order: true of any work-conserving scheduler.
+//! - *One core.* There are exact tests, with what keeps the core as blocking (see `one_core`).
+//!   Under static priorities they come first, under EDF last, as they give only the deadline.
+//! - *Alone.* A DAG that nothing may outrank or block, and whose bound is
+//!   within its period, may have a shorter one by its subtasks' priorities.
+//!
+//! If a younger job may win over an older one of the same DAG (unequal
+//! priorities inside, or no preemption), the equation counts younger jobs too.
+//! A response time beyond `in_flight` periods would meet the overrun policy;
+//! it does not count as proven.
+//!
+//! A DAG that cannot be analysed, because it lacks a WCET for example, takes
+//! those with it that it may delay, directly or through others. What is left
+//! is analysed without it: whatever it does, it cannot delay these.
+//!
+//! # Which DAG may delay which
+//!
+//! It depends on the policy, on the priorities and on which subtasks can be
+//! preempted, not on any execution time; so it is known also for DAGs that
+//! cannot be analysed. See `judge` for why each case is sound.
+//!
+//! # Bounds for single sinks, where a job's bound is known
+//!
+//! The critical chain of a sink ends with the sink, so it is at most as long as the
+//! longest path to it, and its subtasks are the sink's ancestors. What delays it is what
+//! delays the job, but for two things:
+//!
+//! - Of the job itself only subtasks count that may win over an ancestor. If all can be
+//!   preempted these are, under EDF, those that reach a sink whose deadline is no later
+//!   (all ancestors have deadlines no later than the sink's); under static priority,
+//!   those that are not less urgent than the least urgent ancestor. If not all can be
+//!   preempted, all count.
+//! - Under EDF with `D <= T`, jobs of other DAGs count up to the *sink's* deadline. What is
+//!   due later and keeps its core may block.
+//!
+//! On one core under EDF the demand test proves each sink its deadline, if it accepts the set.
+//!
+//! So the sink's bound is the solution of the job's equation with these figures (see
+//! `pipelined`). Older and younger jobs of the DAG count as there, with the job's bound,
+//! which holds for all of them. The sink finishes no later than its job: the smaller of
+//! both bounds is taken. Evidence: `accepted_sets_keep_their_bounds` observes sinks, too.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::interference::Delays;
+use super::intra_task::intra_task;
+use super::multi_path;
+use super::one_core::{Due, Load, Response, demand};
+use super::pipelined::{Figures, STEP_LIMIT, Unsolved};
+use super::set::{Failure, Set, Steps, constrained};
+use super::task::{Task, TaskError};
+use super::utilisation::Ratio;
+use super::utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
+use super::width::SUBTASK_LIMIT;
+use super::workload::Bursts;
+use super::{Answer, DagBound, NotProven, Reason, Settings, Test};
+use crate::ids::{DagId, SubtaskId, to_u32};
+use crate::order::sorted_by_key;
+use crate::policy::{Policy, Preemption};
+use crate::task_set::{Dag, TaskSet};
+
+/// Bounds the response time of every DAG, as far as a test proves it.
+///
+/// Clusters share no core, so each is a case of its own. A signal from one to another needs
+/// no term: a sporadic DAG counts as if signals came as fast as they may.
+#[must_use]
+pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
+    let dags = task_set.dags();
+    let unknown = dags.iter().map(|dag| vec![None; dag.sinks().len()]);
+    let mut answer = Answer {
+        bounds: vec![None; dags.len()],
+        sinks_ns: unknown.collect(),
+        reasons: vec![None; dags.len()],
+        first_failing: None,
+    };
+    for cluster in task_set.clusters() {
+        let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
+        let own: Vec<usize> = own.collect();
+        let settings = Settings {
+            cores: to_u32(task_set.cores_of(cluster, settings.cores).len()),
+            ..*settings
+        };
+        let first_failing = &mut answer.first_failing;
+        with_case(
+            dags,
+            &own,
+            &settings,
+            &mut answer.reasons,
+            |case, reasons| {
+                let mut verdict = case.verdict();
+                bound(case, &mut verdict, &mut answer.sinks_ns);
+                let first = first_unknown(&own, reasons).or(verdict.first_failing);
+                *first_failing = first_failing.or(first);
+                for (position, &dag) in case.members.iter().enumerate() {
+                    answer.bounds[dag] = verdict.bounds[position];
+                    reasons[dag] = verdict.reasons[position];
+                }
+            },
+        );
+    }
+    answer
+}
+
+/// Makes the case of those DAGs at the positions `own` that can be analysed, and notes why
+/// others of these cannot be. There are no other DAGs on the cores of the settings.
+pub(super) fn with_case(
+    dags: &[Dag],
+    own: &[usize],
+    settings: &Settings,
+    reasons: &mut [Option<Reason>],
+    work: impl FnOnce(&Case<'_>, &mut [Option<Reason>]),
+) {
+    let relation = Relation::new(dags, own, settings.policy, settings.preemption);
+    let tasks = analysable(dags, own, &relation, settings, reasons);
+    let can_be = |dag: &usize| reasons[*dag].is_none();
+    let members: Vec<usize> = own.iter().copied().filter(can_be).collect();
+    let tasks: Vec<&Task> = members
+        .iter()
+        .filter_map(|&dag| tasks[dag].as_ref())
+        .collect();
+    let relation = relation.among(&members);
+    let case = Case::new(dags, own, (&members, &tasks), relation, settings);
+    work(&case, reasons);
+}
+
+/// The DAGs that can be analysed, and what follows from their attributes.
+pub(super) struct Case<'a> {
+    /// All DAGs of the commit.
+    all: &'a [Dag],
+    /// Whether no other DAG is on these cores, one that cannot be analysed either.
+    is_only_one: bool,
+    /// Those of this case; elsewhere a DAG is a position in this list.
+    pub(super) members: &'a [usize],
+    pub(super) tasks: &'a [&'a Task],
+    pub(super) settings: &'a Settings,
+    pub(super) relation: Relation,
+    /// The most urgent DAG first.
+    order: Vec<usize>,
+    pub(super) set: Set<'a>,
+}
+
+impl<'a> Case<'a> {
+    fn new(
+        all: &'a [Dag],
+        own: &[usize],
+        (members, tasks): (&'a [usize], &'a [&'a Task]),
+        relation: Relation,
+        settings: &'a Settings,
+    ) -> Self {
+        let order = sorted_by_key(members.len(), |dag| match settings.policy {
+            Policy::StaticPriority => u64::from(relation.ranks(dag)[0].0),
+            Policy::Edf => tasks[dag].relative_deadline_ns(),
+        });
+        let mut case = Self {
+            all,
+            is_only_one: own.len() == 1,
+            members,
+            tasks,
+            settings,
+            relation,
+            order,
+            set: Set::new(tasks, settings.cores),
+        };
+        case.set.bursts = Bursts::of(own.iter().map(|&dag| &all[dag]), settings);
+        case.complete();
+        case
+    }
+
+    pub(super) fn dag(&self, dag: usize) -> &'a Dag {
+        &self.all[self.members[dag]]
+    }
+
+    pub(super) fn id(&self, dag: usize) -> DagId {
+        dag_id(self.members[dag])
+    }
+
+    /// Answers for the jobs of the DAGs of this case, by their positions in it; names
+    /// them by their positions in the commit.
+    pub(super) fn verdict(&self) -> Answer {
+        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
+        let solution = self.set.solve(&self.order, may_outrank);
+        let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
+            .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
+            .collect();
+        let demand = || are_in_time(self).then_some(Test::Demand);
+        if bounds.iter().any(Option::is_none)
+            && let Some(test) = self.vouching_test().or_else(demand)
+        {
+            for (bound, task) in bounds.iter_mut().zip(self.tasks) {
+                bound.get_or_insert(DagBound {
+                    bound_ns: task.relative_deadline_ns(),
+                    test,
+                });
+            }
+        }
+        let mut reasons: Vec<Option<Reason>> = (bounds.iter().enumerate())
+            .map(|(dag, bound)| match bound {
+                Some(_) => None,
+                None => solution.failures[dag].map(|failure| self.reason(dag, failure)),
+            })
+            .collect();
+        let mut first = solution.first_failing.map(|(dag, _)| dag);
+        if reasons.iter().any(Option::is_some) {
+            for (dag, reason) in self.certain().into_iter().rev() {
+                if bounds[dag].is_none() {
+                    reasons[dag] = Some(reason);
+                    first = Some(dag);
+                }
+            }
+        }
+        let first_failing = first.and_then(|dag| {
+            let reason = reasons[dag]?;
+            let dag = self.id(dag);
+            Some(NotProven { dag, reason })
+        });
+        Answer {
+            bounds,
+            sinks_ns: Vec::new(),
+            reasons,
+            first_failing,
+        }
+    }
+
+    /// Reports whether a DAG has all cores whenever it needs them.
+    fn is_alone(&self, dag: usize) -> bool {
+        let blocked = self.relation.preemption != Mixture::All && !self.is_only_one;
+        let mut others = 0..self.members.len();
+        !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
+    }
+
+    /// Bounds the response time of a DAG by its subtasks' priorities, if nothing can delay it
+    /// and that is the shortest bound.
+    fn by_priorities(&self, dag: usize) -> Option<u64> {
+        let (task, cores) = (self.tasks[dag], self.settings.cores);
+        let subtasks = self.dag(dag).subtasks();
+        if self.relation.preemption != Mixture::All
+            || self.settings.policy != Policy::StaticPriority
+            || subtasks.len() > SUBTASK_LIMIT
+            || !self.is_alone(dag)
+        {
+            return None;
+        }
+        let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
+        let covers = &self.set.shapes[dag].covers;
+        let others = multi_path::alone(task, covers, cores.into())?;
+        let limit = task.relative_deadline_ns().min(task.period_ns());
+        let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
+        let bound = bound.and_then(|bound_ns| self.set.bursts.after(bound_ns));
+        bound.filter(|&bound_ns| bound_ns <= limit)
+    }
+
+    /// Tells the equations what follows from the attributes.
+    fn complete(&mut self) {
+        self.set.keep_cores = self.relation.preemption == Mixture::None;
+        self.set.deadlines_limit = self.settings.policy == Policy::Edf
+            && self.relation.preemption != Mixture::Some
+            && constrained(self.tasks, self.settings.cores);
+        for (dag, figures) in self.set.figures.iter_mut().enumerate() {
+            figures.younger_may_win = self.relation.younger_may_win(dag);
+            figures.allow_in_flight(self.all[self.members[dag]].in_flight());
+        }
+        self.set.known = match (self.settings.cores, self.settings.policy) {
+            (1, Policy::StaticPriority) => responses(self),
+            _ => {
+                let dags = 0..self.members.len();
+                dags.map(|dag| self.by_priorities(dag)).collect()
+            }
+        };
+    }
+
+    /// Names the test behind a response time of the set's equations.
+    fn bound(&self, dag: usize, bound_ns: u64) -> DagBound {
+        let test = if self.set.known[dag].is_some() {
+            match self.settings.cores {
+                1 => Test::OneCore,
+                _ => Test::IntraTask,
+            }
+        } else if bound_ns > self.tasks[dag].period_ns() {
+            Test::Pipelined
+        } else if self.is_alone(dag) {
+            Test::Alone
+        } else {
+            match (self.relation.preemption, self.settings.policy) {
+                (Mixture::Some, _) => Test::AnyOrder,
+                (Mixture::None, _) => Test::NonPreemptive,
+                (Mixture::All, Policy::StaticPriority) => Test::FixedPriority,
+                (Mixture::All, Policy::Edf) => Test::Edf,
+            }
+        };
+        DagBound { bound_ns, test }
+    }
+
+    /// Returns the utilisation test that accepts the whole set, if one does.
+    fn vouching_test(&self) -> Option<Test> {
+        let (tasks, cores) = (self.tasks, self.settings.cores);
+        let applies = self.relation.preemption == Mixture::All
+            && !self.relation.ranks_sinks
+            && self.set.bursts.are_none();
+        if !applies || !constrained(tasks, cores) {
+            return None;
+        }
+        let (capacity, speed_up) = match self.settings.policy {
+            Policy::Edf => (gedf_capacity(tasks, cores), bonifaci_edf(tasks, cores)),
+            Policy::StaticPriority => {
+                let pairs = || self.order.windows(2).map(|pair| (pair[0], pair[1]));
+                if pairs().any(|(first, second)| self.relation.may_outrank(second, first)) {
+                    return None;
+                }
+                let by = |time: fn(&Task) -> u64| {
+                    pairs().all(|(first, second)| time(tasks[first]) <= time(tasks[second]))
+                };
+                let monotonic = by(Task::period_ns).then(|| grm_capacity(tasks, cores));
+                let speed_up = by(Task::relative_deadline_ns) && bonifaci_dm(tasks, cores);
+                (monotonic.flatten(), speed_up)
+            }
+        };
+        match (capacity, speed_up) {
+            (Some(true), _) => Some(Test::Capacity),
+            (_, true) => Some(Test::SpeedUp),
+            _ => None,
+        }
+    }
+
+    fn reason(&self, dag: usize, failure: Failure) -> Reason {
+        let task = self.tasks[dag];
+        let in_flight = self.dag(dag).in_flight();
+        let room = u128::from(in_flight) * u128::from(task.period_ns());
+        match failure {
+            Failure::Other(other) => Reason::DelayedBy {
+                dag: self.id(other),
+            },
+            Failure::Own(Unsolved::Limit) => Reason::Limit,
+            Failure::Own(Unsolved::BeyondDeadline)
+                if room < u128::from(task.relative_deadline_ns()) =>
+            {
+                Reason::InFlightTooFew { in_flight }
+            }
+            Failure::Own(Unsolved::BeyondDeadline) => Reason::NoBound,
+        }
+    }
+
+    /// Reports whether jobs are certain to come; a sporadic DAG's signals may not.
+    fn must_keep_up(&self, dag: usize) -> bool {
+        !self.dag(dag).is_sporadic()
+    }
+
+    /// Finds the DAGs that cannot keep up at WCETs: by urgency those that could
+    /// not even alone, then the first at which the cores do not suffice.
+    fn certain(&self) -> Vec<(usize, Reason)> {
+        let hopeless = |&dag: &usize| {
+            let task = self.tasks[dag];
+            let length_ns = task.length_ns();
+            if length_ns > task.relative_deadline_ns() {
+                return Some((dag, Reason::LengthBeyondDeadline { length_ns }));
+            }
+            if !self.must_keep_up(dag) {
+                return None;
+            }
+            let ids = (0_u32..).map(SubtaskId).zip(task.wcets_ns());
+            let mut long = ids.filter(|&(_, &wcet)| wcet > task.period_ns());
+            let (subtask, _) = long.next()?;
+            Some((dag, Reason::SubtaskBeyondPeriod { subtask }))
+        };
+        let mut certain: Vec<(usize, Reason)> = self.order.iter().filter_map(hopeless).collect();
+        let cores = u128::from(self.settings.cores);
+        let mut used = Vec::new();
+        for &dag in self.order.iter().filter(|&&dag| self.must_keep_up(dag)) {
+            used.push((self.tasks[dag].volume_ns(), self.tasks[dag].period_ns()));
+            let Some(sum) = Ratio::sum(used.iter().copied()) else {
+                break;
+            };
+            if !sum.at_most(cores, 1) {
+                if certain.iter().all(|&(hopeless, _)| hopeless != dag) {
+                    certain.push((dag, Reason::Overload));
+                }
+                break;
+            }
+        }
+        certain
+    }
+}
+
+fn dag_id(dag: usize) -> DagId {
+    // A task set cannot have more DAGs than ids; this only spells it out.
+    DagId(u32::try_from(dag).unwrap_or(u32::MAX))
+}
+
+/// Returns the DAGs at the positions `own` as the analysis sees them, and notes for each that
+/// cannot be analysed the reason: its own, or that it may have to wait for such a one.
+fn analysable(
+    dags: &[Dag],
+    own: &[usize],
+    relation: &Relation,
+    settings: &Settings,
+    reasons: &mut [Option<Reason>],
+) -> Vec<Option<Task>> {
+    let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
+    let mut tasks: Vec<Option<Task>> = dags.iter().map(|_| None).collect();
+    for &dag in own {
+        let task = overhead
+            .ok_or(TaskError::VolumeOverflow)
+            .and_then(|overhead_ns| Task::from_dag(&dags[dag], overhead_ns));
+        reasons[dag] = match &task {
+            _ if settings.cores == 0 => Some(Reason::NoCores),
+            Ok(_) => None,
+            Err(error) => Some(Reason::Unknown(*error)),
+        };
+        tasks[dag] = task.ok();
+    }
+    let (mut known, mut unknown): (Vec<usize>, Vec<usize>) =
+        own.iter().partition(|&&dag| reasons[dag].is_none());
+    let mut seen = 0;
+    while let Some(&other) = unknown.get(seen) {
+        seen += 1;
+        known.retain(|&dag| {
+            let is_delayed = relation.may_delay(other, dag);
+            if is_delayed {
+                reasons[dag] = Some(Reason::DelayedBy { dag: dag_id(other) });
+                unknown.push(dag);
+            }
+            !is_delayed
+        });
+    }
+    tasks
+}
+
+/// Returns the first DAG at the positions `among` that cannot be analysed for a reason of its own.
+fn first_unknown(among: &[usize], reasons: &[Option<Reason>]) -> Option<NotProven> {
+    let own = |reason: &Reason| !matches!(reason, Reason::DelayedBy { .. });
+    let mut unknown = among.iter().filter_map(|&dag| {
+        let reason = reasons[dag].filter(own)?;
+        let dag = dag_id(dag);
+        Some(NotProven { dag, reason })
+    });
+    unknown.next()
+}
+
+/// The relation between the DAGs of a commit, by their positions.
+#[derive(Clone, Debug)]
+pub(super) struct Relation {
+    policy: Policy,
+    pub(super) preemption: Mixture,
+    /// Per DAG the most and the least urgent priority, as numbers.
+    priorities: Vec<(u32, u32)>,
+    /// Whether subtasks of one job may have different deadlines, under EDF.
+    pub(super) ranks_sinks: bool,
+}
+
+/// Which subtasks can be preempted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mixture {
+    All,
+    None,
+    Some,
+}
+
+impl Relation {
+    /// Makes the relation between those that are at the positions `own`.
+    pub(super) fn new(dags: &[Dag], own: &[usize], policy: Policy, preemption: Preemption) -> Self {
+        let has_sink_deadlines =
+            |&dag: &usize| dags[dag].least_deadline_ns() != dags[dag].relative_deadline_ns();
+        Self {
+            policy,
+            preemption: mixture(dags, own, preemption),
+            priorities: dags.iter().map(priority_range).collect(),
+            ranks_sinks: policy == Policy::Edf && own.iter().any(has_sink_deadlines),
+        }
+    }
+
+    /// Returns the relation between some of the DAGs, by their positions among
+    /// these. The others still are on the machine: what can be preempted stays.
+    pub(super) fn among(&self, members: &[usize]) -> Self {
+        Self {
+            priorities: members.iter().map(|&dag| self.priorities[dag]).collect(),
+            ..*self
+        }
+    }
+
+    /// Reports whether an instance of `other` may win a core that an instance
+    /// of `dag` waits for.
+    pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
+        other != dag
+            && match (self.policy, self.preemption) {
+                (Policy::Edf, _) | (_, Mixture::Some) => true,
+                (Policy::StaticPriority, _) => self.ranks(other)[0] < self.ranks(dag)[1],
+            }
+    }
+
+    /// Reports whether `dag` may have to wait for `other`, be it only because
+    /// an instance of `other` keeps its core.
+    fn may_delay(&self, other: usize, dag: usize) -> bool {
+        other != dag && (self.preemption != Mixture::All || self.may_outrank(other, dag))
+    }
+
+    /// Returns the most and the least urgent priority of a DAG among all; the smaller wins.
+    pub(super) fn ranks(&self, dag: usize) -> [(u32, usize); 2] {
+        let (most, least) = self.priorities[dag];
+        [(most, dag), (least, dag)]
+    }
+
+    /// Reports whether a younger job of a DAG may win over an older one.
+    pub(super) fn younger_may_win(&self, dag: usize) -> bool {
+        let (most, least) = self.priorities[dag];
+        let unequal = match self.policy {
+            Policy::StaticPriority => most != least,
+            // It may have a subtask that leads to a more urgent sink.
+            Policy::Edf => self.ranks_sinks,
+        };
+        unequal || self.preemption != Mixture::All
+    }
+}
+
+fn priority_range(dag: &Dag) -> (u32, u32) {
+    let numbers = || dag.subtasks().iter().map(|subtask| subtask.priority().0);
+    (numbers().min().unwrap_or(0), numbers().max().unwrap_or(0))
+}
+
+fn mixture(dags: &[Dag], own: &[usize], preemption: Preemption) -> Mixture {
+    let mut subtasks = own.iter().flat_map(|&dag| dags[dag].subtasks());
+    let keeps = |non_preemptive: bool| non_preemptive || preemption == Preemption::Disabled;
+    let Some(first) = subtasks
+        .next()
+        .map(|first| keeps(first.is_non_preemptive()))
+    else {
+        return Mixture::All;
+    };
+    if subtasks.any(|other| keeps(other.is_non_preemptive()) != first) {
+        Mixture::Some
+    } else if first {
+        Mixture::None
+    } else {
+        Mixture::All
+    }
+}
+
+/// Returns the DAGs of a case as their response times on one core need them.
+pub(super) fn loads(case: &Case<'_>) -> Vec<Load> {
+    let loads = case.tasks.iter().enumerate().map(|(dag, task)| Load {
+        volume_ns: task.volume_ns(),
+        period_ns: task.period_ns(),
+        limit_ns: case.set.figures[dag].limit_ns(),
+        priorities: case.relation.ranks(dag),
+        keeps_ns: dues(case, dag)
+            .iter()
+            .map(|due| due.keeps_ns)
+            .max()
+            .unwrap_or(0),
+    });
+    loads.collect()
+}
+
+/// Bounds the response times of DAGs that something may delay, where all that may delay them
+/// keep their own.
+fn responses(case: &Case<'_>) -> Vec<Option<u64>> {
+    let loads = loads(case);
+    let (loads, bursts) = (&loads, &case.set.bursts);
+    let (mut steps, mut found) = (Steps::of(loads.len()), vec![None; loads.len()]);
+    for &dag in &case.order {
+        found[dag] = steps.spend(dag, |steps| Response::of(loads, bursts, dag).solve(steps));
+    }
+    let known = (0..loads.len()).map(|dag| {
+        let others = Response::of(loads, bursts, dag).others;
+        let are_known = others.iter().all(|&other| found[other].is_some());
+        found[dag].filter(|_| are_known && !case.is_alone(dag))
+    });
+    known.collect()
+}
+
+/// Reports whether each subtask is finished by its deadline, under EDF.
+pub(super) fn are_in_time(case: &Case<'_>) -> bool {
+    let fit =
+        |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
+    let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
+    applies && (0..case.tasks.len()).all(fit) && demand(&all_dues(case), &case.set.bursts).is_some()
+}
+
+/// Returns what is due of all DAGs.
+pub(super) fn all_dues(case: &Case<'_>) -> Vec<Due> {
+    (0..case.tasks.len())
+        .flat_map(|dag| dues(case, dag))
+        .collect()
+}
+
+/// Returns what is due of a DAG, by deadlines.
+fn dues(case: &Case<'_>, dag: usize) -> Vec<Due> {
+    let (task, subtasks) = (case.tasks[dag], case.dag(dag).subtasks());
+    let mut dues: Vec<Due> = Vec::new();
+    for (subtask, &wcet_ns) in subtasks.iter().zip(task.wcets_ns()) {
+        let deadline_ns = subtask.relative_deadline_ns();
+        let known = dues.iter().position(|due| due.deadline_ns == deadline_ns);
+        let place = known.unwrap_or(dues.len());
+        if known.is_none() {
+            dues.push(Due {
+                deadline_ns,
+                period_ns: task.period_ns(),
+                volume_ns: 0,
+                keeps_ns: 0,
+            });
+        }
+        let due = &mut dues[place];
+        due.volume_ns += wcet_ns;
+        if subtask.is_non_preemptive() || case.settings.preemption == Preemption::Disabled {
+            due.keeps_ns = due.keeps_ns.max(wcet_ns);
+        }
+    }
+    dues
+}
+
+/// The path to a sink, and what of its own job may delay it.
+struct Reach {
+    length_ns: u64,
+    volume_ns: u64,
+}
+
+/// Fills in the bounds of the sinks of each DAG, in their order, that follow from the bounds
+/// of jobs. A DAG of which a sink is not bounded by its own deadline is not proven.
+fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Option<u64>>]) {
+    let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
+    let responses: Vec<Option<u64>> = whole_ns.collect();
+    let is_met = case.relation.ranks_sinks && are_in_time(case);
+    for (dag, &number) in case.members.iter().enumerate() {
+        let solved = equations(case, dag, &responses).map(|(sink, equation)| {
+            let solved = equation
+                .and_then(|(figures, delays)| figures.solve(&delays, 0, &mut { STEP_LIMIT }).ok());
+            let deadline_ns = case.dag(dag).subtask(sink).relative_deadline_ns();
+            solved.or(is_met.then_some(deadline_ns))
+        });
+        bounds[number] = solved.collect();
+    }
+    for (dag, &number) in case.members.iter().enumerate() {
+        let model = case.dag(dag);
+        let sinks_ns = &mut bounds[number];
+        let unbounded = within_deadlines(model, verdict.bounds[dag], sinks_ns);
+        let reason = match (too_far(case.tasks[dag], model), unbounded) {
+            (Some((sink, length_ns)), _) if !is_certain(verdict.reasons[dag]) => {
+                Reason::PathBeyondDeadline { sink, length_ns }
+            }
+            (_, Some(sink)) => Reason::NoSinkBound { sink },
+            _ => continue,
+        };
+        verdict.bounds[dag] = None;
+        verdict.reasons[dag] = Some(reason);
+        let failing = NotProven {
+            dag: case.id(dag),
+            reason,
+        };
+        verdict.first_failing.get_or_insert(failing);
+    }
+}
+
+fn is_certain(reason: Option<Reason>) -> bool {
+    reason.is_some_and(|reason| reason.is_certain())
+}
+
+/// Returns the equation of each sink of a DAG and what may delay it, where the response times
+/// of jobs are known that it rests on.
+pub(super) fn equations<'a>(
+    case: &'a Case<'_>,
+    dag: usize,
+    responses: &'a [Option<u64>],
+) -> impl Iterator<Item = (SubtaskId, Option<(Figures, Delays)>)> {
+    let (set, model) = (&case.set, case.dag(dag));
+    let (policy, preemption) = (case.settings.policy, case.relation.preemption);
+    let reaches = reaches(set.tasks[dag], model, policy, preemption);
+    let sinks = model.sinks().iter().zip(reaches);
+    sinks.map(move |(&sink, reach)| {
+        let equation = || {
+            let deadline_ns = model.subtask(sink).relative_deadline_ns();
+            let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+            let delays = set.delays(dag, deadline_ns, responses, may_outrank).ok()?;
+            let (length_ns, volume_ns) = (reach.length_ns, reach.volume_ns);
+            let figures = &set.figures[dag];
+            let figures = figures.of_sink(length_ns, volume_ns, deadline_ns, responses[dag]?);
+            Some((figures, delays))
+        };
+        (sink, equation())
+    })
+}
+
+/// Returns the longest path to each sink, in their order.
+fn lengths_ns(task: &Task, model: &Dag) -> Vec<u64> {
+    let mut lengths_ns: Vec<u64> = task.wcets_ns().to_vec();
+    for subtask in task.topological_order() {
+        for next in task.successors(subtask) {
+            let through_ns = lengths_ns[subtask] + task.wcets_ns()[next];
+            lengths_ns[next] = lengths_ns[next].max(through_ns);
+        }
+    }
+    let sinks = model.sinks().iter();
+    sinks.map(|sink| lengths_ns[sink.index()]).collect()
+}
+
+/// Completes the bounds of a DAG's sinks by that of its jobs, and returns the first sink
+/// that is not bounded by its deadline; then none of them has a bound.
+fn within_deadlines(
+    model: &Dag,
+    whole: Option<DagBound>,
+    sinks_ns: &mut [Option<u64>],
+) -> Option<SubtaskId> {
+    let Some(DagBound { bound_ns, .. }) = whole else {
+        sinks_ns.fill(None);
+        return None;
+    };
+    let mut late = None;
+    for (&sink, sink_ns) in model.sinks().iter().zip(sinks_ns.iter_mut()) {
+        let least_ns = sink_ns.map_or(bound_ns, |sink_ns| sink_ns.min(bound_ns));
+        *sink_ns = Some(least_ns);
+        if least_ns > model.subtask(sink).relative_deadline_ns() {
+            late = late.or(Some(sink));
+        }
+    }
+    if late.is_some() {
+        sinks_ns.fill(None);
+    }
+    late
+}
+
+/// Returns the first sink whose longest path is longer than its deadline, and that path's
+/// length.
+fn too_far(task: &Task, model: &Dag) -> Option<(SubtaskId, u64)> {
+    let mut sinks = model.sinks().iter().copied().zip(lengths_ns(task, model));
+    sinks.find(|&(sink, length_ns)| length_ns > model.subtask(sink).relative_deadline_ns())
+}
+
+fn reaches(task: &Task, model: &Dag, policy: Policy, preemption: Mixture) -> Vec<Reach> {
+    let subtasks = model.subtasks();
+    // The smaller number wins, in both.
+    let urgency = |subtask: usize| match policy {
+        Policy::StaticPriority => u64::from(subtasks[subtask].priority().0),
+        Policy::Edf => subtasks[subtask].relative_deadline_ns(),
+    };
+    // The largest number among the ancestors.
+    let mut least_urgent: Vec<u64> = (0..subtasks.len()).map(urgency).collect();
+    for subtask in task.topological_order() {
+        for next in task.successors(subtask) {
+            least_urgent[next] = least_urgent[next].max(least_urgent[subtask]);
+        }
+    }
+    // By urgency, with the sums of WCETs: a look at all subtasks for each sink takes as long
+    // as the square of a large DAG's size.
+    let order = sorted_by_key(subtasks.len(), urgency);
+    let mut sums_ns = vec![0];
+    for &subtask in &order {
+        sums_ns.push(sums_ns[sums_ns.len() - 1] + task.wcets_ns()[subtask]);
+    }
+    let sinks = model.sinks().iter().zip(lengths_ns(task, model));
+    let reach = sinks.map(|(sink, length_ns)| {
+        let least = least_urgent[sink.index()];
+        let counted = match preemption {
+            Mixture::All => order.partition_point(|&subtask| urgency(subtask) <= least),
+            Mixture::None | Mixture::Some => order.len(),
+        };
+        Reach {
+            length_ns,
+            volume_ns: sums_ns[counted],
+        }
+    });
+    reach.collect()
+}

@@ -1,0 +1,490 @@
+//! Chains that cross DAGs by latest values: how long an effect takes from end to end.
+//!
+//! Within a DAG the response time says all. From the DAG of a sensor to that of a motor values
+//! pass by *sampling*: a subtask takes the latest value that is complete when it starts. Such a
+//! path of subtasks is what the literature calls a *cause-effect chain*, with *implicit
+//! communication* (N. Feiertag et al., A Compositional Framework for End-to-End Path Delay
+//! Calculation of Automotive Systems under Different Path Semantics, CRTS 2008; M. Günzel et al.,
+//! Timing Analysis of Asynchronized Distributed Cause-Effect Chains, RTAS 2021,
+//! doi:10.1109/RTAS52030.2021.00012).
+//!
+//! # Words
+//!
+//! - A chain has *segments*: in each DAG that it passes, the subtask at which it enters and the
+//!   one at which it leaves. The last subtask of the last segment makes the *outputs*.
+//! - An output *goes back* to one job of the first DAG: the one whose value was sampled by the
+//!   job whose value was sampled ... by the job of the output. (An *immediate backward chain*.)
+//! - *Age of an output*: from the nominal release of the job that it goes back to, to its finish.
+//!   RTAS 2021 calls its maximum the *reduced* data age.
+//! - *Data age*: the same to the finish of the next output, for so long the old one is in force.
+//!   (*Last to last* of CRTS 2008.)
+//! - *Reaction time* to what happens just after a job of the first DAG has been released, and is
+//!   too late for it: from there to the finish of the first output that goes back to a later job.
+//!   (*First to first.*) The longest reaction time is the longest data age, but for what the end
+//!   of a run cuts off (M. Günzel et al., On the Equivalence of Maximum Reaction Time and Maximum
+//!   Data Age for Cause-Effect Chains, ECRTS 2023, doi:10.4230/LIPIcs.ECRTS.2023.10).
+//!
+//! The first subtask counts as reading its sensor at the nominal release. It starts later, so
+//! what it reads is younger, and none of the times is longer than stated here.
+//!
+//! # Parts
+//!
+//! [`Chain::all`] and [`Chain::between`] find chains, [`Chain::latencies`] measures one in the
+//! events of a run, [`Chain::output_age_bound_ns`] and [`Chain::reaction_bound_ns`] bound it.
+//!
+//! # Bounds: how long the times of a chain can be, where each of its DAGs has a bound
+//!
+//! Let DAG i of the chain, counted from 0 to n, have period T(i) and a proven response time
+//! R(i), both from nominal releases on. Then
+//!
+//! - the age of an output is at most T(0) + R(0) + ... + T(n-1) + R(n-1) + R(n);
+//! - data age and reaction time are at most T(n) longer.
+//!
+//! *Proof of the first.* Let job j of DAG i sample, at time t, the value of job k of DAG i-1.
+//! Job k+1 was not complete at t, and is so R(i-1) after its release, which is T(i-1) after that
+//! of k; so t < r(k) + T(i-1) + R(i-1). And r(j) <= t, as nothing of job j starts before its
+//! release. So from r(k) to r(j) it is less than T(i-1) + R(i-1). Summed up over the samplings,
+//! this leads from the release of the job that the output goes back to, to that of its own job,
+//! which takes R(n) more.
+//!
+//! *Of the second.* The next output is that of the next job, released T(n) later: that is the
+//! data age. With the longest data age goes the longest reaction time, as the words above say.
+//!
+//! The sum of T + R over all DAGs is the bound of A. Davare et al., Period Optimization for Hard
+//! Real-time Distributed Automotive Systems, DAC 2007 (doi:10.1145/1278480.1278553). It is safe
+//! for any phases of the DAGs, so it is not tight for given ones.
+//!
+//! It holds for as long as jobs come: none is skipped, aborted or lost by a fault, and the DAGs
+//! go on. A sporadic DAG has no longest distance of releases, so its T is none; as the last
+//! DAG of a chain it still has an age of outputs.
+//!
+//! # Which outputs count
+//!
+//! Outputs count up to the instant at which the next job of one of the chain's DAGs would have
+//! been due and did not come, because the DAG had ended: from then on what is sampled only gets
+//! older. Outputs that go back to nothing, as the first ones of a run, do not count.
+//!
+//! Let outputs m and m+1 follow each other and go back to jobs s(m) and s(m+1). The data age of
+//! m is f(m+1) - r(s(m)). If s(m+1) > s(m), this is the reaction time to what happens after the
+//! release of job s(m); else that is longer still. Conversely, the reaction time to what happens
+//! after the release of job k >= s(m), where m+1 is the first output that goes back to a later
+//! one, is f(m+1) - r(k) <= f(m+1) - r(s(m)). So the longest of each are the same, if the run
+//! does not end between.
+//!
+//! # Samples
+//!
+//! An instance samples when it starts, and a value shows when its writer's instance is complete.
+//! Both are events of the journal, which stand in the order in which they happened under the
+//! scheduler's lock. So the value is that of the writer's last finish before the start. On a
+//! machine the function is called a little after its start was written; a writer that finishes
+//! in these instructions is taken for too late. In a replay samples are those of the recording,
+//! whatever has finished before.
+
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt;
+
+use crate::ids::{DagId, Instance, SubtaskId};
+use crate::journal::{Event, What};
+use crate::task_set::{Dag, Subtask, TaskSet};
+
+/// A subtask of a DAG.
+pub type Place = (DagId, SubtaskId);
+
+/// The sampling of a topic: the subtask that writes it, and the one that samples it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Sampling {
+    /// The subtask that writes the topic.
+    pub writer: Place,
+    /// The subtask that samples it.
+    pub reader: Place,
+}
+
+/// The part of a chain that lies in one DAG.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Segment {
+    dag: DagId,
+    /// Where the chain enters: a sampling subtask, or where it begins.
+    entry: SubtaskId,
+    /// Where it leaves: the writer of what is sampled next, or of the outputs.
+    exit: SubtaskId,
+}
+
+/// A path from a subtask to another one, along edges within DAGs and samplings between them. It
+/// passes no DAG twice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chain {
+    /// One for each DAG, at least one.
+    segments: Vec<Segment>,
+}
+
+impl Chain {
+    /// Finds a subtask that is named as `dag/subtask`, each part by its name or its number.
+    #[must_use]
+    pub fn place(task_set: &TaskSet, name: &str) -> Option<Place> {
+        // Names may have a `/` in them.
+        let splits = name
+            .match_indices('/')
+            .map(|(at, _)| (&name[..at], &name[at + 1..]));
+        splits.into_iter().find_map(|(dag, subtask)| {
+            let dags = task_set.dags().iter().map(Dag::name);
+            let dag = DagId(number_of(dags, dag)?);
+            let subtasks = task_set.dag(dag).subtasks().iter().map(Subtask::name);
+            Some((dag, SubtaskId(number_of(subtasks, subtask)?)))
+        })
+    }
+
+    /// Returns the names of the subtasks at which it enters and leaves DAGs, in its order, as
+    /// `dag/subtask`.
+    pub fn names<'t>(&'t self, task_set: &'t TaskSet) -> impl Iterator<Item = impl fmt::Display> {
+        self.segments.iter().flat_map(move |segment| {
+            let Segment { dag, entry, exit } = *segment;
+            let exit = (exit != entry).then_some(exit);
+            let of_segment = [Some(entry), exit].into_iter().flatten();
+            of_segment.map(move |subtask| Named(task_set, (dag, subtask)))
+        })
+    }
+
+    /// Returns how old an output can be at its finish; or else the first DAG that has no bound of
+    /// its own in `responses_ns`, which are in the order of the DAGs, or is sporadic and not the
+    /// last one.
+    ///
+    /// # Errors
+    ///
+    /// That DAG.
+    pub fn output_age_bound_ns(
+        &self,
+        task_set: &TaskSet,
+        responses_ns: &[Option<u64>],
+    ) -> Result<u64, DagId> {
+        let last = self.segments.len() - 1;
+        let before = sum(&self.segments[..last], task_set, responses_ns)?;
+        let dag = self.segments[last].dag;
+        let response_ns = responses_ns.get(dag.index()).copied().flatten();
+        Ok(before.saturating_add(response_ns.ok_or(dag)?))
+    }
+
+    /// Returns the longest reaction time, which is the longest data age; or else the first DAG
+    /// that has no bound of its own, or is sporadic.
+    ///
+    /// # Errors
+    ///
+    /// That DAG.
+    pub fn reaction_bound_ns(
+        &self,
+        task_set: &TaskSet,
+        responses_ns: &[Option<u64>],
+    ) -> Result<u64, DagId> {
+        sum(&self.segments, task_set, responses_ns)
+    }
+}
+
+/// Returns the sum of period and response time over DAGs.
+fn sum(
+    segments: &[Segment],
+    task_set: &TaskSet,
+    responses_ns: &[Option<u64>],
+) -> Result<u64, DagId> {
+    segments.iter().try_fold(0, |sum: u64, segment| {
+        let model = task_set.dag(segment.dag);
+        let response_ns = responses_ns.get(segment.dag.index()).copied().flatten();
+        let response_ns = response_ns.filter(|_| !model.is_sporadic());
+        let of_dag = model
+            .period_ns()
+            .saturating_add(response_ns.ok_or(segment.dag)?);
+        Ok(sum.saturating_add(of_dag))
+    })
+}
+
+/// Returns the position of what has this name, or else the number that is written there.
+fn number_of<'n>(names: impl Iterator<Item = &'n str> + Clone, wanted: &str) -> Option<u32> {
+    let named = (0..).zip(names.clone()).find(|(_, name)| *name == wanted);
+    let number = || {
+        wanted
+            .parse()
+            .ok()
+            .filter(|number| (0..).zip(names).any(|(at, _)| at == *number))
+    };
+    named.map(|(at, _)| at).or_else(number)
+}
+
+/// A subtask as `dag/subtask`; what has no name has its number.
+struct Named<'t>(&'t TaskSet, Place);
+
+impl fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(task_set, (dag, subtask)) = self;
+        let model = task_set.dag(*dag);
+        match model.name() {
+            "" => write!(f, "{}/", dag.0)?,
+            name => write!(f, "{name}/")?,
+        }
+        match model.subtask(*subtask).name() {
+            "" => write!(f, "{}", subtask.0),
+            name => f.write_str(name),
+        }
+    }
+}
+
+/// The most chains that are looked for: their number may double with each DAG.
+const MOST: usize = 1000;
+
+impl Chain {
+    /// Finds the chains that cross DAGs and are part of no longer one: from a source that samples
+    /// nothing to a sink that no DAG samples. At most 1000.
+    #[must_use]
+    pub fn all(task_set: &TaskSet, samplings: &[Sampling]) -> Vec<Chain> {
+        let mut search = Search::new(task_set, samplings);
+        for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
+            for &source in model.sources() {
+                let place = (dag, source);
+                if samplings.iter().all(|sampling| sampling.reader != place) {
+                    search.go_on_from(place, &|search, exit| {
+                        !search.path.is_empty()
+                            && model_of(search, exit).sinks().contains(&exit.1)
+                            && samplings.iter().all(|sampling| sampling.writer != exit)
+                    });
+                }
+            }
+        }
+        search.found
+    }
+
+    /// Finds the chains from a subtask to another one, of the same DAG or of another, at most
+    /// 1000. None, if nothing leads there.
+    #[must_use]
+    pub fn between(
+        task_set: &TaskSet,
+        samplings: &[Sampling],
+        from: Place,
+        to: Place,
+    ) -> Vec<Chain> {
+        let mut search = Search::new(task_set, samplings);
+        search.go_on_from(from, &|_, exit| exit == to);
+        search.found
+    }
+}
+
+fn model_of<'t>(search: &Search<'t>, (dag, _): Place) -> &'t Dag {
+    search.task_set.dag(dag)
+}
+
+struct Search<'t> {
+    task_set: &'t TaskSet,
+    /// Each once: a subtask may sample a topic twice.
+    samplings: Vec<Sampling>,
+    /// The segments up to the one that is looked at.
+    path: Vec<Segment>,
+    found: Vec<Chain>,
+}
+
+impl<'t> Search<'t> {
+    fn new(task_set: &'t TaskSet, samplings: &[Sampling]) -> Self {
+        let mut samplings = samplings.to_vec();
+        samplings.sort_unstable();
+        samplings.dedup();
+        Self {
+            task_set,
+            samplings,
+            path: Vec::new(),
+            found: Vec::new(),
+        }
+    }
+
+    /// Finds the chains that go on from a subtask. It calls itself at most once for each DAG.
+    fn go_on_from(&mut self, (dag, entry): Place, is_end: &dyn Fn(&Self, Place) -> bool) {
+        for exit in self.reached_from((dag, entry)) {
+            if self.found.len() >= MOST {
+                return;
+            }
+            let segment = Segment { dag, entry, exit };
+            if is_end(self, (dag, exit)) {
+                let segments = [&self.path[..], &[segment]].concat();
+                self.found.push(Chain { segments });
+            }
+            self.path.push(segment);
+            for at in 0..self.samplings.len() {
+                let Sampling { writer, reader } = self.samplings[at];
+                let is_new = self.path.iter().all(|passed| passed.dag != reader.0);
+                if writer == (dag, exit) && is_new {
+                    self.go_on_from(reader, is_end);
+                }
+            }
+            self.path.pop();
+        }
+    }
+
+    /// Returns a subtask and all that follow it in its DAG.
+    fn reached_from(&self, (dag, entry): Place) -> Vec<SubtaskId> {
+        let model = self.task_set.dag(dag);
+        let mut is_reached = vec![false; model.subtasks().len()];
+        is_reached[entry.index()] = true;
+        let mut reached = Vec::new();
+        for &subtask in model.topological_order() {
+            if is_reached[subtask.index()] {
+                reached.push(subtask);
+                for successor in model.successors(subtask) {
+                    is_reached[successor.index()] = true;
+                }
+            }
+        }
+        reached
+    }
+}
+
+/// The times of a chain in one run, in nanoseconds; `chains` says what they are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Latencies {
+    /// Of each output: its age at its finish.
+    pub output_age_ns: Vec<u64>,
+    /// Of each output that was followed by another one: its data age.
+    pub data_age_ns: Vec<u64>,
+    /// The reaction time to what happens just after each job's release, if it was seen.
+    pub reaction_ns: Vec<u64>,
+}
+
+impl Chain {
+    /// Measures the chain in the events of a run, which are in the order of the journal.
+    #[must_use]
+    pub fn latencies(
+        &self,
+        task_set: &TaskSet,
+        events: impl Iterator<Item = Event> + Clone,
+    ) -> Latencies {
+        let hops = self.segments.windows(2).map(|hop| Sampling {
+            writer: (hop[0].dag, hop[0].exit),
+            reader: (hop[1].dag, hop[1].entry),
+        });
+        let hops: Vec<Sampling> = hops.collect();
+        let sampled = SampledJobs::new(&hops, events.clone());
+        let releases = Releases::of(task_set, events.clone());
+        let end_ns = self.segments.iter().map(|segment| {
+            let model = task_set.dag(segment.dag);
+            let last = releases.0.keys().rfind(|(dag, _)| *dag == segment.dag);
+            match last {
+                Some((_, job)) if !model.is_sporadic() => model.grid_ns(job.saturating_add(1)),
+                _ => u64::MAX,
+            }
+        });
+        let end_ns = end_ns.min().unwrap_or(u64::MAX);
+        let (first, last) = (self.segments[0], self.segments[self.segments.len() - 1]);
+        let mut latencies = Latencies::default();
+        // The job that the output before goes back to, and its release.
+        let mut before: Option<(u64, u64)> = None;
+        let is_output = |event: &Event| {
+            (event.what, event.dag, event.subtask) == (What::Finish, last.dag, Some(last.exit))
+                && event.time_ns <= end_ns
+        };
+        for output in events.filter(is_output) {
+            // What it goes back to, hop by hop.
+            let origin = hops.iter().rev().try_fold(output.job, |job, hop| {
+                let (dag, subtask) = hop.reader;
+                sampled.job(Instance { dag, job, subtask }, hop.writer)
+            });
+            let release_ns = |job| releases.0.get(&(first.dag, job)).copied();
+            let Some((origin, release_ns)) = origin.and_then(|job| Some((job, release_ns(job)?)))
+            else {
+                before = None;
+                continue;
+            };
+            let since = |start_ns: u64| output.time_ns.saturating_sub(start_ns);
+            latencies.output_age_ns.push(since(release_ns));
+            if let Some((before, before_ns)) = before {
+                latencies.data_age_ns.push(since(before_ns));
+                let missed = releases
+                    .0
+                    .range((first.dag, before)..(first.dag, origin.max(before)));
+                let reactions = missed.map(|(_, release_ns)| since(*release_ns));
+                latencies.reaction_ns.extend(reactions);
+            }
+            before = Some((origin, release_ns));
+        }
+        latencies
+    }
+}
+
+/// The nominal releases of all jobs that were released.
+struct Releases(BTreeMap<(DagId, u64), u64>);
+
+impl Releases {
+    fn of(task_set: &TaskSet, events: impl Iterator<Item = Event>) -> Self {
+        let mut due_ns = BTreeMap::new();
+        let mut releases = BTreeMap::new();
+        for event in events {
+            let of = (event.dag, event.job);
+            match event.what {
+                What::Due => {
+                    due_ns.insert(of, event.time_ns);
+                }
+                What::Released => {
+                    let model = task_set.dag(event.dag);
+                    let due_ns = due_ns.get(&of).copied().unwrap_or(event.time_ns);
+                    releases.insert(of, model.release_ns(event.job, due_ns));
+                }
+                _ => {}
+            }
+        }
+        Self(releases)
+    }
+}
+
+/// The samples of a run.
+#[derive(Clone, Debug, Default)]
+pub struct SampledJobs {
+    /// By instance, and by the writer of what it samples: the job.
+    jobs: BTreeMap<(Instance, Place), u64>,
+}
+
+impl SampledJobs {
+    /// Follows the events of a run, in the order of the journal.
+    #[must_use]
+    pub fn new(samplings: &[Sampling], events: impl Iterator<Item = Event>) -> Self {
+        let mut readers: BTreeMap<Place, Vec<Place>> = BTreeMap::new();
+        // Of the writers: the last job that is complete.
+        let mut latest: BTreeMap<Place, Option<u64>> = BTreeMap::new();
+        for sampling in samplings {
+            let writers = readers.entry(sampling.reader).or_default();
+            writers.push(sampling.writer);
+            latest.insert(sampling.writer, None);
+        }
+        let mut jobs = BTreeMap::new();
+        for event in events {
+            let Some(instance) = event.instance() else {
+                continue;
+            };
+            let place = (instance.dag, instance.subtask);
+            match event.what {
+                What::Start => {
+                    for writer in readers.get(&place).into_iter().flatten() {
+                        if let Some(Some(job)) = latest.get(writer) {
+                            jobs.insert((instance, *writer), *job);
+                        }
+                    }
+                }
+                What::Finish => {
+                    if let Some(latest) = latest.get_mut(&place) {
+                        *latest = Some(event.job);
+                    }
+                }
+                _ => {}
+            }
+        }
+        Self { jobs }
+    }
+
+    /// Returns the job whose value an instance has sampled of a writer; `None`: it has not
+    /// started, or found nothing.
+    #[must_use]
+    pub fn job(&self, reader: Instance, writer: Place) -> Option<u64> {
+        self.jobs.get(&(reader, writer)).copied()
+    }
+
+    /// Returns all that was sampled: by which instance, and whose value.
+    pub fn all(&self) -> impl Iterator<Item = (Instance, Instance)> {
+        self.jobs.iter().map(|((reader, (dag, subtask)), job)| {
+            let (dag, job, subtask) = (*dag, *job, *subtask);
+            (*reader, Instance { dag, job, subtask })
+        })
+    }
+}

@@ -1,0 +1,643 @@
+//! The instances that wait for a core, in the order of their keys (R5).
+//!
+//! # The front
+//!
+//! Often an instance that has just become ready is the only one in line and starts
+//! at once, on the core that its predecessor has left. So the queue keeps one
+//! instance, the *front*, outside of its ordered rest: such an instance passes
+//! through without being sorted in. The front, if there is one, has the
+//! smallest key of all.
+//!
+//! # The rest
+//!
+//! Under static priority the order of all instances that can ever wait together
+//! is mostly known at commit: then each subtask has a *rank*, and the rest is a
+//! set of bits, which costs the same however many wait; up to 64 subtasks are bits of
+//! one word, which is at hand without any call. That holds unless two
+//! subtasks of one DAG share a priority and jobs of that DAG overlap, because
+//! then the job comes before the subtask. In that case the rest is a heap. Under
+//! EDF it is a heap of jobs or, where sinks have deadlines of their own, of instances.
+//!
+//! # The heap of items that are known by index
+//!
+//! The items are `0..capacity`, each in the heap at most once, so that an item
+//! can be found and removed, or get another key, in logarithmic time (Williams,
+//! Communications of the ACM 7, 1964, with a table of positions next to it). Each entry
+//! has four below it, which makes the way half as long as with two, and an entry that
+//! moves is written once, where it ends (LaMarca and Ladner, Journal of Experimental
+//! Algorithmics 1, 1996). All memory is taken when the heap is made.
+//!
+//! # By deadline
+//!
+//! All instances of a job have the deadline of the job. So it is jobs that are put
+//! in order, by a heap, and each has a set of bits for its subtasks: a job with a
+//! hundred ready subtasks is one entry of the heap, not a hundred.
+
+use alloc::boxed::Box;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::bits::BitSet;
+use super::jobs::Job;
+use super::key::{Key, Order};
+use super::vertices::{Vertex, Vertices};
+use crate::ids::{DagId, SubtaskId, to_u32};
+use crate::order::{sorted, sorted_by_key};
+use crate::policy::Policy;
+use crate::task_set::{Dag, TaskSet};
+
+/// The instances in line. At most one of a vertex waits at a time.
+#[derive(Clone, Debug, Hash)]
+pub(super) struct ReadyQueue {
+    /// The smallest key, or none.
+    front: Key,
+    /// How many are in the rest.
+    others: u32,
+    order: Order,
+    /// Under `SinkDeadline` the relative deadline of each rank, else nothing.
+    deadlines_ns: Box<[u64]>,
+    rest: Rest,
+}
+
+/// `repr(u8)`, so that testing for the first variant takes one comparison.
+#[derive(Clone, Debug, Hash)]
+#[repr(u8)]
+enum Rest {
+    /// For keys that are ranks up to 63.
+    Word {
+        ranks: u64,
+        /// The vertex of each rank. Keys are made of both, not loaded: loaded by
+        /// halves or as one, the front would have to be loaded the same way, and a
+        /// processor cannot load as one what it has just stored by halves.
+        vertices: Box<[u32]>,
+    },
+    /// For keys that are ranks.
+    Ranked {
+        ranks: BitSet,
+        /// The key of each rank.
+        keys: Box<[Key]>,
+    },
+    /// For keys that begin with a deadline.
+    ByDeadline(ByDeadline),
+    /// For any keys, by vertex.
+    Keyed(IndexedHeap<Key>),
+}
+
+impl ReadyQueue {
+    /// Makes the queue for a set and a policy; gives vertices their ranks.
+    #[inline]
+    pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut Vertices) -> Self {
+        let in_any_order = |count| Rest::Keyed(IndexedHeap::new(count));
+        if policy == Policy::Edf {
+            if task_set
+                .dags()
+                .iter()
+                .all(|dag| deadlines_ns(dag).len() == 1)
+            {
+                let rest = Rest::ByDeadline(ByDeadline::new(task_set));
+                return Self::of(Order::Deadline, rest);
+            }
+            return Self {
+                deadlines_ns: rank_by_deadline(task_set, vertices).into(),
+                ..Self::of(Order::SinkDeadline, in_any_order(vertices.len()))
+            };
+        }
+        if task_set.dags().iter().all(has_ranks) {
+            let order = rank(vertices, Order::Rank);
+            return Self::of(Order::Rank, ranked(&order));
+        }
+        rank(vertices, Order::Job);
+        Self::of(Order::Job, in_any_order(vertices.len()))
+    }
+
+    #[inline]
+    fn of(order: Order, rest: Rest) -> Self {
+        Self {
+            front: Key::NONE,
+            others: 0,
+            order,
+            deadlines_ns: Box::default(),
+            rest,
+        }
+    }
+
+    /// Returns the key of a vertex's next instance, which is of the job that `job` finds.
+    #[inline]
+    pub(super) fn key<'j>(
+        &self,
+        number: u32,
+        vertex: &Vertex,
+        job: impl FnOnce() -> &'j Job,
+    ) -> Key {
+        // The usual one is told apart by one comparison, and the next one by another.
+        if self.order == Order::Rank {
+            return Key::of_rank(vertex.rank, number);
+        }
+        let job = job();
+        if self.order == Order::Deadline {
+            return Key::of_parts(job.deadline_ns, job.slot, number);
+        }
+        self.rare_key(number, vertex, job)
+    }
+
+    /// Apart, so that no other key pays for it.
+    #[inline(never)]
+    fn rare_key(&self, number: u32, vertex: &Vertex, job: &Job) -> Key {
+        match self.order {
+            Order::SinkDeadline => {
+                let deadline_ns = self.deadlines_ns[vertex.rank as usize];
+                Key::by_sink(deadline_ns, number, vertex, job)
+            }
+            _ => Key::by_job(number, vertex),
+        }
+    }
+
+    /// Reports whether none waits.
+    #[inline]
+    pub(super) const fn is_empty(&self) -> bool {
+        self.front.is_none() && self.others == 0
+    }
+
+    /// Returns the smallest key.
+    #[inline]
+    pub(super) fn peek(&self) -> Option<Key> {
+        if !self.front.is_none() {
+            return Some(self.front);
+        }
+        if self.others == 0 {
+            return None;
+        }
+        self.rest.peek()
+    }
+
+    /// Puts an instance in line.
+    #[inline]
+    pub(super) fn insert(&mut self, key: Key) {
+        if self.is_empty() {
+            self.front = key;
+        } else {
+            self.insert_among_others(key);
+        }
+    }
+
+    /// Compares with the front only: comparing with the rest costs as much as inserting.
+    #[inline]
+    fn insert_among_others(&mut self, key: Key) {
+        let precedes_front = !self.front.is_none() && key < self.front;
+        let behind = match precedes_front {
+            true => core::mem::replace(&mut self.front, key),
+            false => key,
+        };
+        self.others += 1;
+        self.rest.insert(behind);
+    }
+
+    /// Takes the instance with the smallest key out.
+    #[inline]
+    pub(super) fn pop(&mut self) -> Option<Key> {
+        if !self.front.is_none() {
+            return Some(core::mem::replace(&mut self.front, Key::NONE));
+        }
+        if self.others == 0 {
+            return None;
+        }
+        self.others -= 1;
+        Some(self.rest.pop())
+    }
+
+    /// Takes an instance out, which waits.
+    #[inline]
+    pub(super) fn remove(&mut self, key: Key) {
+        if self.front == key {
+            self.front = Key::NONE;
+            return;
+        }
+        self.others -= 1;
+        self.rest.remove(key);
+    }
+}
+
+impl Rest {
+    #[inline]
+    fn peek(&self) -> Option<Key> {
+        match self {
+            Self::Word { ranks, vertices } => {
+                let rank = ranks.trailing_zeros();
+                let vertex = vertices.get(rank as usize)?;
+                Some(Key::of_rank(rank, *vertex))
+            }
+            Self::Ranked { ranks, keys } => ranks.first().map(|rank| keys[rank]),
+            Self::ByDeadline(jobs) => jobs.peek(),
+            Self::Keyed(heap) => heap.peek().map(|(key, _)| key),
+        }
+    }
+
+    #[inline]
+    fn insert(&mut self, key: Key) {
+        match self {
+            Self::Word { ranks, .. } => *ranks |= 1 << key.rank(),
+            _ => self.insert_beyond_a_word(key),
+        }
+    }
+
+    // `cold`: a call, which leaves the caller its registers, but compiled as the caller is.
+    #[cold]
+    #[inline]
+    fn insert_beyond_a_word(&mut self, key: Key) {
+        match self {
+            Self::Word { .. } => {}
+            Self::Ranked { ranks, .. } => ranks.insert(key.rank()),
+            Self::ByDeadline(jobs) => jobs.insert(key),
+            Self::Keyed(heap) => heap.set(key.vertex() as usize, key),
+        }
+    }
+
+    #[inline]
+    fn remove(&mut self, key: Key) {
+        match self {
+            Self::Word { ranks, .. } => *ranks &= !(1 << key.rank()),
+            Self::Ranked { ranks, .. } => ranks.remove(key.rank()),
+            Self::ByDeadline(jobs) => jobs.remove(key),
+            Self::Keyed(heap) => heap.remove(key.vertex() as usize),
+        }
+    }
+
+    /// Takes the instance with the smallest key out, of which there is one.
+    #[inline]
+    fn pop(&mut self) -> Key {
+        match self {
+            Self::Word { ranks, vertices } => {
+                let rank = ranks.trailing_zeros();
+                *ranks &= ranks.wrapping_sub(1);
+                Key::of_rank(rank, vertices[rank as usize])
+            }
+            _ => self.pop_beyond_a_word(),
+        }
+    }
+
+    #[cold]
+    #[inline]
+    fn pop_beyond_a_word(&mut self) -> Key {
+        let first = match self {
+            Self::Word { .. } => None,
+            Self::Ranked { ranks, keys } => ranks.pop().map(|rank| keys[rank]),
+            Self::ByDeadline(jobs) => jobs.pop(),
+            Self::Keyed(heap) => heap.pop().map(|(key, _)| key),
+        };
+        first.expect("as many are in line as were counted")
+    }
+}
+
+/// Makes the rest for vertices in the order of their ranks.
+#[inline]
+fn ranked(order: &[u32]) -> Rest {
+    let keys = (0u32..).zip(order);
+    match order.len() {
+        0..=64 => Rest::Word {
+            ranks: 0,
+            vertices: order.into(),
+        },
+        count => Rest::Ranked {
+            ranks: BitSet::new(count),
+            keys: keys
+                .map(|(rank, &vertex)| Key::of_rank(rank, vertex))
+                .collect(),
+        },
+    }
+}
+
+/// Reports whether the subtasks of a DAG, as far as they wait together, are in
+/// the same order whatever jobs they do.
+fn has_ranks(dag: &Dag) -> bool {
+    let priorities: Vec<_> = dag.subtasks().iter().map(|s| s.priority().0).collect();
+    let priorities = sorted(&priorities);
+    dag.in_flight() == 1 || priorities.windows(2).all(|pair| pair[0] != pair[1])
+}
+
+/// Replaces each vertex's priority by its place in the order of (priority, DAG,
+/// subtask), or of (priority, DAG) if the job comes next; returns the vertices in
+/// that order.
+fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
+    // Vertices count DAG by DAG, within a DAG by subtask, and the sort is stable.
+    let urgency = |vertex| vertices.get(to_u32(vertex)).rank;
+    let order = sorted_by_key(vertices.len(), urgency);
+    let order: Vec<u32> = order.into_iter().map(to_u32).collect();
+    let mut rank = 0;
+    let mut last = None;
+    for &number in &order {
+        let vertex = vertices.get_mut(number);
+        let group = (vertex.rank, vertex.dag);
+        if last.is_some_and(|last| kind == Order::Rank || last != group) {
+            rank += 1;
+        }
+        last = Some(group);
+        vertex.rank = rank;
+    }
+    order
+}
+
+/// Replaces each vertex's priority by its place in the order of (DAG, relative deadline,
+/// the longest first), and returns the relative deadline of each place.
+fn rank_by_deadline(task_set: &TaskSet, vertices: &mut Vertices) -> Vec<u64> {
+    let mut of_ranks = Vec::new();
+    for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
+        let first = task_set.first_vertex(id);
+        let of_dag = deadlines_ns(dag);
+        for (subtask, attributes) in (0..).map(SubtaskId).zip(dag.subtasks()) {
+            let own_ns = attributes.relative_deadline_ns();
+            let longer = of_dag.partition_point(|&longer_ns| longer_ns > own_ns);
+            vertices.get_mut(first + subtask.0).rank = to_u32(of_ranks.len() + longer);
+        }
+        of_ranks.extend(of_dag);
+    }
+    of_ranks
+}
+
+/// Returns the relative deadlines of a DAG's subtasks, each once, the longest first.
+fn deadlines_ns(dag: &Dag) -> Vec<u64> {
+    let of_subtasks = dag.subtasks().iter().map(|of| of.relative_deadline_ns());
+    let mut deadlines_ns = sorted(&of_subtasks.collect::<Vec<_>>());
+    deadlines_ns.dedup();
+    deadlines_ns.reverse();
+    deadlines_ns
+}
+
+/// How many entries stand below each.
+const BELOW: usize = 4;
+
+/// The position of an item that is not in the heap.
+const ABSENT: usize = usize::MAX;
+
+/// A heap with the smallest key on top.
+#[derive(Clone, Debug, Hash)]
+pub(super) struct IndexedHeap<K> {
+    entries: Vec<(K, usize)>,
+    /// Where in `entries` each item is.
+    positions: Box<[usize]>,
+}
+
+impl<K: Ord + Copy> IndexedHeap<K> {
+    /// Makes an empty heap for the items `0..capacity`.
+    #[inline]
+    pub(super) fn new(capacity: usize) -> Self {
+        Self {
+            entries: Vec::with_capacity(capacity),
+            positions: vec![ABSENT; capacity].into_boxed_slice(),
+        }
+    }
+
+    /// Returns the smallest key and its item.
+    #[inline]
+    pub(super) fn peek(&self) -> Option<(K, usize)> {
+        self.entries.first().copied()
+    }
+
+    /// Puts an item into the heap, or gives it another key.
+    #[inline]
+    pub(super) fn set(&mut self, item: usize, key: K) {
+        let position = self.positions[item];
+        let entry = (key, item);
+        match self.entries.get(position) {
+            None => {
+                self.entries.push(entry);
+                self.rise(self.entries.len() - 1, entry);
+            }
+            Some((old, _)) if *old < key => self.sink_if_above(position, entry),
+            Some(_) => self.rise(position, entry),
+        }
+    }
+
+    /// Takes the item with the smallest key out.
+    #[inline]
+    pub(super) fn pop(&mut self) -> Option<(K, usize)> {
+        let (key, item) = self.peek()?;
+        self.remove(item);
+        Some((key, item))
+    }
+
+    /// Takes an item out, if it is in.
+    #[inline]
+    pub(super) fn remove(&mut self, item: usize) {
+        let position = self.positions[item];
+        if position == ABSENT {
+            return;
+        }
+        self.positions[item] = ABSENT;
+        let Some(last) = self.entries.pop() else {
+            return;
+        };
+        if let Some((removed, _)) = self.entries.get(position) {
+            match *removed < last.0 {
+                true => self.sink(position, last),
+                false => self.rise(position, last),
+            }
+        }
+    }
+
+    /// Puts an entry where `position` is, or above.
+    #[inline]
+    fn rise(&mut self, mut position: usize, entry: (K, usize)) {
+        while position > 0 {
+            let above = (position - 1) / BELOW;
+            if self.entries[above].0 <= entry.0 {
+                break;
+            }
+            self.put(position, self.entries[above]);
+            position = above;
+        }
+        self.put(position, entry);
+    }
+
+    /// Puts an entry where `position` is, or below; at once if nothing is below.
+    #[inline]
+    fn sink_if_above(&mut self, position: usize, entry: (K, usize)) {
+        if BELOW * position + 1 < self.entries.len() {
+            self.sink(position, entry);
+        } else {
+            self.entries[position] = entry;
+        }
+    }
+
+    /// Puts an entry where `position` is, or below.
+    #[inline]
+    fn sink(&mut self, mut position: usize, entry: (K, usize)) {
+        while let first = BELOW * position + 1
+            && let Some(below) = self.entries.get(first..)
+            && let Some((from, least)) = least(below)
+            && least.0 < entry.0
+        {
+            self.put(position, least);
+            position = first + from;
+        }
+        self.put(position, entry);
+    }
+
+    #[inline]
+    fn put(&mut self, position: usize, entry: (K, usize)) {
+        self.entries[position] = entry;
+        self.positions[entry.1] = position;
+    }
+}
+
+/// Returns the smallest of the first [`BELOW`] entries, the first of equal ones, and where it is.
+#[inline]
+fn least<K: Ord + Copy>(entries: &[(K, usize)]) -> Option<(usize, (K, usize))> {
+    if let Some((four, _)) = entries.split_first_chunk::<BELOW>() {
+        // Which one it is cannot be foretold: places are calculated, and no jump depends on it.
+        let one = usize::from(four[1].0 < four[0].0);
+        let other = 2 + usize::from(four[3].0 < four[2].0);
+        let place = match four[other].0 < four[one].0 {
+            true => other,
+            false => one,
+        };
+        return Some((place, four[place]));
+    }
+    let mut least = (0, *entries.first()?);
+    for (place, &entry) in entries.iter().enumerate().skip(1) {
+        if entry.0 < least.1.0 {
+            least = (place, entry);
+        }
+    }
+    Some(least)
+}
+
+/// Instances by the absolute deadline, then by the slot of the job, then by vertex.
+#[derive(Clone, Debug, Hash)]
+struct ByDeadline {
+    /// What comes before the vertex in the keys of the jobs that have ready instances, by slot.
+    jobs: IndexedHeap<u128>,
+    /// By slot.
+    lines: Box<[Line]>,
+}
+
+/// The ready instances of one job in flight.
+#[derive(Clone, Debug, Hash)]
+struct Line {
+    /// The first vertex of its DAG.
+    first: u32,
+    /// The ready ones, counted from there.
+    subtasks: BitSet,
+}
+
+impl ByDeadline {
+    #[inline]
+    pub(super) fn new(task_set: &TaskSet) -> Self {
+        let mut lines = Vec::new();
+        for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
+            lines.extend((0..dag.slots()).map(|_| Line {
+                first: task_set.first_vertex(id),
+                subtasks: BitSet::new(dag.subtasks().len()),
+            }));
+        }
+        Self {
+            jobs: IndexedHeap::new(lines.len()),
+            lines: lines.into_boxed_slice(),
+        }
+    }
+
+    #[inline]
+    pub(super) fn insert(&mut self, key: Key) {
+        let slot = key.slot();
+        let line = &mut self.lines[slot];
+        if line.subtasks.is_empty() {
+            self.jobs.set(slot, key.before_the_vertex());
+        }
+        line.subtasks.insert((key.vertex() - line.first) as usize);
+    }
+
+    /// Returns the smallest key.
+    #[inline]
+    pub(super) fn peek(&self) -> Option<Key> {
+        let (job, slot) = self.jobs.peek()?;
+        let line = &self.lines[slot];
+        let vertex = line.first + to_u32(line.subtasks.first()?);
+        Some(Key::of_job(job, vertex))
+    }
+
+    /// Takes the instance with the smallest key out.
+    #[inline]
+    pub(super) fn pop(&mut self) -> Option<Key> {
+        let (job, slot) = self.jobs.peek()?;
+        let line = &mut self.lines[slot];
+        let vertex = line.first + to_u32(line.subtasks.pop()?);
+        if line.subtasks.is_empty() {
+            self.jobs.remove(slot);
+        }
+        Some(Key::of_job(job, vertex))
+    }
+
+    #[inline]
+    pub(super) fn remove(&mut self, key: Key) {
+        let slot = key.slot();
+        let line = &mut self.lines[slot];
+        line.subtasks.remove((key.vertex() - line.first) as usize);
+        if line.subtasks.is_empty() {
+            self.jobs.remove(slot);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(number: u32) -> Key {
+        Key::of_parts(u64::from(number) << 32, 0, number)
+    }
+
+    /// One of each kind that needs no task set, with room for so many.
+    fn queues() -> [(ReadyQueue, u32); 4] {
+        let ranked = |count| (ReadyQueue::of(Order::Rank, ranked(&order(count))), count);
+        let keyed = Rest::Keyed(IndexedHeap::new(100));
+        let keyed = (ReadyQueue::of(Order::Job, keyed), 100);
+        [ranked(63), ranked(64), ranked(100), keyed]
+    }
+
+    fn order(count: u32) -> Vec<u32> {
+        (0..count).collect()
+    }
+
+    #[test]
+    fn pops_ascending_however_inserts_pops_and_removals_mix() {
+        for (mut queue, count) in queues() {
+            for number in 0..count {
+                queue.insert(key((number * 37) % count));
+                if number % 3 == 0 {
+                    let first = queue.peek();
+                    let popped = queue.pop().expect("one waits");
+                    assert_eq!(Some(popped), first);
+                    queue.insert(popped);
+                }
+            }
+            // The front, too.
+            for vertex in (0..count).step_by(4) {
+                queue.remove(key(vertex));
+            }
+            let left = order(count).into_iter().filter(|vertex| vertex % 4 != 0);
+            let popped: Vec<_> = core::iter::from_fn(|| queue.pop()).collect();
+            assert_eq!(popped.len(), left.count());
+            assert!(popped.iter().all(|&popped| popped == key(popped.vertex())));
+            assert!(popped.is_sorted());
+        }
+    }
+
+    #[test]
+    fn pops_ascending_after_sets_changes_and_removals() {
+        let mut heap = IndexedHeap::new(100);
+        for item in 0..100 {
+            heap.set(item, (item * 37) % 100);
+        }
+        // Removed twice, as nothing forbids it.
+        for item in (0..100).step_by(3).flat_map(|item| [item, item]) {
+            heap.remove(item);
+        }
+        for item in (1..100).step_by(3) {
+            heap.set(item, 200 - item);
+        }
+        let changed = (1..100).step_by(3).map(|item| (200 - item, item));
+        let kept = (2..100).step_by(3).map(|item| ((item * 37) % 100, item));
+        let mut expected: Vec<_> = changed.chain(kept).collect();
+        expected.sort_unstable();
+        assert!(core::iter::from_fn(|| heap.pop()).eq(expected));
+    }
+}
