@@ -59,14 +59,14 @@ mod watch;
 #[doc(hidden)]
 pub use boot::memory_functions;
 
+pub use crate::app::lock::Event;
 pub use app::bare_machine::Machine;
-pub use app::event::Event;
 pub use app::lock::Lock;
 pub use executive::memory::heap::KernelHeap;
 pub use front::app::ending::Ending;
 #[doc(inline)]
 pub use front::named::{console, json, options};
-pub use front::report::memory::Resources;
+pub use front::report::Resources;
 pub use front::{print, println};
 #[doc(inline)]
 pub use sched_dag::engine::Run;

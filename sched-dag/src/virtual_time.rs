@@ -355,7 +355,7 @@ impl<B: Body> fmt::Debug for VirtualTime<B> {
 /// What instances do and how long it takes them.
 pub trait Workload<B = Instance> {
     /// Returns the execution time of an instance in nanoseconds; 0 is allowed. Called once for
-    /// each instance, at its start. `None`: the run is [stopped](super::End::Stopped) at once.
+    /// each instance, at its start. `None`: the run is [stopped](End::Stopped) at once.
     fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
 
     /// Reports whether an instance fails, instead of finishing, when its

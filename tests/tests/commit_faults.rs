@@ -237,7 +237,7 @@ fn every_reason_of_a_platform_is_listed() {
     let documented = table("| text | platform |");
     let sources = sources(&[
         "kernel/executive/src/run/execution/mod.rs",
-        "kernel/executive/src/run/execution/stacks.rs",
+        "kernel/executive/src/run/execution/port.rs",
         "fass/virtual-time/src/platform.rs",
         "fass/linux/src/platform.rs",
         "sched-dag/src/lifecycle.rs",

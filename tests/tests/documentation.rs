@@ -26,11 +26,11 @@ const FILES: [&str; 12] = [
     "sched-dag/src/engine/run.rs",
     "kernel/front/src/options.rs",
     "kernel/front/src/text/json.rs",
-    "kernel/front/src/text/console/mod.rs",
-    "kernel/src/app/event.rs",
+    "kernel/front/src/text/console.rs",
+    "kernel/src/app/lock.rs",
     "kernel/src/app/lock.rs",
     "sched-dag/src/law/distribution.rs",
-    "kernel/front/src/report/time.rs",
+    "kernel/front/src/report.rs",
 ];
 
 /// What is public for its own crate alone, because its module is not, or for the kernel,

@@ -36,14 +36,14 @@ pub mod entry;
 mod heap;
 mod output;
 
-pub use app::event::Event;
+pub use crate::app::lock::Event;
 pub use app::linux_system::Machine;
 pub use app::lock::Lock;
 pub use front::app::ending::Ending;
 #[doc(inline)]
 pub use front::named::{console, json, options};
 pub use front::report;
-pub use front::report::memory::Resources;
+pub use front::report::Resources;
 pub use front::{print, println};
 #[doc(hidden)]
 pub use heap::Heap;

@@ -21,7 +21,7 @@ use executive::text::console;
 use front::app::ending::Ending;
 use front::app::machine::System;
 use front::json;
-use front::report::memory::Memory;
+use front::report::Memory;
 use sched_dag::engine::{Counts, Run};
 
 /// The machine, lent to the app's function for the time of the run.
@@ -96,14 +96,14 @@ impl System for BareMachine {
             lock_acquisitions: locks,
         });
         record::end_run(&run);
-        report::left::dump(&run);
+        report::tell_left(&run);
         if let Some(line) = LINE.get() {
             line.report();
         }
         if let Some((ticks, place)) = longest {
             report_interrupts_off(machine::clock::ticks_to_ns(ticks), place);
         }
-        report::stacks::dump(&run);
+        report::tell_stacks(&run);
         Ok(run)
     }
 

@@ -1,4 +1,4 @@
-//! A lock for what instances of an app share.
+//! A lock for what instances of an app share, and waiting for what another core does.
 //!
 //! A DAG needs none: its values move along its edges. This is for what is no DAG,
 //! such as the publish/subscribe baseline that DAGs are compared with, where
@@ -10,8 +10,38 @@
 //!
 //! A fault in a section ends the holder's DAG, as anywhere, and the lock is lost with
 //! it: the data may be half changed. An instance that waits for it, or takes it later, panics.
+//!
+//! # Events
+//!
+//! An [`Event`] is a count that only goes up: its *version*. A waiter has read the
+//! version, then looked for what it wants in vain, and now waits until the
+//! version is another one. As it read the version before it looked, nothing that
+//! happens later is missed:
+//!
+//! ```no_run
+//! # use kernel::{Event, Lock};
+//! # fn take(_: &Lock<Vec<u32>>) -> Option<u32> { None }
+//! # fn next(event: &Event, data: &Lock<Vec<u32>>) -> u32 {
+//! loop {
+//!     let seen = event.version();
+//!     match take(data) {
+//!         Some(value) => return value,
+//!         None => event.wait(seen, u64::MAX),
+//!     }
+//! }
+//! # }
+//! ```
+//!
+//! A waiting core halts; its instance keeps it, as the scheduler knows nothing of
+//! this. So waits belong to what is no DAG (see [`Lock`](crate::Lock)): in a DAG an
+//! instance becomes ready when its inputs are there and never waits.
+
+use core::sync::atomic::{AtomicU64, Ordering};
 
 use executive::machine::section::{Guarded, Refusal};
+use executive::machine::timer::{self, Alarm};
+use executive::machine::{clock, interrupt_flag, this_core, turns};
+use executive::text::console;
 
 /// Data that one instance at a time may use.
 ///
@@ -59,6 +89,103 @@ impl<T> Lock<T> {
             Err(Refusal::HolderEnded) => {
                 panic!("a fault has ended a section of this lock; its data may be half changed")
             }
+        }
+    }
+}
+
+/// Something that cores wait for.
+///
+/// ```no_run
+/// use kernel::Event;
+///
+/// static NEWS: Event = Event::new();
+///
+/// /// Waits until somebody calls `NEWS.notify()`, at most to a time of `fass::now_ns`.
+/// fn has_news(until_ns: u64) -> bool {
+///     let seen = NEWS.version();
+///     // look for what is wanted; if it is not there:
+///     NEWS.wait(seen, until_ns);
+///     NEWS.version() != seen
+/// }
+/// ```
+#[derive(Debug, Default)]
+pub struct Event {
+    version: AtomicU64,
+    /// The cores that wait, as bits, or have waited since the last notice.
+    waiting: [AtomicU64; 4],
+}
+
+impl Event {
+    /// Makes an event that has not happened.
+    ///
+    /// See [`Event`].
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            version: AtomicU64::new(0),
+            waiting: [const { AtomicU64::new(0) }; 4],
+        }
+    }
+
+    /// Returns how often the event has happened.
+    ///
+    /// See [`Event`].
+    #[must_use]
+    pub fn version(&self) -> u64 {
+        self.version.load(Ordering::SeqCst)
+    }
+
+    /// Raises the version: all that wait go on.
+    ///
+    /// See [`Event`].
+    pub fn notify(&self) {
+        self.version.fetch_add(1, Ordering::SeqCst);
+        for (word, first) in self.waiting.iter().zip((0..).step_by(64)) {
+            let mut left = word.swap(0, Ordering::SeqCst);
+            while left != 0 {
+                let were_enabled = interrupt_flag::disable();
+                this_core::all()[first + left.trailing_zeros() as usize].wake_up();
+                if were_enabled {
+                    interrupt_flag::enable();
+                }
+                left &= left - 1;
+            }
+        }
+    }
+
+    /// Halts the calling instance's core until the version is not `seen` or the time
+    /// is `until_ns`, on the clock of [`fass::now_ns`]; `u64::MAX` is never. An idle
+    /// core sends text that waits to be printed.
+    ///
+    /// No notice is lost. The bit is set before the version is compared, and the
+    /// notifier changes the version before it takes the bits: one of them sees the
+    /// other (both orders are sequentially consistent). If it is the notifier, its
+    /// interrupt comes after interrupts were disabled here, and so ends the halt.
+    ///
+    /// See [`Event`].
+    pub fn wait(&self, seen: u64, until_ns: u64) {
+        loop {
+            interrupt_flag::disable();
+            // Read in every round: in between, the instance may have moved.
+            let core = this_core::get();
+            let here = core.index;
+            let word = &self.waiting[(here / 64) as usize];
+            word.fetch_or(1 << (here % 64), Ordering::SeqCst);
+            if self.version() != seen || clock::now_ns() >= until_ns {
+                // The bit stays, at worst for one interrupt that means nothing.
+                timer::set(Alarm::Hold, u64::MAX);
+                turns::enter();
+                interrupt_flag::enable();
+                return;
+            }
+            if console::has_pending() {
+                interrupt_flag::enable();
+                console::send_pending_byte();
+                continue;
+            }
+            turns::leave(core);
+            timer::set(Alarm::Hold, until_ns);
+            interrupt_flag::enable_and_halt();
         }
     }
 }

@@ -7,5 +7,4 @@
 
 pub(crate) mod bare_machine;
 mod calibration;
-pub(crate) mod event;
 pub(crate) mod lock;

@@ -12,7 +12,7 @@ use super::selection;
 use crate::println;
 use executive::machine::calibration::Rate;
 use executive::machine::this_core::{self, Core};
-use executive::machine::{agreement, avx, clock, cpu, interrupt_flag, local_apic, topology};
+use executive::machine::{agreement, avx, clock, cpu, interrupt_flag, local_apic, processors};
 use front::json;
 
 /// Says what machine this is, and of what an app has to beware.
@@ -20,7 +20,7 @@ pub(super) fn announce(info: &BootInfo, app: &str, memory_bytes: u64, rate: &Rat
     let all = this_core::all();
     let cores = all.len();
     let ids: Vec<u32> = all.iter().map(Core::apic_id).collect();
-    let siblings = selection::siblings(&ids, topology::sibling_bits());
+    let siblings = selection::siblings(&ids, processors::sibling_bits());
     let efficiency_cores = all.iter().filter(|core| core.is_efficient()).count();
     let command_line = info.command_line().unwrap_or("(not UTF-8)");
     json::report("boot", |line| {

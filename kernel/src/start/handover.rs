@@ -15,20 +15,18 @@ use crate::app::bare_machine::{BareMachine, Machine};
 use crate::options::{Options, UsageError};
 use crate::println;
 use crate::watch::{self, panic};
-use executive::interrupts;
-use executive::machine::calibration::{self, Rate};
-use executive::machine::known_clock::KnownClock;
+use executive::machine::calibration::{self, KnownClock, Rate};
 use executive::machine::paging::MapError;
 use executive::machine::power::{self, End};
 use executive::machine::this_core::{self, Stacks};
 use executive::machine::{
-    agreement, avx, clock, cpu, exit, interrupt, interrupt_flag, io_apic, legacy, local_apic,
-    processors, screen, serial, topology,
+    agreement, avx, clock, cpu, interrupt, interrupt_flag, legacy, local_apic, processors, screen,
+    serial,
 };
-use executive::memory;
 use executive::run::platform::KERNEL;
 use executive::run::{containment, contexts, heartbeat, record, worker};
 use executive::text::console;
+use executive::{interrupts, memory};
 use front::app::ending::{self, Ending};
 use front::app::terms;
 use front::app::verdict::Verdict;
@@ -121,7 +119,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     unsafe { power::set_registers(platform.power) };
     for base in platform.io_apics.as_slice() {
         // SAFETY: likewise, and nothing else in this kernel uses them.
-        unsafe { io_apic::mask_all(*base) };
+        unsafe { legacy::mask_io_apic(*base) };
     }
     this_core::create(with_stacks(selected(info, &platform)));
     let core = processors::become_core(local_apic::id());
@@ -302,7 +300,7 @@ fn selected(info: &BootInfo, platform: &Platform) -> Vec<u32> {
         MAX_PROCESSORS - 1
     );
     let drops_siblings = info.value("smt") == Some("off");
-    let bits = drops_siblings.then(topology::sibling_bits);
+    let bits = drops_siblings.then(processors::sibling_bits);
     selection::select(by_number(platform), list, bits.unwrap_or(0))
 }
 
@@ -368,5 +366,5 @@ fn run_app(
 fn end(result: Result<(), Ending>) -> ! {
     let told = ending::tell(&result);
     console::resume();
-    exit::exit(told)
+    power::exit(told)
 }

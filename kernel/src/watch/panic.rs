@@ -14,9 +14,8 @@ use crate::report;
 use executive::machine::context::Registers;
 use executive::machine::fault::Exception;
 use executive::machine::interrupt::Interrupted;
-use executive::machine::{cpu, exit, interrupt_flag, non_maskable, this_core};
-use executive::run::containment;
-use executive::run::execution;
+use executive::machine::{cpu, interrupt_flag, non_maskable, power, this_core};
+use executive::run::{containment, execution};
 use executive::text::backtrace::Spot;
 use executive::text::console::{write_in_emergency, write_line_in_emergency};
 use fass::edge::Excerpt;
@@ -77,7 +76,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
             ));
             give_verdict(&what)
         }
-        Err(FAILED) => exit::exit(Told::Failure),
+        Err(FAILED) => power::exit(Told::Failure),
         // Another core reports, and is about to stop this one.
         Err(_) => cpu::halt_forever(),
     }
@@ -112,7 +111,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         write_in_emergency(format_args!("{registers}"));
     }
     if core.is_some() {
-        write_in_emergency(format_args!("{}", report::latest::latest::<EVENTS_SHOWN>()));
+        write_in_emergency(format_args!("{}", report::latest::<EVENTS_SHOWN>()));
     }
     let line = json::line(what, |line| {
         line.number("cpu", index);
@@ -139,5 +138,5 @@ fn give_verdict(what: &dyn Display) -> ! {
         line.text("status", "failure").text("reason", what);
     });
     write_line_in_emergency(&verdict);
-    exit::exit(Told::Failure)
+    power::exit(Told::Failure)
 }

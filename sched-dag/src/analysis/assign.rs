@@ -29,12 +29,11 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use super::Settings;
-use super::fixed_order;
 use super::multi_path::multi_path;
 use super::set::constrained;
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, sort_largest_first};
+use super::{Settings, fixed_order};
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::policy::Why;
 use crate::task_set::TaskSet;

@@ -12,8 +12,7 @@ use super::cover::covers_and_parts;
 use super::one_core::{Blocking, largest};
 use super::task::Task;
 use super::width::parallelism;
-use super::workload::Bursts;
-use super::workload::{Piece, Workload};
+use super::workload::{Bursts, Piece, Workload};
 
 /// Which interference the multi-path equations count; each is a bound, the later the tighter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

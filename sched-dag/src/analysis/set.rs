@@ -25,8 +25,7 @@ use super::interference::{Clip, Delays, Other, Shape};
 use super::multi_path::{Equations, alone};
 use super::pipelined::{Figures, OWN_STEPS, Refusal, STEP_LIMIT, Unsolved};
 use super::task::Task;
-use super::workload::Bursts;
-use super::workload::Workload;
+use super::workload::{Bursts, Workload};
 
 /// DAGs with what enters their equations.
 pub(super) struct Set<'a> {

@@ -7,13 +7,11 @@
 
 use alloc::vec::Vec;
 
-use super::CommitOptions;
-use super::MAX_ARITY;
 use super::fault::{Direction, Fault, Time, Warning};
 use super::label::SubtaskLabel;
 use super::names::Interner;
 use super::topics::is_shared;
-use super::{Findings, Page};
+use super::{CommitOptions, Findings, MAX_ARITY, Page};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};

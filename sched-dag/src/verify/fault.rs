@@ -9,13 +9,13 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use super::label::{DagLabel, SubtaskLabel};
-use super::label::{list, members, ns, one_up_to, own_input, question, ring, undivided};
-use crate::MAX_ARITY;
+use super::label::{
+    DagLabel, SubtaskLabel, list, members, ns, one_up_to, own_input, question, ring, undivided,
+};
 use crate::ids::ClusterId;
 use crate::policy::Priority;
 use crate::spec::STACK_BYTES;
-use crate::worded;
+use crate::{MAX_ARITY, worded};
 
 worded! {
     /// One reason why DAGs cannot be scheduled as described.

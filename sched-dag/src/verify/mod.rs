@@ -25,8 +25,7 @@ use core::borrow::Borrow;
 use core::fmt;
 
 use crate::order::sorted_by_key;
-use crate::policy::Clusters;
-use crate::policy::Policy;
+use crate::policy::{Clusters, Policy};
 use crate::spec::DagSpec;
 use crate::task_set::TaskSet;
 

@@ -2,11 +2,10 @@
 
 use alloc::vec::Vec;
 
-use super::CommitOptions;
-use super::Findings;
 use super::attributes::in_flight;
 use super::fault::Fault;
 use super::shape::Shape;
+use super::{CommitOptions, Findings};
 use crate::graph::Graph;
 use crate::ids::SubtaskId;
 use crate::order::sort_by_key;

@@ -20,10 +20,8 @@ use alloc::vec::Vec;
 
 use super::fault::{Fault, Warning};
 use super::label::SubtaskLabel;
-use super::topics;
 use super::topics::Topology;
-use super::{ConstructionPolicy, Count};
-use super::{Findings, Page};
+use super::{ConstructionPolicy, Count, Findings, Page, topics};
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sorted, sorted_by_key};

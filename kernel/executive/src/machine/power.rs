@@ -1,11 +1,13 @@
-//! The machine's end where no host ends it: powered off, reset, or just halted.
+//! The end of the run: telling QEMU, or another host; where there is none, powered off, reset, or
+//! just halted.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
 use boot::power::{Off, Power, Register};
-
-use super::port;
 use fass::SetOnce;
+use front::app::ending::Told;
+
+use super::{cpu, non_maskable, port, serial, this_core};
 
 /// What to do after the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +40,7 @@ pub unsafe fn set_registers(power: Power) {
 }
 
 /// Does what was settled. Returns where that is to halt, or nothing has come of it.
-pub fn end() {
+fn end() {
     let end = END.load(Ordering::Acquire);
     let power = POWER.get().copied().unwrap_or_default();
     if end == End::Off as u8
@@ -108,4 +110,25 @@ fn read_control(control: u16) -> u16 {
 fn write_control(control: u16, value: u16) {
     // SAFETY: as in `write`.
     unsafe { port::write_u16(control, value) };
+}
+
+/// Ends the run, and says how: QEMU exits with 33, 35 or 37. Without the debug exit device the machine ends as was settled
+/// ([`set_end`]), or stays halted: all its cores are, or one would look into why
+/// this one is silent.
+pub fn exit(told: Told) -> ! {
+    const DEBUG_EXIT: u16 = 0xf4;
+    // QEMU's own exit status is twice what its device takes, plus 1.
+    let status: u32 = match told {
+        Told::Success => 0x10,
+        Told::Failure => 0x11,
+        Told::Usage => 0x12,
+    };
+    // SAFETY: the port belongs to QEMU's isa-debug-exit device or to nobody.
+    unsafe { port::write_u32(DEBUG_EXIT, status) };
+    if this_core::is_ready() {
+        non_maskable::stop_others();
+    }
+    serial::FIRST.drain();
+    end();
+    cpu::halt_forever()
 }

@@ -1,9 +1,15 @@
-//! Starting the other cores.
+//! The processors: starting the other cores, and what each states of its kind and of those that it
+//! shares a core with.
+//!
+//! *Siblings* are processors that share one physical core (SMT): each slows down the other.
+//! Their APIC ids differ in their lowest bits only. *Efficiency cores* are slower than the
+//! others of the same machine. Nothing here schedules by that; it is said, and people choose.
 
+use core::arch::x86_64::{__cpuid, __cpuid_count, CpuidResult};
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::this_core::{self, Core};
-use super::{agreement, avx, clock, cpu, interrupt, local_apic, machine_check, topology};
+use super::{agreement, avx, clock, cpu, interrupt, local_apic, machine_check};
 
 /// Cores that have arrived in their entry function, the boot processor not
 /// counted.
@@ -17,7 +23,7 @@ const LONGEST_JUMP_NS: u64 = 2_000;
 /// segments, interrupt stacks, interrupt table and local APIC.
 pub fn become_core(apic_id: u32) -> &'static Core {
     let core = this_core::load(apic_id);
-    let is_efficient = topology::is_efficiency_core();
+    let is_efficient = is_efficiency_core();
     core.is_efficient.store(is_efficient, Ordering::Relaxed);
     avx::begin();
     interrupt::load_table();
@@ -84,5 +90,91 @@ fn wait(ns: u64, expected: u32) -> bool {
             local_apic::start_timer(clock::apic_ticks(LONGEST_JUMP_NS));
         }
         cpu::relax();
+    }
+}
+
+/// Returns how many of an APIC id's lowest bits tell siblings apart.
+pub fn sibling_bits() -> u32 {
+    const TOPOLOGY: u32 = 0xb;
+    const AMD_TOPOLOGY: u32 = 0x8000_001e;
+    const CACHES: u32 = 4;
+    let has = |leaf| __cpuid(leaf & 0x8000_0000).eax >= leaf;
+    let read = |leaf| has(leaf).then(|| __cpuid_count(leaf, 0));
+    bits_of_topology(read(TOPOLOGY))
+        .or_else(|| bits_of_amd(__cpuid(0x8000_0001), read(AMD_TOPOLOGY)))
+        .or_else(|| bits_of_caches(__cpuid(1), read(CACHES)))
+        .unwrap_or(0)
+}
+
+/// By Intel's SDM volume 2, CPUID leaf 0xb: the level of the first subleaf, if there is one.
+fn bits_of_topology(leaf: Option<CpuidResult>) -> Option<u32> {
+    const SIBLINGS: u32 = 1;
+    let leaf = leaf.filter(|leaf| leaf.ebx != 0 && leaf.ecx >> 8 & 0xff == SIBLINGS)?;
+    Some(leaf.eax & 0x1f)
+}
+
+/// By AMD's manual volume 3, E.4.17, where leaf 0x8000_0001 says that it is there.
+fn bits_of_amd(features: CpuidResult, leaf: Option<CpuidResult>) -> Option<u32> {
+    const HAS_TOPOLOGY: u32 = 1 << 22;
+    let leaf = leaf.filter(|_| features.ecx & HAS_TOPOLOGY != 0)?;
+    Some(bits_for((leaf.ebx >> 8 & 0xff) + 1))
+}
+
+/// By Intel's SDM volume 3, 9.9.3: ids for processors of a package (leaf 1), less those for cores
+/// (leaf 4).
+fn bits_of_caches(features: CpuidResult, leaf: Option<CpuidResult>) -> Option<u32> {
+    const HAS_SEVERAL: u32 = 1 << 28;
+    const A_CACHE: u32 = 0x1f;
+    let leaf = leaf.filter(|leaf| features.edx & HAS_SEVERAL != 0 && leaf.eax & A_CACHE != 0)?;
+    let (processors, cores) = (features.ebx >> 16 & 0xff, (leaf.eax >> 26) + 1);
+    Some(bits_for(processors).saturating_sub(bits_for(cores)))
+}
+
+/// Returns how many bits tell so many things apart.
+const fn bits_for(count: u32) -> u32 {
+    count.next_power_of_two().trailing_zeros()
+}
+
+/// Reports whether the processor that executes this is an efficiency core (Intel's SDM volume 2,
+/// leaves 7 and 0x1a).
+fn is_efficiency_core() -> bool {
+    const FEATURES: u32 = 7;
+    const HYBRID: u32 = 1 << 15;
+    const KIND: u32 = 0x1a;
+    const ATOM: u32 = 0x20;
+    __cpuid(0).eax >= KIND
+        && __cpuid_count(FEATURES, 0).edx & HYBRID != 0
+        && __cpuid_count(KIND, 0).eax >> 24 == ATOM
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn leaf(eax: u32, ebx: u32, ecx: u32, edx: u32) -> CpuidResult {
+        CpuidResult { eax, ebx, ecx, edx }
+    }
+
+    #[test]
+    fn siblings_are_told_apart_by_the_bits_that_each_maker_states() {
+        assert_eq!(bits_of_topology(Some(leaf(1, 2, 0x100, 0))), Some(1));
+        assert_eq!(bits_of_topology(Some(leaf(0, 1, 0x100, 0))), Some(0));
+        assert_eq!(bits_of_topology(Some(leaf(4, 8, 0x200, 0))), None, "cores");
+        assert_eq!(bits_of_topology(Some(leaf(0, 0, 0, 0))), None, "no level");
+        assert_eq!(bits_of_topology(None), None);
+
+        let (with, without) = (leaf(0, 0, 1 << 22, 0), leaf(0, 0, 0, 0));
+        assert_eq!(bits_of_amd(with, Some(leaf(0, 0x100, 0, 0))), Some(1));
+        assert_eq!(bits_of_amd(with, Some(leaf(0, 0, 0, 0))), Some(0));
+        assert_eq!(bits_of_amd(without, Some(leaf(0, 0x100, 0, 0))), None);
+
+        let of = |processors: u32, cores: u32| {
+            let features = leaf(0, processors << 16, 0, 1 << 28);
+            bits_of_caches(features, Some(leaf((cores - 1) << 26 | 1, 0, 0, 0)))
+        };
+        assert_eq!(of(8, 4), Some(1));
+        assert_eq!(of(4, 4), Some(0));
+        assert_eq!(of(16, 6), Some(1), "ids for eight cores");
+        assert_eq!(bits_of_caches(leaf(0, 2 << 16, 0, 0), None), None);
     }
 }

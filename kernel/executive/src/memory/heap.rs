@@ -15,7 +15,7 @@ use core::ops::Range;
 use core::ptr::NonNull;
 
 use super::tlsf::Tlsf;
-pub use super::tlsf::usage::Usage;
+pub use super::tlsf::Usage;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core;
 

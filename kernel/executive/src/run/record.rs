@@ -13,8 +13,7 @@ use super::{edge, execution};
 use crate::machine::debug_port;
 use crate::machine::spinlock::SpinLock;
 use crate::text::console;
-use front::report::crossing;
-use front::report::record::Lines;
+use front::report::{self, Lines};
 
 type File = Kept<To>;
 
@@ -82,7 +81,7 @@ pub fn end_recording(outgoing: Outgoing, is_over: bool) {
     let before_fault = edge.before_fault();
     drop(edge);
     if let Some(outcome) = outcome {
-        crossing::replayed(&outcome);
+        report::replayed(&outcome);
     }
     if before_fault.is_some() && RECORD.lock().is_none() {
         begin(false);
@@ -97,7 +96,7 @@ pub fn end_recording(outgoing: Outgoing, is_over: bool) {
         };
         let outgoing = outgoing.or_else(|| before_fault.map(begin));
         if let Some(drained) = record.end_recording(outgoing) {
-            crossing::recorded(&drained);
+            report::recorded(&drained);
         }
     });
 }

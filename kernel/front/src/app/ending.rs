@@ -10,7 +10,7 @@ use sched_dag::DagId;
 use sched_dag::engine::Run;
 
 use crate::options::UsageError;
-use crate::report::{counts, log};
+use crate::report;
 use crate::text::json;
 
 /// Why an app ends other than by success.
@@ -38,7 +38,7 @@ impl Ending {
     /// Tells of a run that a person has ended, and returns how its app ends.
     pub fn after_shutdown(run: &Run) -> Self {
         for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-            counts::show(run.snapshot(dag), dag, model, counts::print);
+            report::show_dag(run.snapshot(dag), dag, model, report::print_counts);
         }
         match run.violations().count() {
             0 => Self::Shutdown,
@@ -70,7 +70,7 @@ pub enum Told {
 /// Prints how the app ended; the verdict is the last line.
 pub fn tell(result: &Result<(), Ending>) -> Told {
     // What was said outside of runs.
-    log::tell(|| None);
+    report::tell_log(|| None);
     let (told, word) = match result {
         Ok(()) | Err(Ending::Shutdown) => (Told::Success, "success"),
         Err(Ending::Usage(_)) => (Told::Usage, "usage"),

@@ -12,10 +12,9 @@ use fass::{Policy, Preemption, Signal, Terms, Wire};
 use sched_dag::engine::Run;
 
 use super::ending::Ending;
-use super::verdict::Verdict;
-use super::wcet_notes;
+use super::verdict::{self, Verdict};
 use crate::options::{Options, UsageError};
-use crate::report::memory::Memory;
+use crate::report::Memory;
 use crate::shell::LiveRun;
 
 /// What an app's machine is made of: the bare machine, or Linux.
@@ -297,7 +296,7 @@ impl<S: System> Machine<S> {
     fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, Ending> {
         let run = self.system.run(epoch_ns, self.input.borrow().as_ref())?;
         self.verdict.note(&run);
-        wcet_notes::note(&run, self.system.terms().overheads);
+        verdict::note(&run, self.system.terms().overheads);
         if self.system.is_shut_down() {
             return Err(Ending::after_shutdown(&run));
         }

@@ -7,4 +7,3 @@ pub mod machine;
 mod services;
 pub mod terms;
 pub mod verdict;
-mod wcet_notes;

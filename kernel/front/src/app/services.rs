@@ -9,8 +9,8 @@ use fass::{Tunable, Wire};
 use super::ending::Ending;
 use super::machine::{Machine, System};
 use crate::options::UsageError;
-use crate::report::memory::Resources;
-use crate::shell::offered::Parameters;
+use crate::report::Resources;
+use crate::shell::parameters::Parameters;
 use crate::shell::topics::Topics;
 use crate::shell::{PARAMETERS, TOPICS};
 

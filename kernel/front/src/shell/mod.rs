@@ -10,8 +10,7 @@
 //! `console`; `dags` and `stats` print a line of kind `dag_status` for each DAG.
 
 mod input;
-pub mod offered;
-mod parameters;
+pub mod parameters;
 pub mod topics;
 
 use alloc::sync::Arc;
@@ -26,9 +25,8 @@ use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, Scheduler, Snapshot, TaskSet};
 
 use crate::options::whole_number;
-use crate::println;
-use crate::report::counts;
 use crate::text::json;
+use crate::{println, report};
 use input::{Input, Typed};
 
 /// How often a platform looks for bytes, at least.
@@ -235,7 +233,7 @@ impl Listing {
     fn print_one<R: LiveRun>(self, task_set: &TaskSet) -> Option<Listing> {
         let (dag, model) = (self.next, task_set.dag(self.next));
         if let Some(snapshot) = snapshot::<R>(task_set, dag) {
-            counts::show(&snapshot, dag, model, self.print);
+            report::show_dag(&snapshot, dag, model, self.print);
         }
         let next = DagId(dag.0 + 1);
         (next < self.end).then_some(Listing { next, ..self })
@@ -254,7 +252,7 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Opt
             }
         }
         ("dags", "") => return list(task_set, rest, describe, refuse),
-        ("stats", _) => return list(task_set, rest, counts::print, refuse),
+        ("stats", _) => return list(task_set, rest, report::print_counts, refuse),
         ("trace", "on" | "off") => record::<R>(rest == "on", task_set, refuse),
         ("stop" | "start", "") => {
             wants("the name or the number of a DAG; `dags` lists them", refuse)

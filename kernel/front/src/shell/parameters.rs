@@ -1,10 +1,80 @@
-//! What a person says of parameters at the console.
+//! Parameters that an app offers, and people set: at the console, or by the command line's word
+//! `set`.
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt::{self, Display};
 
 use fass::Tunable;
+use sched_dag::nearest_of;
 
-use super::offered::Parameters;
 use super::{Commands, Refuse};
+use crate::options::UsageError;
 use crate::println;
+
+/// The parameters that an app offers.
+pub struct Parameters(pub Vec<Arc<dyn Tunable>>);
+
+impl Parameters {
+    /// Takes those that an app offers; two of one name are refused in words.
+    pub fn new(parameters: &[&dyn Tunable]) -> Result<Self, String> {
+        let mut names = (1..).zip(parameters);
+        if let Some((_, twice)) = names.find(|(next, parameter)| {
+            let rest = parameters.get(*next..).unwrap_or_default();
+            rest.iter().any(|other| other.name() == parameter.name())
+        }) {
+            let name = twice.name();
+            return Err(format!(
+                "two parameters have the name `{name}`; give each its own"
+            ));
+        }
+        let shared = parameters.iter().map(|parameter| parameter.share());
+        Ok(Self(shared.collect()))
+    }
+
+    /// Sets those that a word of the command line names, as `NAME=VALUE,...`.
+    pub fn set_all(&self, word: &str) -> Result<(), UsageError> {
+        for part in word.split(',') {
+            let mut refusal = None;
+            match part.split_once('=') {
+                Some((name, value)) => {
+                    self.set(name, value, &mut |why| refusal = Some(why.to_string()));
+                }
+                None => refusal = Some(format!("`set={part}`: give it as NAME=VALUE")),
+            }
+            if let Some(line) = refusal {
+                return Err(UsageError::new(line));
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets one of them, or tells why not.
+    pub fn set(
+        &self,
+        name: &str,
+        value: &str,
+        refuse: &mut dyn FnMut(&dyn Display),
+    ) -> Option<&dyn Tunable> {
+        let Some(parameter) = self.0.iter().find(|of| of.name() == name) else {
+            refuse(&fmt::from_fn(|f| {
+                write!(f, "there is no parameter `{name}`; ")?;
+                match nearest_of(name, &mut self.0.iter().map(|of| of.name())) {
+                    Some(near) => write!(f, "did you mean `{near}`?"),
+                    None => f.write_str("`params` lists them"),
+                }
+            }));
+            return None;
+        };
+        if !parameter.set_text(value) {
+            refuse(&parameter.refusal(value));
+            return None;
+        }
+        Some(&**parameter)
+    }
+}
 
 impl Commands for Parameters {
     fn help(&self) -> &'static [(&'static str, &'static str)] {

@@ -9,7 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use fass::edge::Seen;
-use front::report::log;
+use front::report::tell_log;
 use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, Session};
 use linux::Control;
 use sched_dag::lifecycle::Request;
@@ -106,7 +106,7 @@ pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, 
                     control.raise();
                     is_raised = true;
                 }
-                log::tell(|| Some(Arc::clone(control.task_set())));
+                tell_log(|| Some(Arc::clone(control.task_set())));
             }
             while session.as_mut().is_some_and(Session::slice) {}
             thread::park_timeout(Duration::from_nanos(PERIOD_NS));

@@ -14,10 +14,9 @@ use crate::heap;
 use front::app::division::Divisible;
 use front::app::ending::Ending;
 use front::app::machine::System;
-use front::json;
 use front::options::{Options, UsageError};
-use front::report;
-use front::report::memory::Memory;
+use front::report::Memory;
+use front::{json, report};
 use sched_dag::engine::Run;
 
 /// The machine, lent to the app's function for the time of the run.
@@ -119,17 +118,17 @@ impl System for LinuxSystem {
         self.is_closed.set(is_closed);
         let run = run.map_err(|why| failure(why.to_string()))?;
         drop(connection);
-        report::log::tell(|| Some(Arc::clone(run.task_set())));
+        report::tell_log(|| Some(Arc::clone(run.task_set())));
         tell_faults(&run);
         let crossed = self.linux.end_recording(!self.is_shut_down());
         if let Some(outcome) = &crossed.0 {
-            report::crossing::replayed(outcome);
+            report::replayed(outcome);
         }
         if let Some(drained) = &crossed.1 {
-            report::crossing::recorded(drained);
+            report::recorded(drained);
         }
         if let Some(ends) = &*ends {
-            report::wire::report(&ends.wire);
+            report::tell_wire(&ends.wire);
         }
         Ok(run.into_run())
     }

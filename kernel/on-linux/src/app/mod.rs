@@ -2,7 +2,6 @@
 //! outside their DAGs. The machine as an app sees it, and how a run is judged, is the front's.
 
 pub(crate) mod console;
-pub(crate) mod event;
 pub(crate) mod linux_system;
 pub(crate) mod lock;
 pub(crate) mod words;

@@ -30,7 +30,7 @@ use linux::{Linux, Mechanism};
 use fass::edge::Sink;
 use front::app::terms::{self, Chosen};
 use front::options::{Options, UsageError};
-use front::report::record::Lines;
+use front::report::Lines;
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
 const FOREIGN: [(&str, &str); 12] = [

@@ -16,12 +16,8 @@
 
 mod listener;
 pub(crate) mod live_run;
-mod load;
-mod patience;
-mod progress;
-mod stall;
+pub(crate) mod stall;
 mod status;
-pub(crate) mod watchdog;
 pub(crate) mod wire;
 
 use core::sync::atomic::{AtomicU64, Ordering};
@@ -31,13 +27,12 @@ use executive::machine::spinlock::SpinLock;
 use executive::run::{execution, heartbeat};
 use executive::text::console;
 use fass::SetOnce;
-use front::report::log;
+use front::report::tell_log;
 use front::shell::{self, Session};
 use listener::Listener;
 use live_run::KernelRun;
-use progress::Progress;
 use sched_dag::DagId;
-use status::Status;
+use status::{Progress, Status};
 
 /// What the command line says about the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -176,7 +171,7 @@ impl Background {
     /// Does what is due. Reports whether there is more to do at once.
     pub(crate) fn step(&mut self) -> bool {
         self.progress.print_when_due();
-        log::tell(execution::task_set);
+        tell_log(execution::task_set);
         if let Some(listener) = &self.listener {
             listener.step();
         }
@@ -195,7 +190,7 @@ impl Background {
         if let Some(line) = LINE.get() {
             line.end();
         }
-        log::tell(execution::task_set);
+        tell_log(execution::task_set);
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;

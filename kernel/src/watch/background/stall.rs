@@ -9,15 +9,29 @@
 //!
 //! Between two looks nothing is counted, so this costs a run nothing. It also sees
 //! less: an instance that was preempted in between counts as if it had not been.
+//!
+//! # Cores that watch each other: a core that takes no interrupts is noticed
+//!
+//! Only code with `unsafe` can disable interrupts for long. Such a core can be reached by
+//! a non-maskable interrupt alone, and nothing on it can go on. So core 0 looks at all
+//! others in its heartbeat, and core 1 at core 0. A core that has taken no interrupt for
+//! [`QUIET_NS`] while it runs something is sent one; if it has taken none for
+//! [`SILENT_NS`], it is accused at each look, by a non-maskable interrupt. If interrupts turn
+//! out to be enabled there, it was the host that did not let it run, and it goes on. If they
+//! are disabled at two looks in a row, it reports where it is, and ends the run.
+//!
+//! A machine of one core has nobody to notice.
 
-use sched_dag::Instance;
+use core::sync::atomic::Ordering;
 
-use executive::machine::clock;
 use executive::machine::spinlock::SpinLock;
-use executive::machine::this_core;
+use executive::machine::this_core::{self, Core};
+use executive::machine::{clock, non_maskable};
 use executive::run::execution;
+use executive::run::heartbeat::SECOND_NS;
 use executive::text::console;
 use front::json;
+use sched_dag::Instance;
 
 /// The time between two looks. Heartbeats may come more often.
 pub(super) const LOOK_NS: u64 = 250_000_000;
@@ -172,10 +186,62 @@ fn report(core: u32, instance: Instance, still_ns: u64) {
     });
 }
 
+/// After this time without an interrupt a core is sent one. Core 0 gets its own.
+const QUIET_NS: u64 = 1_500_000_000;
+
+/// After this time without an interrupt a core is accused.
+const SILENT_NS: u64 = 4_000_000_000;
+
+const _: () = assert!(
+    QUIET_NS + SECOND_NS < SILENT_NS,
+    "core 1 asks core 0 before it accuses it"
+);
+
+/// What is to be done about a core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Doubt {
+    None,
+    Ask,
+    Accuse,
+}
+
+/// Judges a core that took its last interrupt so long ago.
+const fn judge(silent_ns: u64) -> Doubt {
+    match silent_ns {
+        SILENT_NS.. => Doubt::Accuse,
+        QUIET_NS.. => Doubt::Ask,
+        _ => Doubt::None,
+    }
+}
+
+/// Looks at the cores that are this core's to watch. In a heartbeat.
+pub(crate) fn look(own: &Core, now_ns: u64) {
+    let cores = this_core::all();
+    let watched = match own.index {
+        0 => cores.get(1..),
+        1 => cores.get(..1),
+        _ => None,
+    };
+    for core in watched.unwrap_or_default() {
+        // A core without work halts, and nobody has to wake it. Core 0 never rests for long.
+        if core.index != 0 && execution::running(core).is_none() {
+            core.interrupted_ns.store(now_ns, Ordering::Relaxed);
+            continue;
+        }
+        let silent_ns = now_ns.saturating_sub(core.interrupted_ns.load(Ordering::Relaxed));
+        match judge(silent_ns) {
+            Doubt::None => {}
+            Doubt::Ask => core.wake_up(),
+            Doubt::Accuse => non_maskable::accuse(core),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
     use sched_dag::{DagId, SubtaskId};
+
+    use super::*;
 
     /// Looks at a core that runs instances of these jobs; returns at which looks one
     /// was named.
@@ -212,5 +278,14 @@ mod tests {
     #[test]
     fn up_to_its_wcet_an_instance_may_run_without_a_word() {
         assert_eq!(named(&[Some(1); 20], 5 * LOOK_NS), [5]);
+    }
+
+    #[test]
+    fn a_core_is_asked_before_it_is_accused() {
+        assert_eq!(judge(0), Doubt::None);
+        assert_eq!(judge(QUIET_NS - 1), Doubt::None);
+        assert_eq!(judge(QUIET_NS), Doubt::Ask);
+        assert_eq!(judge(SILENT_NS - 1), Doubt::Ask);
+        assert_eq!(judge(SILENT_NS), Doubt::Accuse);
     }
 }

@@ -17,13 +17,13 @@ use fass::Wire;
 
 use super::{LINE, Line};
 use crate::options::UsageError;
-use crate::report;
 use executive::machine::serial::{Port, SECOND};
 use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core;
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
 use front::app::ending::Ending;
+use front::report::tell_wire;
 
 /// The time between two looks at the port.
 pub(super) const PERIOD_NS: u64 = 1_000_000;
@@ -143,7 +143,7 @@ impl Line for Connection {
     }
 
     fn report(&self) {
-        report::wire::report(&self.wire);
+        tell_wire(&self.wire);
     }
 }
 

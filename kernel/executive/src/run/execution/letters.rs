@@ -9,8 +9,7 @@ use core::sync::atomic::Ordering;
 use fass::Request;
 use sched_dag::{ClusterId, lifecycle};
 
-use super::cluster::{FIRST_SEAT, nth};
-use super::core_set::CoreSet;
+use super::cluster::{CoreSet, FIRST_SEAT, nth};
 
 /// Those of a run; all clusters have the same ones. None where cores are not divided.
 pub(super) type Letters = Option<Arc<lifecycle::Letters>>;

@@ -11,21 +11,13 @@
 //! Times inside are the scheduler's: nanoseconds since the run's `epoch_ns`.
 
 mod cluster;
-mod control;
-mod core_set;
 mod divided;
-mod ended;
-mod events;
 mod letters;
 #[allow(unsafe_code, reason = "what a fault has left on a stack is taken back")]
 mod loans;
 mod port;
-mod runner;
-mod signals;
-mod stacks;
 mod status;
 mod step;
-mod time;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
@@ -41,21 +33,20 @@ use sched_dag::{Dag, Journal, Scheduler, TaskSet};
 use crate::machine::context::Parked;
 use crate::machine::this_core;
 pub use cluster::{count as clusters, first_core};
-pub use control::{control, nominal_end_ns, task_set};
 pub use divided::is_finished;
-pub use ended::look_at_clearing;
-pub use events::{complete, fail, find_work, interrupt};
 pub use loans::Loan;
 use loans::Loans;
-use port::SmpPort;
-use runner::Runner;
-use signals::Signals;
-pub use signals::{raise, raise_in_interrupt};
+use port::{Runner, SmpPort};
+pub use port::{arm_all, arm_next_event, keeps_time, since_epoch};
+pub use status::look_at_clearing;
 pub use status::{
     budget_ns, cost_of_fault, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal,
     try_names, with_scheduler,
 };
-pub use time::{arm_all, arm_next_event, keeps_time, since_epoch};
+pub use status::{control, nominal_end_ns, task_set};
+use step::Signals;
+pub use step::{complete, fail, find_work, interrupt};
+pub use step::{raise, raise_in_interrupt};
 
 /// What a core is to do next.
 pub enum Work {
@@ -101,7 +92,7 @@ pub fn prepare(mut plan: Plan, terms: &Terms, coincidence_ns: u64) -> Result<(),
             "other DAGs are committed already; run them first, or commit all in one call",
         ));
     }
-    stacks::provide(&plan.task_set, options)?;
+    port::provide(&plan.task_set, options)?;
     let lifecycle = plan.lifecycle.take();
     let task_set = &plan.task_set;
     let (letters, lifecycles) = match cluster::MAY_DIVIDE {
@@ -136,7 +127,7 @@ pub fn prepare(mut plan: Plan, terms: &Terms, coincidence_ns: u64) -> Result<(),
         })
         .collect();
     executions[0].proven = plan.proven;
-    for runner in runner::runners(task_set, plan.bodies, terms.budget_factor) {
+    for runner in port::runners(task_set, plan.bodies, terms.budget_factor) {
         let cluster = task_set.dag(runner.instance.dag).cluster();
         let Execution { engine, loans, .. } = &mut executions[cluster.index()];
         let loan = loans.lend(runner);
@@ -175,7 +166,7 @@ pub fn end() -> Option<Run> {
     if cluster::MAY_DIVIDE {
         (others.iter_mut()).for_each(|other| run.absorb(&mut other.engine));
     }
-    ended::clear(&mut parts);
+    status::clear(&mut parts);
     Some(run)
 }
 

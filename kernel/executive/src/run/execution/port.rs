@@ -1,22 +1,27 @@
 //! The machine below a cluster's engine: its clock, its edge, and the cores to wake.
+//!
+//! The stacks of a run are taken at its commit: as many as its DAGs can need at once.
 
+use alloc::format;
+use alloc::vec::Vec;
+use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering;
 
+use fass::{Body, LaunchError};
 use sched_dag::engine::{Body as _, Port};
 use sched_dag::journal::What;
 use sched_dag::lifecycle::{self, Request};
-use sched_dag::{ClusterId, CoreId, Notice};
+use sched_dag::{ClusterId, CoreId, Notice, Preemption, SchedulerOptions, TaskSet};
 
 use super::EPOCH_NS;
-use super::cluster::{Cluster, MAY_DIVIDE};
-use super::core_set::CoreSet;
+use super::cluster::{self, Cluster, CoreSet, FIRST_SEAT, MAY_DIVIDE};
 use super::letters::{self, Letters};
 use super::loans::Loan;
 use super::status::note_running;
-use super::time::{here, instance_time_ns, since_epoch};
+use crate::machine::clock;
+use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, this_core};
-use crate::run::edge;
+use crate::run::{contexts, edge};
 
 /// A step of the engine on this core.
 pub(super) struct SmpPort<'a> {
@@ -86,5 +91,136 @@ impl Port<Loan> for SmpPort<'_> {
 
     fn hear(&mut self, notice: &Notice) {
         edge::happened(notice);
+    }
+}
+
+/// A subtask's [runner](fass::Runner), and what running an instance of it takes here.
+///
+/// There is one for each subtask, as a subtask has one started instance at a time
+/// (R2). Between its place and the core that runs it moves a [`Loan`](super::Loan).
+pub struct Runner {
+    pub(super) inner: fass::Runner,
+    cluster: &'static Cluster,
+    /// The time that an instance may execute for, `u64::MAX` if there is no limit.
+    pub(super) budget_ns: u64,
+}
+
+impl Runner {
+    /// Returns the cluster that runs it.
+    #[inline]
+    pub(super) const fn cluster(&self) -> &'static Cluster {
+        match cluster::MAY_DIVIDE {
+            true => self.cluster,
+            false => &cluster::FIRST,
+        }
+    }
+}
+
+impl Deref for Runner {
+    type Target = fass::Runner;
+
+    #[inline]
+    fn deref(&self) -> &fass::Runner {
+        &self.inner
+    }
+}
+
+impl DerefMut for Runner {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut fass::Runner {
+        &mut self.inner
+    }
+}
+
+/// Makes a runner for each body, by vertex.
+pub(super) fn runners(
+    task_set: &TaskSet,
+    bodies: Vec<Vec<Body>>,
+    budget_factor: u64,
+) -> impl Iterator<Item = Runner> {
+    fass::Runner::all(task_set, bodies).map(move |inner| {
+        let dag = task_set.dag(inner.instance.dag);
+        let subtask = dag.subtask(inner.instance.subtask);
+        Runner {
+            cluster: cluster::nth(dag.cluster().index()),
+            budget_ns: subtask.most_execution_ns(budget_factor),
+            inner,
+        }
+    })
+}
+
+/// Makes sure that the stacks which a task set needs are there.
+pub(super) fn provide(task_set: &TaskSet, options: SchedulerOptions) -> Result<(), LaunchError> {
+    let subtasks = task_set.vertices();
+    let cores = usize::try_from(options.cores).unwrap_or(usize::MAX);
+    let suspended = match options.preemption {
+        Preemption::Enabled => task_set.most_suspended(),
+        Preemption::Disabled => 0,
+    };
+    let total = cores.saturating_mul(2).saturating_add(suspended);
+    let needed = contexts::stack_bytes(task_set);
+    let kib = needed / 1024;
+    let settled = contexts::settle(needed).and_then(|settled| {
+        contexts::provide(total)?;
+        Ok(settled)
+    });
+    let settled = settled.map_err(|_| {
+        LaunchError::new(format!(
+            "{subtasks} subtasks and {cores} cores need {total} stacks of {kib} KiB, more than \
+             there is memory for; register fewer subtasks, or give the machine more memory"
+        ))
+    })?;
+    if settled < needed {
+        return Err(LaunchError::new(format!(
+            "a subtask states a stack of {kib} KiB, and the first commit has settled {} KiB; \
+             state as much there",
+            settled / 1024
+        )));
+    }
+    Ok(())
+}
+
+/// Converts a time on the clock to the run's time; one before time 0 becomes that.
+pub fn since_epoch(time_ns: u64) -> u64 {
+    time_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
+}
+
+/// Does the same for when something happened to an instance: none before time 0.
+#[inline]
+pub(super) fn instance_time_ns(time_ns: u64) -> u64 {
+    time_ns.wrapping_sub(EPOCH_NS.load(Ordering::Relaxed))
+}
+
+/// Returns the seat of the core that executes this. Interrupts are disabled.
+pub(super) fn here() -> CoreId {
+    seat(this_core::get())
+}
+
+/// Returns a core's seat.
+#[inline]
+pub(super) fn seat(core: &Core) -> CoreId {
+    match cluster::MAY_DIVIDE {
+        true => CoreId(core.place.load(Ordering::Relaxed)),
+        false => CoreId(core.index),
+    }
+}
+
+/// Reports whether a core keeps its cluster's time.
+pub fn keeps_time(core: &Core) -> bool {
+    seat(core) == FIRST_SEAT
+}
+
+/// Sets this core's alarm for the next event; it is its cluster's first one. Interrupts are
+/// disabled, or nothing else runs here.
+pub fn arm_next_event() {
+    let cluster = cluster::of(this_core::get());
+    timer::set(Alarm::Schedule, cluster.next_event_ns());
+}
+
+/// Sets the alarms of all clusters. On core 0, before a run.
+pub fn arm_all() {
+    arm_next_event();
+    for cluster in cluster::all().skip(1) {
+        this_core::all()[cluster.core(FIRST_SEAT) as usize].wake_up();
     }
 }

@@ -1,14 +1,28 @@
-//! What the rest of the kernel may ask about the run.
+//! What the rest of the kernel, and a person, may ask of a run, and change in it, while it goes on.
+//!
+//! To be called by core 0's background. Each question and each change holds a
+//! cluster's lock for a bounded time; nothing is allocated.
+//!
+//! # What the clusters of a run that has ended leave behind
+//!
+//! The bodies, and the values that waited for them, are dropped at once, DAG by DAG: outside any
+//! instance, so a `drop` of the app's that panics or never returns cannot be contained. It can be
+//! named ([`look_at_clearing`]).
 
 use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
 use sched_dag::engine::Cost;
 use sched_dag::journal::Subject;
-use sched_dag::{DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet};
+use sched_dag::lifecycle::Request;
+use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet};
 
-use super::cluster::{self, FIRST_SEAT};
+use super::cluster::{self, CoreSet, FIRST_SEAT};
+use super::{Execution, Loan, divided};
+use crate::machine::clock;
+use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core::{self, Core};
+use crate::machine::timer::{self, Alarm};
 use crate::memory::heap;
 
 const _: () = {
@@ -112,4 +126,93 @@ pub fn try_journal<R>(look: impl FnOnce(&Journal, u32) -> R) -> Option<R> {
             cluster.core(FIRST_SEAT),
         )
     })
+}
+
+/// Returns the model of the run, if one goes on.
+pub fn task_set() -> Option<Arc<TaskSet>> {
+    let place = cluster::nth(0).execution.lock();
+    place.as_ref().map(|execution| execution.task_set().clone())
+}
+
+/// Returns the latest deadline of any job, on the run's time; `None` if there is
+/// no run, or no last job.
+pub fn nominal_end_ns() -> Option<u64> {
+    let end_ns = |dag: &Dag| {
+        let last = dag.jobs().filter(|_| !dag.is_sporadic())?.checked_sub(1)?;
+        let release_ns = dag.period_ns().checked_mul(last)?;
+        let release_ns = release_ns.checked_add(dag.offset_ns())?;
+        release_ns.checked_add(dag.relative_deadline_ns())
+    };
+    let task_set = task_set()?;
+    let ends = task_set.dags().iter().map(end_ns);
+    ends.reduce(|one, other| Some(one?.max(other?))).flatten()
+}
+
+/// Makes a change to a DAG, in a step of its scheduler.
+pub fn control(dag: DagId, change: fn(DagId) -> Request) {
+    serve(None, dag, change(dag));
+}
+
+/// Serves a request to a DAG in a step of its scheduler; one to the DAG of the plan with a number
+/// only if that is the one which runs, and as of time 0 if it has not begun.
+///
+/// This is the only such step, so that the scheduler is known by its address in it, too.
+pub(super) fn serve(plan: Option<u64>, dag: DagId, request: Request) {
+    let cluster = divided::of_dag(dag);
+    let mut place = cluster.execution.lock();
+    let Some(execution) = place.as_mut() else {
+        return;
+    };
+    match plan {
+        Some(plan) if plan != execution.signals.plan => return,
+        Some(_) if !execution.signals.has_begun => {
+            return execution.engine.requests.keep(request);
+        }
+        _ => {}
+    }
+    let mut woken = CoreSet::default();
+    let seat = cluster::visit(cluster);
+    execution.step(clock::now_ns(), &mut woken, |moment| moment.serve(request));
+    this_core::get().place.store(seat, Ordering::Relaxed);
+    drop(place);
+    woken.wake();
+    // The step may want this core, too, which follows at its next interrupt.
+    timer::set(Alarm::Schedule, clock::now_ns());
+}
+
+/// The DAG whose bodies are being dropped, and since when.
+static CLEARING: SpinLock<Option<(Arc<TaskSet>, DagId, u64)>> = SpinLock::new(None);
+
+/// Hands over the name of the DAG whose bodies are being dropped, if that goes on, and since when
+/// it does.
+pub fn look_at_clearing<R>(look: impl FnOnce(&str, u64) -> R) -> Option<R> {
+    let clearing = CLEARING.try_lock()?;
+    let (task_set, dag, since_ns) = clearing.as_ref()?;
+    Some(look(task_set.dag(*dag).name(), *since_ns))
+}
+
+/// Drops what the clusters of a run have left behind, and gives back what faults have left.
+pub(super) fn clear(executions: &mut [Execution]) {
+    let task_set = Arc::clone(executions[0].task_set());
+    for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
+        let engine = &mut executions[dag.cluster().index()].engine;
+        *CLEARING.lock() = Some((Arc::clone(&task_set), id, clock::now_ns()));
+        let of_dag = |lost: &mut Loan| lost.instance.dag == id;
+        let lost = engine.lost.extract_if(.., of_dag);
+        lost.for_each(|lost| lost.give_back().inner.body.forget());
+        for subtask in (0..).map(SubtaskId).take(dag.subtasks().len()) {
+            let any = Instance {
+                dag: id,
+                job: 0,
+                subtask,
+            };
+            drop(
+                engine
+                    .placement
+                    .take(task_set.vertex(any))
+                    .map(Loan::give_back),
+            );
+        }
+        drop(CLEARING.lock().take());
+    }
 }

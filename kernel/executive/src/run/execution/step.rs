@@ -1,26 +1,40 @@
 //! One step of the scheduler, and following what it decides.
+//!
+//! # Events of a core
+//! completes it, is interrupted, or ends it because of a fault.
+//!
+//! Each of these takes the cluster's lock once, makes a step of the scheduler where
+//! there is something to decide, and wakes the other cores after the lock is
+//! free again.
+//!
+//! # What else completions do beyond their DAG
+//!
+//! A completing instance's latest values show, and its requests are taken, signals among them,
+//! under the lock and before the scheduler's step; the step passes them on right after the
+//! completion. A signal from outside makes a step of its own. A request that concerns another
+//! cluster is a letter (`letters`), which counts once that cluster takes it.
 
 use core::sync::atomic::Ordering;
 
-use sched_dag::engine::Engine;
+use fass::{Plan, Request};
+use sched_dag::engine::{Continuation, Engine};
 use sched_dag::journal::{Subject, What};
 use sched_dag::placement::Next;
-use sched_dag::{CoreId, Instance, Moment};
+use sched_dag::{CoreId, DagId, Instance, Moment};
 
-use super::cluster::{self, Cluster, FIRST_SEAT, MAY_DIVIDE};
-use super::core_set::CoreSet;
+use super::cluster::{self, Cluster, CoreSet, FIRST_SEAT, MAY_DIVIDE};
+use super::letters::Letters;
 use super::loans::Loan;
-use super::port::SmpPort;
-use super::status::note_running;
-use super::time::{here, seat, since_epoch};
-
+use super::port::{SmpPort, here, instance_time_ns, seat, since_epoch};
+use super::status::{self, note_running};
 use super::{EPOCH_NS, Execution, Work};
+use crate::machine::abandoned::Abandoned;
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
-use crate::machine::this_core::Core;
+use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{clock, this_core, turns};
-use crate::run::contexts;
+use crate::machine::{clock, interrupt_flag, section, turns};
+use crate::run::{contexts, edge};
 
 impl Execution {
     /// Returns the engine, and the port for a step of it.
@@ -61,7 +75,7 @@ impl Execution {
     }
 
     #[inline]
-    pub(super) fn end_step(&mut self, now_ns: u64, woken: &mut CoreSet) {
+    fn end_step(&mut self, now_ns: u64, woken: &mut CoreSet) {
         // What happens before time 0 releases nothing yet.
         let waits_until_ns = now_ns.saturating_add(self.coincidence_ns);
         let epoch_ns = EPOCH_NS.load(Ordering::Relaxed);
@@ -89,7 +103,7 @@ impl Execution {
 
     /// Publishes the next event, and sees to it that the first core waits for it: that is to
     /// be woken if it has to be for that, and core 0 if nothing is left to be done here.
-    pub(super) fn announce(&self, woken: &mut CoreSet) {
+    fn announce(&self, woken: &mut CoreSet) {
         let cluster = self.cluster();
         let earlier_ns = cluster.next_event_ns();
         self.publish();
@@ -213,4 +227,166 @@ impl Execution {
             );
         }
     }
+}
+
+/// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
+pub fn find_work() -> Work {
+    let core = this_core::get();
+    let mut place = cluster::of(core).execution.lock_uninterrupted();
+    let Some(execution) = place.as_mut() else {
+        return Work::Rest;
+    };
+    let work = execution.find_work(core);
+    drop(place);
+    take_turns(core, work)
+}
+
+/// Leaves the turns to others if this core does not compute.
+fn take_turns(core: &Core, work: Work) -> Work {
+    match &work {
+        Work::Run(_) => {}
+        Work::Continue(context) if !context.is_background() => {}
+        Work::Continue(_) | Work::Rest => turns::rest(core),
+    }
+    work
+}
+
+/// Reports that this core has run its instance, and finds what it is to do
+/// next. Interrupts are disabled.
+pub fn complete(finished: Loan, finish_ns: u64) -> Work {
+    let core = this_core::get();
+    let here = seat(core);
+    let mut place = finished.cluster().execution.lock_uninterrupted();
+    let Some(execution) = place.as_mut() else {
+        return Work::Rest;
+    };
+    let vertex = finished.vertex;
+    let run_ns = instance_time_ns(finish_ns);
+    let is_alone = execution.may_hand_off;
+    let mut woken = CoreSet::default();
+    let (engine, mut port) = execution.parts(&mut woken);
+    match engine.complete((here, vertex), finished, run_ns, is_alone, &mut port) {
+        Continuation::Run(successor) => return Work::Run(successor),
+        Continuation::Look {
+            is_rescheduled: false,
+        } => {}
+        Continuation::Look {
+            is_rescheduled: true,
+        } => execution.announce(&mut woken),
+        Continuation::Step(ended) => execution.step(finish_ns, &mut woken, |moment| {
+            ended.into_iter().for_each(|ended| moment.complete(ended));
+        }),
+    }
+    let work = execution.find_work(core);
+    drop(place);
+    woken.wake();
+    take_turns(core, work)
+}
+
+/// Ends this core's instance because of a fault, and with it its DAG or its job. Its context was
+/// `left` here. Interrupts are disabled.
+pub fn fail(left: &Abandoned) {
+    let core = this_core::get();
+    let mut place = cluster::of(core).execution.lock_uninterrupted();
+    let Some(execution) = place.as_mut() else {
+        return;
+    };
+    let here = seat(core);
+    let Some(lost) = (execution.loans).recover(&mut execution.engine.placement, here.index(), left)
+    else {
+        return;
+    };
+    // Not when the interrupt came: a step may have left events since then. Nor may what follows
+    // stand before this event.
+    let clock_ns = clock::now_ns();
+    let ended_ns = since_epoch(clock_ns);
+    note_running(core, None);
+    edge::failed(lost.instance, ended_ns, clock_ns);
+    let mut woken = CoreSet::default();
+    let (engine, mut port) = execution.parts(&mut woken);
+    engine.tell_fault((ended_ns, here), lost.vertex, Some(lost), &mut port);
+    execution.end_step(clock_ns, &mut woken);
+    drop(place);
+    woken.wake();
+}
+
+/// Makes a step of the scheduler if `is_event`, and follows its decisions on this
+/// core. In an interrupt handler.
+pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
+    let core = this_core::get();
+    let cluster = cluster::of(core);
+    let mut place = cluster.execution.lock_uninterrupted();
+    let Some(execution) = place.as_mut() else {
+        return;
+    };
+    let mut woken = CoreSet::default();
+    if is_event || cluster.may_have_letters() {
+        execution.step(now_ns, &mut woken, |_| ());
+    }
+    if !section::puts_off(core, now_ns)
+        && let Some(waiting) = execution.follow(interrupted, now_ns)
+    {
+        woken.insert(cluster.core(waiting));
+    }
+    drop(place);
+    woken.wake();
+}
+
+/// The requests of a run that are on their way to its scheduler.
+pub(super) struct Signals {
+    /// The number of the plan that runs.
+    pub(super) plan: u64,
+    /// Whether the run has begun, so that there is time.
+    pub(super) has_begun: bool,
+    pub(super) letters: Letters,
+}
+
+impl Signals {
+    pub(super) fn new(plan: &Plan, letters: &Letters) -> Self {
+        Self {
+            plan: plan.number,
+            letters: letters.clone(),
+            has_begun: false,
+        }
+    }
+}
+
+impl Execution {
+    /// Begins to pass signals on, those from before at time 0.
+    pub(super) fn begin_signals(&mut self) {
+        self.signals.has_begun = true;
+        // What was raised before is to DAGs of this cluster.
+        let mut none = CoreSet::default();
+        let (engine, mut port) = self.parts(&mut none);
+        engine.tell((0, here()), &mut port, |_| ());
+    }
+}
+
+/// Takes a signal from outside all instances to a DAG of the plan with a number. One
+/// that comes between the commit and the run counts as of time 0.
+///
+/// # Panics
+///
+/// If an instance does so.
+#[track_caller]
+pub fn raise(plan: u64, dag: DagId) {
+    let were_enabled = interrupt_flag::disable();
+    let is_instance = status::running(this_core::get()).is_some();
+    if !is_instance {
+        raise_in_interrupt(plan, dag);
+    }
+    if were_enabled {
+        interrupt_flag::enable();
+    }
+    assert!(
+        !is_instance,
+        "a subtask raises a signal that it was not registered with; register it by \
+         `dag.using(signal.raising())`"
+    );
+}
+
+/// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
+/// are disabled.
+pub fn raise_in_interrupt(plan: u64, dag: DagId) {
+    status::serve(Some(plan), dag, Request::Signal(dag));
 }

@@ -7,8 +7,8 @@ use core::alloc::Layout;
 use core::ptr::NonNull;
 
 use super::super::block::{Block, HEADER_SIZE, MIN_BLOCK_SIZE};
-use super::super::class::{Class, FIRST_LEVEL, SECOND_LEVEL};
 use super::super::{GRANULE, Tlsf, Usage};
+use crate::memory::tlsf::block::{Class, FIRST_LEVEL, SECOND_LEVEL};
 
 /// Owns the memory of a heap, and frees it.
 pub(super) struct TestHeap {

@@ -1,0 +1,322 @@
+//! The report of a run: what became of its jobs, its memory, its wires and its recording, how times
+//! are written, and lines of the log, which come meanwhile.
+
+use alloc::sync::Arc;
+use core::fmt::{self, Write};
+use core::iter;
+
+use fass::edge::{Drained, Outcome, Sink};
+use fass::log::Line;
+use fass::{Wire, WireCounts};
+use sched_dag::{Dag, DagId, Snapshot, TaskSet};
+
+use crate::text::json;
+
+pub use sched_dag::law::Distribution;
+
+/// Prints the line of a DAG for people, of which `print` makes the rest, and its machine line.
+pub fn show_dag(snapshot: &Snapshot, dag: DagId, model: &Dag, print: fn(&Snapshot, &Dag)) {
+    crate::print!("  dag {} ", dag.0);
+    print(snapshot, model);
+    let of = snapshot.statistics;
+    json::emit("dag_status", |line| {
+        line.number("dag", dag.0)
+            .text("name", model.name())
+            .text("state", snapshot.word())
+            .number("released", of.released)
+            .number("completed", of.completed)
+            .number("in_flight", snapshot.in_flight)
+            .number("waiting", snapshot.waiting)
+            .number("misses", of.misses)
+            .number("skips", of.skips)
+            .number("aborts", of.aborts)
+            .number("faults", of.faults)
+            .number("failed", of.failed)
+            .number("restarts", of.restarts);
+    });
+}
+
+/// Prints the counts of a DAG's jobs.
+pub fn print_counts(snapshot: &Snapshot, model: &Dag) {
+    let of = snapshot.statistics;
+    crate::println!(
+        "`{}`: {}; {} jobs released, {} completed, {} in flight, {} waiting; {} deadlines \
+         missed, {} jobs skipped, {} aborted, {} lost to faults",
+        model.name(),
+        snapshot.word(),
+        of.released,
+        of.completed,
+        snapshot.in_flight,
+        snapshot.waiting,
+        of.misses,
+        of.skips,
+        of.aborts,
+        of.failed
+    );
+}
+
+/// What of the machine's memory is in use while nothing runs.
+///
+/// See `Machine::resources`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resources {
+    /// The bytes of the heap that are in use.
+    pub heap_bytes: usize,
+    /// The contexts, each with a stack, that there are for instances; none on Linux, where each
+    /// run has its own threads.
+    pub contexts: usize,
+    /// How many of these can be taken: while nothing runs, all.
+    pub contexts_free: usize,
+}
+
+/// What of its memory a program needs.
+#[derive(Clone, Copy, Debug)]
+pub struct Memory {
+    /// The bytes of the heap that are in use.
+    pub in_use_bytes: usize,
+    /// The most that were.
+    pub peak_bytes: u64,
+    /// The bytes that there are.
+    pub bytes: u64,
+    /// How often memory was allocated.
+    pub allocations: u64,
+}
+
+impl Memory {
+    /// Prints what was needed.
+    pub(crate) fn report(self) {
+        crate::println!(
+            "heap: {} KiB at its peak of {} KiB",
+            self.peak_bytes.div_ceil(1024),
+            self.bytes / 1024
+        );
+        json::emit("memory", |line| {
+            line.number("heap_peak_bytes", self.peak_bytes)
+                .number("heap_bytes", self.bytes)
+                .number("allocations", self.allocations);
+        });
+    }
+}
+
+/// Tells how complete a recording is.
+pub fn recorded(drained: &Drained) {
+    let is_complete = !drained.is_cut && drained.lost == 0;
+    json::emit("recorded", |line| {
+        line.number("entries", drained.entries)
+            .number("lost", drained.lost)
+            .flag("complete", is_complete);
+    });
+}
+
+/// Tells what a replay has found.
+pub fn replayed(outcome: &Outcome) {
+    let (compared, uncompared) = (outcome.compared, outcome.uncompared);
+    crate::println!(
+        "replay: {compared} values were compared, {uncompared} recorded ones were not computed"
+    );
+    if let Some((dag, first)) = &outcome.lacking {
+        crate::println!(
+            "replay: what functions of dag `{dag}` remember of jobs before {first} is not recorded"
+        );
+    }
+    json::emit("replayed", |line| {
+        line.number("compared", outcome.compared)
+            .number("uncompared", outcome.uncompared);
+        if let Some(divergence) = &outcome.divergence {
+            line.text("dag_name", &divergence.dag)
+                .text("topic", &divergence.topic)
+                .number("job", divergence.job);
+            let (recorded, computed) = (&divergence.recorded, &divergence.computed);
+            for (name, value) in [("recorded", recorded), ("computed", computed)] {
+                if let Some(value) = value {
+                    line.text(name, value);
+                }
+            }
+        }
+    });
+}
+
+/// How many bytes a line has; a multiple of three, so that only the last one is padded.
+const LINE_BYTES: usize = 768;
+
+/// Prints a record, by the line.
+#[derive(Debug)]
+pub struct Lines {
+    bytes: [u8; LINE_BYTES],
+    length: usize,
+}
+
+impl Lines {
+    /// Begins with nothing.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            bytes: [0; LINE_BYTES],
+            length: 0,
+        }
+    }
+
+    /// Prints what waits for a line to be full.
+    pub fn flush(&mut self) {
+        let bytes = &self.bytes[..core::mem::take(&mut self.length)];
+        if !bytes.is_empty() {
+            json::report("record", |line| {
+                line.text("bytes", in_base64(bytes));
+            });
+        }
+    }
+}
+
+impl Default for Lines {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Sink for Lines {
+    fn put(&mut self, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let count = bytes.len().min(LINE_BYTES - self.length);
+            let (now, later) = bytes.split_at(count);
+            self.bytes[self.length..self.length + count].copy_from_slice(now);
+            self.length += count;
+            bytes = later;
+            if self.length == LINE_BYTES {
+                self.flush();
+            }
+        }
+    }
+}
+
+/// Writes bytes as RFC 4648 has it, section 4.
+fn in_base64(bytes: &[u8]) -> impl fmt::Display {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    fmt::from_fn(move |f| {
+        bytes.chunks(3).try_for_each(|three| {
+            let byte = |place: usize| u32::from(three.get(place).copied().unwrap_or(0));
+            let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+            (0..4).try_for_each(|digit| match digit <= three.len() {
+                true => {
+                    let place = bits >> (18 - 6 * digit) & 63;
+                    f.write_char(char::from(DIGITS[place as usize]))
+                }
+                false => f.write_char('='),
+            })
+        })
+    })
+}
+
+/// Says it in a line for people and in one for programs.
+pub fn tell_wire(wire: &Wire) {
+    let WireCounts {
+        packets,
+        bytes,
+        lost_packets,
+        malformed,
+        sent_bytes,
+        unsent_bytes,
+        ..
+    } = wire.counts();
+    crate::println!(
+        "wire `{}`: {packets} packets came, {lost_packets} were lost, {malformed} malformed; \
+         {sent_bytes} bytes sent, {unsent_bytes} lost",
+        wire.name()
+    );
+    json::emit("wire", |line| {
+        line.text("name", wire.name())
+            .number("packets", packets)
+            .number("bytes", bytes)
+            .number("lost_packets", lost_packets)
+            .number("malformed", malformed)
+            .number("sent_bytes", sent_bytes)
+            .number("unsent_bytes", unsent_bytes);
+    });
+}
+
+/// The most lines that are shown at once: as many as can wait.
+const AT_ONCE: usize = 64;
+
+/// Shows the lines that wait, with the names of the run that they are of. Nothing is allocated.
+pub fn tell_log(task_set: impl Fn() -> Option<Arc<TaskSet>>) {
+    for line in iter::from_fn(Line::take).take(AT_ONCE) {
+        let task_set = task_set();
+        let task_set = task_set.as_deref();
+        crate::println!("{}", line.shown(task_set));
+        json::emit("log", |object| {
+            object
+                .text("level", line.level.word())
+                .text("message", line.text)
+                .number("time_ns", line.at_ns);
+            if let Some((dag, subtask, instance)) = line.names(task_set) {
+                object
+                    .number("dag", instance.dag.0)
+                    .text("dag_name", dag)
+                    .number("subtask", instance.subtask.0)
+                    .text("subtask_name", subtask)
+                    .number("job", instance.job);
+            }
+            let fields = |fields: &mut json::Object<'_, '_>| {
+                for (key, value) in line.fields() {
+                    fields.shown(key, &value);
+                }
+            };
+            object
+                .object("fields", fields)
+                .number("left_out", line.left_out);
+        });
+    }
+}
+
+/// Nanoseconds, shown with four digits or so and a unit: `412 ns`, `1.050 us`,
+/// `25.000 ms`, `1.500 s`. Honours the width of the format string.
+///
+/// ```no_run
+/// use kernel::report::Ns;
+///
+/// assert_eq!(Ns(25_000_000).to_string(), "25.000 ms");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ns(pub u64);
+
+impl fmt::Display for Ns {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ns = self.0;
+        let (unit, name) = match ns {
+            0..1_000 => return f.pad(&alloc::format!("{ns} ns")),
+            1_000..1_000_000 => (1_000, "us"),
+            1_000_000..1_000_000_000 => (1_000_000, "ms"),
+            _ => (1_000_000_000, "s"),
+        };
+        let thousandths = (ns % unit) / (unit / 1_000);
+        f.pad(&alloc::format!("{}.{thousandths:03} {name}", ns / unit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{in_base64, *};
+
+    #[test]
+    fn bytes_are_written_as_the_standard_has_it() {
+        let rows = [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ];
+        for (bytes, text) in rows {
+            assert_eq!(in_base64(bytes.as_bytes()).to_string(), text);
+        }
+    }
+
+    #[test]
+    fn chooses_the_unit() {
+        let texts = [0, 999, 1_050, 25_000_000, 1_500_000_000].map(|ns| Ns(ns).to_string());
+        assert_eq!(
+            texts,
+            ["0 ns", "999 ns", "1.050 us", "25.000 ms", "1.500 s"]
+        );
+        assert_eq!(format!("{:>8}", Ns(7)), "    7 ns");
+    }
+}
