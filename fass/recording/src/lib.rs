@@ -50,23 +50,24 @@
 
 extern crate alloc;
 
-mod file;
-mod value;
+mod bytes;
+mod commit;
+mod entry;
+mod read;
+mod recordable;
+mod schema;
+mod shown;
+mod stream;
 
-pub use file::commit::{Commit, CommittedDag, CommittedSubtask, CommittedTopic};
-pub use file::entry::{Entry, What};
-pub use file::header::{Channel, DagHeader, Header, Role};
-pub use file::read::{Chunk, Entries, Events, Recording, mended};
-pub use file::stream::{Sink, Stream, Writer};
-pub use file::times::{Counted, DagTimes, SubtaskTimes, Times};
-pub use file::values::{Mismatch, Values};
-pub use file::{MAGIC, VERSION};
+pub use bytes::{Decoder, Encoder, Full, Malformed};
+pub use commit::{
+    Commit, CommittedDag, CommittedSubtask, CommittedTopic, Counted, DagTimes, SubtaskTimes, Times,
+};
+pub use entry::{Channel, DagHeader, Entry, Header, Role, What};
+pub use read::{Chunk, Events, Mismatch, Recording, mended};
 #[doc(hidden)]
-pub use value::containers::deepest;
-pub use value::crc::Crc;
-pub use value::decode::{Decoder, Malformed};
-pub use value::encode::{Encoder, Full};
-pub use value::recordable::{MOST_GROWTH, Recordable, to_bytes};
-pub use value::schema::{Field, MOST_DEPTH, MOST_WEIGHTLESS, Scalar, Schema};
-pub use value::shown::{Shown, write_json};
-pub use value::walk::Part;
+pub use recordable::deepest;
+pub use recordable::{MOST_GROWTH, Recordable, to_bytes};
+pub use schema::{Field, MOST_DEPTH, MOST_WEIGHTLESS, Scalar, Schema};
+pub use shown::{Part, Shown, write_json};
+pub use stream::{Crc, MAGIC, Sink, Stream, VERSION, Writer};

@@ -1,15 +1,120 @@
-//! Writing a recording frame by frame, to whatever takes bytes.
+//! The file: a mark, a header, entries, and an end, each with a checksum.
+//!
+//! ```text
+//! 0x89 "FASSREC"  version, 2 bytes   then frames:
+//! kind, 1 byte    length, 4 bytes    payload    checksum, 4 bytes
+//! ```
+//!
+//! The checksum of a frame is that of all bytes from the file's first one on, checksums left
+//! out. So a frame that is altered, left out, doubled or moved is found, and so is a cut at a
+//! frame's end, by the missing frame of the end. There are two kinds of ends: of a recording
+//! that says of everything what became of it, if only that it is lost, and of one that says
+//! nothing of what came after its last entry. [`mended`](crate::mended) gives the second one to
+//! what a run that died has left. Between entries there may be the rest of what is known of the
+//! run: its [commits](crate::Commit), the events of its journals, the [times](crate::Times) of
+//! runs that have ended, and lines of text.
+//!
+//! A recording is written here, frame by frame, to whatever takes bytes.
 
 use alloc::vec::Vec;
 
-use super::commit::Commit;
-use super::entry::{Entry, What};
-use super::header::Header;
-use super::times::Times;
-use super::{COMMIT, CUT, END, ENTRY, EVENTS, HEADER, MAGIC, TEXT, TIMES, VERSION};
-use crate::value::crc::Crc;
-use crate::value::encode::Encoder;
-use crate::value::recordable::to_bytes;
+use super::bytes::Encoder;
+use super::commit::{Commit, Times};
+use super::entry::{Entry, Header, What};
+use super::recordable::to_bytes;
+
+/// The first bytes of each recording. The first one is no text, so that a transfer of text is
+/// found, which would alter the rest.
+pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
+
+/// The version of the format that is written, of values included. Those before are read, too: the
+/// first has no entries of [`What::Clock`](crate::What::Clock), and neither of
+/// [`What::Fault`](crate::What::Fault); those before 4 have no text, and
+/// those before 5 no commits, events and times, and no [states](crate::Role::State).
+pub const VERSION: u16 = 5;
+
+/// The kinds of frames.
+pub(super) const HEADER: u8 = 1;
+pub(super) const ENTRY: u8 = 2;
+pub(super) const END: u8 = 3;
+pub(super) const CUT: u8 = 4;
+pub(super) const TEXT: u8 = 5;
+pub(super) const COMMIT: u8 = 6;
+pub(super) const EVENTS: u8 = 7;
+pub(super) const TIMES: u8 = 8;
+
+/// The polynomial, its lowest power first.
+const POLYNOMIAL: u32 = 0xedb8_8320;
+
+/// What eight zero bits do to each value of the lowest byte.
+static TABLE: [u32; 256] = table();
+
+const fn table() -> [u32; 256] {
+    let mut table = [0_u32; 256];
+    let mut byte = 0_u32;
+    while byte < 256 {
+        let mut value = byte;
+        let mut bit = 0;
+        while bit < 8 {
+            value = if value & 1 == 1 {
+                value >> 1 ^ POLYNOMIAL
+            } else {
+                value >> 1
+            };
+            bit += 1;
+        }
+        table[byte as usize] = value;
+        byte += 1;
+    }
+    table
+}
+
+/// A checksum of bytes that are given piece by piece.
+///
+/// ```
+/// use recording::Crc;
+///
+/// let mut crc = Crc::new();
+/// crc.update(b"1234");
+/// crc.update(b"56789");
+/// assert_eq!(crc.value(), 0xcbf4_3926);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crc(u32);
+
+impl Crc {
+    /// Begins with no byte.
+    ///
+    /// See [`Crc`].
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(u32::MAX)
+    }
+
+    /// Takes more bytes in.
+    ///
+    /// See [`Crc`].
+    pub fn update(&mut self, bytes: &[u8]) {
+        self.0 = bytes.iter().fold(self.0, |crc, &byte| {
+            let [low, ..] = crc.to_le_bytes();
+            TABLE[usize::from(low ^ byte)] ^ crc >> 8
+        });
+    }
+
+    /// Returns the checksum of all bytes so far.
+    ///
+    /// See [`Crc`].
+    #[must_use]
+    pub const fn value(self) -> u32 {
+        !self.0
+    }
+}
+
+impl Default for Crc {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 /// A place that takes the bytes of a recording.
 ///
@@ -245,7 +350,7 @@ impl<S: Sink + ?Sized> Stream<S> {
         self.lost
     }
 
-    pub(super) fn finish(&mut self, kind: u8) {
+    fn finish(&mut self, kind: u8) {
         self.whole(kind, &[&to_bytes(&(self.entries, self.lost))]);
     }
 

@@ -1,16 +1,18 @@
-//! Reading a recording, all of which may be wrong.
+//! Reading a recording, all of which may be wrong: its chunks, and the values of one channel by
+//! their type.
 
+use alloc::format;
+use alloc::string::{String, ToString};
 use alloc::vec::Vec;
+use core::fmt::{self, Debug};
 
-use super::commit::Commit;
-use super::entry::{Entry, What};
-use super::header::{Channel, Header};
-use super::stream::Stream;
-use super::times::Times;
-use super::{COMMIT, CUT, END, ENTRY, EVENTS, HEADER, MAGIC, READ, TEXT, TIMES};
-use crate::value::crc::Crc;
-use crate::value::decode::{Decoder, Malformed};
-use crate::value::recordable::Recordable;
+use super::bytes::{Decoder, Malformed};
+use super::commit::{Commit, Times};
+use super::entry::{Channel, Entry, Header, What};
+use super::recordable::Recordable;
+use super::stream::{
+    COMMIT, CUT, Crc, END, ENTRY, EVENTS, HEADER, MAGIC, Stream, TEXT, TIMES, VERSION,
+};
 
 /// A recording that is whole and unaltered.
 ///
@@ -18,17 +20,15 @@ use crate::value::recordable::Recordable;
 #[derive(Clone, Debug)]
 pub struct Recording<'b> {
     bytes: &'b [u8],
-    header: Header,
-    /// Where the first frame stands.
-    first: usize,
-    count: u64,
-    lost: u64,
+    read: Progress,
     is_cut: bool,
 }
 
-/// How far a recording was read.
+/// How far a recording was read, and what is there.
+#[derive(Clone, Debug)]
 struct Progress {
-    header: Option<Header>,
+    header: Header,
+    has_header: bool,
     /// Where the first frame stands, and what is behind the last whole frame.
     first: usize,
     last: usize,
@@ -36,12 +36,6 @@ struct Progress {
     count: u64,
     lost: u64,
 }
-
-/// The entries of a recording, in the order in which they were written.
-///
-/// See [`Recording::entries`].
-#[derive(Clone, Debug)]
-pub struct Entries<'b>(Decoder<'b>);
 
 /// A frame, and where its payload stands.
 struct Frame<'b> {
@@ -63,14 +57,11 @@ impl<'b> Recording<'b> {
     ///
     /// See [`Writer`](crate::Writer).
     pub fn read(bytes: &'b [u8]) -> Result<Self, Malformed> {
-        let mut progress = Progress::none();
-        let is_cut = progress.read(bytes)?;
+        let mut read = Progress::none();
+        let is_cut = read.read(bytes)?;
         Ok(Self {
             bytes,
-            header: progress.header.unwrap_or_default(),
-            first: progress.first,
-            count: progress.count,
-            lost: progress.lost,
+            read,
             is_cut,
         })
     }
@@ -80,7 +71,7 @@ impl<'b> Recording<'b> {
     /// See [`Writer`](crate::Writer).
     #[must_use]
     pub const fn header(&self) -> &Header {
-        &self.header
+        &self.read.header
     }
 
     /// Returns the number of entries.
@@ -88,7 +79,7 @@ impl<'b> Recording<'b> {
     /// See [`Writer`](crate::Writer).
     #[must_use]
     pub const fn count(&self) -> u64 {
-        self.count
+        self.read.count
     }
 
     /// Returns how many entries are of what was lost; 0, if the recording is not
@@ -97,7 +88,7 @@ impl<'b> Recording<'b> {
     /// See [`Writer`](crate::Writer).
     #[must_use]
     pub const fn lost(&self) -> u64 {
-        self.lost
+        self.read.lost
     }
 
     /// Reports whether the recording says nothing of what happened after its last entry: the
@@ -109,19 +100,21 @@ impl<'b> Recording<'b> {
         self.is_cut
     }
 
-    /// Returns the entries.
+    /// Returns the entries, in the order in which they were written.
     ///
     /// See [`Writer`](crate::Writer).
-    #[must_use]
-    pub fn entries(&self) -> Entries<'b> {
-        Entries(Decoder::new(&self.bytes[self.first..]))
+    pub fn entries(&self) -> impl Iterator<Item = Entry<'b>> + Clone + Debug + use<'b> {
+        self.chunks().filter_map(|chunk| match chunk {
+            Chunk::Entry(entry) => Some(entry),
+            _ => None,
+        })
     }
 
     /// Returns all that is in the recording, in the order in which it was written.
     ///
     /// See [`Commit`], [`Events`], [`Times`].
-    pub fn chunks(&self) -> impl Iterator<Item = Chunk<'b>> + use<'b> {
-        let mut input = Decoder::new(&self.bytes[self.first..]);
+    pub fn chunks(&self) -> impl Iterator<Item = Chunk<'b>> + Clone + Debug + use<'b> {
+        let mut input = Decoder::new(&self.bytes[self.read.first..]);
         let frames = core::iter::from_fn(move || frame(&mut input).ok());
         // Whatever could be wrong was found when the recording was read.
         frames.map_while(|frame| Chunk::read(&frame).ok().flatten())
@@ -224,9 +217,10 @@ impl<'b> Chunk<'b> {
 }
 
 impl Progress {
-    const fn none() -> Self {
+    fn none() -> Self {
         Self {
-            header: None,
+            header: Header::default(),
+            has_header: false,
             first: 0,
             last: 0,
             crc: Crc::new(),
@@ -244,7 +238,7 @@ impl Progress {
         }
         let malformed =
             input.expected("version 1 to 5 of recordings, which are those that are read");
-        if !READ.contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
+        if !(1..=VERSION).contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
             return Err(malformed);
         }
         let mut crc = Crc::new();
@@ -256,7 +250,7 @@ impl Progress {
             let inside = |malformed: Malformed| malformed.behind(frame.offset);
             match Chunk::read(&frame)? {
                 Some(Chunk::Header(header)) => {
-                    if self.header.is_some() || self.count > 0 {
+                    if self.has_header || self.count > 0 {
                         return Err(frame.expected("no other header"));
                     }
                     let wrong = |expected| Malformed {
@@ -264,11 +258,10 @@ impl Progress {
                         expected,
                     };
                     check_header(&header).map_err(wrong)?;
-                    self.header = Some(header);
+                    (self.header, self.has_header) = (header, true);
                 }
                 Some(Chunk::Entry(entry)) => {
-                    let header = self.header.get_or_insert_default();
-                    entry.check(header).map_err(inside)?;
+                    entry.check(&self.header).map_err(inside)?;
                     self.count += 1;
                     self.lost += u64::from(entry.what == What::Lost);
                 }
@@ -319,22 +312,6 @@ pub fn mended(bytes: &[u8]) -> Result<Vec<u8>, Malformed> {
     let whole = bytes[..progress.last].to_vec();
     let stream = Stream::behind(progress.crc, (progress.count, progress.lost), whole);
     Ok(stream.cut())
-}
-
-impl<'b> Iterator for Entries<'b> {
-    type Item = Entry<'b>;
-
-    fn next(&mut self) -> Option<Entry<'b>> {
-        loop {
-            // Whatever could be wrong was found when the recording was read.
-            let frame = frame(&mut self.0).ok()?;
-            match frame.kind {
-                ENTRY => return Entry::decode(frame.payload).ok(),
-                END | CUT => return None,
-                _ => {}
-            }
-        }
-    }
 }
 
 impl Frame<'_> {
@@ -396,3 +373,75 @@ fn check_header(header: &Header) -> Result<(), &'static str> {
         false => Err("channels of DAGs that the header has"),
     }
 }
+
+/// A recording does not have what is wanted of it.
+///
+/// See [`Recording::values`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mismatch(String);
+
+impl<'b> Recording<'b> {
+    /// Returns the values that a DAG's subtask has written to a topic, with their jobs.
+    ///
+    /// # Errors
+    ///
+    /// The recording has none of this topic, or of another type.
+    ///
+    /// ```
+    /// use recording::{Header, Recording, Writer};
+    ///
+    /// let bytes = Writer::new(&Header::default()).end();
+    /// let recording = Recording::read(&bytes).unwrap();
+    /// let refused = recording.values::<u8>("lidar", "points").unwrap_err();
+    /// assert_eq!(
+    ///     refused.to_string(),
+    ///     "there is nothing of topic `points` of dag `lidar`; there is nothing at all"
+    /// );
+    /// ```
+    pub fn values<T: Recordable>(
+        &self,
+        dag: &str,
+        topic: &str,
+    ) -> Result<impl Iterator<Item = (u64, T)> + Clone + Debug + use<'b, T>, Mismatch> {
+        let header = self.header();
+        let name_of = |dag: u16| &*header.dags[usize::from(dag)].name;
+        let mut channels = (0_u16..).zip(&header.channels);
+        let found = channels.find(|(_, channel)| {
+            let is_written = channel.role.is_written();
+            is_written && channel.topic == topic && name_of(channel.dag) == dag
+        });
+        let Some((number, channel)) = found else {
+            let there = header.channels.iter();
+            let there =
+                there.map(|it| format!("topic `{}` of dag `{}`", it.topic, name_of(it.dag)));
+            let there = match &there.collect::<Vec<String>>()[..] {
+                [] => "nothing at all".to_string(),
+                there => there.join(", "),
+            };
+            return Err(Mismatch(format!(
+                "there is nothing of topic `{topic}` of dag `{dag}`; there is {there}"
+            )));
+        };
+        let wanted = T::schema();
+        if channel.schema != wanted {
+            let here = &channel.schema;
+            return Err(Mismatch(format!(
+                "topic `{topic}` of dag `{dag}` has values of type {here}, and {wanted} is \
+                 wanted; record it again"
+            )));
+        }
+        let is_of_channel =
+            move |entry: &Entry<'_>| entry.what == What::Value && entry.place == number;
+        // Each is one of the type: the recording was read by the same schema.
+        let value = |entry: Entry<'_>| Some((entry.job, T::from_bytes(entry.value).ok()?));
+        Ok(self.entries().filter(is_of_channel).filter_map(value))
+    }
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl core::error::Error for Mismatch {}

@@ -1,0 +1,229 @@
+//! What a recording says of itself, whose it is and what is in it; and what happened, one entry
+//! after the other.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use super::bytes::{Decoder, Encoder, Malformed};
+use super::recordable::Recordable;
+use super::schema::Schema;
+
+crate::recordable! {
+    /// What stands at the start of a recording.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    pub struct Header {
+        /// The app, or what else the recording is of.
+        pub app: String,
+        /// The DAGs, in the order of their commit.
+        pub dags: Vec<DagHeader>,
+        /// What values there are.
+        pub channels: Vec<Channel>,
+    }
+
+    /// A DAG of a recording.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[derive(Clone, Debug, Default, PartialEq, Eq)]
+    pub struct DagHeader {
+        /// Its name.
+        pub name: String,
+        /// The hash of its names and edges; 0: the values were not recorded in a run.
+        pub graph: u64,
+    }
+
+    /// Values of one type and one place: what a subtask writes to a topic, or samples, or finds in
+    /// a state.
+    ///
+    /// See [`Writer`](crate::Writer).
+    #[derive(Clone, Debug, PartialEq, Eq)]
+    pub struct Channel {
+        /// The number of the DAG.
+        pub dag: u16,
+        /// The number of the subtask that writes the values, or finds them.
+        pub subtask: u16,
+        /// What the values are to the DAG.
+        pub role: Role,
+        /// The topic, or the state.
+        pub topic: String,
+        /// The type.
+        pub schema: Schema,
+    }
+}
+
+/// Declares kinds that have a number in recordings, in their order, and a word.
+macro_rules! kinds {
+    ($($(#[$about:meta])* pub enum $Kinds:ident($expected:literal) {
+        $($(#[$doc:meta])* $Kind:ident = $name:literal,)+
+    })+) => {$(
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $Kinds {
+            $($(#[$doc])* $Kind,)+
+        }
+
+        impl $Kinds {
+            /// Returns the word for it.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$Kind => $name,)+
+                }
+            }
+        }
+
+        impl Recordable for $Kinds {
+            const LEAST_BYTES: usize = 1;
+            const DEPTH: usize = 1;
+
+            fn schema() -> Schema {
+                u8::schema()
+            }
+
+            fn encode(&self, out: &mut Encoder<'_>) {
+                out.put(&[*self as u8]);
+            }
+
+            fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+                let malformed = input.expected($expected);
+                let number = usize::from(u8::decode(input)?);
+                [$(Self::$Kind),+].get(number).copied().ok_or(malformed)
+            }
+        }
+    )+};
+}
+
+kinds! {
+    /// What values are to their DAG.
+    ///
+    /// ```
+    /// assert_eq!(recording::Role::Source.name(), "source");
+    /// ```
+    pub enum Role("what the values are: 0 source, 1 result, 2 sample, 3 state") {
+        /// A source returned them. A replay takes them.
+        Source = "source",
+        /// Another subtask returned them. A replay compares them.
+        Result = "result",
+        /// A subtask found them as latest values of a topic, of whatever DAG: the type is
+        /// `(u64, u64, T)?`, with the job that the value is of, and when that was complete. A
+        /// replay takes them.
+        Sample = "sample",
+        /// A subtask found them in a state, before it changed that in the job. A replay that begins
+        /// with a job takes what is recorded of it, and compares the others. Since version 5 of the
+        /// format.
+        State = "state",
+    }
+
+    /// What happened.
+    ///
+    /// ```
+    /// assert_eq!(recording::What::Value.name(), "value");
+    /// ```
+    pub enum What("what happened, a number from 0 to 7") {
+        /// A value of a channel.
+        Value = "value",
+        /// A signal released the job of a sporadic DAG.
+        Signal = "signal",
+        /// The job was due, and was never released.
+        Skip = "skip",
+        /// The instance of a subtask will not run.
+        Cut = "cut",
+        /// The subtask goes on with another function, after a fault in this job.
+        Restart = "restart",
+        /// The value of a channel is not in the recording, for there was no room.
+        Lost = "lost",
+        /// The instance of a subtask asked for the time: the value is a `Vec<u64>` of the answers,
+        /// in nanoseconds. Since version 2 of the format.
+        Clock = "clock",
+        /// The instance of the subtask failed. Since version 3 of the format.
+        Fault = "fault",
+    }
+}
+
+impl Role {
+    /// Reports whether a subtask writes the values to a topic of its DAG.
+    ///
+    /// ```
+    /// assert!(!recording::Role::Sample.is_written());
+    /// ```
+    #[must_use]
+    pub const fn is_written(self) -> bool {
+        matches!(self, Self::Source | Self::Result)
+    }
+}
+
+/// Something that happened in a run.
+///
+/// See [`Writer`](crate::Writer).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry<'v> {
+    /// What.
+    pub what: What,
+    /// The number of the DAG.
+    pub dag: u16,
+    /// The number of the channel or of the subtask; [`What`] says which.
+    pub place: u16,
+    /// The job.
+    pub job: u64,
+    /// The nominal release of the job, in nanoseconds from the start of the run.
+    pub release_ns: u64,
+    /// When it happened: for values, when the instance was complete that wrote or sampled
+    /// them.
+    pub at_ns: u64,
+    /// The value's bytes, where it has one.
+    pub value: &'v [u8],
+}
+
+impl<'v> Entry<'v> {
+    pub(super) fn encode(&self, out: &mut Encoder<'_>) {
+        self.what.encode(out);
+        (self.dag, self.place, self.job, self.release_ns, self.at_ns).encode(out);
+        out.put(self.value);
+    }
+
+    pub(super) fn decode(payload: &'v [u8]) -> Result<Self, Malformed> {
+        let mut input = Decoder::new(payload);
+        let what = What::decode(&mut input)?;
+        let (dag, place, job, release_ns, at_ns) = Recordable::decode(&mut input)?;
+        Ok(Self {
+            what,
+            dag,
+            place,
+            job,
+            release_ns,
+            at_ns,
+            value: input.take(input.remaining(), "the value")?,
+        })
+    }
+
+    /// Makes sure that it fits to the header.
+    pub(super) fn check(&self, header: &Header) -> Result<(), Malformed> {
+        /// Where the numbers and the value stand in the payload.
+        const DAG: usize = 1;
+        const PLACE: usize = 3;
+        const VALUE: usize = 29;
+        let malformed = |offset, expected| Malformed { offset, expected };
+        if usize::from(self.dag) >= header.dags.len() {
+            return Err(malformed(DAG, "the number of a DAG of the header"));
+        }
+        let mut rest = Decoder::new(self.value);
+        let checked = match self.what {
+            What::Value | What::Lost => {
+                let channel = header.channels.get(usize::from(self.place));
+                let Some(channel) = channel.filter(|channel| channel.dag == self.dag) else {
+                    return Err(malformed(PLACE, "the number of a channel of the DAG"));
+                };
+                match self.what {
+                    What::Value => channel.schema.walk(&mut rest, &mut |_| ()),
+                    _ => Ok(()),
+                }
+            }
+            What::Clock => Vec::<u64>::schema().walk(&mut rest, &mut |_| ()),
+            What::Signal | What::Skip | What::Cut | What::Restart | What::Fault => Ok(()),
+        };
+        checked
+            .and_then(|()| rest.end())
+            .map_err(|malformed| malformed.behind(VALUE))
+    }
+}
