@@ -1,34 +1,24 @@
-//! The page `docs/errors.md`, as the tests read it: what a commit says of each
-//! fault, and the code that has the fault, are compared with it word for word, so it
-//! cannot go stale.
+//! The page `docs/errors.md`, as the tests read it: what a commit says of each fault is
+//! compared with it word for word, so it cannot go stale.
 //!
-//! A fault's *entry* is headed by its name in backquotes. It has a cause, the text
-//! as an indented line, a remedy, and a block of Rust, in this order.
+//! A fault's *entry* is a row of a table that is headed `| fault | text |`, and a third
+//! column: its name in backquotes, its text, and what else there is to say.
 
 use std::collections::BTreeMap;
 
 use tool::golden::Golden;
 
-use crate::markdown::{blocks, page};
+use crate::markdown::page;
 
 const PAGE: &str = "docs/errors.md";
 
-/// What the page says of one fault.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
-    /// The commit's text.
-    pub text: String,
-    /// The code that has the fault.
-    pub example: String,
-}
-
-/// Reads the page: the entry of each fault by the fault's name.
+/// Reads the page: the text of each fault by the fault's name.
 ///
 /// # Panics
 ///
-/// Panics if the page has no entries, or if one lacks a part.
+/// Panics if the page has no entries, or if one lacks a part or stands there twice.
 #[must_use]
-pub fn documented_faults() -> BTreeMap<String, Entry> {
+pub fn documented_faults() -> BTreeMap<String, String> {
     read(&page(PAGE)).unwrap_or_else(|why| panic!("{PAGE}: {why}"))
 }
 
@@ -62,43 +52,17 @@ pub fn is_said_by(text: &str, pattern: &str) -> bool {
     rest.is_empty()
 }
 
-/// Returns the bodies of a source's functions without arguments, by their names,
-/// without the indentation.
-#[must_use]
-pub fn function_bodies(source: &str) -> BTreeMap<String, String> {
-    let mut bodies = BTreeMap::new();
-    let mut open: Option<(String, String)> = None;
-    for line in source.lines() {
-        match open.as_mut() {
-            None => {
-                let function = line.strip_prefix("pub(super) ").unwrap_or(line);
-                let name = function
-                    .strip_prefix("fn ")
-                    .filter(|rest| rest.ends_with('{'))
-                    .and_then(|rest| rest.split_once("()"));
-                open = name.map(|(name, _)| (name.into(), String::new()));
-            }
-            Some(_) if line == "}" => bodies.extend(open.take()),
-            Some((_, body)) => {
-                *body += line.strip_prefix("    ").unwrap_or(line);
-                body.push('\n');
-            }
-        }
-    }
-    bodies
-}
-
-/// Holds a part of a fault's entry, its text or its example, to what it is now.
+/// Holds the text of a fault's entry to what is said now.
 ///
 /// # Panics
 ///
 /// Panics if it is another; see [`Golden::assert_is`].
 #[track_caller]
-pub fn assert_is(fault: &str, part: &str, now: &str) {
+pub fn assert_is(fault: &str, text: &str, now: &str) {
     let golden = Golden {
         file: PAGE,
-        below: &format!("\n### `{fault}`\n"),
-        text: part,
+        below: &format!("\n| `{fault}` | "),
+        text,
     };
     golden.assert_is(now);
 }
@@ -117,69 +81,55 @@ pub fn with_names_of(other: &str, text: &str) -> String {
     parts.collect::<Vec<_>>().join("`")
 }
 
-fn read(page: &str) -> Result<BTreeMap<String, Entry>, String> {
-    let sections = page.split("\n### `").skip(1);
-    let named = |section: &str| {
-        let (fault, rest) = section.split_once('`').ok_or("a heading without end")?;
-        let rest = rest.split("\n## ").next().unwrap_or(rest);
-        let entry = read_entry(rest).map_err(|lack| format!("`{fault}` lacks its {lack}"))?;
-        Ok((fault.to_string(), entry))
-    };
-    let faults: BTreeMap<String, Entry> = sections.map(named).collect::<Result<_, String>>()?;
+fn read(page: &str) -> Result<BTreeMap<String, String>, String> {
+    let mut faults = BTreeMap::new();
+    for table in page.split("\n| fault | text |").skip(1) {
+        let rows = table.lines().skip(2);
+        for row in rows.take_while(|row| row.starts_with('|')) {
+            let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+            let &["", name, text, _, ""] = &cells[..] else {
+                return Err(format!("a row without three cells: {row}"));
+            };
+            let name = name.trim_matches('`');
+            if name.is_empty() || text.is_empty() {
+                return Err(format!("an empty cell: {row}"));
+            }
+            if faults.insert(name.into(), text.into()).is_some() {
+                return Err(format!("`{name}` stands there twice"));
+            }
+        }
+    }
     if faults.is_empty() {
         return Err("the page has no entry".into());
     }
     Ok(faults)
 }
 
-/// Reads what stands below an entry's heading, or says which part it lacks.
-fn read_entry(section: &str) -> Result<Entry, &'static str> {
-    let (cause, rest) = section.split_once("\n    ").ok_or("text")?;
-    let (text, rest) = rest.split_once('\n').ok_or("remedy")?;
-    let (remedy, _) = rest.split_once("```rust").ok_or("example")?;
-    if cause.trim().is_empty() {
-        return Err("cause");
-    }
-    if remedy.trim().is_empty() {
-        return Err("remedy");
-    }
-    let example = blocks(section).into_iter().next().ok_or("example")?;
-    Ok(Entry {
-        text: text.into(),
-        example: example.text,
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{function_bodies, is_said_by, read, with_names_of};
+    use super::{is_said_by, read, with_names_of};
 
-    const ENTRY: &str = "# Errors\n\n### `cycle`\n\nA circle.\n\n    a -> b; cut it\n\n\
-                         Cut it.\n\n```rust\nlet dag = cycle();\n```\n\n## More\n";
+    const TABLE: &str = "# Errors\n\n| fault | text | more |\n|---|---|---|\n\
+                         | `cycle` | a -> b; cut it | A circle. |\n\
+                         | `no_dags` | no dag; create one | |\n\n\
+                         | warning | cause |\n|---|---|\n| `zero_wcet` | none |\n";
 
     #[test]
-    fn an_entry_has_a_cause_a_text_a_remedy_and_code() {
-        let faults = read(ENTRY).unwrap();
-        assert_eq!(faults["cycle"].text, "a -> b; cut it");
-        assert_eq!(faults["cycle"].example, "let dag = cycle();\n");
-        for (part, lack) in [
-            ("A circle.\n", "cause"),
-            ("    a -> b; cut it\n", "text"),
-            ("Cut it.\n", "remedy"),
-            ("```rust\nlet dag = cycle();\n```\n", "example"),
+    fn an_entry_is_a_row_with_a_name_and_a_text() {
+        let faults = read(TABLE).unwrap();
+        assert_eq!(faults.len(), 2, "{faults:?}");
+        assert_eq!(faults["cycle"], "a -> b; cut it");
+        assert_eq!(faults["no_dags"], "no dag; create one");
+        for (part, other, lack) in [
+            ("a -> b; cut it", "", "an empty cell: | `cycle` |"),
+            ("`cycle`", "", "an empty cell: |  | a -> b"),
+            (" A circle. |", "", "a row without three cells: | `cycle`"),
+            ("`no_dags`", "`cycle`", "`cycle` stands there twice"),
+            ("| fault |", "| error |", "the page has no entry"),
         ] {
-            let error = read(&ENTRY.replace(part, "")).unwrap_err();
-            assert_eq!(error, format!("`cycle` lacks its {lack}"));
+            let error = read(&TABLE.replace(part, other)).unwrap_err();
+            assert!(error.starts_with(lack), "{error}");
         }
-    }
-
-    #[test]
-    fn bodies_are_those_of_functions_without_arguments() {
-        let source = "pub(super) fn a() -> u8 {\n    if true {\n        1\n    }\n}\n\
-                      fn b(x: u8) {\n    x\n}\n";
-        let bodies = function_bodies(source);
-        assert_eq!(bodies.len(), 1);
-        assert_eq!(bodies["a"], "if true {\n    1\n}\n");
     }
 
     #[test]

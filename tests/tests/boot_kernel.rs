@@ -227,7 +227,7 @@ fn every_commit_fault_is_printed_as_documented() {
     for line in outcome.lines("provoked") {
         let fault = line.member("fault");
         assert!(cases.remove(fault), "{}", line.text);
-        fault_page::assert_is(fault, &documented[fault].text, line.member("message"));
+        fault_page::assert_is(fault, &documented[fault], line.member("message"));
     }
     assert_eq!(cases, BTreeSet::new(), "they are not printed");
 }

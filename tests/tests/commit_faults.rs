@@ -1,6 +1,5 @@
-//! Every fault that there is stands in `docs/errors.md` as the commit says it,
-//! with the code that has it. Here on the host, in virtual time; a boot test does
-//! the same for the texts in the guest.
+//! Every fault that there is stands in `docs/errors.md` as the commit says it. Here on the
+//! host, in virtual time; a boot test does the same in the guest.
 //!
 //! What `fass` cannot be brought to say is found by `sched_dag::verify` itself, or
 //! is a value of the fault where provoking it would take 2^32 DAGs.
@@ -9,7 +8,7 @@ use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet};
 
 use fass::finish_create_dags;
-use harness::fault_page::{self, documented_faults, function_bodies, is_said_by, table};
+use harness::fault_page::{self, documented_faults, is_said_by, table};
 use harness::markdown::page;
 use sched_dag::analysis::{Reason, TaskError};
 use sched_dag::{
@@ -17,16 +16,6 @@ use sched_dag::{
     verify,
 };
 use tool::golden::Golden;
-
-/// The files whose functions the page shows, each named as its fault.
-const EXAMPLES: [&str; 6] = [
-    "tests/guest/src/faults/graph.rs",
-    "tests/guest/src/faults/values.rs",
-    "tests/guest/src/faults/shared.rs",
-    "tests/guest/src/faults/modes.rs",
-    "tests/tests/commit_faults.rs",
-    "tests/tests/commit_without_platform.rs",
-];
 
 fn not_launched() -> fass::CommitError {
     let machine = virtual_time::VirtualTime::new();
@@ -181,7 +170,7 @@ fn every_fault_is_found_and_said_as_documented() {
         said.insert(fault.to_string(), text.to_string());
     });
     for (code, text) in &said {
-        fault_page::assert_is(code, &documented[code].text, text);
+        fault_page::assert_is(code, &documented[code], text);
     }
     // The last one needs a program of its own: `commit_without_platform.rs`.
     let mut missing: Vec<&String> = documented.keys().collect();
@@ -200,35 +189,13 @@ fn every_kind_of_fault_has_an_entry() {
     let found = others.split("add(\"").skip(1);
     codes.extend(found.filter_map(|call| Some(call.split('"').next()?.to_string())));
     assert_eq!(documented, codes);
-    let page = page("docs/errors.md");
-    for code in codes {
-        let link = format!("[`{code}`](#{code})");
-        assert!(page.contains(&link), "the page's index lacks `{code}`");
-    }
 }
 
 #[test]
-fn every_example_is_the_code_that_is_tested() {
-    let mut bodies = BTreeMap::new();
-    for file in EXAMPLES {
-        bodies.extend(function_bodies(&page(file)));
-    }
-    for (code, entry) in documented_faults() {
-        let body = bodies.get(&code);
-        let body = body.unwrap_or_else(|| panic!("no function `{code}` has the fault"));
-        fault_page::assert_is(&code, &entry.example, body);
-    }
-}
-
-#[test]
-fn every_text_is_one_line_and_ends_in_a_remedy() {
-    for (fault, entry) in documented_faults() {
-        let text = entry.text;
-        assert_eq!(text.lines().count(), 1, "{fault}");
-        assert!(
-            text.contains("; "),
-            "no remedy after a semicolon: {fault}: {text}"
-        );
+fn every_text_ends_in_a_remedy() {
+    for (fault, text) in documented_faults() {
+        let has_remedy = text.contains("; ");
+        assert!(has_remedy, "no remedy after a semicolon: {fault}: {text}");
     }
 }
 

@@ -1,5 +1,5 @@
-//! The one fault that needs a program without a platform, as the page
-//! `docs/errors.md` shows it. The only test of its program, because an installed
+//! The one fault that needs a program without a platform, as the page `docs/errors.md` has
+//! it. The only test of its program, because an installed
 //! platform cannot be removed.
 
 use std::time::Duration;
@@ -23,6 +23,6 @@ fn a_commit_without_platform_is_refused_as_documented() {
     let error = no_platform().expect_err("there is none");
     assert_eq!(error.faults()[0].code(), "no_platform");
     let documented = documented_faults();
-    let entry = &documented["no_platform"];
-    fault_page::assert_is("no_platform", &entry.text, &error.to_string());
+    let text = &documented["no_platform"];
+    fault_page::assert_is("no_platform", text, &error.to_string());
 }

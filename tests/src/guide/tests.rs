@@ -106,7 +106,7 @@ fn what_they_say_of_a_fault_is_its_entrys_text_with_names_of_their_own() {
         let quoted = |block: &Block| block.info.starts_with("text fault-");
         let Block { info, text } = blocks.find(quoted).expect("it shows a fault");
         let fault = &faults[info.trim_start_matches("text fault-")];
-        let said = with_names_of(&text, &fault.text) + "\n";
+        let said = with_names_of(&text, fault) + "\n";
         let (below, text) = (&*info, &*text);
         Golden { file, below, text }.assert_is(&said);
     }

@@ -2,8 +2,8 @@
 //!
 //! A *case* builds DAGs that a commit must refuse for one reason, its fault.
 //! [`provoke`] commits them one after the other and hands over what the commit
-//! said; `docs/errors.md` shows the same texts and the same functions to people,
-//! each named as its fault. A fault that `fass` rules out by its types (such as 17
+//! said, which `docs/errors.md` tells people word for word. Each function is named as its
+//! fault. A fault that `fass` rules out by its types (such as 17
 //! inputs) has no case.
 
 mod graph;
