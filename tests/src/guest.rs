@@ -241,7 +241,7 @@ impl Guest {
 
     /// Builds the image if need be, boots it and waits for the end, whatever
     /// that is. Where the firmware has read a file wrongly from its stick, and the application
-    /// of UEFI says so, it boots again, twice at most (decision 33).
+    /// of UEFI says so, it boots again, twice at most (decision 29).
     ///
     /// # Panics
     ///

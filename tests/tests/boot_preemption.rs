@@ -9,7 +9,7 @@ use tool::record::Run;
 use tool::{Mode, Outcome};
 
 /// For how long a core waits for others' turns, and for what the kernel executes meanwhile
-/// (`docs/decisions/0021-turns.md`).
+/// (`docs/decisions/0008-deterministic-by-default.md`).
 const TURN_NS: u64 = 20_000;
 
 /// Describes DAGs that preempt one another, of instances that keep values in all registers and
