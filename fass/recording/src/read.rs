@@ -104,20 +104,24 @@ impl<'b> Recording<'b> {
     ///
     /// See [`Writer`](crate::Writer).
     pub fn entries(&self) -> impl Iterator<Item = Entry<'b>> + Clone + Debug + use<'b> {
-        self.chunks().filter_map(|chunk| match chunk {
-            Chunk::Entry(entry) => Some(entry),
-            _ => None,
-        })
+        let entries = self.frames().filter(|frame| frame.kind == ENTRY);
+        entries.filter_map(|frame| Entry::decode(frame.payload).ok())
     }
 
     /// Returns all that is in the recording, in the order in which it was written.
     ///
     /// See [`Commit`], [`Events`], [`Times`].
     pub fn chunks(&self) -> impl Iterator<Item = Chunk<'b>> + Clone + Debug + use<'b> {
+        self.frames()
+            .map_while(|frame| Chunk::read(&frame).ok().flatten())
+    }
+
+    /// Returns the frames up to the end. Whatever could be wrong was found when the recording was
+    /// read.
+    fn frames(&self) -> impl Iterator<Item = Frame<'b>> + Clone + Debug + use<'b> {
         let mut input = Decoder::new(&self.bytes[self.read.first..]);
         let frames = core::iter::from_fn(move || frame(&mut input).ok());
-        // Whatever could be wrong was found when the recording was read.
-        frames.map_while(|frame| Chunk::read(&frame).ok().flatten())
+        frames.take_while(|frame| !matches!(frame.kind, END | CUT))
     }
 }
 
@@ -190,7 +194,8 @@ impl<'b> Events<'b> {
 }
 
 impl<'b> Chunk<'b> {
-    /// Reads a frame, if it is no end.
+    /// Reads a frame, if it is no end. Not inlined: all that a record can have is decoded here.
+    #[inline(never)]
     fn read(frame: &Frame<'b>) -> Result<Option<Self>, Malformed> {
         let payload = frame.payload;
         let chunk = match frame.kind {
