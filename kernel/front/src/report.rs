@@ -1,5 +1,5 @@
-//! The report of a run: what became of its jobs, its memory, its wires and its recording, how times
-//! are written, and lines of the log, which come meanwhile.
+//! The report of a run: what became of its jobs, its memory, its wires and its recording, and
+//! lines of the log, which come meanwhile.
 
 use alloc::sync::Arc;
 use core::fmt::{self, Write};
@@ -12,6 +12,7 @@ use sched_dag::{Dag, DagId, Snapshot, TaskSet};
 
 use crate::text::json;
 
+pub use crate::text::Ns;
 pub use sched_dag::law::Distribution;
 
 /// Prints the line of a DAG for people, of which `print` makes the rest, and its machine line.
@@ -264,31 +265,6 @@ pub fn tell_log(task_set: impl Fn() -> Option<Arc<TaskSet>>) {
                 .object("fields", fields)
                 .number("left_out", line.left_out);
         });
-    }
-}
-
-/// Nanoseconds, shown with four digits or so and a unit: `412 ns`, `1.050 us`,
-/// `25.000 ms`, `1.500 s`. Honours the width of the format string.
-///
-/// ```no_run
-/// use kernel::report::Ns;
-///
-/// assert_eq!(Ns(25_000_000).to_string(), "25.000 ms");
-/// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ns(pub u64);
-
-impl fmt::Display for Ns {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ns = self.0;
-        let (unit, name) = match ns {
-            0..1_000 => return f.pad(&alloc::format!("{ns} ns")),
-            1_000..1_000_000 => (1_000, "us"),
-            1_000_000..1_000_000_000 => (1_000_000, "ms"),
-            _ => (1_000_000_000, "s"),
-        };
-        let thousandths = (ns % unit) / (unit / 1_000);
-        f.pad(&alloc::format!("{}.{thousandths:03} {name}", ns / unit))
     }
 }
 
