@@ -109,25 +109,21 @@ mod run;
 
 pub use api::dag::{Dag, create_dag};
 pub use api::latest::{Latest, Sample, Sampling};
-pub use api::lifecycle::{Shutdown, ShuttingDown, Switch, Switching, shutting_down};
-pub use api::modes::{Entering, Entrance, Mode, Modes};
+pub use api::lifecycle::{
+    Entering, Entrance, Mode, Modes, Shutdown, ShuttingDown, Switch, Switching, shutting_down,
+};
 pub use api::parameter::{Parameter, ParameterValue, Reading, Tunable, Unsettable};
 pub use api::signal::{Raiser, Raising, Signal};
 pub use api::state::{Read, State, StateValue, Update};
-pub use api::subtask::Subtask;
-pub use api::untyped::Untyped;
-pub use api::uses::{ResettableUses, Uses};
-pub use api::using::Using;
-pub use api::wire::uses::{Packet, Received, Receiving, Sender, Sending};
-pub use api::wire::{Wire, WireCounts, WireOptions};
-pub use commit::answer::{Answer, Placement, SinkAnswer, Unproven, Verdict};
-pub use commit::assign::assign_clusters;
-pub use commit::chains::EndToEnd;
-pub use commit::error::CommitError;
-pub use commit::fault::Fault;
-pub use commit::{Commit, finish_create_dags, finish_create_dags_with};
-pub use draft::attributes::SubtaskAttributes;
-pub use draft::flaw::WordedFault;
+pub use api::subtask::{Subtask, Untyped};
+pub use api::uses::{ResettableUses, Uses, Using};
+pub use api::wire::{Packet, Received, Receiving, Sender, Sending, Wire, WireCounts, WireOptions};
+pub use commit::accepted::{Commit, EndToEnd};
+pub use commit::answer::{Answer, Placement, SinkAnswer, Verdict};
+pub use commit::{assign_clusters, finish_create_dags, finish_create_dags_with};
+pub use draft::SubtaskAttributes;
+pub use draft::fault::{CommitError, Fault, Unproven};
+pub use edge::latest::LatestJobs;
 #[doc(hidden)]
 pub use platform::say;
 pub use platform::{
@@ -136,21 +132,18 @@ pub use platform::{
 };
 pub use recording::Channel;
 pub use run::cell::SetOnce;
-pub use run::crossing::Recorded;
-pub use run::latest_jobs::LatestJobs;
+pub use run::latest::Staleness;
+pub use run::line::Recorded;
 pub use run::log;
 pub use run::message::{Message, MessageType, Unique};
-pub use run::plan::{Body, Plan, Replacement};
-pub use run::runner::Runner;
-pub use run::staleness::Staleness;
+pub use run::plan::{Body, Plan, Replacement, Runner};
 pub use run::topic::{Ports, Publisher, Subscriber};
-
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
-pub use run::wire::incoming::Framing;
+pub use run::wire::Framing;
 pub use sched_dag::analysis::{OverheadSource, Overheads, Reason, Test};
 pub use sched_dag::lifecycle::Request;
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{
     ClusterId, Clusters, ConstructionPolicy, Count, FaultLimit, Order, OverrunPolicy, Policy,
+    Preemption, Warning, Why,
 };
-pub use sched_dag::{Preemption, Warning, Why};

@@ -184,8 +184,7 @@ fn every_kind_of_fault_has_an_entry() {
     let tables = [sched_dag::Fault::CODES, fass::Fault::CODES];
     let mut codes: BTreeSet<String> = tables.concat().into_iter().map(String::from).collect();
     // Others are named where they are found.
-    let others = sources(&["fass/src/draft/modes.rs", "fass/src/draft/recorded.rs"])
-        + &sources(&["fass/src/commit/inputs.rs"]);
+    let others = sources(&["fass/src/draft/checks.rs", "fass/src/commit/checks.rs"]);
     let found = others.split("add(\"").skip(1);
     codes.extend(found.filter_map(|call| Some(call.split('"').next()?.to_string())));
     assert_eq!(documented, codes);
@@ -221,10 +220,10 @@ fn every_panic_of_a_wrong_program_is_one() {
     assert!(documented.len() >= 5, "{documented:?}");
     let sources = sources(&[
         "fass/src/api/dag.rs",
-        "fass/src/api/untyped.rs",
+        "fass/src/api/subtask.rs",
         "fass/src/api/signal.rs",
-        "fass/src/api/using.rs",
-        "fass/src/api/wire/mod.rs",
+        "fass/src/api/uses.rs",
+        "fass/src/api/wire.rs",
         "fass/virtual-time/src/platform.rs",
     ]);
     all_are_in(&documented, &sources);

@@ -17,7 +17,7 @@ use core::time::Duration;
 use sched_dag::{ClusterId, DagId, DagKey, Order, OverrunPolicy, TaskSet};
 
 use crate::draft::Draft;
-use crate::draft::attributes::SubtaskAttributes;
+use crate::draft::SubtaskAttributes;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 /// Creates an empty DAG.

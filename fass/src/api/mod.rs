@@ -6,14 +6,11 @@
 pub(crate) mod dag;
 pub(crate) mod latest;
 pub(crate) mod lifecycle;
-pub(crate) mod modes;
 pub(crate) mod parameter;
 pub(crate) mod record;
 pub(crate) mod replaceable;
 pub(crate) mod signal;
 pub(crate) mod state;
 pub(crate) mod subtask;
-pub(crate) mod untyped;
 pub(crate) mod uses;
-pub(crate) mod using;
 pub(crate) mod wire;

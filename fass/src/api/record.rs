@@ -6,10 +6,10 @@ use alloc::rc::Rc;
 use recording::Recordable;
 
 use super::dag::Dag;
-use crate::draft::recorded::check;
+use crate::draft::checks::check_recorded;
 use crate::edge::{self, Crossing, Host, Wish};
 use crate::platform::{expect_installed, record};
-use crate::run::crossing::Edge;
+use crate::run::line::Edge;
 use crate::run::message::Message;
 use crate::run::record::RecordedTopic;
 
@@ -82,7 +82,7 @@ impl Dag {
         let mut draft = self.open();
         draft.latest.push(Rc::<RecordedTopic<T>>::clone(&recorded));
         draft.recorded.push(recorded);
-        draft.check_recorded = Some(check);
+        draft.check_recorded = Some(check_recorded);
         self
     }
 }

@@ -13,10 +13,10 @@ use sched_dag::{FaultLimit, OnFault};
 
 use super::dag::Dag;
 use super::subtask::Subtask;
+use super::uses::Using;
 use super::uses::{ResettableUses, Uses};
-use super::using::Using;
 use crate::run::replaceable::{Alternatives, Anew, Functions, Two, defer};
-use crate::run::reset::Reset;
+use crate::run::state::Reset;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 impl Dag {

@@ -42,7 +42,7 @@ use super::uses::{ResettableUses, Uses, sealed};
 use crate::draft::Draft;
 use crate::run::cell::{Changing, Looking};
 use crate::run::line::KeptState;
-use crate::run::reset::{Reset, Resettable};
+use crate::run::state::{Reset, Resettable};
 
 /// What can be a state: any type that several cores may use in turn.
 ///

@@ -6,16 +6,32 @@
 //! subtask that *uses* something besides its inputs ([`Dag::using`]), one whose function is
 //! *replaced* after a fault ([`Dag::restarting`]), the source of a *sporadic* DAG
 //! ([`Dag::sporadic`]).
+//!
+//! # Untyped subtasks
+//!
+//! A function's tuples state a graph at compile time, with at most 16 inputs
+//! and outputs a subtask. A graph that is read from a file, or generated, has
+//! neither: its subtasks are *untyped*. An untyped subtask is a function of the
+//! job's number alone, its edges are stated one by one
+//! ([`Dag::precede`](crate::Dag::precede)), any number of them, and carry no data.
+//!
+//! All else is as for typed subtasks. The commit verifies the same graph of the
+//! same model. Each edge has its ring of slots, through which a token
+//! goes for every job: an instance takes the tokens of *its* job from all
+//! predecessors before the function is called (R2), and gives its own only after
+//! the function has returned (R3). A platform that starts an instance early is
+//! found out here as it is with typed subtasks.
 
+use alloc::rc::Rc;
 use alloc::vec::Vec;
+use core::cell::RefCell;
 use core::fmt;
 use core::time::Duration;
 
 use sched_dag::SubtaskLabel;
 
 use super::dag::Dag;
-use crate::draft::Ends;
-use crate::draft::attributes::SubtaskAttributes;
+use crate::draft::{Draft, Ends, SubtaskAttributes};
 use crate::run::message::MessageType;
 use crate::run::subtask::{MakeBody, defer};
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -168,5 +184,131 @@ impl<'d> Subtask<'d> {
 impl fmt::Debug for Subtask<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Subtask").finish_non_exhaustive()
+    }
+}
+
+/// A subtask without types, by which edges name it. Made by
+/// [`Dag::register_untyped_subtask`](crate::Dag::register_untyped_subtask).
+///
+/// ```
+/// use fass::{SubtaskAttributes, Untyped, create_dag};
+///
+/// let dag = create_dag();
+/// let subtasks: Vec<Untyped> = (0..40)
+///     .map(|_| dag.register_untyped_subtask(|_job| (), SubtaskAttributes::default()))
+///     .collect();
+/// for earlier in &subtasks[..39] {
+///     dag.precede(earlier, &subtasks[39]); // a join of 39
+/// }
+/// ```
+#[derive(Clone)]
+pub struct Untyped {
+    pub(crate) draft: Rc<RefCell<Draft>>,
+    /// The subtask's position in its DAG.
+    pub(crate) subtask: usize,
+}
+
+impl fmt::Debug for Untyped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Untyped").field(&self.subtask).finish()
+    }
+}
+
+impl Dag {
+    /// Registers a subtask without types, for a graph that is known only at run
+    /// time: a function of the job's number, with any number of edges.
+    ///
+    /// Its edges are those stated with [`precede`](Self::precede). Without one
+    /// leading to it, it is a source. The DAG's [`period`](Self::period) and
+    /// [`relative_deadline`](Self::relative_deadline) are stated for themselves.
+    /// The guarantees are the same as for typed subtasks: the function is called
+    /// when all predecessors of its job are complete, and successors follow when
+    /// it has returned.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// let machine = virtual_time::VirtualTime::new();
+    /// let dag = create_dag();
+    /// dag.jobs(3).period(Duration::from_millis(10));
+    /// dag.relative_deadline(Duration::from_millis(10));
+    /// let wcets_ms = [1, 4, 2, 3];
+    /// let edges = [(0, 1), (0, 2), (1, 3), (2, 3)];
+    ///
+    /// let work = |ms| {
+    ///     let time = Duration::from_millis(ms);
+    ///     move |_job| fass::execute_for(time, fass::Occupation::Hold)
+    /// };
+    /// let register = |ms| dag.register_untyped_subtask(work(ms), SubtaskAttributes::default());
+    /// let subtasks = wcets_ms.map(register);
+    /// for (earlier, later) in edges {
+    ///     dag.precede(&subtasks[earlier], &subtasks[later]);
+    /// }
+    /// finish_create_dags(&[dag]).unwrap();
+    /// assert_eq!(machine.run().jobs.len(), 3);
+    /// ```
+    #[track_caller]
+    pub fn register_untyped_subtask<F>(&self, f: F, attributes: SubtaskAttributes) -> Untyped
+    where
+        F: FnMut(u64) + Send + 'static,
+    {
+        Untyped {
+            subtask: self.open().register_untyped(f, attributes),
+            draft: Rc::clone(&self.draft),
+        }
+    }
+
+    /// Adds an edge: of each job, `later` starts only when `earlier` is complete.
+    ///
+    /// See [`register_untyped_subtask`](Self::register_untyped_subtask). What is
+    /// wrong with the graph is reported at the commit.
+    ///
+    /// # Panics
+    ///
+    /// Also if one of the two is a subtask of another DAG: there are no edges
+    /// between DAGs.
+    #[track_caller]
+    pub fn precede(&self, earlier: &Untyped, later: &Untyped) -> &Self {
+        for end in [earlier, later] {
+            assert!(
+                Rc::ptr_eq(&end.draft, &self.draft),
+                "{end:?} is a subtask of another DAG; an edge joins two subtasks of one"
+            );
+        }
+        let edge = (earlier.subtask, later.subtask);
+        self.open().spec.edges.push(edge);
+        self
+    }
+
+    /// Sets the time after a release by which an untyped sink shall have finished, where
+    /// that is less than its DAG's. (A typed sink states it at its registration.)
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag};
+    ///
+    /// let dag = create_dag();
+    /// dag.period(Duration::from_millis(10)).relative_deadline(Duration::from_millis(10));
+    /// let [plan, act, log] = ["plan", "act", "log"]
+    ///     .map(|name| dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named(name)));
+    /// dag.precede(&plan, &act).precede(&plan, &log);
+    /// dag.sink_deadline(&act, Duration::from_millis(2)); // `log` has 10 ms
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// Also if it is a subtask of another DAG.
+    #[track_caller]
+    pub fn sink_deadline(&self, sink: &Untyped, relative_deadline: Duration) -> &Self {
+        assert!(
+            Rc::ptr_eq(&sink.draft, &self.draft),
+            "{sink:?} is a subtask of another DAG; call its own DAG's `sink_deadline`"
+        );
+        let mut draft = self.open();
+        let label = draft.label(sink.subtask);
+        draft.set_sink_deadline(relative_deadline, &label);
+        drop(draft);
+        self
     }
 }

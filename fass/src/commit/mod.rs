@@ -12,33 +12,30 @@
 //! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
 //! 5. *Launch.* The platform takes the plan.
 
-mod accepted;
+pub(crate) mod accepted;
 pub(crate) mod answer;
-pub(crate) mod assign;
-pub(crate) mod chains;
-mod count;
-pub(crate) mod error;
-pub(crate) mod fault;
-mod inputs;
-mod missing;
-mod modes;
-mod replaceable;
+mod checks;
 mod staleness;
 mod tie;
 
+use alloc::format;
 use alloc::rc::Rc;
 use alloc::string::ToString;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use sched_dag::{CommitOptions, ConstructionPolicy, Count, DagId, DagLabel};
-use sched_dag::{Policy, Verified, Warning, analysis, sorted_by_key, wcets};
+
+use sched_dag::analysis::{self, NotAssigned};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, Count, DagId, DagLabel, Policy, TaskSet, Verified, Warning,
+    sorted_by_key, wcets,
+};
 
 use crate::api::dag::Dag;
+use crate::draft::fault::{CommitError, Fault};
 use crate::platform;
-pub use accepted::Commit;
+use crate::platform::{LaunchError, Platform};
+use accepted::Commit;
 use answer::Answers;
-use error::CommitError;
-use fault::Fault;
 use tie::tie;
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
@@ -210,8 +207,8 @@ fn verify(
     let mut faults = Vec::new();
     let drafts: Vec<_> = dags.iter().map(|dag| dag.draft.borrow()).collect();
     let mut specs = Vec::with_capacity(dags.len());
-    let all = dags.iter().zip(&drafts).enumerate();
-    for ((number, (dag, draft)), is_repeated) in all.zip(repeated(dags)) {
+    let all = drafts.iter().enumerate();
+    for ((number, draft), is_repeated) in all.zip(repeated(dags)) {
         let label = DagLabel {
             id: DagId(u32::try_from(number).unwrap_or(u32::MAX)),
             name: draft.spec.name.clone(),
@@ -233,17 +230,15 @@ fn verify(
             id: DagId(u32::try_from(specs.len()).unwrap_or(u32::MAX)),
             name: spec.name.clone(),
         };
-        faults.extend((draft.flaws.iter()).map(|flaw| Fault::of(flaw.clone(), label.clone())));
+        faults.extend((draft.flaws.iter()).map(|flaw| flaw.clone().in_dag(&label)));
         if let Some(Err(fault)) = observed.map(|file| wcets::apply(file, spec.to_mut())) {
             let dag = label.clone();
             faults.push(Fault::WcetsRefused { dag, fault });
         }
-        faults.extend(missing::others(dags, dag, &label));
-        faults.extend(replaceable::check(draft, &label));
-        faults.extend(inputs::check(draft, &label));
+        checks::check_dag(dags, draft, &label, &mut faults);
         specs.push(spec);
     }
-    modes::check(dags, &mut faults);
+    checks::check_all(dags, &mut faults);
     // A commit of nothing but repeated DAGs has been told what is wrong.
     if specs.is_empty() && !faults.is_empty() {
         let warnings = Vec::new();
@@ -272,4 +267,29 @@ fn is_consequence(fault: &sched_dag::Fault, ours: &[Fault]) -> bool {
     ours.iter().any(|fault| {
         matches!(fault, Fault::DurationTooLong { dag, what, .. } if dag == label && *what == missing)
     })
+}
+
+/// Divides a platform's cores for a task set, as [`sched_dag::analysis::assign()`] does: what
+/// [`Platform::assign`] is to do, if the commit may.
+///
+/// # Errors
+///
+/// In words: which DAG gets no cores, and why.
+///
+/// ```
+/// use fass::{LaunchError, Platform, assign_clusters};
+/// use sched_dag::TaskSet;
+///
+/// /// The `assign` of a platform that always leaves it to the commit.
+/// fn assign(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+///     assign_clusters(platform, task_set)
+/// }
+/// ```
+pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+    analysis::assign(task_set, &platform.terms().settings()).map_err(
+        |NotAssigned { dag, reason }| {
+            let dag = task_set.label(dag);
+            LaunchError::new(format!("{dag} gets no cores: {reason}"))
+        },
+    )
 }

@@ -20,7 +20,7 @@ use sched_dag::TaskSet;
 use super::answer::Answer;
 use crate::api::dag::Dag;
 use crate::run::latest::AnyLatest;
-use crate::run::staleness::Staleness;
+use crate::run::latest::Staleness;
 
 /// Returns the staleness of each sample of all DAGs.
 pub(crate) fn of_all(dags: &[Dag], task_set: &TaskSet, answers: &[Answer]) -> Vec<Staleness> {

@@ -17,9 +17,9 @@ use super::answer::Answers;
 use super::staleness::writer_of;
 use crate::api::dag::Dag;
 use crate::draft::Draft;
+use crate::run::latest::Staleness;
 use crate::run::plan::{Body, Plan};
 use crate::run::record::{AnyRecorded, OfDag, Sampled};
-use crate::run::staleness::Staleness;
 use crate::run::subtask::MakeBody;
 use crate::run::topic::Wiring;
 

@@ -7,10 +7,8 @@
 //! keeps its topics in the spec, but with the type [`Unknown`], which the commit
 //! takes to be whatever the topic's other end says.
 
-pub(crate) mod attributes;
-pub(crate) mod flaw;
-pub(crate) mod modes;
-pub(crate) mod recorded;
+pub(crate) mod checks;
+pub(crate) mod fault;
 
 use alloc::borrow::Cow;
 use alloc::boxed::Box;
@@ -23,23 +21,21 @@ use core::fmt;
 use core::time::Duration;
 
 use sched_dag::lifecycle::Lifecycle;
-use sched_dag::{Activation, DagSpec, LatestSpec, Priority, SubtaskId};
-use sched_dag::{SubtaskLabel, SubtaskSpec, TopicPort};
+use sched_dag::{
+    Activation, DagId, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel,
+    SubtaskSpec, TopicPort,
+};
 
-use crate::run::effect::Effect;
+use crate::run::effect::{Asked, Effect, Of, Target, Wish, wish};
 use crate::run::latest::AnyLatest;
 use crate::run::line::KeptState;
 use crate::run::message::MessageType;
 use crate::run::record::AnyRecorded;
-use crate::run::request::{Asked, Of, Wish, wish};
-use crate::run::signal::Target;
-use crate::run::subtask::MakeBody;
-use crate::run::untyped;
-use attributes::SubtaskAttributes;
-use flaw::Flaw;
+use crate::run::subtask::{MakeBody, defer_untyped};
+use fault::Fault;
 
 /// Makes of all drafts of a commit what serves their requests.
-pub(crate) type MakeLifecycle = fn(&[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle>;
+type MakeLifecycle = fn(&[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle>;
 
 /// Provides so many values of a state for after faults.
 pub(crate) type Reset = Box<dyn FnOnce(u32)>;
@@ -51,12 +47,12 @@ pub(crate) struct Draft {
     /// One for each of `spec.subtasks`.
     pub(crate) make_bodies: Vec<MakeBody>,
     /// What only this crate can find wrong.
-    pub(crate) flaws: Vec<Flaw>,
+    pub(crate) flaws: Vec<Fault>,
     pub(crate) is_committed: bool,
     /// A source that states a period.
-    pub(crate) periodic_source: Option<SubtaskLabel>,
+    periodic_source: Option<SubtaskLabel>,
     /// Whether the relative deadline is the DAG's own, rather than its sinks' longest.
-    pub(crate) states_deadline: bool,
+    states_deadline: bool,
     /// Whether the commit is to be refused unless the deadlines are proven.
     pub(crate) demands_proof: bool,
     /// The topics whose latest values are offered.
@@ -79,11 +75,11 @@ pub(crate) struct Draft {
     /// Whether a subtask may end the run.
     pub(crate) may_shut_down: bool,
     /// The modes that it is in, and those that its subtasks may enter.
-    pub(crate) modes: Vec<modes::Modes>,
+    pub(crate) modes: Vec<checks::Modes>,
     /// What finds their faults, if there are any.
-    pub(crate) check_modes: Option<modes::Check>,
+    pub(crate) check_modes: Option<checks::Check>,
     /// The check of topics that are recorded, if there are any.
-    pub(crate) check_recorded: Option<modes::Check>,
+    pub(crate) check_recorded: Option<checks::Check>,
     /// What makes that which serves requests, if it states something of that kind.
     pub(crate) lifecycle: Option<MakeLifecycle>,
     /// What is to be told of the DAG's signal if it is sporadic: wires that its source receives on.
@@ -123,14 +119,16 @@ impl Draft {
         self.make_bodies.push(body);
         let subtask = self.next_label(&attributes);
         if input_types.len() != inputs.len() {
-            self.flaws.push(Flaw::InputArity {
+            self.flaws.push(Fault::InputArity {
+                dag: unnamed(),
                 subtask: subtask.clone(),
                 expected: input_types.len(),
                 given: inputs.len(),
             });
         }
         if output_types.len() != outputs.len() {
-            self.flaws.push(Flaw::OutputArity {
+            self.flaws.push(Fault::OutputArity {
+                dag: unnamed(),
                 subtask: subtask.clone(),
                 expected: output_types.len(),
                 given: outputs.len(),
@@ -153,7 +151,7 @@ impl Draft {
         let subtask = self.next_label(&attributes);
         let spec = self.specify(&subtask, attributes);
         self.spec.subtasks.push(spec);
-        self.make_bodies.push(untyped::defer(f));
+        self.make_bodies.push(defer_untyped(f));
         subtask.id.index()
     }
 
@@ -197,7 +195,10 @@ impl Draft {
         self.spec.activation = Activation::Sporadic;
         self.replace_period(min_inter_arrival);
         if let Some(subtask) = self.periodic_source.clone() {
-            self.flaws.push(Flaw::ActivationsDiffer { subtask });
+            self.flaws.push(Fault::ActivationsDiffer {
+                dag: unnamed(),
+                subtask,
+            });
         }
     }
 
@@ -205,7 +206,10 @@ impl Draft {
     #[inline(never)]
     pub(crate) fn set_period(&mut self, period: Duration, subtask: SubtaskLabel) {
         if self.spec.activation == Activation::Sporadic {
-            self.flaws.push(Flaw::ActivationsDiffer { subtask });
+            self.flaws.push(Fault::ActivationsDiffer {
+                dag: unnamed(),
+                subtask,
+            });
             return;
         }
         self.periodic_source = Some(subtask.clone());
@@ -214,7 +218,8 @@ impl Draft {
         };
         let first_ns = *self.spec.period_ns.get_or_insert(period_ns);
         if first_ns != period_ns {
-            self.flaws.push(Flaw::PeriodsDiffer {
+            self.flaws.push(Fault::PeriodsDiffer {
+                dag: unnamed(),
                 subtask,
                 first_ns,
                 second_ns: period_ns,
@@ -265,7 +270,7 @@ impl Draft {
         }
         let unknown = MessageType::of::<Unknown>().id();
         let is_of_arity =
-            |flaw: &Flaw| matches!(flaw, Flaw::InputArity { .. } | Flaw::OutputArity { .. });
+            |flaw: &Fault| matches!(flaw, Fault::InputArity { .. } | Fault::OutputArity { .. });
         if !self.flaws.iter().any(is_of_arity) {
             return spec;
         }
@@ -296,7 +301,8 @@ impl Draft {
     ) -> Option<u64> {
         let ns = u64::try_from(duration.as_nanos()).ok();
         if ns.is_none() {
-            self.flaws.push(Flaw::DurationTooLong {
+            self.flaws.push(Fault::DurationTooLong {
+                dag: unnamed(),
                 subtask: subtask.cloned(),
                 what,
             });
@@ -310,6 +316,14 @@ impl Draft {
             id: SubtaskId(number),
             name: attributes.name.clone(),
         }
+    }
+}
+
+/// Stands where a fault names the DAG, whose label the commit knows.
+const fn unnamed() -> DagLabel {
+    DagLabel {
+        id: DagId(0),
+        name: String::new(),
     }
 }
 
@@ -333,5 +347,116 @@ impl fmt::Debug for Draft {
             .field("flaws", &self.flaws)
             .field("is_committed", &self.is_committed)
             .finish_non_exhaustive()
+    }
+}
+
+/// What an app states about a subtask beyond its function and its topics.
+///
+/// The paper leaves these to the scheduling algorithm; all of them are optional
+/// here, and the commit says when the chosen policy needs one that is missing.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::SubtaskAttributes;
+///
+/// let attributes = SubtaskAttributes::named("fuse")
+///     .priority(3)
+///     .wcet(Duration::from_micros(500))
+///     .non_preemptive();
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[must_use = "attributes have no effect until they are registered with a subtask"]
+pub struct SubtaskAttributes {
+    pub(crate) name: String,
+    pub(crate) priority: Option<u32>,
+    pub(crate) wcet: Option<Duration>,
+    pub(crate) budget: Option<Duration>,
+    stack_bytes: Option<u64>,
+    non_preemptive: bool,
+}
+
+impl SubtaskAttributes {
+    /// Starts with a name, by which reports and error messages call the subtask.
+    ///
+    /// Names are unique within a DAG. Without a name
+    /// ([`default`](Self::default)) messages say `subtask 2`, counting from 0
+    /// in the order of registration.
+    ///
+    /// ```
+    /// let attributes = fass::SubtaskAttributes::named("fuse");
+    /// ```
+    pub fn named(name: &str) -> Self {
+        Self {
+            name: name.into(),
+            ..Self::default()
+        }
+    }
+
+    /// Sets the static priority; the *smaller* number is the higher priority.
+    ///
+    /// Used under [`Policy::StaticPriority`](crate::Policy::StaticPriority).
+    /// Without it the commit derives one from the graph.
+    ///
+    /// ```
+    /// let urgent = fass::SubtaskAttributes::named("brake").priority(0);
+    /// ```
+    pub fn priority(mut self, priority: u32) -> Self {
+        self.priority = Some(priority);
+        self
+    }
+
+    /// Sets the worst-case execution time: the longest that one instance
+    /// executes, preemption not counted.
+    ///
+    /// At most `u64::MAX` nanoseconds; a longer one is a fault at commit.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// let attributes = fass::SubtaskAttributes::named("fuse").wcet(Duration::from_millis(2));
+    /// ```
+    pub fn wcet(mut self, wcet: Duration) -> Self {
+        self.wcet = Some(wcet);
+        self
+    }
+
+    /// Sets the execution budget: an instance that executes longer, preemption
+    /// not counted, is ended by the platform as a fault, and its DAG with it.
+    ///
+    /// Without it the platform may enforce a multiple of the
+    /// [WCET](Self::wcet). At most `u64::MAX` nanoseconds; a longer one is a
+    /// fault at commit. Virtual time does not enforce budgets.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// let attributes = fass::SubtaskAttributes::named("plan").budget(Duration::from_millis(5));
+    /// ```
+    pub fn budget(mut self, budget: Duration) -> Self {
+        self.budget = Some(budget);
+        self
+    }
+
+    /// Sets the stack that the subtask needs, in bytes, from 16 KiB to 1 MiB; another number is
+    /// a fault at commit. Without it the kernel gives 64 KiB. The stacks of a commit are all as
+    /// large as the largest; `measure=stacks` says how much of them each subtask uses.
+    ///
+    /// ```
+    /// let attributes = fass::SubtaskAttributes::named("plan").stack_bytes(256 << 10);
+    /// ```
+    pub fn stack_bytes(mut self, bytes: u64) -> Self {
+        self.stack_bytes = Some(bytes);
+        self
+    }
+
+    /// States that a started instance keeps its core until it finishes, although the
+    /// platform preempts others.
+    ///
+    /// ```
+    /// let attributes = fass::SubtaskAttributes::named("log").non_preemptive();
+    /// ```
+    pub fn non_preemptive(mut self) -> Self {
+        self.non_preemptive = true;
+        self
     }
 }

@@ -17,7 +17,7 @@ use sched_dag::{DagId, Instance, Notice};
 
 use super::replay::Outcome;
 use super::{Crossing, Drain, Echoing, Seen};
-use crate::run::crossing::Recorded;
+use crate::run::line::Recorded;
 use crate::run::plan::Plan;
 
 /// The longest value that is shown, in bytes.

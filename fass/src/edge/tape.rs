@@ -1,26 +1,27 @@
-//! What happens at the edge, on its way to the drain.
+//! What happens at the edge, on its way into a file.
 //!
 //! Each channel has a place for its values, into which its subtask writes them; here comes only
 //! what else happens, and which values had no room there. If even these are too many, the tape
 //! ends there, and the recording says that it is cut.
+//!
+//! The drain makes the file. It takes the earliest of the values and events that wait, so the file
+//! has them nearly in the order of their times, and each channel's in its own. Before a channel's
+//! next value it tells of those that are lost, which completions have noted, one at a time.
 
 use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::mem;
-use core::sync::atomic::AtomicU64;
+use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-use recording::{Channel, Encoder, Header, Recordable};
-use sched_dag::{DagId, Instance, Notice, SubtaskId};
+use recording::{Channel, Encoder, Entry, Header, Recordable, What};
+use sched_dag::{DagId, Instance, Notice, SubtaskId, TaskSet};
 
-use super::drain::{EVENT_BYTES, OfTape, event};
-use super::lost::{Lost, LostJobs};
-use super::replay::Outcome;
-use super::{Crossing, Drain, name, open, recorded};
-use crate::run::cell::outbox::{Outbox, outbox, words_of};
-use crate::run::crossing::Recorded;
-use crate::run::line::LineOf;
+use super::replay::{Outcome, narrow};
+use super::{Crossing, Drain, Drained, Record, name, open, recorded};
+use crate::run::cell::outbox::{Outbox, OutboxReader, Published, outbox, words_of};
+use crate::run::line::{LineOf, Recorded};
 use crate::run::plan::Plan;
 
 /// Records a run.
@@ -156,5 +157,375 @@ impl Crossing for Tape {
 
     fn outcome(&self, _is_over: bool) -> Option<Outcome> {
         None
+    }
+}
+
+/// An event in its record: the place of what it is among [`EVENTS`], DAG and subtask, and when the
+/// job was due, where that is known.
+type Event = (u8, u16, u16, Option<u64>);
+
+/// The most bytes of an event.
+const EVENT_BYTES: usize = 14;
+
+const EVENTS: [What; 6] = [
+    What::Signal,
+    What::Skip,
+    What::Cut,
+    What::Restart,
+    What::Clock,
+    What::Fault,
+];
+
+/// Returns what happened to an instance as a record has it.
+fn event(what: What, of: Instance, release_ns: Option<u64>) -> Event {
+    let place = (0..).zip(EVENTS).find(|(_, other)| *other == what);
+    let (dag, subtask) = narrow(of).unwrap_or((u16::MAX, u16::MAX));
+    (
+        place.map_or(0, |(place, _)| place),
+        dag,
+        subtask,
+        release_ns,
+    )
+}
+
+/// The bytes of a list of one time.
+const TOLD: usize = 4 + 8;
+
+/// Writes down what an instance was told that asked for the time, as a list of one.
+fn write_told(clock_ns: u64, bytes: &mut [u8; TOLD]) -> &[u8] {
+    (1_u32, clock_ns).encode(&mut Encoder::new(bytes));
+    bytes
+}
+
+/// Makes the file.
+struct OfTape {
+    events: OutboxReader,
+    /// By channel.
+    records: Vec<OutboxReader>,
+    lost: Lost,
+    header: Header,
+    releases: Vec<Releases>,
+    /// When the run's time begins, on the clock, on which values were complete.
+    epoch_ns: u64,
+}
+
+/// When a DAG's jobs are due.
+pub(super) enum Releases {
+    Periodic {
+        offset_ns: u64,
+        period_ns: u64,
+    },
+    /// The signals in flight: job and release, a place for each.
+    Sporadic(Vec<(u64, u64)>),
+}
+
+/// How many signals of a DAG are remembered.
+pub(super) const SIGNALS: u32 = 64;
+
+impl Releases {
+    /// Returns those of each DAG.
+    pub(super) fn of_all(task_set: &TaskSet) -> Vec<Self> {
+        let releases = task_set.dags().iter().map(|dag| match dag.is_sporadic() {
+            true => Self::Sporadic((0..SIGNALS).map(|_| (u64::MAX, 0)).collect()),
+            false => Self::Periodic {
+                offset_ns: dag.offset_ns(),
+                period_ns: dag.period_ns(),
+            },
+        });
+        releases.collect()
+    }
+
+    pub(super) fn of(&self, job: u64) -> Option<u64> {
+        match self {
+            Self::Periodic {
+                offset_ns,
+                period_ns,
+            } => offset_ns.checked_add(period_ns.checked_mul(job)?),
+            Self::Sporadic(signals) => {
+                let (of, release_ns) = signals[place_of(job)?];
+                (of == job).then_some(release_ns)
+            }
+        }
+    }
+
+    pub(super) fn note(&mut self, job: u64, release_ns: u64) {
+        if let Self::Sporadic(signals) = self
+            && let Some(place) = place_of(job)
+        {
+            signals[place] = (job, release_ns);
+        }
+    }
+}
+
+/// Returns the place of a signal.
+fn place_of(job: u64) -> Option<usize> {
+    usize::try_from(job % u64::from(SIGNALS)).ok()
+}
+
+impl OfTape {
+    fn new(
+        events: OutboxReader,
+        records: Vec<OutboxReader>,
+        header: Header,
+        lost: Lost,
+        task_set: &TaskSet,
+    ) -> Self {
+        Self {
+            events,
+            records,
+            lost,
+            header,
+            releases: Releases::of_all(task_set),
+            epoch_ns: 0,
+        }
+    }
+
+    /// Finds what is earliest of all that waits: a channel, or `None` for an event, and its time.
+    fn earliest(&mut self) -> Option<(u64, Option<u16>)> {
+        let event = self.events.next().map(|event| (event.at_ns, None));
+        let epoch_ns = self.epoch_ns;
+        let values = (0..)
+            .zip(&mut self.records)
+            .filter_map(|(channel, records)| {
+                let at_ns = records.next()?.at_ns.saturating_sub(epoch_ns);
+                Some((at_ns, Some(channel)))
+            });
+        // At one time an event is first, such as the signal that released a job.
+        event
+            .into_iter()
+            .chain(values)
+            .min_by_key(|(at_ns, _)| *at_ns)
+    }
+
+    fn release_ns(&self, dag: u16, job: u64) -> Option<u64> {
+        self.releases.get(usize::from(dag))?.of(job)
+    }
+
+    /// Tells of the values of a channel that are lost, before the next one, or at the end.
+    fn tell_lost(&mut self, channel: u16, next: Option<(u64, u64)>, to: &mut Record) {
+        let before = next.map(|(job, _)| job);
+        while let Some((first, last)) = self.lost.values[usize::from(channel)].take(before) {
+            for job in first..=last {
+                let dag = self.header.channels[usize::from(channel)].dag;
+                let release_ns = self.release_ns(dag, job).unwrap_or(0);
+                let lost = Entry {
+                    what: What::Lost,
+                    dag,
+                    place: channel,
+                    job,
+                    release_ns,
+                    // What is told at the end only has no time of its own.
+                    at_ns: next.map_or(release_ns, |(_, at_ns)| at_ns),
+                    value: &[],
+                };
+                to.write(&lost);
+            }
+        }
+    }
+
+    /// Writes the next value of a channel.
+    fn write_value(&mut self, channel: u16, at_ns: u64, to: &mut Record) {
+        let number = usize::from(channel);
+        let Some(job) = self.records[number].next().map(|record| record.job) else {
+            return;
+        };
+        self.tell_lost(channel, Some((job, at_ns)), to);
+        let dag = self.header.channels[number].dag;
+        let release_ns = self.release_ns(dag, job).unwrap_or(at_ns);
+        let records = &mut self.records[number];
+        if let Some(record) = records.next() {
+            let value = Entry {
+                what: What::Value,
+                dag,
+                place: channel,
+                job,
+                release_ns,
+                at_ns,
+                value: record.bytes,
+            };
+            to.write(&value);
+        }
+        records.forget();
+    }
+
+    /// Writes the next event.
+    fn write_event(&mut self, to: &mut Record) {
+        let Some(Published { job, at_ns, bytes }) = self.events.next() else {
+            return;
+        };
+        let event = Event::from_bytes(bytes).unwrap_or_default();
+        self.events.forget();
+        let (what, dag, place, release_ns) = event;
+        let what = EVENTS[usize::from(what) % EVENTS.len()];
+        let known = release_ns.or_else(|| self.release_ns(dag, job));
+        let release_ns = known.unwrap_or(at_ns);
+        if what == What::Signal
+            && let Some(releases) = self.releases.get_mut(usize::from(dag))
+        {
+            releases.note(job, release_ns);
+        }
+        let mut told = [0; TOLD];
+        let entry = Entry {
+            what,
+            dag,
+            place,
+            job,
+            release_ns,
+            at_ns,
+            value: match what {
+                What::Clock => write_told(at_ns + self.epoch_ns, &mut told),
+                _ => &[],
+            },
+        };
+        to.write(&entry);
+    }
+
+    /// Reports whether the recording has ended before that time, for something had no room.
+    fn has_ended(&self, at_ns: u64) -> bool {
+        self.lost.rest_ns.load(Ordering::Acquire) < at_ns
+    }
+}
+
+impl Drain for OfTape {
+    fn begin(&mut self, to: &mut Record) {
+        to.header(&self.header);
+    }
+
+    fn begin_run(&mut self, epoch_ns: u64) {
+        self.epoch_ns = epoch_ns;
+    }
+
+    fn step(&mut self, to: Option<&mut Record>) -> bool {
+        let Some(to) = to else {
+            return false;
+        };
+        match self.earliest() {
+            Some((at_ns, _)) if self.has_ended(at_ns) => return false,
+            Some((at_ns, Some(channel))) => self.write_value(channel, at_ns, to),
+            Some((_, None)) => self.write_event(to),
+            None => return false,
+        }
+        true
+    }
+
+    fn end(&mut self, to: &mut Record) -> Option<Drained> {
+        let is_cut = self.has_ended(u64::MAX);
+        if !is_cut {
+            (0..)
+                .take(self.records.len())
+                .for_each(|channel| self.tell_lost(channel, None, to));
+        }
+        Some(Drained {
+            entries: to.entries(),
+            lost: to.lost(),
+            is_cut,
+        })
+    }
+}
+
+/// The most runs of jobs that are noted.
+const MOST_RUNS: usize = 32;
+
+/// Runs of lost jobs.
+struct LostJobs {
+    /// The first and the last job of each.
+    runs: [[AtomicU64; 2]; MOST_RUNS],
+    /// How many have been written, and read, in all.
+    written: AtomicUsize,
+    read: AtomicUsize,
+}
+
+impl LostJobs {
+    const fn new() -> Self {
+        Self {
+            runs: [const { [const { AtomicU64::new(0) }; 2] }; MOST_RUNS],
+            written: AtomicUsize::new(0),
+            read: AtomicUsize::new(0),
+        }
+    }
+
+    /// Notes a job, which is after those before; `false`: they are too many.
+    fn note(&self, job: u64) -> bool {
+        let written = self.written.load(Ordering::Relaxed);
+        let read = self.read.load(Ordering::Acquire);
+        // The run before goes on. Nobody reads it yet, for that takes a value of a later job, and
+        // between that and this one there would be a job.
+        if written > read
+            && let [_, last] = &self.runs[(written - 1) % MOST_RUNS]
+            && last.load(Ordering::Relaxed) + 1 == job
+        {
+            last.store(job, Ordering::Release);
+            return true;
+        }
+        if written - read == MOST_RUNS {
+            return false;
+        }
+        for end in &self.runs[written % MOST_RUNS] {
+            end.store(job, Ordering::Relaxed);
+        }
+        self.written.store(written + 1, Ordering::Release);
+        true
+    }
+
+    /// Takes the next run if it comes before a job whose value is there, or at the end.
+    fn take(&self, before: Option<u64>) -> Option<(u64, u64)> {
+        let read = self.read.load(Ordering::Relaxed);
+        if read == self.written.load(Ordering::Acquire) {
+            return None;
+        }
+        let ends = self.runs[read % MOST_RUNS].each_ref();
+        let [first, last] = ends.map(|end| end.load(Ordering::Acquire));
+        if before.is_some_and(|before| first >= before) {
+            return None;
+        }
+        self.read.store(read + 1, Ordering::Release);
+        Some((first, last))
+    }
+}
+
+/// What is lost.
+#[derive(Clone)]
+struct Lost {
+    /// By channel.
+    values: Arc<[LostJobs]>,
+    /// When something happened that had no room; `u64::MAX`: there was nothing.
+    rest_ns: Arc<AtomicU64>,
+}
+
+impl Lost {
+    /// Notes a value. It happens at completions, under the scheduler's lock.
+    #[cold]
+    fn note(&self, value: &Recorded<'_>, at_ns: u64) {
+        let jobs = self.values.get(usize::from(value.channel));
+        if jobs.is_some_and(|jobs| !jobs.note(value.job)) {
+            self.end(at_ns);
+        }
+    }
+
+    /// Ends the recording, unless it has ended before.
+    #[cold]
+    fn end(&self, at_ns: u64) {
+        self.rest_ns.fetch_min(at_ns, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_told_before_the_next_value_and_the_rest_at_the_end() {
+        let lost = LostJobs::new();
+        for job in [3, 4, 5, 7, 9, 10] {
+            assert!(lost.note(job));
+        }
+        assert_eq!(lost.take(Some(2)), None);
+        assert_eq!(lost.take(Some(8)), Some((3, 5)));
+        assert_eq!(lost.take(Some(8)), Some((7, 7)));
+        assert_eq!(lost.take(Some(8)), None);
+        assert_eq!((lost.take(None), lost.take(None)), (Some((9, 10)), None));
+        let noted = (0..100).filter(|run| lost.note(2 * run)).count();
+        assert_eq!(noted, MOST_RUNS, "more are refused");
+        assert!(lost.take(None).is_some() && lost.note(1000), "one is gone");
     }
 }

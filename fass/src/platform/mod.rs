@@ -5,9 +5,6 @@
 //! commits its DAGs. The commit asks it for the policy and the cores to verify
 //! against, and leaves the [`Plan`] with it.
 
-mod clock;
-mod installed;
-mod log;
 mod terms;
 
 use alloc::string::String;
@@ -18,14 +15,11 @@ use recording::Channel;
 use sched_dag::{DagId, TaskSet};
 
 use crate::edge::Begin;
-use crate::run::crossing::Recorded;
-use crate::run::log::Line;
+use crate::run::cell::{Current, SetOnce};
+use crate::run::line::Recorded;
+use crate::run::log::{Field, Level, Line};
 use crate::run::plan::Plan;
 
-pub use clock::{Clock, now_ns, set_clock};
-pub use installed::{AlreadyInstalled, install};
-pub(crate) use installed::{expect_installed, installed, record};
-pub use log::say;
 pub use terms::Terms;
 
 /// A machine that schedules committed DAGs.
@@ -250,4 +244,177 @@ impl core::error::Error for LaunchError {}
 /// ```
 pub fn execute_for(duration: Duration, how: Occupation) {
     expect_installed().execute_for(duration, how);
+}
+
+static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
+
+/// A platform is installed already; the earlier one stays.
+///
+/// # Examples
+///
+/// ```
+/// assert!(fass::AlreadyInstalled.to_string().contains("already installed"));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AlreadyInstalled;
+
+impl fmt::Display for AlreadyInstalled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a platform is already installed; install one platform, once, at start")
+    }
+}
+
+impl core::error::Error for AlreadyInstalled {}
+
+/// Installs the platform, once, for the whole program.
+///
+/// # Errors
+///
+/// [`AlreadyInstalled`] from the second call on.
+///
+/// # Examples
+///
+/// Apps do not call it; the kernel's entry or `VirtualTime` does. See
+/// [`Platform`] for a platform of one's own.
+///
+/// ```standalone_crate
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new(); // installs itself
+/// assert_eq!(fass::now_ns(), 0);
+/// ```
+pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> {
+    if PLATFORM.set(platform) {
+        Ok(())
+    } else {
+        Err(AlreadyInstalled)
+    }
+}
+
+/// Returns the installed platform, if there is one.
+#[inline]
+pub(crate) fn installed() -> Option<&'static dyn Platform> {
+    PLATFORM.get().copied()
+}
+
+#[inline]
+pub(crate) fn expect_installed() -> &'static dyn Platform {
+    match installed() {
+        Some(platform) => platform,
+        None => missing(),
+    }
+}
+
+/// Gives a value to the platform. It looks for the platform itself: a function that is called for
+/// that is, in a crate compiled for size, as long again.
+pub(crate) fn record(value: &Recorded<'_>) {
+    match PLATFORM.get() {
+        Some(platform) => platform.record(value),
+        None => missing(),
+    }
+}
+
+#[cold]
+fn missing() -> ! {
+    panic!("no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`")
+}
+
+/// What tells the time: the platform, unless it has named something else.
+static CLOCK: Current<Clock> = Current::new(&(ASK_THE_PLATFORM as Clock));
+
+/// Tells the time, as [`now_ns`] does.
+pub type Clock = fn() -> u64;
+
+const ASK_THE_PLATFORM: Clock = || expect_installed().now_ns();
+
+/// Returns the platform's time in nanoseconds.
+///
+/// # Panics
+///
+/// If no platform is installed.
+///
+/// # Examples
+///
+/// ```
+/// let machine = virtual_time::VirtualTime::new();
+/// assert_eq!(fass::now_ns(), 0);
+/// ```
+#[inline]
+#[must_use]
+pub fn now_ns() -> u64 {
+    CLOCK.get()()
+}
+
+/// Has functions told the time by that from now on, in place of by [`Platform::now_ns`](Platform::now_ns).
+///
+/// For platforms: one that writes down what functions were told has a way to do so, and all
+/// others a shorter one.
+///
+/// # Examples
+///
+/// ```standalone_crate
+/// static HALF_PAST: fass::Clock = || 30;
+///
+/// fass::set_clock(&HALF_PAST);
+/// assert_eq!(fass::now_ns(), 30);
+/// ```
+pub fn set_clock(clock: &'static Clock) {
+    CLOCK.set(clock);
+}
+
+/// Says a line of the [log](mod@crate::log), for people: a level, a text, and up to four fields.
+///
+/// A field is a number, a truth value, a character or a text that lasts for ever. The line bears
+/// the DAG, the subtask and the job of the instance that says it, and the time; outside of subtasks
+/// the time only. It is shown soon, and never by the caller, which goes on after a copy of some 300
+/// bytes.
+///
+/// A line is no result of its instance: it is shown although that fails later.
+///
+/// On the machine and on Linux the word `log=off|error|warn|info|debug` says up to which level
+/// lines are said, `info` by default. In virtual time all are, and go to the report. Without a
+/// platform they go nowhere.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let dag = create_dag();
+/// let period = Duration::from_millis(10);
+/// dag.name("front").jobs(2).period(period).relative_deadline(period);
+/// let watch = |job| {
+///     if job == 1 {
+///         fass::log!(Warn, "camera late", by_ns = 300 * job, eye = "left");
+///     }
+/// };
+/// dag.register_untyped_subtask(watch, SubtaskAttributes::named("watch"));
+/// finish_create_dags(&[dag]).unwrap();
+/// fass::log!(Debug, "committed");
+///
+/// let said = machine.run().logs;
+/// let warns = r#"warn front/watch[1] 10000000 ns: camera late by_ns=300 eye="left""#;
+/// assert_eq!(said, ["debug 0 ns: committed", warns]);
+/// ```
+#[macro_export]
+macro_rules! log {
+    ($level:ident, $text:expr $(, $key:ident = $value:expr)* $(,)?) => {
+        if $crate::log::Level::$level.is_on() {
+            const { ::core::assert!(<[&str]>::len(&[$(::core::stringify!($key)),*]) <= $crate::log::FIELDS) };
+            let fields = [$((::core::stringify!($key), ::core::convert::From::from($value))),*];
+            $crate::say($crate::log::Level::$level, $text, &fields);
+        }
+    };
+}
+
+/// Says a line of a level that is on.
+#[cold]
+#[inline(never)]
+pub fn say(level: Level, text: &'static str, fields: &[Field]) {
+    if let Some(platform) = installed() {
+        platform.log(Line::new(level, text, fields));
+    }
 }

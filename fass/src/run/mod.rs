@@ -10,26 +10,16 @@
     reason = "the four cells of job slots, shared values and records"
 )]
 pub(crate) mod cell;
-pub(crate) mod crossing;
 pub(crate) mod effect;
-mod kept;
 pub(crate) mod latest;
-pub(crate) mod latest_jobs;
 pub(crate) mod line;
 pub mod log;
 pub(crate) mod message;
 pub(crate) mod plan;
 pub(crate) mod record;
 pub(crate) mod replaceable;
-pub(crate) mod request;
-pub(crate) mod reset;
-pub(crate) mod runner;
-pub(crate) mod sample;
-pub(crate) mod sampling;
-pub(crate) mod signal;
-pub(crate) mod staleness;
+pub(crate) mod state;
 pub(crate) mod subtask;
 pub(crate) mod topic;
 pub(crate) mod tuple;
-pub(crate) mod untyped;
 pub(crate) mod wire;

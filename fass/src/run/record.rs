@@ -4,6 +4,9 @@
 //! writer's function has returned, and writes it down; the writer's completion lets that go to
 //! the platform. In a replay the body of a source is another one, which asks the
 //! platform for the values of the job, and sends them.
+//!
+//! What a subtask samples of such a topic is written down when it looks, and goes to the platform when
+//! the instance is complete, or has failed: without it nobody could compute its fault again.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -12,19 +15,17 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::any::Any;
 use core::marker::PhantomData;
+use core::sync::atomic::{AtomicU64, Ordering};
 
 use recording::{Channel, Recordable, Role, Schema};
 use sched_dag::wcets::graph_hash;
 use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
 
-use super::crossing::Edge;
 use super::effect::Effect;
-use super::latest::{AnyLatest, SharedLatest};
-use super::line::{KeptState, Line, LineOf};
+use super::latest::{AnyLatest, Entry, Probe, SharedLatest, Slot};
+use super::line::{Edge, Found, KeptState, Line, LineOf};
 use super::message::{Message, MessageType};
 use super::plan::{Body, Subtask};
-use super::sample::{self, SampleLine};
-use super::sampling::{self, Around};
 use super::topic::{Ports, Publisher, Relay, Wiring, Wrap};
 
 /// A recorded topic while DAGs are built.
@@ -92,7 +93,7 @@ pub(crate) trait AnyRecorded {
                 let way = (schema, Arc::clone(&found));
                 open(sample.subtask, Role::Sample, latest.topic(), way, None);
                 let look = move |job| line.begin(job);
-                around.push((sample.subtask, sampling::around(found, look)));
+                around.push((sample.subtask, looking(found, look)));
             }
         }
         for (position, of_state) in of.states {
@@ -115,7 +116,7 @@ pub(crate) trait AnyRecorded {
                 );
                 let (found, kept) = (Arc::clone(&line), Arc::clone(of_state));
                 let look = move |job| kept.keep(&line, job);
-                around.push((subtask, sampling::around(found, look)));
+                around.push((subtask, looking(found, look)));
             }
         }
         if !channels.is_empty() {
@@ -129,7 +130,11 @@ pub(crate) trait AnyRecorded {
 
     /// Puts these around the bodies of subtasks.
     fn attach(&self, around: Vec<(usize, Around)>, bodies: &mut Vec<Body>) {
-        sampling::attach(around, bodies);
+        let mut all: Vec<Option<Body>> = core::mem::take(bodies).into_iter().map(Some).collect();
+        for (subtask, around) in around {
+            all[subtask] = all[subtask].take().map(around);
+        }
+        bodies.extend(all.into_iter().flatten());
     }
 
     /// Returns the body of a source in a replay, if there is one and the source is recorded.
@@ -265,7 +270,7 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
 
     fn probe(&self, latest: &dyn AnyLatest, sampler: usize) -> Option<(Schema, Arc<SampleLine>)> {
         let shared = latest.as_any().downcast_ref::<SharedLatest<T>>()?;
-        Some(sample::probe(shared, sampler, self.line.edge))
+        Some(probe(shared, sampler, self.line.edge))
     }
 }
 
@@ -313,4 +318,101 @@ impl Subtask for ReplayedSource {
 
     // It has no function.
     fn forget(self: Box<Self>) {}
+}
+
+/// What the probe of a sampling subtask, its body and its completion share.
+pub(crate) struct SampleLine {
+    way: Arc<Line>,
+    /// The job whose instance runs.
+    job: AtomicU64,
+}
+
+/// A sample as it is written down: its job, when that was complete, and the value.
+type Sample<T> = Option<(u64, u64, T)>;
+
+/// Sets a probe, and returns the type of the samples, and what the probe has of its instance.
+fn probe<T: Recordable + Send + 'static>(
+    shared: &SharedLatest<T>,
+    sampler: usize,
+    edge: &'static Edge,
+) -> (Schema, Arc<SampleLine>) {
+    let line = Arc::new(SampleLine {
+        way: Arc::new(Line::new(edge)),
+        job: AtomicU64::new(0),
+    });
+    shared.set_probe(
+        sampler,
+        Box::new(SampleProbe {
+            line: Arc::clone(&line),
+            of: PhantomData::<fn() -> T>,
+        }),
+    );
+    (Sample::<T>::schema(), line)
+}
+
+impl SampleLine {
+    /// Notes the job whose instance runs.
+    fn begin(&self, job: u64) {
+        self.job.store(job, Ordering::Relaxed);
+    }
+}
+
+/// The probe of a subtask that samples values of this type.
+struct SampleProbe<T> {
+    line: Arc<SampleLine>,
+    of: PhantomData<fn() -> T>,
+}
+
+impl<T: Recordable + 'static> Probe for SampleProbe<T> {
+    fn replay(&self, slot: &dyn Any) -> bool {
+        let way = &self.line.way;
+        let mut found = None;
+        let job = self.line.job.load(Ordering::Relaxed);
+        (way.edge.replay)(way.number(), job, &mut |bytes| {
+            found = Sample::<T>::from_bytes(bytes).ok();
+        });
+        let slot = slot.downcast_ref::<Slot<T>>();
+        let Some((found, mut slot)) = found.zip(slot.and_then(Slot::change)) else {
+            return false;
+        };
+        *slot = found.map(|(job, completed_ns, value)| Entry {
+            value,
+            job,
+            completed_ns,
+        });
+        true
+    }
+
+    fn look_at(&self, slot: &dyn Any) {
+        let slot = slot.downcast_ref::<Slot<T>>();
+        let Some(sample) = slot.and_then(Slot::look) else {
+            return;
+        };
+        let job = self.line.job.load(Ordering::Relaxed);
+        self.line.way.stage::<Sample<T>>(job, |out| {
+            // As an `Option` of a tuple is written.
+            sample.is_some().encode(out);
+            if let Some(entry) = &*sample {
+                (entry.job, entry.completed_ns).encode(out);
+                entry.value.encode(out);
+            }
+        });
+    }
+}
+
+/// Puts something around a body.
+type Around = Box<dyn FnOnce(Body) -> Body>;
+
+/// Has a subtask look for something before each turn, and the line give away what it has found.
+fn looking(line: Arc<Line>, look: impl Fn(u64) + Send + 'static) -> Around {
+    let found: Box<dyn Effect> = Box::new(Found(line));
+    let look = move |job| {
+        look(job);
+        true
+    };
+    Box::new(|body| {
+        let mut body = body.before(look);
+        body.add_effects([found]);
+        body
+    })
 }

@@ -19,7 +19,7 @@ use core::task::{Context, Poll, Waker};
 
 use super::cell::{Changing, Shared};
 use super::plan::{Body, Next, Replacement, Subtask};
-use super::reset::Reset;
+use super::state::Reset;
 use super::subtask::MakeBody;
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 

@@ -9,14 +9,18 @@
 //! Here they are generated before the future is made, since a source may
 //! otherwise publish before a later subtask listens, and that subtask's topics
 //! would be one job behind forever.
+//!
+//! An untyped subtask is as a typed one, with tokens for values, and no future, since it
+//! has nothing to wait for.
 
 use alloc::boxed::Box;
+use alloc::vec::Vec;
 use core::convert::Infallible;
 use core::pin::{Pin, pin};
 use core::task::{Context, Poll, Waker, ready};
 
 use super::plan::{Body, Subtask};
-use super::topic::Wiring;
+use super::topic::{Publisher, Subscriber, Token, Wiring};
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
 /// What the commit calls to make a registered subtask's body: with the DAG's
@@ -97,6 +101,38 @@ where
 
     fn discard(&mut self, job: u64) {
         self.subs.discard_all(job);
+    }
+
+    fn forget(self: Box<Self>) {
+        core::mem::forget(self.f);
+    }
+}
+
+/// Defers making the subtask until the commit knows the wiring.
+pub(crate) fn defer_untyped<F: FnMut(u64) + Send + 'static>(f: F) -> MakeBody {
+    Box::new(move |wiring, subtask| {
+        let (before, after) = wiring.tokens(subtask);
+        Body::new(Box::new(Untyped { f, before, after }))
+    })
+}
+
+struct Untyped<F> {
+    f: F,
+    before: Vec<Subscriber<Token>>,
+    after: Publisher<Token>,
+}
+
+impl<F: FnMut(u64) + Send> Subtask for Untyped<F> {
+    fn take_turn(&mut self, job: u64) {
+        self.before.iter_mut().for_each(|edge| {
+            edge.recv(job);
+        });
+        (self.f)(job);
+        self.after.send(job, Token);
+    }
+
+    fn discard(&mut self, job: u64) {
+        self.before.iter_mut().for_each(|edge| edge.discard(job));
     }
 
     fn forget(self: Box<Self>) {

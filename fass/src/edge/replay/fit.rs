@@ -1,15 +1,20 @@
-//! Whether a recording is one of a plan, and which channel is which.
+//! Whether a recording is one of a plan, and which channel is which; with which job of each DAG the
+//! replay begins, and what states it finds there.
+//!
+//! A recording need not have a run's first jobs, or the person wants a later one. What functions
+//! remember of the jobs before is then lacking, unless the DAG's states are recorded: the replay
+//! begins with a job of which each of them is.
 
-use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use alloc::{format, vec};
 
-use recording::{Channel, Header, Role};
-use sched_dag::{SubtaskId, TaskSet};
+use recording::{Channel, Header, Role, What};
+use sched_dag::{DagId, SubtaskId, TaskSet};
 
-use super::{Replay, is_compared};
-use crate::edge::guard::Passed;
+use super::{Passed, Replay, guard, is_compared};
+use crate::run::plan::Plan;
 
 impl Replay {
     /// Finds the channels of the plan.
@@ -161,4 +166,245 @@ impl Replay {
 fn is_same(one: &Channel, other: &Channel) -> bool {
     let same_subtask = one.role != Role::Sample || one.subtask == other.subtask;
     same_subtask && (one.dag, one.role, &one.topic) == (other.dag, other.role, &other.topic)
+}
+
+/// The most jobs of a DAG that a replay goes through: everything of them is kept.
+const MOST_JOBS: u64 = 10_000_000;
+
+/// Reads the words by which a job is named, DAG/JOB.
+///
+/// ```
+/// assert_eq!(fass::edge::job_of("gait/17"), Some(("gait", 17)));
+/// ```
+#[must_use]
+pub fn job_of(words: &str) -> Option<(&str, u64)> {
+    let (dag, job) = words.rsplit_once('/')?;
+    Some((dag, job.parse().ok()?))
+}
+
+impl Replay {
+    /// Has it begin as late as may be, so that this job is computed of what was recorded.
+    pub fn begin_before(&mut self, dag: &str, job: u64) {
+        self.from = Some((dag.into(), job));
+    }
+
+    /// Finds the job that each DAG begins with, and forgets those before.
+    fn find_begins(&mut self, task_set: &TaskSet) -> Result<(), String> {
+        self.begins = vec![0; task_set.dags().len()];
+        let ids = (0_u16..).take(self.begins.len());
+        for dag in ids.clone() {
+            self.begins[usize::from(dag)] = self.earliest(task_set, dag);
+        }
+        if let Some((name, job)) = self.from.take() {
+            let mut dags = ids.clone();
+            let of = dags.find(|dag| self.is_of(id(*dag)) && self.name_of(*dag) == name);
+            let of = of.ok_or_else(|| {
+                format!("the recording has no inputs of a dag `{name}` to begin with")
+            })?;
+            let begin = self.latest(of, |other| other <= job);
+            let at_ns = self.release_ns(task_set, of, begin);
+            for dag in ids.clone() {
+                if !self.is_of(id(dag)) {
+                    continue;
+                }
+                self.begins[usize::from(dag)] = match dag == of {
+                    true => begin,
+                    false => self.latest(dag, |job| self.release_ns(task_set, dag, job) <= at_ns),
+                };
+            }
+        }
+        self.check_jobs(task_set)?;
+        self.lacking = ids.clone().find_map(|dag| {
+            let begin = self.begins[usize::from(dag)];
+            let is_lacking = self.is_of(id(dag)) && begin > 0 && !self.has_states(dag, begin);
+            is_lacking.then(|| (self.name_of(dag).into(), begin))
+        });
+        self.forget_before(task_set);
+        Ok(())
+    }
+
+    fn name_of(&self, dag: u16) -> &str {
+        &self.own.dags[usize::from(dag)].name
+    }
+
+    /// Returns the jobs of a DAG whose inputs are recorded.
+    fn jobs_with_inputs(&self, dag: u16) -> impl DoubleEndedIterator<Item = u64> + Clone {
+        let jobs = &self.passed.jobs;
+        let [first, end] = [dag.into(), u32::from(dag) + 1]
+            .map(|dag: u32| jobs.partition_point(|(of, _)| u32::from(*of) < dag));
+        jobs[first..end].iter().map(|(_, job)| *job)
+    }
+
+    /// Reports whether all states of a DAG are recorded in a job, and there is one. What a function
+    /// has fallen back on before is no state.
+    fn has_states(&self, dag: u16, job: u64) -> bool {
+        let events = self.events.iter();
+        let mut restarts = events.filter(|event| (event.dag, event.what) == (dag, What::Restart));
+        self.channels_of_states(dag).next().is_some()
+            && self.is_whole(dag, job)
+            && restarts.all(|event| event.job >= job)
+    }
+
+    /// Reports whether no state of a DAG lacks in a job.
+    fn is_whole(&self, dag: u16, job: u64) -> bool {
+        let mut channels = self.channels_of_states(dag);
+        channels.all(|channel| self.find(channel, job).is_some())
+    }
+
+    fn channels_of_states(&self, dag: u16) -> impl Iterator<Item = u16> {
+        let channels = (0..).zip(&self.own.channels);
+        let of_states = channels.filter(move |(_, it)| (it.dag, it.role) == (dag, Role::State));
+        of_states.map(|(channel, _)| channel)
+    }
+
+    /// Returns the first job that a DAG can begin with.
+    fn earliest(&self, task_set: &TaskSet, dag: u16) -> u64 {
+        let mut jobs = self.jobs_with_inputs(dag);
+        let mut events = self.events.iter();
+        // The first jobs may have been skipped or cut.
+        if events.any(|event| (event.dag, event.job) == (dag, 0)) {
+            return 0;
+        }
+        match jobs.clone().next() {
+            Some(0) => 0,
+            Some(first) => jobs.find(|job| self.is_whole(dag, *job)).unwrap_or(first),
+            None if !task_set.dag(id(dag)).is_sporadic() => 0,
+            None => self.first_signals.get(&id(dag)).copied().unwrap_or(0),
+        }
+    }
+
+    /// Returns the latest one of those jobs.
+    fn latest(&self, dag: u16, is_early: impl Fn(u64) -> bool) -> u64 {
+        let mut jobs = self.jobs_with_inputs(dag).rev();
+        let found = jobs.find(|job| is_early(*job) && self.is_whole(dag, *job));
+        found.unwrap_or(0).max(self.begins[usize::from(dag)])
+    }
+
+    fn release_ns(&self, task_set: &TaskSet, dag: u16, job: u64) -> u64 {
+        let model = task_set.dag(id(dag));
+        let first = self.first_signals.get(&id(dag)).copied().unwrap_or(0);
+        let place = usize::try_from(job.saturating_sub(first)).unwrap_or(usize::MAX);
+        let signals = self.signals.get(&id(dag)).filter(|_| model.is_sporadic());
+        let signal_ns = signals.and_then(|signals| signals.get(place)).copied();
+        signal_ns.unwrap_or_else(|| model.grid_ns(job))
+    }
+
+    /// Makes sure that a replay can go through all jobs up to the last one.
+    fn check_jobs(&self, task_set: &TaskSet) -> Result<(), String> {
+        let of_values = self.values.iter().map(|((place, job), _)| {
+            let channel = &self.header.channels[usize::from(*place)];
+            (channel.dag, *job)
+        });
+        let of_signals = self.first_signals.iter();
+        let of_signals = of_signals.filter_map(|(dag, job)| Some((dag.0.try_into().ok()?, *job)));
+        let begin = |dag: u16| self.begins[usize::from(dag)];
+        let is_too_late = |(dag, job): &(u16, u64)| {
+            let release_ns = task_set.dag(id(*dag)).grid_ns(*job);
+            job.saturating_sub(begin(*dag)) >= MOST_JOBS || release_ns > u64::MAX / 2
+        };
+        match of_values.chain(of_signals).find(is_too_late) {
+            Some((dag, job)) => Err(format!(
+                "the recording has job {job} of dag `{}`, and a replay goes through all jobs from {} \
+                 on, which may be {MOST_JOBS} at most; record a shorter run",
+                self.name_of(dag),
+                begin(dag)
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// Forgets what comes before, and has a signal for each job from there on: those of which none
+    /// is recorded were as far apart as the DAG says, so there is time for them.
+    fn forget_before(&mut self, task_set: &TaskSet) {
+        let (begins, channels) = (&self.begins, &self.header.channels);
+        let is_kept = |dag: u16, job: u64| job >= begins[usize::from(dag)];
+        self.values.retain(|((place, job), _)| {
+            let dag = channels[usize::from(*place)].dag;
+            is_kept(dag, *job)
+        });
+        self.events.retain(|event| is_kept(event.dag, event.job));
+        self.faults
+            .retain(|fault| fault.instance.job >= begins[fault.instance.dag.index()]);
+        let jobs = &mut Arc::make_mut(&mut self.passed).jobs;
+        jobs.retain(|(dag, job)| is_kept(*dag, *job));
+        // Nothing but signals releases a sporadic DAG, and nothing else takes any.
+        self.signals
+            .retain(|dag, _| task_set.dag(*dag).is_sporadic());
+        for (dag, signals) in &mut self.signals {
+            let (begin, model) = (begins[dag.index()], task_set.dag(*dag));
+            let first = self.first_signals.get(dag).copied().unwrap_or(0);
+            let before = usize::try_from(begin.saturating_sub(first)).unwrap_or(usize::MAX);
+            signals.drain(..before.min(signals.len()));
+            for job in (begin..first).rev() {
+                signals.push_front(model.grid_ns(job));
+            }
+        }
+    }
+
+    /// Makes what is replayed release the jobs that are recorded, and lose none on the way, with
+    /// the states that it begins with.
+    ///
+    /// # Errors
+    ///
+    /// In words: a state cannot be what is recorded.
+    pub fn prepare(&self, plan: &mut Plan) -> Result<(), String> {
+        self.restore(plan)?;
+        let task_set = Arc::make_mut(&mut plan.task_set);
+        for dag in (0..).map(DagId).take(task_set.dags().len()) {
+            // No other signals come: without a last job, it would end no run, or keep none going.
+            let begin = self.begins[dag.index()];
+            let of_signals = || {
+                let signals = self.signals.get(&dag);
+                signals.map_or(begin, |signals| begin + signals.len() as u64)
+            };
+            let end = match task_set.dag(dag).is_sporadic() {
+                true => Some(of_signals()),
+                false => self.end_of(dag),
+            };
+            if let Some(end) = end {
+                task_set.replay(dag, begin..end);
+                if let Some(lifecycle) = &mut plan.lifecycle {
+                    lifecycle.leave_alone(dag);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the job behind a DAG's last one, if its inputs are recorded.
+    fn end_of(&self, dag: DagId) -> Option<u64> {
+        let dag = u16::try_from(dag.0).ok().filter(|_| self.is_of(dag))?;
+        let of_dag = self.passed.jobs.iter().rev().find(|(of, _)| *of == dag);
+        Some(of_dag.map_or(1, |(_, last)| last.saturating_add(1)))
+    }
+
+    /// Makes the bodies of a plan pass over what is not called.
+    pub(crate) fn guard(&self, plan: &mut Plan) {
+        guard(plan, &self.passed);
+    }
+
+    /// Gives the states what they were when the replay begins, and has them looked at in each job:
+    /// they are compared wherever they are recorded.
+    fn restore(&self, plan: &Plan) -> Result<(), String> {
+        for (channel, of) in (0..).zip(&plan.lines) {
+            let begin = self.begins[of.dag.index()];
+            let state = of.state.as_ref();
+            let state = state.inspect(|state| state.keep_every(1));
+            if let Some(kept) = state.filter(|_| begin > 0)
+                && let Some(value) = self.value(channel, begin)
+                && !kept.state.restore(value)
+            {
+                let topic = &self.own.channels[usize::from(channel)].topic;
+                return Err(format!(
+                    "state `{topic}` cannot be what the recording has of job {begin}; record it \
+                     again"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn id(dag: u16) -> DagId {
+    DagId(dag.into())
 }

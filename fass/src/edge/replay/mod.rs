@@ -1,7 +1,10 @@
-//! What a replay takes from a recording, and what it finds.
+//! What a replay takes from a recording, and what it finds: values that differ, and faults that do not
+//! come again.
+//!
+//! A function that fails because of its inputs fails again. What it remembers of jobs that are not
+//! recorded is lacking in a replay, so a fault that follows from that does not come again; nor does
+//! one of a source that is not called, or of a budget.
 
-mod begin;
-mod faults;
 mod fit;
 
 use alloc::borrow::Cow;
@@ -9,16 +12,16 @@ use alloc::collections::{BTreeMap, VecDeque};
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::fmt;
 use core::ops::Range;
+use core::{fmt, mem};
 
 use recording::{Channel, Entry, Header, Malformed, Recordable, Recording, Role, Shown, What};
-use sched_dag::{DagId, Instance, TaskSet};
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
-use super::guard::{Passed, narrow};
-use crate::run::crossing::Recorded;
-pub use begin::job_of;
-use faults::Fault;
+use crate::run::line::Recorded;
+use crate::run::plan::{Body, Plan};
+
+pub use fit::job_of;
 
 /// A recording that takes the place of what enters.
 #[derive(Debug)]
@@ -369,4 +372,115 @@ impl Replay {
 /// Reports whether values are compared, rather than taken.
 const fn is_compared(role: Role) -> bool {
     matches!(role, Role::Result | Role::State)
+}
+
+/// The instances whose functions are not called.
+#[derive(Clone, Debug)]
+struct Passed {
+    /// The DAGs whose inputs are recorded, in order.
+    dags: Vec<u16>,
+    /// The jobs of these that have some, in order.
+    jobs: Vec<(u16, u64)>,
+    /// The instances that were cut, in order.
+    cuts: Vec<(u16, u16, u64)>,
+}
+
+impl Passed {
+    /// Reports whether the inputs of a DAG are recorded.
+    fn is_of(&self, dag: u16) -> bool {
+        self.dags.binary_search(&dag).is_ok()
+    }
+
+    /// Adds an instance that is cut; `false`: it was before.
+    fn cut(&mut self, instance: Instance) -> bool {
+        let Some((dag, subtask)) = narrow(instance) else {
+            return false;
+        };
+        let cut = (dag, subtask, instance.job);
+        let place = self.cuts.binary_search(&cut);
+        place.map_err(|place| self.cuts.insert(place, cut)).is_err()
+    }
+
+    /// Reports whether an instance is one of them.
+    fn has(&self, instance: Instance) -> bool {
+        let Some((dag, subtask)) = narrow(instance) else {
+            return false;
+        };
+        let job = instance.job;
+        self.is_of(dag)
+            && (self.jobs.binary_search(&(dag, job)).is_err()
+                || self.cuts.binary_search(&(dag, subtask, job)).is_ok())
+    }
+}
+
+/// Returns the numbers of a DAG and of a subtask, as recordings have them.
+pub(super) fn narrow(instance: Instance) -> Option<(u16, u16)> {
+    let dag = u16::try_from(instance.dag.0).ok()?;
+    Some((dag, u16::try_from(instance.subtask.0).ok()?))
+}
+
+/// Makes all bodies of a plan pass over these.
+fn guard(plan: &mut Plan, passed: &Arc<Passed>) {
+    for (dag, bodies) in (0..).map(DagId).zip(&mut plan.bodies) {
+        let of_subtasks = (0..).map(SubtaskId).zip(mem::take(bodies));
+        let guarded = of_subtasks.map(|(subtask, body): (_, Body)| {
+            let passed = Arc::clone(passed);
+            body.before(move |job| !passed.has(Instance { dag, job, subtask }))
+        });
+        *bodies = guarded.collect();
+    }
+}
+
+/// A fault of the recorded run.
+#[derive(Debug)]
+struct Fault {
+    instance: Instance,
+    /// The name of the subtask, once it is known.
+    subtask: String,
+}
+
+impl Fault {
+    fn new(dag: u16, subtask: u16, job: u64) -> Self {
+        let (dag, subtask) = (DagId(dag.into()), SubtaskId(subtask.into()));
+        Self {
+            instance: Instance { dag, subtask, job },
+            subtask: String::new(),
+        }
+    }
+}
+
+impl Replay {
+    /// Finds the names of those that have failed. The DAGs are those of the recording.
+    fn name_faults(&mut self, task_set: &TaskSet) {
+        for Fault { instance, subtask } in &mut self.faults {
+            let subtasks = task_set.dag(instance.dag).subtasks();
+            let failed = subtasks.get(instance.subtask.index());
+            *subtask = failed.map_or("", |failed| failed.name()).into();
+        }
+    }
+
+    /// Takes note that an instance of this run has failed.
+    pub(crate) fn meet_fault(&mut self, instance: Instance) {
+        self.faults.retain(|fault| fault.instance != instance);
+    }
+
+    /// Returns the first recorded fault, of any job or of one, that has not come again. Where the
+    /// recording is of a whole run, only those count whose function is called.
+    #[must_use]
+    pub fn unmet_fault(&self, of: Option<(DagId, u64)>) -> Option<Divergence> {
+        let is_unmet = |Fault { instance, .. }: &&Fault| {
+            let is_of = of.is_none_or(|of| of == (instance.dag, instance.job));
+            let is_only_a_part = self.begins[instance.dag.index()] > 0;
+            is_of && self.is_of(instance.dag) && (is_only_a_part || !self.passes_over(*instance))
+        };
+        let Fault { instance, subtask } = self.faults.iter().find(is_unmet)?;
+        Some(Divergence {
+            dag: self.own.dags[instance.dag.index()].name.clone(),
+            topic: subtask.clone(),
+            is_state: false,
+            job: instance.job,
+            recorded: None,
+            computed: None,
+        })
+    }
 }

@@ -1,4 +1,4 @@
-//! The cells in which the crate's `unsafe` lives, some of them in files of their own.
+//! The cells in which the crate's `unsafe` lives; one of them, of records, is in a file of its own.
 //!
 //! # The slot ring
 //!
@@ -55,12 +55,15 @@
 //! > `Release` change. So all that one holder did happens before all that the next
 //! > conflicting one does.
 
+pub(crate) mod outbox;
+
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::cell::UnsafeCell;
 use core::mem::{ManuallyDrop, MaybeUninit};
 use core::ops::{Deref, DerefMut};
-use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use core::ptr;
+use core::sync::atomic::{AtomicPtr, AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 /// The turn of a slot that holds no value.
 const EMPTY_SLOT: u64 = 0;
@@ -335,10 +338,99 @@ impl<T> Drop for Looking<'_, T> {
     }
 }
 
-pub(crate) mod current;
-pub(crate) mod outbox;
-mod set_once;
+const EMPTY: u8 = 0;
+const WRITING: u8 = 1;
+const SET: u8 = 2;
+
+/// A value that is set at most once and then read by everybody.
+///
+/// ```
+/// static PLACE: fass::SetOnce<u32> = fass::SetOnce::new();
+/// assert_eq!(PLACE.get(), None);
+/// assert!(PLACE.set(1) && !PLACE.set(2));
+/// assert_eq!(PLACE.get(), Some(&1));
+/// ```
+#[derive(Debug)]
+pub struct SetOnce<T> {
+    state: AtomicU8,
+    value: UnsafeCell<MaybeUninit<T>>,
+}
+
+// SAFETY: by the set-once invariant the value is written by one thread before
+// any thread reads it. `T: Send` as the owner drops it, `T: Sync` as all look at it.
+unsafe impl<T: Send + Sync> Sync for SetOnce<T> {}
+
+impl<T> SetOnce<T> {
+    /// Makes an empty place.
+    #[must_use]
+    #[allow(clippy::new_without_default, reason = "it is for statics")]
+    pub const fn new() -> Self {
+        Self {
+            state: AtomicU8::new(EMPTY),
+            value: UnsafeCell::new(MaybeUninit::uninit()),
+        }
+    }
+
+    /// Sets the value, and reports whether this call was the one that did.
+    pub fn set(&self, value: T) -> bool {
+        let claim =
+            self.state
+                .compare_exchange(EMPTY, WRITING, Ordering::Relaxed, Ordering::Relaxed);
+        if claim.is_err() {
+            return false;
+        }
+        let place = self.value.get().cast::<T>();
+        // SAFETY: we moved the state from `EMPTY` to `WRITING`, so by the
+        // set-once invariant we alone may write, and nobody reads yet.
+        unsafe { place.write(value) };
+        self.state.store(SET, Ordering::Release);
+        true
+    }
+
+    /// Returns the value, or `None` while none is set.
+    #[inline]
+    pub fn get(&self) -> Option<&T> {
+        if self.state.load(Ordering::Acquire) != SET {
+            return None;
+        }
+        let place = self.value.get().cast::<T>();
+        // SAFETY: the state is `SET`, so by the set-once invariant the value is
+        // initialised and no longer written, as long as this borrow of the cell lasts.
+        Some(unsafe { &*place })
+    }
+}
+
+impl<T> Drop for SetOnce<T> {
+    fn drop(&mut self) {
+        if *self.state.get_mut() == SET {
+            // SAFETY: by the set-once invariant it is initialised, and `&mut self` is alone.
+            unsafe { self.value.get_mut().assume_init_drop() };
+        }
+    }
+}
+
+/// Which of several values is current. Reading it is a load.
+///
+/// > **Current invariant.** The pointer always comes from a `&'static T`.
+pub(crate) struct Current<T: 'static>(AtomicPtr<T>);
+
+impl<T: Sync> Current<T> {
+    pub(crate) const fn new(first: &'static T) -> Self {
+        Self(AtomicPtr::new(ptr::from_ref(first).cast_mut()))
+    }
+
+    pub(crate) fn set(&self, next: &'static T) {
+        let next = ptr::from_ref(next).cast_mut();
+        self.0.store(next, Ordering::Release);
+    }
+
+    #[inline]
+    pub(crate) fn get(&self) -> &'static T {
+        let current = self.0.load(Ordering::Acquire);
+        // SAFETY: by the current invariant it is valid, and only looked at, for ever.
+        unsafe { &*current }
+    }
+}
+
 #[cfg(test)]
 mod tests;
-
-pub use set_once::SetOnce;

@@ -4,8 +4,7 @@ use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use super::incoming::{Framing, Incoming};
-use super::outgoing::{Departure, Outgoing};
+use super::{Departure, Framing, Incoming, Outgoing};
 use crate::run::effect::Effect;
 
 /// Takes all packets that are there, as text.

@@ -20,19 +20,18 @@
 //! - A DAG without all its WCETs is not analysed, and neither are those that
 //!   it may delay; they are not proven. A WCET of 0 is none.
 
-mod text;
-
 use alloc::string::{String, ToString};
-use alloc::vec;
 use alloc::vec::Vec;
+use core::fmt;
 use core::ops::Range;
 use core::time::Duration;
 
-use sched_dag::analysis::{self, OverheadSource, Reason, Settings, TaskError, Test};
+use sched_dag::analysis::{self, OverheadSource, Reason, Settings, Test};
 use sched_dag::engine::Proven;
 use sched_dag::wcets::WcetSource;
-use sched_dag::{ClusterId, DagId, DagLabel, Subtask, SubtaskId, SubtaskLabel, TaskSet, Why};
+use sched_dag::{ClusterId, DagId, DagLabel, Subtask, SubtaskLabel, TaskSet, Why};
 
+use crate::draft::fault::{Count, Unproven};
 use crate::platform::Terms;
 
 /// What is known at commit about the deadlines of one DAG.
@@ -151,41 +150,6 @@ pub enum Verdict {
     NotProven(Unproven),
 }
 
-/// Why a DAG is not proven to meet its deadlines, with names.
-///
-/// Its `Display` states the fact and what to do about it.
-///
-/// # Examples
-///
-/// ```
-/// use core::time::Duration;
-/// use fass::{SubtaskAttributes, Verdict, create_dag, finish_create_dags};
-///
-/// # let machine = virtual_time::VirtualTime::new();
-/// let dag = create_dag();
-/// let period = Duration::from_millis(10);
-/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
-/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::named("sink"));
-///
-/// let commit = finish_create_dags(&[dag]).unwrap();
-/// let Verdict::NotProven(unproven) = &commit.answers()[0].verdict else {
-///     panic!("nothing is known about its execution times");
-/// };
-/// assert_eq!(
-///     unproven.to_string(),
-///     "no WCET above 0 is given for subtask `source`, subtask `sink`; give every subtask one \
-///      to have the DAG analysed"
-/// );
-/// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Unproven {
-    reason: Reason,
-    /// The subtasks that the reason is about.
-    subtasks: Vec<SubtaskLabel>,
-    /// The other DAG that the reason is about.
-    other: Option<DagLabel>,
-}
-
 impl Verdict {
     /// Returns the bound, if there is one.
     ///
@@ -212,60 +176,6 @@ impl Verdict {
         match self {
             Self::Proven { .. } => None,
             Self::NotProven(unproven) => Some(unproven),
-        }
-    }
-}
-
-impl Unproven {
-    /// Returns the reason, by which a program may decide.
-    ///
-    /// ```
-    /// use fass::{Reason, Unproven};
-    ///
-    /// fn is_worth_another_core(unproven: &Unproven) -> bool {
-    ///     matches!(unproven.reason(), Reason::NoBound | Reason::Overload)
-    /// }
-    /// ```
-    #[must_use]
-    pub const fn reason(&self) -> Reason {
-        self.reason
-    }
-
-    /// Reports whether deadlines will be missed when every instance takes its
-    /// WCET, rather than merely not being proven to be met.
-    ///
-    /// ```
-    /// use fass::{Answer, Unproven};
-    ///
-    /// fn is_hopeless(answer: &Answer) -> bool {
-    ///     answer.verdict.unproven().is_some_and(Unproven::is_certain)
-    /// }
-    /// ```
-    #[must_use]
-    pub const fn is_certain(&self) -> bool {
-        self.reason.is_certain()
-    }
-
-    fn new(task_set: &TaskSet, dag: DagId, reason: Reason) -> Self {
-        let subtasks = match reason {
-            Reason::Unknown(TaskError::MissingWcet { .. }) => {
-                let subtasks = (0..).map(SubtaskId).zip(task_set.dag(dag).subtasks());
-                let lacking = subtasks.filter(|(_, subtask)| subtask.wcet_ns().unwrap_or(0) == 0);
-                lacking.map(|(id, _)| id).collect()
-            }
-            Reason::SubtaskBeyondPeriod { subtask } => vec![subtask],
-            Reason::PathBeyondDeadline { sink, .. } | Reason::NoSinkBound { sink } => vec![sink],
-            _ => Vec::new(),
-        };
-        let labels = subtasks.into_iter();
-        let other = match reason {
-            Reason::DelayedBy { dag } => Some(dag),
-            _ => None,
-        };
-        Self {
-            reason,
-            subtasks: labels.map(|id| task_set.subtask_label(dag, id)).collect(),
-            other: other.map(|other| task_set.label(other)),
         }
     }
 }
@@ -357,4 +267,57 @@ fn sinks(task_set: &TaskSet, dag: DagId, bounds_ns: &[Option<u64>]) -> Vec<SinkA
         bound: bound_ns.map(Duration::from_nanos),
     });
     answers.collect()
+}
+
+impl fmt::Display for Answer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let dag = &self.dag;
+        match &self.verdict {
+            Verdict::Proven { bound, test } => {
+                write!(f, "{dag} takes at most {bound:?}, by {test}")
+            }
+            Verdict::NotProven(unproven) => {
+                write!(f, "{dag} is not proven to meet its deadlines: {unproven}")
+            }
+        }?;
+        if let Some(placement) = &self.cluster {
+            write!(f, "; it runs {placement}")?;
+        }
+        // What is observed is never called proven.
+        let observed = self.wcets.iter().filter_map(|source| match source {
+            WcetSource::Observed { margin_percent } => Some(margin_percent),
+            _ => None,
+        });
+        if let Some(margin) = observed.clone().next() {
+            let (count, all) = (observed.count(), self.wcets.len());
+            write!(
+                f,
+                "; {count} of {all} WCETs are observed ones and {margin} %"
+            )?;
+        }
+        match self.overheads {
+            OverheadSource::Stated => Ok(()),
+            OverheadSource::Measured {
+                dispatches,
+                margin_percent,
+            } => write!(
+                f,
+                "; overheads are the longest of {dispatches} measured and {margin_percent} %"
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Placement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            cluster,
+            cores,
+            why,
+        } = self;
+        let (count, first) = (Count(cores.len(), "core"), cores.start);
+        let cluster = cluster.0;
+        write!(f, "in cluster {cluster}, on {count} from core {first} on")?;
+        why.map_or(Ok(()), |why| write!(f, ": {why}"))
+    }
 }

@@ -1,4 +1,5 @@
-//! The modes that are stated before the commit, and what may be wrong with them.
+//! The modes that are stated before the commit, and what may be wrong with them; and whether what a
+//! DAG records suffices for a replay, which calls no recorded source.
 
 use alloc::format;
 use alloc::rc::{Rc, Weak};
@@ -6,11 +7,12 @@ use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
+use core::ptr;
 
 use sched_dag::{DagId, DagLabel};
 
 use super::Draft;
-use super::flaw::WordedFault;
+use crate::run::latest::AnyLatest;
 
 /// A mode as stated so far.
 pub(crate) struct ModeDraft {
@@ -24,10 +26,13 @@ pub(crate) struct ModeDraft {
 pub(crate) type Modes = Rc<RefCell<Vec<ModeDraft>>>;
 
 /// All drafts of a commit.
-pub(crate) type Drafts = [Rc<RefCell<Draft>>];
+type Drafts = [Rc<RefCell<Draft>>];
+
+/// Takes a fault, by its code and its text.
+type Add<'a> = &'a mut dyn FnMut(&'static str, String);
 
 /// Reports all that is wrong with the modes of a commit, or with what it records.
-pub(crate) type Check = fn(&Drafts, &mut dyn FnMut(WordedFault));
+pub(crate) type Check = fn(&Drafts, Add<'_>);
 
 /// Returns the DAGs of each mode of a commit.
 pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
@@ -39,9 +44,8 @@ pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
 }
 
 /// Reports all that is wrong with the modes of a commit.
-pub(crate) fn check(drafts: &Drafts, report: &mut dyn FnMut(WordedFault)) {
+pub(crate) fn check_modes(drafts: &Drafts, add: Add<'_>) {
     let found = of_commit(drafts);
-    let mut add = |code, text| report(WordedFault { code, text });
     if found.len() > 1 {
         let text = "the commit has modes of more than one `Modes`; make all of them by one";
         add("several_sets_of_modes", text.into());
@@ -121,10 +125,62 @@ fn handler(drafts: &Drafts, draft: &Draft) -> Option<DagId> {
     (0..).map(DagId).nth(drafts.iter().position(is_it)?)
 }
 
-pub(super) fn label(drafts: &Drafts, dag: DagId) -> DagLabel {
+fn label(drafts: &Drafts, dag: DagId) -> DagLabel {
     let mut name = drafts[dag.index()].borrow().spec.name.clone();
     if name.is_empty() {
         name = dag.0.to_string();
     }
     DagLabel { id: dag, name }
+}
+
+/// Reports what the DAGs of a commit do not record that a replay would need: of each DAG a source
+/// of which is recorded, all else that its sources write, and what its other subtasks sample.
+pub(crate) fn check_recorded(drafts: &Drafts, add: Add<'_>) {
+    for (id, draft) in (0..).map(DagId).zip(drafts) {
+        let draft = draft.borrow();
+        let dag = label(drafts, id);
+        let is_source = |subtask: usize| draft.spec.subtasks[subtask].inputs.is_empty();
+        let sources = (0..draft.spec.subtasks.len()).filter(|subtask| is_source(*subtask));
+        let written = sources.flat_map(|subtask| {
+            let outputs = draft.spec.subtasks[subtask].outputs.iter();
+            outputs.map(move |port| (subtask, &*port.topic))
+        });
+        let (recorded, others): (Vec<_>, Vec<_>) =
+            written.partition(|(_, topic)| records(&draft, topic));
+        let Some((_, first)) = recorded.first() else {
+            continue;
+        };
+        for (subtask, topic) in others {
+            let subtask = draft.label(subtask);
+            let text = format!(
+                "{subtask} of {dag} writes topic `{topic}`, which is not recorded, and a replay \
+                 would not call it, for topic `{first}` of a source is; record all topics of the \
+                 sources, or none"
+            );
+            add("source_partly_recorded", text);
+        }
+        let samples = draft.samples.iter();
+        for (subtask, latest, _) in samples.filter(|(subtask, ..)| !is_source(*subtask)) {
+            let (subtask, topic) = (draft.label(*subtask), latest.topic());
+            let offers = |other: &Draft| other.latest.iter().any(|own| is_same(own, latest));
+            let mut others = drafts.iter().map(|other| other.borrow());
+            if others.any(|other| offers(&other) && !records(&other, topic)) {
+                let text = format!(
+                    "{subtask} of {dag} samples topic `{topic}`, which is not recorded, and a \
+                     replay could not give it the same, though topic `{first}` of a source is; \
+                     record both, or neither"
+                );
+                add("sample_not_recorded", text);
+            }
+        }
+    }
+}
+
+fn records(draft: &Draft, topic: &str) -> bool {
+    let mut recorded = draft.recorded.iter();
+    recorded.any(|recorded| recorded.topic() == topic)
+}
+
+fn is_same(one: &Rc<dyn AnyLatest>, other: &Rc<dyn AnyLatest>) -> bool {
+    ptr::addr_eq(Rc::as_ptr(one), Rc::as_ptr(other))
 }

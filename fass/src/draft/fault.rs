@@ -1,0 +1,353 @@
+//! Reasons why a commit is refused, in words.
+//!
+//! Every fault states a fact, names the offender, and says what to do. The
+//! faults of the graph itself are [`sched_dag::Fault`]s; the ones here can only
+//! be seen from this side: the shape of functions, durations, the platform.
+
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::fmt::{self, Display};
+use core::time::Duration;
+
+use sched_dag::analysis::{Reason, TaskError};
+use sched_dag::wcets::WcetFault;
+use sched_dag::{DagId, DagLabel, SubtaskId, SubtaskLabel, TaskSet, Warning, worded};
+
+use crate::platform::LaunchError;
+
+worded! {
+    /// One reason why a commit was refused.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{Fault, SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// let dag = create_dag();
+    /// dag.name("demo");
+    /// dag.register_periodic_subtask(
+    ///     || (1, 2),
+    ///     vec!["numbers"], // one topic for two results
+    ///     Duration::from_millis(10),
+    ///     SubtaskAttributes::named("source"),
+    /// );
+    /// dag.register_sink_subtask(
+    ///     |(_,): (i32,)| (),
+    ///     vec!["numbers"],
+    ///     Duration::from_millis(10),
+    ///     SubtaskAttributes::named("sink"),
+    /// );
+    /// let error = finish_create_dags(&[dag]).unwrap_err();
+    /// let codes: Vec<_> = error.faults().iter().map(Fault::code).collect();
+    /// assert_eq!(codes, ["output_arity"]);
+    /// ```
+    pub enum Fault {
+        /// No platform is installed that could schedule the DAGs.
+        NoPlatform = "no_platform",
+            "no platform is installed that could run the DAGs; boot the kernel, or make a \
+             `virtual_time::VirtualTime` first";
+        /// The same DAG stands twice in one commit.
+        GivenTwice { dag: DagLabel } = "given_twice",
+            "{dag} is given twice in one commit; give it once";
+        /// The DAG was committed before.
+        AlreadyCommitted { dag: DagLabel } = "already_committed",
+            "{dag} is committed already; build a new DAG and commit that";
+        /// A function takes another number of inputs, `expected`, than its list names
+        /// topics, `given`.
+        InputArity { dag: DagLabel, subtask: SubtaskLabel, expected: usize, given: usize } =
+            "input_arity",
+            "{subtask} of {dag} takes {} but lists {}; list one topic for each element of its \
+             argument tuple", Count(*expected, "input"), Count(*given, "input topic");
+        /// A function returns another number of outputs, `expected`, than its list names
+        /// topics, `given`.
+        OutputArity { dag: DagLabel, subtask: SubtaskLabel, expected: usize, given: usize } =
+            "output_arity",
+            "{subtask} of {dag} returns {} but lists {}; list one topic for each element of its \
+             result tuple", Count(*expected, "output"), Count(*given, "output topic");
+        /// A duration, of a DAG or of one of its subtasks, does not fit into 64 bits of
+        /// nanoseconds (584 years); `what` says what it is for.
+        DurationTooLong { dag: DagLabel, subtask: Option<SubtaskLabel>, what: &'static str } =
+            "duration_too_long",
+            "the {what} of {}{dag} is too long; give at most {} ns", part(subtask), u64::MAX;
+        /// Two sources of one DAG state different periods, in nanoseconds; `subtask` the
+        /// second one.
+        PeriodsDiffer { dag: DagLabel, subtask: SubtaskLabel, first_ns: u64, second_ns: u64 } =
+            "periods_differ",
+            "{subtask} gives {dag} a period of {:?} where {:?} were given before; a DAG has one \
+             period, make two DAGs or give the same period",
+            Duration::from_nanos(*second_ns), Duration::from_nanos(*first_ns);
+        /// Of two sources of one DAG one is periodic and one sporadic; `subtask` is the one
+        /// registered second.
+        ActivationsDiffer { dag: DagLabel, subtask: SubtaskLabel } = "activations_differ",
+            "{subtask} has a period, and its {dag} is sporadic, released by a signal; make two \
+             DAGs, or leave one of the two out";
+        /// The file of observed WCETs does not fit the DAG.
+        WcetsRefused { dag: DagLabel, fault: WcetFault } = "wcets_refused", "{fault}: {dag}";
+        /// A subtask samples a latest value of a DAG that is not in the commit.
+        LatestNotCommitted { dag: DagLabel, subtask: SubtaskLabel, topic: String } =
+            "latest_not_committed",
+            "{subtask} of {dag} samples the latest value of topic `{topic}`, whose dag is not in \
+             the commit; commit both dags in one call";
+        /// A subtask may raise the signal of a DAG that is not in the commit.
+        SignalNotCommitted { dag: DagLabel, subtask: SubtaskLabel } = "signal_not_committed",
+            "{subtask} of {dag} may raise the signal of a dag that is not in the commit; commit \
+             both dags in one call";
+        /// A subtask may pause a DAG that is not in the commit.
+        SwitchedNotCommitted { dag: DagLabel, subtask: SubtaskLabel } = "switched_not_committed",
+            "{subtask} of {dag} may pause a dag that is not in the commit; commit both dags in one \
+             call";
+        /// Something is wrong with the modes, or with what enters from outside.
+        Worded { code: &'static str, text: String } = of *code, "{text}";
+        /// A subtask has a function for after a fault, and a fault ends its DAG.
+        ReplacedInVain { dag: DagLabel, subtask: SubtaskLabel } = "replaced_in_vain",
+            "{subtask} of {dag} has another function for after a fault, and a fault ends the dag; \
+             let the dag survive faults by `survive_faults`, or register one function";
+        /// A DAG goes on after faults, and no subtask has a function for that.
+        NothingReplaceable { dag: DagLabel } = "nothing_replaceable",
+            "{dag} drops a job at a fault and goes on, and no subtask of it has another function \
+             for that; register one by `restarting` or `falling_back`";
+        /// A subtask that has a function for after a fault uses a state that has no value
+        /// for that.
+        StateWithoutReset { dag: DagLabel, subtask: SubtaskLabel, state: String } =
+            "state_without_reset",
+            "{subtask} of {dag} has another function for after a fault, and the state `{state}`, \
+             which it uses, no other value; give it one by `reset_to`";
+        /// The commit is to find the clusters, and a DAG gets no cores.
+        NotAssigned(error: LaunchError) = "not_assigned", "{error}";
+        /// The DAG demands a proof that it meets its deadlines, and there is none, for that
+        /// reason. Found only where nothing else is wrong.
+        NotProven { dag: DagLabel, unproven: Unproven } = "not_proven",
+            "{dag} demands a proof that it meets its deadlines, and there is none: {unproven}";
+        /// The graph or its attributes are at fault.
+        Model(fault: sched_dag::Fault) = of fault.code(), "{fault}";
+        /// The platform did not take the verified plan.
+        NotLaunched(error: LaunchError) = "not_launched",
+            "the platform did not take the plan: {error}";
+    }
+}
+
+impl Fault {
+    /// Names the DAG of a fault that a registration noted, when it did not know the DAG's label yet.
+    pub(crate) fn in_dag(mut self, label: &DagLabel) -> Self {
+        if let Self::InputArity { dag, .. }
+        | Self::OutputArity { dag, .. }
+        | Self::DurationTooLong { dag, .. }
+        | Self::PeriodsDiffer { dag, .. }
+        | Self::ActivationsDiffer { dag, .. } = &mut self
+        {
+            dag.clone_from(label);
+        }
+        self
+    }
+}
+
+/// Returns which part of a DAG is at fault, if it is not the DAG itself.
+fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
+    fmt::from_fn(move |f| match subtask {
+        Some(subtask) => write!(f, "{subtask} of "),
+        None => Ok(()),
+    })
+}
+
+/// Why a DAG is not proven to meet its deadlines, with names.
+///
+/// Its `Display` states the fact and what to do about it.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, Verdict, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// let period = Duration::from_millis(10);
+/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
+/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::named("sink"));
+///
+/// let commit = finish_create_dags(&[dag]).unwrap();
+/// let Verdict::NotProven(unproven) = &commit.answers()[0].verdict else {
+///     panic!("nothing is known about its execution times");
+/// };
+/// assert_eq!(
+///     unproven.to_string(),
+///     "no WCET above 0 is given for subtask `source`, subtask `sink`; give every subtask one \
+///      to have the DAG analysed"
+/// );
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unproven {
+    reason: Reason,
+    /// The subtasks that the reason is about.
+    subtasks: Vec<SubtaskLabel>,
+    /// The other DAG that the reason is about.
+    other: Option<DagLabel>,
+}
+
+impl Unproven {
+    /// Returns the reason, by which a program may decide.
+    ///
+    /// ```
+    /// use fass::{Reason, Unproven};
+    ///
+    /// fn is_worth_another_core(unproven: &Unproven) -> bool {
+    ///     matches!(unproven.reason(), Reason::NoBound | Reason::Overload)
+    /// }
+    /// ```
+    #[must_use]
+    pub const fn reason(&self) -> Reason {
+        self.reason
+    }
+
+    /// Reports whether deadlines will be missed when every instance takes its
+    /// WCET, rather than merely not being proven to be met.
+    ///
+    /// ```
+    /// use fass::{Answer, Unproven};
+    ///
+    /// fn is_hopeless(answer: &Answer) -> bool {
+    ///     answer.verdict.unproven().is_some_and(Unproven::is_certain)
+    /// }
+    /// ```
+    #[must_use]
+    pub const fn is_certain(&self) -> bool {
+        self.reason.is_certain()
+    }
+
+    pub(crate) fn new(task_set: &TaskSet, dag: DagId, reason: Reason) -> Self {
+        let subtasks = match reason {
+            Reason::Unknown(TaskError::MissingWcet { .. }) => {
+                let subtasks = (0..).map(SubtaskId).zip(task_set.dag(dag).subtasks());
+                let lacking = subtasks.filter(|(_, subtask)| subtask.wcet_ns().unwrap_or(0) == 0);
+                lacking.map(|(id, _)| id).collect()
+            }
+            Reason::SubtaskBeyondPeriod { subtask } => vec![subtask],
+            Reason::PathBeyondDeadline { sink, .. } | Reason::NoSinkBound { sink } => vec![sink],
+            _ => Vec::new(),
+        };
+        let labels = subtasks.into_iter();
+        let other = match reason {
+            Reason::DelayedBy { dag } => Some(dag),
+            _ => None,
+        };
+        Self {
+            reason,
+            subtasks: labels.map(|id| task_set.subtask_label(dag, id)).collect(),
+            other: other.map(|other| task_set.label(other)),
+        }
+    }
+}
+
+/// So many subtasks without WCET are named, and the rest counted.
+const MOST_NAMED: usize = 8;
+
+impl fmt::Display for Unproven {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.reason, &self.subtasks[..], &self.other) {
+            (Reason::Unknown(TaskError::MissingWcet { .. }), [first, others @ ..], _) => {
+                write!(f, "no WCET above 0 is given for {first}")?;
+                let (named, more) = others.split_at(others.len().min(MOST_NAMED - 1));
+                named.iter().try_for_each(|other| write!(f, ", {other}"))?;
+                if !more.is_empty() {
+                    write!(f, " and {} more", more.len())?;
+                }
+                f.write_str("; give every subtask one to have the DAG analysed")
+            }
+            (Reason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
+                f,
+                "{subtask} alone takes more than a period; split it or lengthen the period"
+            ),
+            (Reason::PathBeyondDeadline { length_ns, .. }, [sink, ..], _) => write!(
+                f,
+                "the longest path to {sink} alone takes {:?}, which is more than the relative \
+                 deadline of that sink; shorten the path or relax the deadline",
+                Duration::from_nanos(*length_ns)
+            ),
+            (Reason::NoSinkBound { .. }, [sink, ..], _) => write!(
+                f,
+                "no test bounds the response time of {sink} by the relative deadline of that sink \
+                 (it may still meet it); add cores or relax the deadline"
+            ),
+            (Reason::DelayedBy { .. }, _, Some(other)) => write!(
+                f,
+                "{other}, which may delay it, is not proven itself; see to that one first"
+            ),
+            (reason, _, _) => reason.fmt(f),
+        }
+    }
+}
+
+/// A refused commit: all its faults, and the warnings.
+///
+/// Its `Display` prints one line for each fault; of very many the first 20, and how
+/// many more there are.
+///
+/// # Examples
+///
+/// ```
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = fass::create_dag(); // empty
+/// let error = fass::finish_create_dags(&[dag]).unwrap_err();
+/// for fault in error.faults() {
+///     println!("{}: {fault}", fault.code());
+/// }
+/// assert_eq!(error.to_string().lines().count(), error.faults().len());
+/// ```
+#[derive(Clone, Debug)]
+pub struct CommitError {
+    pub(crate) faults: Vec<Fault>,
+    pub(crate) warnings: Vec<Warning>,
+}
+
+impl CommitError {
+    pub(crate) fn of(fault: Fault, warnings: Vec<Warning>) -> Self {
+        let faults = Vec::from([fault]);
+        Self { faults, warnings }
+    }
+
+    /// Returns the faults, at least one.
+    ///
+    /// ```
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// let error = fass::finish_create_dags(&[fass::create_dag()]).unwrap_err();
+    /// assert!(!error.faults().is_empty());
+    /// ```
+    #[must_use]
+    pub fn faults(&self) -> &[Fault] {
+        &self.faults
+    }
+
+    /// Returns what would not have refused the commit but deserves a look.
+    ///
+    /// ```
+    /// # let machine = virtual_time::VirtualTime::new();
+    /// let error = fass::finish_create_dags(&[fass::create_dag()]).unwrap_err();
+    /// assert!(error.warnings().is_empty());
+    /// ```
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+}
+
+impl fmt::Display for CommitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        sched_dag::write_faults(&self.faults, f)
+    }
+}
+
+impl core::error::Error for CommitError {}
+
+/// A number of things, in the singular or the plural.
+pub(crate) struct Count(pub(crate) usize, pub(crate) &'static str);
+
+impl fmt::Display for Count {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(number, thing) = self;
+        let plural = if *number == 1 { "" } else { "s" };
+        write!(f, "{number} {thing}{plural}")
+    }
+}
