@@ -76,7 +76,7 @@ void bpf_iter_scx_dsq_destroy(struct bpf_iter_scx_dsq *at) __ksym;
 // For how long one of those has a core before the next one has it, in nanoseconds.
 #define SHARE 5000000
 
-// What the program shares: `fass/linux/src/seats.rs` has the same.
+// What the program shares: `fass/linux/src/level.rs` has the same.
 struct seats {
 	__u8 ranks[THREADS];
 	// The number of the program, with whose end the policy is unloaded.

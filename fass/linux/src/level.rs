@@ -9,10 +9,24 @@
 //! | none | abandoned workers: what they run has exceeded its budget |
 //!
 //! Four neighbours, below the 50 at which Linux runs interrupt handlers that are threads. A
-//! policy of sched_ext has the same four (`seats`).
+//! policy of `sched_ext` has the same four.
+//!
+//! # The policy
+//!
+//! `bpf/seats.bpf.c` is that policy. As this program sees it, it is a table of threads, in which one
+//! that is higher comes before a lower one on the same processor.
+//!
+//! It is loaded by a person who may; this program then has it to its own end. Putting a
+//! thread somewhere is a store. It needs no system call, as what follows does for it: a
+//! preemption wakes the worker that takes the core over, and where a demoted one goes on, the
+//! worker that had the core sleeps. Both have Linux ask the policy.
 
-use crate::seats::Seats;
-use crate::sys::{self, ThreadId};
+use std::fs;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::sys;
+use crate::sys::ThreadId;
 
 /// Where the levels end, if nobody says otherwise.
 pub(crate) const USUAL_TOP: i32 = 49;
@@ -73,5 +87,151 @@ impl Levels {
                 Ok(())
             }
         };
+    }
+}
+
+/// The policy's name.
+const NAME: &str = "fass_seats";
+/// Where its table is pinned.
+const PLACE: &std::ffi::CStr = c"/sys/fs/bpf/fass_seats";
+/// How many threads it has a word for: no Linux numbers more.
+const THREADS: usize = 1 << 22;
+/// What Linux calls the numbering of threads that is not a container's.
+const FIRST_NUMBERING: &str = "pid:[4026531836]";
+
+/// The table, with a byte for each thread and then the number of the program that has it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seats(&'static [AtomicU32]);
+
+impl Seats {
+    const OWNER: usize = THREADS / size_of::<AtomicU32>();
+
+    /// Takes the policy for this program.
+    ///
+    /// # Errors
+    ///
+    /// Fact and remedy, in a line.
+    pub(crate) fn take() -> Result<Self, String> {
+        let read = |name: &str| {
+            let text = fs::read_to_string(format!("/sys/kernel/sched_ext/{name}"));
+            text.map(|text| text.trim().to_owned())
+        };
+        check(
+            read("state").ok().as_deref(),
+            read("root/ops").ok().as_deref(),
+        )?;
+        let numbering = fs::read_link("/proc/self/ns/pid");
+        if numbering.is_ok_and(|name| name.as_os_str() != FIRST_NUMBERING) {
+            return Err(
+                "this program is in a container that numbers threads anew, and the policy \
+                 `fass_seats` knows them by number; do run it outside, or with the host's \
+                 numbers (`--pid=host`)"
+                    .to_owned(),
+            );
+        }
+        static TABLE: OnceLock<Result<Seats, String>> = OnceLock::new();
+        let table = TABLE.get_or_init(|| {
+            let bytes = THREADS + size_of::<AtomicU32>();
+            let table = sys::pinned_table(PLACE, bytes).map(Self);
+            table.map_err(|why| {
+                format!(
+                    "the table of the policy `{NAME}`, {}, is refused ({why}); do run it as \
+                     root, or `setcap cap_bpf+ep PROGRAM`",
+                    PLACE.to_string_lossy()
+                )
+            })
+        });
+        let seats = table.clone()?;
+        seats.own()?;
+        Ok(seats)
+    }
+
+    /// Makes this program the one with whose end the policy is unloaded.
+    fn own(self) -> Result<(), String> {
+        let (me, owner) = (std::process::id(), &self.0[Self::OWNER]);
+        let taken = owner.compare_exchange(0, me, Ordering::AcqRel, Ordering::Acquire);
+        match taken {
+            Err(other) if other != me => Err(format!(
+                "program {other} has the policy `{NAME}`; do end that one first"
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Puts a thread at a place in the order, 0 being that of all programs.
+    pub(crate) fn put(self, thread: ThreadId, rank: u8) {
+        let Ok(number) = usize::try_from(thread.0) else {
+            return;
+        };
+        let (word, shift) = (&self.0[number / 4 % Self::OWNER], number % 4 * 8);
+        // Another thread's byte may be changed at the same time.
+        let _ = word.fetch_update(Ordering::AcqRel, Ordering::Relaxed, |word| {
+            Some(word & !(0xff << shift) | u32::from(rank) << shift)
+        });
+    }
+}
+
+/// Looks at what the kernel says of `sched_ext`: its state, and the loaded policy's name.
+fn check(state: Option<&str>, policy: Option<&str>) -> Result<(), String> {
+    const LOAD: &str = "do load it, as root: `bpftool struct_ops register seats.bpf.o`";
+    match (state, policy) {
+        (None, _) => Err(
+            "this kernel has no sched_ext; do use Linux 6.13 or later with \
+             CONFIG_SCHED_CLASS_EXT, or `./scripts/linux`, which boots one in QEMU"
+                .to_owned(),
+        ),
+        (Some("enabled"), Some(NAME)) => Ok(()),
+        (Some("enabled"), Some(other)) => Err(format!(
+            "the policy `{other}` of sched_ext is loaded, and Linux has one at a time; do end it, \
+             and {LOAD}"
+        )),
+        _ => Err(format!("the policy `{NAME}` is not loaded; {LOAD}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+    use crate::sys::ThreadId;
+
+    #[test]
+    fn each_refusal_has_its_remedy_in_one_line() {
+        for (state, policy, says) in [
+            (None, None, "this kernel has no sched_ext; do "),
+            (
+                Some("disabled"),
+                None,
+                "the policy `fass_seats` is not loaded; do load it, ",
+            ),
+            (
+                Some("enabled"),
+                Some("simple"),
+                "the policy `simple` of sched_ext is loaded, ",
+            ),
+        ] {
+            let why = check(state, policy).expect_err("it is refused");
+            assert!(why.starts_with(says) && !why.contains('\n'), "{why}");
+        }
+        assert_eq!(check(Some("enabled"), Some("fass_seats")), Ok(()));
+    }
+
+    #[test]
+    fn a_thread_is_put_where_the_policy_looks_and_no_other_is_moved() {
+        let words: Vec<AtomicU32> = (0..=Seats::OWNER).map(|_| AtomicU32::new(0)).collect();
+        let seats = Seats(Vec::leak(words));
+        for (thread, rank) in [(4, 1), (5, 2), (7, 4), (5, 3), (i32::MAX, 9), (-1, 9)] {
+            seats.put(ThreadId(thread), rank);
+        }
+        assert_eq!(
+            seats.0[1].load(Ordering::Relaxed).to_le_bytes(),
+            [1, 3, 0, 4]
+        );
+        assert_eq!(seats.0[Seats::OWNER].load(Ordering::Relaxed), 0);
+        assert!(seats.own().is_ok() && seats.own().is_ok(), "it has it");
+        seats.0[Seats::OWNER].store(1, Ordering::Relaxed);
+        let why = seats.own().expect_err("another one has it");
+        assert!(why.starts_with("program 1 has the policy"), "{why}");
     }
 }

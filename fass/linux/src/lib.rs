@@ -38,18 +38,13 @@
 
 mod control;
 mod edge;
-mod end_signals;
-mod lead;
 mod level;
 mod look_out;
 mod machine;
 mod office;
-mod parked;
 mod platform;
-mod recording;
 mod release;
 mod run;
-mod seats;
 mod state;
 #[allow(
     unsafe_code,
@@ -57,12 +52,10 @@ mod state;
 )]
 mod sys;
 mod team;
-mod warnings;
 mod wires;
 mod worker;
 
-pub use control::Control;
-pub use end_signals::EndSignals;
+pub use control::{Control, EndSignals};
 pub use machine::{Linux, Mechanism, StartError, now_ns, own_core, processors};
 pub use run::{Counts, Run};
 pub use state::Fault;

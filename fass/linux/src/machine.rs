@@ -1,22 +1,23 @@
 //! The machine as an app sees it: so many cores of this computer.
 
-use std::fmt;
-use std::io;
+use std::io::{self, Write};
 use std::os::fd::AsFd;
 use std::sync::OnceLock;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
+use std::{fmt, fs};
 
+use fass::edge::{Drained, Kept, Outcome, Wish};
 use fass::{Platform as _, Preemption, Signal, Terms};
 
-use crate::control::{self, Control};
-use crate::level::{Levels, USUAL_TOP};
+use crate::control::Control;
+use crate::edge::{FILE, File, IS_LIVE, LEFT, unpoisoned};
+use crate::level::{Levels, Seats, USUAL_TOP};
 use crate::platform::{HOST, Threads};
-use crate::run::{self, Run};
-use crate::seats::Seats;
-use crate::sys;
+use crate::run::Run;
 use crate::team::with_own_worker;
-use crate::warnings;
 use crate::worker::Worker;
+use crate::{control, edge, run, sys};
 
 /// How the scheduler's decisions are carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,7 +157,7 @@ impl Linux {
         match mechanism {
             Mechanism::Fifo => match Levels::of_fifo(USUAL_TOP) {
                 Ok(taken) => levels = Some(taken),
-                Err(why) => found.push(warnings::no_privilege(USUAL_TOP, &why)),
+                Err(why) => found.push(no_privilege(USUAL_TOP, &why)),
             },
             Mechanism::SchedExt => {
                 levels = Some(Levels::SchedExt(Seats::take().map_err(StartError)?));
@@ -165,7 +166,7 @@ impl Linux {
         }
         if levels.is_some() {
             let is_throttled = mechanism == Mechanism::Fifo;
-            found.extend(warnings::look(&processors, is_throttled));
+            found.extend(look(&processors, is_throttled));
         }
         static IS_OURS: OnceLock<bool> = OnceLock::new();
         assert!(
@@ -343,4 +344,155 @@ impl Drop for Linux {
         *HOST.threads() = None;
         control::set(None);
     }
+}
+
+/// How much may wait to be sent.
+const ROOM_BYTES: usize = 8 << 20;
+
+impl Linux {
+    /// Keeps a record of the commits and runs to come, with the values that are recorded, by the
+    /// name of an app. What is there is written while a run goes on, too.
+    ///
+    /// ```no_run
+    /// use std::fs::File;
+    /// use linux::{Linux, Mechanism};
+    ///
+    /// let machine = Linux::new(2, Mechanism::Fifo).expect("two processors are there");
+    /// machine.record("pump", File::create("pump.rec").expect("a file"));
+    /// // build DAGs, name topics by `Dag::record`, commit
+    /// machine.run().expect("it is committed");
+    /// machine.end_recording(true);
+    /// Linux::end_record().expect("the file is written");
+    /// ```
+    pub fn record(&self, app: &'static str, to: impl Write + Send + 'static) {
+        self.record_as(app, true, to);
+    }
+
+    /// Works like [`record`](Self::record), and takes also a run of which no value is recorded.
+    pub fn keep(&self, app: &'static str, to: impl Write + Send + 'static) {
+        self.record_as(app, false, to);
+    }
+
+    fn record_as(&self, app: &'static str, is_needed: bool, to: impl Write + Send + 'static) {
+        self.keep_events(to);
+        IS_LIVE.store(true, Ordering::Relaxed);
+        let wish = Wish::Record {
+            app,
+            bytes: ROOM_BYTES,
+            is_needed,
+        };
+        edge::get().set_wish(Box::leak(Box::new(wish)));
+    }
+
+    /// Keeps a record without values, each run of it when that is over.
+    ///
+    /// See [`record`](Self::record).
+    pub fn keep_events(&self, to: impl Write + Send + 'static) {
+        *unpoisoned(&FILE) = Some(Kept::new(File {
+            writer: Box::new(to),
+            failure: None,
+        }));
+    }
+
+    /// Has the run to come replay a recording, which may begin with this job of a DAG, or before.
+    pub fn replay(&self, recording: &'static [u8], from: Option<(&'static str, u64)>) {
+        let bytes = recording;
+        edge::get().set_wish(Box::leak(Box::new(Wish::Replay { bytes, from })));
+    }
+
+    /// Lets people look at what crosses, by [`watch`](fass::edge::Edge::watch).
+    pub fn let_look(&self) {
+        edge::get().let_look();
+    }
+
+    /// Writes the rest of what a run has recorded. Returns what a replay has found, and how
+    /// complete the recording is. `is_over`: the run has not been ended before its time.
+    ///
+    /// See [`record`](Self::record).
+    pub fn end_recording(&self, is_over: bool) -> (Option<Outcome>, Option<Drained>) {
+        let outcome = edge::get().end_run(is_over);
+        let left = unpoisoned(&LEFT).take();
+        let end = |file: &mut Kept<File>| file.end_recording(left);
+        (outcome, unpoisoned(&FILE).as_mut().and_then(end))
+    }
+
+    /// Writes the end of the record.
+    ///
+    /// # Errors
+    ///
+    /// Why it could not be written.
+    ///
+    /// See [`record`](Self::record).
+    pub fn end_record() -> io::Result<()> {
+        let Some(file) = unpoisoned(&FILE).take() else {
+            return Ok(());
+        };
+        let mut file = file.end();
+        file.flush();
+        file.failure.map_or(Ok(()), Err)
+    }
+
+    /// Returns why a recording or a replay could not be, and how a replay differed from its
+    /// recording, if that is so.
+    #[must_use]
+    pub fn objections() -> [Option<String>; 2] {
+        let edge = edge::get();
+        [edge.refusal(), edge.complaint()].map(|text| text.map(str::to_owned))
+    }
+}
+
+/// Says that SCHED_FIFO is refused, and what that means.
+fn no_privilege(top: i32, why: &io::Error) -> String {
+    format!(
+        "SCHED_FIFO is refused ({why}), so nothing is preempted, and other programs share the \
+         cores; do run it as root, or `setcap cap_sys_nice+ep PROGRAM`, or allow `rtprio {top}` \
+         in /etc/security/limits.conf"
+    )
+}
+
+/// Looks at the kernel's settings, those for real-time classes among them if these are used, and
+/// locks the memory.
+pub(crate) fn look(processors: &[u32], is_real_time: bool) -> Vec<String> {
+    let mut found = Vec::new();
+    let setting = |name: &str| {
+        read(&format!("/proc/sys/kernel/{name}"))?
+            .parse::<i64>()
+            .ok()
+    };
+    if let (Some(runtime), Some(period)) = (
+        setting("sched_rt_runtime_us"),
+        setting("sched_rt_period_us"),
+    ) && is_real_time
+        && runtime >= 0
+        && runtime < period
+    {
+        found.push(format!(
+            "the kernel may take {} of every {period} us from all SCHED_FIFO threads of a core; \
+             do `sysctl -w kernel.sched_rt_runtime_us=-1` if they need it for so long at a stretch",
+            period - runtime
+        ));
+    }
+    if let Err(why) = sys::lock_memory() {
+        found.push(format!(
+            "memory is not locked ({why}), so a page fault can delay an instance; do raise the \
+             limit (`ulimit -l unlimited`, or LimitMEMLOCK=infinity in the service)"
+        ));
+    }
+    let slow = processors.iter().find_map(|processor| {
+        let name = format!("/sys/devices/system/cpu/cpu{processor}/cpufreq/scaling_governor");
+        let governor = read(&name)?;
+        (governor != "performance").then_some((processor, governor))
+    });
+    if let Some((processor, governor)) = slow {
+        found.push(format!(
+            "processor {processor} changes its frequency (governor {governor}), so execution times \
+             vary; do `cpupower frequency-set -g performance`"
+        ));
+    }
+    found
+}
+
+fn read(name: &str) -> Option<String> {
+    let text = fs::read_to_string(name).ok()?;
+    Some(text.trim().to_owned())
 }

@@ -13,12 +13,12 @@ use sched_dag::ClusterId;
 use sched_dag::engine::{Continuation, Port as _};
 
 use crate::edge;
-use crate::lead::Lead;
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
 use crate::office::Office;
 use crate::state::{Left, Number, State};
 use crate::sys;
+use crate::worker::Lead;
 use crate::worker::Worker;
 
 thread_local! {

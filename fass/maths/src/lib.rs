@@ -28,9 +28,6 @@
 #![no_std]
 
 mod arcs;
-#[allow(unsafe_code, reason = "the processor's square root")]
-mod root;
-pub mod single;
 mod turns;
 
 pub use arcs::{acos, asin, atan, atan2};
@@ -51,4 +48,47 @@ fn nearest_integer(x: f64) -> (f64, u64) {
 fn polynomial(x: f64, coefficients: &[f64]) -> f64 {
     let highest_first = coefficients.iter().rev();
     highest_first.fold(0.0, |sum, coefficient| sum * x + coefficient)
+}
+
+#[allow(unsafe_code, reason = "the processor's square root")]
+mod root {
+    use core::arch::x86_64::{_mm_cvtsd_f64, _mm_set_sd, _mm_sqrt_sd};
+
+    /// Returns the square root, rounded to the nearest; NaN of a negative number.
+    #[must_use]
+    pub fn sqrt(x: f64) -> f64 {
+        // SAFETY: SSE2 is part of every x86_64 processor, and code for it is compiled with SSE2.
+        unsafe { root(x) }
+    }
+
+    #[target_feature(enable = "sse2")]
+    fn root(x: f64) -> f64 {
+        let x = _mm_set_sd(x);
+        _mm_cvtsd_f64(_mm_sqrt_sd(x, x))
+    }
+}
+
+/// The functions of `f32`, calculated in `f64` and rounded once more.
+pub mod single {
+    macro_rules! single {
+        ($($name:ident($($argument:ident),+): $what:literal;)+) => {$(
+            #[doc = concat!("Returns ", $what, "; see [`", stringify!($name), "`](super::", stringify!($name), ").")]
+            #[must_use]
+            #[allow(clippy::cast_possible_truncation, reason = "rounding is what is wanted")]
+            pub fn $name($($argument: f32),+) -> f32 {
+                super::$name($(f64::from($argument)),+) as f32
+            }
+        )+};
+    }
+
+    single! {
+        sqrt(x): "the square root";
+        sin(angle): "the sine of an angle in radians";
+        cos(angle): "the cosine of an angle in radians";
+        tan(angle): "the tangent of an angle in radians";
+        atan(x): "the angle whose tangent is `x`, in radians";
+        asin(x): "the angle whose sine is `x`, in radians";
+        acos(x): "the angle whose cosine is `x`, in radians";
+        atan2(y, x): "the angle of the point (x, y), in radians";
+    }
 }

@@ -6,8 +6,8 @@ use recording::{Channel, Entry, Recordable, Recording, Shown, What};
 use sched_dag::{DagId, Instance, JobOutcome, SubtaskId, Topic};
 
 use crate::edge::Divergence;
-use crate::record::{InstanceRecord, JobRecord};
 use crate::report::Report;
+use crate::report::{InstanceRecord, JobRecord};
 
 /// A job and all that is known of its subtasks. Shown, it is text with a line for each value.
 ///

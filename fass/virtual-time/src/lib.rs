@@ -32,21 +32,14 @@
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
-mod calls;
 mod command;
-mod dag_report;
-mod disturbed;
 mod edge;
-mod error;
 mod job;
 mod platform;
-mod record;
 mod report;
 mod session;
 mod settings;
-mod silent;
 mod surroundings;
-mod wires;
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -59,16 +52,15 @@ pub use sched_dag::{
 };
 
 pub use command::replay_command;
-pub use dag_report::DagReport;
 pub use edge::Divergence;
-pub use error::RunError;
 pub use job::{JobShown, Passed, SubtaskShown, Value};
 use platform::Machine;
-pub use record::{InstanceRecord, JobRecord, PanicRecord};
-pub use report::Report;
+pub use report::{DagReport, InstanceRecord, JobRecord, Report};
 pub use sched_dag::journal::{Event, What};
+pub use session::RunError;
 use settings::Settings;
-pub use silent::Silent;
+pub use settings::Silent;
+pub use surroundings::PanicRecord;
 
 /// A machine in virtual time, belonging to the thread that makes it.
 ///

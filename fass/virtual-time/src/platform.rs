@@ -17,10 +17,10 @@ use fass::{LaunchError, Occupation, Plan, Platform, Recorded, Terms};
 use recording::Channel;
 use sched_dag::{DagId, TaskSet};
 
-use crate::error::RunError;
 use crate::job::JobShown;
 use crate::nanoseconds;
 use crate::report::Report;
+use crate::session::RunError;
 use crate::session::Session;
 use crate::surroundings::Surroundings;
 

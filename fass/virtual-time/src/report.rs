@@ -1,17 +1,16 @@
-//! What a run leaves behind.
+//! What a run leaves behind: of the whole, of each DAG, each job and each instance.
 
 use std::ops::Deref;
 
 use fass::edge::Outcome;
 use fass::log::Line;
-use sched_dag::Instance;
 use sched_dag::engine::Run;
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{self, Terms, Violation};
+use sched_dag::{DagId, DagKey, DagStatistics, Instance, SubtaskKey};
 
-use crate::calls::Calls;
 use crate::edge::Divergence;
-use crate::record::{InstanceRecord, JobRecord, PanicRecord};
+use crate::surroundings::{Calls, PanicRecord};
 
 /// Everything that happened from the commit to the end of a run: the engine's [`Run`], and what
 /// only virtual time knows.
@@ -201,6 +200,186 @@ impl Report {
             _ => String::new(),
         };
         format!("{time_ns} {what} {name}[{job}]{}", more.to_lowercase())
+    }
+}
+
+/// What one DAG did in a run.
+///
+/// See [`Report::dag`].
+#[derive(Clone, Copy, Debug)]
+pub struct DagReport<'r> {
+    report: &'r Report,
+    id: DagId,
+}
+
+impl Report {
+    /// Returns what a DAG did, which is asked for by its name, or by the handle that built it.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such DAG: a test that asks for one is wrong.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let machine = VirtualTime::new();
+    /// let (dag, ms) = (create_dag(), Duration::from_millis);
+    /// dag.name("clock").jobs(2).relative_deadline(ms(5));
+    /// let tick = SubtaskAttributes::named("tick").wcet(ms(1));
+    /// dag.register_periodic_subtask(|| (), vec![], ms(10), tick);
+    /// finish_create_dags(&[dag]).unwrap();
+    ///
+    /// let report = machine.run();
+    /// let clock = report.dag("clock");
+    /// assert_eq!(clock.statistics().completed, 2);
+    /// assert_eq!(clock.jobs().filter_map(|job| job.response_time_ns()).max(), Some(1_000_000));
+    /// assert_eq!(clock.subtask("tick")[1].start_ns, Some(10_000_000));
+    /// assert_eq!((clock.sink_misses("tick"), clock.is_degraded()), (0, false));
+    /// assert_eq!(report.dags().count(), 1);
+    /// ```
+    #[must_use]
+    #[track_caller]
+    pub fn dag(&self, dag: impl DagKey) -> DagReport<'_> {
+        DagReport {
+            report: self,
+            id: self.task_set().find(dag),
+        }
+    }
+
+    /// Returns what each DAG did, in the order of the commit.
+    ///
+    /// See [`dag`](Self::dag).
+    pub fn dags(&self) -> impl Iterator<Item = DagReport<'_>> {
+        let ids = (0..).map(DagId).take(self.task_set().dags().len());
+        ids.map(|id| DagReport { report: self, id })
+    }
+}
+
+impl<'r> DagReport<'r> {
+    /// Returns the scheduler's counters.
+    ///
+    /// See [`Report::dag`].
+    #[must_use]
+    pub fn statistics(&self) -> &'r DagStatistics {
+        self.report.statistics(self.id)
+    }
+
+    /// Returns in how many jobs a sink was late.
+    ///
+    /// # Panics
+    ///
+    /// If it is no sink of the DAG.
+    ///
+    /// See [`Report::dag`].
+    #[must_use]
+    #[track_caller]
+    pub fn sink_misses(&self, sink: impl SubtaskKey) -> u64 {
+        self.report.sink_misses(self.id, sink)
+    }
+
+    /// Reports whether a subtask of the DAG has fallen back on its second function.
+    ///
+    /// See [`Report::dag`].
+    #[must_use]
+    pub fn is_degraded(&self) -> bool {
+        self.report.degraded[self.id.index()]
+    }
+
+    /// Returns the jobs that were released, in that order.
+    ///
+    /// See [`Report::dag`].
+    pub fn jobs(&self) -> impl Iterator<Item = &'r JobRecord> + use<'r> {
+        let id = self.id;
+        self.report.jobs.iter().filter(move |job| job.dag == id)
+    }
+
+    /// Returns the records of a subtask's instances, in the order of its jobs.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such subtask.
+    ///
+    /// See [`Report::dag`].
+    #[must_use]
+    #[track_caller]
+    pub fn subtask(&self, subtask: impl SubtaskKey) -> Vec<InstanceRecord> {
+        let subtask = self.report.task_set().dag(self.id).find(subtask);
+        let all = self.report.instances.iter();
+        let is_of = |record: &&InstanceRecord| {
+            (record.instance.dag, record.instance.subtask) == (self.id, subtask)
+        };
+        all.filter(is_of).copied().collect()
+    }
+}
+
+/// An instance that became ready, with its [times](law::InstanceRecord).
+///
+/// See [`Report`](crate::Report).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InstanceRecord {
+    /// The instance.
+    pub instance: Instance,
+    /// How long it executes in all, in nanoseconds, once it has begun.
+    pub execution_ns: u64,
+    pub(crate) times: law::InstanceRecord,
+}
+
+/// A job that was released, with its [times](law::JobRecord).
+///
+/// See [`Report`](crate::Report).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JobRecord {
+    /// The DAG.
+    pub dag: DagId,
+    /// The job.
+    pub job: u64,
+    /// The nominal release time, in nanoseconds, from which the deadline counts.
+    pub release_ns: u64,
+    /// The absolute deadline of the whole job, the latest one of its sinks'.
+    pub deadline_ns: u64,
+    pub(crate) times: law::JobRecord,
+}
+
+impl Deref for InstanceRecord {
+    type Target = law::InstanceRecord;
+
+    fn deref(&self) -> &law::InstanceRecord {
+        &self.times
+    }
+}
+
+impl Deref for JobRecord {
+    type Target = law::JobRecord;
+
+    fn deref(&self) -> &law::JobRecord {
+        &self.times
+    }
+}
+
+impl JobRecord {
+    /// Takes the job of a release.
+    pub(crate) fn new(run: &Run, release: &Event) -> Option<Self> {
+        let Event { dag, job, .. } = *release;
+        let times = *run.record().job(dag, job)?;
+        let release_ns = times.release_ns.unwrap_or(release.time_ns);
+        let deadline_ns = run.task_set().dag(dag).relative_deadline_ns();
+        Some(Self {
+            dag,
+            job,
+            release_ns,
+            deadline_ns: release_ns.saturating_add(deadline_ns),
+            times,
+        })
+    }
+
+    /// Returns the time from the nominal release to the end, if there was one.
+    ///
+    /// See [`Report`](crate::Report).
+    #[must_use]
+    pub fn response_time_ns(&self) -> Option<u64> {
+        self.ended_ns.map(|ended_ns| ended_ns - self.release_ns)
     }
 }
 

@@ -2,8 +2,11 @@
 //!
 //! The driver is `sched_dag::virtual_time`, the one loop in virtual time, which has the engine
 //! with the bodies and the journal; it asks for the execution time of each instance at its start.
-//! [`Calls`] answers by running the instance's real body and adding up what it executed.
+//! [`Calls`] answers by running the instance's real body and adding up what it executed. Why a run
+//! could not go on is a [`RunError`].
 
+use std::error::Error;
+use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,12 +15,9 @@ use fass::{Plan, Runner};
 use sched_dag::virtual_time::{End, VirtualTime as Driver};
 use sched_dag::{Dag, DagId, DagLabel, Instance, SchedulerOptions, SubtaskLabel, TaskSet};
 
-use crate::calls::Calls;
-use crate::error::RunError;
 use crate::nanoseconds;
-use crate::record::PanicRecord;
 use crate::report::Report;
-use crate::surroundings::Surroundings;
+use crate::surroundings::{Calls, PanicRecord, Surroundings};
 
 /// A plan that runs, or can go on running.
 #[derive(Debug)]
@@ -137,3 +137,87 @@ impl Session {
         edge.recording(&self.driver.run_so_far())
     }
 }
+
+/// Why a run in virtual time ended early, or could not begin.
+///
+/// ```
+/// use virtual_time::{RunError, VirtualTime};
+///
+/// let machine = VirtualTime::new(); // and nothing is committed
+/// assert!(matches!(machine.try_run(), Err(RunError::NothingToRun)));
+/// ```
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum RunError {
+    /// Nothing has been committed on this thread since the machine was made, or
+    /// an earlier run has failed.
+    NothingToRun,
+    /// A run to the end was asked for, but this DAG has no end.
+    Endless {
+        /// The DAG.
+        dag: DagLabel,
+    },
+    /// A subtask's function panicked, and the machine was not told to
+    /// [contain](crate::VirtualTime::contain_panics) that. No function runs
+    /// after it.
+    Panicked {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The job.
+        job: u64,
+        /// The panic's message.
+        message: String,
+        /// What happened up to the panic.
+        report: Box<Report>,
+    },
+    /// A job of a DAG was asked for that is not in the commit.
+    NoSuchDag {
+        /// The name.
+        name: String,
+        /// Those that are there.
+        there: String,
+    },
+    /// An instance would finish after `u64::MAX` nanoseconds.
+    TimeOverflow {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The job.
+        job: u64,
+    },
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NothingToRun => f.write_str(
+                "there is nothing to run; commit DAGs on this thread after making the `VirtualTime`",
+            ),
+            Self::Endless { dag } => write!(
+                f,
+                "{dag} has no limit of jobs, so its run has no end; set `jobs` or use `run_for`"
+            ),
+            Self::Panicked {
+                dag,
+                subtask,
+                job,
+                message,
+                ..
+            } => write!(f, "{subtask} of {dag} panicked in job {job}: {message}"),
+            Self::NoSuchDag { name, there } => {
+                write!(f, "there is no dag `{name}`; there are {there}")
+            }
+            Self::TimeOverflow { dag, subtask, job } => write!(
+                f,
+                "{subtask} of {dag} would finish job {job} after {} ns, the last time there is; \
+                 execute for less",
+                u64::MAX
+            ),
+        }
+    }
+}
+
+impl Error for RunError {}

@@ -1,9 +1,15 @@
-//! What a machine is asked to be, by the builder's methods, before the commit.
+//! What a machine is asked to be, by the builder's methods, before the commit; how long calls take
+//! that do not say, and what it suffers: interrupts that come late, and calls that fail.
+//!
+//! All of it follows from what was asked alone, so that a run can be repeated.
 
+use std::time::Duration;
+
+use common::random::{nth, scale};
 use fass::Terms;
+use sched_dag::{Dag, Instance, Subtask, TaskSet};
 
-use crate::disturbed::{Fault, Late};
-use crate::silent::Silent;
+use crate::{VirtualTime, nanoseconds};
 
 /// What a machine is asked to be.
 #[derive(Clone, Debug, Default)]
@@ -20,4 +26,178 @@ pub(crate) struct Settings {
     pub(crate) contains_panics: bool,
     /// How many jobs' inputs are kept, if not all is.
     pub(crate) most_jobs: Option<u32>,
+}
+
+/// How late a timer's interrupt is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Late {
+    pub(crate) most_ns: u64,
+    seed: u64,
+}
+
+/// A call that fails.
+#[derive(Clone, Debug)]
+pub(crate) struct Fault {
+    dag: String,
+    subtask: String,
+    job: u64,
+}
+
+impl VirtualTime {
+    /// Lets each interrupt of the scheduler's timer come late, by a time from 0 to `most` that
+    /// is drawn uniformly. It follows from the seed and the time at which the interrupt is due.
+    /// Another event that comes first does what is due.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let ms = Duration::from_millis;
+    /// let machine = VirtualTime::new().late(ms(1), 7);
+    /// let dag = create_dag();
+    /// dag.name("clock").jobs(20).period(ms(10)).relative_deadline(ms(10));
+    /// dag.register_untyped_subtask(|_| (), SubtaskAttributes::named("tick").wcet(ms(2)));
+    /// finish_create_dags(&[dag]).unwrap();
+    ///
+    /// let report = machine.run();
+    /// let late_ns = |job: &virtual_time::JobRecord| job.released_ns.unwrap() - job.release_ns;
+    /// assert!(report.jobs.iter().any(|job| late_ns(job) > 500_000));
+    /// assert!(report.jobs.iter().all(|job| late_ns(job) <= 1_000_000));
+    /// assert_eq!(report.violations(), []);
+    /// ```
+    #[must_use = "the machine itself is returned"]
+    pub fn late(self, most: Duration, seed: u64) -> Self {
+        let most_ns = nanoseconds(most);
+        self.set(|settings| settings.late = Late { most_ns, seed })
+    }
+
+    /// Lets one call fail: in place of its function it executes as long as
+    /// [`silent`](Self::silent) says, and then has the fault. May be called several times, and
+    /// [contains](Self::contain_panics) panics. A commit without such a subtask is refused.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let ms = Duration::from_millis;
+    /// let machine = VirtualTime::new().fault("clock", "tick", 3);
+    /// let dag = create_dag();
+    /// dag.name("clock").jobs(20).period(ms(10)).relative_deadline(ms(10));
+    /// dag.register_untyped_subtask(|_| (), SubtaskAttributes::named("tick").wcet(ms(2)));
+    /// finish_create_dags(&[dag]).unwrap();
+    ///
+    /// let report = machine.run();
+    /// assert_eq!(report.dag("clock").statistics().completed, 3);
+    /// assert_eq!(report.panics[0].instance.job, 3);
+    /// assert_eq!(report.end_ns, 32_000_000);
+    /// ```
+    #[must_use = "the machine itself is returned"]
+    pub fn fault(self, dag: &str, subtask: &str, job: u64) -> Self {
+        let fault = Fault {
+            dag: dag.into(),
+            subtask: subtask.into(),
+            job,
+        };
+        self.set(|settings| settings.faults.push(fault))
+            .contain_panics()
+    }
+}
+
+impl Late {
+    /// Returns how late the interrupt is that is due then.
+    pub(crate) fn of_interrupt_ns(self, due_ns: u64) -> u64 {
+        scale(nth(nth(self.seed, 0) ^ due_ns, 0), 0..=self.most_ns)
+    }
+}
+
+impl Fault {
+    fn is_of(&self, dag: &Dag, subtask: &Subtask) -> bool {
+        self.dag == dag.name() && self.subtask == subtask.name()
+    }
+
+    /// Reports whether it is this call that has to fail.
+    pub(crate) fn is(&self, instance: Instance, task_set: &TaskSet) -> bool {
+        let dag = task_set.dag(instance.dag);
+        self.job == instance.job && self.is_of(dag, dag.subtask(instance.subtask))
+    }
+
+    /// Returns the names of DAG and subtask if there is no such call.
+    pub(crate) fn absent(&self, task_set: &TaskSet) -> Option<(&str, &str)> {
+        let is_in = |dag: &Dag| {
+            dag.subtasks()
+                .iter()
+                .any(|subtask| self.is_of(dag, subtask))
+        };
+        let is_there = task_set.dags().iter().any(is_in);
+        (!is_there).then_some((&self.dag, &self.subtask))
+    }
+}
+
+/// The time that a call takes if its function executes nothing by `fass::execute_for`, and
+/// the subtask has a WCET. Without one it takes none.
+///
+/// ```
+/// use std::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::{Silent, VirtualTime};
+///
+/// let response_ns = |silent| {
+///     let machine = VirtualTime::new().silent(silent);
+///     let (dag, period) = (create_dag(), Duration::from_millis(10));
+///     dag.period(period).relative_deadline(period).jobs(1);
+///     let tick = SubtaskAttributes::named("tick").wcet(Duration::from_millis(2));
+///     dag.register_untyped_subtask(|_| (), tick);
+///     finish_create_dags(&[dag]).unwrap();
+///     let report = machine.run();
+///     assert_eq!(report.took_no_time(), silent == Silent::NoTime);
+///     report.jobs[0].response_time_ns().unwrap()
+/// };
+/// assert_eq!(response_ns(Silent::NoTime), 0);
+/// assert_eq!(response_ns(Silent::Wcet), 2_000_000);
+/// assert!((1..=2_000_000).contains(&response_ns(Silent::Drawn { seed: 7 })));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Silent {
+    /// None.
+    NoTime,
+    /// Its WCET: stated, or observed ([`VirtualTime::wcets`](crate::VirtualTime::wcets)).
+    #[default]
+    Wcet,
+    /// A time from 1 ns to the WCET, drawn uniformly. It follows from the seed and the
+    /// instance alone.
+    Drawn {
+        /// The seed.
+        seed: u64,
+    },
+}
+
+impl Silent {
+    /// Returns how long a call takes, in nanoseconds.
+    pub(crate) fn of_call_ns(self, instance: Instance, wcet_ns: Option<u64>) -> u64 {
+        let wcet_ns = wcet_ns.unwrap_or(0);
+        match self {
+            Self::NoTime => 0,
+            Self::Wcet => wcet_ns,
+            Self::Drawn { seed } => {
+                let Instance { dag, subtask, job } = instance;
+                let numbers = [dag.0.into(), subtask.0.into(), job].into_iter();
+                let drawn = numbers.fold(nth(seed, 0), |drawn, n| nth(drawn ^ n, 0));
+                scale(drawn, wcet_ns.min(1)..=wcet_ns)
+            }
+        }
+    }
+}
+
+impl VirtualTime {
+    /// Sets how long a call takes whose function does not say so by `fass::execute_for`: its
+    /// WCET, unless this says otherwise. What executes counts from the call's start, so
+    /// `fass::now_ns` in the function does not show it.
+    ///
+    /// See [`Silent`].
+    #[must_use = "the machine itself is returned"]
+    pub fn silent(self, silent: Silent) -> Self {
+        self.set(|settings| settings.silent = silent)
+    }
 }
