@@ -1,13 +1,12 @@
 //! Recording topics: stating which values shall be written down.
 
-use alloc::boxed::Box;
 use alloc::rc::Rc;
 
 use recording::Recordable;
 
 use super::dag::Dag;
 use crate::draft::checks::check_recorded;
-use crate::edge::{self, Crossing, Host, Wish};
+use crate::edge::{self, Begin, Host};
 use crate::platform::{expect_installed, record};
 use crate::run::line::Edge;
 use crate::run::message::Message;
@@ -16,19 +15,20 @@ use crate::run::record::RecordedTopic;
 static EDGE: Edge = Edge {
     crosses: || expect_installed().crosses(),
     has_results: || expect_installed().results_cross(),
-    open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels, begin),
+    open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels, BEGIN),
     record,
     replays: || expect_installed().replays(),
     replay: |channel, job, take| expect_installed().replay(channel, job, take),
 };
 
-fn begin(wish: Wish) -> Box<dyn Crossing> {
+const BEGIN: Begin = |wish, shows| {
     let host = Host {
         raise: |plan, dag| expect_installed().raise(plan, dag),
         now_ns: || expect_installed().now_ns(),
     };
-    edge::begin(wish, host)
-}
+    let crossing = wish.map(|wish| edge::begin(wish, host));
+    (crossing, shows.then(edge::begin_echo))
+};
 
 impl Dag {
     /// Records the values of a topic, where the platform records.

@@ -1,7 +1,6 @@
 //! What a person sees of a recorded topic while the run goes on: its latest value.
 //!
-//! Where people can look, this stands in front of what else is done with what crosses. Of the
-//! topic that is watched, a completion copies the value into one room, and the next one takes its
+//! Of the topic that is watched, a completion copies the value into one room, and the next one takes its
 //! place: a person reads slower than a DAG writes. The console takes it out, and
 //! makes its text in its own time.
 
@@ -13,19 +12,15 @@ use alloc::vec::Vec;
 use core::fmt;
 
 use recording::{Channel, Schema, Shown};
-use sched_dag::{DagId, Instance, Notice};
 
-use super::replay::Outcome;
-use super::{Crossing, Drain, Echoing, Seen};
+use super::{Echoing, Seen};
 use crate::run::line::Recorded;
-use crate::run::plan::Plan;
 
 /// The longest value that is shown, in bytes.
 const ROOM: usize = 512;
 
-/// Keeps the latest value of a topic, and passes on all that crosses.
+/// Keeps the latest value of a topic.
 pub(super) struct Echo {
-    inner: Option<Box<dyn Crossing>>,
     /// By channel: the topic and its type; none of what is sampled.
     topics: Vec<Option<(String, Arc<Schema>)>>,
     /// Whether the topics are those of a plan that is launched.
@@ -38,9 +33,8 @@ pub(super) struct Echo {
 }
 
 impl Echo {
-    pub(super) fn new(inner: Option<Box<dyn Crossing>>) -> Self {
+    pub(super) fn new() -> Self {
         Self {
-            inner,
             topics: Vec::new(),
             is_launched: false,
             watched: None,
@@ -52,6 +46,36 @@ impl Echo {
 }
 
 impl Echoing for Echo {
+    fn open(&mut self, channels: &[Channel]) {
+        if core::mem::take(&mut self.is_launched) {
+            self.topics.clear();
+            self.watch(None);
+        }
+        self.topics.extend(channels.iter().map(|channel| {
+            let schema = || Arc::new(channel.schema.clone());
+            channel
+                .role
+                .is_written()
+                .then(|| (channel.topic.clone(), schema()))
+        }));
+    }
+
+    fn launch(&mut self) {
+        self.is_launched = true;
+    }
+
+    fn record(&mut self, value: &Recorded<'_>) {
+        if self.watched == Some(value.channel) {
+            self.left_out += u64::from(self.kept.is_some());
+            let length = value.bytes.and_then(|bytes| {
+                let room = self.room.get_mut(..bytes.len())?;
+                room.copy_from_slice(bytes);
+                Some(bytes.len())
+            });
+            self.kept = Some((value.job, length));
+        }
+    }
+
     fn watch(&mut self, topic: Option<&str>) -> bool {
         let named = |of: &Option<(String, _)>| {
             let name = of.as_ref().map(|(name, _)| name.as_str());
@@ -82,86 +106,6 @@ impl Echoing for Echo {
     }
 }
 
-impl Crossing for Echo {
-    fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool {
-        if core::mem::take(&mut self.is_launched) {
-            self.topics.clear();
-            self.watch(None);
-        }
-        self.topics.extend(channels.iter().map(|channel| {
-            let schema = || Arc::new(channel.schema.clone());
-            channel
-                .role
-                .is_written()
-                .then(|| (channel.topic.clone(), schema()))
-        }));
-        if let Some(inner) = &mut self.inner {
-            inner.open(dag, graph, channels);
-        }
-        // Any topic may be the one that is watched, so each value has to come by here.
-        false
-    }
-
-    fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
-        self.is_launched = true;
-        self.inner
-            .as_mut()
-            .map_or(Ok(()), |inner| inner.launch(plan))
-    }
-
-    fn record(&mut self, value: &Recorded<'_>, at_ns: u64) {
-        if self.watched == Some(value.channel) {
-            self.left_out += u64::from(self.kept.is_some());
-            let length = value.bytes.and_then(|bytes| {
-                let room = self.room.get_mut(..bytes.len())?;
-                room.copy_from_slice(bytes);
-                Some(bytes.len())
-            });
-            self.kept = Some((value.job, length));
-        }
-        if let Some(inner) = &mut self.inner {
-            inner.record(value, at_ns);
-        }
-    }
-
-    fn happened(&mut self, notice: &Notice) {
-        if let Some(inner) = &mut self.inner {
-            inner.happened(notice);
-        }
-    }
-
-    fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
-        if let Some(inner) = &mut self.inner {
-            inner.failed(instance, at_ns, clock_ns);
-        }
-    }
-
-    fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
-        match &mut self.inner {
-            Some(inner) => inner.tell_time(instance, clock_ns, at_ns),
-            None => clock_ns,
-        }
-    }
-
-    fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        if let Some(inner) = &self.inner {
-            inner.lend(channel, job, take);
-        }
-    }
-
-    fn drain(&mut self) -> Option<Box<dyn Drain>> {
-        self.inner.as_mut()?.drain()
-    }
-
-    fn outcome(&self, is_over: bool) -> Option<Outcome> {
-        self.inner.as_ref()?.outcome(is_over)
-    }
-
-    fn echo(&mut self) -> Option<&mut dyn Echoing> {
-        Some(self)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -176,7 +120,7 @@ mod tests {
             topic: (*topic).into(),
             schema: u32::schema(),
         });
-        echo.open(DagId(0), 0, &channels.collect::<Vec<_>>());
+        echo.open(&channels.collect::<Vec<_>>());
     }
 
     fn record(echo: &mut Echo, channel: u16, job: u64, bytes: &[u8]) {
@@ -186,7 +130,7 @@ mod tests {
             completed_ns: 0,
             bytes: Some(bytes),
         };
-        echo.record(&value, 0);
+        echo.record(&value);
     }
 
     /// The job, the value as text, and how many were left out.
@@ -199,7 +143,7 @@ mod tests {
 
     #[test]
     fn the_latest_value_is_seen_and_others_are_counted() {
-        let mut echo = Echo::new(None);
+        let mut echo = Echo::new();
         let speed = ("speed", Role::Source);
         let topics = [("pose", Role::Sample), speed, ("pose", Role::Result)];
         open(&mut echo, &topics);

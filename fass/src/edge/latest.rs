@@ -19,7 +19,7 @@ use core::ops::Range;
 use recording::{Channel, Entry, Header, Role, What};
 use sched_dag::{DagId, Instance, Notice, journal};
 
-use super::replay::{Outcome, narrow};
+use super::replay::narrow;
 use super::tape::{Releases, SIGNALS};
 use super::{Crossing, Drain, Drained, Record, name, open};
 use crate::run::line::{LineOf, Recorded, room_for};
@@ -117,15 +117,9 @@ impl Crossing for Latest {
         }
     }
 
-    fn lend(&self, _channel: u16, _job: u64, _take: &mut dyn FnMut(&[u8])) {}
-
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
         let kept = self.kept.take_if(|kept| !kept.faults.is_empty())?;
         Some(Box::new(OfLatest(kept)))
-    }
-
-    fn outcome(&self, _is_over: bool) -> Option<Outcome> {
-        None
     }
 }
 

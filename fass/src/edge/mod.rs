@@ -67,8 +67,6 @@ pub enum Wish {
         /// How many jobs of each DAG.
         jobs: u32,
     },
-    /// Let people look at it, and do what else is wished.
-    Echo(Option<&'static Wish>),
 }
 
 /// What a replay needs of the platform.
@@ -79,8 +77,8 @@ pub(crate) struct Host {
     pub(crate) now_ns: fn() -> u64,
 }
 
-/// Begins to do what is wished.
-pub type Begin = fn(Wish) -> Box<dyn Crossing>;
+/// Begins to do what is wished, and, if people can look, what they see.
+pub type Begin = fn(Option<Wish>, bool) -> (Option<Box<dyn Crossing>>, Option<Box<dyn Echoing>>);
 
 /// What a platform asks for in order to record or to replay; times are of the run. What does
 /// not concern a replay, or a tape, does nothing there.
@@ -89,8 +87,8 @@ pub type Begin = fn(Wish) -> Box<dyn Crossing>;
 /// use fass::edge::{Begin, Crossing, Wish};
 ///
 /// /// What a platform does in `open_channels`, once.
-/// fn crossing(begin: Begin, file: &'static [u8]) -> Box<dyn Crossing> {
-///     begin(Wish::Replay { bytes: file, from: None })
+/// fn crossing(begin: Begin, file: &'static [u8]) -> Option<Box<dyn Crossing>> {
+///     begin(Some(Wish::Replay { bytes: file, from: None }), false).0
 /// }
 /// ```
 pub trait Crossing: Send {
@@ -126,17 +124,17 @@ pub trait Crossing: Send {
     }
 
     /// Lends the recorded value of a channel and a job, if there is one.
-    fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8]));
+    fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        let _ = (channel, job, take);
+    }
 
     /// Returns what core 0 has to do; the first time only. Of the last jobs there is a file when
     /// one has failed.
     fn drain(&mut self) -> Option<Box<dyn Drain>>;
 
     /// Returns what a replay has found; if the run is over, also a value that it has not computed.
-    fn outcome(&self, is_over: bool) -> Option<Outcome>;
-
-    /// Returns what shows values to people, if they can look.
-    fn echo(&mut self) -> Option<&mut dyn Echoing> {
+    fn outcome(&self, is_over: bool) -> Option<Outcome> {
+        let _ = is_over;
         None
     }
 }
@@ -144,7 +142,16 @@ pub trait Crossing: Send {
 /// Shows values of a recorded topic while the run goes on.
 ///
 /// See [`Crossing`].
-pub trait Echoing {
+pub trait Echoing: Send {
+    /// Takes the recorded topics of a DAG of the plan to come.
+    fn open(&mut self, channels: &[Channel]);
+
+    /// Takes note that the plan is there.
+    fn launch(&mut self);
+
+    /// Takes a value, at the completion of its writer.
+    fn record(&mut self, value: &Recorded<'_>);
+
     /// Keeps the latest value of this topic from now on, or nothing. Reports whether the topic is
     /// recorded.
     fn watch(&mut self, topic: Option<&str>) -> bool;
@@ -225,8 +232,12 @@ pub(crate) fn begin(wish: Wish, host: Host) -> Box<dyn Crossing> {
         Wish::Record { app, bytes, .. } => Box::new(tape::Tape::new(app, bytes)),
         Wish::Replay { bytes, from } => Box::new(machine::OfMachine::new(bytes, from, host)),
         Wish::Latest { app, jobs } => Box::new(latest::Latest::new(app, jobs)),
-        Wish::Echo(other) => Box::new(echo::Echo::new(other.map(|other| begin(*other, host)))),
     }
+}
+
+/// Begins to show values.
+pub(crate) fn begin_echo() -> Box<dyn Echoing> {
+    Box::new(echo::Echo::new())
 }
 
 /// Adds the recorded topics of a DAG to a header.
@@ -283,6 +294,7 @@ pub struct Edge {
     /// Whether people can look at what crosses.
     shows: bool,
     crossing: Option<Box<dyn Crossing>>,
+    echo: Option<Box<dyn Echoing>>,
     /// Whether a plan has been launched with it, so that events are of interest.
     is_on: bool,
     /// What sends the recording of the run to come.
@@ -303,6 +315,7 @@ impl Edge {
             wish: None,
             shows: false,
             crossing: None,
+            echo: None,
             is_on: false,
             outgoing: None,
             has_sent_latest: false,
@@ -348,13 +361,16 @@ impl Edge {
     /// Takes the recorded topics of a DAG, and reports whether their values are read where they
     /// are written.
     pub fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
-        let wish = match (self.wish, self.shows) {
-            (wish, true) => Wish::Echo(wish),
-            (Some(wish), false) => *wish,
-            (None, false) => return false,
-        };
-        let crossing = self.crossing.get_or_insert_with(|| begin(wish));
-        crossing.open(dag, graph, channels)
+        if self.is_wished() && self.crossing.is_none() && self.echo.is_none() {
+            (self.crossing, self.echo) = begin(self.wish.copied(), self.shows);
+        }
+        if let Some(echo) = &mut self.echo {
+            echo.open(channels);
+        }
+        let crossing = self.crossing.as_mut();
+        let is_read = crossing.is_some_and(|crossing| crossing.open(dag, graph, channels));
+        // Any topic may be the one that is watched, so each value has to come by here.
+        is_read && self.echo.is_none()
     }
 
     /// Makes a plan one that is recorded or replayed, if there is a wish, and begins a
@@ -364,14 +380,14 @@ impl Edge {
     ///
     /// If nothing of the plan is recorded, it does not fit a replay, or it is a second one.
     pub fn launch(&mut self, plan: &mut Plan, to: Option<&mut Record>) -> Result<bool, String> {
+        if let Some(echo) = &mut self.echo {
+            echo.launch();
+        }
         let word = match self.wish {
-            None => {
-                let launched = self.crossing.as_mut().map(|crossing| crossing.launch(plan));
-                return launched.unwrap_or(Ok(())).map(|()| false);
-            }
+            None => return Ok(false),
             Some(Wish::Record { .. }) => "record",
             Some(Wish::Replay { .. }) => "replay",
-            Some(Wish::Latest { .. } | Wish::Echo(_)) => "latest",
+            Some(Wish::Latest { .. }) => "latest",
         };
         let is_asked_for = !matches!(self.wish, Some(Wish::Latest { .. }));
         let is_needed = match self.wish {
@@ -453,6 +469,9 @@ impl Edge {
     /// Takes a value that is not read where it was written, and when that was in the time of the
     /// run.
     pub fn record(&mut self, value: &Recorded<'_>, at_ns: u64) {
+        if let Some(echo) = &mut self.echo {
+            echo.record(value);
+        }
         if let Some(crossing) = &mut self.crossing {
             crossing.record(value, at_ns);
         }
@@ -470,13 +489,12 @@ impl Edge {
     /// Keeps the latest value of a recorded topic from now on, or nothing. Reports whether there
     /// is such a topic.
     pub fn watch(&mut self, topic: Option<&str>) -> bool {
-        let echo = self.crossing.as_mut().and_then(|crossing| crossing.echo());
-        echo.is_some_and(|echo| echo.watch(topic))
+        (self.echo.as_mut()).is_some_and(|echo| echo.watch(topic))
     }
 
     /// Takes that value out, if there is one.
     pub fn take_seen(&mut self, into: &mut [u8]) -> Option<Seen> {
-        self.crossing.as_mut()?.echo()?.take(into)
+        self.echo.as_mut()?.take(into)
     }
 
     /// Lends a recorded value.

@@ -18,7 +18,7 @@ use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use recording::{Channel, Encoder, Entry, Header, Recordable, What};
 use sched_dag::{DagId, Instance, Notice, SubtaskId, TaskSet};
 
-use super::replay::{Outcome, narrow};
+use super::replay::narrow;
 use super::{Crossing, Drain, Drained, Record, name, open, recorded};
 use crate::run::cell::outbox::{Outbox, OutboxReader, Published, outbox, words_of};
 use crate::run::line::{LineOf, Recorded};
@@ -149,14 +149,8 @@ impl Crossing for Tape {
         clock_ns
     }
 
-    fn lend(&self, _channel: u16, _job: u64, _take: &mut dyn FnMut(&[u8])) {}
-
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
         self.drain.take()
-    }
-
-    fn outcome(&self, _is_over: bool) -> Option<Outcome> {
-        None
     }
 }
 
