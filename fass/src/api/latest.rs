@@ -26,7 +26,6 @@
 //! - Values may be sampled several times, or never.
 
 use alloc::rc::Rc;
-use core::fmt;
 
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
@@ -79,9 +78,8 @@ pub struct Latest<T> {
 /// [`Latest::sample`].
 ///
 /// See [`Latest`].
-pub struct Sampling<T> {
-    shared: Rc<SharedLatest<T>>,
-}
+#[derive(Debug)]
+pub struct Sampling<T>(Latest<T>);
 
 /// A value as a subtask finds it at its start: that of the latest complete instance
 /// of its writer. `None` in its place: none has been complete yet.
@@ -130,9 +128,8 @@ impl<T: Message + Sync> Latest<T> {
     /// See [`Latest`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn sample(&self) -> Sampling<T> {
-        Sampling {
-            shared: Rc::clone(&self.shared),
-        }
+        let shared = Rc::clone(&self.shared);
+        Sampling(Latest { shared })
     }
 }
 
@@ -163,9 +160,9 @@ impl<T: Message + Sync> Uses for Sampling<T> {
     type Guard<'a> = Looked<'a, T>;
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        let (sampler, number) = self.shared.sampler();
+        let (sampler, number) = self.0.shared.sampler();
         let mut draft = dag.draft.borrow_mut();
-        draft.samples.push((subtask, self.shared, number));
+        draft.samples.push((subtask, self.0.shared, number));
         sampler
     }
 
@@ -182,14 +179,4 @@ impl<T: Message + Sync> Uses for Sampling<T> {
     }
 }
 
-impl<T> fmt::Debug for Latest<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Latest").field(&self.shared.topic).finish()
-    }
-}
-
-impl<T> fmt::Debug for Sampling<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Sampling").field(&self.shared.topic).finish()
-    }
-}
+shown_as!(Latest<T>, |of| of.shared.topic);

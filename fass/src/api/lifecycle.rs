@@ -387,8 +387,4 @@ impl fmt::Debug for Modes {
     }
 }
 
-impl fmt::Debug for Mode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Mode").field(&self.number.0).finish()
-    }
-}
+shown_as!(Mode, |of| of.number.0);

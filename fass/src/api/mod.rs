@@ -3,6 +3,18 @@
 //! Everything said here is noted in a draft; nothing is judged before the commit, and
 //! nothing runs.
 
+/// Shows handles to people who debug: as what they are, and of what.
+macro_rules! shown_as {
+    ($Handle:ident $(<$T:ident>)?, |$of:ident| $what:expr) => {
+        impl $(<$T>)? core::fmt::Debug for $Handle $(<$T>)? {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                let $of = self;
+                f.debug_tuple(stringify!($Handle)).field(&$what).finish()
+            }
+        }
+    };
+}
+
 pub(crate) mod dag;
 pub(crate) mod latest;
 pub(crate) mod lifecycle;

@@ -320,11 +320,7 @@ impl<T> Clone for Parameter<T> {
     }
 }
 
-impl<T> fmt::Debug for Parameter<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Parameter").field(&self.0.name).finish()
-    }
-}
+shown_as!(Parameter<T>, |of| of.0.name);
 
 impl<T> sealed::Sealed for Reading<T> {}
 

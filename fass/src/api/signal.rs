@@ -14,7 +14,6 @@
 //! - the app's code outside subtasks ([`Signal::raise`]).
 
 use alloc::sync::Arc;
-use core::fmt;
 use core::sync::atomic::{AtomicU8, Ordering};
 use core::time::Duration;
 
@@ -222,8 +221,4 @@ implement_asking!(Raising, Raiser, |raising, draft, subtask| {
     draft.ask(subtask, Of::Signal(target))
 });
 
-impl fmt::Debug for Signal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Signal").field(&self.target()).finish()
-    }
-}
+shown_as!(Signal, |of| of.target());

@@ -32,7 +32,6 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::RefCell;
-use core::fmt;
 
 use recording::Recordable;
 use sched_dag::{StateSpec, StateUser};
@@ -360,8 +359,4 @@ fn refuse() -> ! {
     )
 }
 
-impl<T> fmt::Debug for State<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("State").field(&self.position).finish()
-    }
-}
+shown_as!(State<T>, |of| of.position);

@@ -208,11 +208,7 @@ pub struct Untyped {
     pub(crate) subtask: usize,
 }
 
-impl fmt::Debug for Untyped {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Untyped").field(&self.subtask).finish()
-    }
-}
+shown_as!(Untyped, |of| of.subtask);
 
 impl Dag {
     /// Registers a subtask without types, for a graph that is known only at run

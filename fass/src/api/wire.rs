@@ -279,11 +279,7 @@ impl PartialEq for Wire {
     }
 }
 
-impl fmt::Debug for Wire {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Wire").field(&self.name()).finish()
-    }
-}
+shown_as!(Wire, |of| of.name());
 
 /// The use of a wire by the subtask that receives. Made by [`Wire::receiving`].
 ///

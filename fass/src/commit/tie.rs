@@ -11,7 +11,7 @@ use core::cell::RefCell;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::lifecycle::Lifecycle;
-use sched_dag::{Activation, DagId, DagSpec, OnFault, SubtaskSpec, TaskSet};
+use sched_dag::{Activation, DagId, OnFault, SubtaskSpec, TaskSet};
 
 use super::answer::Answers;
 use super::staleness::writer_of;
@@ -39,6 +39,9 @@ pub(crate) fn tie(
         .map(|dag| core::mem::take(&mut dag.draft.borrow_mut().recorded));
     let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
     let any = recorded.iter().flatten().next();
+    let samples = dags.iter().map(|dag| samples(dags, dag, &recorded));
+    let samples: Vec<Vec<Sampled>> = samples.collect();
+    let lifecycle = lifecycle(dags);
     let mut lines = Vec::new();
     let bodies = ((0..)
         .map(DagId)
@@ -46,36 +49,21 @@ pub(crate) fn tie(
         .zip(task_set.dags())
         .zip(&recorded))
     .map(|(((id, dag), verified), of_dag)| {
-        let (spec, make_bodies, latest, effects, resets, states) = {
-            let mut draft = dag.draft.borrow_mut();
-            draft.is_committed = true;
-            let name = draft.spec.name.clone();
-            let named = DagSpec {
-                name,
-                ..DagSpec::default()
-            };
-            let spec = core::mem::replace(&mut draft.spec, named);
-            draft.target.set(number, id);
-            for tell in core::mem::take(&mut draft.receives) {
-                if spec.activation == Activation::Sporadic {
-                    tell(Arc::clone(&draft.target));
-                }
-            }
-            let effects = core::mem::take(&mut draft.effects);
-            let make_bodies = core::mem::take(&mut draft.make_bodies);
-            let resets = core::mem::take(&mut draft.resets);
-            let latest = draft.latest.clone();
-            let states = core::mem::take(&mut draft.states);
-            (spec, make_bodies, latest, effects, resets, states)
-        };
+        let draft = dag.draft.borrow_mut().close();
+        let (spec, latest) = (draft.spec, draft.latest);
+        draft.target.set(number, id);
+        if spec.activation == Activation::Sporadic {
+            let tell = |tell: Box<dyn FnOnce(_)>| tell(Arc::clone(&draft.target));
+            draft.receives.into_iter().for_each(tell);
+        }
         let around = any.map(|any| {
             let of_dag = OfDag {
                 dag: id,
                 spec: &spec,
                 order: verified.topological_order(),
                 recorded: of_dag,
-                samples: &samples(dags, dag, &recorded),
-                states: &states,
+                samples: &samples[id.index()],
+                states: &draft.states,
             };
             any.open_all(&of_dag, &mut lines)
         });
@@ -84,18 +72,26 @@ pub(crate) fn tie(
             OnFault::EndDag => 0,
             OnFault::DropJob(limit) => limit.in_all,
         };
-        resets.into_iter().for_each(|provide| provide.1(faults));
+        draft
+            .resets
+            .into_iter()
+            .for_each(|provide| provide.1(faults));
         let mut wiring = Wiring::new(&spec, &latest, slots);
         let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
             let any = of_dag.first();
             any.and_then(|any| any.source(of_dag, &spec, &mut wiring, subtask))
                 .unwrap_or_else(|| make_body(&mut wiring, subtask))
         };
-        let mut bodies: Vec<Body> = make_bodies.into_iter().enumerate().map(make).collect();
-        for (subtask, effect) in effects {
+        let mut bodies: Vec<Body> = draft
+            .make_bodies
+            .into_iter()
+            .enumerate()
+            .map(make)
+            .collect();
+        for (subtask, effect) in draft.effects {
             bodies[subtask].add_effects([effect]);
         }
-        for latest in latest {
+        for latest in &latest {
             let writes = |subtask: &SubtaskSpec| {
                 (subtask.outputs.iter()).any(|port| port.topic == latest.topic())
             };
@@ -116,7 +112,7 @@ pub(crate) fn tie(
         bodies,
         proven: answers.proven(),
         after_fault: dags.iter().map(handler).collect(),
-        lifecycle: lifecycle(dags),
+        lifecycle,
         staleness,
         lines,
     }

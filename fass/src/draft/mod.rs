@@ -107,6 +107,21 @@ pub(crate) struct Ends<'a> {
 struct Unknown;
 
 impl Draft {
+    /// Takes what was registered, for the commit, and leaves what handles may still ask for.
+    pub(crate) fn close(&mut self) -> Self {
+        let committed = Self {
+            spec: DagSpec {
+                name: self.spec.name.clone(),
+                ..DagSpec::default()
+            },
+            is_committed: true,
+            target: Arc::clone(&self.target),
+            on_fault: self.on_fault.clone(),
+            ..Self::default()
+        };
+        core::mem::replace(self, committed)
+    }
+
     /// Adds a subtask and returns its label.
     pub(crate) fn register(
         &mut self,
