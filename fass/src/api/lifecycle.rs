@@ -2,9 +2,9 @@
 //!
 //! A subtask that may change what runs says so at its registration, as one that raises a signal
 //! does. What its function asks for takes effect when its instance is complete (R3); the rules L1
-//! to L6 are in `sched-dag/src/lifecycle/`.
+//! to L6 are in `sched-dag/src/lifecycle.rs`.
 //!
-//! Modes are named sets of DAGs, one of which runs; `sched-dag/src/lifecycle/modes.rs` has the
+//! Modes are named sets of DAGs, one of which runs; `sched-dag/src/lifecycle.rs` has the
 //! rules, M1 to M7.
 
 use alloc::boxed::Box;

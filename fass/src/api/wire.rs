@@ -220,6 +220,8 @@ impl Wire {
     }
 
     /// Returns the wire's name.
+    ///
+    /// See [`Wire`].
     #[must_use]
     pub fn name(&self) -> &str {
         &self.shared.name
@@ -249,6 +251,8 @@ impl Wire {
     /// and a sporadic DAG receives it.
     ///
     /// For platforms, which have one place that calls this. It may be an interrupt handler.
+    ///
+    /// See [`Wire`].
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
         let is_whole = self.shared.incoming.arrive(bytes, now_ns);
         let signal = self.shared.signal.get().filter(|_| is_whole)?;
@@ -258,6 +262,8 @@ impl Wire {
     /// Reports whether there is a byte that is to go.
     ///
     /// For platforms.
+    ///
+    /// See [`Wire`].
     #[must_use]
     pub fn has_bytes_to_go(&self) -> bool {
         !self.shared.outgoing.is_empty()
@@ -266,6 +272,8 @@ impl Wire {
     /// Takes the next byte that is to go, if there is one.
     ///
     /// For platforms, which have one place that calls this.
+    ///
+    /// See [`Wire`].
     #[must_use]
     pub fn depart(&self) -> Option<u8> {
         self.shared.outgoing.take()
@@ -355,6 +363,8 @@ impl fmt::Write for Sender<'_> {
 }
 
 /// What the subtask that receives keeps.
+///
+/// See [`Wire`].
 #[doc(hidden)]
 pub struct Receiver<T> {
     wire: Wire,
