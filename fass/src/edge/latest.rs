@@ -16,11 +16,11 @@ use alloc::vec::Vec;
 use core::mem;
 use core::ops::Range;
 
-use recording::{Channel, Entry, Header, Role, What};
+use recording::{Channel, Header, Role, What};
 use sched_dag::{DagId, Instance, Notice, journal};
 
 use super::replay::narrow;
-use super::tape::{Releases, SIGNALS};
+use super::tape::{Releases, SIGNALS, place_of};
 use super::{Crossing, Drain, Drained, Record, name, open};
 use crate::run::line::{LineOf, Recorded, room_for};
 use crate::run::plan::Plan;
@@ -39,7 +39,7 @@ pub(super) struct Latest {
 struct Kept {
     header: Header,
     latest: LatestJobs,
-    releases: Vec<Releases>,
+    releases: Releases,
     lines: Vec<LineOf>,
     /// The first instance of each DAG that has failed, and when.
     faults: Vec<(Instance, u64)>,
@@ -72,7 +72,7 @@ impl Crossing for Latest {
         self.kept = latest.map(|latest| Kept {
             header,
             latest,
-            releases: Releases::of_all(&plan.task_set),
+            releases: Releases::new(&plan.task_set),
             lines: mem::take(&mut plan.lines),
             faults: Vec::with_capacity(plan.task_set.dags().len()),
         });
@@ -94,10 +94,9 @@ impl Crossing for Latest {
         if let journal::What::Due | journal::What::Skipped = notice.event.what
             && let Some(kept) = &mut self.kept
             && let Some(release_ns) = notice.at_ns
-            && let Some(releases) = kept.releases.get_mut(dag)
             && kept.latest.is_of_interest(dag, job)
         {
-            releases.note(job, release_ns);
+            kept.releases.note(dag, job, release_ns);
         }
     }
 
@@ -136,26 +135,14 @@ impl Drain for OfLatest {
             ..
         } = &self.0;
         to.header(header);
-        let mut write = |what, dag, place, job, at_ns, value: &[u8]| {
-            let release_ns = releases[usize::from(dag)].of(job).unwrap_or(at_ns);
-            let entry = Entry {
-                what,
-                dag,
-                place,
-                job,
-                release_ns,
-                at_ns,
-                value,
-            };
-            to.write(&entry);
+        let mut write = |what, of, job, at_ns, value: &[u8]| {
+            to.write(&releases.entry(what, of, job, at_ns, value));
         };
-        for (dag, of_dag) in (0_u16..).zip(releases) {
-            if let Releases::Periodic { .. } = of_dag {
-                continue;
-            }
+        let dags = (0_u16..).zip(releases.task_set.dags());
+        for (dag, _) in dags.filter(|(_, model)| model.is_sporadic()) {
             for job in latest.jobs(dag.into()) {
-                if let Some(release_ns) = of_dag.of(job) {
-                    write(What::Signal, dag, 0, job, release_ns, &[]);
+                if let Some(release_ns) = releases.of(dag.into(), job) {
+                    write(What::Signal, [dag, 0], job, release_ns, &[]);
                 }
             }
         }
@@ -163,11 +150,11 @@ impl Drain for OfLatest {
             let dag = header.channels[usize::from(value.channel)].dag;
             let what = value.bytes.map_or(What::Lost, |_| What::Value);
             let (at_ns, bytes) = (value.completed_ns, value.bytes.unwrap_or_default());
-            write(what, dag, value.channel, value.job, at_ns, bytes);
+            write(what, [dag, value.channel], value.job, at_ns, bytes);
         }
         for &(instance, at_ns) in faults {
             if let Some((dag, place)) = narrow(instance) {
-                write(What::Fault, dag, place, instance.job, at_ns, &[]);
+                write(What::Fault, [dag, place], instance.job, at_ns, &[]);
             }
         }
     }
@@ -178,11 +165,7 @@ impl Drain for OfLatest {
     }
 
     fn end(&mut self, to: &mut Record) -> Option<Drained> {
-        Some(Drained {
-            entries: to.entries(),
-            lost: to.lost(),
-            is_cut: true,
-        })
+        Some(Drained::of(to, true))
     }
 }
 
@@ -351,9 +334,4 @@ fn filled<T: Clone>(value: T, count: usize) -> Option<Vec<T>> {
     all.try_reserve_exact(count).ok()?;
     all.resize(count, value);
     Some(all)
-}
-
-/// Returns the place of a job, if there are places.
-fn place_of(job: u64, places: usize) -> Option<usize> {
-    usize::try_from(job.checked_rem(u64::try_from(places).ok()?)?).ok()
 }

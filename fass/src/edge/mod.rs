@@ -226,6 +226,16 @@ pub struct Drained {
     pub is_cut: bool,
 }
 
+impl Drained {
+    fn of(file: &Record, is_cut: bool) -> Self {
+        Self {
+            entries: file.entries(),
+            lost: file.lost(),
+            is_cut,
+        }
+    }
+}
+
 /// Begins to do what is wished.
 pub(crate) fn begin(wish: Wish, host: Host) -> Box<dyn Crossing> {
     match wish {

@@ -65,20 +65,24 @@ impl Tape {
         let (records, given) = records.collect::<Option<_>>()?;
         self.given = given;
         self.lost.values = channels.iter().map(|_| LostJobs::new()).collect();
-        let (header, lost) = (self.header.clone(), self.lost.clone());
-        let drain = OfTape::new(reader, records, header, lost, &plan.task_set);
         self.events = Some(events);
-        self.drain = Some(Box::new(drain));
+        self.drain = Some(Box::new(OfTape {
+            events: reader,
+            records,
+            lost: self.lost.clone(),
+            header: self.header.clone(),
+            releases: Releases::new(&plan.task_set),
+            epoch_ns: 0,
+        }));
         Some(())
     }
-}
 
-impl Tape {
     /// Puts an event into its ring; without room the recording ends.
-    fn put(&mut self, what: recording::What, of: Instance, release_ns: Option<u64>, at_ns: u64) {
+    fn put(&mut self, what: What, of: Instance, release_ns: Option<u64>, at_ns: u64) {
         let mut bytes = [0; EVENT_BYTES];
         let mut out = Encoder::new(&mut bytes);
-        event(what, of, release_ns).encode(&mut out);
+        let (dag, subtask) = narrow(of).unwrap_or((u16::MAX, u16::MAX));
+        (what, dag, subtask, release_ns).encode(&mut out);
         let length = out.finish().unwrap_or(EVENT_BYTES);
         if let Some(events) = &self.events
             && !events.put(of.job, at_ns, &bytes[..length])
@@ -137,14 +141,14 @@ impl Crossing for Tape {
                 take(&self.given, &self.lost, sample, at_ns);
             });
         }
-        self.put(recording::What::Fault, instance, None, at_ns);
+        self.put(What::Fault, instance, None, at_ns);
     }
 
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
         let number = u16::try_from(instance.dag.0);
         let mut channels = self.header.channels.iter();
         if channels.any(|channel| Ok(channel.dag) == number) {
-            self.put(recording::What::Clock, instance, None, at_ns);
+            self.put(What::Clock, instance, None, at_ns);
         }
         clock_ns
     }
@@ -154,33 +158,12 @@ impl Crossing for Tape {
     }
 }
 
-/// An event in its record: the place of what it is among [`EVENTS`], DAG and subtask, and when the
-/// job was due, where that is known.
-type Event = (u8, u16, u16, Option<u64>);
+/// An event in its record: what it is, of which DAG and subtask, and when the job was due, where
+/// that is known.
+type Event = (What, u16, u16, Option<u64>);
 
 /// The most bytes of an event.
 const EVENT_BYTES: usize = 14;
-
-const EVENTS: [What; 6] = [
-    What::Signal,
-    What::Skip,
-    What::Cut,
-    What::Restart,
-    What::Clock,
-    What::Fault,
-];
-
-/// Returns what happened to an instance as a record has it.
-fn event(what: What, of: Instance, release_ns: Option<u64>) -> Event {
-    let place = (0..).zip(EVENTS).find(|(_, other)| *other == what);
-    let (dag, subtask) = narrow(of).unwrap_or((u16::MAX, u16::MAX));
-    (
-        place.map_or(0, |(place, _)| place),
-        dag,
-        subtask,
-        release_ns,
-    )
-}
 
 /// The bytes of a list of one time.
 const TOLD: usize = 4 + 8;
@@ -198,82 +181,79 @@ struct OfTape {
     records: Vec<OutboxReader>,
     lost: Lost,
     header: Header,
-    releases: Vec<Releases>,
+    releases: Releases,
     /// When the run's time begins, on the clock, on which values were complete.
     epoch_ns: u64,
 }
 
-/// When a DAG's jobs are due.
-pub(super) enum Releases {
-    Periodic {
-        offset_ns: u64,
-        period_ns: u64,
-    },
-    /// The signals in flight: job and release, a place for each.
-    Sporadic(Vec<(u64, u64)>),
+/// When jobs are due.
+pub(super) struct Releases {
+    pub(super) task_set: Arc<TaskSet>,
+    /// By DAG, if it is sporadic, the signals in flight: job and release, a place for each.
+    signals: Vec<Vec<(u64, u64)>>,
 }
 
 /// How many signals of a DAG are remembered.
 pub(super) const SIGNALS: u32 = 64;
 
 impl Releases {
-    /// Returns those of each DAG.
-    pub(super) fn of_all(task_set: &TaskSet) -> Vec<Self> {
-        let releases = task_set.dags().iter().map(|dag| match dag.is_sporadic() {
-            true => Self::Sporadic((0..SIGNALS).map(|_| (u64::MAX, 0)).collect()),
-            false => Self::Periodic {
-                offset_ns: dag.offset_ns(),
-                period_ns: dag.period_ns(),
-            },
+    pub(super) fn new(task_set: &Arc<TaskSet>) -> Self {
+        let signals = task_set.dags().iter().map(|dag| match dag.is_sporadic() {
+            true => (0..SIGNALS).map(|_| (u64::MAX, 0)).collect(),
+            false => Vec::new(),
         });
-        releases.collect()
+        Self {
+            signals: signals.collect(),
+            task_set: Arc::clone(task_set),
+        }
     }
 
-    pub(super) fn of(&self, job: u64) -> Option<u64> {
-        match self {
-            Self::Periodic {
-                offset_ns,
-                period_ns,
-            } => offset_ns.checked_add(period_ns.checked_mul(job)?),
-            Self::Sporadic(signals) => {
-                let (of, release_ns) = signals[place_of(job)?];
+    pub(super) fn of(&self, dag: usize, job: u64) -> Option<u64> {
+        let signals = self.signals.get(dag)?;
+        match place_of(job, signals.len()) {
+            None => Some(self.task_set.dags()[dag].grid_ns(job)),
+            Some(place) => {
+                let (of, release_ns) = signals[place];
                 (of == job).then_some(release_ns)
             }
         }
     }
 
-    pub(super) fn note(&mut self, job: u64, release_ns: u64) {
-        if let Self::Sporadic(signals) = self
-            && let Some(place) = place_of(job)
+    pub(super) fn note(&mut self, dag: usize, job: u64, release_ns: u64) {
+        if let Some(signals) = self.signals.get_mut(dag)
+            && let Some(place) = place_of(job, signals.len())
         {
             signals[place] = (job, release_ns);
         }
     }
+
+    /// Returns what happened to a job at a time, which takes the place of an unknown release.
+    pub(super) fn entry<'v>(
+        &self,
+        what: What,
+        [dag, place]: [u16; 2],
+        job: u64,
+        at_ns: u64,
+        value: &'v [u8],
+    ) -> Entry<'v> {
+        Entry {
+            what,
+            dag,
+            place,
+            job,
+            release_ns: self.of(dag.into(), job).unwrap_or(at_ns),
+            at_ns,
+            value,
+        }
+    }
 }
 
-/// Returns the place of a signal.
-fn place_of(job: u64) -> Option<usize> {
-    usize::try_from(job % u64::from(SIGNALS)).ok()
+/// Returns the place of a job, if there are places.
+pub(super) fn place_of(job: u64, places: usize) -> Option<usize> {
+    usize::try_from(job.checked_rem(u64::try_from(places).ok()?)?).ok()
 }
 
 impl OfTape {
-    fn new(
-        events: OutboxReader,
-        records: Vec<OutboxReader>,
-        header: Header,
-        lost: Lost,
-        task_set: &TaskSet,
-    ) -> Self {
-        Self {
-            events,
-            records,
-            lost,
-            header,
-            releases: Releases::of_all(task_set),
-            epoch_ns: 0,
-        }
-    }
-
     /// Finds what is earliest of all that waits: a channel, or `None` for an event, and its time.
     fn earliest(&mut self) -> Option<(u64, Option<u16>)> {
         let event = self.events.next().map(|event| (event.at_ns, None));
@@ -291,28 +271,17 @@ impl OfTape {
             .min_by_key(|(at_ns, _)| *at_ns)
     }
 
-    fn release_ns(&self, dag: u16, job: u64) -> Option<u64> {
-        self.releases.get(usize::from(dag))?.of(job)
-    }
-
     /// Tells of the values of a channel that are lost, before the next one, or at the end.
     fn tell_lost(&mut self, channel: u16, next: Option<(u64, u64)>, to: &mut Record) {
+        let dag = self.header.channels[usize::from(channel)].dag;
         let before = next.map(|(job, _)| job);
         while let Some((first, last)) = self.lost.values[usize::from(channel)].take(before) {
             for job in first..=last {
-                let dag = self.header.channels[usize::from(channel)].dag;
-                let release_ns = self.release_ns(dag, job).unwrap_or(0);
-                let lost = Entry {
-                    what: What::Lost,
-                    dag,
-                    place: channel,
-                    job,
-                    release_ns,
-                    // What is told at the end only has no time of its own.
-                    at_ns: next.map_or(release_ns, |(_, at_ns)| at_ns),
-                    value: &[],
-                };
-                to.write(&lost);
+                // What is told at the end only has no time of its own.
+                let release_ns = || self.releases.of(dag.into(), job).unwrap_or(0);
+                let at_ns = next.map_or_else(release_ns, |(_, at_ns)| at_ns);
+                let of = [dag, channel];
+                to.write(&self.releases.entry(What::Lost, of, job, at_ns, &[]));
             }
         }
     }
@@ -324,20 +293,10 @@ impl OfTape {
             return;
         };
         self.tell_lost(channel, Some((job, at_ns)), to);
-        let dag = self.header.channels[number].dag;
-        let release_ns = self.release_ns(dag, job).unwrap_or(at_ns);
+        let of = [self.header.channels[number].dag, channel];
         let records = &mut self.records[number];
-        if let Some(record) = records.next() {
-            let value = Entry {
-                what: What::Value,
-                dag,
-                place: channel,
-                job,
-                release_ns,
-                at_ns,
-                value: record.bytes,
-            };
-            to.write(&value);
+        if let Some(Published { bytes, .. }) = records.next() {
+            to.write(&self.releases.entry(What::Value, of, job, at_ns, bytes));
         }
         records.forget();
     }
@@ -347,31 +306,25 @@ impl OfTape {
         let Some(Published { job, at_ns, bytes }) = self.events.next() else {
             return;
         };
-        let event = Event::from_bytes(bytes).unwrap_or_default();
+        let event = Event::from_bytes(bytes);
         self.events.forget();
-        let (what, dag, place, release_ns) = event;
-        let what = EVENTS[usize::from(what) % EVENTS.len()];
-        let known = release_ns.or_else(|| self.release_ns(dag, job));
-        let release_ns = known.unwrap_or(at_ns);
-        if what == What::Signal
-            && let Some(releases) = self.releases.get_mut(usize::from(dag))
-        {
-            releases.note(job, release_ns);
-        }
-        let mut told = [0; TOLD];
-        let entry = Entry {
-            what,
-            dag,
-            place,
-            job,
-            release_ns,
-            at_ns,
-            value: match what {
-                What::Clock => write_told(at_ns + self.epoch_ns, &mut told),
-                _ => &[],
-            },
+        let Ok((what, dag, place, known_ns)) = event else {
+            return;
         };
-        to.write(&entry);
+        let mut told = [0; TOLD];
+        let value = match what {
+            What::Clock => write_told(at_ns + self.epoch_ns, &mut told),
+            _ => &[],
+        };
+        let entry = self.releases.entry(what, [dag, place], job, at_ns, value);
+        let release_ns = known_ns.unwrap_or(entry.release_ns);
+        if what == What::Signal {
+            self.releases.note(dag.into(), job, release_ns);
+        }
+        to.write(&Entry {
+            release_ns,
+            ..entry
+        });
     }
 
     /// Reports whether the recording has ended before that time, for something had no room.
@@ -409,11 +362,7 @@ impl Drain for OfTape {
                 .take(self.records.len())
                 .for_each(|channel| self.tell_lost(channel, None, to));
         }
-        Some(Drained {
-            entries: to.entries(),
-            lost: to.lost(),
-            is_cut,
-        })
+        Some(Drained::of(to, is_cut))
     }
 }
 
