@@ -1,13 +1,20 @@
 //! Bodies driven by hand: what a platform may do with them, and what it is told if it does
-//! anything else. `hostile.rs` does it all at random.
+//! anything else.
+//!
+//! A platform that keeps no rule runs bodies too early, twice, with any job, users of a state at once,
+//! a writer while its value is looked at; and completes what it likes, never, twice, or before it has
+//! run. It gets panics in plain words; values are never torn, mixed between jobs, or lost track of.
 
 mod support;
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicI64, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread;
 
-use fass::{Plan, Unique, create_dag};
+use common::random::Random;
+use fass::{Body, Dag, Plan, Raiser, Request, Sample, Unique, create_dag};
+use sched_dag::DagId;
 use support::{PERIOD, Shared, commit, inside, named, panic_message, run_job};
 
 #[test]
@@ -62,9 +69,9 @@ fn r3_nothing_is_visible_before_the_function_has_returned() {
 }
 
 /// A value that counts how often it was cloned.
-struct Counted(Arc<AtomicUsize>);
+struct Cloned(Arc<AtomicUsize>);
 
-impl Clone for Counted {
+impl Clone for Cloned {
     fn clone(&self) -> Self {
         self.0.fetch_add(1, Ordering::Relaxed);
         Self(Arc::clone(&self.0))
@@ -76,11 +83,11 @@ fn all_readers_but_the_last_get_a_clone() {
     for readers in 1..=3 {
         let (dag, clones) = (create_dag(), Arc::<AtomicUsize>::default());
         let counter = Arc::clone(&clones);
-        let source = move || (Counted(Arc::clone(&counter)),);
+        let source = move || (Cloned(Arc::clone(&counter)),);
         dag.register_periodic_subtask(source, vec!["value"], PERIOD, named("source"));
         for reader in 0..readers {
             let name = named(&format!("reader {reader}"));
-            dag.register_sink_subtask(|_: (Counted,)| (), vec!["value"], PERIOD, name);
+            dag.register_sink_subtask(|_: (Cloned,)| (), vec!["value"], PERIOD, name);
         }
         let mut plan = commit(&[dag]);
         (0..10).for_each(|job| run_job(&mut plan, job));
@@ -163,4 +170,296 @@ fn discarding_a_large_value_takes_little_stack() {
         plan
     };
     on_stack(LARGE, Box::new(look));
+}
+
+/// A value that knows its job and is counted while it lives.
+struct Counted {
+    job: u64,
+    /// More than a processor stores at once.
+    copies: [u64; 8],
+    alive: Arc<AtomicI64>,
+}
+
+impl Counted {
+    fn new(job: u64, alive: &Arc<AtomicI64>) -> Self {
+        alive.fetch_add(1, Ordering::Relaxed);
+        Self {
+            job,
+            copies: [job; 8],
+            alive: Arc::clone(alive),
+        }
+    }
+
+    /// Holds the value against the job of which the body was run.
+    fn check(&self, running: &AtomicU64) {
+        assert_eq!(self.copies, [self.job; 8], "torn");
+        let running = running.load(Ordering::Relaxed);
+        assert_eq!(self.job, running, "a value of another job");
+    }
+}
+
+impl Clone for Counted {
+    fn clone(&self) -> Self {
+        Self::new(self.job, &self.alive)
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        assert_eq!(self.copies, [self.job; 8], "dropped once, and whole");
+        self.alive.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// What a wrong order is told, and nothing else.
+const COMPLAINTS: [&str; 3] = [
+    "is missing: the platform started",
+    "finds no free slot: the platform cancelled",
+    "and cannot continue",
+];
+
+/// A source, two in the middle and a sink; each of them finds the job that it is run
+/// with in `running`.
+fn diamond(alive: &Arc<AtomicI64>, running: &Arc<[AtomicU64; 4]>, joined: &Arc<AtomicU64>) -> Dag {
+    let dag = create_dag();
+    dag.in_flight(3);
+    let (source, for_source) = (Arc::clone(alive), Arc::clone(running));
+    let source = move || {
+        let value = Counted::new(for_source[0].load(Ordering::Relaxed), &source);
+        (value,)
+    };
+    dag.register_periodic_subtask(source, vec!["value"], PERIOD, named("source"));
+    for (number, name) in [(1, "left"), (2, "right")] {
+        let running = Arc::clone(running);
+        let pass = move |(value,): (Counted,)| {
+            value.check(&running[number]);
+            (value,)
+        };
+        dag.register_subtask(pass, vec!["value"], vec![name], named(name));
+    }
+    let (running, joined) = (Arc::clone(running), Arc::clone(joined));
+    let sink = move |(left, right): (Counted, Counted)| {
+        left.check(&running[3]);
+        right.check(&running[3]);
+        joined.fetch_add(1, Ordering::Relaxed);
+    };
+    dag.register_sink_subtask(sink, vec!["left", "right"], PERIOD, named("sink"));
+    dag
+}
+
+/// A body, and the job that is its next one.
+type Place = Mutex<(Body, u64)>;
+
+/// Runs the bodies in turn, each with its next job: that is an order which a platform
+/// may choose, even with as many threads as jobs may be in flight. But now and then it
+/// takes another body, another job, or does something else.
+fn misuse(places: &[Place], running: &[AtomicU64; 4], turns: u32, random: &mut Random) {
+    for _ in 0..turns {
+        for number in 0..places.len() {
+            let is_wrong = random.chance(3);
+            let number = if is_wrong { random.index(4) } else { number };
+            let mut place = places[number]
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            let (body, next) = &mut *place;
+            let job = match random.index(6) {
+                0 if is_wrong => u64::MAX,
+                1 | 2 if is_wrong => random.within(0..=2 * *next),
+                _ => *next,
+            };
+            let what = if is_wrong { random.index(4) } else { 0 };
+            running[number].store(job, Ordering::Relaxed);
+            let done = catch_unwind(AssertUnwindSafe(|| match what {
+                0 | 1 => body.run(job),
+                2 => body.discard(job),
+                _ => body.complete(job, &mut |_| ()),
+            }));
+            *next += u64::from(job == *next && !random.chance(1));
+            drop(place);
+            if let Err(payload) = done {
+                let message = payload.downcast_ref::<String>().expect("a message");
+                let is_known = COMPLAINTS.iter().any(|known| message.contains(known));
+                assert!(is_known, "{message}");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_order_of_calls_tears_mixes_or_leaks_values() {
+    let rounds = if cfg!(miri) { 3 } else { 400 };
+    let joined = Arc::new(AtomicU64::new(0));
+    for seed in 0..rounds {
+        let alive = Arc::new(AtomicI64::new(0));
+        let running = Arc::new([const { AtomicU64::new(0) }; 4]);
+        let mut plan = commit(&[diamond(&alive, &running, &joined)]);
+        let places = plan.bodies.remove(0).into_iter();
+        let places: Vec<Place> = places.map(|body| Mutex::new((body, 0))).collect();
+        if seed % 2 == 0 {
+            misuse(&places, &running, 30, &mut Random::new(seed));
+        } else {
+            thread::scope(|scope| {
+                for thread in 0..3 {
+                    let (places, running) = (&places, &running);
+                    let mut random = Random::new(seed * 3 + thread);
+                    scope.spawn(move || misuse(places, running, 10, &mut random));
+                }
+            });
+        }
+        drop(places);
+        assert_eq!(alive.load(Ordering::Relaxed), 0, "seed {seed}");
+    }
+    assert!(
+        joined.load(Ordering::Relaxed) > rounds,
+        "many a join succeeds"
+    );
+}
+
+/// The bodies of a DAG with a state that its source updates and two others read.
+fn with_state() -> [Shared; 4] {
+    let dag = create_dag();
+    let state = dag.state("pair", (0_u64, 0_u64));
+    let update = |pair: &mut (u64, u64)| {
+        pair.0 += 1;
+        inside();
+        pair.1 += 1;
+        (pair.0,)
+    };
+    let source = dag.period(PERIOD).using(state.update()).source(update);
+    source.writes(&["count"]).register(named("update"));
+    for name in ["first", "second"] {
+        let read = |pair: &(u64, u64), (count,): (u64,)| {
+            assert_eq!((pair.0, pair.1), (count, count), "in mid-change");
+            inside();
+            (count,)
+        };
+        let reader = dag.using(state.read()).subtask(read).reads(&["count"]);
+        reader.writes(&[name]).register(named(name));
+    }
+    let join = |(first, second): (u64, u64)| assert_eq!(first, second);
+    dag.register_sink_subtask(join, vec!["first", "second"], PERIOD, named("join"));
+    Shared::all(commit(&[dag]))
+}
+
+const IN_USE: &str = "a state is in use by another subtask: the platform started the instance \
+                      before all its predecessors were complete";
+
+#[test]
+fn readers_share_a_state_and_an_update_at_the_same_time_is_refused() {
+    let [update, first, second, join] = with_state();
+    update.run(0);
+    first.run_while(0, move || {
+        second.run_while(0, move || {
+            // Both look at it now.
+            assert_eq!(panic_message(|| update.run(1)), IN_USE);
+        });
+    });
+    join.run(0);
+}
+
+#[test]
+fn a_state_that_is_being_changed_is_refused_to_readers() {
+    let [update, first, second, _] = with_state();
+    update.run(0);
+    let full = panic_message(|| {
+        // The pair is (2, 1) now.
+        let look = move || assert_eq!(panic_message(|| first.run(0)), IN_USE);
+        update.run_while(1, look);
+    });
+    // Its readers have not run: they hold no value of job 1, and both slots.
+    assert!(full.contains("finds no free slot"), "{full}");
+    // The update has ended, if by a panic, and given the state back: it is (2, 2).
+    let late = panic_message(|| second.run(0));
+    assert!(
+        late.contains("in mid-change"),
+        "it is not job 0's any more: {late}"
+    );
+}
+
+/// A job's number, in more words than a processor stores at once.
+#[derive(Clone)]
+struct Whole {
+    copies: [u64; 8],
+    _alive: Arc<()>,
+}
+
+/// Of which job a sample was, and when that was complete.
+type Told = mpsc::Receiver<Option<(u64, u64)>>;
+
+/// A writer of values, and a subtask of another DAG that samples them twice in each instance.
+fn sampled(alive: &Arc<()>) -> ([Shared; 2], Told) {
+    let (tells, told) = mpsc::channel();
+    let (writer, reader) = (create_dag(), create_dag());
+    let (mut next, of_writer) = (0, Arc::clone(alive));
+    let count = move || {
+        next += 1;
+        let (copies, _alive) = ([next - 1; 8], Arc::clone(&of_writer));
+        (Whole { copies, _alive },)
+    };
+    writer.register_periodic_subtask(count, vec!["count"], PERIOD, named("count"));
+    let latest = writer.relative_deadline(PERIOD).latest::<Whole>("count");
+    let sample = move |sample: Option<Sample<'_, Whole>>| {
+        let look = || {
+            let sample = sample?;
+            assert_eq!(sample.value.copies, [sample.job; 8], "torn");
+            Some((sample.job, sample.completed_ns))
+        };
+        let first = look();
+        inside();
+        assert_eq!(look(), first, "a sample does not change during an instance");
+        tells.send(first).expect("the test listens");
+    };
+    reader.period(PERIOD).relative_deadline(PERIOD);
+    let source = reader.using(latest.sample()).source(sample);
+    source.register(named("sample"));
+    (Shared::all(commit(&[writer, reader])), told)
+}
+
+#[test]
+fn a_sample_stays_whole_while_its_writer_goes_on() {
+    let (jobs, alive) = (if cfg!(miri) { 20 } else { 5_000 }, Arc::new(()));
+    let ([writer, reader], told) = sampled(&alive);
+    for (round, expected) in [(0, None), (1, Some((jobs - 1, jobs - 1)))] {
+        let writer = writer.clone();
+        reader.run_while(round, move || {
+            for job in round * jobs..(round + 1) * jobs {
+                writer.run(job);
+                writer.complete(job);
+            }
+        });
+        assert_eq!(told.try_recv(), Ok(expected));
+    }
+    drop((writer, reader));
+    assert_eq!(Arc::strong_count(&alive), 1);
+}
+
+#[test]
+fn a_signal_is_raised_once_however_often_it_is_completed() {
+    let sporadic = create_dag();
+    sporadic.relative_deadline(PERIOD);
+    let signal = sporadic.sporadic(PERIOD);
+    sporadic.source(|| ()).register(named("answer"));
+    let dag = create_dag();
+    dag.relative_deadline(PERIOD);
+    let mut is_first = true;
+    dag.period(PERIOD)
+        .using(signal.raising())
+        .source(move |mut signal: Raiser<'_>| {
+            if std::mem::take(&mut is_first) {
+                signal.raise();
+                signal.raise();
+            }
+        })
+        .register(named("ask"));
+    let mut plan = commit(&[dag, sporadic]);
+    let ask = &mut plan.bodies[0][0];
+    let mut raised = Vec::new();
+    ask.complete(0, &mut |request| raised.push(request));
+    assert_eq!(raised, [], "not run yet");
+    ask.run(0);
+    ask.run(0);
+    for _ in 0..3 {
+        ask.complete(0, &mut |request| raised.push(request));
+    }
+    assert_eq!(raised, [Request::Signal(DagId(1))]);
 }

@@ -5,7 +5,7 @@ mod support;
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::thread;
 
 use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
@@ -50,30 +50,6 @@ fn the_runs_time_skips_what_is_idle() {
             let of = run.statistics(dag);
             assert_eq!((of.completed, of.misses, of.faults), (500, 0, 0));
         }
-    }
-}
-
-#[test]
-fn an_endless_function_loses_its_core_after_its_budget() {
-    for mechanism in mechanisms() {
-        let alone = alone(1, mechanism);
-        let may_end = Arc::new(AtomicBool::new(false));
-        let endless = create_dag();
-        endless.name("endless").jobs(20);
-        endless.period(ms(5)).relative_deadline(ms(5));
-        let flag = Arc::clone(&may_end);
-        let function = move |job| while job == 2 && !flag.load(Relaxed) {};
-        let attributes = SubtaskAttributes::named("waits").priority(0).budget(ms(4));
-        endless.register_untyped_subtask(function, attributes);
-        let healthy = chain("healthy", 1, 20, ms(5), 100);
-        finish_create_dags(&[endless, healthy]).unwrap();
-        let run = alone.machine.run().unwrap();
-        may_end.store(true, Relaxed);
-        assert_eq!(run.violations().count(), 0);
-        assert_eq!(run.faults().len(), 1, "{:?}", run.faults());
-        assert_eq!(run.faults()[0].instance.job, 2);
-        assert_eq!(run.statistics("endless").completed, 2);
-        assert_eq!(run.statistics("healthy").completed, 20);
     }
 }
 

@@ -4,8 +4,8 @@
 mod support;
 
 use fass::{Dag, FaultLimit, Sample, Unique, create_dag, finish_create_dags};
-use support::{MS, Seen, every, job_numbers, ms, named, run, ticking, work};
-use virtual_time::{JobOutcome, VirtualTime};
+use support::{Seen, every, job_numbers, ms, named, run, ticking, work};
+use virtual_time::VirtualTime;
 
 /// At most one fault within three jobs.
 const FAULT_LIMIT: FaultLimit = FaultLimit {
@@ -134,22 +134,6 @@ fn a_source_restarts_and_until_then_its_latest_value_stays() {
     run(&machine, &[dag, reader]);
     let expected = [(0, 1), (1, 2), (1, 2), (3, 1)].map(Some);
     assert_eq!(kept.all(), expected);
-}
-
-#[test]
-fn a_call_that_is_to_fail_does_so_in_place_of_its_function() {
-    let machine = VirtualTime::new().fault("counting", "sink", 1);
-    let dag = counting(4);
-    let sink = dag.restarting(|| |_: (u64,)| work(1)).reads(&["job"]);
-    sink.register(named("sink").wcet(ms(2)));
-    let report = run(&machine, &[dag]);
-    let outcomes: Vec<_> = report.jobs.iter().map(|job| job.outcome).collect();
-    let met = Some(JobOutcome::Met);
-    assert_eq!(outcomes, [met, Some(JobOutcome::Failed), met, met]);
-    assert_eq!(report.panics[0].message, "a fault that was asked for");
-    let failed = (report.instance(report.panics[0].instance)).expect("it was ready");
-    assert_eq!((failed.failed_ns, failed.finish_ns), (Some(12 * MS), None));
-    assert_eq!(failed.execution_ns, 2 * MS);
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Recordings beyond those that lead to the same run (`replays`): what a crash leaves behind, one
-//! job of a run, recordings of something else, or that have lost something.
+//! job of a run, recordings of something else, or that have lost something; and recorded states, which
+//! a replay that begins with a later job finds as that had, so that what follows from them comes again.
 
 mod support;
 
 use std::ops::AddAssign;
 
-use fass::{Dag, Raiser, Sample, create_dag, finish_create_dags};
-use recording::{Entry, Recording, Role, What, Writer};
+use fass::{Dag, Raiser, Sample, State, create_dag, finish_create_dags};
+use recording::{Channel, Entry, Recording, Role, What, Writer, to_bytes};
 use support::{commit, every, job_numbers, ms, named, run, ticking};
 use virtual_time::{JobShown, Passed, Report, RunError, SubtaskShown, Value, VirtualTime};
 
@@ -394,4 +395,189 @@ fn a_second_commit_that_is_refused_leaves_the_recording_as_it_is() {
     let recording = record(&machine, &[demo("demo", &["in"])]);
     finish_create_dags(&[demo("other", &["in", "out"])]).expect_err("a second plan");
     assert_eq!(machine.recording(), recording);
+}
+
+/// The job whose filter fails.
+const FAULT: u64 = 5_000;
+
+type Sums = (u64, u64);
+
+const fn add((sum, sums): Sums, n: u64) -> Sums {
+    (sum + n, sums + sum + n)
+}
+
+/// A filter that adds up the sums of numbers, and fails at the one that it has in a job: with
+/// another state it fails in another job, or never.
+fn filter(jobs: u64, keep: impl Fn(&State<Sums>)) -> Dag {
+    let dag = every(1, "filter");
+    dag.jobs(jobs).record::<u64>("in").record::<u64>("out");
+    let source = dag.source(job_numbers(0)).writes(&["in"]);
+    source.register(named("source"));
+    let sums = dag.state("sums", (0, 0));
+    keep(&sums);
+    let fails_at = (0..=FAULT).fold((0, 0), add);
+    let step = move |sums: &mut Sums, (n,): (u64,)| {
+        *sums = add(*sums, n);
+        assert!(*sums != fails_at, "too great");
+        (sums.1,)
+    };
+    let step = dag.using(sums.update()).subtask(step).reads(&["in"]);
+    step.writes(&["out"]).register(named("step"));
+    dag.register_sink_subtask(|_: (u64,)| (), vec!["out"], ms(1), named("sink"));
+    dag
+}
+
+fn kept() -> Dag {
+    filter(6_000, |sums| _ = sums.record())
+}
+
+/// The record that a crash of it leaves.
+fn crash(dag: Dag) -> Vec<u8> {
+    let machine = VirtualTime::new().contain_panics().keep_latest(16);
+    record(&machine, &[dag])
+}
+
+fn replaying(recording: &[u8]) -> VirtualTime {
+    let machine = VirtualTime::new().contain_panics();
+    machine.replay(recording).expect("whole")
+}
+
+/// Returns the jobs that failed, what differs, and what lacks.
+fn found(report: &Report) -> (Vec<u64>, Option<String>, Option<u64>) {
+    let panics = report.panics.iter().map(|panic| panic.instance.job);
+    let differs = report.divergence.as_ref().map(ToString::to_string);
+    let lacking = report.lacking.as_ref().map(|(_, job)| *job);
+    (panics.collect(), differs, lacking)
+}
+
+#[test]
+fn a_fault_that_follows_from_a_recorded_state_comes_again() {
+    let bytes = crash(kept());
+    let recording = Recording::read(&bytes).expect("whole");
+    let states = recording.entries().filter(|entry| {
+        let channel = &recording.header().channels[usize::from(entry.place)];
+        entry.what == What::Value && (channel.role, &*channel.topic) == (Role::State, "sums")
+    });
+    // Not only every 64, for of that many there are no inputs.
+    let states: Vec<u64> = states.map(|entry| entry.job).collect();
+    assert_eq!(states, [4_992, 5_000]);
+    assert!(recording.entries().any(|it| it.what == What::Fault));
+    for cores in [1, 4] {
+        let machine = replaying(&bytes).cores(cores);
+        let report = run(&machine, &[kept()]);
+        assert_eq!(found(&report), (vec![FAULT], None, None));
+        assert_eq!(report.jobs.len(), 9, "none before 4,992");
+        let job = machine.until("filter", FAULT).expect("it is there");
+        let step = of(&job, "step");
+        assert_eq!(step.panic.as_deref(), Some("too great"));
+        let (sum, sums) = (0..FAULT).fold((0, 0), add);
+        let shown = Value::Json(format!("[{sum},{sums}]"));
+        assert_eq!(value(&step.takes, "sums"), &shown, "it is found");
+    }
+}
+
+#[test]
+fn an_altered_state_is_found() {
+    let bytes = crash(kept());
+    let mut flipped = bytes.clone();
+    flipped[bytes.len() / 2] ^= 1;
+    let refused = VirtualTime::new().replay(&flipped).unwrap_err().to_string();
+    assert!(refused.contains("the file is altered"), "{refused}");
+    let is_state = |entry: &Entry<'_>, role| entry.what == What::Value && role == Role::State;
+    let shorter = altered(&bytes, |entry, role| match is_state(&entry, role) {
+        true => vec![Entry {
+            value: &entry.value[1..],
+            ..entry
+        }],
+        false => vec![entry],
+    });
+    let refused = VirtualTime::new().replay(&shorter).unwrap_err().to_string();
+    assert!(refused.contains("expected a u64, 8 bytes"), "{refused}");
+
+    // What is one of its type is not what the filter had.
+    let value = &*to_bytes(&(1_u64, 2_u64));
+    let later = altered(&bytes, |entry, role| match entry.job {
+        FAULT if is_state(&entry, role) => vec![Entry { value, ..entry }],
+        _ => vec![entry],
+    });
+    let (_, differs, _) = found(&run(&replaying(&later), &[kept()]));
+    let said = "state `sums` of dag `filter` diverges in job 5000: [1,2] is recorded, and ";
+    assert!(differs.is_some_and(|text| text.starts_with(said)));
+
+    // Another type is refused.
+    let other = every(1, "filter");
+    other.jobs(6_000).record::<u64>("in").record::<u64>("out");
+    let source = other.source(job_numbers(0)).writes(&["in"]);
+    source.register(named("source"));
+    let sums = other.state("sums", 0_u64);
+    sums.record();
+    let step = other
+        .using(sums.update())
+        .subtask(|_: &mut u64, n: (u64,)| n);
+    let step = step.reads(&["in"]).writes(&["out"]);
+    step.register(named("step"));
+    other.register_sink_subtask(|_: (u64,)| (), vec!["out"], ms(1), named("sink"));
+    let _machine = replaying(&bytes);
+    let error = finish_create_dags(&[other]).unwrap_err().to_string();
+    let said = "state `sums` was recorded with values of type (u64, u64), and is of type u64 now";
+    assert!(error.contains(said), "{error}");
+}
+
+#[test]
+fn a_late_job_of_a_long_recording_is_computed_at_once() {
+    const LAST: u64 = 1_000_050;
+    let bytes = record(&VirtualTime::new(), &[filter(1, |sums| _ = sums.record())]);
+    let short = Recording::read(&bytes).expect("whole");
+    let mut writer = Writer::new(short.header());
+    let place = |role: Role| {
+        let mut channels = (0_u16..).zip(&short.header().channels);
+        let found = channels.find(|(_, channel): &(u16, &Channel)| channel.role == role);
+        found.expect("there is one").0
+    };
+    let [source, result, state] = [Role::Source, Role::Result, Role::State].map(place);
+    let mut sums = (0, 0);
+    for job in 0..=LAST {
+        let mut write = |place, value: &[u8]| {
+            writer.write(&Entry {
+                what: What::Value,
+                dag: 0,
+                place,
+                job,
+                release_ns: job * 1_000_000,
+                at_ns: job * 1_000_000,
+                value,
+            });
+        };
+        // The jobs between would take the test long to write.
+        let is_written = !(100..LAST - 1_000).contains(&job);
+        if is_written && job % 64 == 0 {
+            write(state, &to_bytes(&sums));
+        }
+        if is_written {
+            write(source, &to_bytes(&job));
+        }
+        sums = add(sums, job);
+        if is_written && job % 1_000 == 0 {
+            write(result, &to_bytes(&sums.1));
+        }
+    }
+    let machine = replaying(&writer.end()).from("filter", LAST);
+    commit(&[filter(2 * LAST, |sums| _ = sums.record())]);
+    let job = machine.until("filter", LAST).expect("it is there");
+    assert!(
+        job.times
+            .is_some_and(|times| times.release_ns == LAST * 1_000_000)
+    );
+    let report = machine.run();
+    assert_eq!(found(&report), (vec![], None, None));
+    assert_eq!(
+        (report.jobs.len(), report.compared),
+        (51, 2),
+        "from 1,000,000 on"
+    );
+
+    let refused = replaying(&bytes).from("filtre", 3);
+    let error = finish_create_dags(&[kept()]).unwrap_err().to_string();
+    drop(refused);
+    assert!(error.contains("no inputs of a dag `filtre`"), "{error}");
 }
