@@ -31,14 +31,12 @@ use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::cell::RefCell;
 
 use recording::Recordable;
 use sched_dag::{StateSpec, StateUser};
 
 use super::dag::Dag;
 use super::uses::{ResettableUses, Uses, sealed};
-use crate::draft::Draft;
 use crate::run::cell::{Changing, Looking};
 use crate::run::line::KeptState;
 use crate::run::state::{Reset, Resettable};
@@ -94,9 +92,8 @@ impl<T: Send + Sync + 'static> StateValue for T {}
 /// finish_create_dags(&[dag]).unwrap();
 /// machine.run();
 /// ```
-#[derive(Clone)]
 pub struct State<T> {
-    draft: Rc<RefCell<Draft>>,
+    dag: Dag,
     /// The position among the DAG's states.
     position: usize,
     value: Arc<Resettable<T>>,
@@ -122,7 +119,7 @@ impl<T: StateValue> State<T> {
     /// See [`State`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn update(&self) -> Update<T> {
-        Update(self.handle())
+        Update(self.clone())
     }
 
     /// Returns the use of a subtask that only reads the state. Readers between two
@@ -131,7 +128,7 @@ impl<T: StateValue> State<T> {
     /// See [`State`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn read(&self) -> Read<T> {
-        Read(self.handle())
+        Read(self.clone())
     }
 
     /// States what the state is reset to after a fault of a subtask that uses it, where the
@@ -147,10 +144,7 @@ impl<T: StateValue> State<T> {
     pub fn reset_to(&self, mut make: impl FnMut() -> T + 'static) -> &Self {
         let value = Arc::clone(&self.value);
         let provide = move |faults| value.provide((0..faults).map(|_| make()));
-        let dag = Dag {
-            draft: Rc::clone(&self.draft),
-        };
-        let mut draft = dag.open();
+        let mut draft = self.dag.open();
         draft.resets.retain(|(state, _)| *state != self.position);
         draft.resets.push((self.position, Box::new(provide)));
         drop(draft);
@@ -222,23 +216,12 @@ impl<T: StateValue> State<T> {
         T: Recordable,
     {
         let value = Arc::<Resettable<T>>::clone(&self.value);
-        let dag = Dag {
-            draft: Rc::clone(&self.draft),
-        };
-        let mut draft = dag.open();
+        let mut draft = self.dag.open();
         draft.states.retain(|(state, _)| *state != self.position);
         let kept = Arc::new(KeptState::new(value, jobs));
         draft.states.push((self.position, kept));
         drop(draft);
         self
-    }
-
-    fn handle(&self) -> Self {
-        Self {
-            draft: Rc::clone(&self.draft),
-            position: self.position,
-            value: Arc::clone(&self.value),
-        }
     }
 
     /// Notes a use, and returns the value that the subtask will claim.
@@ -251,9 +234,13 @@ impl<T: StateValue> State<T> {
     }
 }
 
-impl<T> State<T> {
-    fn is_of(&self, dag: &Dag) -> bool {
-        Rc::ptr_eq(&self.draft, &dag.draft)
+impl<T> Clone for State<T> {
+    fn clone(&self) -> Self {
+        Self {
+            dag: self.dag.clone(),
+            position: self.position,
+            value: Arc::clone(&self.value),
+        }
     }
 }
 
@@ -277,80 +264,55 @@ impl Dag {
             users: Default::default(),
         });
         State {
-            draft: Rc::clone(&self.draft),
+            dag: self.clone(),
             position,
             value: Arc::new(Resettable::new(initial)),
         }
     }
 }
 
-impl<T> sealed::Sealed for Update<T> {}
+/// Implements a use of a state: what a function borrows, whether it updates that, and how the value
+/// is claimed.
+macro_rules! implement_use {
+    ($Use:ident: $Borrowed:ty, $updates:literal, $claim:ident -> $Guard:ident) => {
+        impl<T> sealed::Sealed for $Use<T> {}
 
-impl<T: StateValue> Uses for Update<T> {
-    type Borrowed<'a> = &'a mut T;
-    type Held = Arc<Resettable<T>>;
-    type Guard<'a> = Changing<'a, T>;
+        impl<T: StateValue> Uses for $Use<T> {
+            type Borrowed<'a> = $Borrowed;
+            type Held = Arc<Resettable<T>>;
+            type Guard<'a> = $Guard<'a, T>;
 
-    fn is_of(&self, dag: &Dag) -> bool {
-        self.0.is_of(dag)
-    }
+            fn is_of(&self, dag: &Dag) -> bool {
+                Rc::ptr_eq(&self.0.dag.draft, &dag.draft)
+            }
 
-    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        self.0.note(dag, subtask, true)
-    }
+            fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
+                self.0.note(dag, subtask, $updates)
+            }
 
-    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held.present().change().unwrap_or_else(|| refuse())
-    }
+            fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
+                held.present().$claim().unwrap_or_else(|| refuse())
+            }
 
-    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        &mut *guard
-    }
+            fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
+                guard
+            }
+        }
+
+        impl<T: StateValue> ResettableUses for $Use<T> {
+            fn another(held: &Self::Held) -> Self::Held {
+                Arc::clone(held)
+            }
+
+            fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>> {
+                vec![Arc::<Resettable<T>>::clone(held)]
+            }
+        }
+    };
 }
 
-impl<T> sealed::Sealed for Read<T> {}
-
-impl<T: StateValue> Uses for Read<T> {
-    type Borrowed<'a> = &'a T;
-    type Held = Arc<Resettable<T>>;
-    type Guard<'a> = Looking<'a, T>;
-
-    fn is_of(&self, dag: &Dag) -> bool {
-        self.0.is_of(dag)
-    }
-
-    fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        self.0.note(dag, subtask, false)
-    }
-
-    fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held.present().look().unwrap_or_else(|| refuse())
-    }
-
-    fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        &*guard
-    }
-}
-
-impl<T: StateValue> ResettableUses for Update<T> {
-    fn another(held: &Self::Held) -> Self::Held {
-        Arc::clone(held)
-    }
-
-    fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>> {
-        vec![Arc::<Resettable<T>>::clone(held)]
-    }
-}
-
-impl<T: StateValue> ResettableUses for Read<T> {
-    fn another(held: &Self::Held) -> Self::Held {
-        Arc::clone(held)
-    }
-
-    fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>> {
-        vec![Arc::<Resettable<T>>::clone(held)]
-    }
-}
+implement_use!(Update: &'a mut T, true, change -> Changing);
+implement_use!(Read: &'a T, false, look -> Looking);
 
 fn refuse() -> ! {
     panic!(

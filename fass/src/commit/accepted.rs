@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::fmt;
 use core::time::Duration;
 
-use sched_dag::chains::{Chain, Place, Sampling};
+use sched_dag::chains::{Chain, Sampling};
 use sched_dag::{DagId, DagKey, TaskSet, Warning};
 
 use super::answer::{Answer, Answers};
@@ -225,15 +225,12 @@ impl Commit {
     /// See [`EndToEnd`].
     #[must_use]
     pub fn chains_between(&self, from: &str, to: &str) -> Vec<EndToEnd> {
-        let (Some(from), Some(to)) = (self.place(from), self.place(to)) else {
+        let [Some(from), Some(to)] = [from, to].map(|name| Chain::place(&self.task_set, name))
+        else {
             return Vec::new();
         };
         let chains = Chain::between(&self.task_set, &self.samplings(), from, to);
         self.with_bounds(chains)
-    }
-
-    fn place(&self, name: &str) -> Option<Place> {
-        Chain::place(&self.task_set, name)
     }
 
     fn samplings(&self) -> Vec<Sampling> {
@@ -250,11 +247,7 @@ impl Commit {
     }
 
     fn with_bounds(&self, chains: Vec<Chain>) -> Vec<EndToEnd> {
-        let answers = self.answers.of_dags.iter();
-        let bounds = answers.map(|answer| answer.verdict.bound());
-        let responses_ns: Vec<Option<u64>> = bounds
-            .map(|bound| u64::try_from(bound?.as_nanos()).ok())
-            .collect();
+        let responses_ns = self.answers.proven().bounds_ns;
         let of_chain = |chain: Chain| {
             let time = |ns: Result<u64, DagId>| ns.ok().map(Duration::from_nanos);
             let names = chain.names(&self.task_set).map(|name| name.to_string());

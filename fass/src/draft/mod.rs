@@ -26,7 +26,7 @@ use sched_dag::{
     SubtaskSpec, TopicPort,
 };
 
-use crate::run::effect::{Asked, Effect, Of, Target, Wish, wish};
+use crate::run::effect::{Asked, Effect, Of, Target, Wish};
 use crate::run::latest::AnyLatest;
 use crate::run::line::KeptState;
 use crate::run::message::MessageType;
@@ -258,8 +258,11 @@ impl Draft {
 
     /// Notes that completions of a subtask may ask for something.
     pub(crate) fn ask(&mut self, subtask: usize, of: Of) -> Wish {
-        let wish = wish();
-        let asked = Asked::new(Arc::clone(&wish), of);
+        let wish = Wish::default();
+        let asked = Asked {
+            wish: Arc::clone(&wish),
+            of,
+        };
         self.effects.push((subtask, Box::new(asked)));
         wish
     }

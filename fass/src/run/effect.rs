@@ -88,13 +88,8 @@ pub(crate) const AT_ONCE: u8 = 1;
 /// The wish that a mode is entered when what leaves is idle.
 pub(crate) const WHEN_IDLE: u8 = 2;
 
-/// What an instance wishes; the last word counts.
+/// A place for what an instance wishes, at first nothing; the last word counts.
 pub(crate) type Wish = Arc<AtomicU8>;
-
-/// Makes a place for wishes.
-pub(crate) fn wish() -> Wish {
-    Arc::new(AtomicU8::new(NOTHING))
-}
 
 /// What a wish is about.
 pub(crate) enum Of {
@@ -106,14 +101,8 @@ pub(crate) enum Of {
 
 /// What an instance may ask for.
 pub(crate) struct Asked {
-    wish: Wish,
-    of: Of,
-}
-
-impl Asked {
-    pub(crate) const fn new(wish: Wish, of: Of) -> Self {
-        Self { wish, of }
-    }
+    pub(crate) wish: Wish,
+    pub(crate) of: Of,
 }
 
 impl Effect for Asked {

@@ -24,7 +24,7 @@ use crate::run::plan::{Body, Plan};
 pub use fit::job_of;
 
 /// A recording that takes the place of what enters.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Replay {
     bytes: Cow<'static, [u8]>,
     header: Header,
@@ -145,33 +145,35 @@ impl Replay {
     pub fn read(bytes: impl Into<Cow<'static, [u8]>>) -> Result<Self, Malformed> {
         let bytes = bytes.into();
         let recording = Recording::read(&bytes)?;
-        let header = recording.header().clone();
-        let role = |place: u16| header.channels[usize::from(place)].role;
+        let role = |place: u16| recording.header().channels[usize::from(place)].role;
         let no_memory = |_| Malformed {
             offset: bytes.len(),
             expected: "fewer entries, for whose places there is memory",
         };
         let is_value = |entry: &Entry<'_>| entry.what == What::Value;
         let count = recording.entries().filter(is_value).count();
-        let (mut values, mut is_compared) = (Vec::new(), Vec::new());
-        values.try_reserve_exact(count).map_err(no_memory)?;
-        is_compared.try_reserve_exact(count).map_err(no_memory)?;
-        let (mut cuts, mut clock, mut lost) = (Vec::new(), BTreeMap::new(), None);
-        let mut faults = Vec::new();
-        let mut signals = BTreeMap::<DagId, VecDeque<u64>>::new();
-        let (mut first_signals, mut events) = (BTreeMap::new(), Vec::new());
+        let mut replay = Self {
+            header: recording.header().clone(),
+            is_cut: recording.is_cut(),
+            // A value of a usual size allocates nothing.
+            computed: Vec::with_capacity(4096),
+            ..Self::default()
+        };
+        (replay.values.try_reserve_exact(count)).map_err(no_memory)?;
+        (replay.is_compared.try_reserve_exact(count)).map_err(no_memory)?;
+        let mut cuts = Vec::new();
         for entry in recording.entries() {
             let Entry {
                 what,
                 dag,
                 place,
                 job,
-                release_ns,
                 value,
                 ..
             } = entry;
+            let id = DagId(dag.into());
             if !matches!(what, What::Value | What::Lost | What::Clock) {
-                events.push(Entry {
+                replay.events.push(Entry {
                     value: &[],
                     ..entry
                 });
@@ -179,56 +181,37 @@ impl Replay {
             match what {
                 What::Value => {
                     let start = value.as_ptr().addr() - bytes.as_ptr().addr();
-                    values.push(((place, job), start..start + value.len()));
-                    is_compared.push(false);
+                    (replay.values).push(((place, job), start..start + value.len()));
+                    replay.is_compared.push(false);
                 }
                 What::Cut => cuts.push((dag, place, job)),
-                What::Fault => faults.push(Fault::new(dag, place, job)),
+                What::Fault => replay.faults.push(Fault::new(dag, place, job)),
                 What::Signal | What::Skip => {
-                    first_signals.entry(DagId(dag.into())).or_insert(job);
-                    let of_dag = signals.entry(DagId(dag.into())).or_default();
-                    of_dag.push_back(release_ns);
+                    replay.first_signals.entry(id).or_insert(job);
+                    let of_dag = replay.signals.entry(id).or_default();
+                    of_dag.push_back(entry.release_ns);
                 }
                 What::Clock => {
                     // The machine writes each answer by itself.
-                    let told = clock.entry((dag, place, job)).or_insert_with(Told::default);
+                    let told = replay.clock.entry((dag, place, job)).or_default();
                     told.times.extend(Vec::<u64>::from_bytes(value)?);
                 }
                 What::Lost if role(place) == Role::Source => {
-                    lost.get_or_insert((place, job));
+                    replay.lost.get_or_insert((place, job));
                 }
                 What::Restart | What::Lost => {}
             }
         }
-        values.sort_unstable_by_key(|(of, _)| *of);
+        replay.values.sort_unstable_by_key(|(of, _)| *of);
         cuts.sort_unstable();
+        let passed = Passed {
+            cuts,
+            ..Passed::default()
+        };
         Ok(Self {
-            is_cut: recording.is_cut(),
-            values,
-            is_compared,
-            passed: Arc::new(Passed {
-                dags: Vec::new(),
-                jobs: Vec::new(),
-                cuts,
-            }),
-            clock,
-            signals,
-            first_signals,
-            events,
-            faults,
-            lost,
-            from: None,
-            begins: Vec::new(),
-            lacking: None,
-            own: Header::default(),
-            channels: Vec::new(),
-            to_compare: 0,
-            compared: 0,
-            divergence: None,
-            // A value of a usual size allocates nothing.
-            computed: Vec::with_capacity(4096),
-            header,
+            passed: Arc::new(passed),
             bytes,
+            ..replay
         })
     }
 
@@ -375,7 +358,7 @@ const fn is_compared(role: Role) -> bool {
 }
 
 /// The instances whose functions are not called.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Passed {
     /// The DAGs whose inputs are recorded, in order.
     dags: Vec<u16>,
