@@ -230,7 +230,7 @@ fn verify(
             id: DagId(u32::try_from(specs.len()).unwrap_or(u32::MAX)),
             name: spec.name.clone(),
         };
-        faults.extend((draft.flaws.iter()).map(|flaw| flaw.clone().in_dag(&label)));
+        faults.extend(draft.flaws.iter().map(|flaw| flaw(label.clone())));
         if let Some(Err(fault)) = observed.map(|file| wcets::apply(file, spec.to_mut())) {
             let dag = label.clone();
             faults.push(Fault::WcetsRefused { dag, fault });

@@ -129,21 +129,6 @@ worded! {
     }
 }
 
-impl Fault {
-    /// Names the DAG of a fault that a registration noted, when it did not know the DAG's label yet.
-    pub(crate) fn in_dag(mut self, label: &DagLabel) -> Self {
-        if let Self::InputArity { dag, .. }
-        | Self::OutputArity { dag, .. }
-        | Self::DurationTooLong { dag, .. }
-        | Self::PeriodsDiffer { dag, .. }
-        | Self::ActivationsDiffer { dag, .. } = &mut self
-        {
-            dag.clone_from(label);
-        }
-        self
-    }
-}
-
 /// Returns which part of a DAG is at fault, if it is not the DAG itself.
 fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
     fmt::from_fn(move |f| match subtask {

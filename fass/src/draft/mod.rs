@@ -22,7 +22,7 @@ use core::time::Duration;
 
 use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{
-    Activation, DagId, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel,
+    Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel,
     SubtaskSpec, TopicPort,
 };
 
@@ -40,6 +40,10 @@ type MakeLifecycle = fn(&[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle>;
 /// Provides so many values of a state for after faults.
 pub(crate) type Reset = Box<dyn FnOnce(u32)>;
 
+/// Something that is wrong with a registration: the fault that it is in a DAG of that label, which
+/// is known at the commit only.
+pub(crate) type Flaw = Box<dyn Fn(DagLabel) -> Fault>;
+
 /// A DAG as registered so far.
 #[derive(Default)]
 pub(crate) struct Draft {
@@ -47,7 +51,7 @@ pub(crate) struct Draft {
     /// One for each of `spec.subtasks`.
     pub(crate) make_bodies: Vec<MakeBody>,
     /// What only this crate can find wrong.
-    pub(crate) flaws: Vec<Fault>,
+    pub(crate) flaws: Vec<Flaw>,
     pub(crate) is_committed: bool,
     /// A source that states a period.
     periodic_source: Option<SubtaskLabel>,
@@ -134,20 +138,24 @@ impl Draft {
         self.make_bodies.push(body);
         let subtask = self.next_label(&attributes);
         if input_types.len() != inputs.len() {
-            self.flaws.push(Fault::InputArity {
-                dag: unnamed(),
+            let subtask = subtask.clone();
+            let (expected, given) = (input_types.len(), inputs.len());
+            self.flaws.push(Box::new(move |dag| Fault::InputArity {
+                dag,
                 subtask: subtask.clone(),
-                expected: input_types.len(),
-                given: inputs.len(),
-            });
+                expected,
+                given,
+            }));
         }
         if output_types.len() != outputs.len() {
-            self.flaws.push(Fault::OutputArity {
-                dag: unnamed(),
+            let subtask = subtask.clone();
+            let (expected, given) = (output_types.len(), outputs.len());
+            self.flaws.push(Box::new(move |dag| Fault::OutputArity {
+                dag,
                 subtask: subtask.clone(),
-                expected: output_types.len(),
-                given: outputs.len(),
-            });
+                expected,
+                given,
+            }));
         }
         let spec = self.specify(&subtask, attributes);
         self.spec.subtasks.push(SubtaskSpec {
@@ -210,10 +218,11 @@ impl Draft {
         self.spec.activation = Activation::Sporadic;
         self.replace_period(min_inter_arrival);
         if let Some(subtask) = self.periodic_source.clone() {
-            self.flaws.push(Fault::ActivationsDiffer {
-                dag: unnamed(),
-                subtask,
-            });
+            self.flaws
+                .push(Box::new(move |dag| Fault::ActivationsDiffer {
+                    dag,
+                    subtask: subtask.clone(),
+                }));
         }
     }
 
@@ -221,10 +230,11 @@ impl Draft {
     #[inline(never)]
     pub(crate) fn set_period(&mut self, period: Duration, subtask: SubtaskLabel) {
         if self.spec.activation == Activation::Sporadic {
-            self.flaws.push(Fault::ActivationsDiffer {
-                dag: unnamed(),
-                subtask,
-            });
+            self.flaws
+                .push(Box::new(move |dag| Fault::ActivationsDiffer {
+                    dag,
+                    subtask: subtask.clone(),
+                }));
             return;
         }
         self.periodic_source = Some(subtask.clone());
@@ -233,12 +243,12 @@ impl Draft {
         };
         let first_ns = *self.spec.period_ns.get_or_insert(period_ns);
         if first_ns != period_ns {
-            self.flaws.push(Fault::PeriodsDiffer {
-                dag: unnamed(),
-                subtask,
+            self.flaws.push(Box::new(move |dag| Fault::PeriodsDiffer {
+                dag,
+                subtask: subtask.clone(),
                 first_ns,
                 second_ns: period_ns,
-            });
+            }));
         }
     }
 
@@ -287,13 +297,12 @@ impl Draft {
             spec.to_mut().latest = latest.collect();
         }
         let unknown = MessageType::of::<Unknown>().id();
-        let is_of_arity =
-            |flaw: &Fault| matches!(flaw, Fault::InputArity { .. } | Fault::OutputArity { .. });
-        if !self.flaws.iter().any(is_of_arity) {
+        let ports = (self.spec.subtasks.iter())
+            .flat_map(|subtask| subtask.inputs.iter().chain(&subtask.outputs));
+        if ports.clone().all(|port| port.type_id != unknown) {
             return spec;
         }
-        let known: Vec<TopicPort> = (self.spec.subtasks.iter())
-            .flat_map(|subtask| subtask.inputs.iter().chain(&subtask.outputs))
+        let known: Vec<TopicPort> = ports
             .filter(|port| port.type_id != unknown)
             .cloned()
             .chain(self.latest.iter().map(|latest| latest.port()))
@@ -319,11 +328,12 @@ impl Draft {
     ) -> Option<u64> {
         let ns = u64::try_from(duration.as_nanos()).ok();
         if ns.is_none() {
-            self.flaws.push(Fault::DurationTooLong {
-                dag: unnamed(),
-                subtask: subtask.cloned(),
+            let subtask = subtask.cloned();
+            self.flaws.push(Box::new(move |dag| Fault::DurationTooLong {
+                dag,
+                subtask: subtask.clone(),
                 what,
-            });
+            }));
         }
         ns
     }
@@ -334,14 +344,6 @@ impl Draft {
             id: SubtaskId(number),
             name: attributes.name.clone(),
         }
-    }
-}
-
-/// Stands where a fault names the DAG, whose label the commit knows.
-const fn unnamed() -> DagLabel {
-    DagLabel {
-        id: DagId(0),
-        name: String::new(),
     }
 }
 
@@ -362,7 +364,7 @@ impl fmt::Debug for Draft {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Draft")
             .field("spec", &self.spec)
-            .field("flaws", &self.flaws)
+            .field("flaws", &self.flaws.len())
             .field("is_committed", &self.is_committed)
             .finish_non_exhaustive()
     }
