@@ -12,6 +12,7 @@
 //! - [`sizes`]: what each part of an image takes of its room.
 
 pub mod bounds;
+mod code;
 mod frame;
 pub mod hand_off;
 pub mod join_latency;

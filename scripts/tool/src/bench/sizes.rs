@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
+use super::code::{self, Frames};
 use super::frame::by_plan;
-use super::frame::code::{self, Frames};
 use crate::image;
 use crate::json::Object;
 use crate::options::{Command, Parsed, Takes, options};
@@ -99,7 +99,7 @@ fn part(line: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{LIBRARY, parts};
-    use crate::bench::frame::code::Frames;
+    use crate::bench::code::Frames;
     use crate::places::Frame;
     use crate::system;
 

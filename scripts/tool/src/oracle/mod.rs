@@ -16,10 +16,10 @@
 
 pub mod bounds;
 pub mod in_kernel;
+pub(crate) mod older_bounds;
 mod responses;
 pub mod schedules;
 pub mod synchronizer;
-mod table;
 
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -29,7 +29,7 @@ use std::process::ExitCode;
 use replay::lines::Malformed;
 
 use crate::files;
-use crate::options::{Command, Menu, Refusal, choices};
+use crate::options::{Command, Menu, Refusal, Takes, choices, options};
 use crate::progress::Progress;
 
 /// What reads the cases of one kind.
@@ -41,7 +41,7 @@ static ORACLE: Menu = Menu {
     about: "Compares reference cases with what this project computes.",
     choices: choices! {
         "bounds": "lengths, widths, response-time bounds and verdicts", |words| {
-            run_files(words, &table::BOUNDS, bounds::parse, bounds::check, |case| &case.name)
+            run_files(words, &BOUNDS, bounds::parse, bounds::check, |case| &case.name)
         };
         "responses": "random accepted sets in virtual time, with overheads, against their bounds",
             responses::command;
@@ -49,13 +49,55 @@ static ORACLE: Menu = Menu {
             if words.iter().any(|word| word == "--in-kernel") {
                 return in_kernel::command(words);
             }
-            run_files(words, &table::SCHEDULES, schedules::parse, schedules::check, |case| &case.name)
+            run_files(words, &SCHEDULES, schedules::parse, schedules::check, |case| &case.name)
         };
         "synchronizer": "sets that ExactTime and ApproximateTime emit, and what they drop", |words| {
-            run_files(words, &table::SYNCHRONIZER, synchronizer::parse, synchronizer::check, |case| &case.name)
+            run_files(words, &SYNCHRONIZER, synchronizer::parse, synchronizer::check, |case| &case.name)
         };
     },
-    notes: table::NOTES,
+    notes: NOTES,
+};
+
+/// What all kinds have in common, for the help texts.
+const NOTES: &str = "\
+Prints the first difference of each failing case, then `N passed, M failed`.
+
+Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
+";
+
+const FILES: Option<(Takes, &str)> = Some((
+    Takes::File("FILE..."),
+    "Reference files, as in tests/oracle.",
+));
+
+static BOUNDS: Command = Command {
+    invocation: "./scripts/oracle bounds",
+    about: "Compares lengths, widths, response-time bounds and verdicts with those of the \
+            analysis at commit.",
+    positional: FILES,
+    options: &[],
+    notes: NOTES,
+};
+
+static SCHEDULES: Command = Command {
+    invocation: "./scripts/oracle schedules",
+    about: "Compares starts, finishes, preemptions, response times and misses with those of \
+            the scheduler in virtual time.",
+    positional: FILES,
+    options: options! {
+        /// On the bare machine; with options of its own, see schedules --in-kernel --help.
+        "in-kernel": Takes::Nothing;
+    },
+    notes: NOTES,
+};
+
+static SYNCHRONIZER: Command = Command {
+    invocation: "./scripts/oracle synchronizer",
+    about: "Compares the sets that ExactTime and ApproximateTime emit, and what they drop, \
+            with those of the publish/subscribe baseline.",
+    positional: FILES,
+    options: &[],
+    notes: NOTES,
 };
 
 /// Runs the subcommand.

@@ -1,9 +1,16 @@
 //! The boots that measure: which app on how many cores, and what tells its figures.
+//!
+//! The workloads also run on more and more cores, and with more and more subtasks. With counted
+//! time all cores share one clock, which each instruction of any of them moves on. So a figure is
+//! the number of instructions that *all* cores have executed in between, waiting for a lock
+//! included; halted cores execute none. It is work, not time: what it says is how much more there
+//! is to do for each instance.
 
+use std::iter;
 use std::path::Path;
 use std::time::Duration;
 
-use crate::bench::frame::{Figure, judged};
+use crate::bench::frame::{Column, Figure, Table, judged};
 use crate::image;
 use crate::json::Object;
 use crate::outcome::boot;
@@ -103,5 +110,152 @@ impl Boot {
                 figures => Ok(figures),
             },
         )
+    }
+}
+
+/// The workload, figure and heading of each column.
+type Columns = &'static [(&'static str, &'static str, &'static str)];
+
+const BY_CORES: Columns = &[
+    ("chain-64", "hop", "chain-64 hop"),
+    ("fork-join-16", "return_to_start", "fj-16 return->sink"),
+    ("fork-join-16", "source_to_sink", "fj-16 source->sink"),
+    ("layered-1000", "instance", "layered instance"),
+    ("layered-1000", "locks", "locks/instance"),
+    ("chain-64", "release_to_start", "release->start"),
+];
+
+const BY_SUBTASKS: Columns = &[
+    ("layered", "instance", "instance"),
+    ("layered", "release_to_start", "release->start"),
+    ("layered", "locks", "locks/instance"),
+    ("layered", "commit", "commit/subtask"),
+];
+
+const BY_CLUSTERS: Columns = &[
+    ("layered-100", "instance", "layered instance"),
+    ("layered-100", "locks", "locks/instance"),
+];
+
+const CORES_OF_A_CLUSTER: u64 = 4;
+
+/// The subtasks of each cluster's graph; all of them have stacks at one time.
+const OF_A_CLUSTER: u64 = 100;
+
+/// By how much an instance may cost more where there are more clusters, in per cent.
+const MOST_GROWTH_PERCENT: u64 = 3;
+
+/// Counts what more cores, more subtasks and more clusters cost, and prints it.
+///
+/// # Errors
+///
+/// In words: a guest failed, or an instance costs more than it may.
+pub(super) fn measure_scale(image: &Path) -> Result<(), String> {
+    let count = |sizes: &[u64], boot: &dyn Fn(u64) -> Boot| {
+        let counted = sizes.iter().map(|&size| {
+            let figures = boot(size).measure(Mode::Deterministic, image)?;
+            for figure in &figures {
+                println!("{}", machine_line(figure, Mode::Deterministic));
+            }
+            Ok((size, figures))
+        });
+        counted.collect::<Result<Vec<_>, String>>()
+    };
+    let by_cores = count(&[1, 2, 4, 8, 16, 32, 64], &|cores| {
+        Boot::new(Kind::Figures, cores, MOST_SUBTASKS, WORKLOADS)
+    })?;
+    let by_subtasks = count(&[10, 100, 1000, 10_000], &|subtasks| {
+        let words = format!("part=workloads chain=2 branches=2 layered={subtasks}");
+        Boot::new(Kind::Figures, 1, subtasks, words)
+    })?;
+    let by_clusters = count(&[1, 2, 4, 8, 16], &|clusters| {
+        let sizes: Vec<String> = (0..clusters)
+            .map(|_| CORES_OF_A_CLUSTER.to_string())
+            .collect();
+        let words = format!("test=cluster_scale jobs=200 clusters={}", sizes.join(","));
+        let (cores, subtasks) = (clusters * CORES_OF_A_CLUSTER, clusters * OF_A_CLUSTER);
+        Boot::new(Kind::Divided, cores, subtasks, words)
+    })?;
+    println!("medians of the instructions that all cores together executed:");
+    print!("{}", table("cores", BY_CORES, &by_cores));
+    println!("layered random graphs on one core:");
+    print!("{}", table("subtasks", BY_SUBTASKS, &by_subtasks));
+    println!("a layered random graph in each cluster of {CORES_OF_A_CLUSTER} cores:");
+    check_clusters(&by_clusters)?;
+    print!("{}", table("clusters", BY_CLUSTERS, &by_clusters));
+    Ok(())
+}
+
+/// Makes sure that an instance costs hardly more where there are more clusters.
+///
+/// # Errors
+///
+/// In words: it does, and how much.
+fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
+    let cost = |figures: &[Figure]| {
+        let one = figures.iter().find(|figure| figure.figure == "instance")?;
+        Some((one.median, one.per))
+    };
+    let alone = rows.first().and_then(|(_, figures)| cost(figures));
+    for (clusters, figures) in rows {
+        if let (Some((is, per)), Some((was, of))) = (cost(figures), alone)
+            && u128::from(is) * u128::from(of) * 100
+                > u128::from(was) * u128::from(per) * u128::from(100 + MOST_GROWTH_PERCENT)
+        {
+            return Err(format!(
+                "an instance takes more instructions in {clusters} clusters than in one, by more \
+                 than {MOST_GROWTH_PERCENT} %: {} instead of {}",
+                is / per,
+                was / of
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Returns a table with a row for each size; workload `layered` is the one of that size.
+fn table(what: &str, of: Columns, rows: &[(u64, Vec<Figure>)]) -> String {
+    let mut columns: Vec<Column<'_>> = vec![(what, 8, 0)];
+    columns.extend(of.iter().map(|&(_, _, heading)| (heading, 20, 0)));
+    let mut table = Table::new("", &columns);
+    for (size, figures) in rows {
+        let sized = format!("layered-{size}");
+        let median = |&(workload, name, _): &(&str, &str, _)| {
+            let workload = if workload == "layered" {
+                &sized
+            } else {
+                workload
+            };
+            let is_it = |one: &&Figure| one.workload == workload && one.figure == name;
+            let found = figures.iter().find(is_it);
+            found.map_or_else(String::new, |one| one.one(one.median))
+        };
+        table.cells(iter::once(size.to_string()).chain(of.iter().map(median)));
+    }
+    table.text()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BY_CLUSTERS, Figure, check_clusters, table};
+
+    fn figures(median: u64) -> Vec<Figure> {
+        vec![Figure::new((4, "layered-100", "instance"), 100, [median])]
+    }
+
+    #[test]
+    fn an_instance_may_cost_a_little_more_in_more_clusters_and_no_more() {
+        let rows = |last| {
+            [
+                (1, figures(80_000)),
+                (4, figures(80_100)),
+                (16, figures(last)),
+            ]
+        };
+        check_clusters(&rows(82_400)).expect("within 3 %");
+        let table = table("clusters", BY_CLUSTERS, &rows(82_400));
+        assert_eq!(table.lines().count(), 4, "{table}");
+        let complaint = check_clusters(&rows(82_401)).expect_err("beyond");
+        assert!(complaint.starts_with("an instance takes more instructions in 16 clusters"));
     }
 }

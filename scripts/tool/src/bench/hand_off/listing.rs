@@ -12,7 +12,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use super::boots::{Boot, Kind, LIMIT};
-use crate::bench::frame::code::{self, Frames};
+use crate::bench::code::{self, Frames};
 use crate::places::Frame;
 use crate::qemu::{Ending, Mode};
 use crate::{files, protocol::Status, system};

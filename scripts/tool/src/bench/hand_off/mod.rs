@@ -5,15 +5,13 @@
 //! the same figures come out of every run, and can be held against those that
 //! the repository keeps: `tests/baselines/hand-off.json`.
 //!
-//! - `boots`: what measures them;
-//! - `baseline`: what they were before, and the tables;
-//! - `scale`: the same on more cores, and with more subtasks;
+//! - `boots`: which app measures on how many cores, and what cores and subtasks cost;
+//! - `baseline`: what the figures were before, and the tables;
 //! - `listing`: one hop, instruction by instruction.
 
 mod baseline;
 mod boots;
 mod listing;
-mod scale;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -129,7 +127,7 @@ fn measure(plan: &Plan) -> Result<bool, String> {
     install::ensure_qemu()?;
     let image = &image::build("hand-off")?.path;
     if plan.scale {
-        return scale::measure(image).map(|()| true);
+        return boots::measure_scale(image).map(|()| true);
     }
     if let Some(file) = &plan.listing {
         return listing::list(image, file).map(|()| true);

@@ -1,11 +1,114 @@
-//! From raw times to metrics, and from samples to figures.
+//! From a condition's raw times to metrics, and from samples to figures and files.
+//!
+//! The file of a condition begins with a comment that states everything the times depend on.
+//! A file whose first line differs is another condition's, and is measured anew.
 //!
 //! *Publication* i of a topic is that of job i. The *last publication* of i is when
 //! all parallel subtasks have published it. What the metrics mean and which of them
 //! can be compared is told in `docs/evaluation.md`.
 
-use join_latency::Samples;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use join_latency::{Joined, Samples, Span};
 use sched_dag::law::Distribution;
+
+use super::{Condition, Setting};
+use crate::bench::frame::Table;
+use crate::json::{Object, Value};
+use crate::protocol::Transcript;
+
+/// The columns. `subtask` 0 is the source, 1 to N are the parallel ones, the next one is the join.
+const COLUMNS: &str = "what,subtask,index,ready_ns,start_ns,finish_ns,joined_indices";
+
+/// Returns the times that a guest has printed as CSV, under a first line `# {statement}`.
+///
+/// # Errors
+///
+/// In words: a line is not as it should be, or there are not so many jobs.
+pub(super) fn write(
+    transcript: &Transcript,
+    statement: &str,
+    subtasks: usize,
+    jobs: u64,
+) -> Result<String, String> {
+    let sink = subtasks as u64 + 1;
+    let mut text = format!("# {statement}\n{COLUMNS}\n");
+    let mut counts: BTreeMap<u64, u64> = BTreeMap::new();
+    let lines = transcript.machine.iter();
+    for line in lines.filter(|line| ["executions", "joins"].contains(&&*line.kind)) {
+        let number = line.number;
+        let damaged = || format!("serial line {number} has no times as it should");
+        let subtask = match &*line.kind {
+            "joins" => sink,
+            _ => line.number_at("subtask").ok_or_else(damaged)?,
+        };
+        let index = counts.entry(subtask).or_default();
+        if line.number_at("first") != Some(*index) {
+            return Err(format!("a batch before serial line {number} is missing"));
+        }
+        for times in line.value.get("times").ok_or_else(damaged)?.elements() {
+            let numbers = times.elements().iter().filter_map(Value::as_u64);
+            // Writing into a `String` cannot fail.
+            let _ = match numbers.collect::<Vec<_>>()[..] {
+                [start_ns, finish_ns] if subtask < sink => {
+                    writeln!(text, "execution,{subtask},{index},,{start_ns},{finish_ns},")
+                }
+                [ready_ns, start_ns, finish_ns, ref joined @ ..] if joined.len() == subtasks => {
+                    let joined: Vec<String> = joined.iter().map(u64::to_string).collect();
+                    let joined = joined.join(" ");
+                    writeln!(
+                        text,
+                        "join,{sink},{index},{ready_ns},{start_ns},{finish_ns},{joined}"
+                    )
+                }
+                _ => return Err(damaged()),
+            };
+            *index += 1;
+        }
+    }
+    match counts.get(&0).copied().unwrap_or_default() {
+        all if all == jobs => Ok(text),
+        some => Err(format!("the guest printed {some} of {jobs} jobs")),
+    }
+}
+
+/// Reads what [`write()`] wrote, if the statement is this one and nothing is damaged.
+pub(super) fn read(text: &str, statement: &str, subtasks: usize) -> Option<Samples> {
+    let mut lines = text.lines();
+    let is_its_own = lines.next()?.strip_prefix("# ")? == statement && lines.next()? == COLUMNS;
+    if !is_its_own || !text.ends_with('\n') {
+        return None;
+    }
+    let mut samples = Samples {
+        parallel: vec![Vec::new(); subtasks],
+        ..Samples::default()
+    };
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [what, subtask, _, ready_ns, start_ns, finish_ns, joined] = cells[..] else {
+            return None;
+        };
+        let span = Span {
+            start_ns: start_ns.parse().ok()?,
+            finish_ns: finish_ns.parse().ok()?,
+        };
+        if what == "join" {
+            let joined = joined.split(' ').map(|index| index.parse().ok());
+            samples
+                .indices
+                .extend(joined.collect::<Option<Vec<u64>>>()?);
+            let ready_ns = ready_ns.parse().ok()?;
+            samples.joins.push(Joined { ready_ns, span });
+        } else {
+            match subtask.parse::<usize>().ok()? {
+                0 => samples.source.push(span),
+                parallel => samples.parallel.get_mut(parallel - 1)?.push(span),
+            }
+        }
+    }
+    Some(samples)
+}
 
 /// The time between two releases, in nanoseconds.
 pub(super) const PERIOD_NS: u64 = 25_000_000;
@@ -105,10 +208,165 @@ impl Figures {
     }
 }
 
+/// The conditions measured so far, in the order of the plan.
+type Measured = [(Condition, Figures)];
+
+/// Returns each sample of each metric as a line.
+pub(super) fn samples_csv(measured: &Measured) -> String {
+    let mut text = String::from("policy,subtasks,seed,metric,index,value_ns\n");
+    for (condition, figures) in measured {
+        let (policy, subtasks, seed) = (condition.policy, condition.subtasks, condition.seed);
+        for (metric, samples) in METRICS.iter().zip(&figures.samples) {
+            for (index, value_ns) in samples {
+                // Writing into a `String` cannot fail.
+                let _ = writeln!(
+                    text,
+                    "{policy},{subtasks},{seed},{metric},{index},{value_ns}"
+                );
+            }
+        }
+    }
+    text
+}
+
+/// Returns the figures of each policy and N, seeds pooled, in the order of the plan: with its
+/// first condition. What is not measured yet is left out.
+fn pooled(measured: &Measured) -> impl Iterator<Item = (Condition, Figures)> {
+    let of = |condition: &Condition| (condition.subtasks, condition.policy);
+    let alike = measured.chunk_by(move |(one, _), (other, _)| of(one) == of(other));
+    alike.map(|seeds| {
+        let mut sum = Figures::default();
+        seeds.iter().for_each(|(_, figures)| sum.add(figures));
+        (seeds[0].0, sum)
+    })
+}
+
+/// Returns the summary, a line for each policy and N.
+pub(super) fn summary_json(setting: &Setting<'_>, measured: &Measured) -> String {
+    let plan = setting.plan;
+    let results = pooled(measured).map(|(condition, figures)| result_json(condition, &figures));
+    let results = results.collect::<Vec<_>>().join(",\n");
+    let summary = Object::new()
+        .text("qemu", &setting.version)
+        .text("commit", &setting.commit)
+        .text("image", &setting.checksum)
+        .text("mode", setting.mode_name())
+        .text("time", setting.meaning())
+        .number("cores", plan.cores)
+        .number("memory_mib", plan.memory_mib)
+        .number("jobs", plan.jobs)
+        .number("queue", plan.queue)
+        .list("seeds", &plan.seeds)
+        .number("conditions", plan.conditions.len() as u64)
+        .number("conditions_measured", measured.len() as u64)
+        .json("results", &format!("[\n{results}\n]"));
+    summary.end() + "\n"
+}
+
+fn result_json(condition: Condition, figures: &Figures) -> String {
+    let mut result = Object::new()
+        .text("policy", &condition.policy.to_string())
+        .number("subtasks", condition.subtasks as u64);
+    for (name, count) in COUNTS.iter().zip(figures.counts) {
+        result = result.number(name, count as u64);
+    }
+    result = result.json("joins_per_job", &format!("{:.4}", figures.joins_per_job()));
+    for (position, metric) in METRICS.iter().enumerate() {
+        let of = figures.distribution(position);
+        let distribution = Object::new()
+            .number("count", of.count())
+            .number("median", of.median())
+            .json("mean", &figures.mean_ns(position).to_string())
+            .number("p99", of.p99())
+            .number("max", of.max());
+        result = result.json(&format!("{metric}_ns"), &distribution.end());
+    }
+    result.end()
+}
+
+/// Returns the figures of each policy and N as a table.
+pub(super) fn table(measured: &Measured) -> String {
+    let columns = [
+        ("N", 2, 0),
+        (" joined by", -23, 0),
+        ("joins/job", 9, 3),
+        ("one job", 8, 0),
+        ("across", 8, 0),
+        ("missing", 9, 0),
+        ("latency", 12, 0),
+        ("p99", 12, 0),
+        ("cover", 12, 0),
+        ("p99", 12, 0),
+        ("response", 12, 0),
+    ];
+    let mut table = Table::new("", &columns);
+    for (condition, figures) in pooled(measured) {
+        let [latency, cover, _, response] = [0, 1, 2, 3].map(|metric| figures.distribution(metric));
+        let [_, _, same_index, cross_index, missing, _] = figures.counts;
+        table.row(&[
+            &condition.subtasks,
+            &format!(" {}", condition.policy.title()),
+            &figures.joins_per_job(),
+            &same_index,
+            &cross_index,
+            &missing,
+            &ns(latency.median()),
+            &ns(latency.p99()),
+            &ns(cover.median()),
+            &ns(cover.p99()),
+            &ns(response.median()),
+        ]);
+    }
+    table.text()
+}
+
+/// Returns nanoseconds as people read them.
+fn ns(ns: u64) -> String {
+    let value = ns as f64;
+    match ns {
+        0..1_000 => format!("{ns} ns"),
+        1_000..1_000_000 => format!("{:.2} µs", value / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.2} ms", value / 1e6),
+        _ => format!("{:.2} s", value / 1e9),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Figures, PERIOD_NS};
-    use join_latency::{Joined, Samples, Span};
+    use super::*;
+
+    const LOG: &str = "\
+{\"kind\":\"executions\",\"subtask\":0,\"first\":0,\"times\":[[0,1],[25,26]]}
+{\"kind\":\"executions\",\"subtask\":1,\"first\":0,\"times\":[[2,9]]}
+{\"kind\":\"executions\",\"subtask\":1,\"first\":1,\"times\":[[27,40]]}
+{\"kind\":\"executions\",\"subtask\":2,\"first\":0,\"times\":[[3,8],[28,30]]}
+{\"kind\":\"joins\",\"first\":0,\"times\":[[10,11,12,0,0],[41,42,43,1,1]]}
+";
+
+    #[test]
+    fn times_survive_the_way_through_the_file() {
+        let text = write(&Transcript::read(LOG), "jobs=2", 2, 2).unwrap();
+        let samples = read(&text, "jobs=2", 2).unwrap();
+        assert_eq!(samples.source[1].start_ns, 25);
+        assert_eq!(samples.parallel[0][1].finish_ns, 40);
+        assert_eq!(samples.joins[1].ready_ns, 41);
+        assert_eq!(samples.indices, [0, 0, 1, 1]);
+        assert_eq!(read(&text, "jobs=3", 2), None);
+        let cut = &text[..text.len() - 4];
+        assert_eq!(read(cut, "jobs=2", 2), None, "a cut file is not taken");
+    }
+
+    #[test]
+    fn a_missing_batch_or_job_is_noticed() {
+        let without: String = LOG.lines().filter(|line| !line.contains("[2,9]")).collect();
+        let without = without.replace("}{", "}\n{");
+        let message = write(&Transcript::read(&without), "", 2, 2).unwrap_err();
+        assert_eq!(message, "a batch before serial line 2 is missing");
+        let message = write(&Transcript::read(LOG), "", 2, 3).unwrap_err();
+        assert_eq!(message, "the guest printed 2 of 3 jobs");
+        let message = write(&Transcript::read(LOG), "", 3, 2).unwrap_err();
+        assert_eq!(message, "serial line 5 has no times as it should");
+    }
 
     /// Two parallel subtasks, three jobs; the only join has jobs 1 and 2.
     fn samples() -> Samples {
@@ -146,5 +404,11 @@ mod tests {
         both.add(&figures);
         assert_eq!(both.counts, [6, 2, 0, 2, 4, 2]);
         assert_eq!((both.distribution(1).count(), both.mean_ns(2)), (4, 12));
+    }
+
+    #[test]
+    fn times_have_a_fitting_unit() {
+        let texts = [614, 1_874, 36_500_000, 22_644_000_000].map(ns);
+        assert_eq!(texts, ["614 ns", "1.87 µs", "36.50 ms", "22.64 s"]);
     }
 }

@@ -7,34 +7,33 @@
 //! interrupted, and what is there already is not measured again, as long as it was
 //! measured under the same conditions (image, QEMU, all options).
 //!
-//! - `plan`, `condition`: what is to be measured;
-//! - `setting`: by what;
-//! - `times`, `figures`: from the guest's lines to figures;
-//! - `results`: from figures to what people and programs read.
+//! - here: what is to be measured, and by what;
+//! - `figures`: from the guest's lines to figures, and what people and programs read of them.
 
-mod condition;
 mod figures;
-mod plan;
-mod results;
-mod setting;
-mod times;
 
 use std::ffi::OsString;
+use std::fmt;
 use std::fs;
-use std::path::Path;
-use std::process::ExitCode;
+use std::path::{Path, PathBuf};
+use std::process::{self, ExitCode};
+use std::time::Duration;
 
-use figures::Figures;
-use plan::Plan;
-use setting::Setting;
+use recording::Crc;
+use replay::shown::quoted;
 
-use super::frame::{by_plan, draw};
+use super::frame::{by_plan, draw, judged};
 use crate::files;
+use crate::options::{Command, Parsed, Takes, options};
+use crate::program::Order;
 use crate::progress::Progress;
+use crate::qemu::{Mode, PROGRAM, Qemu};
+use crate::{image, install, outcome, probe, program, system};
+use figures::Figures;
 
 /// Runs `bench join-latency` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    by_plan(&plan::TABLE, words, Plan::new, |plan| {
+    by_plan(&TABLE, words, Plan::new, |plan| {
         measure_all(plan).map(|()| true)
     })
 }
@@ -58,7 +57,7 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
         progress.show(over);
         let statement = setting.statement(condition);
         let file = folder.join(format!("{}.csv", condition.file_stem()));
-        let read = |text: String| times::read(&text, &statement, condition.subtasks);
+        let read = |text: String| figures::read(&text, &statement, condition.subtasks);
         let samples = match fs::read_to_string(&file).ok().and_then(read) {
             Some(samples) => samples,
             None => {
@@ -69,18 +68,18 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
         };
         measured.push((*condition, Figures::of(&samples)));
         // After each: an interruption leaves numbers for what was measured.
-        let summary = results::summary_json(&setting, &measured);
+        let summary = figures::summary_json(&setting, &measured);
         write_whole(&plan.out.join("summary.json"), &summary)?;
         write_whole(
             &plan.out.join("samples.csv"),
-            &results::samples_csv(&measured),
+            &figures::samples_csv(&measured),
         )?;
     }
     progress.end();
     if let Err(line) = draw("join_latency.py", &plan.out) {
         eprintln!("{line}");
     }
-    print!("{}", results::table(&measured));
+    print!("{}", figures::table(&measured));
     println!("written: {}", plan.out.display());
     Ok(())
 }
@@ -91,4 +90,476 @@ fn write_whole(path: &Path, text: &str) -> Result<(), String> {
     files::write(&unfinished, text)?;
     let renamed = fs::rename(&unfinished, path);
     renamed.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
+}
+
+/// The table of `bench join-latency`.
+static TABLE: Command = Command {
+    invocation: "./scripts/bench join-latency",
+    about: "Reproduces the paper's evaluation: joins by a DAG, by equal and by close stamps.",
+    positional: None,
+    options: options! {
+        /// The folder for all results; what is there already is not measured again. If not given,
+        /// target/join-latency, or target/join-latency-on-linux.
+        "out" 'o': Takes::File("DIR");
+        /// Jobs of each condition.
+        "jobs": Takes::number(1..=100_000), or "2000";
+        /// Parallel subtasks N; a condition has two processors more than the largest.
+        "subtasks": Takes::numbers(1..=16), or "2,4,6";
+        /// What joins: fass, exact, approximate-MS with the longest interval.
+        "policies": Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
+        /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
+        /// every policy.
+        "repeat": Takes::number(1..=1000), or "1";
+        /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
+        /// there are fewer.
+        "on": Takes::OneOf(&["machine", "linux"]), or "machine";
+        /// Queue size of the synchronizers.
+        "queue": Takes::number(1..=100_000), or "1000";
+        /// What time means, see ./scripts/run --help; kvm where it works, else deterministic.
+        "mode": Takes::OneOf(Mode::NAMES);
+        /// The same as --mode deterministic.
+        "deterministic": Takes::Nothing;
+        /// Boot each deterministic condition once, not until two boots agree.
+        "once": Takes::Nothing;
+    },
+    notes: "\
+writes into DIR:
+  summary.json        counts, median, mean, p99, max of each condition
+  samples.csv         each sample of each metric
+  conditions/*.csv    each condition's raw times, written when it is complete
+  plots/*.svg         if python3 has matplotlib
+
+Interrupted, it keeps the conditions that are complete; run again with the same
+options, it measures the others only. docs/evaluation.md explains the metrics.
+
+exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command line
+",
+};
+
+/// Everything that all conditions have in common, and the conditions.
+#[derive(Clone, Debug)]
+struct Plan {
+    out: PathBuf,
+    /// For each N all policies, for each of them all seeds.
+    conditions: Vec<Condition>,
+    seeds: Vec<u64>,
+    jobs: u64,
+    queue: u64,
+    cores: u64,
+    memory_mib: u64,
+    /// Whether the conditions are programs of this computer.
+    on_linux: bool,
+    /// The mode that was named; which one it is, the built image settles.
+    named: Option<Mode>,
+    /// Whether a deterministic condition is booted once only.
+    once: bool,
+}
+
+impl Plan {
+    /// Settles the plan.
+    ///
+    /// # Errors
+    ///
+    /// What the options ask for cannot be: one line that says why.
+    fn new(options: &Parsed) -> Result<Plan, String> {
+        let on_linux = options.text("on") == Some("linux");
+        let of_guests = options.given_of(&["mode", "deterministic", "once"]);
+        if let Some(name) = of_guests.filter(|_| on_linux) {
+            return Err(format!(
+                "`--{name}` is for guests; leave it or `--on linux` out"
+            ));
+        }
+        (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
+        options.check_distinct(&["policies", "subtasks"])?;
+        let policies = Policy::list(options.text("policies").unwrap_or_default())?;
+        let mut named = options.text("mode").and_then(Mode::from_name);
+        if options.is_given("deterministic") {
+            let other = named.filter(|mode| *mode != Mode::Deterministic);
+            if let Some(mode) = other {
+                return Err(format!(
+                    "`--mode {mode}` and `--deterministic` exclude each other; give one"
+                ));
+            }
+            named = Some(Mode::Deterministic);
+        }
+        let once = options.is_given("once");
+        if let Some(mode) = named.filter(|mode| once && *mode != Mode::Deterministic) {
+            return Err(format!(
+                "`--once` is for deterministic conditions, and the mode is {mode}, in which each \
+                 is booted once; leave it out"
+            ));
+        }
+        let number = |name| options.number(name).unwrap_or(1);
+        let subtasks: Vec<usize> = options.numbers("subtasks");
+        let seeds: Vec<u64> = (1..=number("repeat")).collect();
+        let of_size = |&subtasks: &usize| {
+            let seeds = &seeds;
+            let of_policy = move |&policy: &Policy| {
+                seeds.iter().map(move |&seed| Condition {
+                    policy,
+                    subtasks,
+                    seed,
+                })
+            };
+            policies.iter().flat_map(of_policy)
+        };
+        let conditions = subtasks.iter().flat_map(of_size).collect();
+        // Source, join and parallel subtasks: none waits for a core.
+        let cores = subtasks.iter().max().map_or(1, |most| *most as u64) + 2;
+        let folder = match on_linux {
+            true => "target/join-latency-on-linux",
+            false => "target/join-latency",
+        };
+        let jobs = number("jobs");
+        Ok(Plan {
+            out: options.path("out").unwrap_or(Path::new(folder)).into(),
+            conditions,
+            seeds,
+            jobs,
+            queue: number("queue"),
+            cores,
+            // The kernel records each instance, and the app its joins: half a KiB.
+            memory_mib: 64 + (jobs * cores).div_ceil(2048),
+            on_linux,
+            named,
+            once,
+        })
+    }
+}
+
+/// What makes the joins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Policy {
+    /// The DAG's scheduler.
+    Fass,
+    /// Equal stamps.
+    Exact,
+    /// Stamps at most this number of milliseconds apart.
+    Approximate(u64),
+}
+
+impl Policy {
+    /// Reads a list of names with commas between.
+    fn list(text: &str) -> Result<Vec<Policy>, String> {
+        let policy = |name| {
+            Policy::from_name(name).ok_or_else(|| {
+                format!(
+                    "`--policies`: {} is none; there are fass, exact, and approximate-MS with 1 \
+                     to 1000000 ms",
+                    quoted(name)
+                )
+            })
+        };
+        text.split(',').map(policy).collect()
+    }
+
+    fn from_name(name: &str) -> Option<Policy> {
+        let number = name.strip_prefix("approximate-");
+        let max_interval_ms = number.and_then(|number| number.parse().ok());
+        let close = max_interval_ms.filter(|ms| (1..=1_000_000).contains(ms));
+        let close = close.map(Policy::Approximate);
+        let mut all = [Policy::Fass, Policy::Exact].into_iter().chain(close);
+        // `+7` would parse too, and be another name for the same.
+        all.find(|policy| policy.to_string() == name)
+    }
+
+    /// Names it for people.
+    fn title(self) -> String {
+        match self {
+            Policy::Fass => "FasS (DAG)".into(),
+            Policy::Exact => "ExactTime".into(),
+            Policy::Approximate(ms) => format!("ApproximateTime {ms} ms"),
+        }
+    }
+}
+
+impl fmt::Display for Policy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Policy::Fass => f.write_str("fass"),
+            Policy::Exact => f.write_str("exact"),
+            Policy::Approximate(ms) => write!(f, "approximate-{ms}"),
+        }
+    }
+}
+
+/// What one boot measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Condition {
+    policy: Policy,
+    subtasks: usize,
+    seed: u64,
+}
+
+impl Condition {
+    /// Returns the name of its file, without the ending.
+    fn file_stem(&self) -> String {
+        format!("{}-n{}-seed{}", self.policy, self.subtasks, self.seed)
+    }
+
+    /// Returns its words of the guest's command line.
+    fn guest_words(&self, jobs: u64, queue: u64) -> String {
+        // Inputs of the parallel subtasks must hold their backlog, which grows
+        // slower than the jobs.
+        let depth = jobs.clamp(1000, 100_000);
+        let of_queues = format!("queue={queue} depth={depth}");
+        let policy = match self.policy {
+            Policy::Approximate(ms) => format!("approximate max_interval_ms={ms} {of_queues}"),
+            Policy::Exact => format!("exact {of_queues}"),
+            Policy::Fass => "fass".into(),
+        };
+        let (subtasks, seed) = (self.subtasks, self.seed);
+        format!("policy_under_test={policy} subtasks={subtasks} jobs={jobs} seed={seed}")
+    }
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (policy, subtasks) = (self.policy.title(), self.subtasks);
+        write!(f, "{policy}, N = {subtasks}, seed {}", self.seed)
+    }
+}
+
+/// How often a condition is booted at most in deterministic mode.
+const MOST_BOOTS: usize = 6;
+
+/// The machine that conditions are measured with, and versions of that, for the record.
+#[derive(Debug)]
+struct Setting<'p> {
+    plan: &'p Plan,
+    /// The mode of the guests; `None`: programs of this computer.
+    mode: Option<Mode>,
+    image: PathBuf,
+    /// A checksum of the image: other code, other times.
+    checksum: String,
+    /// QEMU's version, or Linux's.
+    version: String,
+    /// The commit, with a mark if the tree differs from it.
+    commit: String,
+}
+
+impl<'p> Setting<'p> {
+    /// Builds what is to be run, settles the mode, and returns why it is that one.
+    ///
+    /// # Errors
+    ///
+    /// In words: it cannot be built, or the mode that is named is of no use.
+    fn new(plan: &'p Plan) -> Result<(Self, Option<String>), String> {
+        let mut setting = Self {
+            plan,
+            mode: None,
+            image: PathBuf::new(),
+            checksum: String::new(),
+            version: String::new(),
+            commit: first_line("git", &["describe", "--always", "--abbrev=12", "--dirty"]),
+        };
+        let mut why = None;
+        if plan.on_linux {
+            setting.image = image::build_linux("join-latency", None)?.path;
+            setting.version = first_line("uname", &["-sr"]);
+        } else {
+            install::ensure_qemu()?;
+            setting.image = image::build("join-latency")?.path;
+            setting.version = first_line(PROGRAM, &["--version"]);
+            let machine = setting.qemu(&plan.conditions[0], Mode::Deterministic);
+            let (mode, reason) =
+                probe::choose(plan.named, Mode::Deterministic, &machine, &setting.image)?;
+            setting.mode = Some(mode);
+            why = reason.map(|why| format!("mode {mode} because {why}"));
+        }
+        let mut checksum = Crc::new();
+        checksum.update(&fs::read(&setting.image).unwrap_or_default());
+        setting.checksum = format!("{:08x}", checksum.value());
+        Ok((setting, why))
+    }
+
+    /// Names what time means.
+    fn mode_name(&self) -> &'static str {
+        self.mode.map_or("linux", Mode::name)
+    }
+
+    /// Says in one sentence what a time is worth.
+    fn meaning(&self) -> &'static str {
+        let on_linux = "real nanoseconds on real processors, whatever else this computer does";
+        self.mode.map_or(on_linux, Mode::meaning)
+    }
+
+    /// States everything that a condition's times depend on.
+    fn statement(&self, condition: &Condition) -> String {
+        let (version, checksum) = (&self.version, &self.checksum);
+        let Some(mode) = self.mode else {
+            let words = self.linux_words(condition);
+            return format!("{version}; program {checksum}; {words}");
+        };
+        let qemu = self.qemu(condition, mode);
+        format!(
+            "{version}; image {checksum}; machine {}, {} cores, {} MiB; {}",
+            qemu.machine, qemu.cores, qemu.memory_mib, qemu.guest_words
+        )
+    }
+
+    /// Returns the words of a condition's program on Linux.
+    fn linux_words(&self, condition: &Condition) -> String {
+        let words = condition.guest_words(self.plan.jobs, self.plan.queue);
+        format!("cores={} share=on {words}", self.plan.cores)
+    }
+
+    /// Describes the guest of a condition.
+    fn qemu(&self, condition: &Condition, mode: Mode) -> Qemu {
+        let words = condition.guest_words(self.plan.jobs, self.plan.queue);
+        Qemu {
+            mode,
+            cores: self.plan.cores,
+            memory_mib: self.plan.memory_mib,
+            guest_words: format!("mode={mode} {words}"),
+            ..Qemu::default()
+        }
+    }
+
+    /// Measures one condition, and returns its times: in deterministic mode until two boots agree,
+    /// or [`MOST_BOOTS`] have been tried; then it says so and returns those of the first.
+    ///
+    /// Two boots agree as the kernel removes from counted time what depends on the host
+    /// (its `machine::counted_time`). That rests on how QEMU 7.2 works, so it is checked
+    /// wherever figures are made.
+    fn measure(&self, condition: &Condition) -> Result<String, String> {
+        let is_sure = self.plan.once || self.mode != Some(Mode::Deterministic);
+        let mut seen = Vec::new();
+        while seen.len() < MOST_BOOTS {
+            let times = self.boot_once(condition)?;
+            if is_sure || seen.contains(&times) {
+                if seen.len() > 1 {
+                    eprintln!("{condition}: {} boots until two agreed", seen.len() + 1);
+                }
+                return Ok(times);
+            }
+            seen.push(times);
+        }
+        eprintln!(
+            "{condition}: no two of {MOST_BOOTS} boots agree to the last nanosecond; the first is \
+             kept"
+        );
+        Ok(seen.swap_remove(0))
+    }
+
+    fn boot_once(&self, condition: &Condition) -> Result<String, String> {
+        let jobs = self.plan.jobs;
+        let limit = Duration::from_secs(120 + jobs);
+        let run = |log: &Path| {
+            if let Some(mode) = self.mode {
+                let qemu = self.qemu(condition, mode);
+                return outcome::boot(&qemu, &self.image, log, limit, |_| {});
+            }
+            let words = self.linux_words(condition);
+            let words: Vec<OsString> = words.split(' ').map(OsString::from).collect();
+            let order = Order {
+                program: &self.image,
+                words: &words,
+                is_live: false,
+                stops: false,
+                log,
+                limit,
+            };
+            program::run(&order, &mut |_| {})
+        };
+        judged(condition, "join-latency", run, |outcome| {
+            let statement = self.statement(condition);
+            figures::write(&outcome.transcript, &statement, condition.subtasks, jobs)
+        })
+    }
+}
+
+/// Returns the first line that a program says, if it is there and content.
+fn first_line(program: &str, words: &[&str]) -> String {
+    let mut command = process::Command::new(program);
+    let output = command
+        .args(words)
+        .current_dir(system::workspace())
+        .output();
+    let output = output.ok().filter(|output| output.status.success());
+    let said = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned());
+    let line = said.as_deref().and_then(|said| said.lines().next());
+    line.unwrap_or("unknown").into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(line: &str) -> Result<Plan, String> {
+        Plan::new(&TABLE.right(line))
+    }
+
+    #[test]
+    fn every_combination_is_a_condition() {
+        let plan = plan("--deterministic --repeat 2 --policies fass,exact").unwrap();
+        assert_eq!(plan.conditions.len(), 3 * 2 * 2);
+        assert_eq!((plan.cores, plan.seeds), (8, vec![1, 2]));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let refusal = |line: &str| plan(line).unwrap_err();
+        assert!(refusal("--subtasks 2,2 --deterministic").contains("twice"));
+        assert!(refusal("--policies exact,exact").contains("twice"));
+        assert!(refusal("--mode threads --deterministic").contains("exclude"));
+        assert!(refusal("--on linux --once").contains("`--once` is for guests"));
+    }
+
+    #[test]
+    fn on_linux_results_have_a_folder_of_their_own() {
+        let out = |line: &str| plan(line).unwrap().out;
+        assert_eq!(out(""), Path::new("target/join-latency"));
+        let on_linux = "target/join-latency-on-linux";
+        assert_eq!(out("--on linux"), Path::new(on_linux));
+        assert_eq!(out("--on linux --out x"), Path::new("x"));
+    }
+
+    #[test]
+    fn policies_are_read_back() {
+        let text = "fass,exact,approximate-10";
+        let policies = Policy::list(text).unwrap();
+        assert_eq!(
+            policies,
+            [Policy::Fass, Policy::Exact, Policy::Approximate(10)]
+        );
+        let names: Vec<String> = policies.iter().map(ToString::to_string).collect();
+        assert_eq!(names.join(","), text);
+    }
+
+    #[test]
+    fn a_wrong_policy_is_named() {
+        for wrong in [
+            "fas",
+            "approximate",
+            "approximate-0",
+            "approximate-+7",
+            "approximate-",
+            "",
+        ] {
+            let message = Policy::list(&format!("fass,{wrong}")).unwrap_err();
+            assert!(message.contains(&format!("`{wrong}` is none")), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_guest_is_told_what_matters_to_it() {
+        let words = |policy| {
+            Condition {
+                policy,
+                subtasks: 4,
+                seed: 9,
+            }
+            .guest_words(50, 7)
+        };
+        assert_eq!(
+            words(Policy::Fass),
+            "policy_under_test=fass subtasks=4 jobs=50 seed=9"
+        );
+        assert_eq!(
+            words(Policy::Approximate(30)),
+            "policy_under_test=approximate max_interval_ms=30 queue=7 depth=1000 subtasks=4 \
+             jobs=50 seed=9"
+        );
+    }
 }

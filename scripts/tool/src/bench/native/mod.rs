@@ -1,7 +1,8 @@
 //! What the scheduler costs on the host's own processors.
 //!
 //! The same engine that the kernel has, on threads of Linux that poll, with the
-//! graphs of `bench hand-off` with empty bodies. Nothing here is emulated, so the
+//! graphs of `bench hand-off` with empty bodies, of which only the source does something: once a
+//! round it reads the clock. Nothing here is emulated, so the
 //! figures can be compared with those of libraries that run task graphs on threads.
 //!
 //! Other work on the host shows in them. Therefore each figure is measured in many
@@ -9,21 +10,24 @@
 //! percentile: the minimum is what the code costs, the others are what the host makes
 //! of it.
 //!
-//! - `graphs`: the graphs, as bodies that do nothing;
-//! - `throughput`: rounds of jobs, and what one step of them takes;
-//! - `join`: from the last return to the sink's start, across cores;
-//! - `clusters`: what two clusters of one core do, next to one core.
+//! - here: rounds of jobs, back to back, and what one step of them takes;
+//! - `across_cores`: from the last return to the sink's start, and what two clusters do.
 
-mod clusters;
-mod graphs;
-mod join;
-mod throughput;
+mod across_cores;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use graphs::Graph;
+use fass::{
+    ConstructionPolicy, Policy, SubtaskAttributes, create_dag, finish_create_dags,
+    finish_create_dags_with,
+};
+use hand_off::Shape;
+use linux::{Linux, Mechanism};
 use replay::shown::quoted;
+use sched_dag::DagId;
 
 use super::frame::{Figure, Table, by_plan};
 use crate::json::Object;
@@ -112,7 +116,7 @@ fn measure(plan: &Plan) -> Result<bool, String> {
     if linux::processors() < 2 {
         return Err("this host has one processor for us; two are needed".into());
     }
-    let total = throughput::passes(&plan.graphs, &WORKERS);
+    let total = passes(&plan.graphs, &WORKERS);
     let (mut progress, mut over) = (Progress::new(total, "passes"), 0);
     let mut show = || {
         over += 1;
@@ -120,15 +124,15 @@ fn measure(plan: &Plan) -> Result<bool, String> {
     };
     let mut rows = Vec::new();
     for &graph in &plan.graphs {
-        let measured = throughput::measure(graph, &WORKERS, plan.rounds, &mut show)?;
+        let measured = throughput(graph, &WORKERS, plan.rounds, &mut show)?;
         rows.extend(measured);
     }
     progress.end();
     if plan.with_join {
-        rows.extend(join::measure(plan.jobs)?);
+        rows.extend(across_cores::join(plan.jobs)?);
     }
     let together = match plan.with_clusters {
-        true => clusters::measure(plan.rounds, &mut rows)?,
+        true => across_cores::clusters(plan.rounds, &mut rows)?,
         false => Vec::new(),
     };
     print!("{}", table(&rows));
@@ -193,6 +197,295 @@ fn machine_line((figure, runner): &Row) -> String {
         .end()
 }
 
+/// How often each runner gets its turn, so that a change of the host's speed meets all.
+const PASSES: usize = 3;
+
+/// About how many instances a round has: some hundred microseconds.
+const INSTANCES_A_ROUND: usize = 20_000;
+
+/// What runs the bodies.
+#[derive(Clone, Copy)]
+enum Runner {
+    /// A loop over the functions.
+    Floor,
+    /// The scheduler, with functions of no values.
+    Closures(Policy),
+    /// The scheduler, with a value on each edge, by static priority.
+    Typed,
+}
+
+impl Runner {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Floor => "floor",
+            Self::Closures(Policy::StaticPriority) => "closures, static",
+            Self::Closures(Policy::Edf) => "closures, edf",
+            Self::Typed => "typed, static",
+        }
+    }
+}
+
+/// Returns how many passes [`measure`] makes.
+fn passes(graphs: &[Graph], workers: &[u32]) -> u64 {
+    let of_graph = |graph: &Graph| (PASSES * runners(*graph, workers).len()) as u64;
+    graphs.iter().map(of_graph).sum()
+}
+
+/// Measures all runners, calling `show` after each pass.
+fn throughput(
+    graph: Graph,
+    workers: &[u32],
+    rounds: usize,
+    show: &mut impl FnMut(),
+) -> Result<Vec<Row>, String> {
+    let runners = runners(graph, workers);
+    let mut samples = vec![Vec::new(); runners.len()];
+    for _ in 0..PASSES {
+        for (samples, &(runner, workers)) in samples.iter_mut().zip(&runners) {
+            let rounds_ns = pass(graph, runner, workers, rounds.div_ceil(PASSES));
+            samples.extend(rounds_ns.map_err(|why| {
+                let (graph, runner) = (graph.name, runner.name());
+                format!("{graph}, {runner}: {why}")
+            })?);
+            show();
+        }
+    }
+    let (step, steps) = graph.steps;
+    let per = jobs_a_round(graph) * steps;
+    let of_runner = |(&(runner, workers), samples): (&(Runner, u32), Vec<u64>)| {
+        let what = (u64::from(workers), graph.name, step);
+        (Figure::new(what, per, samples), runner.name())
+    };
+    Ok(runners.iter().zip(samples).map(of_runner).collect())
+}
+
+fn runners(graph: Graph, workers: &[u32]) -> Vec<(Runner, u32)> {
+    let mut runners = vec![(Runner::Floor, 1)];
+    for &workers in workers {
+        let policies = [Policy::StaticPriority, Policy::Edf];
+        runners.extend(policies.map(|policy| (Runner::Closures(policy), workers)));
+        runners.extend(graph.has_values().then_some((Runner::Typed, workers)));
+    }
+    runners
+}
+
+fn jobs_a_round(graph: Graph) -> u64 {
+    (INSTANCES_A_ROUND / graph.instances()) as u64
+}
+
+/// Runs the rounds, and some before to warm up, and returns what each took in nanoseconds.
+fn pass(graph: Graph, runner: Runner, workers: u32, rounds: usize) -> Result<Vec<u64>, String> {
+    let jobs_a_round = jobs_a_round(graph);
+    let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
+    let marks = Rounds::default();
+    let mut functions = empty(graph, &marks, jobs_a_round);
+    match runner {
+        Runner::Floor => {
+            for job in 0..jobs {
+                functions.iter_mut().flatten().for_each(|tick| tick(job));
+            }
+        }
+        Runner::Closures(policy) => {
+            let machine = machine(policy, workers)?;
+            commit(graph, jobs, vec![functions]);
+            run_jobs(&machine, jobs)?;
+        }
+        Runner::Typed => {
+            let machine = machine(Policy::StaticPriority, workers)?;
+            commit_typed(graph, jobs, marks.source(jobs_a_round));
+            run_jobs(&machine, jobs)?;
+        }
+    }
+    let times_ns = marks.times_ns();
+    let rounds_ns = times_ns.windows(2).map(|pair| pair[1] - pair[0]);
+    Ok(rounds_ns.skip(times_ns.len() / 10).collect())
+}
+
+/// A graph that is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Graph {
+    name: &'static str,
+    /// The shape of each DAG.
+    shape: Shape,
+    /// How many DAGs there are: released at once, each with a deadline of its own.
+    dags: u16,
+    /// What a step is called, and how many a job of all DAGs has.
+    steps: (&'static str, u64),
+}
+
+impl Graph {
+    const CHAIN: Self = Self::new("chain-64", Shape::Chain(64), 1, ("per hop", 63));
+    const LAYERED: Self = {
+        let (subtasks, seed) = (1_000, 1);
+        let shape = Shape::Layered { subtasks, seed };
+        Self::new("layered-1000", shape, 1, ("per instance", 1_000))
+    };
+    const JOIN: Self = Self::fork_join("fork-join-2", 2);
+    const ALL: [Self; 6] = [
+        Self::CHAIN,
+        Self::JOIN,
+        Self::fork_join("fork-join-4", 4),
+        Self::fork_join("fork-join-6", 6),
+        Self::LAYERED,
+        Self::new("dags-1000", Shape::Chain(1), 1_000, ("per job", 1_000)),
+    ];
+
+    const fn new(name: &'static str, shape: Shape, dags: u16, steps: (&'static str, u64)) -> Self {
+        Self {
+            name,
+            shape,
+            dags,
+            steps,
+        }
+    }
+
+    const fn fork_join(name: &'static str, parallel: usize) -> Self {
+        Self::new(name, Shape::ForkJoin(parallel), 1, ("per job", 1))
+    }
+
+    /// Returns how many instances a job of each DAG has.
+    fn instances(self) -> usize {
+        usize::from(self.dags) * self.shape.subtasks()
+    }
+
+    /// Reports whether there is a form of it with a value on each edge.
+    const fn has_values(self) -> bool {
+        self.dags == 1 && !matches!(self.shape, Shape::Layered { .. })
+    }
+}
+
+/// Returns a time in nanoseconds.
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// The times at which rounds begin and end, in nanoseconds since the first one.
+#[derive(Clone, Debug, Default)]
+struct Rounds(Arc<Mutex<Vec<u64>>>);
+
+impl Rounds {
+    /// Returns them.
+    fn times_ns(&self) -> Vec<u64> {
+        let times_ns = self.0.lock();
+        times_ns.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Returns what a source does: it reads the clock once in `jobs_a_round` jobs.
+    fn source(&self, jobs_a_round: u64) -> impl FnMut() + Send + 'static {
+        static EPOCH: LazyLock<Instant> = LazyLock::new(Instant::now);
+        let rounds = self.clone();
+        let mut left = 1;
+        move || {
+            left -= 1;
+            if left == 0 {
+                left = jobs_a_round;
+                let mut times_ns = rounds.0.lock().unwrap_or_else(PoisonError::into_inner);
+                times_ns.push(nanoseconds(EPOCH.elapsed()));
+            }
+        }
+    }
+}
+
+/// A period that no job needs, with which the releases are back to back.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// Takes so many cores of this host by threads that poll. Jobs follow one another as fast as they
+/// go, and nothing is written down. Only one thread of the program may measure at a time.
+fn machine(policy: Policy, workers: u32) -> Result<Linux, String> {
+    let linux = Linux::new(workers, Mechanism::Poll).map_err(|why| why.to_string())?;
+    let linux = linux.with(|to| (to.scheduler.policy, to.most_events) = (policy, 0));
+    Ok(linux.skipping_idle_time())
+}
+
+/// Runs what is committed, and makes sure that each DAG has completed so many jobs.
+fn run_jobs(linux: &Linux, jobs: u64) -> Result<(), String> {
+    let run = linux.run().map_err(|why| why.to_string())?;
+    let dags = (0..).map(DagId).take(run.task_set().dags().len());
+    let completed = dags.map(|dag| run.statistics(dag).completed).min();
+    match completed.unwrap_or(0) {
+        least if least == jobs => Ok(()),
+        least => Err(format!("{least} of {jobs} jobs are complete")),
+    }
+}
+
+/// A function of no values.
+type Tick = Box<dyn FnMut(u64) + Send>;
+
+/// Makes empty functions of a graph's DAGs, subtask by subtask; the first source counts rounds.
+fn empty(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Tick>> {
+    let of_dag = |_| (0..graph.shape.subtasks()).map(|_| Box::new(|_| ()) as Tick);
+    let mut all: Vec<Vec<Tick>> = (0..graph.dags).map(|dag| of_dag(dag).collect()).collect();
+    let mut source = rounds.source(jobs_a_round);
+    all[0][0] = Box::new(move |_| source());
+    all
+}
+
+fn named(number: usize) -> SubtaskAttributes {
+    SubtaskAttributes::named(&format!("s{number}"))
+}
+
+/// Commits DAGs without values, of a shape that is any graph; each of the clusters has such ones.
+fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
+    let is_divided = clusters.len() > 1;
+    let mut dags = Vec::new();
+    for (cluster, of_dags) in (0..).zip(clusters) {
+        for (number, functions) in (0_u64..).zip(of_dags) {
+            let dag = create_dag();
+            dag.name(&format!("native{cluster}-{number}"));
+            dag.jobs(jobs).in_flight(1).period(PERIOD);
+            // Deadlines in a shuffled order, of which no two are the same: 617 shares no
+            // divisor with 1,000.
+            let earlier = number * 617 % u64::from(graph.dags);
+            dag.relative_deadline(PERIOD - Duration::from_micros(earlier));
+            if is_divided {
+                dag.cluster(cluster);
+            }
+            let functions = functions.into_iter().enumerate();
+            let subtasks: Vec<_> = functions
+                .map(|(number, tick)| dag.register_untyped_subtask(tick, named(number)))
+                .collect();
+            for (earlier, later) in graph.shape.edges() {
+                dag.precede(&subtasks[earlier], &subtasks[later]);
+            }
+            dags.push(dag);
+        }
+    }
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the graphs are right");
+}
+
+/// Commits a graph of one DAG with a value on each edge; its source does `tick`, too.
+fn commit_typed(graph: Graph, jobs: u64, mut tick: impl FnMut() + Send + 'static) {
+    let dag = create_dag();
+    dag.name("typed").jobs(jobs).in_flight(1);
+    let source = move || {
+        tick();
+        (1u64,)
+    };
+    dag.register_periodic_subtask(source, vec!["t0"], PERIOD, named(0));
+    let sink = graph.shape.subtasks() - 1;
+    // Each subtask writes the topic of its number.
+    let topics: Vec<String> = (0..sink).map(|number| format!("t{number}")).collect();
+    let is_chain = matches!(graph.shape, Shape::Chain(_));
+    for number in 1..sink {
+        let input = &topics[if is_chain { number - 1 } else { 0 }];
+        let body = |(value,): (u64,)| (value,);
+        dag.register_subtask(body, vec![input], vec![&topics[number]], named(number));
+    }
+    let last = if is_chain { sink - 1 } else { 1 };
+    let inputs: Vec<&str> = topics[last..].iter().map(String::as_str).collect();
+    let attributes = named(sink);
+    match inputs.len() {
+        1 => dag.register_sink_subtask(|_: (u64,)| (), inputs, PERIOD, attributes),
+        2 => dag.register_sink_subtask(|_: (u64, u64)| (), inputs, PERIOD, attributes),
+        4 => dag.register_sink_subtask(|_: (u64, u64, u64, u64)| (), inputs, PERIOD, attributes),
+        _ => {
+            let body = |_: (u64, u64, u64, u64, u64, u64)| ();
+            dag.register_sink_subtask(body, inputs, PERIOD, attributes)
+        }
+    };
+    finish_create_dags(&[dag]).expect("the graphs are right");
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -214,14 +507,14 @@ mod tests {
     #[test]
     fn a_short_run_measures_every_graph_alone_and_in_clusters() {
         for graph in Graph::ALL {
-            let rows = throughput::measure(graph, &[1], 3, &mut || {}).expect("it runs");
+            let rows = throughput(graph, &[1], 3, &mut || {}).expect("it runs");
             let expected = 3 + usize::from(graph.has_values());
             assert_eq!(rows.len(), expected, "{}", graph.name);
         }
         let mut rows = Vec::new();
         // On a host that never gives us both processors there is nothing to see.
         if linux::processors() > 1
-            && let Ok(together) = clusters::measure(600, &mut rows)
+            && let Ok(together) = across_cores::clusters(600, &mut rows)
         {
             assert_eq!((together.len(), rows.len()), (2, 4));
         }

@@ -10,7 +10,7 @@ use crate::places::{self, Frame};
 use crate::system;
 
 /// Addresses with everything that contains them, the innermost first.
-pub(in crate::bench) type Frames = BTreeMap<u64, Vec<Frame>>;
+pub(super) type Frames = BTreeMap<u64, Vec<Frame>>;
 
 /// The most addresses that fit a command line with room to spare.
 const AT_ONCE: usize = 20_000;
@@ -20,7 +20,7 @@ const AT_ONCE: usize = 20_000;
 /// # Errors
 ///
 /// In words: `objdump` is missing or cannot be started.
-pub(in crate::bench) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String> {
+pub(super) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String> {
     let objdump = program("objdump")?;
     let output = Command::new(&objdump)
         .args(["-d", "-C", "--no-show-raw-insn"])
@@ -41,7 +41,7 @@ pub(in crate::bench) fn instructions(image: &Path) -> Result<BTreeMap<u64, Strin
 /// # Errors
 ///
 /// In words: `addr2line` is missing or has failed.
-pub(in crate::bench) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames, String> {
+pub(super) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames, String> {
     let addr2line = program("addr2line")?;
     let mut all = Frames::new();
     for some in addresses.chunks(AT_ONCE) {
@@ -54,7 +54,7 @@ pub(in crate::bench) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames
 /// Returns the innermost of what contains an address that is in a file of ours: its line, from the
 /// workspace's root, such as `fass/src/run/plan.rs:183`, and its function. So what the library does
 /// for a file counts as the file's.
-pub(in crate::bench) fn own(frames: &[Frame]) -> Option<(&str, &str)> {
+pub(super) fn own(frames: &[Frame]) -> Option<(&str, &str)> {
     let root = system::workspace().to_str()?;
     frames.iter().find_map(|frame| {
         let line = frame.line.strip_prefix(root)?.strip_prefix('/')?;

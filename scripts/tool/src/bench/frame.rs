@@ -1,0 +1,272 @@
+//! The frame that all measurements share.
+//!
+//! - [`by_plan`]: from a command line to an exit code;
+//! - [`judged`]: a run whose lines are read if it is good, a guest's or a program's;
+//! - [`Figure`]: one measured quantity, as a guest prints it and as a baseline keeps it;
+//! - [`Table`]: figures for people, in columns of fixed widths, under their headings;
+//! - [`draw`]: pictures, by the Python scripts of `scripts/plot`, if there is what they need.
+
+use std::ffi::OsString;
+use std::fmt::Display;
+use std::fs;
+use std::path::Path;
+use std::process::{self, ExitCode, Stdio};
+
+use sched_dag::law::Distribution;
+
+use crate::json::{Object, Value};
+use crate::options::{Command, Parsed, Refusal};
+use crate::outcome::Outcome;
+use crate::protocol::Transcript;
+use crate::system;
+
+/// Runs a measurement: `measure` gets what `plan` makes of the options, and says whether all limits
+/// hold.
+pub(super) fn by_plan<Plan>(
+    table: &Command,
+    words: &[OsString],
+    plan: impl Fn(&Parsed) -> Result<Plan, String>,
+    measure: impl Fn(&Plan) -> Result<bool, String>,
+) -> ExitCode {
+    table.carry_out(words, |options| {
+        let plan = plan(options).map_err(Refusal::Usage)?;
+        let is_good = measure(&plan)?;
+        Ok(ExitCode::from(u8::from(!is_good)))
+    })
+}
+
+/// Runs `what` is measured, with a new log, and returns what `read` finds in its lines.
+///
+/// # Errors
+///
+/// In words: it could not be run, has failed, or its lines are not as they should be; then the log
+/// stays.
+pub(super) fn judged<T>(
+    what: impl Display,
+    name: &str,
+    run: impl FnOnce(&Path) -> Result<Outcome, String>,
+    read: impl FnOnce(&Outcome) -> Result<T, String>,
+) -> Result<T, String> {
+    let log = system::new_log(name)?;
+    let outcome = run(&log)?;
+    let judgement = outcome.judge().map_err(|fault| fault.reason);
+    let found = judgement.and_then(|()| read(&outcome));
+    let found = found.map_err(|why| format!("{what} failed: {why}\n{}", outcome.tail()))?;
+    // It is ours, and in the way of no one if it cannot be removed.
+    let _ = fs::remove_file(&log);
+    Ok(found)
+}
+
+/// One measured quantity of one workload on a number of cores.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Figure {
+    pub(super) cores: u64,
+    pub(super) workload: String,
+    pub(super) figure: String,
+    /// How many steps each of the numbers below is of.
+    pub(super) per: u64,
+    pub(super) median: u64,
+    pub(super) p99: u64,
+    pub(super) max: u64,
+    /// The least sample; a baseline does not keep it.
+    pub(super) min: u64,
+    /// The number of samples; a baseline does not keep it.
+    pub(super) samples: u64,
+}
+
+impl Figure {
+    /// Makes a figure of samples that are of `per` steps each.
+    pub(super) fn new(
+        (cores, workload, figure): (u64, impl ToString, &str),
+        per: u64,
+        samples: impl IntoIterator<Item = u64>,
+    ) -> Self {
+        let of = Distribution::new(samples);
+        Self {
+            cores,
+            workload: workload.to_string(),
+            figure: figure.into(),
+            per,
+            median: of.median(),
+            p99: of.p99(),
+            max: of.max(),
+            min: of.min(),
+            samples: of.count(),
+        }
+    }
+
+    /// Reads all figures of a boot.
+    pub(super) fn read_all(transcript: &Transcript, cores: u64) -> Result<Vec<Self>, String> {
+        let lines = transcript.of_kind("hand_off");
+        let figures = lines.map(|line| {
+            let value = &line.value;
+            Self::read(value, cores, value.get("value").unwrap_or(value))
+                .ok_or_else(|| format!("serial line {}: a figure lacks a member", line.number))
+        });
+        figures.collect()
+    }
+
+    /// Reads a figure as [`json`](Self::json) writes it.
+    pub(super) fn from_json(value: &Value) -> Option<Self> {
+        Self::read(value, value.get("cores")?.as_u64()?, value)
+    }
+
+    /// Reads a figure whose numbers are members of an object of their own, or of the same.
+    fn read(value: &Value, cores: u64, numbers: &Value) -> Option<Self> {
+        let text = |name| value.get(name)?.as_text().map(String::from);
+        let number = |name| numbers.get(name)?.as_u64();
+        Some(Self {
+            cores,
+            workload: text("workload")?,
+            figure: text("figure")?,
+            per: value.get("per")?.as_u64().filter(|per| *per > 0)?,
+            median: number("median")?,
+            p99: number("p99")?,
+            max: number("max")?,
+            ..Self::default()
+        })
+    }
+
+    /// Ends an object with its members.
+    pub(super) fn json(&self, begun: Object) -> String {
+        begun
+            .number("cores", self.cores)
+            .text("workload", &self.workload)
+            .text("figure", &self.figure)
+            .number("per", self.per)
+            .number("median", self.median)
+            .number("p99", self.p99)
+            .number("max", self.max)
+            .end()
+    }
+
+    /// Returns whether two are of the same quantity.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        (self.cores, &self.workload, &self.figure) == (other.cores, &other.workload, &other.figure)
+    }
+
+    /// Returns whether it counts something else than time or instructions.
+    pub(super) fn is_count(&self) -> bool {
+        matches!(&*self.figure, "allocations" | "locks" | "sink_wakeups")
+    }
+
+    /// Returns a number of this figure for one step.
+    pub(super) fn of_step(&self, number: u64) -> f64 {
+        number as f64 / self.per as f64
+    }
+
+    /// Returns a number of this figure for one step, as text.
+    pub(super) fn one(&self, number: u64) -> String {
+        let decimals = match (self.per, self.is_count()) {
+            (1, _) => 0,
+            (_, true) => 2,
+            (_, false) => 1,
+        };
+        format!("{:.decimals$}", self.of_step(number))
+    }
+}
+
+/// A heading, how wide its column is, and the decimals of its numbers. In a column of a negative
+/// width the cells begin at the left.
+pub(super) type Column<'a> = (&'a str, isize, usize);
+
+/// A table that grows row by row.
+#[derive(Debug)]
+pub(super) struct Table<'a> {
+    columns: &'a [Column<'a>],
+    text: String,
+}
+
+impl<'a> Table<'a> {
+    /// Begins a table, below a line if there is a `title`.
+    pub(super) fn new(title: &str, columns: &'a [Column<'a>]) -> Self {
+        let text = title.into();
+        let mut table = Self { columns, text };
+        let headings = columns.iter().map(|&(heading, ..)| heading.to_string());
+        table.cells(headings);
+        table
+    }
+
+    /// Adds a row with a cell for each column.
+    pub(super) fn row(&mut self, cells: &[&dyn Display]) {
+        let cells = cells.iter().zip(self.columns);
+        let cells = cells.map(|(cell, &(_, _, decimals))| match decimals {
+            0 => cell.to_string(),
+            _ => format!("{cell:.decimals$}"),
+        });
+        self.cells(cells);
+    }
+
+    /// Adds a line between the rows, or after them.
+    pub(super) fn line(&mut self, line: &str) {
+        self.text += line;
+        self.text.push('\n');
+    }
+
+    /// Adds a row of cells that are text already.
+    pub(super) fn cells(&mut self, cells: impl IntoIterator<Item = String>) {
+        let cells = cells.into_iter().zip(self.columns);
+        let cells = cells.map(|(cell, &(_, width, _))| {
+            let wide = width.unsigned_abs();
+            match width {
+                ..0 => format!("{cell:<wide$}"),
+                0.. => format!("{cell:>wide$}"),
+            }
+        });
+        self.line(&cells.collect::<String>());
+    }
+
+    /// Returns the whole table.
+    pub(super) fn text(self) -> String {
+        self.text
+    }
+}
+
+/// Has a script of `scripts/plot` draw into `out/plots` what is in `out`.
+///
+/// # Errors
+///
+/// One line: what is missing, or what went wrong.
+pub(super) fn draw(script: &str, out: &Path) -> Result<(), String> {
+    let before = fs::read_dir(out.join("plots"));
+    for picture in before.into_iter().flatten().flatten() {
+        let path = picture.path();
+        if path.extension().is_some_and(|ending| ending == "svg") {
+            // One of earlier figures would be wrong.
+            let _ = fs::remove_file(path);
+        }
+    }
+    let script = system::workspace().join("scripts/plot").join(script);
+    let mut complaint = String::new();
+    // A Python of the person's own may hide the system's, which the package
+    // manager installs matplotlib for.
+    for program in ["python3", "/usr/bin/python3"] {
+        let mut command = process::Command::new(program);
+        match command.args([&script, out]).stdin(Stdio::null()).output() {
+            Ok(output) if output.status.success() => return Ok(()),
+            Ok(output) => complaint = String::from_utf8_lossy(&output.stderr).into_owned(),
+            Err(error) => complaint = format!("cannot start {program}: {error}"),
+        }
+    }
+    let last = complaint.lines().last().unwrap_or_default();
+    Err(format!(
+        "no plots: {last}; they need python3 with matplotlib: install it (Debian, Ubuntu: \
+         apt-get install python3-matplotlib; else: pip install matplotlib) and run this again, \
+         nothing is measured twice"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_stand_below_their_headings_with_their_decimals() {
+        let columns = [("name", -6, 0), ("load", 6, 1), ("sets", 6, 0)];
+        let mut table = Table::new("a title\n", &columns);
+        table.row(&[&"one", &0.25, &7]);
+        table.line("a line");
+        let expected = "a title\nname    load  sets\none      0.2     7\na line\n";
+        assert_eq!(table.text(), expected);
+    }
+}
