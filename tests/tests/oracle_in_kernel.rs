@@ -4,7 +4,7 @@
 //! completion and release, fall on the same instant run so without a window,
 //! too: with each event decided at once, as in apps.
 
-use tool::oracle::in_kernel::{Settings, run, texts_of_cases};
+use tool::oracle::in_kernel::{Settings, run};
 use tool::oracle::schedules::{Case, check, parse};
 
 const PUBLIC: &str = include_str!("../oracle/schedules.txt");
@@ -16,22 +16,17 @@ const DISTINCT: &str = include_str!("../oracle/distinct.txt");
 /// Ten milliseconds: idle time is skipped, so a long unit costs nothing.
 const UNIT_US: u64 = 10_000;
 
-/// Returns the public cases that `keep` keeps, and their texts.
-fn cases(keep: impl Fn(&Case) -> bool) -> (Vec<Case>, Vec<String>) {
-    let cases = parse(PUBLIC).expect("the file is well formed");
-    let texts = texts_of_cases(PUBLIC);
-    assert_eq!(cases.len(), texts.len());
+/// Returns the public cases that `keep` keeps.
+fn cases(keep: impl Fn(&Case) -> bool) -> Vec<Case> {
+    let mut cases = parse(PUBLIC).expect("the file is well formed");
+    cases.retain(keep);
     cases
-        .into_iter()
-        .zip(texts)
-        .filter(|(case, _)| keep(case))
-        .unzip()
 }
 
 /// Runs cases on the machine, and holds each to its schedule.
 #[track_caller]
-fn are_reproduced(cases: &[Case], texts: &[String], settings: &Settings) {
-    let judged = run(cases, texts, settings).expect("QEMU and an image");
+fn are_reproduced(cases: &[Case], settings: &Settings) {
+    let judged = run(cases, settings).expect("QEMU and an image");
     assert_eq!(judged.len(), cases.len());
     let failed: Vec<_> = judged.iter().filter(|case| case.outcome.is_err()).collect();
     assert!(failed.is_empty(), "{failed:#?}");
@@ -39,17 +34,16 @@ fn are_reproduced(cases: &[Case], texts: &[String], settings: &Settings) {
 
 #[test]
 fn the_machine_reproduces_the_public_schedules() {
-    let (cases, texts) = cases(|case| case.cores <= 4);
+    let cases = cases(|case| case.cores <= 4);
     assert_eq!(cases.len(), 24);
-    are_reproduced(&cases, &texts, &Settings::for_unit(UNIT_US));
+    are_reproduced(&cases, &Settings::for_unit(UNIT_US));
 }
 
 #[test]
 fn the_machine_reproduces_the_schedules_of_clusters_and_sink_deadlines() {
     let cases = parse(CLUSTERS).expect("the file is well formed");
     assert_eq!(cases.len(), 30);
-    let settings = Settings::for_unit(UNIT_US);
-    are_reproduced(&cases, &texts_of_cases(CLUSTERS), &settings);
+    are_reproduced(&cases, &Settings::for_unit(UNIT_US));
 }
 
 #[test]
@@ -58,7 +52,7 @@ fn the_machine_reproduces_schedules_of_functions_that_compute() {
     // preemptions, one for each number of cores.
     let last = |case: &Case| case.instances.values().map(|times| times.finish_ns).max();
     let has_preemptions = |case: &Case| case.instances.values().any(|times| times.preemptions > 0);
-    let (cases, texts) = cases(|case| {
+    let cases = cases(|case| {
         let most = if has_preemptions(case) { 600 } else { 200 };
         [1, 2, 4, 8].contains(&case.cores) && last(case).is_some_and(|units| units <= most)
     });
@@ -66,7 +60,7 @@ fn the_machine_reproduces_schedules_of_functions_that_compute() {
     let preempted = cases.iter().filter(|case| has_preemptions(case));
     let preempted: Vec<u32> = preempted.map(|case| case.cores).collect();
     assert_eq!(preempted, [1, 4, 8, 2]);
-    are_reproduced(&cases, &texts, &Settings::for_unit(2000).computing());
+    are_reproduced(&cases, &Settings::for_unit(2000).computing());
 }
 
 #[test]
@@ -82,17 +76,17 @@ fn events_apart_need_no_window() {
         tolerance_percent: 5,
         ..Settings::for_unit(1000)
     };
-    are_reproduced(&cases, &texts_of_cases(DISTINCT), &settings);
+    are_reproduced(&cases, &settings);
 }
 
 #[test]
 fn a_schedule_that_is_not_the_reference_s_is_found_out() {
-    let (_, texts) = cases(|case| case.name == "pub012");
+    let case = cases(|case| case.name == "pub012").remove(0);
     // Longer than the reference takes it to be: what follows comes too late.
-    let text = texts[0].replacen("x 0 0 0 0 3 0", "x 0 0 0 0 2 0", 1);
-    assert_ne!(text, texts[0]);
+    let text = case.text.replacen("x 0 0 0 0 3 0", "x 0 0 0 0 2 0", 1);
+    assert_ne!(text, case.text);
     let cases = parse(&text).expect("well formed");
-    let judged = run(&cases, &[text], &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
+    let judged = run(&cases, &Settings::for_unit(UNIT_US)).expect("QEMU and an image");
     let difference = judged[0].outcome.clone().expect_err("a difference");
     let expected = "dag 0 job 0 subtask 0: finish: expected 2, found 2.99";
     assert!(difference.starts_with(expected), "{difference}");

@@ -30,6 +30,8 @@ use sched_dag::{Clusters, DagId, Instance, Policy, Preemption, TaskSet};
 pub struct Case {
     /// The case's name.
     pub name: String,
+    /// Its records, from which it can be read again.
+    pub text: String,
     /// The number of cores.
     pub cores: u32,
     /// How these are divided.

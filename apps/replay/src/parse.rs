@@ -24,7 +24,14 @@ use crate::lines::{Line, Lines, Malformed, cases, quoted};
 /// [`Malformed`] for the first record that is not as described above, and for
 /// DAGs that cannot be committed.
 pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
-    cases(text, parse_case)
+    cases(text, |header, lines| {
+        let case = parse_case(header, lines)?;
+        let records = text.lines().take(lines.last()).skip(header.number - 1);
+        Ok(Case {
+            text: records.flat_map(|record| [record, "\n"]).collect(),
+            ..case
+        })
+    })
 }
 
 fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
@@ -60,6 +67,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     check_horizon(header, &specs, &executions_ns)?;
     let mut case = Case {
         name: name.to_owned(),
+        text: String::new(),
         cores,
         clusters,
         policy,

@@ -36,7 +36,6 @@ use sched_dag::analysis::{
 };
 
 use replay::lines::{Line, Lines, Malformed, cases, quoted};
-use replay::repeated;
 
 use super::older_bounds as older;
 
@@ -46,29 +45,19 @@ pub struct Case {
     /// The case's name.
     pub name: String,
     cores: u32,
-    dags: Vec<ExpectedDag>,
-    /// The quantities of the set: name and words, in the order of the file.
-    quantities: Vec<(&'static str, Vec<String>)>,
+    dags: Vec<(Task, Quantities)>,
+    quantities: Quantities,
 }
 
-#[derive(Debug)]
-struct ExpectedDag {
-    task: Task,
-    /// What is computed, in the words of the file, and its value.
-    quantities: Vec<(String, String)>,
-}
+/// What is computed, in the words of the file, and its value.
+type Quantities = Vec<(String, String)>;
 
-/// The quantities of one kind of file; each case has each of them once.
-struct Form {
-    /// Those of a DAG, the first by which the kind is known, the last once a number of cores.
-    of_dag: &'static [&'static str],
-    of_set: &'static [&'static str],
-}
-
-const FORMS: [Form; 2] = [
-    Form {
-        of_dag: &["len", "vol", "bottom_level", "single"],
-        of_set: &[
+/// The quantities of a DAG and of a set, by kind of file; each case has each of them once, but the
+/// last one of a DAG once for each number of cores.
+const FORMS: [[&[&str]; 2]; 2] = [
+    [
+        &["len", "vol", "bottom_level", "single"],
+        &[
             "dm_order",
             "width",
             "melani_gfp_dm",
@@ -79,17 +68,17 @@ const FORMS: [Form; 2] = [
             "bonifaci_gedf",
             "federated",
         ],
-    },
-    Form {
-        of_dag: &["cov", "multi_path"],
-        of_set: &[
+    ],
+    [
+        &["cov", "multi_path"],
+        &[
             "dm_order",
             "mp_gfp_dm",
             "mp_gfp_dm_clip",
             "mp_gedf",
             "mp_gedf_clip",
         ],
-    },
+    ],
 ];
 
 /// Reads all cases of a file.
@@ -101,48 +90,161 @@ pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
     cases(text, parse_case)
 }
 
+fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
+    let [name, cores, count] = header.fixed()?;
+    let (cores, count) = (header.cores(cores)?, header.at_least_one(count)?);
+    let mut form = None;
+    let mut dags = Vec::new();
+    for _ in 0..count {
+        let task = parse_task(lines)?;
+        let is_multi_path = || lines.clone().next_if("cov").is_some();
+        let [of_dag, _] = *form.get_or_insert_with(|| FORMS[usize::from(is_multi_path())]);
+        let quantities = parse_quantities(lines, of_dag, task.wcets_ns().len())?;
+        dags.push((task, quantities));
+    }
+    let [_, of_set] = form.unwrap_or_default();
+    let quantities = parse_quantities(lines, of_set, dags.len())?;
+    lines.expect("end")?.exactly(0)?;
+    Ok(Case {
+        name: name.to_owned(),
+        cores,
+        dags,
+        quantities,
+    })
+}
+
+fn parse_task(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
+    let header = lines.expect("dag")?;
+    let [period, deadline, subtasks, edge_count] = header.fixed()?;
+    let (period_ns, deadline_ns) = (header.number(period)?, header.number(deadline)?);
+    let subtasks = header.at_least_one(subtasks)? as usize;
+    let edge_count: u32 = header.number(edge_count)?;
+    let wcets_ns = lines.expect("wcet")?.numbers(subtasks)?;
+    let mut edges = Vec::new();
+    for _ in 0..edge_count {
+        let edge = lines.expect("edge")?;
+        let [from, to] = edge.fixed()?;
+        let end = |word| edge.index("subtask", word, subtasks);
+        edges.push((end(from)?, end(to)?));
+    }
+    Task::new(period_ns, deadline_ns, wcets_ns, &edges)
+        .map_err(|error| header.malformed(error.to_string()))
+}
+
+/// Reads the quantities of these names, in any order, of a DAG or set of `size` parts.
+fn parse_quantities(
+    lines: &mut Lines<'_>,
+    names: &[&str],
+    size: usize,
+) -> Result<Quantities, Malformed> {
+    let mut quantities = Quantities::new();
+    while let Some(line) = names.iter().find_map(|name| lines.next_if(name)) {
+        let (what, value) = parse_quantity(&line, size)?;
+        if quantities.iter().any(|(known, _)| *known == what) {
+            return Err(line.malformed(format!("`{what}` stands here twice")));
+        }
+        quantities.push((what, value));
+    }
+    let has =
+        |name: &str| (quantities.iter()).any(|(what, _)| what.split(' ').next() == Some(name));
+    match names.iter().find(|name| !has(name)) {
+        Some(missing) => Err(lines.expect(missing).err().unwrap_or(lines.ended(missing))),
+        None => Ok(quantities),
+    }
+}
+
+/// Checks the form of a quantity, and returns it in plain form.
+fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malformed> {
+    let plain = |words: &[&str]| {
+        let numbers = words.iter().map(|word| line.number::<u64>(word));
+        Ok(list(&numbers.collect::<Result<Vec<_>, Malformed>>()?))
+    };
+    let on = |cores| Ok(format!("{} {}", line.kind, line.cores(cores)?));
+    let mut what = line.kind.to_owned();
+    let value = match (line.kind, &line.words[..]) {
+        ("multi_path", &[cores, bound]) => {
+            what = on(cores)?;
+            plain(&[bound])?
+        }
+        ("single", &[cores, "graham", graham, "long_paths", long_paths]) => {
+            what = on(cores)?;
+            let (graham, long_paths) = (plain(&[graham])?, plain(&[long_paths])?);
+            format!("graham {graham} long_paths {long_paths}")
+        }
+        ("multi_path", _) => return Err(line.malformed("expected `multi_path M R`")),
+        ("single", _) => {
+            return Err(line.malformed("expected `single M graham R long_paths R`"));
+        }
+        ("len" | "vol", _) => plain(line.exactly(1)?)?,
+        ("cov", words) => plain(words)?,
+        ("bottom_level" | "width", _) => plain(line.exactly(size)?)?,
+        ("dm_order", _) => {
+            let order: Vec<usize> = line.numbers(size)?;
+            if !(0..size).all(|dag| order.contains(&dag)) {
+                let reason = format!("expected each DAG from 0 to {} once", size - 1);
+                return Err(line.malformed(reason));
+            }
+            list(&order)
+        }
+        (_, ["-"]) => "-".to_owned(),
+        ("gedf_capacity" | "bonifaci_gedf", _) => {
+            let [verdict] = line.fixed()?;
+            u8::from(line.flag(verdict)?).to_string()
+        }
+        ("federated", [left, heavy @ ..]) => {
+            let heavy = heavy.iter().map(|word| match word.split_once(':') {
+                Some((dag, cores)) => Ok(format!(" {}:{}", plain(&[dag])?, plain(&[cores])?)),
+                None => Err(line.malformed(format!("expected dag:cores, found {}", quoted(word)))),
+            });
+            plain(&[left])? + &heavy.collect::<Result<String, Malformed>>()?
+        }
+        _ => plain(line.exactly(size)?)?,
+    };
+    Ok((what, value))
+}
+
 /// Computes and compares each quantity of a case.
 ///
 /// # Errors
 ///
 /// The first difference, in one line.
 pub fn check(case: &Case) -> Result<(), String> {
-    for (index, expected) in case.dags.iter().enumerate() {
-        check_dag(expected).map_err(|difference| format!("dag {index}: {difference}"))?;
+    for (index, (task, quantities)) in case.dags.iter().enumerate() {
+        compare(quantities, |what| compute_of_dag(what, task))
+            .map_err(|difference| format!("dag {index}: {difference}"))?;
     }
-    let tasks: Vec<&Task> = case.dags.iter().map(|dag| &dag.task).collect();
-    for (name, expected) in &case.quantities {
-        let computed = compute(name, &tasks, case.cores);
-        compare(name, &expected.join(" "), &computed)?;
+    let tasks: Vec<&Task> = case.dags.iter().map(|(task, _)| task).collect();
+    compare(&case.quantities, |what| compute(what, &tasks, case.cores))
+}
+
+fn compare(quantities: &Quantities, compute: impl Fn(&str) -> String) -> Result<(), String> {
+    for (what, expected) in quantities {
+        let computed = compute(what);
+        if *expected != computed {
+            return Err(format!("{what}: expected {expected}, computed {computed}"));
+        }
     }
     Ok(())
 }
 
-fn check_dag(dag: &ExpectedDag) -> Result<(), String> {
-    for (what, expected) in &dag.quantities {
-        compare(what, expected, &compute_of_dag(what, &dag.task))?;
-    }
-    Ok(())
-}
-
-/// Computes one quantity of a DAG, in the words of the file.
+/// Computes one quantity of a DAG.
 fn compute_of_dag(what: &str, task: &Task) -> String {
-    let words: Vec<&str> = what.split(' ').collect();
-    let cores = |word: &str| word.parse().expect("a number of cores, as was read");
-    let bound = match words[..] {
-        ["len"] => Some(task.length_ns()),
-        ["vol"] => Some(task.volume_ns()),
-        ["bottom_level"] => return list(&task.bottom_levels()),
-        ["cov"] => return list(&covers(task, usize::MAX)),
-        ["multi_path", m] => multi_path(task, cores(m)),
-        ["single", m, "graham"] => Some(older::graham(task, cores(m))),
-        ["single", m, "long_paths"] => Some(older::long_paths(task, cores(m))),
-        _ => None,
-    };
-    bound.map_or("-".to_owned(), |bound| bound.to_string())
+    let (name, cores) = what.split_once(' ').unwrap_or((what, "1"));
+    let cores = cores.parse().expect("a number of cores, as was read");
+    match name {
+        "len" => task.length_ns().to_string(),
+        "vol" => task.volume_ns().to_string(),
+        "bottom_level" => list(&task.bottom_levels()),
+        "cov" => list(&covers(task, usize::MAX)),
+        "multi_path" => multi_path(task, cores).map_or("-".to_owned(), |bound| bound.to_string()),
+        _ => {
+            let (graham, long_paths) = (older::graham(task, cores), older::long_paths(task, cores));
+            format!("graham {graham} long_paths {long_paths}")
+        }
+    }
 }
 
-/// Computes one quantity of a set, in the words of the file.
+/// Computes one quantity of a set.
 fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
     let mut order: Vec<usize> = (0..tasks.len()).collect();
     order.sort_by_key(|&dag| (tasks[dag].relative_deadline_ns(), dag));
@@ -187,184 +289,6 @@ fn list<T: ToString>(values: &[T]) -> String {
     words.join(" ")
 }
 
-fn compare(what: &str, expected: &str, computed: &str) -> Result<(), String> {
-    match expected == computed {
-        true => Ok(()),
-        false => Err(format!("{what}: expected {expected}, computed {computed}")),
-    }
-}
-
-fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
-    let words = header.exactly(3)?;
-    let cores = header.cores(words[1])?;
-    let count: u32 = at_least_one(header, words[2])?;
-    let mut dags = Vec::new();
-    let mut line = lines.expect("dag")?;
-    let (mut following, form) = parse_dag(&line, lines, &FORMS, &mut dags)?;
-    for _ in 1..count {
-        line = following;
-        if line.kind != "dag" {
-            let reason = format!("expected {count} `dag` records, found {}", dags.len());
-            return Err(line.malformed(reason));
-        }
-        let forms = std::slice::from_ref(form);
-        (following, _) = parse_dag(&line, lines, forms, &mut dags)?;
-    }
-    let mut quantities: Vec<(&'static str, Vec<String>)> = Vec::new();
-    line = following;
-    while line.kind != "end" {
-        let Some(name) = form.of_set.iter().find(|name| **name == line.kind) else {
-            let reason = format!("a set of DAGs has no quantity {}", quoted(line.kind));
-            return Err(line.malformed(reason));
-        };
-        if quantities.iter().any(|(known, _)| known == name) {
-            return Err(line.malformed(format!("`{name}` stands here twice")));
-        }
-        quantities.push((name, parse_quantity(&line, dags.len())?));
-        line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
-    }
-    line.exactly(0)?;
-    let has = |name: &str| quantities.iter().any(|(known, _)| *known == name);
-    if let Some(missing) = form.of_set.iter().find(|name| !has(name)) {
-        return Err(line.malformed(format!("the case ends without `{missing}`")));
-    }
-    Ok(Case {
-        name: words[0].to_owned(),
-        cores,
-        dags,
-        quantities,
-    })
-}
-
-/// Reads a DAG of one of the forms and returns the first record after it, and the form.
-fn parse_dag<'a, 'f>(
-    header: &Line<'_>,
-    lines: &mut Lines<'a>,
-    forms: &'f [Form],
-    dags: &mut Vec<ExpectedDag>,
-) -> Result<(Line<'a>, &'f Form), Malformed> {
-    let words = header.exactly(4)?;
-    let (period_ns, deadline_ns) = (header.number(words[0])?, header.number(words[1])?);
-    let subtasks: u32 = at_least_one(header, words[2])?;
-    let edge_count: u32 = header.number(words[3])?;
-    let subtasks =
-        usize::try_from(subtasks).map_err(|error| header.malformed(error.to_string()))?;
-    let wcets_ns = lines.expect("wcet")?.numbers(subtasks)?;
-    let mut edges = Vec::new();
-    for _ in 0..edge_count {
-        let edge = lines.expect("edge")?;
-        let ends: Vec<usize> = edge.numbers(2)?;
-        if let Some(end) = ends.iter().find(|&&end| end >= subtasks) {
-            return Err(edge.malformed(format!("there is no subtask {end}")));
-        }
-        edges.push((ends[0], ends[1]));
-    }
-    let task = Task::new(period_ns, deadline_ns, wcets_ns, &edges)
-        .map_err(|error| header.malformed(error.to_string()))?;
-    let mut line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
-    let Some(form) = forms.iter().find(|form| form.of_dag[0] == line.kind) else {
-        let names = forms.iter().map(|form| format!("`{}`", form.of_dag[0]));
-        let names = names.collect::<Vec<_>>().join(" or ");
-        return Err(line.malformed(format!("expected {names}, found {}", quoted(line.kind))));
-    };
-    let (once, by_cores) = form.of_dag.split_at(form.of_dag.len() - 1);
-    let mut quantities = Vec::new();
-    for name in once {
-        if line.kind != *name {
-            return Err(line.malformed(format!("expected `{name}`, found {}", quoted(line.kind))));
-        }
-        let values = match *name {
-            "bottom_level" => line.numbers::<u64>(subtasks)?,
-            "cov" => line.numbers::<u64>(line.words.len())?,
-            _ => line.numbers::<u64>(1)?,
-        };
-        quantities.push(((*name).to_owned(), list(&values)));
-        line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
-    }
-    let mut seen = Vec::new();
-    while line.kind == by_cores[0] {
-        let (cores, values) = parse_by_cores(&line)?;
-        if seen.contains(&cores) {
-            let reason = format!("`{} {cores}` stands here twice", line.kind);
-            return Err(line.malformed(reason));
-        }
-        seen.push(cores);
-        quantities.extend(values);
-        line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
-    }
-    if seen.is_empty() {
-        let reason = format!("the DAG before this has no `{}` record", by_cores[0]);
-        return Err(line.malformed(reason));
-    }
-    dags.push(ExpectedDag { task, quantities });
-    Ok((line, form))
-}
-
-/// Reads what a DAG takes alone on a number of cores.
-fn parse_by_cores(line: &Line<'_>) -> Result<(u32, Vec<(String, String)>), Malformed> {
-    let quantity = |what: &str, cores: u32, word: &str| {
-        let what = format!("{} {cores}{what}", line.kind);
-        Ok((what, line.number::<u64>(word)?.to_string()))
-    };
-    if line.kind == "multi_path" {
-        let words = line.exactly(2)?;
-        let cores = line.cores(words[0])?;
-        return Ok((cores, vec![quantity("", cores, words[1])?]));
-    }
-    let words = line.exactly(5)?;
-    if words[1] != "graham" || words[3] != "long_paths" {
-        return Err(line.malformed("expected `single M graham R long_paths R`"));
-    }
-    let cores = line.cores(words[0])?;
-    let graham = quantity(" graham", cores, words[2])?;
-    Ok((
-        cores,
-        vec![graham, quantity(" long_paths", cores, words[4])?],
-    ))
-}
-
-/// Checks the form of a quantity's words and returns them in plain form.
-fn parse_quantity(line: &Line<'_>, dags: usize) -> Result<Vec<String>, Malformed> {
-    let plain = |word: &str| line.number::<u64>(word).map(|number| number.to_string());
-    if line.words == ["-"] && line.kind != "dm_order" && line.kind != "width" {
-        return Ok(vec!["-".to_owned()]);
-    }
-    match line.kind {
-        "gedf_capacity" | "bonifaci_gedf" => match line.exactly(1)?[0] {
-            verdict @ ("0" | "1") => Ok(vec![verdict.to_owned()]),
-            other => Err(line.malformed(format!("expected 0, 1 or -, found {}", quoted(other)))),
-        },
-        "federated" => {
-            let mut words = line.words.iter();
-            let left = words
-                .next()
-                .ok_or_else(|| line.malformed("expected the cores left"))?;
-            let heavy = words.map(|word| match word.split_once(':') {
-                Some((dag, cores)) => Ok(format!("{}:{}", plain(dag)?, plain(cores)?)),
-                None => Err(line.malformed(format!("expected dag:cores, found {}", quoted(word)))),
-            });
-            std::iter::once(plain(left)).chain(heavy).collect()
-        }
-        "dm_order" => {
-            let order: Vec<usize> = line.numbers(dags)?;
-            let all = 0..dags;
-            if repeated(&order).is_some() || !order.iter().all(|dag| all.contains(dag)) {
-                let reason = format!("expected each DAG from 0 to {} once", dags - 1);
-                return Err(line.malformed(reason));
-            }
-            Ok(order.iter().map(usize::to_string).collect())
-        }
-        _ => line.exactly(dags)?.iter().map(|word| plain(word)).collect(),
-    }
-}
-
-fn at_least_one(line: &Line<'_>, word: &str) -> Result<u32, Malformed> {
-    match line.number(word)? {
-        0 => Err(line.malformed(format!("`{}` needs at least 1 here, found 0", line.kind))),
-        number => Ok(number),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::{check, parse};
@@ -398,7 +322,7 @@ mod tests {
 
     /// What stands in the first case, what is put in its place, and the difference that makes.
     const WRONG: &str = r"\nlen 41 | \nlen 42 | dag 1: len: expected 42, computed 41
-graham 50 long_paths 46 | graham 50 long_paths 47 | dag 2: single 7 long_paths: expected 47, computed 46
+graham 50 long_paths 46 | graham 50 long_paths 47 | dag 2: single 7: expected graham 50 long_paths 47, computed graham 50 long_paths 46
 melani_gedf 11 44 60 | melani_gedf - | melani_gedf: expected -, computed 11 44 60
 federated 7 | federated 6 0:1 | federated: expected 6 0:1, computed 7";
 
@@ -423,7 +347,7 @@ case bpub000 7 3 | case bpub000 0 3 | 1
 case bpub000 7 3 | case bpub000 7 4 | 28
 case bpub000 7 3 | case bpub000 4294967295 3 | 1 | expected 1 to 64 cores, found 4294967295
 case bpub000 7 3 | case b\x 7 3 | 1 | case `b\u{202e}`: a name must be seen; rename it
-single 7 graham 41 long_paths 41\n |  | 17 | the DAG before this has no `single` record
+single 7 graham 41 long_paths 41\n |  | 17 | expected a `single` record
 single 7 graham 41 long_paths 41\n | single 7 graham 41 long_paths 41\nsingle 7 graham 41 long_paths 41\n | 18 | `single 7` stands here twice
 single 7 graham 41 | single 65 graham 41 | 17
 dm_order 0 1 2 | dm_order 0 1 3 | 28 | expected each DAG from 0 to 2 once

@@ -34,7 +34,6 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use replay::lines::Malformed;
 use replay::{Case, Epoch, Scale, build};
 use sched_dag::law::Record;
 
@@ -106,16 +105,15 @@ fn run_files(options: &Parsed) -> Result<ExitCode, Refusal> {
             "the window and the guard may be a quarter of a unit at most, here {most_us} us"
         )));
     }
-    let mut cases = read(options.files(), with_texts).map_err(Refusal::Usage)?;
+    let mut cases = read(options.files(), schedules::parse).map_err(Refusal::Usage)?;
     let most_cores = options.number("cores-up-to").unwrap_or(MOST_CORES);
     let all = cases.len();
-    cases.retain(|(case, _)| u64::from(case.cores) <= most_cores);
+    cases.retain(|case| u64::from(case.cores) <= most_cores);
     if cases.len() < all {
         let left_out = all - cases.len();
         println!("{left_out} cases for more than {most_cores} cores are left out");
     }
-    let (cases, texts): (Vec<Case>, Vec<String>) = cases.into_iter().unzip();
-    let failed = report(&run(&cases, &texts, &settings)?, &settings);
+    let failed = report(&run(&cases, &settings)?, &settings);
     Ok(ExitCode::from(u8::from(failed > 0)))
 }
 
@@ -136,28 +134,6 @@ fn settings(options: &Parsed) -> Settings {
         tolerance_percent: number("tolerance", usual.tolerance_percent),
         ..usual
     }
-}
-
-/// Reads the cases of a file, each also as text.
-fn with_texts(text: &str) -> Result<Vec<(Case, String)>, Malformed> {
-    let cases = schedules::parse(text)?;
-    Ok(cases.into_iter().zip(texts_of_cases(text)).collect())
-}
-
-/// Takes a well-formed file apart, one text a case.
-#[must_use]
-pub fn texts_of_cases(text: &str) -> Vec<String> {
-    let mut texts: Vec<String> = Vec::new();
-    for line in text.lines() {
-        if line.split_whitespace().next() == Some("case") {
-            texts.push(String::new());
-        }
-        if let Some(last) = texts.last_mut() {
-            last.push_str(line);
-            last.push('\n');
-        }
-    }
-    texts
 }
 
 /// Prints what became of the cases and returns how many failed.
@@ -280,12 +256,11 @@ const MOST_CASES: usize = 64;
 const MEMORY_MIB: u64 = 64;
 
 /// Runs cases in the kernel, in boots of one number of cores each, and compares.
-/// `texts` are the cases' records, one text a case.
 ///
 /// # Errors
 ///
 /// In words: there is no QEMU, no image, or a file cannot be written.
-pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<Judged>, String> {
+pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
     install::ensure_qemu()?;
     let image = image::build("replay")?;
     let machine = Qemu {
@@ -298,36 +273,31 @@ pub fn run(cases: &[Case], texts: &[String], settings: &Settings) -> Result<Vec<
         ..Qemu::default()
     };
     probe::choose(Some(settings.mode), settings.mode, &machine, &image.path)?;
-    let mut by_cores: Vec<(&Case, &str)> =
-        cases.iter().zip(texts.iter().map(String::as_str)).collect();
-    by_cores.sort_by_key(|(case, _)| case.cores);
+    let mut by_cores: Vec<&Case> = cases.iter().collect();
+    by_cores.sort_by_key(|case| case.cores);
+    let mut waiting = &by_cores[..];
     let mut judged = Vec::with_capacity(cases.len());
     let mut progress = Progress::new(cases.len() as u64, "cases");
-    for group in by_cores.chunk_by(|(a, _), (b, _)| a.cores == b.cores) {
-        let mut waiting = group;
-        while let Some((first, _)) = waiting.first() {
-            // What the guest cannot run would end the whole boot.
-            if let Err(reason) = runs_there(first, settings) {
-                judged.push(verdict(first, Err(reason)));
-                waiting = &waiting[1..];
-                continue;
-            }
-            let fits = |(case, _): &&(&Case, &str)| runs_there(case, settings).is_ok();
-            let count = waiting.iter().take(MOST_CASES).take_while(fits).count();
-            let outcome = boot_with(&image.path, &waiting[..count], settings)?;
-            let before = judged.len();
-            judged.extend(judge(&outcome, &waiting[..count], settings));
-            waiting = &waiting[judged.len() - before..];
-            progress.show(judged.len() as u64);
-        }
+    while let Some(first) = waiting.first() {
+        // What the guest cannot run would end the whole boot.
+        let fits = |case: &&&Case| case.cores == first.cores && runs_there(case, settings).is_ok();
+        let count = waiting.iter().take(MOST_CASES).take_while(fits).count();
+        let found = match &waiting[..count] {
+            [] => vec![verdict(first, runs_there(first, settings))],
+            cases => judge(&boot_with(&image.path, cases, settings)?, cases, settings),
+        };
+        waiting = &waiting[found.len()..];
+        judged.extend(found);
+        progress.show(judged.len() as u64);
     }
     progress.end();
     Ok(judged)
 }
 
 /// Returns why a case is not for the guest: its times are none in nanoseconds.
-fn runs_there(case: &Case, settings: &Settings) -> Result<(), String> {
-    build(case, settings.scale(), &Epoch::default(), None).map(drop)
+fn runs_there(case: &Case, settings: &Settings) -> Result<Deviation, String> {
+    let built = build(case, settings.scale(), &Epoch::default(), None);
+    built.map(|_| Deviation::default())
 }
 
 fn verdict(case: &Case, outcome: Result<Deviation, String>) -> Judged {
@@ -338,14 +308,10 @@ fn verdict(case: &Case, outcome: Result<Deviation, String>) -> Judged {
     }
 }
 
-fn boot_with(
-    image: &Path,
-    cases: &[(&Case, &str)],
-    settings: &Settings,
-) -> Result<Outcome, String> {
+fn boot_with(image: &Path, cases: &[&Case], settings: &Settings) -> Result<Outcome, String> {
     let log = system::new_log("replay")?;
     let module = log.with_extension("cases");
-    let text: String = cases.iter().map(|(_, text)| *text).collect();
+    let text: String = cases.iter().map(|case| case.text.as_str()).collect();
     files::write(&module, text)?;
     let Settings {
         mode,
@@ -360,7 +326,7 @@ fn boot_with(
     let qemu = Qemu {
         mode,
         machine,
-        cores: cases.first().map_or(1, |(case, _)| case.cores.into()),
+        cores: cases.first().map_or(1, |case| case.cores.into()),
         memory_mib: MEMORY_MIB,
         guest_words: format!(
             "mode={mode} unit_us={unit_us} guard_us={guard_us} window_us={window_us} \
@@ -369,8 +335,7 @@ fn boot_with(
         module: Some(module.clone()),
         ..Qemu::default()
     };
-    let only_cases: Vec<&Case> = cases.iter().map(|(case, _)| *case).collect();
-    let outcome = boot(&qemu, image, &log, settings.limit(&only_cases), |_| {});
+    let outcome = boot(&qemu, image, &log, settings.limit(cases), |_| {});
     // It is ours, and in the way of no one if it cannot be removed.
     let _ = fs::remove_file(&module);
     outcome
@@ -378,11 +343,7 @@ fn boot_with(
 
 /// Judges the cases that ran and, if the guest did not get through, the one that
 /// ended it; what comes after that has not been run.
-pub(super) fn judge(
-    outcome: &Outcome,
-    cases: &[(&Case, &str)],
-    settings: &Settings,
-) -> Vec<Judged> {
+pub(super) fn judge(outcome: &Outcome, cases: &[&Case], settings: &Settings) -> Vec<Judged> {
     let mut judged = Vec::with_capacity(cases.len());
     let ending = outcome.judge().err();
     let (runs, damaged) = match trace::read(&outcome.serial) {
@@ -390,7 +351,7 @@ pub(super) fn judge(
         Err(damaged) => (Vec::new(), Some(damaged.to_string())),
     };
     let mut ran = outcome.transcript.of_kind("replay").zip(&runs);
-    for (case, _) in cases {
+    for case in cases {
         let Some((line, run)) = ran.next() else {
             let why = ending.map(|fault| fault.reason).or(damaged);
             let why = why.unwrap_or_else(|| "it printed nothing about it".into());
@@ -491,7 +452,7 @@ O=0 | O=1 | dag 0 job 0: release: expected 0, found 1
         let judged_of = |log: String| {
             let status = Ending::Guest(Status::Success);
             let outcome = Outcome::of(status, log, "no.log".as_ref(), "no image".as_ref());
-            let judged = judge(&outcome, &[(&case, CASE)], &Settings::for_unit(1000));
+            let judged = judge(&outcome, &[&case], &Settings::for_unit(1000));
             judged.into_iter().next().expect("a case").outcome
         };
         let judged = |text: &str| {

@@ -19,7 +19,7 @@
 //! one arrival of its topic; that it is unique is checked, but a set of messages
 //! that never arrived is a difference, not an error of the file.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::num::NonZeroUsize;
 
 use pub_sub::{
@@ -33,33 +33,27 @@ pub struct Case {
     /// The case's name.
     pub name: String,
     topics: usize,
-    policy: Policy,
+    queue_size: usize,
+    /// `None` if the policy is exact.
+    approximate: Option<Parameters>,
     arrivals: Vec<Arrival>,
-    /// What is expected at each arrival.
-    expected: Vec<Departures>,
 }
 
-#[derive(Debug)]
-enum Policy {
-    /// With this queue size.
-    Exact(usize),
-    Approximate(Parameters),
-}
-
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Arrival {
     topic: usize,
     sequence: u64,
     stamp_ns: u64,
+    expected: Departures,
 }
 
 /// What leaves a synchronizer while one arrival is handled.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 struct Departures {
     /// For each set the sequence numbers in the order of the topics.
     sets: Vec<Vec<u64>>,
-    /// Topic and sequence number of what left in no set; sorted before comparing.
-    dropped: Vec<(usize, u64)>,
+    /// Topic and sequence number of what left in no set.
+    dropped: BTreeSet<(usize, u64)>,
 }
 
 /// Reserved storage grows with the topics whatever the arrivals are, so a number
@@ -75,82 +69,51 @@ pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
     cases(text, parse_case)
 }
 
-/// A policy before it is known how many arrivals there are.
-struct Header {
-    topics: usize,
-    queue_size: usize,
-    /// `None` if the policy is exact.
-    approximate: Option<Approximate>,
-}
-
-struct Approximate {
-    max_interval_ns: Option<u64>,
-    age_penalty: AgePenalty,
-    lower_bounds_ns: Vec<u64>,
-}
-
-fn parse_case(line: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
-    let &[name, ..] = line.exactly(4)? else {
-        return Err(line.malformed("expected 4 words"));
-    };
-    let header = parse_header(line, lines)?;
-    let mut trace = Trace::default();
-    loop {
-        let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
-        match line.kind {
-            "a" => trace.arrival(&line, header.topics)?,
-            "s" => trace.set(&line, header.topics)?,
-            "r" => trace.dropped(&line, header.topics)?,
-            "end" => {
-                line.exactly(0)?;
-                break;
-            }
-            other => {
-                let reason = format!("expected `a`, `s`, `r` or `end`, found {}", quoted(other));
-                return Err(line.malformed(reason));
-            }
-        }
-    }
-    Ok(Case {
-        name: name.to_owned(),
-        topics: header.topics,
-        policy: header.policy(trace.arrivals.len()),
-        arrivals: trace.arrivals,
-        expected: trace.expected,
-    })
-}
-
-fn parse_header(line: &Line<'_>, lines: &mut Lines<'_>) -> Result<Header, Malformed> {
-    let topics = line.number(line.words[2])?;
+fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
+    let [name, policy, topics, queue_size] = header.fixed()?;
+    let topics = header.number(topics)?;
     if !(1..=MOST_TOPICS).contains(&topics) {
         let reason = format!("expected 1 to {MOST_TOPICS} topics, found {topics}");
-        return Err(line.malformed(reason));
+        return Err(header.malformed(reason));
     }
-    let queue_size = line.number(line.words[3])?;
-    let approximate = match line.words[1] {
+    let queue_size: usize = header.number(queue_size)?;
+    let approximate = match policy {
         "exact" => None,
-        "approximate" if queue_size == 0 => {
-            return Err(line.malformed("an approximate queue holds at least 1, found 0"));
+        "approximate" => {
+            let queue_size = NonZeroUsize::new(queue_size).ok_or_else(|| {
+                header.malformed("an approximate queue holds at least 1, found 0")
+            })?;
+            Some((lines.expect("approximate")?, queue_size))
         }
-        "approximate" => Some(parse_approximate(&lines.expect("approximate")?, topics)?),
         other => {
             let reason = format!("expected `exact` or `approximate`, found {}", quoted(other));
-            return Err(line.malformed(reason));
+            return Err(header.malformed(reason));
         }
     };
-    Ok(Header {
+    let arrivals = parse_arrivals(lines, topics)?;
+    // A queue with room for all arrivals never overflows, so no more than that is reserved.
+    let most = NonZeroUsize::new(arrivals.len()).unwrap_or(NonZeroUsize::MIN);
+    let parameters = |(line, queue_size): (Line<'_>, NonZeroUsize)| {
+        let parameters = Parameters::new(topics, queue_size.min(most));
+        parse_parameters(line.exactly(3 + topics)?, &line, parameters)
+    };
+    Ok(Case {
+        name: name.to_owned(),
         topics,
-        queue_size,
-        approximate,
+        queue_size: queue_size.min(most.get()),
+        approximate: approximate.map(parameters).transpose()?,
+        arrivals,
     })
 }
 
-fn parse_approximate(line: &Line<'_>, topics: usize) -> Result<Approximate, Malformed> {
-    let words = line.exactly(3 + topics)?;
-    let max_interval_ns = match words[0] {
-        "-" => None,
-        word => Some(line.number(word)?),
-    };
+fn parse_parameters(
+    words: &[&str],
+    line: &Line<'_>,
+    mut parameters: Parameters,
+) -> Result<Parameters, Malformed> {
+    if words[0] != "-" {
+        parameters = parameters.max_interval_ns(line.number(words[0])?);
+    }
     let (factor, shift) = (line.number(words[1])?, line.number(words[2])?);
     let age_penalty = AgePenalty::from_factor(factor, shift).ok_or_else(|| {
         line.malformed(format!(
@@ -159,106 +122,63 @@ fn parse_approximate(line: &Line<'_>, topics: usize) -> Result<Approximate, Malf
             AgePenalty::MOST_SHIFT
         ))
     })?;
-    let lower_bounds_ns = words[3..].iter().map(|word| line.number(word));
-    Ok(Approximate {
-        max_interval_ns,
-        age_penalty,
-        lower_bounds_ns: lower_bounds_ns.collect::<Result<_, _>>()?,
-    })
+    let mut bounds = words[3..].iter().enumerate();
+    bounds.try_fold(
+        parameters.age_penalty(age_penalty),
+        |parameters, (topic, bound)| Ok(parameters.lower_bound_ns(topic, line.number(bound)?)),
+    )
 }
 
-impl Header {
-    /// Makes the policy. A queue with room for all arrivals never overflows, so no
-    /// more than that is reserved.
-    fn policy(&self, arrivals: usize) -> Policy {
-        let queue_size = self.queue_size.min(arrivals.max(1));
-        match (&self.approximate, NonZeroUsize::new(queue_size)) {
-            (Some(approximate), Some(queue_size)) => {
-                Policy::Approximate(approximate.parameters(self.topics, queue_size))
-            }
-            _ => Policy::Exact(queue_size),
-        }
-    }
-}
-
-impl Approximate {
-    fn parameters(&self, topics: usize, queue_size: NonZeroUsize) -> Parameters {
-        let mut parameters = Parameters::new(topics, queue_size).age_penalty(self.age_penalty);
-        if let Some(max_interval_ns) = self.max_interval_ns {
-            parameters = parameters.max_interval_ns(max_interval_ns);
-        }
-        let bounds_ns = self.lower_bounds_ns.iter().enumerate();
-        bounds_ns.fold(parameters, |parameters, (topic, &bound_ns)| {
-            parameters.lower_bound_ns(topic, bound_ns)
-        })
-    }
-}
-
-/// The records between a case's header and its end.
-#[derive(Default)]
-struct Trace {
-    arrivals: Vec<Arrival>,
-    expected: Vec<Departures>,
-    /// Topics and sequence numbers that arrived.
-    arrived: HashSet<(usize, u64)>,
-    /// Topics and sequence numbers that left in no set.
-    left: HashSet<(usize, u64)>,
-}
-
-impl Trace {
-    fn arrival(&mut self, line: &Line<'_>, topics: usize) -> Result<(), Malformed> {
-        let words = line.exactly(3)?;
-        let arrival = Arrival {
-            topic: topic(line, words[0], topics)?,
-            sequence: line.number(words[1])?,
-            stamp_ns: line.number(words[2])?,
+fn parse_arrivals(lines: &mut Lines<'_>, topics: usize) -> Result<Vec<Arrival>, Malformed> {
+    let mut arrivals: Vec<Arrival> = Vec::new();
+    let (mut arrived, mut left) = (HashSet::new(), HashSet::new());
+    loop {
+        let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
+        let message = |topic, sequence| {
+            Ok::<_, Malformed>((line.index("topic", topic, topics)?, line.number(sequence)?))
         };
-        if !self.arrived.insert((arrival.topic, arrival.sequence)) {
-            return Err(line.malformed(format!(
-                "message {} of topic {} arrives twice",
-                arrival.sequence, arrival.topic
-            )));
+        let once =
+            |seen: &mut HashSet<_>, (topic, sequence), what| match seen.insert((topic, sequence)) {
+                true => Ok(()),
+                false => {
+                    Err(line.malformed(format!("message {sequence} of topic {topic} {what} twice")))
+                }
+            };
+        match line.kind {
+            "a" => {
+                let [topic, sequence, stamp] = line.fixed()?;
+                let (topic, sequence) = message(topic, sequence)?;
+                once(&mut arrived, (topic, sequence), "arrives")?;
+                arrivals.push(Arrival {
+                    topic,
+                    sequence,
+                    stamp_ns: line.number(stamp)?,
+                    expected: Departures::default(),
+                });
+            }
+            "s" => {
+                let words = line.exactly(1 + topics)?;
+                let arrival = line.index("arrival", words[0], arrivals.len())?;
+                let sequences = words[1..].iter().map(|word| line.number(word));
+                let sequences = sequences.collect::<Result<_, _>>()?;
+                arrivals[arrival].expected.sets.push(sequences);
+            }
+            "r" => {
+                let [arrival, topic, sequence] = line.fixed()?;
+                let message = message(topic, sequence)?;
+                let arrival = line.index("arrival", arrival, arrivals.len())?;
+                once(&mut left, message, "leaves")?;
+                arrivals[arrival].expected.dropped.insert(message);
+            }
+            "end" => {
+                line.exactly(0)?;
+                return Ok(arrivals);
+            }
+            other => {
+                let reason = format!("expected `a`, `s`, `r` or `end`, found {}", quoted(other));
+                return Err(line.malformed(reason));
+            }
         }
-        self.arrivals.push(arrival);
-        self.expected.push(Departures::default());
-        Ok(())
-    }
-
-    fn set(&mut self, line: &Line<'_>, topics: usize) -> Result<(), Malformed> {
-        let words = line.exactly(1 + topics)?;
-        let sequences = words[1..].iter().map(|word| line.number(word));
-        let sequences = sequences.collect::<Result<_, _>>()?;
-        self.departures(line, words[0])?.sets.push(sequences);
-        Ok(())
-    }
-
-    fn dropped(&mut self, line: &Line<'_>, topics: usize) -> Result<(), Malformed> {
-        let words = line.exactly(3)?;
-        let message = (topic(line, words[1], topics)?, line.number(words[2])?);
-        self.departures(line, words[0])?.dropped.push(message);
-        if !self.left.insert(message) {
-            let (topic, sequence) = message;
-            let reason = format!("message {sequence} of topic {topic} leaves twice");
-            return Err(line.malformed(reason));
-        }
-        Ok(())
-    }
-
-    /// Returns what is expected at the arrival that a word names.
-    fn departures(&mut self, line: &Line<'_>, word: &str) -> Result<&mut Departures, Malformed> {
-        let arrival: usize = line.number(word)?;
-        self.expected
-            .get_mut(arrival)
-            .ok_or_else(|| line.malformed(format!("there is no arrival {arrival} before it")))
-    }
-}
-
-fn topic(line: &Line<'_>, word: &str, topics: usize) -> Result<usize, Malformed> {
-    let topic = line.number(word)?;
-    if topic < topics {
-        Ok(topic)
-    } else {
-        Err(line.malformed(format!("there is no topic {topic}")))
     }
 }
 
@@ -268,19 +188,18 @@ fn topic(line: &Line<'_>, word: &str, topics: usize) -> Result<usize, Malformed>
 ///
 /// The first difference in the order of arrivals, in one line.
 pub fn check(case: &Case) -> Result<(), String> {
-    let mut synchronizer: Box<dyn Synchronizer<u64>> = match &case.policy {
-        Policy::Exact(queue_size) => Box::new(ExactTime::new(case.topics, *queue_size)),
-        Policy::Approximate(parameters) => Box::new(ApproximateTime::new(parameters.clone())),
+    let mut synchronizer: Box<dyn Synchronizer<u64>> = match &case.approximate {
+        None => Box::new(ExactTime::new(case.topics, case.queue_size)),
+        Some(parameters) => Box::new(ApproximateTime::new(parameters.clone())),
     };
-    for (index, (arrival, expected)) in case.arrivals.iter().zip(&case.expected).enumerate() {
+    for (index, arrival) in case.arrivals.iter().enumerate() {
+        let (topic, message) = (arrival.topic, arrival.sequence);
+        let stamp_ns = arrival.stamp_ns;
         let mut departures = Departures::default();
-        let message = Stamped {
-            stamp_ns: arrival.stamp_ns,
-            message: arrival.sequence,
-        };
-        synchronizer.arrive(arrival.topic, message, &mut departures);
-        compare(expected, departures)
-            .map_err(|difference| format!("{}: {difference}", place(index, arrival)))?;
+        synchronizer.arrive(topic, Stamped { stamp_ns, message }, &mut departures);
+        compare(&arrival.expected, &departures).map_err(|difference| {
+            format!("arrival {index} (topic {topic}, message {message}): {difference}")
+        })?;
     }
     Ok(())
 }
@@ -293,7 +212,7 @@ impl Outlet<u64> for Departures {
     }
 
     fn dropped(&mut self, topic: usize, message: Stamped<u64>) {
-        self.dropped.push((topic, message.message));
+        self.dropped.insert((topic, message.message));
     }
 
     fn replaced(&mut self, topic: usize, message: Stamped<u64>) {
@@ -301,53 +220,32 @@ impl Outlet<u64> for Departures {
     }
 }
 
-fn place(index: usize, arrival: &Arrival) -> String {
-    format!(
-        "arrival {index} (topic {}, message {})",
-        arrival.topic, arrival.sequence
-    )
-}
-
-fn compare(expected: &Departures, mut departures: Departures) -> Result<(), String> {
-    let sets = expected.sets.len().max(departures.sets.len());
-    for index in 0..sets {
-        let (expected, emitted) = (expected.sets.get(index), departures.sets.get(index));
+fn compare(expected: &Departures, departures: &Departures) -> Result<(), String> {
+    for index in 0..expected.sets.len().max(departures.sets.len()) {
+        let [expected, emitted] = [expected, departures].map(|of| {
+            let set = of.sets.get(index);
+            let words = set.map(|set| set.iter().map(u64::to_string).collect::<Vec<_>>());
+            words.map_or("none".to_owned(), |words| words.join(" "))
+        });
         if expected != emitted {
             return Err(format!(
-                "set {index}: expected {}, emitted {}",
-                words(expected),
-                words(emitted)
+                "set {index}: expected {expected}, emitted {emitted}"
             ));
         }
     }
-    let mut wanted = expected.dropped.clone();
-    wanted.sort_unstable();
-    departures.dropped.sort_unstable();
-    if let Some((topic, sequence)) = difference(&wanted, &departures.dropped) {
-        return Err(format!(
-            "message {sequence} of topic {topic}: expected to leave, but was not dropped"
-        ));
-    }
-    if let Some((topic, sequence)) = difference(&departures.dropped, &wanted) {
-        return Err(format!(
-            "message {sequence} of topic {topic}: dropped, but expected not to leave"
-        ));
+    for (these, others, what) in [
+        (
+            expected,
+            departures,
+            "expected to leave, but was not dropped",
+        ),
+        (departures, expected, "dropped, but expected not to leave"),
+    ] {
+        if let Some((topic, sequence)) = these.dropped.difference(&others.dropped).next() {
+            return Err(format!("message {sequence} of topic {topic}: {what}"));
+        }
     }
     Ok(())
-}
-
-fn words(set: Option<&Vec<u64>>) -> String {
-    let Some(set) = set else {
-        return "none".to_owned();
-    };
-    let words: Vec<String> = set.iter().map(u64::to_string).collect();
-    words.join(" ")
-}
-
-/// Returns the first message of one list that is not in the other.
-fn difference(messages: &[(usize, u64)], others: &[(usize, u64)]) -> Option<(usize, u64)> {
-    let missing = |message: &&(usize, u64)| !others.contains(message);
-    messages.iter().find(missing).copied()
 }
 
 #[cfg(test)]
