@@ -9,7 +9,6 @@
 extern crate alloc;
 
 mod measure;
-mod row;
 
 use alloc::vec::Vec;
 

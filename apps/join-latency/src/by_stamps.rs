@@ -12,10 +12,9 @@ use core::time::Duration;
 use fass::{Dag, SubtaskAttributes, Untyped, create_dag};
 use join_latency::{Experiment, Message, Part};
 use kernel::{Ending, Event, Lock, Machine};
-use pub_sub::executor::{Host, work};
-use pub_sub::graph::Graph;
+use pub_sub::graph::{Graph, Host, work};
 
-use super::output::Outcome;
+use super::Outcome;
 
 /// Longer than any run.
 const FOREVER: Duration = Duration::from_secs(1_000_000);

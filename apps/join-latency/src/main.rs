@@ -1,24 +1,30 @@
 //! Boots into one condition of the evaluation and prints the times of all jobs.
+//!
+//! The DAG-native condition runs `fork-join`'s DAG, joined by the scheduler; the others run
+//! callbacks whose messages a synchronizer matches (`by_stamps`). Printed are all times in batches,
+//! and a summary.
 
 #![no_std]
 #![no_main]
 
 extern crate alloc;
 
-mod by_dag;
 mod by_stamps;
-mod output;
 
 use alloc::format;
 use alloc::string::String;
+use core::fmt::{self, Display};
 use core::num::NonZeroUsize;
 use core::time::Duration;
 
 use fass::Occupation;
 use fork_join::{MOST_PARALLEL, PERIOD, Work, Workload};
-use join_latency::{Experiment, Matching};
+use join_latency::{Experiment, Joined, Matching, Samples, Span};
 use kernel::options::UsageError;
-use kernel::{Ending, Machine, println};
+use kernel::report::{Distribution, Ns};
+use kernel::{Ending, Machine, Run, json, println};
+use sched_dag::law::InstanceRecord;
+use sched_dag::{Instance, SubtaskId};
 
 kernel::entry!(main);
 
@@ -75,7 +81,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
                 seed,
                 work: Work::Simulate(Occupation::Hold),
             };
-            by_dag::run(machine, &workload)?
+            run_dag(machine, &workload)?
         }
         Some(matching) => {
             let experiment = Experiment {
@@ -95,8 +101,8 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         "{name}, N = {parallel}, {jobs} jobs, seed {seed}, {} cores",
         machine.cores()
     );
-    output::emit_samples(&outcome.samples);
-    output::emit_summary(&name, &outcome);
+    emit_samples(&outcome.samples);
+    emit_summary(&name, &outcome);
     machine.report_memory();
     outcome
         .complaint(jobs)
@@ -115,4 +121,185 @@ fn size(number: u64) -> usize {
 
 fn at_least_one(number: u64) -> NonZeroUsize {
     NonZeroUsize::new(size(number)).unwrap_or(NonZeroUsize::MIN)
+}
+
+/// Runs all jobs.
+fn run_dag(machine: &Machine, workload: &Workload) -> Result<Outcome, Ending> {
+    let (dag, joins) = workload.build();
+    // As many jobs in flight as the subscriptions' queues have room for by default,
+    // so that no release waits for the backlog on either side.
+    dag.in_flight(
+        u32::try_from(workload.jobs)
+            .unwrap_or(u32::MAX)
+            .clamp(1, 1000),
+    );
+    fass::finish_create_dags(&[dag])?;
+    let run = machine.run()?;
+    Ok(Outcome {
+        samples: samples(&run, workload.parallel),
+        allocations: run.allocations(),
+        violations: run.violations().count() as u64 + joins.mixed(),
+    })
+}
+
+/// Reads the times from the scheduler's record. Each join has the values of its own
+/// job, which `fork-join` checks and counts otherwise.
+fn samples(run: &Run, parallel: usize) -> Samples {
+    let dag = run.task_set().find("fork-join");
+    let jobs = run.record().numbered(dag).map(|(job, _)| job);
+    let instances = |subtask: usize| {
+        jobs.clone().filter_map(move |job| {
+            let subtask = SubtaskId(u32::try_from(subtask).ok()?);
+            let instance = Instance { dag, job, subtask };
+            Some((job, *run.record().instance(instance)?))
+        })
+    };
+    let spans = |subtask| {
+        instances(subtask)
+            .filter_map(|(_, times)| span(&times))
+            .collect()
+    };
+    let joins = instances(parallel + 1).filter_map(|(job, times)| {
+        let joined = Joined {
+            ready_ns: times.ready_ns?,
+            span: span(&times)?,
+        };
+        Some((job, joined))
+    });
+    Samples {
+        source: spans(0),
+        parallel: (1..=parallel).map(spans).collect(),
+        joins: joins.clone().map(|(_, joined)| joined).collect(),
+        indices: joins
+            .flat_map(|(job, _)| core::iter::repeat_n(job, parallel))
+            .collect(),
+        lost_inputs: 0,
+    }
+}
+
+fn span(times: &InstanceRecord) -> Option<Span> {
+    Some(Span {
+        start_ns: times.start_ns?,
+        finish_ns: times.finish_ns?,
+    })
+}
+
+/// How many executions or joins one line holds.
+const BATCH: usize = 32;
+
+/// What became of a condition.
+pub(crate) struct Outcome {
+    pub(crate) samples: Samples,
+    /// Allocations while it ran.
+    pub(crate) allocations: u64,
+    /// Breaches of the scheduler's rules, and joins of a DAG that mix jobs.
+    pub(crate) violations: u64,
+}
+
+impl Outcome {
+    /// Says what makes the condition worthless, if anything does.
+    fn complaint(&self, jobs: u64) -> Option<String> {
+        let Self {
+            samples,
+            allocations,
+            violations,
+        } = self;
+        if *violations > 0 {
+            return Some(format!("{violations} semantic violations"));
+        }
+        if samples.lost_inputs > 0 {
+            return Some(format!(
+                "subscriptions dropped {} messages; give them a greater `depth`",
+                samples.lost_inputs
+            ));
+        }
+        let mut all = samples.parallel.iter().chain([&samples.source]);
+        if let Some(spans) = all.find(|spans| spans.len() as u64 != jobs) {
+            return Some(format!("only {} of {jobs} jobs were executed", spans.len()));
+        }
+        (*allocations > 0).then(|| format!("{allocations} allocations while running"))
+    }
+}
+
+/// Prints the times of all executions and joins.
+fn emit_samples(samples: &Samples) {
+    let subtasks = core::iter::once(&samples.source).chain(&samples.parallel);
+    for (subtask, spans) in (0u64..).zip(subtasks) {
+        for (batch, spans) in spans.chunks(BATCH).enumerate() {
+            json::emit("executions", |line| {
+                let values = spans.iter().map(|span| Times(span, None, &[]));
+                line.number("subtask", subtask)
+                    .number("first", (batch * BATCH) as u64)
+                    .list("times", values);
+            });
+        }
+    }
+    for (batch, joins) in samples.joins.chunks(BATCH).enumerate() {
+        json::emit("joins", |line| {
+            let values = joins.iter().enumerate().map(|(offset, joined)| {
+                let indices = samples.indices_of(batch * BATCH + offset);
+                Times(&joined.span, Some(joined.ready_ns), indices)
+            });
+            line.number("first", (batch * BATCH) as u64)
+                .list("times", values);
+        });
+    }
+}
+
+/// A list: the time of readiness if any, start, finish, then numbers if any.
+struct Times<'a>(&'a Span, Option<u64>, &'a [u64]);
+
+impl Display for Times<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(span, ready_ns, numbers) = self;
+        f.write_str("[")?;
+        if let Some(ready_ns) = ready_ns {
+            write!(f, "{ready_ns},")?;
+        }
+        write!(f, "{},{}", span.start_ns, span.finish_ns)?;
+        numbers
+            .iter()
+            .try_for_each(|number| write!(f, ",{number}"))?;
+        f.write_str("]")
+    }
+}
+
+/// Prints the counts and distributions, as a machine line and for people.
+fn emit_summary(name: &str, outcome: &Outcome) {
+    let samples = &outcome.samples;
+    let record = samples.record();
+    let [joins, same_index, cross_index, missing] = [
+        record.sets.len(),
+        record.same_index_sets(),
+        record.cross_index_sets(),
+        record.missing_joins(),
+    ];
+    let literal = Distribution::new(record.join_latencies_ns());
+    let cover = Distribution::new(record.cover_delays_ns());
+    json::emit("join_latency", |line| {
+        line.text("policy", name)
+            .number("subtasks", samples.parallel.len() as u64)
+            .number("jobs", samples.source.len() as u64)
+            .number("joins", joins as u64)
+            .number("same_index", same_index as u64)
+            .number("cross_index", cross_index as u64)
+            .number("missing", missing as u64)
+            .number("lost_inputs", samples.lost_inputs)
+            .number("violations", outcome.violations)
+            .number("allocations", outcome.allocations)
+            .distribution("join_latency_ns", &literal)
+            .distribution("cover_delay_ns", &cover);
+    });
+    println!(
+        "{joins} joins: {same_index} of one job, {cross_index} across jobs; {missing} joins never \
+         happened"
+    );
+    for (name, of) in [("join latency", literal), ("cover delay", cover)] {
+        println!(
+            "  {name:<14} median {:>12}  p99 {:>12}  max {:>12}",
+            Ns(of.median()),
+            Ns(of.p99()),
+            Ns(of.max())
+        );
+    }
 }

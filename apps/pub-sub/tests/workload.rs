@@ -6,8 +6,7 @@
 use std::num::NonZeroUsize;
 
 use common::random::Random;
-use pub_sub::metrics::Record;
-use pub_sub::workload::{self, Stamping};
+use pub_sub::workload::{self, Record, Stamping};
 use pub_sub::{ApproximateTime, ExactTime, Parameters, Synchronizer};
 
 const JOBS: usize = 2000;

@@ -17,13 +17,22 @@
 //! One unit of the file's time counts as a nanosecond here; the one that runs
 //! a case chooses how long a unit is. WCETs play no part in a schedule; they are only
 //! checked against the execution times.
+//!
+//! Reading is strict: whatever is not as the format says is refused with its line.
 
+use alloc::borrow::ToOwned;
 use alloc::collections::BTreeMap;
+use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use sched_dag::{Clusters, DagId, Instance, Policy, Preemption, TaskSet};
+use sched_dag::{
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy,
+    Preemption, Priority, SubtaskId, SubtaskSpec, TaskSet, verify,
+};
+
+use crate::lines::{Line, Lines, Malformed, cases, of_file, quoted};
 
 /// One set of DAGs with its expected schedule.
 #[derive(Debug)]
@@ -72,4 +81,260 @@ pub struct JobTimes {
     pub response_ns: u64,
     /// Whether that is more than the relative deadline.
     pub missed: bool,
+}
+
+/// Reads all cases of a file.
+///
+/// # Errors
+///
+/// [`Malformed`] for the first record that is not as described above, and for
+/// DAGs that cannot be committed.
+pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
+    cases(text, |header, lines| {
+        let case = parse_case(header, lines)?;
+        let records = text.lines().take(lines.last()).skip(header.number - 1);
+        Ok(Case {
+            text: records.flat_map(|record| [record, "\n"]).collect(),
+            ..case
+        })
+    })
+}
+
+fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
+    let [name, cores, edf, preemptive, count] = header.fixed()?;
+    let cores = header.cores(cores)?;
+    let policy = match header.flag(edf)? {
+        true => Policy::Edf,
+        false => Policy::StaticPriority,
+    };
+    let preemption = match header.flag(preemptive)? {
+        true => Preemption::Enabled,
+        false => Preemption::Disabled,
+    };
+    let clusters = match lines.next_if("clusters") {
+        Some(line) => Clusters::Of(parse_clusters(&line, cores)?),
+        None => Clusters::Undivided,
+    };
+    let options = CommitOptions::new(policy, cores)
+        .with_clusters(clusters.clone())
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_instance_limit(u32::MAX);
+
+    let mut specs = Vec::new();
+    let mut executions_ns = Vec::new();
+    for _ in 0..header.at_least_one(count)? {
+        let line = lines.expect("dag")?;
+        let (spec, of_dag_ns) = parse_dag(&line, lines, &clusters)?;
+        commit(&line, core::slice::from_ref(&spec), &options)?;
+        specs.push(spec);
+        executions_ns.push(of_dag_ns);
+    }
+    let task_set = commit(header, &specs, &options)?;
+    check_horizon(header, &specs, &executions_ns)?;
+    let mut case = Case {
+        name: name.to_owned(),
+        text: String::new(),
+        cores,
+        clusters,
+        policy,
+        preemption,
+        task_set: Arc::new(task_set),
+        executions_ns,
+        instances: BTreeMap::new(),
+        jobs: BTreeMap::new(),
+    };
+    parse_schedule(lines, &mut case)?;
+    Ok(case)
+}
+
+/// Reads the cores of each cluster, which are all there are.
+fn parse_clusters(line: &Line<'_>, cores: u32) -> Result<Vec<u32>, Malformed> {
+    let sizes: Vec<u32> = line.numbers(line.words.len())?;
+    if sizes.contains(&0) {
+        return Err(line.malformed("expected at least 1 core for each cluster, found 0"));
+    }
+    let sum: u64 = sizes.iter().copied().map(u64::from).sum();
+    match sum == cores.into() {
+        true => Ok(sizes),
+        false => Err(line.malformed(format!(
+            "expected clusters of {cores} cores in all, found {sum}"
+        ))),
+    }
+}
+
+/// Reads a DAG and the execution times of its subtasks' instances.
+fn parse_dag(
+    header: &Line<'_>,
+    lines: &mut Lines<'_>,
+    clusters: &Clusters,
+) -> Result<(DagSpec, Vec<Vec<u64>>), Malformed> {
+    let [period, deadline, offset, jobs, subtasks, edges] = header.fixed()?;
+    let jobs = header.at_least_one(jobs)?;
+    let subtasks = header.at_least_one(subtasks)?;
+    let edges: u32 = header.number(edges)?;
+    let mut spec = DagSpec {
+        period_ns: Some(header.number(period)?),
+        relative_deadline_ns: Some(header.number(deadline)?),
+        offset_ns: header.number(offset)?,
+        // The reference never blocks a release.
+        in_flight: Some(jobs),
+        jobs: Some(u64::from(jobs)),
+        ..DagSpec::default()
+    };
+    if *clusters != Clusters::Undivided {
+        let line = lines.expect("in")?;
+        let [cluster] = line.fixed()?;
+        let cluster = line.index("cluster", cluster, clusters.sizes().len())?;
+        spec.cluster = u32::try_from(cluster).ok().map(ClusterId);
+    }
+    let mut executions_ns = Vec::new();
+    for _ in 0..subtasks {
+        let (subtask, of_subtask_ns) = parse_subtask(&lines.expect("sub")?, jobs)?;
+        spec.subtasks.push(subtask);
+        executions_ns.push(of_subtask_ns);
+    }
+    let subtasks = spec.subtasks.len();
+    for _ in 0..edges {
+        let line = lines.expect("edge")?;
+        let [earlier, later] = line.fixed()?;
+        let end = |word| line.index("subtask", word, subtasks);
+        spec.edges.push((end(earlier)?, end(later)?));
+    }
+    while let Some(line) = lines.next_if("sink") {
+        let [sink, deadline] = line.fixed()?;
+        let sink = line.index("subtask", sink, subtasks)?;
+        let place = &mut spec.subtasks[sink].relative_deadline_ns;
+        once(&line, place.replace(line.number(deadline)?))?;
+    }
+    Ok((spec, executions_ns))
+}
+
+/// Reads a subtask and the execution time of each job's instance.
+fn parse_subtask(line: &Line<'_>, jobs: u32) -> Result<(SubtaskSpec, Vec<u64>), Malformed> {
+    let [wcet, priority, executions @ ..] = &line.words[..] else {
+        return Err(line.malformed("expected `sub wcet prio e_0 ..`"));
+    };
+    if u32::try_from(executions.len()) != Ok(jobs) {
+        return Err(line.malformed(format!(
+            "expected an execution time for each of {jobs} jobs, found {}",
+            executions.len()
+        )));
+    }
+    let wcet_ns: u64 = line.number(wcet)?;
+    let execution = |word: &&str| match line.number(word)? {
+        execution_ns if (1..=wcet_ns).contains(&execution_ns) => Ok(execution_ns),
+        execution_ns => Err(line.malformed(format!(
+            "the execution time {execution_ns} is not between 1 and the WCET {wcet_ns}"
+        ))),
+    };
+    let executions_ns = executions.iter().map(execution).collect::<Result<_, _>>()?;
+    let subtask = SubtaskSpec {
+        priority: Some(Priority(line.number(priority)?)),
+        ..SubtaskSpec::default()
+    };
+    Ok((subtask, executions_ns))
+}
+
+/// Verifies DAGs that the record `line` begins.
+fn commit(
+    line: &Line<'_>,
+    specs: &[DagSpec],
+    options: &CommitOptions,
+) -> Result<TaskSet, Malformed> {
+    match verify(specs, options) {
+        Ok(verified) => Ok(verified.task_set),
+        Err(rejected) => {
+            let reasons: Vec<String> = of_file(&rejected).map(|(_, reason)| reason).collect();
+            Err(line.malformed(reasons.join("; ")))
+        }
+    }
+}
+
+/// Refuses a case in which even a schedule on one core might end after the last
+/// time there is.
+fn check_horizon(
+    header: &Line<'_>,
+    specs: &[DagSpec],
+    executions_ns: &[Vec<Vec<u64>>],
+) -> Result<(), Malformed> {
+    let last_release_ns = specs.iter().map(|spec| {
+        let jobs = spec.jobs.unwrap_or(1);
+        u128::from(spec.offset_ns) + u128::from(spec.period_ns.unwrap_or(0)) * u128::from(jobs - 1)
+    });
+    let executions_ns = executions_ns.iter().flatten().flatten().copied();
+    let busy_ns: u128 = executions_ns.map(u128::from).sum();
+    if last_release_ns.max().unwrap_or(0) + busy_ns > u128::from(u64::MAX) {
+        return Err(header.malformed("the schedule may end after the last time that 64 bits hold"));
+    }
+    Ok(())
+}
+
+/// Reads what is expected of each instance and each job.
+fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malformed> {
+    let executions_ns = &case.executions_ns;
+    let dag_and_job = |line: &Line<'_>, dag: &str, job: &str| {
+        let dag = line.index("dag", dag, executions_ns.len())?;
+        let job = line.index("job", job, executions_ns[dag][0].len())?;
+        Ok::<_, Malformed>((dag, job as u64))
+    };
+    let id = |index| u32::try_from(index).unwrap_or(u32::MAX);
+    loop {
+        let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
+        match line.kind {
+            "x" => {
+                let [dag, job, subtask, start, finish, preemptions] = line.fixed()?;
+                let (dag, job) = dag_and_job(&line, dag, job)?;
+                let subtask = line.index("subtask", subtask, executions_ns[dag].len())?;
+                let instance = Instance {
+                    dag: DagId(id(dag)),
+                    job,
+                    subtask: SubtaskId(id(subtask)),
+                };
+                let times = InstanceTimes {
+                    start_ns: line.number(start)?,
+                    finish_ns: line.number(finish)?,
+                    preemptions: line.number(preemptions)?,
+                };
+                once(&line, case.instances.insert(instance, times))?;
+            }
+            "j" => {
+                let [dag, job, release, finish, response, missed] = line.fixed()?;
+                let (dag, job) = dag_and_job(&line, dag, job)?;
+                let times = JobTimes {
+                    release_ns: line.number(release)?,
+                    finish_ns: line.number(finish)?,
+                    response_ns: line.number(response)?,
+                    missed: line.flag(missed)?,
+                };
+                once(&line, case.jobs.insert((DagId(id(dag)), job), times))?;
+            }
+            "end" => {
+                line.exactly(0)?;
+                let jobs: usize = executions_ns.iter().map(|dag| dag[0].len()).sum();
+                let instances: usize = executions_ns.iter().flatten().map(Vec::len).sum();
+                let instances = instances - case.instances.len();
+                let jobs = jobs - case.jobs.len();
+                if instances + jobs > 0 {
+                    return Err(line.malformed(format!(
+                        "the case ends without {instances} `x` records and {jobs} `j` records"
+                    )));
+                }
+                return Ok(());
+            }
+            other => {
+                return Err(line.malformed(format!(
+                    "expected `x`, `j` or `end`, found {}",
+                    quoted(other)
+                )));
+            }
+        }
+    }
+}
+
+/// Refuses a record that has replaced an earlier one.
+fn once<T>(line: &Line<'_>, earlier: Option<T>) -> Result<(), Malformed> {
+    match earlier {
+        None => Ok(()),
+        Some(_) => Err(line.malformed("this record stands here twice")),
+    }
 }

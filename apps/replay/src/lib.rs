@@ -22,14 +22,9 @@ extern crate alloc;
 
 mod case;
 mod dags;
-mod faults;
 pub mod lines;
-mod parse;
-mod repeated;
 pub mod shown;
 
-pub use case::{Case, InstanceTimes, JobTimes};
+pub use case::{Case, InstanceTimes, JobTimes, parse};
 pub use dags::{Computing, Epoch, Scale, build};
-pub use faults::of_file;
-pub use parse::parse;
-pub use repeated::repeated;
+pub use lines::{of_file, repeated};

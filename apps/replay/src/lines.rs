@@ -4,14 +4,20 @@
 //! blank lines count but say nothing. Everything unexpected is a
 //! [`Malformed`] with the number of its line, so that a broken file is never
 //! taken for a failing implementation.
+//!
+//! What a commit would refuse of DAGs that a file describes is said in the words of a file, too:
+//! the commit speaks to an app's author, of attributes and registrations. A person with
+//! a file has keys and records, and is not told what follows from something else.
 
 use alloc::collections::BTreeMap;
 use alloc::format;
-use alloc::string::String;
+use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::fmt;
 use core::num::IntErrorKind;
 use core::str::FromStr;
+
+use sched_dag::{Fault, Rejected, sorted_by_key};
 
 use crate::shown::is_seen;
 pub use crate::shown::quoted;
@@ -280,9 +286,48 @@ impl fmt::Display for Malformed {
 
 impl core::error::Error for Malformed {}
 
+/// Returns the first of the items that equals one before it: the positions of that one
+/// and of itself.
+#[must_use]
+pub fn repeated<T: Ord>(items: impl IntoIterator<Item = T>) -> Option<(usize, usize)> {
+    let items: Vec<T> = items.into_iter().collect();
+    let order = sorted_by_key(items.len(), |position| &items[position]);
+    let pairs = order.windows(2).map(|pair| (pair[0], pair[1]));
+    let equal = pairs.filter(|&(first, second)| items[first] == items[second]);
+    equal.min_by_key(|&(_, second)| second)
+}
+
+/// Returns the faults that a person can mend, and what to say of each.
+pub fn of_file(rejected: &Rejected) -> impl Iterator<Item = (&Fault, String)> {
+    let faults = rejected.faults();
+    let is_cycle = |fault: &Fault| matches!(fault, Fault::Cycle { .. } | Fault::SelfEdge { .. });
+    let has_cycle = faults.iter().any(is_cycle);
+    // A graph that is one cycle has no ends either; the cycle says all.
+    let follows = move |fault: &&Fault| {
+        has_cycle && matches!(fault, Fault::NoSource { .. } | Fault::NoSink { .. })
+    };
+    let news = faults.iter().filter(move |fault| !follows(fault));
+    news.map(|fault| (fault, reason(fault)))
+}
+
+fn reason(fault: &Fault) -> String {
+    match fault {
+        Fault::TooManyInstances {
+            dag,
+            in_flight,
+            instances,
+            limit,
+        } => format!(
+            "the jobs in flight need {instances} instances, more than the limit of {limit}, and \
+             {dag} with {in_flight} jobs in flight needs most; lower its in-flight"
+        ),
+        other => other.to_string(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Lines;
+    use super::{Lines, repeated};
 
     #[test]
     fn records_know_their_lines() {
@@ -300,5 +345,13 @@ mod tests {
         let word = three.number::<u64>(three.words[1]).unwrap_err();
         assert_eq!(word.to_string(), "line 4: `x` is not a whole number");
         assert_eq!(lines.expect("four").unwrap_err().line, 5);
+    }
+
+    #[test]
+    fn the_first_that_is_too_many_is_found() {
+        assert_eq!(repeated([3, 1, 2]), None);
+        assert_eq!(repeated([""; 0]), None);
+        assert_eq!(repeated(["b", "a", "b", "a", "b"]), Some((0, 2)));
+        assert_eq!(repeated([5, 5, 5]), Some((0, 1)));
     }
 }

@@ -4,8 +4,7 @@ use std::sync::{Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use pub_sub::executor::{Host, work};
-use pub_sub::graph::{Callbacks, Graph};
+use pub_sub::graph::{Callbacks, Graph, Host, work};
 
 /// A graph shared by threads.
 struct Threads<M, C> {

@@ -1,6 +1,6 @@
 //! Close stamps make a set.
 //!
-//! Each topic has a [ring](ring::Ring) of messages in order of arrival. A *search*
+//! Each topic has a [ring](Ring) of messages in order of arrival. A *search*
 //! walks through them by advancing cursors, always that of the earliest head. The
 //! fronts of all rings may be a *candidate*: the best set that was found so far,
 //! from its earliest to its latest stamp. The *pivot* is the topic that was latest
@@ -44,16 +44,147 @@
 //! virtual ones; an arrival emits at most the queue size plus one sets. Typically an
 //! arrival takes a few passes.
 
-mod parameters;
-mod ring;
-
-pub use parameters::{AgePenalty, Parameters};
-
+use alloc::collections::VecDeque;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::num::NonZeroUsize;
 
 use crate::{Outlet, Set, Stamped, Synchronizer};
-use ring::Ring;
+
+/// The parameters of [`ApproximateTime`](ApproximateTime).
+///
+/// ```
+/// use core::num::NonZeroUsize;
+/// use pub_sub::Parameters;
+///
+/// let queue_size = NonZeroUsize::new(10).expect("not 0");
+/// let parameters = Parameters::new(3, queue_size)
+///     .max_interval_ns(30_000_000)
+///     .lower_bound_ns(0, 25_000_000);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Parameters {
+    queue_size: NonZeroUsize,
+    /// `None` for no limit.
+    max_interval_ns: Option<u64>,
+    age_penalty: AgePenalty,
+    /// One a topic.
+    lower_bounds_ns: Vec<u64>,
+}
+
+impl Parameters {
+    /// Starts with the defaults: no longest interval, an age penalty of 0.1, lower
+    /// bounds of 0. At most `queue_size` messages of a topic are held between
+    /// arrivals.
+    ///
+    /// # Panics
+    ///
+    /// If `topics` is 0.
+    #[must_use]
+    pub fn new(topics: usize, queue_size: NonZeroUsize) -> Self {
+        assert!(
+            topics > 0,
+            "a synchronizer needs a topic; give it at least 1"
+        );
+        Self {
+            queue_size,
+            max_interval_ns: None,
+            age_penalty: AgePenalty::default(),
+            lower_bounds_ns: vec![0; topics],
+        }
+    }
+
+    /// Limits how far the earliest and the latest stamp of a first candidate may be
+    /// apart, itself included. Later candidates are not tested: they are better.
+    #[must_use]
+    pub fn max_interval_ns(mut self, max_interval_ns: u64) -> Self {
+        self.max_interval_ns = Some(max_interval_ns);
+        self
+    }
+
+    /// Sets how much a later set has to be better by.
+    #[must_use]
+    pub fn age_penalty(mut self, age_penalty: AgePenalty) -> Self {
+        self.age_penalty = age_penalty;
+        self
+    }
+
+    /// Promises that two successive stamps of a topic are at least this far apart,
+    /// so that a set may be proved best without waiting for the next message. It is
+    /// believed: a promise that is not kept changes which sets come out.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such topic.
+    #[must_use]
+    pub fn lower_bound_ns(mut self, topic: usize, lower_bound_ns: u64) -> Self {
+        let topics = self.lower_bounds_ns.len();
+        assert!(
+            topic < topics,
+            "there is no topic {topic}; there are {topics}, counted from 0"
+        );
+        self.lower_bounds_ns[topic] = lower_bound_ns;
+        self
+    }
+}
+
+/// How much an older set is preferred to a newer one: a factor on the time by which
+/// the newer one ends later. It is normally 1 or more; a smaller one prefers newer
+/// sets.
+///
+/// The original multiplies by a floating-point 1 + p and rounds toward zero. Here
+/// the factor is the exact value of such a number, M / 2^K, and the product is
+/// exact too. A floating-point product would be wrong where it ties.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AgePenalty {
+    /// M, from 1 to [`MOST_FACTOR`](Self::MOST_FACTOR).
+    factor: i64,
+    /// K, up to [`MOST_SHIFT`](Self::MOST_SHIFT).
+    shift: u32,
+}
+
+impl AgePenalty {
+    /// The largest M. Differences of stamps have at most 65 bits, with which the
+    /// product stays below 2^127.
+    pub const MOST_FACTOR: u64 = (1 << 62) - 1;
+
+    /// The largest K.
+    pub const MOST_SHIFT: u32 = 127;
+
+    /// Returns the penalty whose factor 1 + p is `factor / 2^shift`, or `None` if
+    /// one of them is out of range: M from 1 to [`MOST_FACTOR`](Self::MOST_FACTOR),
+    /// K from 0 to [`MOST_SHIFT`](Self::MOST_SHIFT).
+    ///
+    /// ```
+    /// use pub_sub::AgePenalty;
+    /// assert!(AgePenalty::from_factor(3, 1).is_some(), "1 + 0.5");
+    /// assert!(AgePenalty::from_factor(0, 1).is_none());
+    /// ```
+    #[must_use]
+    pub const fn from_factor(factor: u64, shift: u32) -> Option<Self> {
+        if factor == 0 || factor > Self::MOST_FACTOR || shift > Self::MOST_SHIFT {
+            return None;
+        }
+        let factor = factor.cast_signed();
+        Some(Self { factor, shift })
+    }
+
+    /// Multiplies a difference by the factor, rounded toward zero.
+    fn scaled(self, difference_ns: i128) -> i128 {
+        let magnitude = (difference_ns.abs() * i128::from(self.factor)) >> self.shift;
+        magnitude * difference_ns.signum()
+    }
+}
+
+/// 0.1: the factor is the double nearest to 1.1.
+impl Default for AgePenalty {
+    fn default() -> Self {
+        Self {
+            factor: 2_476_979_795_053_773,
+            shift: 51,
+        }
+    }
+}
 
 /// The policy that makes sets of stamps that are close to each other.
 #[derive(Debug)]
@@ -300,5 +431,110 @@ impl<M> Synchronizer<M> for ApproximateTime<M> {
     fn held(&self, topic: usize) -> usize {
         assert!(topic < self.rings.len(), "there is no topic {topic}");
         self.rings[topic].len()
+    }
+}
+
+/// The messages of one topic, oldest arrival first, and how far a search got. A *cursor* parts
+/// them: those before it are *passed*, those from it on are *waiting*. The first waiting one is the
+/// *head*. Entries leave at the front.
+#[derive(Debug)]
+struct Ring<M> {
+    entries: VecDeque<Stamped<M>>,
+    cursor: usize,
+    /// Whether an entry was discarded for want of room, and nothing since has shown
+    /// that this could not have hidden a better set.
+    lossy: bool,
+}
+
+impl<M> Ring<M> {
+    /// Makes an empty ring with room for `entries` entries.
+    fn with_capacity(entries: usize) -> Self {
+        Self {
+            entries: VecDeque::with_capacity(entries),
+            cursor: 0,
+            lossy: false,
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    fn append(&mut self, entry: Stamped<M>) {
+        self.entries.push_back(entry);
+    }
+
+    /// Returns the stamp of the first waiting entry.
+    fn head_ns(&self) -> Option<i128> {
+        Some(self.entries.get(self.cursor)?.stamp_ns.into())
+    }
+
+    /// Returns the stamp of the last passed entry.
+    fn last_passed_ns(&self) -> Option<i128> {
+        let position = self.cursor.checked_sub(1)?;
+        Some(self.entries.get(position)?.stamp_ns.into())
+    }
+
+    /// Makes the head passed. Nothing leaves.
+    fn advance(&mut self) {
+        debug_assert!(self.cursor < self.entries.len(), "no head to advance over");
+        self.cursor += 1;
+    }
+
+    /// Makes all entries waiting again.
+    fn rewind(&mut self) {
+        self.cursor = 0;
+    }
+
+    fn cursor(&self) -> usize {
+        self.cursor
+    }
+
+    /// Takes a cursor back to where [`cursor`](Self::cursor) said it was; nothing
+    /// has left meanwhile.
+    fn restore(&mut self, cursor: usize) {
+        self.cursor = cursor;
+    }
+
+    /// Removes the front entry, which the cursor must not depend on.
+    fn take_front(&mut self) -> Option<Stamped<M>> {
+        debug_assert!(self.cursor == 0, "the front may be passed: rewind first");
+        self.entries.pop_front()
+    }
+
+    /// Removes the first passed entry.
+    fn take_passed(&mut self) -> Option<Stamped<M>> {
+        self.cursor = self.cursor.checked_sub(1)?;
+        self.entries.pop_front()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::AgePenalty;
+
+    #[test]
+    fn products_are_exact_and_round_toward_zero() {
+        let half = AgePenalty::from_factor(3, 1).unwrap();
+        assert_eq!((half.scaled(3), half.scaled(-3)), (4, -4));
+        let tenth = AgePenalty::default();
+        assert_eq!((tenth.scaled(10), tenth.scaled(-10)), (11, -11));
+        assert_eq!(tenth.scaled(0), 0);
+    }
+
+    #[test]
+    fn the_default_is_the_double_1_1() {
+        let factor = AgePenalty::default().factor as f64 / 2f64.powi(51);
+        assert_eq!(factor, 1.0 + 0.1);
+    }
+
+    #[test]
+    fn the_largest_product_fits() {
+        let most = AgePenalty::from_factor(AgePenalty::MOST_FACTOR, 0).unwrap();
+        let difference_ns = i128::from(u64::MAX) * 2;
+        assert!(most.scaled(difference_ns) > 0);
+        assert!(most.scaled(-difference_ns) < 0);
+        assert_eq!(AgePenalty::from_factor(1 << 62, 0), None);
+        assert_eq!(AgePenalty::from_factor(1, 128), None);
     }
 }

@@ -1,0 +1,439 @@
+//! The measurements: each commits DAGs, runs them, reads their stamps, and prints figures.
+//!
+//! *On the same core*: chains, fork-joins and layered graphs, from a completion to its successor.
+//! *Elsewhere*: from a completion to successors on other cores, and joins across cores.
+//!
+//! *Preemption*: from a release to the preemptor's first instruction, and back.
+//! A low subtask reads the clock all the time, and keeps the longest time between
+//! two readings of a job: that is when it was preempted. The preemptor stamps. The journal has the
+//! kernel's own times of request, suspension, start, finish and continuation, which no body can see.
+
+use alloc::format;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use fass::{
+    ConstructionPolicy, Dag, Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags,
+    finish_create_dags_with,
+};
+use hand_off::{Pen, Shape, Stamping, Stamps, Workload, build};
+use kernel::report::Distribution;
+use kernel::{Ending, Machine, Run, json};
+use sched_dag::journal::{Event, What};
+use sched_dag::law::InstanceRecord;
+use sched_dag::{CoreId, DagId, Instance, SubtaskId};
+
+/// What reading the clock costs, and what a stamp does.
+pub(crate) fn clock() {
+    const READINGS: usize = 200;
+    let mut readings = [0; READINGS];
+    for reading in &mut readings {
+        *reading = fass::now_ns();
+    }
+    emit("clock", "reading", 1, differences(readings.into_iter()));
+    let mut pen = Pen::new(READINGS);
+    for _ in 0..READINGS {
+        pen.stamp();
+    }
+    emit("clock", "stamp", 1, differences(pen.times()));
+}
+
+/// A chain: from each subtask to the next, and from end to end.
+pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), Ending> {
+    let name = format!("chain-{subtasks}");
+    let shape = Shape::Chain(subtasks);
+    let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
+    let hops = all
+        .jobs()
+        .flat_map(|job| (1..subtasks).map(move |later| (job, later)));
+    let hop = |(job, later)| {
+        since(
+            all.stamps.first(later, job),
+            all.stamps.last(later - 1, job),
+        )
+    };
+    emit(&name, "return_to_start", 1, hops.filter_map(hop));
+    let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
+    emit_hop(&name, &ends);
+    ends.emit_common(&name);
+    Ok(())
+}
+
+/// The same chain, where each subtask has a budget; and by deadlines.
+pub(crate) fn budgets(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), Ending> {
+    let mut workload = workload(Shape::Chain(subtasks), jobs, Stamping::Ends);
+    workload.wcet = Some(Duration::from_millis(1));
+    let ends = Measured::run(machine, workload)?;
+    emit_hop(&format!("chain-{subtasks} with budgets"), &ends);
+    workload.wcet = None;
+    machine.configure(Policy::Edf, Preemption::Enabled);
+    let ends = Measured::run(machine, workload)?;
+    emit_hop(&format!("chain-{subtasks} by deadlines"), &ends);
+    Ok(())
+}
+
+fn emit_hop(name: &str, ends: &Measured) {
+    let hops = ends.workload.shape.subtasks() as u64 - 1;
+    emit(name, "hop", hops, ends.source_to_sink());
+}
+
+/// A fork and its join: from the last return to the sink.
+pub(crate) fn fork_join(machine: &Machine, parallel: usize, jobs: u64) -> Result<(), Ending> {
+    let name = format!("fork-join-{parallel}");
+    let shape = Shape::ForkJoin(parallel);
+    let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
+    emit_join(&name, &all);
+    let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
+    emit(&name, "source_to_sink", 1, ends.source_to_sink());
+    ends.emit_common(&name);
+    Ok(())
+}
+
+/// Prints the times from the last return to the sink's start.
+fn emit_join(name: &str, all: &Measured) {
+    let sink = all.workload.shape.subtasks() - 1;
+    let first = |job| all.stamps.first(sink, job);
+    let ready = |job| all.ready_ns(sink, job);
+    let to_start = all
+        .jobs()
+        .filter_map(|job| since(first(job), all.last_return(job)));
+    emit(name, "return_to_start", 1, to_start);
+    let to_ready = all
+        .jobs()
+        .filter_map(|job| since(ready(job), all.last_return(job)));
+    emit(name, "return_to_ready", 1, to_ready);
+    let ready_to_start = all.jobs().filter_map(|job| since(first(job), ready(job)));
+    emit(name, "ready_to_start", 1, ready_to_start);
+}
+
+/// A fork and its join: how often the scheduler makes the sink ready. A system that wakes a sink for
+/// each of its inputs makes N wake-ups of a join of N.
+pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), Ending> {
+    const JOBS: u64 = 20;
+    let shape = Shape::ForkJoin(parallel);
+    let ends = Measured::run(machine, workload(shape, JOBS, Stamping::Ends))?;
+    let is_sinks = |of: SubtaskId| of.index() == parallel + 1;
+    let wakes = |event: &Event| event.what == What::Ready && event.subtask.is_some_and(is_sinks);
+    let count = ends.run.journal().events().filter(wakes).count() as u64;
+    emit(
+        &format!("fork-join-{parallel}"),
+        "sink_wakeups",
+        JOBS,
+        [count],
+    );
+    Ok(())
+}
+
+/// A layered random graph: from end to end, for each instance.
+pub(crate) fn layered(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), Ending> {
+    let name = format!("layered-{subtasks}");
+    // As many instances as a chain has, and a few jobs at least.
+    let jobs = (jobs.saturating_mul(64) / subtasks as u64).clamp(3, jobs.max(3));
+    let shape = Shape::Layered { subtasks, seed: 1 };
+    let ends = Measured::run(machine, workload(shape, jobs, Stamping::Ends))?;
+    emit(&name, "instance", subtasks as u64, ends.source_to_sink());
+    ends.emit_common(&name);
+    Ok(())
+}
+
+fn differences(times: impl Iterator<Item = u64> + Clone) -> impl Iterator<Item = u64> {
+    let later = times.clone().skip(1);
+    later.zip(times).map(|(later, earlier)| later - earlier)
+}
+
+/// A fork into two on an otherwise idle machine: one branch follows on the
+/// source's core, the other on a core that has to be woken.
+pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), Ending> {
+    let shape = Shape::ForkJoin(2);
+    let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
+    let core = |subtask, job| all.instance(subtask, job)?.core;
+    let branches = || all.jobs().flat_map(|job| [(1, job), (2, job)]);
+    let elsewhere = || branches().filter(|&(branch, job)| core(branch, job) != core(0, job));
+    let first = |(branch, job)| all.stamps.first(branch, job);
+    let from_return = elsewhere().filter_map(|at| since(first(at), all.stamps.last(0, at.1)));
+    emit("woken core", "return_to_start", 1, from_return);
+    let from_ready = elsewhere().filter_map(|at| since(first(at), all.ready_ns(at.0, at.1)));
+    emit("woken core", "ready_to_start", 1, from_ready);
+    Ok(())
+}
+
+/// Joins of branches that compute for 2 us each, on different cores.
+pub(crate) fn joins(machine: &Machine, jobs: u64) -> Result<(), Ending> {
+    const WORK: Duration = Duration::from_micros(2);
+    for parallel in [2, 4] {
+        let mut workload = workload(Shape::ForkJoin(parallel), jobs, Stamping::All);
+        workload.work = WORK;
+        let all = Measured::run(machine, workload)?;
+        emit_join(&format!("fork-join-{parallel} of 2 us bodies"), &all);
+    }
+    Ok(())
+}
+
+const PERIOD: Duration = Duration::from_millis(4);
+
+/// When the preemptor is released: amid what it preempts.
+const OFFSET: Duration = Duration::from_millis(1);
+
+/// How long the low subtasks compute.
+const WORK_NS: u64 = 2_000_000;
+
+/// Preempts one of the low subtasks, of which each core has one.
+pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), Ending> {
+    let mut stamps = Stamps::default();
+    let mut dags = alloc::vec![preemptor(jobs, stamps.pen(jobs))];
+    for priority in 1..=machine.cores() {
+        dags.push(preempted(jobs, priority, stamps.pen(jobs)));
+    }
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;
+    let run = run(machine)?;
+    let epoch_ns = run.epoch_ns();
+    let [period_ns, offset_ns] =
+        [PERIOD, OFFSET].map(|time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
+    let core = |job| {
+        let instance = Instance {
+            dag: run.task_set().find(&dags[0]),
+            job,
+            subtask: SubtaskId(0),
+        };
+        run.record().instance(instance)?.core
+    };
+    // Of the lowest priority is the last, wherever it runs.
+    let lowest = dags.len() - 1;
+    // Only core 0 has the release timer; another core is told. Where there are
+    // others, few jobs preempt core 0: they are left out.
+    let is_told = machine.cores() > 1;
+    let name = if is_told {
+        "preemption of another core"
+    } else {
+        "preemption"
+    };
+    let jobs = || (0..jobs).filter(|job| (core(*job) != Some(CoreId(0))) == is_told);
+    let release_ns = |job| Some(epoch_ns + offset_ns + job * period_ns);
+    let (first, last) = (|job| stamps.first(0, job), |job| stamps.last(0, job));
+    // Another gap than the preemptor's was longer, where the host is busy.
+    let gap = |job| {
+        let gap = (stamps.first(lowest, job)?, stamps.last(lowest, job)?);
+        (gap.0 <= first(job)? && last(job)? <= gap.1).then_some(gap)
+    };
+    let to_start = jobs().filter_map(|job| since(first(job), release_ns(job)));
+    emit(name, "release_to_start", 1, to_start);
+    if !is_told {
+        let out = jobs().filter_map(|job| since(first(job), Some(gap(job)?.0)));
+        emit(name, "preempted_to_start", 1, out);
+    }
+    let back = jobs().filter_map(|job| since(Some(gap(job)?.1), last(job)));
+    emit(name, "return_to_resumed", 1, back);
+    let preemptor = run.task_set().find(&dags[0]);
+    for (part, samples) in parts(&run, preemptor, is_told) {
+        emit(name, part, 1, samples);
+    }
+    Ok(())
+}
+
+/// Takes preemptions apart by the kernel's own times: those of core 0, or of all others.
+fn parts(run: &Run, preemptor: DagId, is_told: bool) -> [(&'static str, Vec<u64>); 3] {
+    let mut parts = [
+        ("request_to_suspended", Vec::new()),
+        ("suspended_to_start", Vec::new()),
+        ("finish_to_resumed", Vec::new()),
+    ];
+    // They are in order of time only core by core.
+    let mut events: Vec<Event> = run.journal().events().collect();
+    events.sort_by_key(|event| event.time_ns);
+    for (place, request) in events.iter().enumerate() {
+        let is_meant = request.what == What::Request && request.dag == preemptor;
+        if !is_meant || (request.core != CoreId(0)) != is_told {
+            continue;
+        }
+        // What happened next on that core, each after the one before.
+        let mut later = events[place..].iter();
+        let mut next = |what, is_preemptors: bool| {
+            let event = later.find(|event| {
+                (event.what, event.core) == (what, request.core)
+                    && (event.dag == preemptor) == is_preemptors
+            })?;
+            Some(event.time_ns)
+        };
+        let times = [
+            next(What::Suspend, false),
+            next(What::Start, true),
+            next(What::Finish, true),
+            next(What::Resume, false),
+        ];
+        if let [Some(suspended), Some(start), Some(finish), Some(resumed)] = times {
+            parts[0].1.push(suspended - request.time_ns);
+            parts[1].1.push(start - suspended);
+            parts[2].1.push(resumed - finish);
+        }
+    }
+    parts
+}
+
+fn preemptor(jobs: u64, mut pen: Pen) -> Dag {
+    let body = move |_| {
+        pen.stamp();
+        pen.stamp();
+    };
+    let dag = periodic(jobs, "preemptor", 0, body);
+    dag.offset(OFFSET);
+    dag
+}
+
+fn preempted(jobs: u64, priority: u32, mut pen: Pen) -> Dag {
+    let body = move |_| {
+        let start_ns = fass::now_ns();
+        let (mut last_ns, mut gap) = (start_ns, (0, 0));
+        while last_ns - start_ns < WORK_NS {
+            let now_ns = fass::now_ns();
+            if now_ns - last_ns > gap.1 - gap.0 {
+                gap = (last_ns, now_ns);
+            }
+            last_ns = now_ns;
+            core::hint::spin_loop();
+        }
+        pen.put(gap.0);
+        pen.put(gap.1);
+    };
+    periodic(jobs, "preempted", priority, body)
+}
+
+fn periodic(jobs: u64, name: &str, priority: u32, body: impl FnMut(u64) + Send + 'static) -> Dag {
+    let dag = create_dag();
+    dag.name(name).jobs(jobs).in_flight(1);
+    dag.period(PERIOD).relative_deadline(PERIOD);
+    let attributes = SubtaskAttributes::named(name).priority(priority);
+    let _ = dag.register_untyped_subtask(body, attributes);
+    dag
+}
+
+/// Describes a workload of empty bodies, released seldom enough for each job to be
+/// complete before the next.
+fn workload(shape: Shape, jobs: u64, stamping: Stamping) -> Workload {
+    /// Room for an instance, even where a nanosecond is a real one.
+    const PERIOD_OF_INSTANCE: Duration = Duration::from_micros(20);
+    let instances = u32::try_from(shape.subtasks()).unwrap_or(u32::MAX);
+    Workload {
+        shape,
+        jobs,
+        period: Duration::from_millis(2) + PERIOD_OF_INSTANCE.saturating_mul(instances),
+        stamping,
+        work: Duration::ZERO,
+        wcet: None,
+    }
+}
+
+/// A run that has ended, with its stamps.
+struct Measured {
+    run: Run,
+    stamps: Stamps,
+    workload: Workload,
+    dag: DagId,
+    commit_ns: u64,
+}
+
+impl Measured {
+    /// Commits and runs.
+    fn run(machine: &Machine, workload: Workload) -> Result<Self, Ending> {
+        let (dag, stamps) = build(&workload);
+        let before_ns = fass::now_ns();
+        let dags = [dag];
+        finish_create_dags(&dags)?;
+        let commit_ns = fass::now_ns() - before_ns;
+        let run = run(machine)?;
+        Ok(Self {
+            dag: run.task_set().find(&dags[0]),
+            run,
+            stamps,
+            workload,
+            commit_ns,
+        })
+    }
+
+    /// Prints what every workload has.
+    fn emit_common(&self, name: &str) {
+        let period_ns = u64::try_from(self.workload.period.as_nanos()).unwrap_or(u64::MAX);
+        let release_ns = |job: u64| self.run.epoch_ns() + job * period_ns;
+        let from_release: Vec<u64> = self
+            .jobs()
+            .filter_map(|job| since(self.stamps.first(0, job), Some(release_ns(job))))
+            .collect();
+        let least = from_release.iter().copied().min().unwrap_or(0);
+        let jitter = from_release.iter().map(|ns| ns - least);
+        emit(name, "release_jitter", 1, jitter);
+        emit(name, "release_to_start", 1, from_release.iter().copied());
+        emit(
+            name,
+            "commit",
+            self.workload.shape.subtasks() as u64,
+            [self.commit_ns],
+        );
+        emit(
+            name,
+            "allocations",
+            self.workload.jobs,
+            [self.run.allocations()],
+        );
+        let locks = u64::from(self.run.lock_acquisitions());
+        let instances = self.workload.jobs * self.workload.shape.subtasks() as u64;
+        emit(name, "locks", instances, [locks]);
+    }
+
+    fn jobs(&self) -> impl Iterator<Item = u64> + Clone + use<> {
+        0..self.workload.jobs
+    }
+
+    /// Returns the times from the source's first to the sink's first instruction.
+    fn source_to_sink(&self) -> impl Iterator<Item = u64> {
+        let sink = self.workload.shape.subtasks() - 1;
+        let stamps = &self.stamps;
+        self.jobs()
+            .filter_map(move |job| since(stamps.first(sink, job), stamps.first(0, job)))
+    }
+
+    /// Returns when the last of the sink's predecessors in a fork-join returned.
+    fn last_return(&self, job: u64) -> Option<u64> {
+        let sink = self.workload.shape.subtasks() - 1;
+        (1..sink)
+            .filter_map(|branch| self.stamps.last(branch, job))
+            .max()
+    }
+
+    /// Returns when the scheduler made an instance ready.
+    fn ready_ns(&self, subtask: usize, job: u64) -> Option<u64> {
+        Some(self.run.epoch_ns() + self.instance(subtask, job)?.ready_ns?)
+    }
+
+    /// Returns what the scheduler did with an instance.
+    fn instance(&self, subtask: usize, job: u64) -> Option<&InstanceRecord> {
+        self.run.record().instance(Instance {
+            dag: self.dag,
+            job,
+            subtask: SubtaskId(u32::try_from(subtask).ok()?),
+        })
+    }
+}
+
+/// Runs what is committed; a breach of the model's rules is an error.
+fn run(machine: &Machine) -> Result<Run, Ending> {
+    let run = machine.run()?;
+    if let Some(violation) = run.violations().next() {
+        return Err(Ending::Failure(alloc::format!("{violation}")));
+    }
+    Ok(run)
+}
+
+fn since(later: Option<u64>, earlier: Option<u64>) -> Option<u64> {
+    later?.checked_sub(earlier?)
+}
+
+/// Prints a measured quantity of one workload as a machine line; a sample is of `per` equal steps.
+fn emit(workload: &str, figure: &str, per: u64, samples: impl IntoIterator<Item = u64>) {
+    let samples = Distribution::new(samples);
+    json::emit("hand_off", |line| {
+        line.text("workload", workload)
+            .text("figure", figure)
+            .number("per", per)
+            .number("samples", samples.count())
+            .distribution("value", &samples);
+    });
+}
