@@ -10,7 +10,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::{Dag, SubtaskAttributes, Untyped, create_dag};
-use join_latency::{Experiment, Message, Part};
+use join_latency::{Experiment, Message, Part, Samples};
 use kernel::{Ending, Event, Lock, Machine};
 use pub_sub::graph::{Graph, Host, work};
 
@@ -33,7 +33,7 @@ pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, 
     // The workers are at their end, and whatever they still hold of it stays.
     let graph = shared.graph.with(core::mem::take);
     Ok(Outcome {
-        samples: experiment.samples(graph),
+        samples: Samples::of(graph),
         allocations: run.allocations(),
         violations: run.violations().count() as u64,
     })

@@ -20,14 +20,13 @@
 extern crate alloc;
 
 use alloc::boxed::Box;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::num::NonZeroUsize;
 use core::time::Duration;
 
 use fork_join::ExecutionTimes;
 use pub_sub::graph::{Call, Callbacks, Context, Graph, TopicId};
-use pub_sub::workload::{Record, RecordedSet, Stamping};
+use pub_sub::workload::{Record, RecordedSet};
 use pub_sub::{ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer};
 
 /// How messages are matched.
@@ -68,64 +67,36 @@ impl Experiment {
     /// Builds the graph. Its time 0 is the run's epoch; it shuts down when all has
     /// been published and joined.
     #[must_use]
-    pub fn graph(&self) -> Graph<Message, Part> {
+    pub fn graph(self) -> Graph<Message, Part> {
         let mut graph = Graph::new();
         let input = graph.add_topic();
         let outputs: Vec<TopicId> = (0..self.parallel).map(|_| graph.add_topic()).collect();
-        let source = graph.add_group(Part::Source {
-            output: input,
+        let part = |role| Part {
+            experiment: self,
+            role,
             spans: Vec::with_capacity(self.jobs),
-            jobs: self.jobs,
-        });
+        };
+        let source = graph.add_group(part(Role::Source { output: input }));
         graph.add_timer(source, 0, self.period_ns);
         for (branch, &output) in outputs.iter().enumerate() {
-            let parallel = graph.add_group(Part::Parallel {
-                branch,
-                output,
-                times: ExecutionTimes::new(self.seed, branch),
-                execute: self.execute,
-                stamping: self.stamping(),
-                spans: Vec::with_capacity(self.jobs),
-            });
+            let times = ExecutionTimes::new(self.seed, branch);
+            let parallel = graph.add_group(part(Role::Parallel { output, times }));
             graph.subscribe(parallel, input, self.depth.get());
         }
-        let (joins, indices) = Samples::room_for_joins(self.parallel, self.jobs);
-        let join = graph.add_group(Part::Join {
+        let join = graph.add_group(part(Role::Join {
             synchronizer: self.synchronizer(),
             inputs: outputs.clone(),
-            joins,
-            indices,
+            ready_ns: Vec::with_capacity(self.jobs),
+            indices: Vec::with_capacity(self.jobs * self.parallel),
             expected: self.parallel * self.jobs,
-        });
+        }));
         for &output in &outputs {
             graph.subscribe(join, output, self.depth.get());
         }
         graph
     }
 
-    /// Takes what a graph has seen when it was shut down and no worker uses it.
-    #[must_use]
-    pub fn samples(&self, graph: Graph<Message, Part>) -> Samples {
-        let mut samples = Samples::empty(self.parallel);
-        samples.lost_inputs = graph.dropped();
-        for part in graph.into_callbacks() {
-            part.add_to(&mut samples);
-        }
-        samples
-    }
-
-    /// Returns what publications are stamped with.
-    #[must_use]
-    pub const fn stamping(&self) -> Stamping {
-        match self.matching {
-            Matching::Exact => Stamping::Release,
-            Matching::Approximate { .. } => Stamping::Publication,
-        }
-    }
-
-    /// Makes the synchronizer.
-    #[must_use]
-    pub fn synchronizer(&self) -> Box<dyn Synchronizer<u64> + Send> {
+    fn synchronizer(&self) -> Box<dyn Synchronizer<u64> + Send> {
         match self.matching {
             Matching::Exact => Box::new(ExactTime::new(self.parallel, self.queue.get())),
             Matching::Approximate { max_interval_ns } => {
@@ -142,39 +113,28 @@ impl Experiment {
 pub type Message = Stamped<u64>;
 
 /// The callbacks of one group, with what they have seen so far.
-pub enum Part {
+pub struct Part {
+    experiment: Experiment,
+    role: Role,
+    /// Its executions: of a source or a parallel subtask one a job, else one a join.
+    spans: Vec<Span>,
+}
+
+enum Role {
     /// Publishes a job at each call of its timer, until all are published.
-    Source {
-        /// Where the jobs are published.
-        output: TopicId,
-        /// Its executions so far, one a job.
-        spans: Vec<Span>,
-        /// How many jobs there are.
-        jobs: usize,
-    },
+    Source { output: TopicId },
     /// Executes each job it receives for a drawn time, and publishes it.
     Parallel {
-        /// Which parallel subtask it is.
-        branch: usize,
-        /// Where the jobs are published.
         output: TopicId,
-        /// How long the next executions take.
         times: ExecutionTimes,
-        /// How an execution passes its time.
-        execute: fn(Duration),
-        /// With what its publications are stamped.
-        stamping: Stamping,
-        /// Its executions so far, one a job.
-        spans: Vec<Span>,
     },
     /// Joins what the parallel subtasks publish.
     Join {
-        /// The policy by which it joins.
         synchronizer: Box<dyn Synchronizer<u64> + Send>,
         /// The topics of the parallel subtasks, in their order.
         inputs: Vec<TopicId>,
-        /// The joins so far.
-        joins: Vec<Joined>,
+        /// When each join was ready.
+        ready_ns: Vec<u64>,
         /// The jobs that were joined, as in [`Samples::indices`].
         indices: Vec<u64>,
         /// How many messages are to come; after that, nothing can happen any more.
@@ -185,62 +145,37 @@ pub enum Part {
 impl Callbacks<Message> for Part {
     fn call(&mut self, call: Call<Message>, context: &dyn Context<Message>) {
         let start_ns = context.now_ns();
-        match (self, call) {
-            (
-                Self::Source {
-                    output,
-                    spans,
-                    jobs,
-                },
-                Call::Timer { .. },
-            ) => {
-                if spans.len() < *jobs {
-                    let stamp_ns = context.now_ns();
-                    let job = spans.len() as u64;
-                    spans.push(Span {
-                        start_ns,
-                        finish_ns: stamp_ns,
-                    });
-                    context.publish(
-                        *output,
-                        Stamped {
-                            stamp_ns,
-                            message: job,
-                        },
-                    );
-                } else if context.dropped() > 0 {
-                    // The join waits for messages that will never come.
-                    context.shut_down();
-                }
+        let spans = &mut self.spans;
+        match (&mut self.role, call) {
+            (Role::Source { output }, _) if spans.len() < self.experiment.jobs => {
+                let stamp_ns = context.now_ns();
+                let message = spans.len() as u64;
+                spans.push(Span {
+                    start_ns,
+                    finish_ns: stamp_ns,
+                });
+                context.publish(*output, Stamped { stamp_ns, message });
             }
-            (
-                Self::Parallel {
-                    output,
-                    times,
-                    execute,
-                    stamping,
-                    spans,
-                    ..
-                },
-                Call::Message { message: job, .. },
-            ) => {
-                execute(times.next_time());
+            // The join waits for messages that will never come.
+            (Role::Source { .. }, _) if context.dropped() > 0 => context.shut_down(),
+            (Role::Parallel { output, times }, Call::Message { message: job, .. }) => {
+                (self.experiment.execute)(times.next_time());
                 let finish_ns = context.now_ns();
                 spans.push(Span {
                     start_ns,
                     finish_ns,
                 });
-                let stamp_ns = match stamping {
-                    Stamping::Release => job.stamp_ns,
-                    Stamping::Publication => finish_ns,
+                let stamp_ns = match self.experiment.matching {
+                    Matching::Exact => job.stamp_ns,
+                    Matching::Approximate { .. } => finish_ns,
                 };
                 context.publish(*output, Stamped { stamp_ns, ..job });
             }
             (
-                Self::Join {
+                Role::Join {
                     synchronizer,
                     inputs,
-                    joins,
+                    ready_ns,
                     indices,
                     expected,
                 },
@@ -249,7 +184,8 @@ impl Callbacks<Message> for Part {
                 if let Some(position) = inputs.iter().position(|input| *input == topic) {
                     let mut outlet = Joining {
                         context,
-                        joins,
+                        ready_ns,
+                        spans,
                         indices,
                     };
                     synchronizer.arrive(position, message, &mut outlet);
@@ -259,51 +195,30 @@ impl Callbacks<Message> for Part {
                     context.shut_down();
                 }
             }
-            (Self::Source { .. }, Call::Message { .. })
-            | (Self::Parallel { .. } | Self::Join { .. }, Call::Timer { .. }) => {
-                unreachable!("the graph registers no such callback for it")
-            }
+            // A source that is through; and the graph registers no other timer.
+            (_, Call::Timer { .. }) | (Role::Source { .. }, _) => {}
         }
     }
 }
 
 /// Where sets go: to the join's function, which is called at once, as the original
-/// calls it.
+/// calls it. Like the DAG's sink, it only looks.
 struct Joining<'a> {
     context: &'a dyn Context<Message>,
-    joins: &'a mut Vec<Joined>,
+    ready_ns: &'a mut Vec<u64>,
+    spans: &'a mut Vec<Span>,
     indices: &'a mut Vec<u64>,
 }
 
 impl Outlet<u64> for Joining<'_> {
     fn emitted(&mut self, set: Set<'_, u64>) {
-        let ready_ns = self.context.now_ns();
-        let span = join(self.context, set, self.indices);
-        self.joins.push(Joined { ready_ns, span });
-    }
-}
-
-/// The function that uses what was joined: like the DAG's sink, it only looks.
-fn join(context: &dyn Context<Message>, set: Set<'_, u64>, indices: &mut Vec<u64>) -> Span {
-    let start_ns = context.now_ns();
-    indices.extend(set.map(|stamped| stamped.message));
-    Span {
-        start_ns,
-        finish_ns: context.now_ns(),
-    }
-}
-
-impl Part {
-    /// Adds what this part has seen to the samples of the run.
-    pub(crate) fn add_to(self, samples: &mut Samples) {
-        match self {
-            Self::Source { spans, .. } => samples.source = spans,
-            Self::Parallel { branch, spans, .. } => samples.parallel[branch] = spans,
-            Self::Join { joins, indices, .. } => {
-                samples.joins = joins;
-                samples.indices = indices;
-            }
-        }
+        self.ready_ns.push(self.context.now_ns());
+        let start_ns = self.context.now_ns();
+        self.indices.extend(set.map(|stamped| stamped.message));
+        self.spans.push(Span {
+            start_ns,
+            finish_ns: self.context.now_ns(),
+        });
     }
 }
 
@@ -344,6 +259,30 @@ pub struct Samples {
 }
 
 impl Samples {
+    /// Takes what a graph has seen when it was shut down and no worker uses it.
+    #[must_use]
+    pub fn of(graph: Graph<Message, Part>) -> Self {
+        let lost_inputs = graph.dropped();
+        let mut samples = Self {
+            lost_inputs,
+            ..Self::default()
+        };
+        for Part { role, spans, .. } in graph.into_callbacks() {
+            match role {
+                Role::Source { .. } => samples.source = spans,
+                Role::Parallel { .. } => samples.parallel.push(spans),
+                Role::Join {
+                    ready_ns, indices, ..
+                } => {
+                    let joins = ready_ns.into_iter().zip(spans);
+                    let joined = |(ready_ns, span)| Joined { ready_ns, span };
+                    (samples.joins, samples.indices) = (joins.map(joined).collect(), indices);
+                }
+            }
+        }
+        samples
+    }
+
     /// Returns the jobs whose values a join has joined.
     #[must_use]
     pub fn indices_of(&self, join: usize) -> &[u64] {
@@ -367,22 +306,6 @@ impl Samples {
         Record {
             publications_ns: self.parallel.iter().map(publications).collect(),
             sets: sets.collect(),
-        }
-    }
-
-    /// Makes room for `jobs` jobs, with joins of `parallel` values.
-    pub(crate) fn room_for_joins(parallel: usize, jobs: usize) -> (Vec<Joined>, Vec<u64>) {
-        (
-            Vec::with_capacity(jobs),
-            Vec::with_capacity(jobs * parallel),
-        )
-    }
-
-    /// Makes samples without any.
-    pub(crate) fn empty(parallel: usize) -> Self {
-        Self {
-            parallel: vec![Vec::new(); parallel],
-            ..Self::default()
         }
     }
 }

@@ -23,7 +23,7 @@ fn run(matching: Matching, depth: usize) -> Samples {
         period_ns: 250_000,
         execute: |time| thread::sleep(time / 100),
     };
-    experiment.samples(support::run(experiment.graph(), PARALLEL + 2))
+    Samples::of(support::run(experiment.graph(), PARALLEL + 2))
 }
 
 #[test]

@@ -15,9 +15,8 @@
 //!    still be completed, so the stamps of successive sets can go backwards.
 //!
 //! Storage for the queue size plus one entries is reserved at construction. The
-//! order is kept in a ring of (stamp, place) pairs, so that an arrival costs a
-//! binary search, and moves at most half of those pairs when it makes an entry in
-//! the middle. Without a limit the storage grows with the largest backlog.
+//! order is kept in a ring of stamps with their slots elsewhere, so that an arrival costs a
+//! binary search, and moves at most half of the ring when it makes an entry in the middle. Without a limit the storage grows with the largest backlog.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -49,22 +48,21 @@ pub struct ExactTime<M> {
     /// 0 for no limit.
     queue_size: usize,
     /// In ascending order of the stamp, each stamp once.
-    entries: VecDeque<Entry>,
-    /// The slots of all entries; entry e has those from `e.slots` on.
-    slots: Vec<Option<M>>,
-    /// Where slots are that no entry has.
-    free: Vec<usize>,
+    entries: VecDeque<Entry<M>>,
+    /// Empty slots for entries to come.
+    spare: Vec<Slots<M>>,
     /// The set being emitted; otherwise empty.
     set: Vec<Stamped<M>>,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Entry {
+/// A slot for each topic.
+type Slots<M> = Vec<Option<M>>;
+
+#[derive(Debug)]
+struct Entry<M> {
     stamp_ns: u64,
-    /// The position of topic 0's slot.
-    slots: usize,
-    /// How many slots are full, at least one.
-    full: usize,
+    /// At least one of them is full.
+    slots: Slots<M>,
 }
 
 impl<M> ExactTime<M> {
@@ -85,16 +83,15 @@ impl<M> ExactTime<M> {
             0 => 0,
             _ => queue_size.saturating_add(1),
         };
-        let mut slots = Vec::with_capacity(topics.saturating_mul(entries));
-        slots.resize_with(topics * entries, || None);
-        Self {
+        let mut exact = Self {
             topics,
             queue_size,
             entries: VecDeque::with_capacity(entries),
-            slots,
-            free: (0..entries).rev().map(|entry| entry * topics).collect(),
+            spare: Vec::with_capacity(entries),
             set: Vec::with_capacity(topics),
-        }
+        };
+        exact.spare.extend((0..entries).map(|_| empty(topics)));
+        exact
     }
 
     /// Returns the position of a stamp's entry, which it makes if there is none.
@@ -103,17 +100,9 @@ impl<M> ExactTime<M> {
             .entries
             .binary_search_by_key(&stamp_ns, |entry| entry.stamp_ns);
         known.unwrap_or_else(|position| {
-            let slots = self.free.pop().unwrap_or_else(|| {
-                // Only without a limit: all that a limit allows is reserved.
-                let slots = self.slots.len();
-                self.slots.resize_with(slots + self.topics, || None);
-                slots
-            });
-            let entry = Entry {
-                stamp_ns,
-                slots,
-                full: 0,
-            };
+            // Only without a limit there may be none: all that a limit allows is reserved.
+            let slots = self.spare.pop().unwrap_or_else(|| empty(self.topics));
+            let entry = Entry { stamp_ns, slots };
             self.entries.insert(position, entry);
             position
         })
@@ -121,32 +110,35 @@ impl<M> ExactTime<M> {
 
     /// Emits the entry at a position (step 2, first part).
     fn emit(&mut self, position: usize, outlet: &mut dyn Outlet<M>) {
-        let Some(entry) = self.entries.remove(position) else {
+        let Some(mut entry) = self.entries.remove(position) else {
             return;
         };
-        let slots = &mut self.slots[entry.slots..entry.slots + self.topics];
-        let messages = slots.iter_mut().filter_map(Option::take);
+        let messages = entry.slots.iter_mut().filter_map(Option::take);
         self.set.extend(messages.map(|message| Stamped {
             stamp_ns: entry.stamp_ns,
             message,
         }));
-        self.free.push(entry.slots);
+        self.spare.push(entry.slots);
         outlet.emitted(Set::new(self.set.drain(..)));
     }
 
     /// Drops the entry with the smallest stamp.
     fn drop_smallest(&mut self, outlet: &mut dyn Outlet<M>) {
-        let Some(entry) = self.entries.pop_front() else {
+        let Some(mut entry) = self.entries.pop_front() else {
             return;
         };
         let stamp_ns = entry.stamp_ns;
-        for topic in 0..self.topics {
-            if let Some(message) = self.slots[entry.slots + topic].take() {
+        for (topic, slot) in entry.slots.iter_mut().enumerate() {
+            if let Some(message) = slot.take() {
                 outlet.dropped(topic, Stamped { stamp_ns, message });
             }
         }
-        self.free.push(entry.slots);
+        self.spare.push(entry.slots);
     }
+}
+
+fn empty<M>(topics: usize) -> Slots<M> {
+    (0..topics).map(|_| None).collect()
 }
 
 impl<M> Synchronizer<M> for ExactTime<M> {
@@ -162,12 +154,11 @@ impl<M> Synchronizer<M> for ExactTime<M> {
         );
         let Stamped { stamp_ns, message } = message;
         let position = self.entry(stamp_ns);
-        let entry = &mut self.entries[position];
-        match self.slots[entry.slots + topic].replace(message) {
-            Some(message) => outlet.replaced(topic, Stamped { stamp_ns, message }),
-            None => entry.full += 1,
+        let slots = &mut self.entries[position].slots;
+        if let Some(message) = slots[topic].replace(message) {
+            outlet.replaced(topic, Stamped { stamp_ns, message });
         }
-        if entry.full == self.topics {
+        if slots.iter().all(Option::is_some) {
             self.emit(position, outlet);
             for _ in 0..position {
                 self.drop_smallest(outlet);
@@ -180,7 +171,7 @@ impl<M> Synchronizer<M> for ExactTime<M> {
 
     fn held(&self, topic: usize) -> usize {
         assert!(topic < self.topics, "there is no topic {topic}");
-        let slots = self.entries.iter().map(|entry| entry.slots + topic);
-        slots.filter(|&slot| self.slots[slot].is_some()).count()
+        let entries = self.entries.iter();
+        entries.filter(|entry| entry.slots[topic].is_some()).count()
     }
 }
