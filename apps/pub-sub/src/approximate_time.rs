@@ -341,7 +341,7 @@ impl<M> ApproximateTime<M> {
     /// where they were.
     fn virtual_search(&mut self, candidate: Candidate) -> bool {
         for (cursor, ring) in self.cursors.iter_mut().zip(&self.rings) {
-            *cursor = ring.cursor();
+            *cursor = ring.cursor;
         }
         while let Some(heads) = self.virtual_heads(candidate) {
             if self.rules_out_later_sets(heads.latest_ns, candidate) {
@@ -355,7 +355,7 @@ impl<M> ApproximateTime<M> {
             self.rings[heads.earliest].advance();
         }
         for (&cursor, ring) in self.cursors.iter().zip(&mut self.rings) {
-            ring.restore(cursor);
+            ring.cursor = cursor;
         }
         false
     }
@@ -388,7 +388,7 @@ impl<M> ApproximateTime<M> {
     fn emit(&mut self, outlet: &mut dyn Outlet<M>) {
         self.candidate = None;
         for ring in &mut self.rings {
-            ring.rewind();
+            ring.cursor = 0;
             self.set.extend(ring.take_front());
         }
         outlet.emitted(Set::new(self.set.drain(..)));
@@ -397,7 +397,7 @@ impl<M> ApproximateTime<M> {
     /// Makes room in a topic's ring (step 7).
     fn overflow(&mut self, topic: usize, outlet: &mut dyn Outlet<M>) {
         for ring in &mut self.rings {
-            ring.rewind();
+            ring.cursor = 0;
         }
         let ring = &mut self.rings[topic];
         ring.lossy = true;
@@ -421,16 +421,16 @@ impl<M> Synchronizer<M> for ApproximateTime<M> {
             topic < topics,
             "there is no topic {topic}; there are {topics}, counted from 0"
         );
-        self.rings[topic].append(message);
+        self.rings[topic].entries.push_back(message);
         self.search(outlet);
-        if self.rings[topic].len() > self.parameters.queue_size.get() {
+        if self.rings[topic].entries.len() > self.parameters.queue_size.get() {
             self.overflow(topic, outlet);
         }
     }
 
     fn held(&self, topic: usize) -> usize {
         assert!(topic < self.rings.len(), "there is no topic {topic}");
-        self.rings[topic].len()
+        self.rings[topic].entries.len()
     }
 }
 
@@ -456,14 +456,6 @@ impl<M> Ring<M> {
         }
     }
 
-    fn len(&self) -> usize {
-        self.entries.len()
-    }
-
-    fn append(&mut self, entry: Stamped<M>) {
-        self.entries.push_back(entry);
-    }
-
     /// Returns the stamp of the first waiting entry.
     fn head_ns(&self) -> Option<i128> {
         Some(self.entries.get(self.cursor)?.stamp_ns.into())
@@ -479,21 +471,6 @@ impl<M> Ring<M> {
     fn advance(&mut self) {
         debug_assert!(self.cursor < self.entries.len(), "no head to advance over");
         self.cursor += 1;
-    }
-
-    /// Makes all entries waiting again.
-    fn rewind(&mut self) {
-        self.cursor = 0;
-    }
-
-    fn cursor(&self) -> usize {
-        self.cursor
-    }
-
-    /// Takes a cursor back to where [`cursor`](Self::cursor) said it was; nothing
-    /// has left meanwhile.
-    fn restore(&mut self, cursor: usize) {
-        self.cursor = cursor;
     }
 
     /// Removes the front entry, which the cursor must not depend on.

@@ -289,34 +289,18 @@ mod tests {
     }
 
     #[test]
-    fn sets_are_counted_by_kind() {
+    fn sets_are_counted_by_kind_and_their_latencies_compared_by_rank_and_by_cover() {
         let record = record();
+        let sets = (record.same_index_sets(), record.cross_index_sets());
+        assert_eq!((sets, record.missing_joins()), ((1, 1), 2));
+        assert_eq!(record.join_latencies_ns(), [13 - 12, 44 - 20]);
+        // Nothing covers index 3.
+        assert_eq!(record.cover_delays_ns(), [13 - 12, 44 - 20, 44 - 35]);
+        assert_eq!(record.covering_sets(), [0, 1, 1]);
+        let empty = Record::default();
         assert_eq!(
-            (record.same_index_sets(), record.cross_index_sets()),
-            (1, 1)
+            (empty.missing_joins(), empty.cover_delays_ns()),
+            (0, vec![])
         );
-        assert_eq!(record.missing_joins(), 2);
-    }
-
-    #[test]
-    fn the_papers_latency_compares_by_rank() {
-        assert_eq!(record().join_latencies_ns(), [13 - 12, 44 - 20]);
-    }
-
-    #[test]
-    fn an_index_is_covered_by_the_first_set_that_is_all_as_late() {
-        assert_eq!(
-            record().cover_delays_ns(),
-            [13 - 12, 44 - 20, 44 - 35],
-            "nothing covers index 3"
-        );
-        assert_eq!(record().covering_sets(), [0, 1, 1]);
-    }
-
-    #[test]
-    fn an_empty_record_has_nothing_to_tell() {
-        let record = Record::default();
-        assert_eq!(record.missing_joins(), 0);
-        assert_eq!(record.cover_delays_ns(), []);
     }
 }
