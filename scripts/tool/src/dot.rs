@@ -12,8 +12,8 @@ use std::fmt::Write;
 
 use recording::{CommittedDag, CommittedSubtask};
 
+use crate::record::Committed;
 use crate::record::Record;
-use crate::record::model::Committed;
 
 /// Returns the committed DAGs of a record as a graph.
 ///
@@ -200,8 +200,8 @@ mod tests {
 
     use super::{quoted, text, time, without_paths};
     use crate::made::commit;
+    use crate::record::Committed;
     use crate::record::Record;
-    use crate::record::model::Committed;
 
     const EYE: &str = "static 2
 eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 1>2";

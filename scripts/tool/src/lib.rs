@@ -9,7 +9,7 @@
 //! the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
 //!
 //! - [`json`], [`protocol`]: what a guest prints, read strictly;
-//! - [`elf`], [`image`], [`efi`], [`iso`], [`medium`], [`places`], [`tiny`]: what is booted;
+//! - [`elf`], [`image`], [`efi`], [`medium`], [`places`], [`tiny`]: what is booted;
 //! - [`child`], [`qemu`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
@@ -46,7 +46,6 @@ pub mod files;
 pub mod golden;
 pub mod image;
 pub mod install;
-pub mod iso;
 pub mod json;
 pub mod medium;
 pub mod new_app;

@@ -1,7 +1,7 @@
 //! The subcommand `image`: an app as a file that boots on a PC.
 //!
-//! The file is an [`iso`] or an application of UEFI ([`efi`]), with the app's image, the words
-//! that it is to be given and a file that it is to find in memory. What can be refused is,
+//! The file is an ISO ([`medium`]) or an application of UEFI ([`efi`]), with the app's image, the
+//! words that it is to be given and a file that it is to find in memory. What can be refused is,
 //! before anything is built, and nothing is written before all of it is there.
 //!
 //! Exit codes: 0 the files are there, 1 one could not be made, 2 a refused command line.
@@ -14,8 +14,7 @@ use std::process::ExitCode;
 use crate::efi;
 use crate::files;
 use crate::image::{self, Contents};
-use crate::iso;
-use crate::medium::Medium;
+use crate::medium::{self, Medium};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::qemu::{Loader, Qemu};
 
@@ -85,7 +84,7 @@ fn check(options: &Parsed) -> Result<String, String> {
     let words = options.files().map(Path::to_string_lossy);
     let guest_words = words.collect::<Vec<_>>().join(" ");
     if options.is_given("iso") {
-        iso::check_words(&guest_words)?;
+        medium::check_words(&guest_words)?;
     }
     let guest = Qemu {
         guest_words,

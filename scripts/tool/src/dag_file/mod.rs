@@ -5,21 +5,522 @@
 //! - [`rd_gen`]: RD-Gen's YAML, by [`yaml`], with several rates split by [`rates`];
 //! - [`stg`]: task graphs, from JSON;
 //! - [`load()`]: whichever of them a file is, checked as the commit will check it;
-//! - [`prepare()`]: what `./scripts/run --dag FILE` boots;
-//! - [`batch`]: a folder of files, one boot each, in one table.
+//! - [`prepare()`]: what `./scripts/run --dag FILE` boots: the file that becomes the boot module,
+//!   words for the guest, and enough memory and time.
 //!
 //! Every message about a file begins `FILE:LINE:`, with a line of the file that was named,
 //! whatever it became on the way to the guest.
+//! The guest reads the file in our format, as it was written for it, and the commit
+//! knows names alone. Whatever can be told before a boot has been told by then with the
+//! right lines; what remains are words for the guest that the host does not read, and a
+//! machine that is too small.
 
-pub mod batch;
-mod load;
-mod prepare;
 pub mod rates;
 pub mod rd_gen;
-mod source_lines;
 pub mod stg;
 pub mod yaml;
 
-pub use load::{Import, load};
-pub(crate) use prepare::states_overheads;
-pub use prepare::{Prepared, prepare};
+use std::path::{Path, PathBuf};
+
+use dag_file::time::parse_ns;
+use dag_file::{DagFile, Execution, FileDag, Length, Malformed, Set, check, is_name, parse};
+use replay::shown::{is_seen, shown};
+use sched_dag::{Clusters, CommitOptions, Policy};
+
+use crate::files;
+use crate::options::Parsed;
+
+/// How a file is read.
+#[derive(Clone, Debug)]
+pub struct Import {
+    /// The length of a unit, for formats whose numbers have none.
+    pub unit_ns: u64,
+    /// The one graph wanted of a set of task graphs.
+    pub graph: Option<String>,
+    /// The number of cores that it will run on.
+    pub cores: u32,
+    /// How they are divided.
+    pub clusters: Clusters,
+    /// For how long it will run.
+    pub length: Length,
+}
+
+/// The formats that a file may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    /// Our own.
+    Ours,
+    /// RD-Gen's YAML.
+    RdGen,
+    /// A set of task graphs in JSON.
+    TaskGraphs,
+}
+
+impl Format {
+    /// Returns the format that a file's name tells, in small or in capital letters;
+    /// `None` if its ending is none of those that are known.
+    pub(crate) fn of(path: &Path) -> Option<Format> {
+        let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+        match ending.as_str() {
+            "dag" => Some(Format::Ours),
+            "yaml" | "yml" => Some(Format::RdGen),
+            "json" => Some(Format::TaskGraphs),
+            _ => None,
+        }
+    }
+}
+
+/// Returns a name for the DAGs of a file: its own without the ending, with `_` in place
+/// of what no name may have.
+fn name_of(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let plain = |character: char| match character.is_whitespace() || !is_seen(character) {
+        true => '_',
+        false => character,
+    };
+    let name: String = stem.chars().map(plain).collect();
+    match is_name(&name) {
+        true => name,
+        false => format!("_{name}"),
+    }
+}
+
+/// Reads a file of the format that its name tells, our own if it tells none. It is then
+/// checked as its commit will be.
+///
+/// # Errors
+///
+/// Lines for people, each beginning with the file and mostly the line.
+pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
+    let place = files::place(path);
+    let located = |faults: Vec<Malformed>| -> Vec<String> {
+        let located = faults.into_iter();
+        located
+            .map(|Malformed { line, reason }| format!("{place}:{line}: {reason}"))
+            .collect()
+    };
+    let text = files::read_text(path).map_err(|line| vec![line])?;
+    let text = text.as_str();
+    let format = Format::of(path);
+    let file = match format {
+        Some(Format::RdGen) => rd_gen::read(text, &name_of(path), import.unit_ns),
+        Some(Format::TaskGraphs) => {
+            stg::read(text, import.graph.as_deref(), import.unit_ns).map_err(|one| vec![one])
+        }
+        Some(Format::Ours) => parse(text).map_err(|one| vec![one]),
+        None => parse(text).map_err(|Malformed { line, reason }| {
+            let hint = "read as our format; a name in .yaml or .yml tells RD-Gen's, in .json a task \
+                        graph set";
+            let reason = format!("{reason} ({hint})");
+            vec![Malformed { line, reason }]
+        }),
+    };
+    let file = file.map_err(located)?;
+    if format != Some(Format::TaskGraphs)
+        && let Some(graph) = &import.graph
+    {
+        return Err(vec![format!(
+            "{place}: `--graph {}` is for a set of task graphs in JSON; leave it out",
+            shown(graph)
+        )]);
+    }
+    // Static priorities ask for all that EDF does, and more.
+    let options = CommitOptions::new(Policy::StaticPriority, import.cores)
+        .with_clusters(import.clusters.clone());
+    for set in &file.sets {
+        check(set, &options, import.length).map_err(located)?;
+    }
+    Ok(file)
+}
+
+/// The options that only mean something together with `--dag`.
+const COMPANIONS: [&str; 6] = [
+    "graph",
+    "unit",
+    "print-dag",
+    "execution",
+    "seconds",
+    "strict-deadlines",
+];
+
+/// The jobs of each DAG if nobody says how many.
+const JOBS: u64 = 50;
+
+/// Returns the word for what the kernel costs at most, as measured in deterministic
+/// mode: a context switch, a dispatch, an interrupt. The commit adds it to WCETs before
+/// it bounds anything. A dispatch may wait for those of all cores, which take turns.
+fn overheads(cores: u64) -> String {
+    format!("overheads_ns=1000,{},4000,1000", 2500 * cores)
+}
+
+/// Reports whether a command line says what the kernel costs, or has it measure that.
+pub(crate) fn states_overheads(words: &str) -> bool {
+    words
+        .split_whitespace()
+        .any(|word| word.starts_with("overheads_ns=") || word.starts_with("overheads="))
+}
+
+/// A file that is ready to be booted.
+#[derive(Debug)]
+pub struct Prepared {
+    /// Its name.
+    pub path: PathBuf,
+    /// What it says.
+    pub file: DagFile,
+    /// The least memory for it, in MiB.
+    pub memory_mib: u64,
+    /// Words for the guest besides those that options become.
+    pub words: Vec<String>,
+    /// A limit that is generous also where a job takes its real time, in seconds.
+    pub limit_s: u64,
+}
+
+impl Prepared {
+    /// Returns what the guest says of the file as [`load`] would have said it, one line a
+    /// fault; `None` if it speaks of something else.
+    #[must_use]
+    pub fn translate(&self, said: &str) -> Option<String> {
+        translate(said, &self.path, &self.file)
+    }
+}
+
+/// Reads the file that `--dag` names, if it is given.
+///
+/// # Errors
+///
+/// Lines for people: what is wrong with the options or with the file.
+pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
+    let Some(path) = options.path("dag") else {
+        return options.given_of(&COMPANIONS).map_or(Ok(None), |name| {
+            Err(vec![format!(
+                "`--{name}` needs `--dag FILE`; give that, too"
+            )])
+        });
+    };
+    let refuse = |line: String| vec![line];
+    let apart = [("app", "dag"), ("jobs", "seconds")];
+    let apart = apart.map(|(one, other)| (one, other, "exclude each other"));
+    options.check_apart(&apart).map_err(refuse)?;
+    if options.number("jobs") == Some(0) {
+        let line = "`--jobs 0` has no end, which is for fork-join; with `--dag` give at least 1";
+        return Err(refuse(line.into()));
+    }
+    if let Some(text) = options.text("execution") {
+        Execution::parse(text).map_err(|why| refuse(format!("`--execution`: {why}")))?;
+    }
+    let unit_ns = match parse_ns(options.text("unit").unwrap_or("1ms")) {
+        Ok(0) => Err("a unit of 0; give at least 1ns".into()),
+        other => other,
+    };
+    let unit_ns = unit_ns.map_err(|why| refuse(format!("`--unit`: {why}")))?;
+    let length = length(options);
+    let cores = options.number("cores").unwrap_or(1);
+    let import = Import {
+        unit_ns,
+        graph: options.text("graph").map(String::from),
+        cores: u32::try_from(cores).unwrap_or(u32::MAX),
+        clusters: clusters(options.text("clusters")).map_err(refuse)?,
+        length,
+    };
+    let file = load(path, &import)?;
+    let memory_mib = memory_mib(&file, length, cores);
+    if memory_mib > MOST_MEMORY_MIB && !options.is_given("memory") {
+        return Err(refuse(format!(
+            "{}: its {} subtasks, their jobs and the file itself need {memory_mib} MiB, and a \
+             guest has {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
+            files::place(path),
+            file.most_subtasks()
+        )));
+    }
+    let limit_s = limit_s(&file, length);
+    let has_limit = options.is_given("timeout") || options.is_given("print-dag");
+    if limit_s > MOST_S && !has_limit {
+        return Err(refuse(format!(
+            "{}: its jobs take {} hours or more, and a run has {} if nobody says how long; give \
+             fewer jobs by --jobs, or a limit by --timeout",
+            files::place(path),
+            limit_s / 3600,
+            MOST_S / 3600
+        )));
+    }
+    let mut words = Vec::new();
+    if options.is_given("strict-deadlines") {
+        words.push("deadlines=strict".into());
+    }
+    if !states_overheads(options.text("append").unwrap_or_default()) {
+        words.push(overheads(cores));
+    }
+    Ok(Some(Prepared {
+        memory_mib,
+        limit_s: limit_s.min(MOST_S),
+        path: path.into(),
+        file,
+        words,
+    }))
+}
+
+/// Reads how the cores are to be divided. Where the commit is to find that, it has not yet.
+fn clusters(text: Option<&str>) -> Result<Clusters, String> {
+    let Some(text) = text.filter(|text| *text != "auto") else {
+        return Ok(Clusters::Undivided);
+    };
+    let sizes: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
+    sizes.map(Clusters::Of).map_err(|_| {
+        let text = shown(text);
+        format!("`--clusters {text}`: give the number of cores of each cluster, as in 2,2, or auto")
+    })
+}
+
+fn length(options: &Parsed) -> Length {
+    match options.number("seconds") {
+        Some(seconds) => Length::Span(seconds.saturating_mul(1_000_000_000)),
+        None => Length::Jobs(options.number("jobs").unwrap_or(JOBS)),
+    }
+}
+
+/// Returns the jobs and instances of a set that a run has in all: its records.
+fn records(set: &Set, length: Length) -> u64 {
+    let of = |dag: &FileDag| {
+        let jobs = length.jobs(&dag.spec);
+        jobs.saturating_mul(dag.subtasks.len() as u64 + 1)
+    };
+    set.dags.iter().map(of).fold(0, u64::saturating_add)
+}
+
+/// The most memory in MiB: a guest has its stacks and its heap below 3 GiB.
+const MOST_MEMORY_MIB: u64 = 3072;
+
+/// Returns how much memory a file needs. A quarter of it becomes stacks, of which
+/// each subtask has one and each core a few, and the rest the heap, of which records may take half.
+///
+/// The guest has the file as text, and in the heap what it says: measured, an edge takes
+/// some 210 bytes and a sample some 17, while a line has 12 bytes and a sample 4. So the
+/// heap has 20 bytes for each of the text, and three quarters of the memory are the heap.
+fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
+    const OF_A_CORE: u64 = 4 * (336 << 10);
+    const OF_A_SUBTASK: u64 = 4 * (65 << 10);
+    const OF_A_RECORD: u64 = 256;
+    const OF_A_BYTE: u64 = 1 + 20 * 4 / 3;
+    const MIB: u64 = 1 << 20;
+    let subtasks = file.most_subtasks() as u64;
+    let records = file.sets.iter().map(|set| records(set, length));
+    let bytes = (subtasks.saturating_mul(OF_A_SUBTASK))
+        .saturating_add(records.max().unwrap_or(0).saturating_mul(OF_A_RECORD))
+        .saturating_add(cores.saturating_mul(OF_A_CORE))
+        .saturating_add((file.to_string().len() as u64).saturating_mul(OF_A_BYTE));
+    12 + bytes.div_ceil(MIB)
+}
+
+/// The longest that a run may take if nobody says how long, in seconds: a day.
+const MOST_S: u64 = 86_400;
+
+/// Returns for how long a run may take, in seconds: two minutes, the time from the first
+/// release to the last, the time that all jobs would take on one core, and a second for
+/// every 500 records.
+fn limit_s(file: &DagFile, length: Length) -> u64 {
+    const NS_PER_S: u128 = 1_000_000_000;
+    let mut seconds = 120_u128;
+    for set in &file.sets {
+        seconds += u128::from(records(set, length) / 500);
+        let (mut span_ns, mut busy_ns) = (0_u128, 0_u128);
+        for FileDag { spec, .. } in &set.dags {
+            let jobs = u128::from(length.jobs(spec));
+            let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
+            let of_job_ns: u128 = wcets.map(u128::from).sum();
+            let period_ns = u128::from(spec.period_ns.unwrap_or(0));
+            let last_ns =
+                period_ns.saturating_mul(jobs.saturating_sub(1)) + u128::from(spec.offset_ns);
+            span_ns = span_ns.max(last_ns);
+            busy_ns = busy_ns.saturating_add(of_job_ns.saturating_mul(jobs));
+        }
+        seconds = seconds.saturating_add(span_ns.saturating_add(busy_ns) / NS_PER_S);
+    }
+    u64::try_from(seconds).unwrap_or(u64::MAX)
+}
+
+/// Returns what the guest says with `path` and its lines in place of the words `DAG
+/// file`, one line a fault; `None` if it speaks of no file.
+fn translate(said: &str, path: &Path, file: &DagFile) -> Option<String> {
+    let place = path.display();
+    let said = said.strip_prefix("DAG file")?;
+    if let Some(reason) = said.strip_prefix(": ") {
+        return Some(format!("{place}: {reason}"));
+    }
+    let mut lines = Vec::new();
+    for fault in said.strip_prefix(", line ")?.split("; line ") {
+        let (line, reason) = fault.split_once(": ")?;
+        lines.push(match source_line(file, line.parse().ok()?) {
+            Some(line) => format!("{place}:{line}: {reason}"),
+            None => format!("{place}: {reason}"),
+        });
+    }
+    Some(lines.join("\n"))
+}
+
+/// Returns the line of the person's file that became this line of the guest's.
+fn source_line(file: &DagFile, line: usize) -> Option<usize> {
+    let written = parse(&file.to_string()).ok()?;
+    let dags = |file: &DagFile| -> Vec<Vec<usize>> {
+        let dags = file.sets.iter().flat_map(|set| &set.dags);
+        dags.map(lines).collect()
+    };
+    let (written, read) = (dags(&written), dags(file));
+    let mut pairs = written.iter().flatten().zip(read.iter().flatten());
+    pairs
+        .find(|(written, _)| **written == line)
+        .map(|(_, read)| *read)
+}
+
+/// Returns all lines of a DAG, in an order that is the same for every writing of it.
+fn lines(dag: &FileDag) -> Vec<usize> {
+    let subtasks = dag.subtasks.iter().map(|subtask| subtask.line);
+    let all = std::iter::once(dag.line).chain(subtasks);
+    all.chain(dag.edge_lines.iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        Format, MOST_S, limit_s, memory_mib, name_of, parse, prepare, rd_gen, stg, translate,
+    };
+    use crate::run::RUN;
+    use crate::system::workspace;
+    use common::random::Random;
+    use dag_file::{DagFile, Length, Malformed, is_name};
+    use std::path::Path;
+
+    #[test]
+    fn every_file_name_becomes_a_name_and_its_ending_tells_the_format() {
+        for (file, name, format) in [
+            ("a/gnp_01.yaml", "gnp_01", Some(Format::RdGen)),
+            ("a b.Yml", "a_b", Some(Format::RdGen)),
+            ("#h.YAML", "_#h", Some(Format::RdGen)),
+            ("->.dag", "_->", Some(Format::Ours)),
+            ("{x.JSON", "_{x", Some(Format::TaskGraphs)),
+            ("a\u{1b}\u{202e}b.txt", "a__b", None),
+            ("yaml", "yaml", None),
+        ] {
+            assert_eq!(name_of(Path::new(file)), name);
+            assert!(is_name(name), "{name}");
+            assert_eq!(Format::of(Path::new(file)), format, "{file}");
+        }
+    }
+
+    /// Changes, drops or repeats a part of a text, differently for each number.
+    fn damaged(text: &str, number: u64) -> String {
+        let mut random = Random::new(number);
+        let mut below = |most: usize| random.index(most);
+        let from = below(text.len());
+        let to = (from + below(12)).min(text.len());
+        let (before, part, rest) = (&text[..from], &text[from..to], &text[to..]);
+        match below(4) {
+            0 => [before, rest].concat(),
+            1 => [before, part, part, rest].concat(),
+            2 => {
+                let other = ["-", "#", "\n", "9", " ", "'"][below(6)];
+                [before, other, part, rest].concat()
+            }
+            _ => before.into(),
+        }
+    }
+
+    #[test]
+    fn no_damage_makes_a_reader_panic_or_lose_its_line_or_differ_from_the_guests() {
+        let data = workspace().join("apps/dag-file/examples");
+        let yaml = std::fs::read_to_string(data.join("rd-gen/chain_03.yaml")).unwrap();
+        let json = r#"{"graphs":[{"name":"g","c":[0,3,4,0],"edges":[[0,1],[1,2],[2,3]],"optimal":{"2":7}}]}"#;
+        let ours = rd_gen::read(&yaml, "x", 1000).unwrap().to_string();
+        type Read = fn(&str) -> Result<DagFile, Vec<Malformed>>;
+        let readers: [(&str, Read); 3] = [
+            (&yaml, |text| rd_gen::read(text, "x", 1000)),
+            (&ours, |text| parse(text).map_err(|fault| vec![fault])),
+            (json, |text| {
+                stg::read(text, None, 1000).map_err(|fault| vec![fault])
+            }),
+        ];
+        for number in 0..4000 {
+            for (text, read) in readers {
+                let text = damaged(text, number);
+                match read(&text) {
+                    // What is accepted here is written for the guest, whose reader is ours.
+                    Ok(file) => {
+                        let refused = parse(&file.to_string()).err();
+                        assert_eq!(refused, None, "damage {number}:\n{file}");
+                    }
+                    Err(faults) => {
+                        let lines = 1..=text.lines().count() + 1;
+                        let is_in = |fault: &Malformed| lines.contains(&fault.line);
+                        assert!(faults.iter().all(is_in), "damage {number}: {faults:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    fn file(subtasks: usize) -> DagFile {
+        let subtasks = (0..subtasks).map(|number| format!("subtask s{number} wcet 1ms\n"));
+        let subtasks: String = subtasks.collect();
+        parse(&format!("dag x period 1s\n{subtasks}end")).unwrap()
+    }
+
+    #[test]
+    fn memory_grows_with_subtasks_records_cores_and_the_file_itself() {
+        let of = |subtasks, jobs, cores| memory_mib(&file(subtasks), Length::Jobs(jobs), cores);
+        let (usual, long) = (of(20, 50, 8), of(20, 1_000_000, 8));
+        assert!(usual <= 32 && of(20, 50, 64) > 2 * usual, "{usual}");
+        // A quarter of it holds 10,000 stacks of 64 KiB.
+        assert!(of(10_000, 1, 1) >= 4 * 625);
+        assert!(long > 21 * 200 && of(1, u64::MAX, 8) > long, "{long}");
+        let samples = vec!["1us"; 2_000_000].join(",");
+        let text = format!("dag x period 1s\nsubtask a wcet 1ms samples {samples}\nend");
+        let many = memory_mib(&parse(&text).unwrap(), Length::Jobs(1), 8);
+        // Measured: a heap of 34 MB at its peak, besides the text of 8 MB.
+        assert!((64..512).contains(&many), "{many}");
+    }
+
+    #[test]
+    fn the_limit_has_room_for_real_time_and_is_a_day_at_most_if_nobody_says_how_long() {
+        assert_eq!(limit_s(&file(1), Length::Jobs(101)), 120 + 100);
+        assert!(limit_s(&file(1), Length::Jobs(u64::MAX)) > MOST_S);
+        // DAGs of a set run side by side, sets one after the other.
+        let dag = |name: &str| format!("dag {name} period 10s\nsubtask a wcet 1s\n");
+        let text = format!("set one\n{}{}set two\n{}end", dag("x"), dag("y"), dag("z"));
+        let of_sets = limit_s(&parse(&text).unwrap(), Length::Jobs(11));
+        assert_eq!(of_sets, 120 + (100 + 22) + (100 + 11));
+
+        let name = format!("century-{}.dag", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        std::fs::write(&path, "dag x period 3153600000s\nsubtask a wcet 1ms\nend\n").unwrap();
+        let prepared = |line: &str| prepare(&RUN.right(line).with("dag", path.clone()));
+        let said = prepared("--jobs 2").unwrap_err().join("\n");
+        let words = "its jobs take 876000 hours or more, and a run has 24 if nobody says how long";
+        assert!(said.contains(words), "{said}");
+        assert_eq!(prepared("--jobs 1").unwrap().unwrap().limit_s, 120);
+        assert!(prepared("--jobs 2 --timeout 60").is_ok());
+        assert!(prepared("--jobs 2 --print-dag").is_ok());
+        std::fs::remove_file(path).unwrap();
+    }
+
+    /// What the guest says, and what the person is told.
+    const SAID: &str = r"DAG file, line 1: late; drop it | f.dag:3: late; drop it
+DAG file, line 2: a | f.dag:5: a
+DAG file, line 4: a | f.dag:8: a
+DAG file, line 1: a: b; c; line 6: d | f.dag:3: a: b; c\nf.dag:9: d
+DAG file, line 99: a | f.dag: a
+DAG file: too large | f.dag: too large";
+
+    #[test]
+    fn the_guests_lines_become_those_of_the_file() {
+        let text = "# one\n\ndag x period 1s\n# two\nsubtask a wcet 1ms\nsubtask b wcet 1ms\n\n\
+                    edge a -> b\ndag y period 1s\nsubtask a wcet 1ms\nend";
+        let file = parse(text).unwrap();
+        // The guest's has no comments.
+        assert!(file.to_string().starts_with("dag x "));
+        let told = |said: &str| translate(said, Path::new("f.dag"), &file);
+        for row in SAID.lines() {
+            let (said, expected) = row.split_once(" | ").expect(row);
+            assert_eq!(told(said), Some(expected.replace(r"\n", "\n")), "{said}");
+        }
+        assert_eq!(told("`jbos` is no option"), None);
+    }
+}

@@ -1,15 +1,18 @@
 //! A Linux of Debian's in QEMU, for programs of ours that need another kernel than this
 //! computer's: one with `sched_ext`, or one that grants SCHED_FIFO.
 //!
-//! Kernel and tools are Debian's packages (`packages`). What the guest has of files is in an
+//! Kernel and tools are Debian's packages. What the guest has of files is in an
 //! archive that the kernel unpacks into memory: the program, the libraries that it
 //! names, and a script that runs it. What it prints comes through a port of its own, as bytes
 //! and at any speed; its exit code through another one, into a file.
-
-mod packages;
+//!
+//! The packages are unpacked next to this computer's system and not into it.
+//! `apt-get` fetches them with sources, lists and downloads of its own, below `target/debian`, and
+//! `dpkg` unpacks them there. They are trixie's, with a kernel of trixie's backports,
+//! whatever Debian or Ubuntu this computer has; programs of them are run by their own loader.
 
 use std::ffi::OsString;
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -17,8 +20,7 @@ use crate::files::{self, Temporary, write};
 use crate::install;
 use crate::progress::Lasting;
 use crate::qemu::{Mode, PROGRAM, file_value};
-use crate::system::{self, run};
-use packages::Packages;
+use crate::system::{self, find_program, run};
 
 /// What the guest runs first, and all that it runs besides the program.
 const INIT: &str = include_str!("init.sh");
@@ -189,4 +191,222 @@ fn compile(packages: &Packages, object: &Path) -> Result<(), String> {
     clang.arg("-I").arg(packages.root.join("usr/include"));
     clang.arg(system::workspace().join(POLICY));
     run(clang.arg("-o").arg(object)).map(drop)
+}
+
+/// What is fetched besides the kernel, with all that it depends on.
+const PACKAGES: [&str; 4] = ["busybox-static", "bpftool", "clang-19", "libbpf-dev"];
+
+/// With what the lists of packages are signed.
+const KEYS: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
+
+/// The kernels that are preferred: the policy was tried with these.
+const TRIED: [u32; 2] = [6, 18];
+/// The first kernels whose `sched_ext` has what the policy uses.
+const LEAST: [u32; 2] = [6, 13];
+
+/// The packages, unpacked.
+#[derive(Debug)]
+struct Packages {
+    /// What would be the root of a file system.
+    root: PathBuf,
+    /// The kernel.
+    kernel: PathBuf,
+}
+
+impl Packages {
+    /// Makes sure that they are there.
+    fn get() -> Result<Packages, String> {
+        let folder = system::workspace().join("target/debian");
+        let parts = ["lists/partial", "cache/archives/partial", "root"];
+        for part in parts.map(|part| folder.join(part)) {
+            fs::create_dir_all(&part)
+                .map_err(|why| format!("cannot make the folder `{}`: {why}", part.display()))?;
+        }
+        // Two commands at once fetch them once.
+        let lock = File::create(folder.join("lock"));
+        let locked = lock.and_then(|lock| lock.lock().map(|()| lock));
+        let _lock = locked.map_err(|why| format!("cannot lock `{}`: {why}", folder.display()))?;
+        let (root, ready) = (folder.join("root"), folder.join("kernel"));
+        if !ready.is_file() {
+            let kernel = fetch(&folder)?;
+            files::write(&ready, kernel)?;
+        }
+        let kernel = fs::read_to_string(&ready)
+            .map_err(|why| format!("cannot read `{}`: {why}", ready.display()))?;
+        let kernel = root.join("boot").join(kernel);
+        Ok(Packages { root, kernel })
+    }
+
+    /// Returns the loader of programs that are linked with libraries.
+    fn loader(&self) -> PathBuf {
+        self.root.join("usr/lib64/ld-linux-x86-64.so.2")
+    }
+
+    /// Returns the program of many tools, which needs no libraries.
+    fn busybox(&self) -> PathBuf {
+        self.root.join("usr/bin/busybox")
+    }
+
+    /// Returns a command of one of the packages' programs.
+    fn command(&self, program: &str) -> Command {
+        let mut command = self.loading();
+        command.arg(self.root.join(program));
+        command
+    }
+
+    /// Returns the command that loads a program with the packages' libraries.
+    fn loading(&self) -> Command {
+        let mut command = Command::new(self.loader());
+        let libraries = self.root.join("usr/lib/x86_64-linux-gnu");
+        command.arg("--library-path").arg(libraries);
+        command
+    }
+
+    /// Returns the libraries that programs are linked with, each once.
+    fn libraries(&self, programs: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
+        let mut found = Vec::new();
+        for program in programs {
+            let list = run(self.loading().arg("--list").arg(program))?;
+            found.extend(list.lines().filter_map(library).filter(|path| {
+                // The loader lies elsewhere.
+                !path.ends_with("ld-linux-x86-64.so.2")
+            }));
+        }
+        found.sort();
+        found.dedup();
+        Ok(found)
+    }
+}
+
+/// Reads a line of the loader's such as `libz.so.1 => /lib/libz.so.1 (0x7f00)`.
+fn library(line: &str) -> Option<PathBuf> {
+    let (_, path) = line.split_once(" => ")?;
+    let (path, _) = path.rsplit_once(" (")?;
+    Some(path.into())
+}
+
+/// Fetches and unpacks everything, and returns the kernel's name.
+fn fetch(folder: &Path) -> Result<String, String> {
+    for (name, what) in [("apt-get", "apt"), ("dpkg", "dpkg")] {
+        if find_program(name).is_none() {
+            return Err(format!(
+                "there is no `{name}`, which fetches and unpacks Debian's packages; install \
+                 `{what}` and start again"
+            ));
+        }
+    }
+    if !Path::new(KEYS).is_file() {
+        return Err(format!(
+            "there is no `{KEYS}`, with which Debian's packages are checked; install \
+             `debian-archive-keyring` and start again"
+        ));
+    }
+    eprintln!(
+        "fetching a kernel, busybox, clang and bpftool of Debian's, some 145 MB, to `{}`; \
+         unpacked they take 500 MB",
+        folder.display()
+    );
+    let lasting = Lasting::new("fetching Debian's packages");
+    let line = |suite: &str| {
+        format!("deb [arch=amd64 signed-by={KEYS}] http://deb.debian.org/debian {suite} main\n")
+    };
+    let sources = line("trixie") + &line("trixie-backports");
+    for (name, text) in [("sources.list", sources.as_str()), ("status", "")] {
+        files::write(&folder.join(name), text)?;
+    }
+    run(apt("apt-get", folder).arg("update"))?;
+    let names = run(apt("apt-cache", folder).args(["pkgnames", "linux-image-"]))?;
+    let kernel = choose(names.lines()).ok_or(
+        "Debian's lists have no kernel of 6.13 or later for clouds; look for a newer state of this project",
+    )?;
+    let mut install = apt("apt-get", folder);
+    install.args("--yes --no-install-recommends --download-only install".split(' '));
+    run(install.args(PACKAGES))?;
+    let archives = folder.join("cache/archives");
+    run(apt("apt-get", folder)
+        .current_dir(&archives)
+        .args(["download", kernel]))?;
+    drop(lasting);
+    let _lasting = Lasting::new("unpacking Debian's packages");
+    let files = fs::read_dir(&archives);
+    let files = files.map_err(|why| format!("cannot read `{}`: {why}", archives.display()))?;
+    for file in files.flatten().map(|file| file.path()) {
+        if file.extension().is_some_and(|kind| kind == "deb") {
+            run(Command::new("dpkg")
+                .arg("-x")
+                .arg(&file)
+                .arg(folder.join("root")))?;
+            // It is unpacked, and could be fetched again.
+            let _ = fs::remove_file(&file);
+        }
+    }
+    Ok(kernel.replacen("linux-image-", "vmlinuz-", 1))
+}
+
+/// Returns a command of apt's that knows nothing of this computer's packages, and changes none.
+fn apt(program: &str, folder: &Path) -> Command {
+    let mut command = Command::new(program);
+    for (name, part) in [
+        ("Dir::Etc::sourcelist", "sources.list"),
+        ("Dir::Etc::sourceparts", "none"),
+        ("Dir::State", "."),
+        ("Dir::State::lists", "lists"),
+        ("Dir::State::status", "status"),
+        ("Dir::Cache", "cache"),
+    ] {
+        let place = folder.join(part);
+        command.arg("-o").arg(format!("{name}={}", place.display()));
+    }
+    // Its own user could not write there.
+    command.args([
+        "-o",
+        "APT::Sandbox::User=root",
+        "-o",
+        "APT::Architecture=amd64",
+    ]);
+    command.args(["-o", "Acquire::Languages=none", "-q"]);
+    command.env("DEBIAN_FRONTEND", "noninteractive");
+    command
+}
+
+/// Chooses a kernel for virtual machines: the latest of those that were tried, or else the latest.
+fn choose<'a>(names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let version = |name: &str| -> Option<[u32; 3]> {
+        let name = name.strip_prefix("linux-image-")?;
+        let (version, rest) = name.split_once('+')?;
+        let mut parts = version.split('.').map(|part| part.parse().ok());
+        let version = [parts.next()??, parts.next()??, parts.next()??];
+        let is_whole = rest.ends_with("-cloud-amd64") && parts.next().is_none();
+        (is_whole && version[..2] >= LEAST[..]).then_some(version)
+    };
+    let rated = names.filter_map(|name| {
+        let version = version(name)?;
+        Some(((version[..2] == TRIED, version), name))
+    });
+    rated.max().map(|(_, name)| name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{choose, library};
+
+    #[test]
+    fn the_latest_kernel_of_those_that_were_tried_is_taken() {
+        let names = [
+            "linux-image-6.12.107+deb13-cloud-amd64",
+            "linux-image-6.18.9+deb13-cloud-amd64",
+            "linux-image-6.18.15+deb13-cloud-amd64",
+            "linux-image-6.18.16+deb13-cloud-amd64-dbg",
+            "linux-image-6.18.16+deb13-amd64",
+            "linux-image-7.2.12+deb13-cloud-amd64",
+            "linux-image-cloud-amd64",
+        ];
+        let of = |names: &[&'static str]| choose(names.iter().copied());
+        assert_eq!(of(&names), Some(names[2]));
+        assert_eq!(of(&names[5..]), Some(names[5]));
+        assert_eq!(of(&names[..1]), None, "it is too old");
+        let line = "\tlibz.so.1 => /a b/libz.so.1 (0x00007f0000000000)";
+        assert_eq!(library(line), Some("/a b/libz.so.1".into()));
+        assert_eq!(library("\tlinux-vdso.so.1 (0x00007f0000000000)"), None);
+    }
 }

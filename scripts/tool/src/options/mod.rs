@@ -11,22 +11,24 @@
 //!
 //! Words come as the system hands them over, and need not be text. The name of a file
 //! may be anything; every other word must be UTF-8.
+//! A command line that was understood is [`Parsed`].
 
 mod menu;
-mod option;
-mod parsed;
 
+use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Write;
+use std::ops::RangeInclusive;
 use std::os::unix::ffi::OsStrExt;
+use std::path::Path;
 use std::process::ExitCode;
+use std::str::FromStr;
 
-use replay::shown::{quoted, visible};
+use replay::shown::{quoted, shown, visible};
+
+use crate::files::Named;
 
 pub use menu::{Choice, Menu, choices};
-pub(crate) use option::options;
-pub use option::{Opt, Takes};
-pub use parsed::Parsed;
 pub use sched_dag::nearest;
 
 /// The exit code of a run that a person has ended before its time, as a shell has it for ctrl-C.
@@ -279,6 +281,385 @@ fn split(word: &OsStr) -> (&OsStr, Option<&OsStr>) {
     let mut parts = word.as_bytes().splitn(2, |byte| *byte == b'=');
     let name = parts.next().unwrap_or_default();
     (OsStr::from_bytes(name), parts.next().map(OsStr::from_bytes))
+}
+
+/// One option of a command.
+#[derive(Clone, Copy, Debug)]
+pub struct Opt {
+    /// The long name without its dashes.
+    pub name: &'static str,
+    /// The short form without its dash, such as `q`.
+    pub short: Option<char>,
+    /// The form of what must follow.
+    pub takes: Takes,
+    /// The value when the option is not given; empty: it has none.
+    pub default: &'static str,
+    /// One sentence for the help text.
+    pub help: &'static str,
+}
+
+/// Makes the options of a [`Command`]: above each its sentence for the help text; a
+/// short form stands behind the name, and the value when the option is not given behind `or`.
+macro_rules! options {
+    ($($(#[doc = $help:literal])+ $name:literal $($short:literal)?: $takes:expr $(, or $default:expr)?;)*) => {
+        &[$(
+            $crate::options::Opt::new($name, $takes, concat!($($help),+))$(.short($short))?$(.or($default))?
+        ),*]
+    };
+}
+pub(crate) use options;
+
+/// A value that follows an option.
+#[derive(Clone, Copy, Debug)]
+pub enum Takes {
+    /// Nothing: the option is a flag.
+    Nothing,
+    /// A decimal number within bounds, both included.
+    Number {
+        /// The smallest number allowed.
+        least: u64,
+        /// The largest number allowed.
+        most: u64,
+        /// Whether there may be more, with commas between.
+        is_list: bool,
+    },
+    /// One of these words.
+    OneOf(&'static [&'static str]),
+    /// Any text; the word stands for it in the help text.
+    Text(&'static str),
+    /// The name of a file or folder, of any bytes; the word stands for it likewise.
+    File(&'static str),
+}
+
+impl Takes {
+    /// Takes a number of a range.
+    #[must_use]
+    pub const fn number(range: RangeInclusive<u64>) -> Takes {
+        let (least, most, is_list) = (*range.start(), *range.end(), false);
+        Takes::Number {
+            least,
+            most,
+            is_list,
+        }
+    }
+
+    /// Takes numbers of a range with commas between.
+    #[must_use]
+    pub const fn numbers(range: RangeInclusive<u64>) -> Takes {
+        let (least, most, is_list) = (*range.start(), *range.end(), true);
+        Takes::Number {
+            least,
+            most,
+            is_list,
+        }
+    }
+
+    /// Returns the word that stands for a value in the help text; empty: none does.
+    const fn name(self) -> &'static str {
+        match self {
+            Takes::Nothing => "",
+            Takes::Number { is_list: false, .. } => "N",
+            Takes::Number { is_list: true, .. } => "N,N,...",
+            Takes::OneOf(_) => "WORD",
+            Takes::Text(what) | Takes::File(what) => what,
+        }
+    }
+
+    /// Says in words which values are allowed.
+    fn allowed(self) -> String {
+        match self {
+            Takes::Nothing => "nothing".into(),
+            Takes::Number {
+                least,
+                most,
+                is_list: false,
+            } => format!("a number from {least} to {most}"),
+            Takes::Number { least, most, .. } => {
+                format!("numbers from {least} to {most} with commas between")
+            }
+            Takes::OneOf(words) => format!("one of {}", words.join(", ")),
+            Takes::Text(what) | Takes::File(what) => format!("a {}", what.to_lowercase()),
+        }
+    }
+}
+
+impl Opt {
+    /// Describes an option without short form and default.
+    #[must_use]
+    pub const fn new(name: &'static str, takes: Takes, help: &'static str) -> Opt {
+        Opt {
+            name,
+            short: None,
+            takes,
+            default: "",
+            help,
+        }
+    }
+
+    /// Adds a short form, without its dash.
+    #[must_use]
+    pub const fn short(mut self, short: char) -> Opt {
+        self.short = Some(short);
+        self
+    }
+
+    /// Adds the value when the option is not given.
+    #[must_use]
+    pub const fn or(mut self, default: &'static str) -> Opt {
+        self.default = default;
+        self
+    }
+
+    /// Checks a value against what the option takes.
+    fn check(&self, value: &OsStr) -> Result<(), String> {
+        let text = value.to_str();
+        let valid = match (self.takes, text) {
+            (Takes::Nothing, _) => true,
+            (Takes::File(_), _) => !value.is_empty(),
+            (_, None) => false,
+            (
+                Takes::Number {
+                    least,
+                    most,
+                    is_list,
+                },
+                Some(text),
+            ) => {
+                let mut numbers = text.split(',');
+                let is_number = |text| number(text).is_some_and(|n| (least..=most).contains(&n));
+                numbers.all(is_number) && (is_list || !text.contains(','))
+            }
+            (Takes::OneOf(words), Some(text)) => words.contains(&text),
+            (Takes::Text(_), Some(text)) => !text.is_empty(),
+        };
+        if valid {
+            return Ok(());
+        }
+        let mut must = format!("must be {}", self.takes.allowed());
+        match (self.takes, text) {
+            (_, None) => must = format!("is not UTF-8 text; {must}"),
+            (Takes::OneOf(words), Some(text)) => {
+                let near = nearest(text, words);
+                must += &near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            }
+            _ => {}
+        }
+        let value = value.to_string_lossy();
+        Err(format!("`--{} {}`: {must}", self.name, shown(&value)))
+    }
+
+    /// Says that no value stands after the option. Where an option follows, one that
+    /// was meant as the value could be attached.
+    fn missing(&self, is_followed: bool) -> String {
+        let (name, allowed) = (self.name, self.takes.allowed());
+        let remedy = match (self.takes, is_followed) {
+            (Takes::Text(_) | Takes::File(_), true) => {
+                format!("; one that begins with `-` is written `--{name}=VALUE`")
+            }
+            _ => String::new(),
+        };
+        format!("option `--{name}` lacks its value: {allowed}{remedy}")
+    }
+
+    /// Returns how the help text writes the option.
+    fn heading(&self) -> String {
+        let short = self.short.map(|short| format!("-{short}, "));
+        let heading = format!(
+            "{:4}--{} {}",
+            short.unwrap_or_default(),
+            self.name,
+            self.takes.name()
+        );
+        heading.trim_end().into()
+    }
+
+    /// Returns the help text's sentence, with what is allowed and the default.
+    fn sentence(&self) -> String {
+        let mut parts = Vec::new();
+        match self.takes {
+            // A bound that no one can reach would only be noise.
+            Takes::Number { least, most, .. } => parts.push(match most {
+                u64::MAX => format!("from {least}"),
+                most => format!("{least} to {most}"),
+            }),
+            Takes::OneOf(words) => parts.push(words.join(" | ")),
+            Takes::Nothing | Takes::Text(_) | Takes::File(_) => {}
+        }
+        if !self.default.is_empty() {
+            parts.push(format!("default {}", self.default));
+        }
+        if parts.is_empty() {
+            return self.help.into();
+        }
+        format!("{} [{}]", self.help, parts.join("; "))
+    }
+}
+
+fn number(text: &str) -> Option<u64> {
+    // `parse` alone would let `+1` pass.
+    let is_plain = text.bytes().all(|byte| byte.is_ascii_digit());
+    text.parse().ok().filter(|_| is_plain)
+}
+
+/// A command line that was understood.
+#[derive(Clone, Debug)]
+pub struct Parsed {
+    options: &'static [Opt],
+    given: BTreeMap<&'static str, OsString>,
+    positionals: Vec<OsString>,
+}
+
+impl Parsed {
+    /// Begins with the defaults of these options.
+    fn new(options: &'static [Opt]) -> Parsed {
+        Parsed {
+            options,
+            given: BTreeMap::new(),
+            positionals: Vec::new(),
+        }
+    }
+
+    fn take(&mut self, name: &'static str, value: &OsStr) {
+        self.given.insert(name, value.into());
+    }
+
+    fn take_positional(&mut self, word: &OsStr) {
+        self.positionals.push(word.into());
+    }
+
+    /// Returns whether the person gave the option (or flag).
+    #[must_use]
+    pub fn is_given(&self, name: &str) -> bool {
+        self.given.contains_key(name)
+    }
+
+    fn value(&self, name: &str) -> Option<&OsStr> {
+        let default = || {
+            let mut options = self.options.iter();
+            let option = options.find(|option| option.name == name)?;
+            (!option.default.is_empty()).then(|| OsStr::new(option.default))
+        };
+        self.given
+            .get(name)
+            .map(OsString::as_os_str)
+            .or_else(default)
+    }
+
+    /// Returns the option's value or default; `None` if it has neither. For one that
+    /// takes a file there is [`path`](Self::path).
+    #[must_use]
+    pub fn text(&self, name: &str) -> Option<&str> {
+        self.value(name).and_then(OsStr::to_str)
+    }
+
+    /// Returns the file that the option names, or its default; `None` if it has neither.
+    #[must_use]
+    pub fn path(&self, name: &str) -> Option<&Path> {
+        self.value(name).map(Path::new)
+    }
+
+    /// Returns the files that options of these names name, as far as they are given.
+    #[must_use]
+    pub fn named(&self, options: &[&'static str]) -> Vec<Named<'_>> {
+        let named = options.iter().filter_map(|option| {
+            let path = self.path(option)?;
+            Some(Named { option, path })
+        });
+        named.collect()
+    }
+
+    /// Returns a number's value or default; `None` if it has neither.
+    #[must_use]
+    pub fn number(&self, name: &str) -> Option<u64> {
+        self.text(name).and_then(|value| value.parse().ok())
+    }
+
+    /// Returns the numbers of a list.
+    #[must_use]
+    pub fn numbers<N: FromStr>(&self, name: &str) -> Vec<N> {
+        let words = self.text(name).into_iter().flat_map(|all| all.split(','));
+        words.filter_map(|word| word.parse().ok()).collect()
+    }
+
+    /// Makes sure that nothing stands twice among the values with commas between of
+    /// these options.
+    ///
+    /// # Errors
+    ///
+    /// In words, with the option and the value.
+    pub fn check_distinct(&self, options: &[&'static str]) -> Result<(), String> {
+        for option in options {
+            let mut before = Vec::new();
+            for value in self.text(option).iter().flat_map(|all| all.split(',')) {
+                if before.contains(&value) {
+                    let value = quoted(value);
+                    return Err(format!("`--{option}`: {value} stands twice; give it once"));
+                }
+                before.push(value);
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes sure that of each pair of options at most one is given.
+    ///
+    /// # Errors
+    ///
+    /// In words, with both and what they do, such as to exclude each other.
+    pub fn check_apart(&self, pairs: &[(&str, &str, &str)]) -> Result<(), String> {
+        let both =
+            |(one, other, _): &&(&str, &str, &str)| self.is_given(one) && self.is_given(other);
+        match pairs.iter().find(both) {
+            Some((one, other, do_what)) => {
+                Err(format!("`--{one}` and `--{other}` {do_what}; give one"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Returns the first of these options that is given.
+    #[must_use]
+    pub fn given_of<'n>(&self, names: &[&'n str]) -> Option<&'n str> {
+        names.iter().copied().find(|name| self.is_given(name))
+    }
+
+    /// Returns the same command line with another value of an option, as if the
+    /// person had given it.
+    #[must_use]
+    pub fn with(&self, name: &'static str, value: impl AsRef<OsStr>) -> Parsed {
+        let mut other = self.clone();
+        other.take(name, value.as_ref());
+        other
+    }
+
+    /// Returns the same as if a flag had not been given.
+    #[must_use]
+    pub fn without(&self, name: &str) -> Parsed {
+        let mut other = self.clone();
+        other.given.remove(name);
+        other
+    }
+
+    /// Returns the first positional word, if one was given.
+    #[must_use]
+    pub fn positional(&self) -> Option<&str> {
+        self.positionals.first().and_then(|word| word.to_str())
+    }
+
+    /// Returns the first positional argument as a file, or else the question which it is.
+    ///
+    /// # Errors
+    ///
+    /// The question: there is none.
+    pub fn file(&self, question: &str) -> Result<Named<'_>, String> {
+        let path = self.files().next().ok_or(question)?;
+        Ok(Named { option: "", path })
+    }
+
+    /// Returns the files that the positional words name.
+    pub fn files(&self) -> impl ExactSizeIterator<Item = &Path> + Clone {
+        self.positionals.iter().map(Path::new)
+    }
 }
 
 #[cfg(test)]

@@ -7,12 +7,12 @@ use recording::{Commit, Counted, DagTimes, SubtaskTimes, Times, Writer};
 use sched_dag::DagId;
 use sched_dag::law::Costs;
 
-use super::observed::{self, OfDag};
+use super::observed::OfDag;
 use super::report::{Row, complaint, rows, summary, table};
-use super::{overheads, slack, wcets, witness};
+use super::{observed, report};
 use crate::made::{commit, record_of};
+use crate::record::Committed;
 use crate::record::Record;
-use crate::record::model::Committed;
 
 /// A chain of 2 and 3 ms, each charged 1 us.
 const CHAIN: &str = "static 2
@@ -65,14 +65,14 @@ fn the_model_is_made_again_and_bounded_alike() {
     assert_eq!(commits[0].told.dags[0].bound_ns, Some(5_002_000));
     assert_eq!(commits[0].task_set.dags()[0].name(), "demo");
     // The parts of a bound are the bound.
-    let expected = slack::Slack {
+    let expected = report::Slack {
         overheads_ns: Some(2_000),
         blocking_ns: Some(0),
         interference_ns: Some(0),
         own_order_ns: Some(0),
         length_ns: Some(5_000_000),
     };
-    assert_eq!(slack::of(&commits[0], DagId(0)), expected);
+    assert_eq!(report::of(&commits[0], DagId(0)), expected);
 }
 
 #[test]
@@ -132,7 +132,7 @@ fn what_is_of_one_of_several_files_or_commits_has_its_name() {
         number: 2,
         ..first.clone()
     };
-    let said = witness::write(&path, &[first, third]).unwrap();
+    let said = report::write(&path, &[first, third]).unwrap();
     let (first, second) = (path.display(), format!("{}.2", path.display()));
     assert!(said.starts_with(&format!("{first} {second}: ")), "{said}");
     fs::remove_file(&path).and(fs::remove_file(second)).unwrap();
@@ -151,40 +151,40 @@ dag 5 demo/ |  | 6 | a WCET before the first DAG";
 
 #[test]
 fn wcets_that_are_written_are_read_and_have_the_margin() {
-    let text = wcets::text(&observed(&[9]), 20);
+    let text = observed::text(&observed(&[9]), 20);
     let end = "margin 20\ndag 5 demo\nwcet 11 0 a\nend\n";
     assert!(text.ends_with(end), "{text}");
     let path = std::env::temp_dir().join(format!("wcets-{}", std::process::id()));
     fs::write(&path, &text).unwrap();
-    assert_eq!(wcets::read(&path), Ok(text.clone()));
+    assert_eq!(observed::read(&path), Ok(text.clone()));
     for row in WRONG.lines() {
         let row = row.replace('/', "\n");
         let [right, wrong, line, why] = row.split(" | ").collect::<Vec<_>>()[..] else {
             panic!("{row}");
         };
         fs::write(&path, text.replace(right, wrong)).unwrap();
-        let said = wcets::read(&path).unwrap_err();
+        let said = observed::read(&path).unwrap_err();
         let expected = format!("{}:{line}: {why}", path.display());
         assert!(said.starts_with(&expected), "{said}");
     }
     fs::remove_file(&path).unwrap();
     let said = "line 7 of the WCETs: the DAG has no such subtask; observe it again: dag `d`";
-    let told = wcets::translate(said, Path::new("own.wcets")).unwrap();
+    let told = observed::translate(said, Path::new("own.wcets")).unwrap();
     let begin = "own.wcets:7: the DAG has no such";
     assert!(told.starts_with(begin), "{told}");
-    let other = wcets::translate("line 7 of the file", Path::new("x"));
+    let other = observed::translate("line 7 of the file", Path::new("x"));
     assert_eq!(other, None);
 }
 
 #[test]
 fn the_table_of_wcets_shows_figures_and_a_histogram() {
-    let table = wcets::table(&observed(&[9]), 20);
+    let table = observed::table(&observed(&[9]), 20);
     let row = table.lines().nth(2).unwrap();
     let words: Vec<&str> = row.split_whitespace().collect();
     assert_eq!(words[..6], ["a", "3", "4", "ns", "5", "ns"], "{table}");
     assert!(row.ends_with("  █ █      █"), "{table}");
-    assert_eq!(wcets::shown(999), "999 ns");
-    assert_eq!(wcets::shown(1_500), "1.500 us");
+    assert_eq!(observed::shown(999), "999 ns");
+    assert_eq!(observed::shown(1_500), "1.500 us");
 }
 
 #[test]
@@ -195,7 +195,7 @@ fn the_longest_waits_of_a_run_are_what_is_charged() {
         101 released c0 0.1\n 101 ready c0 0.1.0\n 108 start c0 0.1.0
         120 finish c0 0.1.0\n 120 completed c0 0.1";
     let record = record_of("", &commit("edf 1\nx T=100 D=100 O=0: a/0/50"), events);
-    let measured = overheads::measure(&Record::read(&record).unwrap().runs).unwrap();
+    let measured = observed::measure(&Record::read(&record).unwrap().runs).unwrap();
     let expected = Costs {
         dispatches: 2,
         owed_ns: 7,
@@ -205,6 +205,6 @@ fn the_longest_waits_of_a_run_are_what_is_charged() {
     assert_eq!(measured.0, expected);
     assert_eq!(measured.word(0), "overheads_ns=0,9,7");
     assert_eq!(measured.word(50), "overheads_ns=0,14,11");
-    let nothing = overheads::measure(&[]).unwrap_err();
+    let nothing = observed::measure(&[]).unwrap_err();
     assert_eq!(nothing, "the guest has run nothing");
 }

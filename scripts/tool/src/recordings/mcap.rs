@@ -4,15 +4,30 @@
 //! `/DAG/events`. A message is a JSON object, the job and the value, logged when the instance
 //! was complete and published at the job's nominal release. Messages stand in chunks without
 //! compression, each with its index, so that a reader finds a time without reading all.
+//!
+//! Types are JSON schemas (draft 2020-12), and values JSON of these. Viewers take a part of a
+//! schema only if it has one type: a list of types, `anyOf`, tuples and arrays of arrays make them
+//! refuse the channel. So
+//!
+//! - a tuple is an object, whose fields are called `0`, `1` and so on;
+//! - what may have no value is not `required`, and is left out of its object without one: an
+//!   option, a number (JSON has none for NaN), and an array of numbers, as a whole;
+//! - an array or an option that is an element, and an option of an option, is the field `value`
+//!   of an object of its own;
+//! - what is infinite is `1e999`, a number of JSON that is beyond the range of every reader's.
+//!
+//! A schema says what is written here and nothing else; the tests hold one against the other.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::io::{self, Write};
 
-use recording::{Crc, Entry, Header, Recording, Role, What};
+use recording::{
+    Crc, Decoder, Entry, Field, Header, Malformed, Part, Recordable, Recording, Role, Scalar,
+    Schema, What, write_json,
+};
 
-use super::mcap_json::{of_message, write_message};
-use crate::json::Object;
+use crate::json::{Object, quoted};
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
@@ -304,5 +319,314 @@ impl File<'_> {
         self.record(FOOTER, &footer)?;
         self.put(MAGIC)?;
         Ok(messages)
+    }
+}
+
+/// Returns the schema of the messages of a channel: the job, and a value of this type.
+pub(super) fn of_message(schema: &Schema) -> String {
+    let job = Schema::Scalar(Scalar::U64);
+    object([("job", &job), ("value", schema)].into_iter()).end()
+}
+
+/// Writes a message: the job, and a value of this type.
+///
+/// # Errors
+///
+/// The bytes are no value of the type.
+pub(super) fn write_message(
+    (job, schema, bytes): (u64, &Schema, &[u8]),
+    out: &mut String,
+) -> Result<(), Malformed> {
+    // Writing into a `String` cannot fail.
+    let _ = write!(out, "{{\"job\":{job}");
+    let mut input = Decoder::new(bytes);
+    let mut values = Values {
+        bytes,
+        input: &mut input,
+        out,
+    };
+    values.write_field("value", schema)?;
+    out.push('}');
+    input.end()
+}
+
+fn object<'s>(fields: impl Iterator<Item = (impl Display, &'s Schema)>) -> Object {
+    let (mut properties, mut required) = (Object::new(), Vec::new());
+    for (name, schema) in fields {
+        let name = name.to_string();
+        properties = properties.json(&name, &of(schema));
+        if !may_lack(schema) {
+            required.push(quoted(&name));
+        }
+    }
+    Object::new()
+        .text("type", "object")
+        .json("properties", &properties.end())
+        .list("required", required)
+}
+
+/// Reports whether a part of this type may have no value.
+fn may_lack(schema: &Schema) -> bool {
+    match schema {
+        Schema::Scalar(Scalar::F32 | Scalar::F64) | Schema::Option(_) => true,
+        Schema::List(element) | Schema::Array(element, _) => {
+            !is_wrapped(element) && may_lack(element)
+        }
+        _ => false,
+    }
+}
+
+/// Reports whether an element of this type is an object of its own.
+fn is_wrapped(schema: &Schema) -> bool {
+    matches!(
+        schema,
+        Schema::Option(_) | Schema::List(_) | Schema::Array(..)
+    )
+}
+
+fn of(schema: &Schema) -> String {
+    let of_type = |name| Object::new().text("type", name);
+    let wrapped = |inner| object([("value", inner)].into_iter()).end();
+    let of_element = |element| match is_wrapped(element) {
+        true => wrapped(element),
+        false => of(element),
+    };
+    match schema {
+        Schema::Scalar(scalar) => match scalar.name().as_bytes() {
+            b"bool" => of_type("boolean").end(),
+            b"char" | b"text" => of_type("string").end(),
+            [b'f', ..] => of_type("number").end(),
+            [b'u', ..] => of_type("integer").number("minimum", 0_u8).end(),
+            _ => of_type("integer").end(),
+        },
+        Schema::Option(inner) if matches!(**inner, Schema::Option(_)) => wrapped(inner),
+        Schema::Option(inner) => of(inner),
+        Schema::List(element) => of_type("array").json("items", &of_element(element)).end(),
+        Schema::Array(element, count) => of_type("array")
+            .json("items", &of_element(element))
+            .number("minItems", *count)
+            .number("maxItems", *count)
+            .end(),
+        Schema::Tuple(elements) => object((0..).zip(elements)).end(),
+        Schema::Struct(name, fields) => object(named(fields)).text("title", name).end(),
+    }
+}
+
+fn named(fields: &[Field]) -> impl Iterator<Item = (&str, &Schema)> {
+    fields.iter().map(|field| (&*field.name, &field.schema))
+}
+
+/// Writes values, one after the other.
+struct Values<'v, 'b> {
+    bytes: &'b [u8],
+    input: &'v mut Decoder<'b>,
+    out: &'v mut String,
+}
+
+impl Values<'_, '_> {
+    /// Writes a field behind others, if it has a value.
+    fn write_field(&mut self, name: impl Display, schema: &Schema) -> Result<(), Malformed> {
+        let before = self.out.len();
+        let comma = if self.out.ends_with('{') { "" } else { "," };
+        let _ = write!(self.out, "{comma}{}:", quoted(&name.to_string()));
+        if !self.write(schema)? {
+            self.out.truncate(before);
+        }
+        Ok(())
+    }
+
+    fn write_object<'s>(
+        &mut self,
+        fields: impl Iterator<Item = (impl Display, &'s Schema)>,
+    ) -> Result<bool, Malformed> {
+        self.out.push('{');
+        for (name, schema) in fields {
+            self.write_field(name, schema)?;
+        }
+        self.out.push('}');
+        Ok(true)
+    }
+
+    fn write_array(&mut self, element: &Schema, count: u32) -> Result<bool, Malformed> {
+        let mut has_all = true;
+        for number in 0..count {
+            self.out.push(if number == 0 { '[' } else { ',' });
+            has_all &= match is_wrapped(element) {
+                true => self.write_object([("value", element)].into_iter())?,
+                false => self.write(element)?,
+            };
+        }
+        *self.out += if count == 0 { "[]" } else { "]" };
+        Ok(has_all)
+    }
+
+    /// Writes a value, and reports whether it has one. If not, what is written is to be dropped.
+    fn write(&mut self, schema: &Schema) -> Result<bool, Malformed> {
+        match schema {
+            Schema::Scalar(_) => self.write_scalar(schema),
+            Schema::Option(inner) => match (bool::decode(self.input)?, &**inner) {
+                (false, _) => Ok(false),
+                (true, Schema::Option(_)) => self.write_object([("value", &**inner)].into_iter()),
+                (true, inner) => self.write(inner),
+            },
+            Schema::List(element) => {
+                let count = u32::decode(self.input)?;
+                self.write_array(element, count)
+            }
+            Schema::Array(element, count) => self.write_array(element, *count),
+            Schema::Tuple(elements) => self.write_object((0..).zip(elements)),
+            Schema::Struct(_, fields) => self.write_object(named(fields)),
+        }
+    }
+
+    fn write_scalar(&mut self, schema: &Schema) -> Result<bool, Malformed> {
+        let (start, mut real) = (self.input.offset(), 0.0);
+        schema.walk(self.input, &mut |part| match part {
+            Part::Single(number) => real = number.into(),
+            Part::Double(number) => real = number,
+            _ => {}
+        })?;
+        if real.is_infinite() {
+            *self.out += if real > 0.0 { "1e999" } else { "-1e999" };
+        } else {
+            let bytes = &self.bytes[start..self.input.offset()];
+            write_json(schema, bytes, self.out)?;
+        }
+        Ok(!real.is_nan())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{of_message, write_message};
+    use crate::json::{Value, parse};
+    use common::random::Random;
+    use recording::{Recordable, Schema, to_bytes};
+
+    /// Returns all types that are made of one another this deep.
+    fn types(depth: u32) -> Vec<String> {
+        let scalars = ["bool", "text", "u16", "i64", "f64"].map(String::from);
+        let deeper = |inner: String| {
+            ["T?", "[T]", "[T; 2]", "(T, f64)", "Whole { of: T }"].map(|of| of.replace('T', &inner))
+        };
+        let inner = depth.checked_sub(1).map_or(Vec::new(), types);
+        inner.into_iter().flat_map(deeper).chain(scalars).collect()
+    }
+
+    fn draw_value(random: &mut Random, schema: &Schema, bytes: &mut Vec<u8>) {
+        let choice = random.within(0..=4_u16);
+        let number = usize::from(choice);
+        let mut draw = |schema| draw_value(random, schema, bytes);
+        match schema {
+            Schema::Scalar(scalar) => bytes.extend(match scalar.name() {
+                "bool" => to_bytes(&(choice < 2)),
+                "text" => to_bytes(&String::from(["", "{", "a\"\n", ",", "null"][number])),
+                "u16" => to_bytes(&choice),
+                "i64" => to_bytes(&-i64::from(choice)),
+                _ => to_bytes(&[0.5, -1e300, f64::NAN, f64::INFINITY, 7.0][number]),
+            }),
+            Schema::Option(inner) => {
+                bytes.push(u8::from(choice < 3));
+                (0..u8::from(choice < 3)).for_each(|_| draw_value(random, inner, bytes));
+            }
+            Schema::List(element) => {
+                bytes.extend(u32::from(choice).to_le_bytes());
+                (0..choice).for_each(|_| draw_value(random, element, bytes));
+            }
+            Schema::Array(element, count) => (0..*count).for_each(|_| draw(element)),
+            Schema::Tuple(parts) => parts.iter().for_each(draw),
+            Schema::Struct(_, fields) => fields.iter().for_each(|field| draw(&field.schema)),
+        }
+    }
+
+    /// Reports whether Foxglove's and Lichtblick's `parseJsonSchema` takes a part of a schema, and
+    /// it says nothing else.
+    fn is_taken(part: &Value, is_element: bool) -> bool {
+        let Value::Object(members) = part else {
+            return false;
+        };
+        let kind = part.get("type").and_then(Value::as_text);
+        let says = match (kind, part.get("properties"), part.get("items")) {
+            (Some("boolean" | "string" | "number"), None, None) => vec![],
+            (Some("integer"), None, None) => vec!["minimum"],
+            (Some("object"), Some(Value::Object(fields)), None)
+                if fields.iter().all(|(_, field)| is_taken(field, false)) =>
+            {
+                vec!["properties", "required", "title"]
+            }
+            (Some("array"), None, Some(items)) if !is_element && is_taken(items, true) => {
+                vec!["items", "minItems", "maxItems"]
+            }
+            _ => return false,
+        };
+        (members.iter()).all(|(name, _)| name == "type" || says.contains(&&**name))
+    }
+
+    /// Reports whether a value is of a schema.
+    fn is_of(schema: &Value, value: &Value) -> bool {
+        let bound = |name| schema.get(name).and_then(Value::as_u64);
+        match (schema.get("type").and_then(Value::as_text), value) {
+            (Some("boolean"), Value::Bool(_))
+            | (Some("string"), Value::Text(_))
+            | (Some("number"), Value::Integer(_) | Value::Decimal(_)) => true,
+            (Some("integer"), Value::Integer(number)) => *number >= 0 || bound("minimum").is_none(),
+            (Some("array"), Value::Array(elements)) => {
+                let count = elements.len() as u64;
+                let items = schema.get("items").expect("items");
+                (bound("minItems").is_none_or(|least| least <= count))
+                    && bound("maxItems").is_none_or(|most| most >= count)
+                    && elements.iter().all(|element| is_of(items, element))
+            }
+            (Some("object"), Value::Object(fields)) => {
+                let required = schema.get("required").expect("a list").elements();
+                let is_there = |name: &Value| value.get(name.as_text().expect("a name")).is_some();
+                let is_right = |(name, field): &(String, Value)| {
+                    (schema.at(&["properties", name])).is_some_and(|schema| is_of(schema, field))
+                };
+                required.iter().all(is_there) && fields.iter().all(is_right)
+            }
+            _ => false,
+        }
+    }
+
+    #[test]
+    fn viewers_take_every_schema_and_each_value_is_of_its_schema() {
+        let mut random = Random::new(1);
+        for name in types(3) {
+            let schema = Schema::parse(&name).expect(&name);
+            let text = of_message(&schema);
+            let json = parse(&text).expect(&text);
+            assert!(is_taken(&json, false), "{name}: {text}");
+            for job in 0..20 {
+                let (mut bytes, mut message) = (Vec::new(), String::new());
+                draw_value(&mut random, &schema, &mut bytes);
+                write_message((job, &schema, &bytes), &mut message).expect("a value");
+                // Our own reader takes no number that is beyond its range.
+                let value = parse(&message.replace("1e999", "1e300")).expect(&message);
+                assert!(is_of(&json, &value), "{name}: {text}: {message}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_is_whole_but_for_what_json_cannot_say() {
+        type Parts = (
+            Option<u8>,
+            f64,
+            [f32; 2],
+            Vec<Option<[f64; 1]>>,
+            [[i8; 1]; 2],
+        );
+        let message = |parts: &Parts| {
+            let mut message = String::new();
+            write_message((7, &Parts::schema(), &to_bytes(parts)), &mut message).expect("one");
+            message
+        };
+        let (reals, fields) = ([-f32::INFINITY, 2.0], vec![Some([3.0]), None]);
+        let whole = r#"{"job":7,"value":{"0":1,"1":0.5,"2":[-1e999,2.0],"3":[{"value":[3.0]},{}],"4":[{"value":[4]},{"value":[5]}]}}"#;
+        assert_eq!(message(&(Some(1), 0.5, reals, fields, [[4], [5]])), whole);
+        let (reals, fields) = ([f32::NAN, 2.0], vec![Some([f64::NAN])]);
+        let rest = r#"{"job":7,"value":{"3":[{}],"4":[{"value":[4]},{"value":[5]}]}}"#;
+        assert_eq!(message(&(None, f64::NAN, reals, fields, [[4], [5]])), rest);
     }
 }

@@ -1,29 +1,27 @@
 //! The subcommand `recording`: what is in a recording, and other formats of it.
 //!
-//! A recording is the file of what entered a run; the crate `recording` has its format. It is
-//! shown as a table, written as tables of comma-separated values (`table_out`) and as an MCAP
-//! file (`mcap`), and made of a table (`table_in`).
+//! A recording is the file of what entered a run; the crate `recording` has its format. It is shown
+//! as a table, of all or of one job, written as tables of comma-separated values and as an MCAP
+//! file (`mcap`), and made of a table (`table`).
 
 pub mod mcap;
-mod mcap_json;
-mod summary;
-mod table_in;
-mod table_out;
-mod until;
+mod table;
 
 use std::env;
 use std::ffi::OsString;
+use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::{self, ExitCode};
 
-use recording::Recording;
+use recording::{Chunk, Commit, Counted, Entry, Recording, Schema, Shown, Times, What};
+use replay::shown::{quoted, visible};
 
 use crate::dot;
 use crate::files::{self, Named};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
-use crate::proof::{observed, wcets, witness};
+use crate::proof::{observed, report};
 use crate::record::Record;
 
 /// The options that want something of the runs of a record.
@@ -90,7 +88,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     check(input, options).map_err(Refusal::Usage)?;
     let file = input.path;
     if options.is_given("from-csv") {
-        let bytes = table_in::convert(file, options).map_err(Refusal::Usage)?;
+        let bytes = table::convert(file, options).map_err(Refusal::Usage)?;
         let out = options.path("out").unwrap_or(Path::new(""));
         write(out, |out| out.write_all(&bytes))?;
         println!("{}: {} bytes", files::place(out), bytes.len());
@@ -100,11 +98,11 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     let recording = parse(file, &bytes).map_err(Refusal::Usage)?;
     of_runs(&recording, options).map_err(Refusal::Usage)?;
     match options.text("until") {
-        Some(job) => print!("{}", until::of(&recording, job).map_err(Refusal::Usage)?),
-        None => print!("{}", summary::of(&recording)),
+        Some(job) => print!("{}", inputs_until(&recording, job).map_err(Refusal::Usage)?),
+        None => print!("{}", shown(&recording)),
     }
     if let Some(folder) = options.path("csv") {
-        for (name, table) in table_out::tables(&recording) {
+        for (name, table) in table::tables(&recording) {
             let path = folder.join(name);
             write(&path, |out| out.write_all(table.as_bytes()))?;
             println!("{}", files::place(&path));
@@ -136,12 +134,12 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         println!("{}", files::place(path));
     }
     if let Some(path) = options.path("witness") {
-        println!("{}", witness::write(path, record.proven()?)?);
+        println!("{}", report::write(path, record.proven()?)?);
     }
     if let Some(path) = options.path("observe") {
         let mut observed = Vec::new();
         observed::add(&mut observed, &record)?;
-        let text = wcets::text(&observed, wcets::MARGIN_PERCENT);
+        let text = observed::text(&observed, observed::MARGIN_PERCENT);
         files::write_named("observe", path, text)?;
         println!("{}", files::place(path));
     }
@@ -229,4 +227,209 @@ pub fn independent_reader() -> Result<OsString, String> {
             files::place(Path::new(&python))
         )),
     }
+}
+
+/// Returns the lines.
+fn shown(recording: &Recording<'_>) -> String {
+    let header = recording.header();
+    let mut values = vec![0_u64; header.channels.len()];
+    let mut others = [
+        (What::Signal, 0),
+        (What::Skip, 0),
+        (What::Cut, 0),
+        (What::Restart, 0),
+        (What::Clock, 0),
+        (What::Fault, 0),
+    ];
+    let mut span_ns: Option<(u64, u64)> = None;
+    for entry in recording.entries() {
+        let (first, last) = span_ns.unwrap_or((entry.release_ns, entry.at_ns));
+        span_ns = Some((first.min(entry.release_ns), last.max(entry.at_ns)));
+        match others.iter_mut().find(|(what, _)| *what == entry.what) {
+            Some((_, count)) => *count += 1,
+            None if entry.what == What::Value => values[usize::from(entry.place)] += 1,
+            None => {}
+        }
+    }
+    let mut text = String::new();
+    // Writing into a `String` cannot fail.
+    let _ = writeln!(
+        text,
+        "recording of `{}`, {} entries",
+        visible(&header.app),
+        recording.count()
+    );
+    if let Some((first, last)) = span_ns {
+        let _ = writeln!(text, "from {first} ns to {last} ns");
+    }
+    for (channel, values) in header.channels.iter().zip(values) {
+        let dag = visible(&header.dags[usize::from(channel.dag)].name);
+        let (role, topic) = (channel.role.name(), visible(&channel.topic));
+        let schema = channel.schema.to_string();
+        let schema = visible(&schema);
+        let _ = writeln!(
+            text,
+            "  {role} `{topic}` of dag `{dag}`: {values} values of {schema}"
+        );
+    }
+    for (what, count) in others {
+        if count > 0 {
+            let _ = writeln!(text, "  {count} times {}", what.name());
+        }
+    }
+    let (mut commits, mut events, mut runs, mut lines) = (Vec::new(), 0, 0, 0);
+    let mut tables = String::new();
+    for chunk in recording.chunks() {
+        match chunk {
+            Chunk::Header(_) | Chunk::Entry(_) => {}
+            Chunk::Text(text) => lines += text.lines().count(),
+            Chunk::Commit(commit) => commits.push(commit),
+            Chunk::Events(some) => events += some.words().count(),
+            Chunk::Times(times) => {
+                tables += &commits
+                    .last()
+                    .map_or(String::new(), |of| table(runs, of, &times));
+                runs += 1;
+            }
+        }
+    }
+    let counts = [
+        (commits.len(), "commits"),
+        (events, "events"),
+        (runs, "runs that have ended"),
+        (lines, "machine lines"),
+    ];
+    for (count, what) in counts {
+        if count > 0 {
+            let _ = writeln!(text, "  {count} {what}");
+        }
+    }
+    let _ = match recording.lost() {
+        _ if recording.is_cut() => writeln!(
+            text,
+            "incomplete: it says nothing of what came after its last entry"
+        ),
+        0 => writeln!(text, "complete"),
+        lost => writeln!(text, "incomplete: {lost} values are lost"),
+    };
+    text + &tables
+}
+
+/// Shows what all jobs of a run took, also those whose events are lost.
+fn table(run: usize, commit: &Commit, times: &Times) -> String {
+    let mut text = String::new();
+    let mut row = |name: &str, counted: &Counted| {
+        let times = observed::distribution(counted);
+        let figures = [times.min(), times.median(), times.p99(), times.max()];
+        let figures = figures
+            .map(|ns| format!("{:>12}", observed::shown(ns)))
+            .concat();
+        // Writing into a `String` cannot fail.
+        let _ = match times.count() {
+            0 => Ok(()),
+            count => writeln!(text, "  {name:<34}{count:>8}{figures}"),
+        };
+    };
+    for (dag, times) in commit.dags.iter().zip(&times.dags) {
+        let name = visible(&dag.name).to_string();
+        row(&format!("`{name}` response"), &times.response);
+        row(&format!("`{name}` release jitter"), &times.release_jitter);
+        for (subtask, times) in dag.subtasks.iter().zip(&times.subtasks) {
+            let name = visible(&subtask.name).to_string();
+            row(&format!("  `{name}` join latency"), &times.join_latency);
+            row(&format!("  `{name}` execution"), &times.execution);
+            if let Some((response, ..)) = &times.sink {
+                row(&format!("  `{name}` response"), response);
+            }
+        }
+    }
+    match text.is_empty() {
+        true => text,
+        false => format!(
+            "run {run}{:>39}         min      median         p99         max\n{text}",
+            "count"
+        ),
+    }
+}
+
+/// Returns the lines about a job, which is given as `DAG/JOB`.
+fn inputs_until(recording: &Recording<'_>, job: &str) -> Result<String, String> {
+    let header = recording.header();
+    let parts = job.rsplit_once('/');
+    let Some((name, number)) =
+        parts.and_then(|(dag, number)| Some((dag, number.parse::<u64>().ok()?)))
+    else {
+        return Err(format!(
+            "`--until {}`: DAG/JOB is wanted, such as gait/17",
+            visible(job)
+        ));
+    };
+    let Some(dag) = header.dags.iter().position(|dag| dag.name == name) else {
+        let there = header.dags.iter().map(|dag| quoted(&dag.name).to_string());
+        let there = there.collect::<Vec<String>>().join(", ");
+        return Err(format!(
+            "`--until`: there is no dag {}; there are {there}",
+            quoted(name)
+        ));
+    };
+    let mut of_job = (recording.entries())
+        .filter(|entry| usize::from(entry.dag) == dag && entry.job == number)
+        .peekable();
+    let Some(first) = of_job.peek() else {
+        return Err(format!(
+            "`--until`: nothing is recorded of job {number} of that dag"
+        ));
+    };
+    let mut text = String::new();
+    // Writing into a `String` cannot fail.
+    let _ = writeln!(
+        text,
+        "job {number} of dag `{}`, due at {} ns",
+        visible(name),
+        first.release_ns
+    );
+    let times = Schema::parse("[u64]").expect("it is a schema");
+    for Entry {
+        what,
+        place,
+        at_ns,
+        value,
+        ..
+    } in of_job
+    {
+        let channel = header.channels.get(usize::from(place));
+        let _ = match (what, channel) {
+            (What::Value | What::Lost, Some(channel)) => {
+                let (role, topic) = (channel.role.name(), visible(&channel.topic));
+                let shown = match what {
+                    What::Lost => "lost".to_string(),
+                    _ => Shown {
+                        schema: &channel.schema,
+                        bytes: value,
+                    }
+                    .to_string(),
+                };
+                let subtask = channel.subtask;
+                writeln!(
+                    text,
+                    "  {at_ns} ns, subtask {subtask}, {role} `{topic}`: {shown}"
+                )
+            }
+            (What::Clock, _) => {
+                let shown = Shown {
+                    schema: &times,
+                    bytes: value,
+                };
+                writeln!(
+                    text,
+                    "  {at_ns} ns, subtask {place}, told the time: {shown}"
+                )
+            }
+            (What::Cut | What::Restart | What::Fault, _) => {
+                writeln!(text, "  {at_ns} ns, subtask {place}: {}", what.name())
+            }
+            _ => writeln!(text, "  {at_ns} ns: {}", what.name()),
+        };
+    }
+    Ok(text)
 }

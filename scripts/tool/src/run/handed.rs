@@ -1,15 +1,27 @@
 //! What is handed to the guest as its boot module: DAGs of a file behind `--wcets`, or else
 //! `--wcets`, `--replay`, `--module` and `--input`, in this order.
+//!
+//! Of the parameters that `--params FILE` and `--set NAME=VALUE,...` tell it, the guest knows the
+//! types and ranges; here only that a word can be made of it all. What `--set` says comes after
+//! the file, and so prevails.
+//!
+//! `--input` and `--output` are about the guest's second serial port, which is an app's wire. A
+//! file of bytes with their times goes to the guest with the boot module, so that runs repeat.
+//! Standard input goes to the port, as it comes. What the guest sends goes to a file.
 
 use std::path::{Path, PathBuf};
 
-use super::wire;
+use replay::shown::{quoted, shown};
+
 use crate::dag_file::Prepared;
-use crate::files::{self, Temporary};
+use crate::files::{self, Named, Temporary};
 use crate::options::{Parsed, Refusal};
-use crate::proof::wcets;
+use crate::outcome::Outcome;
+use crate::proof::observed;
+use crate::qemu::Second;
 use crate::recordings;
 use crate::system;
+use crate::wire_script;
 
 /// Files on their way to the guest.
 pub(super) struct Handed {
@@ -26,13 +38,13 @@ pub(super) struct Handed {
 impl Handed {
     /// Reads the files that the options name, if they do, and writes a module of them.
     pub(super) fn read(options: &Parsed, dags: Option<&Prepared>) -> Result<Handed, Refusal> {
-        let read = |path: &Path| wcets::read(path).map_err(Refusal::Usage);
+        let read = |path: &Path| observed::read(path).map_err(Refusal::Usage);
         let text = options.path("wcets").map(read).transpose()?;
         let text = text.unwrap_or_default();
         let replayed = read_replayed(options)?;
         let own = options.named(&["module"]).first().map(files::read_named);
         let own = own.transpose().map_err(Refusal::Usage)?;
-        let input = wire::script(options)?;
+        let input = script(options)?;
         let is_empty = own.is_none() && text.is_empty() && replayed.is_empty() && input.is_empty();
         let (ending, content) = match dags {
             Some(dags) => ("dag", format!("{text}{}", dags.file).into_bytes()),
@@ -91,10 +103,128 @@ fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     }
 }
 
+/// Returns the guest's word after a blank, if one is wanted.
+pub(super) fn guest_word(options: &Parsed) -> Result<String, Refusal> {
+    let mut parts = Vec::new();
+    if let Some(path) = options.path("params") {
+        let place = files::place(path);
+        let option = "params";
+        let bytes = files::read_named(&Named { option, path }).map_err(Refusal::Usage)?;
+        let text = String::from_utf8_lossy(&bytes);
+        parts.extend(of_file(&text).map_err(|line| Refusal::Usage(format!("{place}:{line}")))?);
+    }
+    if let Some(text) = options.text("set") {
+        for part in text.split(',') {
+            let shown = shown(part);
+            let why = format!("`--set {shown}`: give it as NAME=VALUE, without blanks");
+            parts.push(pair(part).ok_or(Refusal::Usage(why))?);
+        }
+    }
+    Ok(match parts.is_empty() {
+        true => String::new(),
+        false => format!(" set={}", parts.join(",")),
+    })
+}
+
+/// Reads the lines of a file, each `NAME=VALUE`; a `#` begins a comment.
+fn of_file(text: &str) -> Result<Vec<String>, String> {
+    let lines = (1..).zip(text.lines()).map(|(number, line)| {
+        let said = line.split('#').next().unwrap_or_default().trim();
+        (number, said)
+    });
+    let said = lines.filter(|(_, said)| !said.is_empty());
+    said.map(|(number, said)| {
+        pair(said)
+            .ok_or_else(|| format!("{number}: {} is not NAME=VALUE; write it so", quoted(said)))
+    })
+    .collect()
+}
+
+/// Returns `NAME=VALUE` without blanks around, if it is that.
+fn pair(text: &str) -> Option<String> {
+    let (name, value) = text.split_once('=')?;
+    let parts = [name.trim(), value.trim()];
+    let is_word =
+        |part: &str| !part.is_empty() && !part.contains(|c: char| c.is_whitespace() || c == ',');
+    let is_pair = parts.into_iter().all(is_word);
+    is_pair.then(|| parts.join("="))
+}
+
+/// What stands for standard input.
+const STREAM: &str = "-";
+
+/// Reports whether standard input goes to the port.
+pub(super) fn is_live(options: &Parsed) -> bool {
+    options.path("input") == Some(Path::new(STREAM))
+}
+
+/// Returns the file that `--input` names, if it names one.
+pub(super) fn input(options: &Parsed) -> Vec<Named<'_>> {
+    match is_live(options) {
+        true => Vec::new(),
+        false => options.named(&["input"]),
+    }
+}
+
+/// Makes sure that both go with the other options.
+pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
+    let usage = |line: &str| Err(Refusal::Usage(line.into()));
+    if is_live(options) && options.is_given("console") {
+        return usage(
+            "`--input -` and `--console` both take standard input; give one, or a file to --input",
+        );
+    }
+    if options.path("output") == Some(Path::new(STREAM)) {
+        return usage("`--output -`: standard output is the guest's text; name a file");
+    }
+    let wire = options.given_of(&["input", "output"]);
+    match wire.filter(|_| options.is_given("dag")) {
+        Some(name) => Err(Refusal::Usage(format!(
+            "`--{name}` and `--dag` exclude each other: DAGs of a file have no wire; give --app"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Returns the script for the guest of the file that `--input` names; empty if it names none.
+pub(super) fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
+    let Some(path) = options.path("input").filter(|_| !is_live(options)) else {
+        return Ok(Vec::new());
+    };
+    let place = files::place(path);
+    let text = files::read_text(path)
+        .map_err(|why| Refusal::Usage(format!("`--input`: {why}; name another file")))?;
+    let entries = wire_script::read(&text)
+        .map_err(|why| Refusal::Usage(format!("`--input`: {place}:{why}")))?;
+    if entries.is_empty() {
+        let why = format!("`--input {place}`: it has no bytes; write lines such as 4ms \"on\\n\"");
+        return Err(Refusal::Usage(why));
+    }
+    Ok(wire_script::for_guest(&entries))
+}
+
+/// Returns what the port is connected to, if either is given.
+pub(super) fn second(options: &Parsed) -> Option<Second> {
+    let output = options.path("output").map(PathBuf::from);
+    (output.is_some() || options.is_given("input")).then(|| Second {
+        is_live: is_live(options),
+        output,
+    })
+}
+
+/// Returns what to say if the app has no wire, and so nothing was sent.
+pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
+    let file = options.path("output").map(files::place)?;
+    let has_wire = outcome.transcript.of_kind("wire").next().is_some();
+    (!has_wire).then(|| format!("{file}: the app has connected no wire, and so it is empty"))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Handed;
-    use crate::run::{RUN, prepare};
+    use super::super::{RUN, prepare};
+    use super::{Handed, check, of_file, pair, second};
+    use crate::options::Refusal;
+    use crate::qemu::Second;
     use crate::system::workspace;
     use std::fs;
 
@@ -108,5 +238,49 @@ mod tests {
         assert_eq!(fs::read_to_string(&module).unwrap(), dags.file.to_string());
         drop(handed);
         assert!(!module.exists());
+    }
+
+    #[test]
+    fn a_file_has_a_parameter_on_each_line_and_what_cannot_stand_in_a_word_is_none() {
+        let text = "# the attitude loop\ngain = 0.5\n\nsteps=3   # few\n";
+        assert_eq!(of_file(text), Ok(vec!["gain=0.5".into(), "steps=3".into()]));
+        let wrong = "2: `gain 0.5` is not NAME=VALUE; write it so";
+        assert_eq!(of_file("steps=3\ngain 0.5\n"), Err(wrong.into()));
+        for text in "gain;=1;gain=;gain=1 2;ga in=1;gain=1,2;gain=1\n2".split(';') {
+            assert_eq!(pair(text), None, "{text}");
+        }
+        // The value may have what the name has not.
+        assert_eq!(pair("a=b=c").as_deref(), Some("a=b=c"));
+    }
+
+    #[test]
+    fn what_standard_streams_cannot_do_is_refused() {
+        for (line, says) in [
+            ("--input - --console", "`--input -` and `--console` both"),
+            ("--output -", "`--output -`: standard output is"),
+            ("--dag x --output y", "`--output` and `--dag` exclude"),
+        ] {
+            match check(&RUN.right(line)) {
+                Err(Refusal::Usage(why)) => assert!(why.starts_with(says), "{why}"),
+                other => panic!("`{line}`: {other:?}"),
+            }
+        }
+        assert!(check(&RUN.right("--input - --output x")).is_ok());
+    }
+
+    #[test]
+    fn the_port_is_there_if_something_is_connected() {
+        for (line, expected) in [
+            ("--console", None),
+            ("--input a", Some((false, None))),
+            ("--input - --output b", Some((true, Some("b")))),
+            ("--output b", Some((false, Some("b")))),
+        ] {
+            let expected = expected.map(|(is_live, output)| Second {
+                is_live,
+                output: output.map(Into::into),
+            });
+            assert_eq!(second(&RUN.right(line)), expected, "{line}");
+        }
     }
 }

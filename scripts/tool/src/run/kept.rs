@@ -1,19 +1,26 @@
-//! The record of a boot: it comes while the guest runs, is completed with what the guest has
+//! What stays of a boot: its record, views of that, and its serial log.
+//!
+//! The record comes while the guest runs, is completed with what the guest has
 //! said, and is written where the options want it, or views of it are.
 //!
 //! Also if nobody has asked for it, a guest sends what it keeps of its last jobs before a fault;
 //! then the file lies beside the log.
+//!
+//! A log that the person names stays. What was in the file before is lost only to a run:
+//! where the guest refuses its command line, the file is as it was.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use recording::{Chunk, Header, Recording, Writer};
 
+use super::screen::Screen;
+use super::{Booted, handed};
 use crate::dot;
 use crate::files::{self, Temporary};
-use crate::options::Parsed;
+use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
-use crate::proof::witness;
+use crate::proof::report;
 use crate::protocol::Status;
 use crate::qemu::Ending;
 use crate::recordings;
@@ -197,7 +204,112 @@ pub(super) fn write_views(options: &Parsed, outcome: &Outcome) -> Result<Vec<Str
         ));
     }
     if let Some(path) = options.path("witness") {
-        announced.push(witness::write(path, outcome.record()?.proven()?)?);
+        announced.push(report::write(path, outcome.record()?.proven()?)?);
     }
     Ok(announced)
+}
+
+/// Writes what the options want in files of a run, and says so; of a run that has failed it speaks
+/// only of trace and recording.
+pub(super) fn write(
+    options: &Parsed,
+    kept: &Kept,
+    mut outcome: Outcome,
+    log: Log,
+    screen: Screen,
+) -> Result<Booted, Refusal> {
+    kept.receive(&mut outcome)?;
+    for line in kept.write(options, &outcome)? {
+        screen.say(&line);
+    }
+    // Else there are worse news.
+    if outcome.judge().is_ok() {
+        let views = write_views(options, &outcome)?;
+        let warning = handed::warning(options, &outcome);
+        views
+            .iter()
+            .chain(&warning)
+            .for_each(|line| screen.say(line));
+    }
+    Ok(Booted {
+        outcome,
+        log,
+        screen,
+    })
+}
+
+/// The options that name the log, of which one may be given.
+const NAMES: [&str; 1] = ["serial"];
+
+/// The serial log of a run.
+pub(super) struct Log {
+    pub(super) path: PathBuf,
+    /// Whether the person has named it.
+    stays: bool,
+    /// Where the content from before is kept, if there was any.
+    before: Option<PathBuf>,
+}
+
+/// Makes sure that the named log can be read back while it is written.
+pub(super) fn check(options: &Parsed) -> Result<(), String> {
+    for named in options.named(&NAMES) {
+        if fs::metadata(named.path).is_ok_and(|data| !data.is_file()) {
+            let (option, place) = (named.option, files::place(named.path));
+            return Err(format!(
+                "`--{option} {place}`: it is a device or a pipe, and the log is read while it \
+                 is written; name a file"
+            ));
+        }
+    }
+    Ok(())
+}
+
+impl Log {
+    /// Settles where it goes. The file is made when the guest starts.
+    pub(super) fn choose(options: &Parsed, app: &str) -> Result<Log, String> {
+        let own = system::new_log(app)?;
+        let Some(named) = options.named(&NAMES).first().copied() else {
+            return Ok(Log {
+                path: own,
+                stays: false,
+                before: None,
+            });
+        };
+        let own = own.with_extension("before");
+        let has_content = fs::metadata(named.path).is_ok_and(|data| data.len() > 0);
+        if has_content {
+            fs::copy(named.path, &own)
+                .map_err(|error| format!("cannot write `{}`: {error}", own.display()))?;
+        }
+        Ok(Log {
+            path: named.path.into(),
+            stays: true,
+            before: has_content.then_some(own),
+        })
+    }
+
+    /// Removes it, unless the person has named it.
+    pub(super) fn discard(&self) {
+        if !self.stays {
+            // It is ours, and in the way of no one if it cannot be removed.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+
+    /// Leaves the file as it was before, for nothing has run.
+    pub(super) fn restore(&self) {
+        // The person is told of the refusal, which is what matters.
+        let _ = match &self.before {
+            Some(before) => fs::copy(before, &self.path).map(drop),
+            None => fs::remove_file(&self.path),
+        };
+    }
+}
+
+impl Drop for Log {
+    fn drop(&mut self) {
+        if let Some(before) = &self.before {
+            let _ = fs::remove_file(before);
+        }
+    }
 }

@@ -9,24 +9,14 @@
 //! the guest's), 130 a run that a person has ended.
 
 mod boot;
-mod conclusion;
 mod debug;
-mod each;
-mod folder;
-mod gdb;
 mod handed;
 mod kept;
 mod loading;
-mod log;
 mod on_linux;
-mod params;
-mod prove;
 mod screen;
-mod seeing;
-mod status;
+mod several;
 mod table;
-mod wire;
-mod written;
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -35,19 +25,19 @@ use std::time::Duration;
 
 use replay::shown::quoted;
 
+use crate::child::Asked;
 use crate::dag_file::{self, Prepared};
 use crate::files;
 use crate::image;
 use crate::install;
-use crate::iso;
-use crate::options::{Parsed, Refusal};
+use crate::medium;
+use crate::options::{BY_PERSON, Parsed, Refusal};
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
-use crate::qemu::{Mode, Qemu};
-use conclusion::{conclude, go_on};
+use crate::protocol::{Status, Transcript};
+use crate::qemu::{Ending, Mode, Qemu};
 use handed::Handed;
-use kept::Kept;
-use log::Log;
+use kept::{Kept, Log};
 use screen::Screen;
 
 pub use boot::boot;
@@ -75,11 +65,11 @@ pub fn run(words: &[OsString]) -> ExitCode {
 fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     let options = &on_linux::settle(options)?;
     options.check_apart(&APART).map_err(Refusal::Usage)?;
-    if let Some(folder) = dag_file::batch::folder(options) {
-        return folder::run(options, &folder);
+    if let Some(folder) = several::folder(options) {
+        return several::run_folder(options, &folder);
     }
-    if prove::is_asked_for(options) {
-        return prove::run(options);
+    if several::is_asked_for(options) {
+        return several::run(options);
     }
     if let Some(name) = options.given_of(&["margin", "seeds"]) {
         let line = format!("`--{name}` needs `--observe FILE` or `--prove`; give one, too");
@@ -103,18 +93,18 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 
 /// Makes sure of all files that the options name, before any is opened.
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
-    wire::check(options)?;
+    handed::check(options)?;
     let names = [
         "dag", "module", "replay", "image", "qemu", "wcets", "params",
     ];
     let mut inputs = options.named(&names);
-    inputs.extend(wire::input(options));
+    inputs.extend(handed::input(options));
     let outputs = [
         "serial", "trace", "record", "keep", "dot", "witness", "observe", "output",
     ];
     let outputs = options.named(&outputs);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
-    log::check(options).map_err(Refusal::Usage)
+    kept::check(options).map_err(Refusal::Usage)
 }
 
 /// A guest that has been booted and has ended, somehow.
@@ -137,7 +127,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     install::ensure_loader(loading::chosen(options))?;
 
     let handed = Handed::read(options, dags)?;
-    let parameters = params::guest_word(options)?;
+    let parameters = handed::guest_word(options)?;
     let kept = Kept::new(options, &app)?;
     let describe = |mode| {
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
@@ -152,7 +142,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let longest = describe(named.unwrap_or(Mode::Deterministic));
     longest.check_words().map_err(Refusal::Usage)?;
     if longest.loader.is_grub() {
-        iso::check_words(&longest.guest_words).map_err(Refusal::Usage)?;
+        medium::check_words(&longest.guest_words).map_err(Refusal::Usage)?;
     }
     let log = Log::choose(options, &app)?;
     let image = match options.path("image") {
@@ -160,7 +150,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         None => image::build(&app)?.path,
     };
     // A person needs time to type, and a firmware takes long where instructions are counted.
-    let is_live = options.is_given("console") || wire::is_live(options);
+    let is_live = options.is_given("console") || handed::is_live(options);
     let otherwise = match is_live || longest.loader.needs_stick() {
         true => Mode::Threads,
         false => Mode::Deterministic,
@@ -178,10 +168,10 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
             screen.show(translated.as_deref().unwrap_or(line));
         }
     };
-    let talk = seeing::relay(options, &log.path);
+    let talk = screen::relay(options, &log.path);
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
     screen.end();
-    written::write(options, &kept, outcome?, log, screen)
+    kept::write(options, &kept, outcome?, log, screen)
 }
 
 /// Settles which app runs: the one that the options name, which a given image must be of,
@@ -230,8 +220,8 @@ fn describe(
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
-    words.extend(seeing::guest_words(options));
-    words.extend(prove::bounds_word(options));
+    words.extend(screen::guest_words(options));
+    words.extend(several::bounds_word(options));
     words.extend(options.text("append").map(String::from));
     Qemu {
         program: program.into(),
@@ -244,8 +234,8 @@ fn describe(
         module: None,
         records: None,
         has_input: options.is_given("console"),
-        stops: seeing::can_stop(options),
-        second: wire::second(options),
+        stops: screen::can_stop(options),
+        second: handed::second(options),
         logs_instructions: false,
         debugger: options.is_given("gdb").then(|| "tcp::1234".into()),
     }
@@ -280,4 +270,86 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
         screen.say("waiting for a debugger: `gdb IMAGE -ex 'target remote :1234'`");
     }
     screen.say("");
+}
+
+/// Says how a run has ended, and returns the exit code.
+fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitCode {
+    let Booted {
+        outcome,
+        log,
+        screen,
+    } = booted;
+    let by_person = outcome.asked == Some(Asked::ByPerson);
+    let Err(fault) = outcome.judge() else {
+        let (how, code) = match by_person {
+            true => ("ended by ctrl-C, in order,", ExitCode::from(BY_PERSON)),
+            false => ("well ended", ExitCode::SUCCESS),
+        };
+        let seconds = outcome.elapsed.as_secs_f64();
+        screen.say(&format!("\n{how} after {seconds:.1} s"));
+        log.discard();
+        return code;
+    };
+    if several::refused(options, &fault.reason) {
+        log.restore();
+        return ExitCode::from(2);
+    }
+    if fault.status == Status::Usage {
+        let of_file = dags.and_then(|dags| dags.translate(&fault.reason));
+        let who = if on_linux::is_asked_for(options) {
+            "app"
+        } else {
+            "guest"
+        };
+        let lines = of_file
+            .unwrap_or_else(|| format!("the {who} refused its command line: {}", fault.reason));
+        let draws_nothing = options.is_given("seeds") && fault.reason.starts_with("`seed`");
+        let remedy = match draws_nothing {
+            true => "; this app draws nothing by a seed: leave `--seeds` out",
+            false => "",
+        };
+        log.restore();
+        return RUN.refuse(&(lines + remedy));
+    }
+    match outcome.transcript.verdict() {
+        // The screen has shown all that it said.
+        Ok(_) => eprintln!("the serial log is {}", outcome.log.display()),
+        Err(_) => eprint!("{}", outcome.tail()),
+    }
+    let remedy = match outcome.ending {
+        Ending::TimedOut { .. } => format!(
+            "{}; `--timeout SECONDS` gives it longer, and a subtask that never returns is ended \
+             if it has a WCET or a budget",
+            stalled(&outcome.transcript)
+        ),
+        Ending::Guest(Status::Success) if matches!(outcome.asked, Some(Asked::ByLimit(_))) => {
+            "; `--timeout SECONDS` gives it longer".into()
+        }
+        _ => String::new(),
+    };
+    let code = RUN.fail(&format!("failed: {}{remedy}", fault.reason));
+    if by_person {
+        return ExitCode::from(BY_PERSON);
+    }
+    code
+}
+
+/// Goes on to the next run, unless a person has ended this one.
+fn go_on(booted: &Booted) -> Result<(), Refusal> {
+    match booted.outcome.asked {
+        Some(Asked::ByPerson) => Err(Refusal::ByPerson),
+        _ => Ok(()),
+    }
+}
+
+/// Names the subtasks that the guest has found to keep their cores, if it has.
+fn stalled(transcript: &Transcript) -> String {
+    let named = transcript.of_kind("stalled").filter_map(|line| {
+        let (subtask, dag) = (line.text_at("subtask_name")?, line.text_at("dag_name")?);
+        let ms = line.number_at("still_ns")? / 1_000_000;
+        Some(format!(
+            "; subtask `{subtask}` of dag `{dag}` kept its core for more than {ms} ms of its time"
+        ))
+    });
+    named.collect()
 }

@@ -6,18 +6,19 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use super::{Booted, limit, prove, table, wire, written};
+use super::Booted;
+use super::handed::{self, Handed};
+use super::kept::{self, Kept, Log};
+use super::screen::Screen;
+use super::table;
+use super::{limit, several};
+
 use crate::dag_file::Prepared;
 use crate::debian::{Guest, Order};
 use crate::image;
 use crate::options::{Parsed, Refusal};
 use crate::program;
 use crate::qemu::{Ending, Mode};
-
-use super::handed::Handed;
-use super::kept::{self, Kept};
-use super::log::Log;
-use super::screen::Screen;
 
 /// The options that are about QEMU, its guest, or what the kernel alone does.
 const FOREIGN: [&str; 6] = ["boot", "gdb", "latest", "machine", "memory", "qemu"];
@@ -63,7 +64,7 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
             format!("`--{name}` is not for `--on {on}`; leave it out, or give `--on {place}`");
         return Err(Refusal::Usage(line));
     }
-    if options.is_given("input") && !wire::is_live(options) {
+    if options.is_given("input") && !handed::is_live(options) {
         let line = "`--input FILE` is for the bare machine, which can repeat its times; with \
             `--on linux` give `--input -`";
         return Err(Refusal::Usage(line.into()));
@@ -149,7 +150,7 @@ pub(super) fn run_app(
     let order = program::Order {
         program: &image,
         words: &words,
-        is_live: wire::is_live(options) || options.is_given("console"),
+        is_live: handed::is_live(options) || options.is_given("console"),
         stops: true,
         log: &log.path,
         limit,
@@ -173,7 +174,7 @@ pub(super) fn run_app(
     if let (Some(guest), Ending::Program(why)) = (&guest, &mut outcome.ending) {
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
-    written::write(options, &kept, outcome, log, screen)
+    kept::write(options, &kept, outcome, log, screen)
 }
 
 /// Says which program is run, and what its times are worth.
@@ -216,9 +217,9 @@ fn words(options: &Parsed, dags: Option<&Prepared>) -> Vec<OsString> {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
-    words.extend(prove::bounds_word(options));
+    words.extend(several::bounds_word(options));
     words.extend(options.is_given("console").then(|| "console=on".into()));
-    words.extend(wire::is_live(options).then(|| "input=-".into()));
+    words.extend(handed::is_live(options).then(|| "input=-".into()));
     words.extend(options.text("output").map(|path| format!("output={path}")));
     let more = options.text("append").unwrap_or_default();
     words.extend(more.split_whitespace().map(String::from));

@@ -1,4 +1,4 @@
-//! What a person (or a program) sees of a run while it goes on.
+//! What a person (or a program) sees of a run while it goes on, and says to it.
 //!
 //! Lines for people and machine lines go to standard output in the order of
 //! the serial log, so that `grep '^{'` works there as on the log itself.
@@ -6,15 +6,24 @@
 //! that is a terminal, and otherwise a line each tenth of the way. Status lines
 //! take its place on a terminal. A fault at an address gets a line of our own that
 //! names the function.
+//!
+//! The console's input comes from standard input, byte by byte; the terminal
+//! itself shows and edits the line. The status is asked for only where a person
+//! looks: what a guest prints changes its times, and a run whose output goes to a
+//! file or a pipe must not depend on who started it.
 
-use std::path::Path;
+use std::fs;
+use std::io::{ErrorKind, IsTerminal, Read, Write, stdin, stdout};
+use std::path::{Path, PathBuf};
+use std::process::ChildStdin;
+use std::thread;
+use std::time::{Duration, Instant};
 
+use super::handed;
 use crate::options::Parsed;
 use crate::places::Places;
 use crate::protocol::{MachineLine, read_line};
 use crate::system;
-
-use super::status::StatusLine;
 
 /// The width of the bar.
 const BAR: u64 = 30;
@@ -123,5 +132,168 @@ impl Screen {
             self.tenths_shown = part_of(10);
             eprintln!("progress: {done} of {total} jobs");
         }
+    }
+}
+
+/// The longest line, so that a narrow terminal does not break it.
+const WIDTH: usize = 100;
+
+/// What is known of a run's speed.
+#[derive(Debug, Default)]
+pub(super) struct StatusLine {
+    /// When the first line came, and the run's time in it.
+    first: Option<(Instant, u64)>,
+}
+
+impl StatusLine {
+    /// Says in one line how the run does; `None` if the machine line does not.
+    pub(super) fn text(&mut self, line: &MachineLine) -> Option<String> {
+        let now = Instant::now();
+        let time_ns = line.number_at("time_ns")?;
+        let (since, since_ns) = match self.first {
+            // Another run of the same boot begins at 0 again.
+            Some(first) if first.1 <= time_ns => first,
+            _ => *self.first.insert((now, time_ns)),
+        };
+        let wall_ns = u64::try_from((now - since).as_nanos()).unwrap_or(u64::MAX);
+        describe(line, wall_ns, time_ns - since_ns)
+    }
+}
+
+/// Does so, `wall_ns` of our time after `run_ns` of the run's time have passed.
+fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
+    let (done, total) = (line.number_at("done")?, line.number_at("total")?);
+    let misses = line.number_at("misses")?;
+    let jobs = match total {
+        0 => format!("{done} jobs"),
+        _ => format!("{done} of {total} jobs"),
+    };
+    let mut text = format!("{jobs}, {misses} missed");
+    let loads = line.value.get("load_permille")?.elements();
+    let percent = |load: &crate::json::Value| Some((load.as_u64()? + 5) / 10);
+    let loads: Vec<String> = loads
+        .iter()
+        .filter_map(percent)
+        .map(|load| load.to_string())
+        .collect();
+    if !loads.is_empty() {
+        text += &format!(", load {} %", loads.join(" "));
+    }
+    if let Some(left_ns) = line.number_at("left_ns").filter(|_| run_ns > 0) {
+        let left_ns = u128::from(left_ns) * u128::from(wall_ns) / u128::from(run_ns);
+        text += &format!(", {} s left", left_ns.div_ceil(1_000_000_000));
+    }
+    if text.len() > WIDTH {
+        text.truncate(text.floor_char_boundary(WIDTH - 2));
+        text += "..";
+    }
+    Some(text)
+}
+
+/// Returns the guest's words for what the options ask for.
+pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
+    let mut words = Vec::new();
+    if options.is_given("console") {
+        words.push("console=on".into());
+    } else {
+        words.extend(can_stop(options).then(|| "console=stop".into()));
+        words.extend(is_watched(options).then(|| "status=1".into()));
+    }
+    words
+}
+
+/// Reports whether the guest can be asked to end: not where standard input goes to its other port,
+/// since QEMU has one such way in.
+pub(super) fn can_stop(options: &Parsed) -> bool {
+    let says_otherwise = options
+        .text("append")
+        .is_some_and(|words| words.contains("console="));
+    !handed::is_live(options) && !says_otherwise
+}
+
+/// Reports whether a person watches, and does not talk meanwhile.
+fn is_watched(options: &Parsed) -> bool {
+    let is_silent = options.given_of(&["quiet", "json", "gdb"]).is_some();
+    stdout().is_terminal() && system::stderr_moves() && !is_silent
+}
+
+/// Hands standard input on to the guest's serial port, until either ends. At its end a console's
+/// last line is ended, too; a run without end is shut down then, for nobody can do so
+/// any more.
+///
+/// Begins when the guest has written into `log`: its serial port loses what comes before
+/// it is set up.
+pub(super) fn relay(options: &Parsed, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
+    let log = log.to_path_buf();
+    let is_read = options.is_given("console") || handed::is_live(options);
+    let farewell = match options.number("jobs") {
+        _ if !options.is_given("console") => "",
+        Some(0) => "\nshutdown\n",
+        _ => "\n",
+    };
+    move |input| {
+        if let Some(input) = input.filter(|_| is_read) {
+            hand_on(input, log, farewell);
+        }
+    }
+}
+
+fn hand_on(mut input: ChildStdin, log: PathBuf, farewell: &'static str) {
+    // The thread is not waited for: it may stand in a read for ever, and ends with
+    // the tool.
+    thread::spawn(move || {
+        let mut bytes = [0; 256];
+        // A log that is gone is that of a guest that has ended.
+        while fs::metadata(&log).is_ok_and(|log| log.len() == 0) {
+            thread::sleep(Duration::from_millis(10));
+        }
+        loop {
+            match stdin().read(&mut bytes) {
+                Ok(0) => {
+                    // The guest may have ended before.
+                    let _ = input.write_all(farewell.as_bytes());
+                    let _ = input.flush();
+                    break;
+                }
+                Ok(count) => {
+                    let sent = input.write_all(&bytes[..count]);
+                    if sent.and_then(|()| input.flush()).is_err() {
+                        break;
+                    }
+                }
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => break,
+            }
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{WIDTH, describe};
+    use crate::protocol::read_line;
+
+    fn described(rest: &str, wall_ns: u64, run_ns: u64) -> Option<String> {
+        let text = format!("{{\"kind\":\"status\",\"time_ns\":5000000000,\"done\":12,{rest}}}");
+        let line = read_line(1, &text).expect("a machine line");
+        describe(&line.expect("good"), wall_ns, run_ns)
+    }
+
+    #[test]
+    fn says_jobs_misses_load_and_time_left_as_far_as_they_are_known() {
+        let full =
+            "\"total\":60,\"misses\":3,\"load_permille\":[894,1000,4],\"left_ns\":9000000000";
+        let text = described(full, 2_000_000_000, 3_000_000_000);
+        let expected = "12 of 60 jobs, 3 missed, load 89 100 0 %, 6 s left";
+        assert_eq!(text.as_deref(), Some(expected));
+        // At the first line nothing is known of the speed.
+        let expected = expected.strip_suffix(", 6 s left");
+        assert_eq!(described(full, 0, 0).as_deref(), expected);
+        let endless = "\"total\":0,\"misses\":0,\"load_permille\":[]";
+        let expected = Some("12 jobs, 0 missed");
+        assert_eq!(described(endless, 1, 1).as_deref(), expected);
+        let loads = ["1000"; 64].join(",");
+        let many = format!("\"total\":60,\"misses\":3,\"load_permille\":[{loads}]");
+        assert_eq!(described(&many, 1, 1).map(|it| it.len()), Some(WIDTH));
     }
 }

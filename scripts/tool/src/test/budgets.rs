@@ -13,8 +13,7 @@ use std::fs;
 use std::mem;
 use std::path::Path;
 
-use super::own::Source;
-use super::tally::none_of;
+use super::{Source, none_of};
 use crate::golden::Golden;
 use crate::system::workspace;
 

@@ -1,15 +1,19 @@
 //! Checks: properties of the whole tree, each counted as one test.
 //!
-//! They hold the promises that no unit test can: the image's weight, no package from
-//! elsewhere, no file too long, layers in order, no crate beyond its budget of lines, nothing for the formatter, the linter
+//! They hold the promises that no unit test can: no package from elsewhere, no file too long,
+//! layers in order, no crate beyond its budget of lines, nothing for the formatter, the linter
 //! and the documentation to complain of, a hand-off of no more instructions than its
 //! baseline, and a guest under KVM where KVM works. They judge the project's own packages.
+//!
+//! Room for what the tests are built into is looked for before anything is built: a disk
+//! that is full in the middle shows as an error of the linker, or as a guest without log.
 
+use std::env;
 use std::fs;
+use std::path::Path;
+use std::process::Command;
 
-use super::own::Source;
-use super::tally::{Tally, Why, none_of};
-use super::{Plan, budgets, layers, own};
+use super::{Plan, Source, Tally, Why, budgets, layers, none_of, packages};
 use crate::bench::hand_off;
 use crate::image;
 use crate::probe;
@@ -92,7 +96,7 @@ fn cargo(sources: &[Source], words: &str, remedy: &str) -> Result<(), String> {
     let mut command = system::cargo();
     let mut each = words.split(' ');
     command.args(each.next());
-    for package in own::packages(sources) {
+    for package in packages(sources) {
         command.args(["-p", &package]);
     }
     command.args(each).env("RUSTDOCFLAGS", "-D warnings");
@@ -142,9 +146,52 @@ fn complain(
     none_of(faults.collect())
 }
 
+/// What all tests and images, built from nothing, take at most, in MiB.
+const NEEDED_MIB: u64 = 3 << 10;
+
+/// Makes sure that there is room. If that cannot be known, it says so and no more.
+///
+/// # Errors
+///
+/// One sentence: how much is missing where, and the remedy.
+pub(super) fn check() -> Result<(), String> {
+    // The tool itself lies in the target folder, whatever cargo was told of it.
+    let tool = env::current_exe().unwrap_or_default();
+    let folder = tool.parent().unwrap_or(Path::new("."));
+    let answer = Command::new("df").arg("-Pk").arg(folder).output();
+    let free = answer.map(|answer| free_mib(&String::from_utf8_lossy(&answer.stdout)));
+    let Ok(Some(free_mib)) = free else {
+        let place = folder.display();
+        eprintln!("test: `df -Pk {place}` does not say how much is free; 3 GiB are needed");
+        return Ok(());
+    };
+    judge(free_mib, folder)
+}
+
+fn judge(free_mib: u64, folder: &Path) -> Result<(), String> {
+    if free_mib >= NEEDED_MIB {
+        return Ok(());
+    }
+    Err(format!(
+        "{free_mib} MiB are free where `{}` is, and building all tests takes up to {NEEDED_MIB}; \
+         remove something, or set CARGO_TARGET_DIR to a folder on another disk",
+        folder.display()
+    ))
+}
+
+/// Reads how much is available, in MiB, from what `df -Pk` says of one folder (POSIX,
+/// `df`, under STDOUT): the number before the percentage. Names may contain blanks.
+fn free_mib(said: &str) -> Option<u64> {
+    let mut words = said.lines().nth(1)?.split_whitespace().rev();
+    words.find(|word| word.ends_with('%'))?;
+    let kib: u64 = words.next()?.parse().ok()?;
+    Some(kib >> 10)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::foreign;
+    use super::{foreign, free_mib, judge};
+    use std::path::Path;
 
     #[test]
     fn a_package_from_a_registry_is_named() {
@@ -153,5 +200,22 @@ mod tests {
         let with = format!("{own}\n[[package]]\nname = \"libc\"\nsource = \"registry+x\"\n");
         let fault = foreign(&with).unwrap_err();
         assert_eq!(fault, "packages of others: libc; do without them");
+    }
+
+    #[test]
+    fn what_df_says_is_read_and_a_full_disk_is_told_with_its_place_and_the_remedy() {
+        let free = |line: &str| free_mib(&format!("Filesystem 1024-blocks Used\n{line}\n"));
+        let usual = "/dev/vda1 264212084 20036928 75248960      22% /";
+        assert_eq!(free(usual), Some(73_485));
+        let odd = "a b:/c 264212084 20036928 1023 100% /with a blank";
+        assert_eq!(free(odd), Some(0));
+        assert_eq!(
+            free("none 0 0 0 - /proc").or(free("")).or(free_mib("")),
+            None
+        );
+        assert_eq!(judge(3072, Path::new("/x")), Ok(()));
+        let line = judge(12, Path::new("/x")).unwrap_err();
+        assert!(line.starts_with("12 MiB are free where `/x` is"), "{line}");
+        assert!(line.contains("set CARGO_TARGET_DIR"), "{line}");
     }
 }

@@ -15,8 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::own::Source;
-use super::tally::none_of;
+use super::{Source, none_of};
 use crate::system::workspace;
 
 /// Where the table stands: the page, and the heading right above it.

@@ -9,8 +9,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use super::Plan;
-use super::tally::{Tally, Why};
+use super::{Plan, Tally, Why};
 use crate::child::{Child, Waited, bound_to_us};
 use crate::golden;
 use crate::install::{self, Need};

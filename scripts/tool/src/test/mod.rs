@@ -8,26 +8,28 @@
 //!
 //! Nothing passes by not running: a test binary that does not compile, dies
 //! without its result line, or does not end within its time is a failure.
+//!
+//! The checks judge the project's own packages. An app that somebody makes here need not follow the
+//! project's rules on lints, format and files, only pass its tests. A package takes the rules on
+//! itself by one thing: by taking the workspace's lints.
 
 mod budgets;
 mod checks;
-mod disk;
 mod layers;
 mod libtest;
-mod own;
-mod tally;
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
+use std::fmt;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
-use crate::image;
+use crate::image::{self, package_name};
 use crate::install;
 use crate::options::{Command, Refusal, Takes, options};
 use crate::system;
-use own::Source;
-use tally::Tally;
 
 /// The table of `test`.
 pub static TEST: Command = Command {
@@ -82,7 +84,7 @@ impl Plan {
 #[must_use]
 pub fn test(words: &[OsString]) -> ExitCode {
     TEST.carry_out(words, |options| {
-        disk::check()?;
+        checks::check()?;
         let list = options.is_given("bless");
         let list = list.then(|| system::new_log("blessed"));
         let plan = Plan {
@@ -93,7 +95,7 @@ pub fn test(words: &[OsString]) -> ExitCode {
             blessed: list.transpose()?,
         };
         let mut tally = Tally::default();
-        let sources = own::sources();
+        let sources = sources();
         build_images(&plan, &sources, &mut tally);
         libtest::run_all(&plan, &mut tally);
         checks::run_all(&plan, &sources, &mut tally);
@@ -135,7 +137,7 @@ fn build_images(plan: &Plan, sources: &[Source], tally: &mut Tally) {
     if plan.quick {
         return;
     }
-    let own = own::packages(sources);
+    let own = packages(sources);
     for app in image::apps() {
         let most = own.contains(&app).then(|| image::most_stripped_bytes(&app));
         let name = match most {
@@ -157,9 +159,191 @@ fn build_image(app: &str, most: u64) -> Result<(), String> {
     Err(format!("it weighs {bytes} bytes, {most} are allowed"))
 }
 
+/// Why a check has not passed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Why {
+    /// It failed.
+    Failed(String),
+    /// It could not run.
+    Skipped(String),
+}
+
+impl From<String> for Why {
+    fn from(why: String) -> Why {
+        Why::Failed(why)
+    }
+}
+
+/// Reports that there are no faults, or which there are.
+fn none_of(faults: Vec<String>) -> Result<(), String> {
+    match faults.is_empty() {
+        true => Ok(()),
+        false => Err(faults.join("; ")),
+    }
+}
+
+/// A file: its name from the workspace's root, and its text.
+#[derive(Debug, PartialEq, Eq)]
+struct Source {
+    name: String,
+    text: String,
+}
+
+/// Returns all files of the workspace but the generated ones, and but those of packages that
+/// are not the project's own; sorted.
+fn sources() -> Vec<Source> {
+    below(system::workspace())
+}
+
+/// Returns the names of the packages whose files these are, sorted.
+fn packages(sources: &[Source]) -> Vec<String> {
+    let manifests = sources.iter().filter(|it| it.name.ends_with("Cargo.toml"));
+    let mut names: Vec<String> = manifests.filter_map(|it| package_name(&it.text)).collect();
+    names.sort();
+    names
+}
+
+fn below(root: &Path) -> Vec<Source> {
+    let files = system::files_below(root, |folder| {
+        let manifest = fs::read_to_string(folder.join("Cargo.toml"));
+        manifest.map_or(true, |text| {
+            package_name(&text).is_none() || takes_lints(&text)
+        })
+    });
+    let source = |file: &Path| Source {
+        name: file
+            .strip_prefix(root)
+            .unwrap_or(file)
+            .display()
+            .to_string(),
+        // One that cannot be read has no essay.
+        text: String::from_utf8_lossy(&fs::read(file).unwrap_or_default()).into_owned(),
+    };
+    files.iter().map(|file| source(file)).collect()
+}
+
+fn takes_lints(manifest: &str) -> bool {
+    let lints = manifest.split("\n[lints]").nth(1);
+    let lines = lints.into_iter().flat_map(str::lines);
+    let mut of_lints = lines.skip(1).take_while(|line| !line.starts_with('['));
+    of_lints.any(|line| line.replace(' ', "") == "workspace=true")
+}
+
+/// The count, and the names behind it.
+#[derive(Debug, Default)]
+struct Tally {
+    passed: u64,
+    failures: Vec<String>,
+    skips: Vec<String>,
+    blessed: BTreeSet<String>,
+}
+
+impl Tally {
+    /// Runs a check, counts it, and says on standard output how it went and how long it took.
+    fn run(&mut self, name: &str, check: impl FnOnce() -> Result<(), Why>) {
+        let start = Instant::now();
+        let result = check();
+        let seconds = start.elapsed().as_secs_f64();
+        match result {
+            Ok(()) => {
+                println!("{name}: ok in {seconds:.1} s");
+                self.passed += 1;
+            }
+            Err(Why::Failed(why)) => {
+                println!("{name}: FAILED: {why}");
+                self.fail(name, &why);
+            }
+            Err(Why::Skipped(why)) => self.skip(name, &why),
+        }
+    }
+
+    /// Counts tests that passed.
+    fn pass(&mut self, tests: u64) {
+        self.passed += tests;
+    }
+
+    /// Counts a failure.
+    fn fail(&mut self, name: &str, why: &str) {
+        let first = why.lines().next().unwrap_or_default();
+        self.failures.push(format!("{name}: {first}"));
+    }
+
+    /// Counts something that could not run.
+    fn skip(&mut self, name: &str, why: &str) {
+        self.skips.push(format!("{name}: {why}"));
+    }
+
+    /// Notes the files of a list, a line each, as rewritten.
+    fn bless(&mut self, list: &str) {
+        self.blessed.extend(list.lines().map(String::from));
+    }
+
+    /// Returns whether anything failed.
+    fn has_failed(&self) -> bool {
+        !self.failures.is_empty()
+    }
+
+    /// Returns whether anything passed or failed, rather than being skipped.
+    fn has_run(&self) -> bool {
+        self.passed > 0 || self.has_failed()
+    }
+
+    /// Returns whether nothing was counted at all.
+    fn is_empty(&self) -> bool {
+        !self.has_run() && self.skips.is_empty()
+    }
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f)?;
+        for skip in &self.skips {
+            writeln!(f, "skipped: {skip}")?;
+        }
+        for failure in &self.failures {
+            writeln!(f, "failed: {failure}")?;
+        }
+        for file in &self.blessed {
+            writeln!(f, "blessed: {file}; read `git diff`")?;
+        }
+        write!(f, "{} passed, {} failed", self.passed, self.failures.len())?;
+        match self.skips.len() {
+            0 => writeln!(f),
+            skipped => writeln!(f, ", {skipped} skipped"),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Tally, complaint};
+    use super::{Tally, Why, below, complaint, packages, sources};
+    use std::fs;
+
+    #[test]
+    fn an_app_of_ones_own_is_not_judged_and_all_packages_of_the_project_are() {
+        let root = std::env::temp_dir().join(format!("own-{}", std::process::id()));
+        for (name, lints) in [("ours", "[lints]\nworkspace = true\n"), ("theirs", "")] {
+            let folder = root.join("apps").join(name);
+            fs::create_dir_all(folder.join("src")).unwrap();
+            let manifest = format!("[package]\nname = \"{name}\"\n\n{lints}");
+            fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+            fs::write(folder.join("src/lib.rs"), "").unwrap();
+        }
+        let found = below(&root);
+        assert_eq!(packages(&found), ["ours"]);
+        let names: Vec<&str> = found.iter().map(|source| &*source.name).collect();
+        assert_eq!(names, ["apps/ours/Cargo.toml", "apps/ours/src/lib.rs"]);
+        fs::remove_dir_all(root).unwrap();
+
+        let packages = packages(&sources());
+        let some = "sched-dag fass kernel boot-link tool harness fork-join";
+        let missing = some
+            .split(' ')
+            .find(|name| !packages.iter().any(|own| own == name));
+        assert_eq!(missing, None, "{packages:?}");
+        let template = include_str!("../../template/manifest.toml");
+        assert!(!super::takes_lints(template));
+    }
 
     #[test]
     fn a_filter_by_which_nothing_has_run_is_named() {
@@ -172,5 +356,22 @@ mod tests {
         assert_eq!(complaint(None, &tally), None);
         tally.fail("a", "b");
         assert_eq!(complaint(Some("boot"), &tally), None);
+    }
+
+    #[test]
+    fn the_last_line_counts_and_the_reasons_stand_above() {
+        let mut tally = Tally::default();
+        assert!(tally.is_empty());
+        tally.pass(12);
+        assert!(!tally.is_empty());
+        assert_eq!(tally.to_string(), "\n12 passed, 0 failed\n");
+        tally.run("a check", || Ok(()));
+        tally.run("a::b", || Err("left is not right\nmore".to_string().into()));
+        tally.run("c", || Err(Why::Skipped("there is no /dev/kvm".into())));
+        tally.bless("b.md\na.md\nb.md\n");
+        let expected = "\nskipped: c: there is no /dev/kvm\nfailed: a::b: left is not right\n\
+                        blessed: a.md; read `git diff`\nblessed: b.md; read `git diff`\n\
+                        13 passed, 1 failed, 1 skipped\n";
+        assert_eq!(tally.to_string(), expected);
     }
 }

@@ -4,31 +4,55 @@
 //! [`sched_dag::law`], which judges all runs, within a stated *bound*, because a decision
 //! takes effect after an interrupt.
 //!
-//! Here are besides: the [`figures`], from `view`, which puts a run in the order of
-//! time; `chains`, how long effects take from DAG to DAG; [`command`], the subcommand, and [`report`], what it prints; and [`viewer`],
-//! which draws a run instead of judging it.
+//! Here are besides: the subcommand `check-trace`; the [`Figures`], from a `View`, which puts a
+//! run in the order of time; how long effects take from DAG to DAG ([`sched_dag::chains`]); and
+//! [`viewer`], which draws a run instead of judging it. All files are read before the first run
+//! is judged, so that a damaged one does not hide behind the breaches of another.
 //!
 //! If events were lost, they were the oldest, and only what came after the instant of the
 //! first one that is left is judged. An instance that has not finished when the trace
 //! ends breaks no rule, unless the run says that it is complete.
+//!
+//! A trace tells in numbers:
+//!
+//! - *finish to ready*: from the finish that was the last thing an instance
+//!   waited for to its readiness; the largest.
+//! - *ready to start*: from readiness to the function's call, of instances for
+//!   which a core was idle when they became ready, unless another instance with
+//!   a smaller key became ready meanwhile and took it.
+//! - *preemption latency*: from the scheduler's request that a core run an
+//!   instance to that instance's start or resumption there. A request that is
+//!   overtaken, by another one for the core or because the instance runs
+//!   elsewhere, does not count.
+//! - *longest inversion*: the longest time for which an instance that should
+//!   have run by R5 waited while one of lower priority ran or a core was idle.
+//! - *load*: the part of the time from the first event to the last for which a
+//!   core had an instance, in thousandths.
+//!
+//! A trace is *complete from* the first instant after the first event that is left; what
+//! happened before is left out.
 
-mod chains;
-pub mod command;
-pub mod figures;
-pub mod report;
-#[cfg(test)]
-mod tests;
-mod view;
 pub mod viewer;
 
-use sched_dag::law::{self, Violation};
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fmt::Write;
+use std::path::Path;
+use std::process::ExitCode;
 
-use crate::record::{Record, Run};
-use figures::Figures;
-use view::View;
+use sched_dag::chains::{Chain, Place};
+use sched_dag::journal::{Event, What};
+use sched_dag::law::sweep::Waits;
+use sched_dag::law::{self, Distribution, Violation};
+use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
 
-pub use command::{CHECK_TRACE, check_trace};
-pub use viewer::{TRACE, trace};
+use crate::files;
+use crate::json::{Object, quoted};
+use crate::options::{Command, Parsed, Refusal, Takes, nearest, options};
+use crate::record::{Record, Run, bound};
+
+pub use viewer::TRACE;
+pub use viewer::trace;
 
 /// What a run's trace shows.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,6 +85,615 @@ pub fn check(run: &Run, bound_ns: u64) -> Findings {
     breaches.sort_by_key(|breach| (breach.time_ns(), breach.rule()));
     Findings {
         breaches,
-        figures: figures::compute(&view, verdict.finish_to_ready_max_ns, dispatch.waits),
+        figures: compute(&view, verdict.finish_to_ready_max_ns, dispatch.waits),
     }
 }
+
+/// The table of `check-trace`.
+pub static CHECK_TRACE: Command = Command {
+    invocation: "./scripts/check-trace",
+    about: "Replays the traces of runs against the model's rules and reports each breach.",
+    positional: Some((
+        Takes::File("FILE..."),
+        "Serial logs, or other files of JSON lines, with traces: \
+         `./scripts/run --trace FILE` makes one.",
+    )),
+    options: options! {
+        /// Microseconds for which an instance may wait for what it is owed, because a decision
+        /// takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 by fifo, 10000
+        /// by sched_ext, 100000 where nothing is preempted, else 1000.
+        "bound-us": Takes::number(0..=1_000_000_000);
+        /// Breaches of a run to be shown; all are counted.
+        "show": Takes::number(0..=u64::MAX), or "20";
+        /// Only the chains that begin with this subtask; with --to.
+        "from": Takes::Text("DAG/SUBTASK");
+        /// Only the chains that end with this subtask; with --from.
+        "to": Takes::Text("DAG/SUBTASK");
+        /// Only the machine lines on standard output, the rest on standard error.
+        "json": Takes::Nothing;
+    },
+    notes: "\
+rules:
+  R1 release              nothing of a job before O + kT
+  R2 join                 after all predecessors and the subtask's own job before
+  R3 completion boundary  all that waits for a finish is released in its step
+  R4 completion           complete with the last finish; missed if that is late
+  R5 dispatch             the smallest keys run; no core idles while one waits
+  one life                an instance starts and finishes once, on one core at a time
+  one core                a core runs one instance at a time
+
+chains: from a source to a sink, from DAG to DAG by samples of latest values
+  age of an output        from the release that it goes back to, to its finish
+  data age                the same, to the finish of the next output
+  reaction time           from what a release just misses to the first output of it
+
+For each run there is a machine line of kind `trace_check`, and one of kind `chain`
+for each chain; docs/trace-format.md explains them.
+
+exit codes: 0 no breach; 1 some; 2 a refused command line, or a file without a
+well-formed trace with events
+",
+};
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn check_trace(words: &[OsString]) -> ExitCode {
+    CHECK_TRACE.carry_out(words, |options| {
+        let breaches = judge_all(options).map_err(Refusal::Usage)?;
+        Ok(ExitCode::from(u8::from(breaches > 0)))
+    })
+}
+
+/// Judges the runs of all files, and returns how many breaches there are.
+fn judge_all(options: &Parsed) -> Result<usize, String> {
+    if options.files().len() == 0 {
+        return Err("which files? name at least one serial log with a trace".into());
+    }
+    files::check_once(options.files())?;
+    let mut runs = Vec::new();
+    for file in options.files() {
+        let found = read_file(file)?.into_iter();
+        runs.extend(found.map(|run| (files::place(file), run)));
+    }
+    // A wrong name is told before anything is shown.
+    let measured = runs.iter().map(|(_, run)| measure(run, options));
+    let measured: Vec<_> = measured.collect::<Result<_, _>>()?;
+    let judged = runs.iter().zip(&measured);
+    let breaches = judged.map(|((file, run), chains)| judge(file, run, chains, options));
+    Ok(breaches.sum())
+}
+
+/// Reads a file's runs, of which at least one must have events.
+fn read_file(path: &Path) -> Result<Vec<Run>, String> {
+    let file = files::place(path);
+    let bytes = files::read(path).map_err(|why| format!("{file}: {why}; name another file"))?;
+    let runs = Record::read(&bytes)
+        .map_err(|why| format!("{file}: {why}"))?
+        .runs;
+    match &runs[..] {
+        [] => Err(format!(
+            "{file}: there is no run in it; `./scripts/run --trace FILE` keeps one"
+        )),
+        runs if runs.iter().all(|run| run.events.is_empty()) => {
+            Err(format!("{file}: no run of the file has an event"))
+        }
+        _ => Ok(runs),
+    }
+}
+
+/// Checks a run, prints what was found, and returns the number of breaches.
+fn judge(file: &str, run: &Run, chains: &[Measured], options: &Parsed) -> usize {
+    let bound_ns = bound::of(run, options);
+    let shown = options.number("show").unwrap_or(u64::MAX);
+    let shown = usize::try_from(shown).unwrap_or(usize::MAX);
+    let findings = check(run, bound_ns);
+    let mut table = table(file, run, &findings, bound_ns, shown);
+    table += &chain_table(run, chains, options.is_given("from"));
+    if options.is_given("json") {
+        eprint!("{table}");
+    } else {
+        print!("{table}");
+    }
+    println!("{}", machine_line(file, run, &findings));
+    for chain in chains {
+        println!("{}", chain_line(file, run, chain));
+    }
+    findings.breaches.len()
+}
+
+/// Returns the text for people: at most `shown` breaches, then the figures.
+#[must_use]
+pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: usize) -> String {
+    let mut text = String::new();
+    let Findings { breaches, figures } = findings;
+    let policy = match run.options.policy {
+        Policy::StaticPriority => "static",
+        Policy::Edf => "edf",
+    };
+    let preemption = match run.options.preemption {
+        Preemption::Enabled => "on",
+        Preemption::Disabled => "off",
+    };
+    let (number, cores) = (run.number, run.options.cores);
+    let mut say = |line: &str| {
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(text, "{line}");
+    };
+    say(&format!(
+        "{file}: run {number}, policy {policy}, preemption {preemption}, {cores} cores"
+    ));
+    for breach in breaches.iter().take(shown) {
+        say(&format!("  breach {}", breach.with_names(&run.task_set)));
+    }
+    if breaches.len() > shown {
+        say(&format!("  and {} breaches more", breaches.len() - shown));
+    }
+    if run.lost > 0 {
+        say(&format!(
+            "  {} events were lost: only what came from {} ns on is judged",
+            run.lost, figures.from_ns
+        ));
+    }
+    let mut row = |name: &str, value: &str| say(&format!("  {name:32}{value}"));
+    row("events", &figures.events.to_string());
+    row("instances started", &figures.instances.to_string());
+    row("preemptions", &figures.preemptions.to_string());
+    row(
+        "finish to ready, largest",
+        &microseconds(figures.finish_to_ready_max_ns),
+    );
+    row(
+        "ready to start, a core idle",
+        &distribution(&figures.ready_to_start),
+    );
+    row("preemption latency", &distribution(&figures.preemption));
+    row(
+        "longest inversion",
+        &format!(
+            "{} (bound {})",
+            microseconds(figures.longest_inversion_ns),
+            microseconds(bound_ns)
+        ),
+    );
+    let loads = figures.load_permille.iter();
+    let loads: Vec<String> = loads
+        .map(|load| format!("{}.{} %", load / 10, load % 10))
+        .collect();
+    row("load by core", &loads.join("  "));
+    row("breaches", &breaches.len().to_string());
+    text
+}
+
+/// Returns the machine line of kind `trace_check`.
+#[must_use]
+pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
+    let Findings { breaches, figures } = findings;
+    Object::new()
+        .text("kind", "trace_check")
+        .text("file", file)
+        .number("run", run.number)
+        .number("events", figures.events as u64)
+        .number("lost", run.lost)
+        .number("judged_from_ns", figures.from_ns)
+        .number("span_ns", figures.span_ns)
+        .number("instances", figures.instances as u64)
+        .number("preemptions", figures.preemptions)
+        .number("breaches", breaches.len() as u64)
+        .number("finish_to_ready_max_ns", figures.finish_to_ready_max_ns)
+        .json("ready_to_start_ns", &object(&figures.ready_to_start))
+        .json("preemption_latency_ns", &object(&figures.preemption))
+        .number("longest_inversion_ns", figures.longest_inversion_ns)
+        .list("load_permille", &figures.load_permille)
+        .end()
+}
+
+fn microseconds(ns: u64) -> String {
+    format!("{}.{:03} us", ns / 1000, ns % 1000)
+}
+
+fn distribution(of: &Distribution) -> String {
+    if of.count() == 0 {
+        return "none".into();
+    }
+    format!(
+        "median {}, p99 {}, max {} of {}",
+        microseconds(of.median()),
+        microseconds(of.p99()),
+        microseconds(of.max()),
+        of.count()
+    )
+}
+
+fn object(of: &Distribution) -> String {
+    format!(
+        "{{\"count\":{},\"median\":{},\"p99\":{},\"max\":{}}}",
+        of.count(),
+        of.median(),
+        of.p99(),
+        of.max()
+    )
+}
+
+/// The most chains that are shown of a run, unless one is named.
+const SHOWN: usize = 8;
+
+/// The times of a chain in a run, and their bounds.
+struct Measured {
+    names: Vec<String>,
+    output_age: (Distribution, Result<u64, DagId>),
+    data_age: (Distribution, Result<u64, DagId>),
+    reaction: (Distribution, Result<u64, DagId>),
+}
+
+/// Measures the chains that the options name, or else all.
+///
+/// # Errors
+///
+/// In words: there is no such subtask, or no chain between the two.
+fn measure(run: &Run, options: &Parsed) -> Result<Vec<Measured>, String> {
+    let samplings = &run.samplings;
+    let ends = (options.text("from"), options.text("to"));
+    let chains = match ends {
+        (None, None) => Chain::all(&run.task_set, samplings),
+        (Some(from), Some(to)) => {
+            let ends = (place(run, "from", from)?, place(run, "to", to)?);
+            let chains = Chain::between(&run.task_set, samplings, ends.0, ends.1);
+            if chains.is_empty() {
+                return Err(format!(
+                    "run {}: no edges and samples lead from `{from}` to `{to}`; \
+                     `./scripts/run --dot FILE` draws which there are",
+                    run.number
+                ));
+            }
+            chains
+        }
+        _ => return Err("give both `--from` and `--to`, or neither for all chains".into()),
+    };
+    let view = View::new(run);
+    let events: Vec<_> = view.in_the_order_of_the_log().collect();
+    let measured = |chain: &Chain| {
+        let times = chain.latencies(&run.task_set, events.iter().copied());
+        let bounds = &run.bounds_ns;
+        let reaction = chain.reaction_bound_ns(&run.task_set, bounds);
+        let names = chain.names(&run.task_set).map(|name| name.to_string());
+        Measured {
+            names: names.collect(),
+            output_age: (
+                Distribution::new(times.output_age_ns),
+                chain.output_age_bound_ns(&run.task_set, bounds),
+            ),
+            data_age: (Distribution::new(times.data_age_ns), reaction),
+            reaction: (Distribution::new(times.reaction_ns), reaction),
+        }
+    };
+    Ok(chains.iter().map(measured).collect())
+}
+
+/// Finds the subtask that an option names.
+fn place(run: &Run, option: &str, name: &str) -> Result<Place, String> {
+    Chain::place(&run.task_set, name).ok_or_else(|| {
+        let dags = (0..).map(DagId).zip(run.task_set.dags());
+        let all: Vec<String> = dags
+            .flat_map(|(dag, model)| {
+                let of_dag = match model.name() {
+                    "" => dag.0.to_string(),
+                    name => name.to_string(),
+                };
+                let subtasks = model.subtasks().iter();
+                subtasks.map(move |subtask| format!("{of_dag}/{}", subtask.name()))
+            })
+            .collect();
+        let names: Vec<&str> = all.iter().map(String::as_str).collect();
+        let hint = match nearest(name, &names) {
+            Some(nearest) => format!("did you mean `{nearest}`?"),
+            None => format!("its subtasks are {}", names.join(", ")),
+        };
+        let number = run.number;
+        format!("`--{option} {name}`: run {number} has no such subtask; {hint}")
+    })
+}
+
+/// Returns the lines for people.
+fn chain_table(run: &Run, chains: &[Measured], is_named: bool) -> String {
+    let mut text = String::new();
+    let shown = if is_named { chains.len() } else { SHOWN };
+    for chain in chains.iter().take(shown) {
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(text, "  chain {}", chain.names.join(" > "));
+        for (name, (times, bound)) in [
+            ("age of an output", &chain.output_age),
+            ("data age", &chain.data_age),
+            ("reaction time", &chain.reaction),
+        ] {
+            let bound = match bound {
+                Ok(ns) => format!("bound {}", microseconds(*ns)),
+                Err(dag) => match run.task_set.dag(*dag) {
+                    model if model.is_sporadic() => {
+                        format!("no bound, as dag `{}` is sporadic", model.name())
+                    }
+                    model => format!("no bound, as dag `{}` has none", model.name()),
+                },
+            };
+            let _ = writeln!(text, "    {name:30}{} ({bound})", distribution(times));
+        }
+    }
+    if chains.len() > shown {
+        let more = chains.len() - shown;
+        let _ = writeln!(
+            text,
+            "  and {more} chains more; `--from DAG/SUBTASK --to DAG/SUBTASK` shows those between \
+             two subtasks"
+        );
+    }
+    text
+}
+
+/// Returns the machine line of kind `chain`.
+fn chain_line(file: &str, run: &Run, chain: &Measured) -> String {
+    let bound = |of: &Result<u64, DagId>| of.map_or("null".into(), |ns| ns.to_string());
+    Object::new()
+        .text("kind", "chain")
+        .text("file", file)
+        .number("run", run.number)
+        .list("path", chain.names.iter().map(|name| quoted(name)))
+        .json("output_age_ns", &object(&chain.output_age.0))
+        .json("data_age_ns", &object(&chain.data_age.0))
+        .json("reaction_ns", &object(&chain.reaction.0))
+        .json("output_age_bound_ns", &bound(&chain.output_age.1))
+        .json("reaction_bound_ns", &bound(&chain.reaction.1))
+        .end()
+}
+
+/// The figures of one run. Times are in nanoseconds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Figures {
+    /// Events that were judged.
+    pub events: usize,
+    /// Instances that started.
+    pub instances: usize,
+    /// How often an instance was suspended.
+    pub preemptions: u64,
+    /// The first instant from which the trace is complete; 0 if nothing was
+    /// lost.
+    pub from_ns: u64,
+    /// From the first judged event to the last.
+    pub span_ns: u64,
+    /// See the module; 0 if there was none.
+    pub finish_to_ready_max_ns: u64,
+    /// See the module.
+    pub ready_to_start: Distribution,
+    /// See the module.
+    pub preemption: Distribution,
+    /// See the module.
+    pub longest_inversion_ns: u64,
+    /// See the module; by core.
+    pub load_permille: Vec<u64>,
+}
+
+/// Computes the figures of a run.
+fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: Waits) -> Figures {
+    let first_ns = view.events.first().map_or(0, |event| event.time_ns);
+    let span_ns = view.end_ns.saturating_sub(first_ns);
+    let histories = view.histories.values();
+    Figures {
+        events: view.events.len(),
+        instances: histories.filter(|it| it.start_ns.is_some()).count(),
+        preemptions: view.histories.values().map(|it| it.suspensions).sum(),
+        from_ns: view.from_ns,
+        span_ns,
+        finish_to_ready_max_ns,
+        ready_to_start: Distribution::new(waits.ready_to_start_ns),
+        preemption: Distribution::new(preemption_latencies_ns(view)),
+        longest_inversion_ns: waits.longest_owed_ns,
+        load_permille: load_permille(view, first_ns, span_ns),
+    }
+}
+
+fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
+    let mut latencies_ns = Vec::new();
+    // The next request for each core, as seen from the one at hand.
+    let mut next_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
+    let requests = view.events.iter().rev();
+    for event in requests.filter(|event| event.what == What::Request) {
+        let overtaken_ns = next_ns.insert(event.core, event.time_ns);
+        let history = event.instance().and_then(|it| view.histories.get(&it));
+        let slices = history.map_or(&[][..], |history| &history.slices);
+        let mut later = slices.iter().filter(|it| it.from_ns >= event.time_ns);
+        if let Some(slice) = later.next()
+            && slice.core == event.core
+            && overtaken_ns.is_none_or(|overtaken_ns| slice.from_ns <= overtaken_ns)
+        {
+            latencies_ns.push(slice.from_ns - event.time_ns);
+        }
+    }
+    latencies_ns
+}
+
+fn load_permille(view: &View<'_>, first_ns: u64, span_ns: u64) -> Vec<u64> {
+    let mut busy_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
+    for slice in view.histories.values().flat_map(|it| &it.slices) {
+        let to_ns = slice.to_ns.unwrap_or(view.end_ns);
+        let from_ns = slice.from_ns.max(first_ns);
+        let busy_ns = busy_ns.entry(slice.core).or_insert(0);
+        *busy_ns = busy_ns.saturating_add(to_ns.saturating_sub(from_ns));
+    }
+    let permille = |core: u32| {
+        let busy_ns = busy_ns.get(&CoreId(core)).copied().unwrap_or(0);
+        let permille = u128::from(busy_ns) * 1000 / u128::from(span_ns.max(1));
+        u64::try_from(permille).unwrap_or(u64::MAX)
+    };
+    (0..view.run.options.cores).map(permille).collect()
+}
+
+/// A run in the order of time.
+#[derive(Debug)]
+struct View<'r> {
+    run: &'r Run,
+    /// The first instant from which on no event is missing.
+    from_ns: u64,
+    /// The time of the last event.
+    end_ns: u64,
+    /// The events from `from_ns` on, by time.
+    events: Vec<Event>,
+    histories: BTreeMap<Instance, History>,
+    /// The jobs, each with what has happened to it and when.
+    jobs: BTreeMap<(DagId, u64), JobHistory>,
+    /// When sporadic jobs were due.
+    due_ns: BTreeMap<(DagId, u64), u64>,
+}
+
+/// What happened to a job, and when first.
+#[derive(Clone, Debug, Default)]
+struct JobHistory {
+    released_ns: Option<u64>,
+    aborted_ns: Option<u64>,
+    missed_ns: Option<u64>,
+    completed_ns: Option<u64>,
+}
+
+/// What happened to an instance, and when first.
+#[derive(Clone, Debug, Default)]
+struct History {
+    ready_ns: Option<u64>,
+    start_ns: Option<u64>,
+    finish_ns: Option<u64>,
+    /// When it was cancelled, or ended by a fault.
+    dropped_ns: Option<u64>,
+    /// The times on a core.
+    slices: Vec<Slice>,
+    suspensions: u64,
+}
+
+/// A stretch of time on one core.
+#[derive(Clone, Copy, Debug)]
+struct Slice {
+    core: CoreId,
+    from_ns: u64,
+    /// `None`: it ran when the trace ended.
+    to_ns: Option<u64>,
+}
+
+impl<'r> View<'r> {
+    /// Puts a run in order.
+    fn new(run: &'r Run) -> View<'r> {
+        let mut view = View {
+            run,
+            from_ns: complete_from_ns(run),
+            end_ns: 0,
+            events: Vec::new(),
+            histories: BTreeMap::new(),
+            jobs: BTreeMap::new(),
+            due_ns: BTreeMap::new(),
+        };
+        view.events = view.in_the_order_of_the_log().collect();
+        view.events.sort_by_key(|event| event.time_ns);
+        view.end_ns = view.events.last().map_or(view.from_ns, |last| last.time_ns);
+        for event in &view.events {
+            let of_job = (event.dag, event.job);
+            match (event.what, event.instance()) {
+                (What::Request, _) => {}
+                (_, Some(instance)) => {
+                    let history = view.histories.entry(instance).or_default();
+                    history.note(event, run.lost > 0, view.from_ns);
+                }
+                (What::Due, None) => {
+                    view.due_ns.insert(of_job, event.time_ns);
+                }
+                (What::Signalled | What::Dropped, None) => {}
+                (what, None) if what.is_of_dag() => {}
+                (_, None) => view.jobs.entry(of_job).or_default().note(event),
+            }
+        }
+        view
+    }
+
+    /// Returns the events that are judged, in the order in which they were learnt of.
+    fn in_the_order_of_the_log(&self) -> impl Iterator<Item = Event> {
+        let events = self.run.events.iter().copied();
+        events.filter(|event| event.time_ns >= self.from_ns)
+    }
+
+    /// Returns the nominal release of a job; 0 if nothing is known of that of a sporadic
+    /// one.
+    fn release_ns(&self, dag: DagId, job: u64) -> u64 {
+        let model = self.run.task_set.dag(dag);
+        match model.is_sporadic() {
+            true => self.due_ns.get(&(dag, job)).copied().unwrap_or(0),
+            false => model.grid_ns(job),
+        }
+    }
+
+    /// Returns the absolute deadline of a job.
+    fn deadline_ns(&self, dag: DagId, job: u64) -> u64 {
+        let relative_ns = self.run.task_set.dag(dag).relative_deadline_ns();
+        self.release_ns(dag, job).saturating_add(relative_ns)
+    }
+}
+
+/// Finds the first instant after which no event is missing.
+fn complete_from_ns(run: &Run) -> u64 {
+    if run.lost == 0 {
+        return 0;
+    }
+    // What is lost came before it, and the time of these was read as they were written.
+    let mut events = run.events.iter();
+    let first = events.find(|event| !matches!(event.what, What::Finish | What::Due));
+    // At that very instant something may be missing.
+    first.map_or(u64::MAX, |first| first.time_ns.saturating_add(1))
+}
+
+impl JobHistory {
+    fn note(&mut self, event: &Event) {
+        let place = match event.what {
+            What::Released => &mut self.released_ns,
+            What::Aborted => &mut self.aborted_ns,
+            What::Missed => &mut self.missed_ns,
+            What::Completed => &mut self.completed_ns,
+            _ => return,
+        };
+        place.get_or_insert(event.time_ns);
+    }
+}
+
+impl History {
+    /// Returns when the instance was over: finished, cancelled or ended.
+    fn over_ns(&self) -> Option<u64> {
+        self.finish_ns.or(self.dropped_ns)
+    }
+
+    fn note(&mut self, event: &Event, is_lossy: bool, from_ns: u64) {
+        let time_ns = event.time_ns;
+        let is_first = self.slices.is_empty() && self.start_ns.is_none();
+        let ran = matches!(event.what, What::Suspend | What::Finish | What::Ended);
+        if is_lossy && is_first && ran {
+            // It has been running since before the trace.
+            self.begin(event.core, from_ns);
+        }
+        if let Some(slice) = self.slices.last_mut() {
+            slice.to_ns.get_or_insert(time_ns);
+        }
+        let place = match event.what {
+            What::Ready => &mut self.ready_ns,
+            What::Start => &mut self.start_ns,
+            What::Finish => &mut self.finish_ns,
+            What::Cancelled | What::Ended => &mut self.dropped_ns,
+            _ => &mut None,
+        };
+        place.get_or_insert(time_ns);
+        self.suspensions += u64::from(event.what == What::Suspend);
+        if matches!(event.what, What::Start | What::Resume) {
+            self.begin(event.core, time_ns);
+        }
+    }
+
+    fn begin(&mut self, core: CoreId, from_ns: u64) {
+        self.slices.push(Slice {
+            core,
+            from_ns,
+            to_ns: None,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -8,41 +8,50 @@
 //!
 //! - a group `cores` with a track for each core: a slice is one uninterrupted
 //!   piece of an instance's execution, an instant a preemption, or the request
-//!   for one (`cores`);
+//!   for one;
 //! - a group for each DAG: its releases, deadlines and misses as instants, a
 //!   slice for each job from its nominal release to its completion, and for each
 //!   subtask the slices of its instances from readiness to their end, with what
-//!   they executed inside (`dags`);
+//!   they executed inside;
 //! - if the trace breaks a rule, a group `breaches` that says where.
 //!
 //! Flows lead along each edge of the graph from an instance's finish to the
 //! start of its successor in the same job, and from an instance's finish to the start of
-//! each one that samples its value; once between cores and once between subtasks (`flows`).
+//! each one that samples its value; once between cores and once between subtasks, under two
+//! numbers.
 //!
 //! It guarantees that slices of one track nest, and that each flow has both its
 //! ends. Each time is the trace's, in microseconds with three decimals. All runs
 //! begin at 0, side by side. Where events were lost, only what came after the
 //! last gap is shown.
+//!
+//! Jobs overlap, and slices of one track must not, so jobs lie on as many *lanes*
+//! as overlap at most. A subtask needs one track only: by R2 its instance of a job
+//! is not ready before the one of the job before has finished.
+//!
+//! Slices are written as a begin and an end (`B`, `E`) rather than as one event
+//! with a duration: viewers keep times in numbers of their own, and so two
+//! slices that touch at one nanosecond touch there, too. Each track's events are
+//! written in the order of time, and at one time in the order in which they were
+//! drawn, which viewers keep.
 
-mod command;
-mod cores;
-mod dags;
-mod flows;
-mod output;
-#[cfg(test)]
-mod tests;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fmt::Write;
+use std::fs;
+use std::process::ExitCode;
 
-use sched_dag::Instance;
+use sched_dag::chains::SampledJobs;
+use sched_dag::journal::What;
 use sched_dag::law::Violation;
+use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 
-use super::check;
-use super::view::View;
-use crate::json::Object;
-use crate::record::Run;
-use flows::Flows;
-use output::{Output, Track};
-
-pub use command::{TRACE, trace};
+use super::{JobHistory, Slice, View};
+use super::{check, read_file};
+use crate::files;
+use crate::json::{Object, quoted};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::record::{Run, bound};
 
 /// Returns runs as one text of JSON. Breaches are looked for with `bound_ns`, as
 /// [`check`] does.
@@ -57,8 +66,8 @@ pub fn convert(runs: &[Run], bound_ns: u64) -> String {
             _ => format!("run {} ", run.number),
         };
         let mut flows = Flows::new(&view, next_flow);
-        cores::draw(&view, &prefix, &flows, &mut output);
-        dags::draw(&view, &prefix, &mut flows, &mut output);
+        draw_cores(&view, &prefix, &flows, &mut output);
+        draw_dags(&view, &prefix, &mut flows, &mut output);
         draw_breaches(run, &breaches, &prefix, &mut output);
         next_flow = flows.next();
     }
@@ -124,3 +133,556 @@ fn draw_piece(
     }
     track.end(to_ns);
 }
+
+/// The table of `trace`.
+pub static TRACE: Command = Command {
+    invocation: "./scripts/trace",
+    about: "Converts the traces of runs for Perfetto's viewer.",
+    positional: Some((
+        Takes::File("FILE"),
+        "A serial log, or another file of JSON lines, with traces: \
+         `./scripts/run --trace FILE` makes one.",
+    )),
+    options: options! {
+        /// Write to this file; else to standard output.
+        "out" 'o': Takes::File("FILE");
+        /// Only the run of this number; else all of them, side by side from time 0.
+        "run": Takes::number(0..=u64::MAX);
+        /// As for ./scripts/check-trace, whose breaches are shown as markers.
+        "bound-us": Takes::number(0..=1_000_000_000);
+    },
+    notes: "\
+Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
+chrome://tracing, or at https://www.speedscope.app. docs/seeing.md explains the picture.
+
+exit codes: 0 all is well; 1 the output cannot be written; 2 a refused command
+line, or a file without a well-formed trace with events
+",
+};
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn trace(words: &[OsString]) -> ExitCode {
+    TRACE.carry_out(words, |options| {
+        let text = draw(options).map_err(Refusal::Usage)?;
+        match options.path("out") {
+            None => print!("{text}"),
+            Some(out) => {
+                let place = files::place(out);
+                fs::write(out, text).map_err(|error| format!("cannot write {place}: {error}"))?;
+                eprintln!("{place}: open it at https://ui.perfetto.dev");
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    })
+}
+
+/// Converts the runs that the options ask for.
+fn draw(options: &Parsed) -> Result<String, String> {
+    let input = options.file("which file? name a serial log with a trace")?;
+    files::check(&[input], &options.named(&["out"]))?;
+    let mut runs = read_file(input.path)?;
+    let file = files::place(input.path);
+    if let Some(number) = options.number("run") {
+        let there: Vec<String> = runs.iter().map(|run| run.number.to_string()).collect();
+        runs.retain(|run| run.number == number);
+        if runs.is_empty() {
+            let there = there.join(", ");
+            return Err(format!(
+                "`--run {number}`: {file} has no such run; its runs are {there}"
+            ));
+        }
+    }
+    // The runs of a log are those of one boot.
+    let bound_ns = runs.first().map_or(0, |run| bound::of(run, options));
+    Ok(convert(&runs, bound_ns))
+}
+
+/// A piece of an instance's execution, and which one of the instance's it is, counted from 0.
+struct Piece {
+    instance: Instance,
+    slice: Slice,
+    number: usize,
+}
+
+/// Draws the cores of a run.
+fn draw_cores(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Output) {
+    let pieces = pieces(view);
+    let group = output.group(&format!("{prefix}cores"), "");
+    for core in (0..view.run.options.cores).map(CoreId) {
+        let mut track = output.track(group, &format!("core {}", core.0));
+        for piece in pieces.iter().filter(|piece| piece.slice.core == core) {
+            draw_one(view, piece, flows, &mut track);
+        }
+        draw_preemptions(view, core, &mut track);
+        output.add(track);
+    }
+}
+
+/// Returns all pieces in the order of time.
+fn pieces(view: &View<'_>) -> Vec<Piece> {
+    let mut pieces = Vec::new();
+    for (&instance, history) in &view.histories {
+        let slices = history.slices.iter().enumerate();
+        pieces.extend(slices.map(|(number, &slice)| Piece {
+            instance,
+            slice,
+            number,
+        }));
+    }
+    pieces.sort_by_key(|piece| (piece.slice.from_ns, piece.slice.to_ns.unwrap_or(u64::MAX)));
+    pieces
+}
+
+fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) {
+    let &Piece {
+        instance,
+        slice,
+        number,
+    } = piece;
+    let history = &view.histories[&instance];
+    let is_last = number + 1 == history.slices.len();
+    let begins = if number > 0 {
+        "resume"
+    } else if history.start_ns.is_some() {
+        "start"
+    } else {
+        "before the trace"
+    };
+    let ends = match slice.to_ns {
+        None => "after the trace",
+        Some(_) if !is_last => "suspend",
+        Some(_) if history.finish_ns.is_some() => "finish",
+        Some(_) if history.dropped_ns.is_some() => "fault",
+        Some(_) => "suspend",
+    };
+    let args = instance_args(instance)
+        .number("piece", number as u64 + 1)
+        .text("begins", begins)
+        .text("ends", ends);
+    let name = instance_name(view.run, instance);
+    draw_piece(view, (instance, number), (&name, &args.end()), flows, track);
+}
+
+fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut Track) {
+    for event in &view.events {
+        let what = match event.what {
+            What::Request => "preempt for",
+            What::Suspend => "preempted",
+            What::Ended => "fault in",
+            What::Restarted => "goes on without",
+            _ => continue,
+        };
+        if let Some(instance) = event.instance()
+            && event.core == core
+        {
+            let name = format!("{what} {}", instance_name(view.run, instance));
+            track.instant(event.time_ns, &name, &instance_args(instance).end());
+        }
+    }
+}
+
+/// Draws all DAGs of a run.
+fn draw_dags(view: &View<'_>, prefix: &str, flows: &mut Flows, output: &mut Output) {
+    flows.draw_again();
+    for (dag, model) in (0..).map(DagId).zip(view.run.task_set.dags()) {
+        let label = format!(
+            "{}T = {}, D = {}",
+            if model.is_sporadic() {
+                "sporadic, "
+            } else {
+                ""
+            },
+            milliseconds(model.period_ns()),
+            milliseconds(model.relative_deadline_ns())
+        );
+        let name = format!("{prefix}dag {}", name_or(model.name(), dag.0));
+        let group = output.group(&name, &label);
+        draw_moments(view, dag, group, output);
+        draw_jobs(view, dag, group, output);
+        for (subtask, of) in (0..).map(SubtaskId).zip(model.subtasks()) {
+            let mut track = output.track(group, &name_or(of.name(), subtask.0));
+            draw_subtask(view, dag, subtask, flows, &mut track);
+            output.add(track);
+        }
+    }
+}
+
+/// Draws what happens to jobs at one moment, and their deadlines.
+fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
+    let mut track = output.track(group, "releases, deadlines");
+    let args = |job: u64| Object::new().number("job", job).end();
+    for event in view.events.iter().filter(|event| event.dag == dag) {
+        let what = match event.what {
+            What::Released => "release",
+            What::Queued => "release waits",
+            What::Skipped => "skip",
+            What::Aborted => "abort",
+            What::Missed => "MISS",
+            What::Signalled => "signal for",
+            What::Dropped => "signal dropped,",
+            _ => continue,
+        };
+        let name = format!("{what} #{}", event.job);
+        track.instant(event.time_ns, &name, &args(event.job));
+    }
+    for (&(_, job), history) in jobs_of(view, dag) {
+        let deadline_ns = view.deadline_ns(dag, job);
+        // A later one would only make the picture longer.
+        if history.released_ns.is_some() && deadline_ns <= view.end_ns {
+            track.instant(deadline_ns, &format!("deadline #{job}"), &args(job));
+        }
+    }
+    output.add(track);
+}
+
+/// Draws each job from its nominal release to its completion.
+fn draw_jobs(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
+    let mut lanes: Vec<Track> = Vec::new();
+    let mut busy_until_ns: Vec<u64> = Vec::new();
+    for (&(_, job), history) in jobs_of(view, dag) {
+        if history.released_ns.is_none() && history.completed_ns.is_none() {
+            continue;
+        }
+        let nominal_ns = view.release_ns(dag, job);
+        let end_ns = history.completed_ns;
+        let to_ns = end_ns.unwrap_or(view.end_ns).max(nominal_ns);
+        let is_free = |until_ns: &u64| *until_ns <= nominal_ns;
+        let lane = busy_until_ns.iter().position(is_free);
+        let lane = lane.unwrap_or_else(|| {
+            lanes.push(output.track(group, &format!("jobs, lane {}", lanes.len() + 1)));
+            busy_until_ns.push(0);
+            lanes.len() - 1
+        });
+        busy_until_ns[lane] = to_ns;
+        let name = format!("job #{job}{}", what_became_of(history));
+        let args = job_args(view, dag, job, history);
+        lanes[lane].begin(nominal_ns, &name, &args);
+        lanes[lane].end(to_ns);
+    }
+    lanes.into_iter().for_each(|lane| output.add(lane));
+}
+
+fn what_became_of(history: &JobHistory) -> &'static str {
+    match history {
+        job if job.aborted_ns.is_some() => ", aborted",
+        job if job.missed_ns.is_some() => ", missed",
+        job if job.completed_ns.is_none() => ", not completed",
+        _ => "",
+    }
+}
+
+fn job_args(view: &View<'_>, dag: DagId, job: u64, history: &JobHistory) -> String {
+    let release_ns = view.release_ns(dag, job);
+    let mut args = Object::new()
+        .number("job", job)
+        .number("release_ns", release_ns)
+        .number("deadline_ns", view.deadline_ns(dag, job));
+    if let Some(released_ns) = history.released_ns {
+        args = args.number("released_ns", released_ns);
+    }
+    if let Some(completed_ns) = history.completed_ns {
+        let response_ns = completed_ns.saturating_sub(release_ns);
+        args = args.number("response_time_ns", response_ns);
+    }
+    args.end()
+}
+
+/// Draws a subtask's instances from readiness to their end.
+fn draw_subtask(view: &View<'_>, dag: DagId, subtask: SubtaskId, flows: &Flows, track: &mut Track) {
+    let of_dag = Instance {
+        dag,
+        job: 0,
+        subtask: SubtaskId(0),
+    }..=Instance {
+        dag,
+        job: u64::MAX,
+        subtask: SubtaskId(u32::MAX),
+    };
+    let instances = view.histories.range(of_dag);
+    for (&instance, history) in instances.filter(|(instance, _)| instance.subtask == subtask) {
+        let first = history.slices.first();
+        let Some(begin_ns) = history.ready_ns.or(first.map(|slice| slice.from_ns)) else {
+            continue;
+        };
+        let over_ns = history.over_ns();
+        let was_cancelled = over_ns.is_some() && first.is_none();
+        let name = match was_cancelled {
+            true => format!("#{}, cancelled", instance.job),
+            false => format!("#{}", instance.job),
+        };
+        if let Some(ready_ns) = history.ready_ns {
+            let name = format!("ready #{}", instance.job);
+            track.instant(ready_ns, &name, &instance_args(instance).end());
+        }
+        let args = instance_args(instance).number("suspensions", history.suspensions);
+        track.begin(begin_ns, &name, &args.end());
+        for (index, slice) in history.slices.iter().enumerate() {
+            let args = Object::new().number("core", slice.core.0).end();
+            let name = format!("on core {}", slice.core.0);
+            draw_piece(view, (instance, index), (&name, &args), flows, track);
+        }
+        track.end(over_ns.unwrap_or(view.end_ns));
+    }
+}
+
+fn jobs_of<'v>(
+    view: &'v View<'_>,
+    dag: DagId,
+) -> impl Iterator<Item = (&'v (DagId, u64), &'v JobHistory)> {
+    view.jobs.range((dag, 0)..=(dag, u64::MAX))
+}
+
+fn milliseconds(ns: u64) -> String {
+    let text = format!("{}.{:06}", ns / 1_000_000, ns % 1_000_000);
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    format!("{text} ms")
+}
+
+/// An arrow, as it is drawn once.
+#[derive(Clone, Copy, Debug)]
+struct Flow {
+    number: u64,
+    /// Whether it is a sample, and no edge.
+    is_sample: bool,
+}
+
+/// The arrows of a run.
+#[derive(Debug)]
+struct Flows {
+    /// By instance, those that leave it.
+    out: BTreeMap<Instance, Vec<u64>>,
+    /// By instance, those that lead to it.
+    into: BTreeMap<Instance, Vec<u64>>,
+    count: u64,
+    /// How many of them, the first ones, are edges.
+    edges: u64,
+    first: u64,
+    /// What lies between the numbers of an arrow's two drawings, and the first.
+    shift: u64,
+}
+
+impl Flows {
+    /// Finds all arrows and numbers them from `first` on.
+    fn new(view: &View<'_>, first: u64) -> Flows {
+        let mut flows = Flows {
+            out: BTreeMap::new(),
+            into: BTreeMap::new(),
+            count: 0,
+            edges: 0,
+            first,
+            shift: 0,
+        };
+        for (&later, history) in &view.histories {
+            if history.start_ns.is_none() {
+                continue;
+            }
+            for &subtask in predecessors(view, later.dag, later.subtask) {
+                let earlier = Instance { subtask, ..later };
+                let finish = view.histories.get(&earlier).and_then(|it| it.finish_ns);
+                if finish.is_some() {
+                    flows.add(earlier, later);
+                }
+            }
+        }
+        flows.edges = flows.count;
+        let samplings = &view.run.samplings;
+        let sampled = SampledJobs::new(samplings, view.in_the_order_of_the_log());
+        for (reader, writer) in sampled.all() {
+            flows.add(writer, reader);
+        }
+        flows
+    }
+
+    fn add(&mut self, from: Instance, to: Instance) {
+        self.out.entry(from).or_default().push(self.count);
+        self.into.entry(to).or_default().push(self.count);
+        self.count += 1;
+    }
+
+    /// Goes on with the second drawing of all arrows.
+    fn draw_again(&mut self) {
+        self.shift = self.count;
+    }
+
+    /// Returns the arrows that leave an instance.
+    fn out(&self, instance: Instance) -> impl Iterator<Item = Flow> {
+        self.drawn(self.out.get(&instance))
+    }
+
+    /// Returns the arrows that lead to an instance.
+    fn into(&self, instance: Instance) -> impl Iterator<Item = Flow> {
+        self.drawn(self.into.get(&instance))
+    }
+
+    /// Returns the first number that no arrow has.
+    const fn next(&self) -> u64 {
+        self.first + 2 * self.count
+    }
+
+    fn drawn<'f>(&'f self, of: Option<&'f Vec<u64>>) -> impl Iterator<Item = Flow> + 'f {
+        of.into_iter().flatten().map(|arrow| Flow {
+            number: arrow + self.first + self.shift,
+            is_sample: *arrow >= self.edges,
+        })
+    }
+}
+
+fn predecessors<'v>(view: &'v View<'_>, dag: DagId, subtask: SubtaskId) -> &'v [SubtaskId] {
+    view.run.task_set.dag(dag).predecessors(subtask)
+}
+
+/// All that is shown.
+#[derive(Debug, Default)]
+struct Output {
+    events: String,
+    /// The last number given to a group or a track; no two share one, as viewers
+    /// mix up a process and a thread of the same number.
+    last_id: u64,
+}
+
+/// A group of tracks.
+#[derive(Clone, Copy, Debug)]
+struct Group(u64);
+
+/// A track that is being drawn.
+#[derive(Debug)]
+struct Track {
+    group: Group,
+    id: u64,
+    drawn: Vec<(u64, String)>,
+    /// The time of the latest begin or end.
+    latest_ns: u64,
+    open: u64,
+}
+
+impl Output {
+    /// Adds a group below those that there are.
+    fn group(&mut self, name: &str, label: &str) -> Group {
+        self.last_id += 1;
+        let id = self.last_id;
+        self.describe("process_name", id, id, Object::new().text("name", name));
+        if !label.is_empty() {
+            let label = Object::new().text("labels", label);
+            self.describe("process_labels", id, id, label);
+        }
+        let place = Object::new().number("sort_index", id);
+        self.describe("process_sort_index", id, id, place);
+        Group(id)
+    }
+
+    /// Begins a track below those that the group has.
+    fn track(&mut self, group: Group, name: &str) -> Track {
+        self.last_id += 1;
+        let id = self.last_id;
+        self.describe("thread_name", group.0, id, Object::new().text("name", name));
+        let place = Object::new().number("sort_index", id);
+        self.describe("thread_sort_index", group.0, id, place);
+        Track {
+            group,
+            id,
+            drawn: Vec::new(),
+            latest_ns: 0,
+            open: 0,
+        }
+    }
+
+    /// Adds a track that has been drawn.
+    ///
+    /// # Panics
+    ///
+    /// If a slice of it was not ended.
+    fn add(&mut self, mut track: Track) {
+        assert_eq!(track.open, 0, "each slice of a track is ended");
+        track.drawn.sort_by_key(|(time_ns, _)| *time_ns);
+        for (_, event) in track.drawn {
+            self.push(&event);
+        }
+    }
+
+    /// Returns the whole text.
+    fn end(self) -> String {
+        format!(
+            "{{\"displayTimeUnit\":\"ns\",\"traceEvents\":[\n{}\n]}}\n",
+            self.events
+        )
+    }
+
+    fn describe(&mut self, what: &str, group: u64, track: u64, args: Object) {
+        let event = Object::new()
+            .text("ph", "M")
+            .text("name", what)
+            .number("pid", group)
+            .number("tid", track)
+            .json("args", &args.end());
+        self.push(&event.end());
+    }
+
+    fn push(&mut self, event: &str) {
+        let separator = if self.events.is_empty() { "" } else { ",\n" };
+        // Writing into a `String` cannot fail.
+        let _ = write!(self.events, "{separator}{event}");
+    }
+}
+
+impl Track {
+    /// Begins a slice, inside the one that is open if there is one. `args` is an
+    /// object of JSON. It does not begin before the last one has ended.
+    fn begin(&mut self, time_ns: u64, name: &str, args: &str) {
+        self.latest_ns = self.latest_ns.max(time_ns);
+        self.open += 1;
+        let rest = format!(",\"name\":{},\"args\":{args}", quoted(name));
+        self.draw('B', self.latest_ns, &rest);
+    }
+
+    /// Ends the slice that was begun last.
+    fn end(&mut self, time_ns: u64) {
+        self.latest_ns = self.latest_ns.max(time_ns);
+        self.open = self.open.saturating_sub(1);
+        self.draw('E', self.latest_ns, "");
+    }
+
+    /// Draws a moment, at any time.
+    fn instant(&mut self, time_ns: u64, name: &str, args: &str) {
+        let rest = format!(",\"s\":\"t\",\"name\":{},\"args\":{args}", quoted(name));
+        self.draw('i', time_ns, &rest);
+    }
+
+    /// Lets a flow leave the slice that is open, at the time drawn last.
+    fn flow_out(&mut self, flow: Flow) {
+        self.draw('s', self.latest_ns, &described(flow));
+    }
+
+    /// Lets a flow arrive at the slice that is open, at the time drawn last.
+    fn flow_in(&mut self, flow: Flow) {
+        let rest = format!("{},\"bp\":\"e\"", described(flow));
+        self.draw('f', self.latest_ns, &rest);
+    }
+
+    /// Sets the time of the flows to come.
+    fn advance(&mut self, time_ns: u64) {
+        self.latest_ns = self.latest_ns.max(time_ns);
+    }
+
+    fn draw(&mut self, phase: char, time_ns: u64, rest: &str) {
+        let (group, id) = (self.group.0, self.id);
+        let (us, ns) = (time_ns / 1000, time_ns % 1000);
+        let event = format!(
+            "{{\"ph\":\"{phase}\",\"pid\":{group},\"tid\":{id},\"ts\":{us}.{ns:03}{rest}}}"
+        );
+        self.drawn.push((time_ns, event));
+    }
+}
+
+/// The members that both ends of a flow have.
+fn described(flow: Flow) -> String {
+    let Flow { number, is_sample } = flow;
+    let (name, category) = match is_sample {
+        true => ("sampled by", "sample"),
+        false => ("precedes", "precedence"),
+    };
+    format!(",\"name\":\"{name}\",\"cat\":\"{category}\",\"id\":{number}")
+}
+
+#[cfg(test)]
+mod tests;

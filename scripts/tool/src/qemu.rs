@@ -2,26 +2,41 @@
 //!
 //! A [`Qemu`] is a description that becomes a command line; [`Qemu::start`]
 //! makes it a process ([`Running`]). The *mode* says what the guest's clock
-//! means, the *machine* which board QEMU imitates. Everything a guest could
+//! means, the *machine* which board QEMU imitates, the
+//! *loader* what brings the image into its memory: QEMU itself, or a firmware, with GRUB or
+//! without. Everything a guest could
 //! see of the host is fixed or left out (`-nodefaults`, no display, no
 //! network), so that in [`Mode::Deterministic`] two runs give the same bytes.
 //!
 //! Serial output goes to a file, for that loses nothing, whereas a slow pipe
 //! drops bytes. The guest ends its run by writing to the port of QEMU's
 //! `isa-debug-exit` device, see [`Ending`]. Input to the serial port comes from us by a pipe.
-
-mod choices;
-mod process;
+//!
+//! *Ending* is how the process went, seen from outside. A guest writes a byte
+//! `v` to port 0xf4, and QEMU's `isa-debug-exit` ends the process with status
+//! `(v << 1) | 1`: 33 for success, 35 for failure, 37 for a refused command
+//! line. No other status is a guest's own word.
+//!
+//! A QEMU started here does not outlive the tool, see [`crate::child`]. One whose guest ends in
+//! order at ctrl-C is no member of the terminal's process group, which ctrl-C would reach: we tell
+//! the guest, by its serial port.
 
 use std::ffi::OsString;
+use std::fmt;
+use std::fs::{self, File};
+use std::io::Write;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::time::Duration;
 
 use boot::MOST_COMMAND_LINE_BYTES;
 
-pub use choices::{Loader, Machine, Mode, OVMF_FILE};
-pub use process::{Ending, Running};
+use crate::child::{Asked, Child, Waited};
+use crate::files::Temporary;
+use crate::protocol::Status;
+use crate::system;
 
 /// The name under which QEMU is looked for.
 pub const PROGRAM: &str = "qemu-system-x86_64";
@@ -229,6 +244,354 @@ pub(crate) fn file_value(before: &str, path: &Path) -> OsString {
     let parts = path.as_os_str().as_bytes().split(|byte| *byte == b',');
     let name = parts.collect::<Vec<_>>().join(&b",,"[..]);
     OsString::from_vec([before.as_bytes(), &name].concat())
+}
+
+/// Where Debian's package `ovmf` has its firmware.
+pub const OVMF_FILE: &str = "/usr/share/ovmf/OVMF.fd";
+
+/// Makes an enumeration each of whose choices has a name, by which it is written and read.
+macro_rules! named {
+    ($(#[$about:meta])* $kind:ident {
+        $($(#[$what:meta])* $choice:ident = $name:literal,)*
+    }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $kind {
+            $($(#[$what])* $choice,)*
+        }
+
+        impl $kind {
+            /// The names, as they stand on command lines.
+            pub const NAMES: &[&str] = &[$($name),*];
+
+            /// Returns the choice of that name.
+            #[must_use]
+            pub fn from_name(name: &str) -> Option<Self> {
+                match name {
+                    $($name => Some(Self::$choice),)*
+                    _ => None,
+                }
+            }
+
+            /// Returns the choice's name.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$choice => $name,)*
+                }
+            }
+        }
+
+        impl std::fmt::Display for $kind {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+    };
+}
+
+named! {
+    /// The meaning of time in the guest.
+    Mode {
+        /// Real cores in real time, by the host's virtualization.
+        Kvm = "kvm",
+        /// One instruction is one virtual nanosecond; every run is the same.
+        Deterministic = "deterministic",
+        /// Emulated cores in real time, one host thread each.
+        Threads = "threads",
+    }
+}
+
+impl Mode {
+    /// Says in one sentence what a time printed in this mode is worth.
+    #[must_use]
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Mode::Kvm => "real nanoseconds on real cores, the host's noise included",
+            Mode::Deterministic => {
+                "one instruction is one virtual nanosecond, idle time is skipped, busy \
+                 processors share one clock; these are not wall times, and are the same \
+                 on every machine"
+            }
+            Mode::Threads => {
+                "real nanoseconds of emulated processors; expect milliseconds of \
+                 noise where the host has fewer cores"
+            }
+        }
+    }
+
+    fn arguments(self) -> &'static [&'static str] {
+        match self {
+            Mode::Kvm => &["-accel", "kvm", "-cpu", "host"],
+            // The sleep=off makes an idle guest jump to its next timer.
+            Mode::Deterministic => &[
+                "-accel",
+                "tcg",
+                "-icount",
+                "shift=0,sleep=off",
+                "-cpu",
+                "max",
+                "-seed",
+                "1",
+                "-rtc",
+                "base=2000-01-01,clock=vm",
+            ],
+            Mode::Threads => &["-accel", "tcg,thread=multi", "-cpu", "max"],
+        }
+    }
+}
+
+named! {
+    /// The board that QEMU imitates, by QEMU's own name.
+    Machine {
+        /// The smallest one, which boots in a tenth of a second.
+        Microvm = "microvm",
+        /// A PC with PCI Express, HPET and all.
+        Q35 = "q35",
+    }
+}
+
+named! {
+    /// The way of the image into the guest's memory.
+    Loader {
+        /// QEMU's `-kernel`: the image is there at the reset.
+        Pvh = "pvh",
+        /// GRUB, started by QEMU's BIOS from a stick.
+        Bios = "bios",
+        /// GRUB, started from a stick by UEFI.
+        Uefi = "uefi",
+        /// An application of our own, started from a stick by UEFI.
+        Efi = "efi",
+    }
+}
+
+impl Loader {
+    /// Reports whether it loads from a stick, by the firmware of a PC.
+    #[must_use]
+    pub fn needs_stick(self) -> bool {
+        self != Loader::Pvh
+    }
+
+    /// Reports whether the words come by GRUB.
+    #[must_use]
+    pub fn is_grub(self) -> bool {
+        matches!(self, Loader::Bios | Loader::Uefi)
+    }
+
+    /// Reports whether the firmware is UEFI.
+    #[must_use]
+    pub fn is_by_uefi(self) -> bool {
+        matches!(self, Loader::Uefi | Loader::Efi)
+    }
+
+    /// Returns the least memory in MiB with which it has been seen to come to the image.
+    #[must_use]
+    pub fn least_memory_mib(self) -> u64 {
+        match self {
+            Loader::Pvh | Loader::Bios => LEAST_MEMORY_MIB,
+            Loader::Uefi | Loader::Efi => 96,
+        }
+    }
+}
+
+/// The most that a guest may print; beyond it something prints without end.
+const MOST_SERIAL_BYTES: u64 = 64 << 20;
+
+/// The byte that ends a guest's run in order (`console=stop`): ctrl-C on a serial line.
+const CTRL_C: &[u8] = &[3];
+
+/// What QEMU says when KVM cannot run the guest any further. It then keeps the guest
+/// paused for ever, and none of its options makes it end.
+const KVM_FAILURES: [&str; 4] = [
+    "KVM internal error",
+    "KVM: entry failed",
+    "KVM: unknown exit",
+    "error: kvm run failed",
+];
+
+/// How a QEMU process ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The guest ended it with one of the agreed statuses.
+    Guest(Status),
+    /// QEMU ended with another status; 0 is a reset or a shutdown.
+    Status(i32),
+    /// A signal ended it.
+    Signal,
+    /// It did not end within this limit and was killed.
+    TimedOut {
+        /// The limit.
+        limit: Duration,
+        /// How busy the host was then, in words.
+        load: String,
+    },
+    /// A person pressed ctrl-C again, and it was killed.
+    Killed,
+    /// KVM could not run the guest any further, and it was killed.
+    KvmFailed,
+    /// It printed more than a run may and was killed.
+    TooMuchOutput,
+    /// It was no QEMU but a program of this computer, and ended as these words say.
+    Program(String),
+}
+
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Ending::Guest(Status::Success) => f.write_str("the guest ended in success"),
+            Ending::Guest(Status::Failure) => f.write_str("the guest ended in failure"),
+            Ending::Guest(Status::Usage) => f.write_str("the guest refused its command line"),
+            Ending::Program(words) => f.write_str(words),
+            Ending::Status(0) => f.write_str(
+                "the machine was reset or shut down without an exit status (a triple fault?)",
+            ),
+            Ending::Status(status) => write!(f, "QEMU ended with status {status}"),
+            Ending::Signal => f.write_str("a signal ended QEMU"),
+            Ending::TimedOut { limit, load } => write!(
+                f,
+                "no end within {} s, QEMU was killed; {load}",
+                limit.as_secs_f64()
+            ),
+            Ending::Killed => f.write_str("ctrl-C was pressed again, and QEMU was killed"),
+            Ending::KvmFailed => {
+                f.write_str("KVM could not run the guest any further, QEMU was killed")
+            }
+            Ending::TooMuchOutput => write!(
+                f,
+                "more than {} MiB of serial output, QEMU was killed",
+                MOST_SERIAL_BYTES >> 20
+            ),
+        }
+    }
+}
+
+/// A QEMU that was started and not yet waited for.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+    serial: PathBuf,
+    complaints: Temporary,
+    /// The way by which the guest is asked to end, if it listens.
+    stop: Option<File>,
+    asked: Option<Asked>,
+}
+
+impl Running {
+    /// Starts `command` with its streams away from the terminal.
+    fn start(
+        mut command: Command,
+        serial: &Path,
+        has_input: bool,
+        stops: bool,
+        has_log: bool,
+    ) -> Result<Running, String> {
+        let file_error = |path: &Path| {
+            let path = path.display().to_string();
+            move |error| format!("cannot write `{path}`: {error}; name a file elsewhere")
+        };
+        File::create(serial).map_err(file_error(serial))?;
+        let mut complaints = serial.as_os_str().to_owned();
+        complaints.push(OsString::from(".qemu"));
+        let complaints = Temporary(Some(complaints.into()));
+        let errors = File::create(complaints.path()).map_err(file_error(complaints.path()))?;
+
+        let piped = |is_piped: bool| match is_piped {
+            true => Stdio::piped(),
+            false => Stdio::null(),
+        };
+        command.stdin(piped(has_input)).stdout(piped(has_log));
+        command.stderr(errors);
+        if stops {
+            command.process_group(0);
+        }
+        let child = Child::start(&mut command)
+            .map_err(|error| format!("cannot start QEMU: {error}; is it for this machine?"))?;
+        Ok(Running {
+            stop: child.second_input().filter(|_| stops),
+            child,
+            serial: serial.to_path_buf(),
+            complaints,
+            asked: None,
+        })
+    }
+
+    /// Waits for the end, for at most `limit` since the start, and shows each whole serial line
+    /// to `show` as it comes. Returns also the serial log.
+    ///
+    /// # Errors
+    ///
+    /// In words: the log cannot be read.
+    pub fn follow(
+        &mut self,
+        limit: Duration,
+        show: &mut dyn FnMut(&str),
+    ) -> Result<(Ending, String), String> {
+        let complaints = self.complaints.path();
+        let mut kvm_failed = false;
+        let is_well = |bytes| {
+            let said = fs::read(complaints).unwrap_or_default();
+            let said = String::from_utf8_lossy(&said);
+            kvm_failed = KVM_FAILURES.iter().any(|failure| said.contains(failure));
+            !kvm_failed && bytes <= MOST_SERIAL_BYTES
+        };
+        // One that has just ended hears nothing any more.
+        let stop = self.stop.take();
+        let mut ask = |_| drop(stop.as_ref().map(|mut stop| stop.write_all(CTRL_C)));
+        let ask: Option<&mut dyn FnMut(Asked)> = if stop.is_some() { Some(&mut ask) } else { None };
+        let followed = (self.child).follow(limit, &self.serial, show, ask, is_well)?;
+        self.asked = followed.asked;
+        let ending = match followed.waited {
+            Waited::Ended(status) => ending_of(status),
+            Waited::TimedOut => Ending::TimedOut {
+                limit,
+                load: system::host_load(),
+            },
+            Waited::Killed => Ending::Killed,
+            Waited::GivenUp if kvm_failed => Ending::KvmFailed,
+            Waited::GivenUp => Ending::TooMuchOutput,
+        };
+        Ok((ending, followed.text))
+    }
+
+    /// Returns why the guest was asked to end, if it was.
+    #[must_use]
+    pub fn asked(&self) -> Option<Asked> {
+        self.asked
+    }
+
+    /// Takes the way to the guest's serial port, if it has one and it was not taken.
+    pub fn input(&mut self) -> Option<ChildStdin> {
+        self.child.input()
+    }
+
+    /// Takes the log of instructions, if there is one and it was not taken.
+    pub fn log(&mut self) -> Option<ChildStdout> {
+        self.child.output()
+    }
+
+    /// Returns the time since the start.
+    #[must_use]
+    pub fn elapsed(&self) -> Duration {
+        self.child.elapsed()
+    }
+
+    /// Returns what QEMU itself complained of, on one line; mostly empty.
+    #[must_use]
+    pub fn complaints(&self) -> String {
+        let text = fs::read(self.complaints.path()).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text);
+        text.lines().collect::<Vec<_>>().join("; ")
+    }
+}
+
+fn ending_of(status: ExitStatus) -> Ending {
+    match status.code() {
+        Some(33) => Ending::Guest(Status::Success),
+        Some(35) => Ending::Guest(Status::Failure),
+        Some(37) => Ending::Guest(Status::Usage),
+        Some(code) => Ending::Status(code),
+        None => Ending::Signal,
+    }
 }
 
 #[cfg(test)]

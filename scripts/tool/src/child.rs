@@ -2,17 +2,16 @@
 //! own process id when its time is over or when we let go of it. One that can end in order is
 //! asked to do so first.
 //!
-//! It is asked at its limit, and when a *signal* asks us to end, such as ctrl-C (`asking`). What it
-//! prints goes to a file, which is followed (`tail`).
+//! It is asked at its limit, and when a *signal* asks us to end, such as ctrl-C. After its limit it
+//! has for as long as it prints, and 10 s; the next signal kills it at once. Before it has
+//! printed anything it does not listen, and is not asked. What it prints goes to a file, of which
+//! each whole line is shown once, when it ends.
 //!
 //! Where the program `setpriv` exists, the system kills the child also if the
 //! tool itself is killed, so nothing is left behind in any case.
 
-mod asking;
-mod tail;
-
 use std::fs::File;
-use std::io;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::os::fd::AsFd;
 use std::path::Path;
 use std::process::{self, ChildStdin, ChildStdout, Command, ExitStatus};
@@ -21,10 +20,8 @@ use std::time::{Duration, Instant};
 
 use linux::EndSignals;
 
+use crate::protocol::written;
 use crate::system;
-pub use asking::Asked;
-use asking::{Asking, Step};
-use tail::Tail;
 
 /// How long one look at the process is from the next.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -203,9 +200,139 @@ pub fn bound_to_us(program: &Path) -> Command {
     command
 }
 
+/// For how long a child that was asked at its limit may print nothing.
+const GRACE: Duration = Duration::from_secs(10);
+
+/// Why a child was asked to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// A person has pressed ctrl-C, or this program was asked to end.
+    ByPerson,
+    /// This limit was over.
+    ByLimit(Duration),
+}
+
+/// The next step after a look at the child.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// To look again.
+    Wait,
+    /// To ask it.
+    Ask(Asked),
+    /// To kill it, as a person wants.
+    Kill,
+    /// To kill it, for its time is over.
+    TimeOut,
+}
+
+/// The state of a child as seen so far.
+#[derive(Debug)]
+struct Asking {
+    limit: Duration,
+    /// Why, and how many signals there had been then.
+    why: Option<(Asked, u32)>,
+    is_asked: bool,
+    printed_bytes: u64,
+    quiet_since: Duration,
+}
+
+impl Asking {
+    /// Begins at the child's start.
+    const fn new(limit: Duration) -> Asking {
+        Asking {
+            limit,
+            why: None,
+            is_asked: false,
+            printed_bytes: 0,
+            quiet_since: Duration::ZERO,
+        }
+    }
+
+    /// Returns why the child was asked, if it was.
+    fn why(&self) -> Option<Asked> {
+        self.why.map(|(why, _)| why)
+    }
+
+    /// Takes a look: so much time, so many signals and so many bytes since the start.
+    fn step(&mut self, elapsed: Duration, signals: u32, printed_bytes: u64) -> Step {
+        let is_over = elapsed >= self.limit;
+        if printed_bytes > self.printed_bytes {
+            self.printed_bytes = printed_bytes;
+            self.quiet_since = elapsed;
+        }
+        match self.why {
+            Some((_, before)) if signals > before => return Step::Kill,
+            None if signals > 0 => self.why = Some((Asked::ByPerson, signals)),
+            None if is_over => self.why = Some((Asked::ByLimit(self.limit), signals)),
+            _ => {}
+        }
+        match self.why {
+            Some((why, _)) if !self.is_asked && printed_bytes > 0 => {
+                self.is_asked = true;
+                self.quiet_since = elapsed;
+                Step::Ask(why)
+            }
+            _ if is_over && elapsed.saturating_sub(self.quiet_since) >= GRACE => Step::TimeOut,
+            _ => Step::Wait,
+        }
+    }
+}
+
+/// A file that is being followed.
+#[derive(Debug)]
+struct Tail<'p> {
+    path: &'p Path,
+    /// The text that has been read, and how much of it was shown.
+    read: Vec<u8>,
+    shown: usize,
+}
+
+impl Tail<'_> {
+    /// Begins at the start of the file; it need not exist yet.
+    fn new(path: &Path) -> Tail<'_> {
+        Tail {
+            path,
+            read: Vec::new(),
+            shown: 0,
+        }
+    }
+
+    /// Returns how many bytes have been read.
+    fn bytes(&self) -> u64 {
+        self.read.len() as u64
+    }
+
+    /// Shows the lines that have ended since the last call.
+    fn follow(&mut self, show: &mut dyn FnMut(&str)) -> io::Result<()> {
+        let mut file = File::open(self.path)?;
+        file.seek(SeekFrom::Start(self.bytes()))?;
+        file.read_to_end(&mut self.read)?;
+        while let Some(length) = self.read[self.shown..]
+            .iter()
+            .position(|byte| *byte == b'\n')
+        {
+            let line = &self.read[self.shown..self.shown + length];
+            show(written(&String::from_utf8_lossy(line)));
+            self.shown += length + 1;
+        }
+        Ok(())
+    }
+
+    /// Shows the lines left, the last one also if it has no end, and returns all that is there.
+    fn finish(mut self, show: &mut dyn FnMut(&str)) -> io::Result<String> {
+        self.follow(show)?;
+        if self.shown < self.read.len() {
+            show(&String::from_utf8_lossy(&self.read[self.shown..]));
+        }
+        Ok(String::from_utf8_lossy(&self.read).into_owned())
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Child, Waited, bound_to_us};
+    use super::{Asked, Asking, Child, Step, Tail, Waited, bound_to_us};
+    use std::fs::File;
+    use std::io::Write;
     use std::path::Path;
     use std::time::Duration;
 
@@ -223,5 +350,62 @@ mod tests {
         let short = Duration::from_millis(50);
         assert_eq!(wait(&["sleep", "60"], short, || true), Waited::TimedOut);
         assert_eq!(wait(&["sleep", "60"], long, || false), Waited::GivenUp);
+    }
+
+    const LIMIT: Duration = Duration::from_secs(60);
+
+    #[test]
+    fn the_first_signal_or_the_limit_asks_and_the_second_or_silence_kills() {
+        let (person, limit) = (Step::Ask(Asked::ByPerson), Step::Ask(Asked::ByLimit(LIMIT)));
+        // Looks: seconds, signals, bytes. Of the steps, those that do not wait.
+        for (looks, expected) in [
+            (
+                &[(1, 0, 9), (2, 1, 9), (3, 1, 9), (4, 2, 9)][..],
+                &[(2, person), (4, Step::Kill)][..],
+            ),
+            // Two at once are one, and nobody is asked who cannot hear.
+            (&[(1, 2, 0), (2, 2, 0), (3, 2, 1)], &[(3, person)]),
+            (&[(1, 1, 0), (2, 2, 0)], &[(2, Step::Kill)]),
+            // After the limit it has as long as it prints.
+            (
+                &[
+                    (59, 0, 9),
+                    (60, 0, 9),
+                    (69, 0, 10),
+                    (78, 0, 10),
+                    (79, 0, 10),
+                ],
+                &[(60, limit), (79, Step::TimeOut)],
+            ),
+            (&[(60, 0, 9), (61, 1, 9)], &[(60, limit), (61, Step::Kill)]),
+            (&[(60, 0, 0)], &[(60, Step::TimeOut)]),
+        ] {
+            let mut asking = Asking::new(LIMIT);
+            let steps = looks.iter().map(|&(seconds, signals, bytes)| {
+                let elapsed = Duration::from_secs(seconds);
+                (seconds, asking.step(elapsed, signals, bytes))
+            });
+            let steps: Vec<_> = steps.filter(|(_, step)| *step != Step::Wait).collect();
+            assert_eq!(steps, expected);
+        }
+    }
+
+    #[test]
+    fn a_line_is_shown_once_and_only_when_it_is_whole() {
+        let path = crate::system::new_log("tail").unwrap();
+        let mut tail = Tail::new(&path);
+        let mut shown: Vec<String> = Vec::new();
+        let mut show = |line: &str| shown.push(line.to_string());
+        assert!(tail.follow(&mut show).is_err(), "it is not there yet");
+        let mut file = File::create(&path).unwrap();
+        file.write_all(b"one\r\ntw").unwrap();
+        tail.follow(&mut show).unwrap();
+        tail.follow(&mut show).unwrap();
+        file.write_all(b"o\nthree").unwrap();
+        tail.follow(&mut show).unwrap();
+        let text = tail.finish(&mut show).unwrap();
+        assert_eq!(text, "one\r\ntwo\nthree");
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(shown, ["one", "two", "three"]);
     }
 }

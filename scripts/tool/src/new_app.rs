@@ -1,0 +1,579 @@
+//! The subcommand `new-app`: an app of one's own, under `apps/` or in a repository of its own.
+//!
+//! The *template* is an app that is complete: a library with the functions and
+//! their DAG, a program that boots it, the same as a program for Linux, and a test that runs
+//! it on the host in virtual time. A new app is a copy in which the template's name is replaced.
+//! Under `apps/` cargo finds it by the workspace's `apps/*`, so nothing else changes. In a
+//! repository it has what the workspace gives otherwise: profiles, the toolchain's
+//! version, where the crates are. Cargo's *runner* there boots what is an image, so that
+//! `cargo run` and `cargo test` do what they do for any program.
+//!
+//! The name is a package's, a folder's and, with `_` for `-`, a crate's at once,
+//! so it must be possible as each: no word of the language, no library that every
+//! program knows, no package that the workspace has. Another is refused before anything is
+//! written. If writing fails in the middle, what was written is removed.
+//!
+//! Exit codes: 0 the app is there, 1 its files could not be written, 2 a refused
+//! command line.
+
+use std::ffi::OsString;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use replay::shown::quoted;
+
+use crate::files;
+use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::system::{self, files_below};
+
+/// The table of `new-app`.
+pub static NEW_APP: Command = Command {
+    invocation: "./scripts/new-app",
+    about: "\
+Makes an app of your own, in a repository of its own or under apps/: a library with
+functions and their DAG, a program that boots it, and a test that runs it on the host in
+virtual time.",
+    positional: Some((
+        Takes::Text("NAME"),
+        "The app's name: small letters, digits and hyphens, a letter first, at most 32.",
+    )),
+    options: options! {
+        /// Make the app in this new folder, which is the root of a repository.
+        "out": Takes::File("DIR");
+        /// --out: take the crates from this git repository, not from the folder of these commands.
+        /// Its runner is `fass-tool boot`, which `cargo install --git URL tool` installs.
+        "git": Takes::Text("URL");
+    },
+    notes: "\
+With --out, cargo run boots the app and cargo test tests it; without, it is in apps/,
+./scripts/run --app NAME boots it and cargo test -p NAME tests it. docs/guide.md shows
+what to do next.
+
+exit codes: 0 the app is there; 1 its files cannot be written; 2 a refused
+command line
+",
+};
+
+/// The template's name, as a package and as a crate.
+const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
+
+/// A file of an app: where it goes in the app's folder, and its text.
+type AppFile = (&'static str, &'static str);
+
+/// What says how an app under `apps/` is built.
+const MANIFEST: AppFile = ("Cargo.toml", include_str!("../template/manifest.toml"));
+
+/// The template's other files, which any app has.
+const FILES: &[AppFile] = &[
+    ("build.rs", include_str!("../template/build.rs")),
+    ("src/lib.rs", include_str!("../template/src/lib.rs")),
+    ("src/main.rs", include_str!("../template/src/main.rs")),
+    (
+        "examples/app-template-linux.rs",
+        include_str!("../template/examples/app-template-linux.rs"),
+    ),
+    (
+        "examples/replay.rs",
+        include_str!("../template/examples/replay.rs"),
+    ),
+    (
+        "tests/virtual_time.rs",
+        include_str!("../template/tests/virtual_time.rs"),
+    ),
+];
+
+/// Texts of the template, and those that stand for them in an app.
+type Changes = Vec<(String, String)>;
+
+/// Runs the subcommand with the words after its name.
+#[must_use]
+pub fn new_app(words: &[OsString]) -> ExitCode {
+    NEW_APP.carry_out(words, |options| {
+        print!("{}", make(options)?);
+        Ok(ExitCode::SUCCESS)
+    })
+}
+
+/// Makes the app, and returns what to do with it.
+fn make(options: &Parsed) -> Result<String, Refusal> {
+    let usage = |line: &str| Err(Refusal::Usage(line.into()));
+    let Some(name) = options.positional() else {
+        return usage("which name? give one, such as `./scripts/new-app brake-assist`");
+    };
+    match (options.path("out"), options.text("git")) {
+        (None, Some(_)) => usage("`--git` is for a repository; add its folder, `--out DIR`"),
+        (None, None) => create(system::workspace(), name).map(|_| next_steps(name)),
+        (Some(out), git) => {
+            let source = git.map_or(Source::Folder(system::workspace()), Source::Git);
+            create_repository(out, name, source).map(|()| next_steps_there(out, source))
+        }
+    }
+}
+
+/// Writes a new app into a workspace, and returns its folder.
+///
+/// # Errors
+///
+/// The name is refused, or a file cannot be written; nothing is left then.
+pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, Refusal> {
+    check(workspace, name).map_err(Refusal::Usage)?;
+    let folder = workspace.join("apps").join(name);
+    let files = [MANIFEST].into_iter().chain(FILES.iter().copied());
+    // Another command may have been as quick.
+    write_folder(&folder, name, files, Changes::new(), &taken(name))?;
+    Ok(folder)
+}
+
+/// Makes an app's folder, which must not be there, and writes its files, each changed as it
+/// has to be. `taken` says that the folder is there.
+fn write_folder(
+    folder: &Path,
+    name: &str,
+    mut files: impl Iterator<Item = AppFile>,
+    mut changes: Changes,
+    taken: &str,
+) -> Result<(), Refusal> {
+    let failed = |error| Refusal::Failure(format!("cannot write `{}`: {error}", folder.display()));
+    if let Some(parent) = folder.parent() {
+        fs::create_dir_all(parent).map_err(failed)?;
+    }
+    fs::create_dir(folder).map_err(|error| match error.kind() {
+        ErrorKind::AlreadyExists => Refusal::Usage(taken.into()),
+        _ => failed(error),
+    })?;
+    changes.push((PLACEHOLDER.0.into(), name.into()));
+    changes.push((PLACEHOLDER.1.into(), name.replace('-', "_")));
+    let written = files.try_for_each(|(place, text)| {
+        let place = folder.join(place.replace(PLACEHOLDER.0, name));
+        let changes = changes.iter();
+        let text = changes.fold(text.to_string(), |text, (old, new)| text.replace(old, new));
+        files::write(&place, text)
+    });
+    written.map_err(|line| {
+        // What cannot be written can perhaps not be removed either; the line
+        // names the place.
+        let _ = fs::remove_dir_all(folder);
+        Refusal::Failure(line)
+    })
+}
+
+/// Says what is in an app's folder.
+fn is_there(folder: &str) -> String {
+    format!(
+        "\
+{folder} is there:
+  src/lib.rs             the functions and their DAG: begin here
+  src/main.rs            boots it and reports
+  tests/virtual_time.rs  runs it on the host, in virtual time
+
+"
+    )
+}
+
+fn next_steps(name: &str) -> String {
+    let boot = format!("./scripts/run --app {name}");
+    let linux = format!("{boot} --on linux");
+    let test = format!("cargo test -p {name}");
+    format!(
+        "\
+{}{boot:width$}  boots it in QEMU
+{linux}  runs it on Linux
+{test:width$}  tests it on the host
+{:width$}  goes on from here
+",
+        is_there(&format!("apps/{name}")),
+        "docs/guide.md",
+        width = linux.len()
+    )
+}
+
+/// The longest name, in bytes, with which the template's lines stay short.
+const LONGEST: usize = 32;
+
+/// Names that cannot be crates, because they mean something already: keywords,
+/// the compiler's own crates, and folders that cargo makes.
+const RESERVED: &str = "\
+    abstract alloc as async await become box break build const continue core crate deps do dyn \
+    else enum examples extern false final fn for gen if impl in incremental let loop macro \
+    match mod move mut override priv proc-macro pub ref return self static std struct super \
+    test trait true try type typeof unsafe unsized use virtual where while yield";
+
+/// Checks that a new app of a workspace can have a name.
+///
+/// # Errors
+///
+/// One line: the name, what is wrong with it, and what is possible.
+pub fn check(workspace: &Path, name: &str) -> Result<(), String> {
+    check_word(name)?;
+    let folder = Path::new("apps").join(name);
+    if workspace.join(&folder).exists() {
+        return Err(taken(name));
+    }
+    match package_folder(workspace, name) {
+        Some(taken) => refuse(
+            name,
+            &format!("the package in {} has it; choose another", taken.display()),
+        ),
+        None => Ok(()),
+    }
+}
+
+fn refuse(name: &str, why: &str) -> Result<(), String> {
+    Err(format!("{} cannot be an app's name: {why}", quoted(name)))
+}
+
+/// Checks that a name can be an app's wherever that is: a package's and a crate's.
+///
+/// # Errors
+///
+/// As of [`check`].
+fn check_word(name: &str) -> Result<(), String> {
+    let refuse = |why: &str| refuse(name, why);
+    if name.is_empty() {
+        return Err("the name is empty; give one, such as `brake-assist`".into());
+    }
+    if let Some(odd) = name.chars().find(|&c| !is_allowed(c)) {
+        let suggestion = suggestion(name);
+        return refuse(&format!(
+            "{odd:?} is in it; use small letters, digits and hyphens{suggestion}"
+        ));
+    }
+    if !name.starts_with(|first: char| first.is_ascii_lowercase()) {
+        return refuse("it does not begin with a letter; put one first");
+    }
+    if name.ends_with('-') || name.contains("--") {
+        return refuse("a hyphen in it joins nothing; write each between two words");
+    }
+    if name.len() > LONGEST {
+        return refuse(&format!(
+            "it has {} letters; give at most {LONGEST}",
+            name.len()
+        ));
+    }
+    if RESERVED.split(' ').any(|word| word == name) {
+        return refuse("Rust or cargo use the word themselves; add another, such as `my-`");
+    }
+    Ok(())
+}
+
+/// Says that there is an app of the name.
+fn taken(name: &str) -> String {
+    format!("there is an app `{name}` already; choose another name, or edit apps/{name}")
+}
+
+fn is_allowed(c: char) -> bool {
+    c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-'
+}
+
+/// Says how the name could be written, if small letters and hyphens suffice.
+fn suggestion(name: &str) -> String {
+    let better = name.to_ascii_lowercase().replace(['_', ' '], "-");
+    if better.chars().all(is_allowed) {
+        return format!(", as in `{better}`");
+    }
+    String::new()
+}
+
+/// Returns the folder, within the workspace, of the package with such a name.
+fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
+    let manifest = files_below(workspace, |_| true).into_iter().find(|file| {
+        let text = || fs::read_to_string(file).unwrap_or_default();
+        file.ends_with("Cargo.toml") && names(&text()).any(|other| other == name)
+    })?;
+    let folder = manifest.parent()?.strip_prefix(workspace);
+    folder.ok().map(Path::to_path_buf)
+}
+
+/// Returns the names that a manifest gives to a package, a library or a program, with
+/// `-` for `_`. Those of examples, tests and benchmarks are in nobody's way.
+fn names(manifest: &str) -> impl Iterator<Item = String> {
+    let mut table = "";
+    manifest.lines().filter_map(move |line| {
+        if line.starts_with('[') {
+            table = line.trim_end();
+        }
+        let (key, value) = line.split_once('=')?;
+        let counts = ["[package]", "[lib]", "[[bin]]"].contains(&table);
+        let is_name = counts && key.trim() == "name";
+        is_name.then(|| value.trim().trim_matches('"').replace('_', "-"))
+    })
+}
+
+/// Where a repository's app has the crates from, and cargo its runner.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a> {
+    /// The root of a workspace in this file system.
+    Folder(&'a Path),
+    /// A git repository, by its URL; the runner is installed.
+    Git(&'a str),
+}
+
+/// The workspace's root, as the template's files name it.
+const WORKSPACE: &str = "/workspace";
+
+/// The packages that the template depends on, by their folders.
+const PACKAGES: [&str; 5] = [
+    "fass",
+    "kernel",
+    "kernel/on-linux",
+    "fass/virtual-time",
+    "boot/link",
+];
+
+/// The files that an app under `apps/` does without, or has others for.
+const OWN_FILES: [AppFile; 6] = [
+    (
+        "Cargo.toml",
+        include_str!("../template/repository/manifest.toml"),
+    ),
+    (
+        ".cargo/config.toml",
+        include_str!("../template/repository/config.toml"),
+    ),
+    (
+        ".github/workflows/ci.yml",
+        include_str!("../template/repository/ci.yml"),
+    ),
+    (".gitignore", "/target\n"),
+    (
+        "README.md",
+        include_str!("../template/repository/README.md"),
+    ),
+    (
+        "rust-toolchain.toml",
+        include_str!("../../../rust-toolchain.toml"),
+    ),
+];
+
+/// Makes a new folder, the root of an app's repository.
+///
+/// # Errors
+///
+/// The name or the folder is refused, or a file cannot be written; nothing is left then.
+pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(), Refusal> {
+    check_word(name).map_err(Refusal::Usage)?;
+    if PACKAGES
+        .iter()
+        .any(|package| package.replace("fass/", "").replace('/', "-") == name)
+    {
+        return Err(Refusal::Usage(format!(
+            "{} cannot be an app's name: it is that of a package that the app needs; choose another",
+            quoted(name)
+        )));
+    }
+    let shown = quoted(&out.to_string_lossy()).to_string();
+    let changes = match source {
+        Source::Git(url) if url.contains(['"', '\\', '\n']) => {
+            let line = format!("`--git {}`: no URL has such a character", quoted(url));
+            return Err(Refusal::Usage(line));
+        }
+        Source::Folder(root) => match root.to_str().filter(|root| !root.contains(['"', '\\'])) {
+            Some(root) => from_folder(root),
+            None => {
+                let line = format!("{shown}: cargo cannot name the folder of these commands");
+                return Err(Refusal::Failure(line));
+            }
+        },
+        Source::Git(url) => from_git(url),
+    };
+    let files = OWN_FILES.into_iter().chain(FILES.iter().copied());
+    let taken = format!("`--out` {shown}: it is there already; name a folder to be made");
+    write_folder(out, name, files, changes, &taken)
+}
+
+/// Returns how texts change for crates of this workspace. Nothing is installed for them.
+fn from_folder(root: &str) -> Changes {
+    let install = "      - run: cargo install --locked --git /workspace tool\n";
+    let changes = [
+        (install, ""),
+        ("ubuntu-latest", "self-hosted # where the crates are"),
+        (WORKSPACE, root),
+    ];
+    changes.map(|(old, new)| (old.into(), new.into())).into()
+}
+
+/// Returns how texts change for crates of this git repository.
+fn from_git(url: &str) -> Changes {
+    let by_path = |package| format!("path = \"{WORKSPACE}/{package}\"");
+    let crates = PACKAGES.map(|package| (by_path(package), format!("git = \"{url}\"")));
+    let others = [
+        ("\"/workspace/scripts/boot\"", "\"fass-tool\", \"boot\""),
+        ("/workspace/scripts/debug", "fass-tool debug"),
+        (WORKSPACE, url),
+    ];
+    let others = others.map(|(old, new)| (old.into(), new.into()));
+    crates.into_iter().chain(others).collect()
+}
+
+/// Says what to do in the repository.
+fn next_steps_there(out: &Path, source: Source<'_>) -> String {
+    let install = match source {
+        Source::Folder(_) => String::new(),
+        Source::Git(url) => {
+            format!("cargo install --locked --git {url} tool   # once: the runner, fass-tool\n")
+        }
+    };
+    format!(
+        "\
+{}{install}cd {}
+cargo run               # boots it in QEMU
+cargo test              # tests it on the host
+cargo run -- --on linux # runs it on Linux, docs/linux.md
+git init                # docs/guide.md goes on from here
+",
+        is_there(&out.display().to_string()),
+        out.display()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        FILES, MANIFEST, PACKAGES, PLACEHOLDER, Source, check, create, create_repository, names,
+    };
+    use crate::options::Refusal;
+    use crate::system::workspace;
+    use std::fs;
+
+    #[test]
+    fn the_template_names_itself_and_nothing_of_its_name_is_left_in_a_copy() {
+        let workspace = std::env::temp_dir().join(format!("new-app-{}", std::process::id()));
+        let folder = create(&workspace, "brake-assist").unwrap();
+        let mut named = 0;
+        for (place, template) in FILES.iter().chain([&MANIFEST]) {
+            let place = place.replace(PLACEHOLDER.0, "brake-assist");
+            let text = fs::read_to_string(folder.join(&place)).unwrap();
+            let has_old = text.contains(PLACEHOLDER.0) || text.contains(PLACEHOLDER.1);
+            assert!(!has_old, "{place}");
+            named += usize::from(*template != text);
+        }
+        // All but build.rs and the program for Linux have the app's name.
+        assert_eq!(named, 5);
+        let again = create(&workspace, "brake-assist").unwrap_err();
+        let line = "there is an app `brake-assist` already; choose another name, or edit \
+                    apps/brake-assist";
+        assert_eq!(again, Refusal::Usage(line.into()));
+        // Of two at once one makes it.
+        for number in 0..50 {
+            let (name, barrier) = (format!("app-{number}"), std::sync::Barrier::new(2));
+            let make = || {
+                barrier.wait();
+                create(&workspace, &name).is_ok()
+            };
+            let made = std::thread::scope(|scope| {
+                [scope.spawn(make), scope.spawn(make)].map(|thread| thread.join().unwrap())
+            });
+            assert!(made[0] != made[1], "{name}: {made:?}");
+        }
+        fs::remove_dir_all(workspace).unwrap();
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_and_leaves_nothing() {
+        let workspace = std::env::temp_dir().join(format!("no-app-{}", std::process::id()));
+        fs::create_dir_all(&workspace).unwrap();
+        // A file where a folder has to be.
+        fs::write(workspace.join("apps"), "").unwrap();
+        let Refusal::Failure(line) = create(&workspace, "brake-assist").unwrap_err() else {
+            panic!("a file has become a folder");
+        };
+        assert!(line.starts_with("cannot write `") && line.contains("apps/brake-assist`: "));
+        fs::remove_dir_all(workspace).unwrap();
+    }
+
+    /// Names, and why they are refused.
+    const BAD: &str = " | the name is empty; give one, such as `brake-assist`
+Brake_Assist | `Brake_Assist` cannot be an app's name: 'B' is in it; use small letters, digits and hyphens, as in `brake-assist`
+../fork | `../fork` cannot be an app's name: '.' is in it; use small letters, digits and hyphens
+2nd | `2nd` cannot be an app's name: it does not begin with a letter; put one first
+brake- | `brake-` cannot be an app's name: a hyphen in it joins nothing; write each between two words
+a-name-that-has-more-letters-than-32 | `a-name-that-has-more-letters-than-32` cannot be an app's name: it has 36 letters; give at most 32
+struct | `struct` cannot be an app's name: Rust or cargo use the word themselves; add another, such as `my-`
+fork-join | there is an app `fork-join` already; choose another name, or edit apps/fork-join
+virtual-time | `virtual-time` cannot be an app's name: the package in fass/virtual-time has it; choose another
+tool | `tool` cannot be an app's name: the package in scripts/tool has it; choose another";
+
+    #[test]
+    fn each_bad_name_is_refused_with_what_is_possible() {
+        for row in BAD.lines() {
+            let (name, line) = row.split_once(" | ").expect(row);
+            assert_eq!(check(workspace(), name), Err(line.to_string()));
+        }
+        assert_eq!(check(workspace(), "brake-assist-2"), Ok(()));
+    }
+
+    #[test]
+    fn an_example_leaves_its_name_to_an_app() {
+        let manifest = "[package]\nname = \"virtual-time\"\n\n[lib]\nname = \"virtual_time\"\n\
+                        [[bin]]\nname = \"tool\"\n[[example]]\nname = \"vision\"\n";
+        let found: Vec<String> = names(manifest).collect();
+        assert_eq!(found, ["virtual-time", "virtual-time", "tool"]);
+    }
+
+    /// That the app is built and boots is shown by `tests/tests/boot_new_app.rs`.
+    #[test]
+    fn from_git_the_url_is_all_that_is_named_and_from_a_folder_nothing_is_installed() {
+        let url = "https://example.org/kernel.git";
+        for source in [Source::Git(url), Source::Folder(workspace())] {
+            let is_git = matches!(source, Source::Git(_));
+            let out = std::env::temp_dir().join(format!("from-{is_git}-{}", std::process::id()));
+            create_repository(&out, "brake-assist", source).unwrap();
+            let places = [
+                "Cargo.toml",
+                ".cargo/config.toml",
+                ".github/workflows/ci.yml",
+            ];
+            let texts = places.map(|place| fs::read_to_string(out.join(place)).unwrap());
+            let [manifest, runner, steps] = &texts;
+            assert_eq!(steps.contains("install"), is_git, "{steps}");
+            if is_git {
+                let by_url = format!("{{ git = \"{url}\" }}");
+                assert_eq!(
+                    manifest.matches(&by_url).count(),
+                    PACKAGES.len(),
+                    "{manifest}"
+                );
+                let words = "runner = [\"fass-tool\", \"boot\"]\n";
+                assert!(runner.ends_with(words), "{runner}");
+                let install = format!("- run: cargo install --locked --git {url} tool\n");
+                assert!(steps.contains(&install), "{steps}");
+                assert!(!texts.concat().contains("/workspace"), "{texts:?}");
+            }
+            for (out, name, part) in [
+                (
+                    out.clone(),
+                    "brake",
+                    ": it is there already; name a folder to be made",
+                ),
+                (
+                    out.join("new"),
+                    "boot-link",
+                    "of a package that the app needs; choose",
+                ),
+                (out.join("new"), "Brake", "'B' is in it; "),
+            ] {
+                match create_repository(&out, name, source) {
+                    Err(Refusal::Usage(line)) => assert!(line.contains(part), "{line}"),
+                    other => panic!("{name}: {other:?}"),
+                }
+            }
+            assert!(!out.join("new").exists());
+            fs::remove_dir_all(out).unwrap();
+        }
+    }
+
+    #[test]
+    fn it_is_built_for_figures_as_in_the_workspace() {
+        let profile = |manifest: &'static str| {
+            let from = manifest.find("[profile.release]").unwrap();
+            let lines = manifest[from..].lines().filter(|line| !line.is_empty());
+            lines.collect::<Vec<_>>()
+        };
+        let own = profile(include_str!("../template/repository/manifest.toml"));
+        let workspace = profile(include_str!("../../../Cargo.toml"));
+        assert!(own.len() > 8, "{own:?}");
+        assert!(own.iter().all(|line| workspace.contains(line)), "{own:?}");
+    }
+}

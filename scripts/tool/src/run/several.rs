@@ -1,0 +1,448 @@
+//! More than one run: the files of a folder (`--dag FOLDER`), and runs that are observed, by
+//! `--observe` and `--prove`: what calls took, and whether bounds have held.
+//!
+//! Both of these boot with the words by which a guest tells its DAGs and its times. `--prove` boots
+//! twice: the first run is observed, the second one commits with the WCETs and the overheads
+//! that the first has shown, except for what the person states.
+//!
+//! Of a folder every file whose name ends in `.dag`, `.yaml` or `.yml` is run, in the order of
+//! their names: one boot each, with `--prove` two boots each, in one table. One that is refused, or
+//! fails, does not keep the others from being run.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
+use crate::dag_file::{Format, states_overheads};
+use crate::files::{self, Temporary};
+use crate::json::quoted;
+use crate::options::{Parsed, Refusal};
+use crate::outcome::Outcome;
+use crate::progress::Progress;
+use crate::proof::observed::{self, Measured, OfDag};
+
+use crate::proof::report;
+use crate::protocol::Status;
+use crate::record::Record;
+use crate::system;
+
+/// What the platform costs; an error in words if no trace was kept.
+type Measurement = Result<Measured, String>;
+
+/// Reports whether the options ask for any of this.
+pub(super) fn is_asked_for(options: &Parsed) -> bool {
+    options.is_given("observe") || options.is_given("prove")
+}
+
+/// Does what the options ask for.
+pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
+    if let Some(name) = options.given_of(&["console", "gdb", "print-dag"]) {
+        let line = format!("`--{name}` is for a run that is not observed; leave one of them out");
+        return Err(Refusal::Usage(line));
+    }
+    check_files(options)?;
+    if !options.is_given("prove") {
+        return Ok(match observe(options, options.path("observe"))? {
+            Some(_) => ExitCode::SUCCESS,
+            None => ExitCode::FAILURE,
+        });
+    }
+    let Some(Proven {
+        rows,
+        code,
+        is_well,
+    }) = prove(options)?
+    else {
+        return Ok(ExitCode::FAILURE);
+    };
+    say(
+        options,
+        &report::table(&rows),
+        rows.iter().map(report::Row::line),
+    );
+    match report::complaint(&rows) {
+        Some(complaint) if is_well => Err(Refusal::Failure(complaint)),
+        _ => Ok(code),
+    }
+}
+
+/// Proves the DAGs of each file, one after the other, and says all in one table. A file that is
+/// refused or fails does not keep the others from being proven.
+pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
+    let mut progress = Progress::new(files.len() as u64, "files");
+    let (mut rows, mut over) = (Vec::new(), 0);
+    let (refused, failed) = each(files, |file| {
+        progress.show(over);
+        over += 1;
+        let one = options.with("dag", file).with("quiet", "yes");
+        // Neither people nor programs want the lines of each run.
+        let one = one.with("json", "yes").with("plain", "yes");
+        let Some(proven) = prove(&one)? else {
+            return Ok(Status::Failure);
+        };
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        rows.extend(proven.rows.into_iter().map(|row| row.of_file(&name)));
+        Ok(match proven.is_well {
+            true => Status::Success,
+            false => Status::Failure,
+        })
+    })?;
+    progress.end();
+    say(
+        options,
+        &report::table(&rows),
+        rows.iter().map(report::Row::line),
+    );
+    if !options.is_given("json") {
+        let (count, summary) = (files.len(), report::summary(&rows));
+        println!("{count} files: {refused} refused, {failed} failed; {summary}");
+    }
+    match report::complaint(&rows) {
+        Some(complaint) => Err(Refusal::Failure(complaint)),
+        None => Ok(worst(refused, failed)),
+    }
+}
+
+/// The second run of a proof.
+struct Proven {
+    rows: Vec<report::Row>,
+    code: ExitCode,
+    is_well: bool,
+}
+
+/// Observes a run, commits with what it has shown, and compares; `None` if the first run has
+/// failed, which has been said.
+fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
+    let log = system::new_log("observed")?;
+    let own = Temporary(Some(log.with_extension("wcets")));
+    let Some(proving) = observe_first(options, own.0.as_deref())? else {
+        return Ok(None);
+    };
+    let dags = prepare(&proving)?;
+    let booted = boot_app(&proving, dags.as_ref(), true)?;
+    let is_well = booted.outcome.judge().is_ok();
+    let code = conclude(&booted, dags.as_ref(), &proving);
+    go_on(&booted)?;
+    let rows = match compare(&booted).map_err(Refusal::Failure) {
+        Ok(rows) => rows,
+        // There are worse news.
+        Err(_) if !is_well => Vec::new(),
+        Err(refusal) => return Err(refusal),
+    };
+    Ok(Some(Proven {
+        rows,
+        code,
+        is_well,
+    }))
+}
+
+/// Observes a run, unless the person states both WCETs and overheads, and returns the command
+/// line by which the next one commits with what was seen; `None` if the run has failed.
+fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>, Refusal> {
+    let append = options.text("append").unwrap_or_default();
+    let measures = !states_overheads(append);
+    if options.is_given("wcets") && !measures {
+        return Ok(Some(options.clone()));
+    }
+    let first = options.with("quiet", "yes").with("plain", "yes");
+    let file = options.path("observe").or(own);
+    let Some(seen) = observe(&first, file.filter(|_| !options.is_given("wcets")))? else {
+        return Ok(None);
+    };
+    let mut next = options.clone();
+    if let (Some(file), false) = (file, options.is_given("wcets")) {
+        next = next.with("wcets", file);
+    }
+    if measures {
+        let measured = seen?;
+        let margin = options.number("margin").unwrap_or(observed::MARGIN_PERCENT);
+        let line = measured.line(margin);
+        say(options, &measured.text(margin), [line].into_iter());
+        next = next.with("append", format!("{append} {}", measured.word(margin)));
+    }
+    Ok(Some(next))
+}
+
+fn compare(booted: &Booted) -> Result<Vec<report::Row>, String> {
+    let record = booted.outcome.record()?;
+    let mut all = Vec::new();
+    observed::add(&mut all, &record)?;
+    report::rows(record.proven()?, &all)
+}
+
+/// Observes a run for each seed, says what the calls took, and writes the file of WCETs.
+/// Returns what else was seen; `None` if a run has failed, which has been said.
+fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
+    let observing = options.without("prove");
+    let observing = observing.with("observe", file.unwrap_or(Path::new("")));
+    let first = options.number("seed").unwrap_or(1);
+    let seeds = options.number("seeds").unwrap_or(1);
+    let mut all: Vec<OfDag> = Vec::new();
+    let mut latest = Record::default();
+    for seed in first..first.saturating_add(seeds) {
+        let one = match seeds {
+            1 => observing.clone(),
+            _ => observing.with("seed", seed.to_string()),
+        };
+        let dags = prepare(&one)?;
+        let booted = boot_app(&one, dags.as_ref(), true)?;
+        let is_well = booted.outcome.judge().is_ok();
+        conclude(&booted, dags.as_ref(), &one);
+        go_on(&booted)?;
+        if !is_well {
+            return Ok(None);
+        }
+        latest = booted.outcome.record()?;
+        observed::add(&mut all, &latest)?;
+    }
+    let margin = options.number("margin").unwrap_or(observed::MARGIN_PERCENT);
+    say(
+        options,
+        &observed::table(&all, margin),
+        observed::lines(&all),
+    );
+    if let Some(path) = file {
+        let place = files::place(path);
+        files::write_named("observe", path, observed::text(&all, margin))?;
+        if options.is_given("observe") && !options.is_given("json") {
+            println!("{place}: the WCETs; `--wcets {place}` commits with them");
+        }
+    }
+    // Those of the last seed stand for all.
+    Ok(Some(observed::measure(&latest.runs)))
+}
+
+/// Says a table to people and lines to programs, as the options want it.
+fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
+    if !options.is_given("json") {
+        print!("{table}");
+    }
+    if !options.is_given("plain") {
+        lines.for_each(|line| println!("{line}"));
+    }
+}
+
+/// A run that only observes judges no bound: what its WCETs and overheads should be is what it is
+/// to show.
+pub(super) fn bounds_word(options: &Parsed) -> Option<String> {
+    let observes = options.is_given("observe") && !options.is_given("prove");
+    observes.then(|| "bounds=observe".into())
+}
+
+/// Says what a guest has refused of a file of WCETs, by its name and line.
+pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
+    let path = options.path("wcets");
+    match path.and_then(|path| observed::translate(reason, path)) {
+        Some(line) => {
+            RUN.complain(&line);
+            true
+        }
+        None => false,
+    }
+}
+
+/// The options that say something of one run.
+const FOR_ONE_FILE: [&str; 10] = [
+    "print-dag",
+    "graph",
+    "trace",
+    "serial",
+    "dot",
+    "witness",
+    "observe",
+    "wcets",
+    "console",
+    "gdb",
+];
+
+/// Runs all files. A refused or failed one does not keep the others from running;
+/// the exit code is that of the worst.
+pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> {
+    if let Some(name) = options.given_of(&FOR_ONE_FILE) {
+        let line = format!("`--{name}` is for one file; name one with `--dag`");
+        return Err(Refusal::Usage(line));
+    }
+    let files = files(folder).map_err(Refusal::Usage)?;
+    if options.is_given("prove") {
+        return of_files(options, &files);
+    }
+    let shows_lines = options.is_given("json");
+    if !shows_lines {
+        println!("{}", heading());
+    }
+    let (refused, failed) = each(&files, |file| {
+        let one = options.with("dag", file).with("quiet", "yes");
+        let dags = prepare(&one)?;
+        let booted = boot_app(&one, dags.as_ref(), false)?;
+        let judged = booted.outcome.judge();
+        let status = judged.map_or_else(|fault| fault.status, |()| Status::Success);
+        if status == Status::Failure {
+            RUN.complain(&format!("{}:", files::place(file)));
+        }
+        conclude(&booted, dags.as_ref(), &one);
+        go_on(&booted)?;
+        if shows_lines {
+            lines(file, &booted.outcome).for_each(|line| println!("{line}"));
+        } else {
+            let cores = options.number("cores").unwrap_or(1);
+            print!("{}", rows(file, cores, &booted.outcome));
+        }
+        Ok(status)
+    })?;
+    if !shows_lines {
+        let count = files.len();
+        println!("{count} files: {refused} refused, {failed} failed");
+    }
+    Ok(worst(refused, failed))
+}
+
+/// Runs each file; one that is refused or fails does not keep the others from running. Returns
+/// how many were refused, and how many failed.
+pub(super) fn each(
+    files: &[PathBuf],
+    mut run: impl FnMut(&Path) -> Result<Status, Refusal>,
+) -> Result<(usize, usize), Refusal> {
+    let (mut refused, mut failed) = (0, 0);
+    for file in files {
+        let status = match run(file) {
+            Ok(status) => status,
+            Err(Refusal::Usage(lines)) => {
+                RUN.complain(&lines);
+                Status::Usage
+            }
+            Err(Refusal::Failure(line)) => {
+                RUN.complain(&format!("{}: {line}", files::place(file)));
+                Status::Failure
+            }
+            Err(refusal) => return Err(refusal),
+        };
+        refused += usize::from(status == Status::Usage);
+        failed += usize::from(status == Status::Failure);
+    }
+    Ok((refused, failed))
+}
+
+/// Returns the exit code of the worst of the files.
+pub(super) fn worst(refused: usize, failed: usize) -> ExitCode {
+    match (refused, failed) {
+        (0, 0) => ExitCode::SUCCESS,
+        (0, _) => ExitCode::FAILURE,
+        _ => ExitCode::from(2),
+    }
+}
+
+/// Returns the folder that `--dag` names, if it is one.
+pub(super) fn folder(options: &Parsed) -> Option<PathBuf> {
+    let path = options.path("dag")?;
+    path.is_dir().then(|| path.to_path_buf())
+}
+
+/// Returns the DAG files of a folder.
+///
+/// # Errors
+///
+/// In words: it cannot be read, or has none.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let place = folder.display();
+    let entries = fs::read_dir(folder).map_err(|error| format!("{place}: {error}"))?;
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|path| matches!(Format::of(path), Some(Format::Ours | Format::RdGen)));
+    if files.is_empty() {
+        return Err(format!(
+            "{place}: the folder has no file .dag, .yaml or .yml; name another"
+        ));
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// The heading of the table.
+fn heading() -> String {
+    format!(
+        "{:<18}{:<18}{:>8}{:>6}{:>6}{:>8}{:>11}{:>14}{:>14}{:>10}",
+        "file",
+        "dag",
+        "subtasks",
+        "cores",
+        "jobs",
+        "misses",
+        "violations",
+        "bound ms",
+        "max ms",
+        "max/bound"
+    )
+}
+
+/// The rows of a file: one for each of its DAGs.
+fn rows(file: &Path, cores: u64, outcome: &Outcome) -> String {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let violations: u64 = outcome
+        .transcript
+        .of_kind("dag_set")
+        .filter_map(|line| line.number_at("violations"))
+        .sum();
+    let mut text = String::new();
+    for line in outcome.transcript.of_kind("dag_run") {
+        let number = |name: &str| line.number_at(name).unwrap_or(0);
+        let milliseconds = |ns: Option<u64>| ns.map_or("-".into(), decimal);
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(
+            text,
+            "{name:<18}{:<18}{:>8}{cores:>6}{:>6}{:>8}{violations:>11}{:>14}{:>14}{:>10}",
+            line.text_at("dag").unwrap_or("?"),
+            number("subtasks"),
+            number("completed"),
+            number("deadline_misses"),
+            milliseconds(line.number_at("bound_ns")),
+            milliseconds(line.number_at("response_time_ns.max")),
+            line.number_at("tightness_permille")
+                .map_or("-".into(), |permille| format!(
+                    "{}.{} %",
+                    permille / 10,
+                    permille % 10
+                )),
+        );
+    }
+    text
+}
+
+/// Writes nanoseconds as milliseconds with three places.
+fn decimal(ns: u64) -> String {
+    let us = ns / 1000;
+    format!("{}.{:03}", us / 1000, us % 1000)
+}
+
+/// The machine lines of a file's DAGs, each with a member that names the file.
+fn lines<'o>(file: &Path, outcome: &'o Outcome) -> impl Iterator<Item = String> + use<'o> {
+    const BEGINNING: &str = "{\"kind\":\"dag_run\",";
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let name = quoted(&name);
+    outcome.serial.lines().filter_map(move |line| {
+        let rest = line.strip_prefix(BEGINNING)?;
+        Some(format!("{BEGINNING}\"file\":{name},{rest}"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::lines;
+    use crate::json::{self, Value};
+    use crate::outcome::Outcome;
+    use crate::qemu::Ending;
+    use std::path::Path;
+
+    #[test]
+    fn any_name_of_a_file_is_one_member_of_a_machine_line() {
+        let serial = "{\"kind\":\"dag_run\",\"dag\":\"x\"}\n";
+        let place = Path::new("the log");
+        let outcome = Outcome::of(Ending::Signal, serial.into(), place, place);
+        for name in ["a.dag", "a\nb.dag", "\"\\.dag", "\u{1b}.dag"] {
+            let all: Vec<String> = lines(Path::new(name), &outcome).collect();
+            assert_eq!(all.concat().lines().count(), 1, "{all:?}");
+            let line = json::parse(&all[0]).expect("JSON");
+            assert_eq!(line.get("file").and_then(Value::as_text), Some(name));
+        }
+    }
+}
