@@ -237,13 +237,25 @@ impl Command {
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "{}\n", self.about);
         let _ = writeln!(text, "usage: {}{positional} [options]\n", self.invocation);
+        // A group's name stands before its first option.
+        let groups = self.options.iter().map(|option| option.group.len());
+        let indent = groups.max().filter(|longest| *longest > 0);
+        let indent = indent.map_or(0, |longest| longest + 2);
+        let mut add = |group: &str, heading: &str, sentence: &str| {
+            add_entry(
+                &mut text,
+                &format!("  {group:indent$}{heading}"),
+                26 + indent,
+                sentence,
+            );
+        };
         if let Some((takes, help)) = self.positional {
-            add_entry(&mut text, takes.name(), help);
+            add("", takes.name(), help);
         }
         for option in self.options {
-            add_entry(&mut text, &option.heading(), &option.sentence());
+            add(option.group, &option.heading(), &option.sentence());
         }
-        add_entry(&mut text, "-h, --help", "Show this text.");
+        add("", "-h, --help", "Show this text.");
         if !self.notes.is_empty() {
             let _ = writeln!(text, "\n{}", self.notes.trim_end());
         }
@@ -252,19 +264,18 @@ impl Command {
 }
 
 /// Adds an entry to a help text: the sentence begins at a column, and is broken to a width.
-fn add_entry(text: &mut String, heading: &str, sentence: &str) {
-    const COLUMN: usize = 26;
-    const WIDTH: usize = 80;
-    let mut line = format!("  {heading}");
-    if line.len() + 2 > COLUMN {
+fn add_entry(text: &mut String, heading: &str, column: usize, sentence: &str) {
+    const WIDTH: usize = 54;
+    let mut line = heading.to_string();
+    if line.len() + 2 > column {
         let _ = writeln!(text, "{line}");
         line.clear();
     }
-    line = format!("{line:COLUMN$}");
+    line = format!("{line:column$}");
     for word in sentence.split_whitespace() {
-        if line.len() + word.len() > WIDTH {
+        if line.len() + word.len() > column + WIDTH {
             let _ = writeln!(text, "{}", line.trim_end());
-            line = " ".repeat(COLUMN);
+            line = " ".repeat(column);
         }
         line.push_str(word);
         line.push(' ');
@@ -296,14 +307,21 @@ pub struct Opt {
     pub default: &'static str,
     /// One sentence for the help text.
     pub help: &'static str,
+    /// The group that begins with it in the help text; empty: none does.
+    pub group: &'static str,
 }
 
 /// Makes the options of a [`Command`]: above each its sentence for the help text; a
-/// short form stands behind the name, and the value when the option is not given behind `or`.
+/// short form stands behind the name, the group that begins with it behind `in`, and the value when
+/// the option is not given behind `or`.
 macro_rules! options {
-    ($($(#[doc = $help:literal])+ $name:literal $($short:literal)?: $takes:expr $(, or $default:expr)?;)*) => {
+    ($(
+        $(#[doc = $help:literal])+
+        $name:literal $($short:literal)? $(in $group:literal)?: $takes:expr $(, or $default:expr)?;
+    )*) => {
         &[$(
-            $crate::options::Opt::new($name, $takes, concat!($($help),+))$(.short($short))?$(.or($default))?
+            $crate::options::Opt::new($name, $takes, concat!($($help),+))
+                $(.short($short))?$(.begins($group))?$(.or($default))?
         ),*]
     };
 }
@@ -393,6 +411,7 @@ impl Opt {
             takes,
             default: "",
             help,
+            group: "",
         }
     }
 
@@ -400,6 +419,13 @@ impl Opt {
     #[must_use]
     pub const fn short(mut self, short: char) -> Opt {
         self.short = Some(short);
+        self
+    }
+
+    /// Has a group of this name begin with the option.
+    #[must_use]
+    pub const fn begins(mut self, group: &'static str) -> Opt {
+        self.group = group;
         self
     }
 

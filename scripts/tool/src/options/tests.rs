@@ -157,3 +157,12 @@ Exit codes: none.
 ";
     assert_eq!(refusal, Refusal::Help(expected.into()));
 }
+
+#[test]
+fn a_group_has_its_name_and_all_options_of_run_stand_on_one_page() {
+    let help = crate::run::RUN.help();
+    let lines: Vec<&str> = help.lines().collect();
+    assert!(lines.len() <= 60, "{} lines:\n{help}", lines.len());
+    assert!(help.contains("\n  where          --on WORD "), "{help}");
+    assert!(lines.iter().all(|line| line.len() <= 100), "{help}");
+}

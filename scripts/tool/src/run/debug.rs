@@ -82,7 +82,7 @@ const fn of_run(name: &str) -> Opt {
     let mut at = 0;
     while at < RUN.options.len() {
         if is_same(RUN.options[at].name.as_bytes(), name.as_bytes()) {
-            return RUN.options[at];
+            return RUN.options[at].begins("");
         }
         at += 1;
     }

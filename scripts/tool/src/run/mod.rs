@@ -44,9 +44,8 @@ pub use boot::boot;
 pub use debug::debug;
 pub use table::RUN;
 
-/// Options that exclude each other, whatever is run, and in one run that is not observed.
-const APART: [(&str, &str, &str); 1] = [("json", "plain", "exclude each other")];
-const APART_IN_ONE: [(&str, &str, &str); 3] = [
+/// Options that exclude each other in one run that is not observed.
+const APART: [(&str, &str, &str); 3] = [
     (
         "dag",
         "module",
@@ -64,7 +63,6 @@ pub fn run(words: &[OsString]) -> ExitCode {
 
 fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     let options = &on_linux::settle(options)?;
-    options.check_apart(&APART).map_err(Refusal::Usage)?;
     if let Some(folder) = several::folder(options) {
         return several::run_folder(options, &folder);
     }
@@ -75,7 +73,7 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
         let line = format!("`--{name}` needs `--observe FILE` or `--prove`; give one, too");
         return Err(Refusal::Usage(line));
     }
-    options.check_apart(&APART_IN_ONE).map_err(Refusal::Usage)?;
+    options.check_apart(&APART).map_err(Refusal::Usage)?;
     check_files(options)?;
     let dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {

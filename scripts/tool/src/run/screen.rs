@@ -28,6 +28,9 @@ use crate::system;
 /// The width of the bar.
 const BAR: u64 = 30;
 
+/// As the value of `quiet`: no machine lines, either. Of a run that only prepares another one.
+pub(super) const NOTHING: &str = "nothing";
+
 /// Where each kind of line goes.
 pub(super) struct Screen {
     people: bool,
@@ -44,7 +47,7 @@ impl Screen {
     pub(super) fn new(options: &Parsed, image: &Path) -> Screen {
         Screen {
             people: !options.is_given("json"),
-            machine: !options.is_given("plain")
+            machine: options.text("quiet") != Some(NOTHING)
                 && (options.is_given("json") || !options.is_given("console")),
             quiet: options.is_given("quiet"),
             on_terminal: system::stderr_moves(),

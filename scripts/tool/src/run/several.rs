@@ -14,6 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use super::screen::NOTHING;
 use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::{Format, states_overheads};
 use crate::files::{self, Temporary};
@@ -76,9 +77,9 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
     let (refused, failed) = each(files, |file| {
         progress.show(over);
         over += 1;
-        let one = options.with("dag", file).with("quiet", "yes");
+        let one = options.with("dag", file).with("quiet", NOTHING);
         // Neither people nor programs want the lines of each run.
-        let one = one.with("json", "yes").with("plain", "yes");
+        let one = one.with("json", "yes");
         let Some(proven) = prove(&one)? else {
             return Ok(Status::Failure);
         };
@@ -146,7 +147,7 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
     if options.is_given("wcets") && !measures {
         return Ok(Some(options.clone()));
     }
-    let first = options.with("quiet", "yes").with("plain", "yes");
+    let first = options.with("quiet", NOTHING);
     let file = options.path("observe").or(own);
     let Some(seen) = observe(&first, file.filter(|_| !options.is_given("wcets")))? else {
         return Ok(None);
@@ -219,7 +220,7 @@ fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
     if !options.is_given("json") {
         print!("{table}");
     }
-    if !options.is_given("plain") {
+    if options.text("quiet") != Some(NOTHING) {
         lines.for_each(|line| println!("{line}"));
     }
 }

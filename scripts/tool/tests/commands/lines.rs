@@ -159,7 +159,7 @@ fn that_another_command_builds_is_said_and_help_does_not_wait_for_it() {
     let waiting = format!("waiting for another command, which builds in {folder}");
     assert_eq!(line, waiting);
 
-    // A tool that is built, and newer than its sources, answers while the lock is held.
+    // A tool that is built answers while the lock is held.
     let built = env!("CARGO_BIN_EXE_fass-tool");
     fs::copy(built, target.join("tool/fass-tool")).expect("the folder takes a program");
     let output = run_help().output().expect("the script can be started");
