@@ -22,8 +22,8 @@ use core::time::Duration;
 
 use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{
-    Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel,
-    SubtaskSpec, TopicPort,
+    Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel, SubtaskSpec,
+    TopicPort,
 };
 
 use crate::run::effect::{Asked, Effect, Of, Target, Wish};
