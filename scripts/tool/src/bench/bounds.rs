@@ -152,10 +152,15 @@ impl Proven {
 /// How many sets are proven, by policy.
 type ByPolicy = [Proven; POLICIES.len()];
 
-fn add(all: &mut ByPolicy, specs: &[DagSpec], cores: u32) {
-    for (proven, (policy, _)) in all.iter_mut().zip(POLICIES) {
-        proven.add(specs, policy, cores);
+/// Analyses sets, each on its cores.
+fn proofs(sets: impl Iterator<Item = (Vec<DagSpec>, u32)>) -> ByPolicy {
+    let mut all = ByPolicy::default();
+    for (specs, cores) in sets {
+        for (proven, (policy, _)) in all.iter_mut().zip(POLICIES) {
+            proven.add(&specs, policy, cores);
+        }
     }
+    all
 }
 
 /// Returns how many sets were proven before and are not now.
@@ -174,16 +179,10 @@ struct Point {
 /// Analyses `sets` sets at each load.
 fn by_load(cores: u32, sets: u64, seed: u64) -> Vec<Point> {
     let mut random = Random::new(seed);
-    let point = |tenths| {
-        let mut proven = ByPolicy::default();
-        for _ in 0..sets {
-            add(&mut proven, &draw_set(&mut random, cores, tenths), cores);
-        }
-        Point {
-            cores,
-            tenths,
-            proven,
-        }
+    let point = |tenths| Point {
+        cores,
+        tenths,
+        proven: proofs((0..sets).map(|_| (draw_set(&mut random, cores, tenths), cores))),
     };
     (1..=10).map(point).collect()
 }
@@ -191,27 +190,17 @@ fn by_load(cores: u32, sets: u64, seed: u64) -> Vec<Point> {
 /// Analyses `sets` small sets.
 fn small(sets: u64, seed: u64) -> ByPolicy {
     let mut random = Random::new(seed);
-    let mut proven = ByPolicy::default();
-    for _ in 0..sets {
+    proofs((0..sets).map(|_| {
         let cores = random.within(2..=4);
-        add(&mut proven, &draw_small(&mut random), cores);
-    }
-    proven
+        (draw_small(&mut random), cores)
+    }))
 }
 
 /// Returns a row a load, and the sums for each number of cores.
 fn table(points: &[Point]) -> String {
-    let columns = [
-        ("cores", 6, 0),
-        ("load", 6, 1),
-        ("sets", 8, 0),
-        ("G-FP before", 14, 1),
-        ("now", 10, 1),
-        ("G-EDF before", 14, 1),
-        ("now", 10, 1),
-    ];
+    let columns = "cores:6|load:6.1|sets:8|G-FP before:14.1|now:10.1|G-EDF before:14.1|now:10.1";
     let title = "sets proven, in percent: before and with the multi-path bound\n";
-    let mut table = Table::new(title, &columns);
+    let mut table = Table::new(title, columns);
     for point in points {
         let percent = |of: &Proven| [of.before, of.now].map(|count| 100.0 * ratio(count, of.sets));
         let [[fp, fp_now], [edf, edf_now]] = point.proven.each_ref().map(percent);
@@ -237,16 +226,8 @@ fn table(points: &[Point]) -> String {
 
 /// Returns a row a policy.
 fn small_table(proven: &ByPolicy) -> String {
-    let columns = [
-        ("policy", 8, 0),
-        ("sets", 9, 0),
-        ("Melani", 10, 0),
-        ("before", 10, 0),
-        ("now", 10, 0),
-        ("now / Melani", 14, 2),
-        ("now / before", 14, 2),
-    ];
-    let mut table = Table::new("small sets with short deadlines, proven\n", &columns);
+    let columns = "policy:8|sets:9|Melani:10|before:10|now:10|now / Melani:14.2|now / before:14.2";
+    let mut table = Table::new("small sets with short deadlines, proven\n", columns);
     for (of, (_, name)) in proven.iter().zip(POLICIES) {
         let [of_melani, of_before] = [of.melani, of.before].map(|other| ratio(of.now, other));
         table.row(&[
@@ -365,15 +346,9 @@ fn task(spec: &DagSpec, order: Order, cores: u32) -> Result<Task, String> {
 ///
 /// In words: a graph that is wrong.
 fn graph_table() -> Result<String, String> {
-    let columns = [
-        ("cores", 6, 0),
-        ("graphs", 8, 0),
-        ("long paths", 12, 3),
-        ("multi-path", 12, 3),
-        ("order fixed", 14, 3),
-    ];
+    let columns = "cores:6|graphs:8|long paths:12.3|multi-path:12.3|order fixed:14.3";
     let title = "task graphs (STG) alone: mean bound over Graham's\n";
-    let mut graph_table = Table::new(title, &columns);
+    let mut graph_table = Table::new(title, columns);
     let (graphs, means) = bound_graphs()?;
     for (cores, [long_paths, multi_path, fixed]) in means {
         graph_table.row(&[&cores, &graphs, &long_paths, &multi_path, &fixed]);

@@ -166,34 +166,45 @@ impl Figure {
     }
 }
 
-/// A heading, how wide its column is, and the decimals of its numbers. In a column of a negative
-/// width the cells begin at the left.
-pub(super) type Column<'a> = (&'a str, isize, usize);
-
 /// A table that grows row by row.
 #[derive(Debug)]
-pub(super) struct Table<'a> {
-    columns: &'a [Column<'a>],
+pub(super) struct Table {
+    /// Whether the cells of a column begin at the left, how wide it is, and the decimals of its
+    /// numbers.
+    columns: Vec<(bool, usize, usize)>,
     text: String,
 }
 
-impl<'a> Table<'a> {
-    /// Begins a table, below a line if there is a `title`.
-    pub(super) fn new(title: &str, columns: &'a [Column<'a>]) -> Self {
+impl Table {
+    /// Begins a table, below a line if there is a `title`. A column is `heading:width`, or
+    /// `heading:width.decimals`, or `heading:<width` if its cells begin at the left; `|` stands
+    /// between.
+    pub(super) fn new(title: &str, columns: &str) -> Self {
+        let number = |digits: &str| digits.parse().unwrap_or(0);
+        let column = |column| {
+            let (heading, form) = str::rsplit_once(column, ':').unwrap_or((column, "0"));
+            let (width, decimals) = form.split_once('.').unwrap_or((form, "0"));
+            let wide = number(width.trim_start_matches('<'));
+            (
+                heading.into(),
+                (width.starts_with('<'), wide, number(decimals)),
+            )
+        };
+        let (headings, columns): (Vec<String>, _) = columns.split('|').map(column).unzip();
         let text = title.into();
         let mut table = Self { columns, text };
-        let headings = columns.iter().map(|&(heading, ..)| heading.to_string());
         table.cells(headings);
         table
     }
 
     /// Adds a row with a cell for each column.
     pub(super) fn row(&mut self, cells: &[&dyn Display]) {
-        let cells = cells.iter().zip(self.columns);
-        let cells = cells.map(|(cell, &(_, _, decimals))| match decimals {
-            0 => cell.to_string(),
-            _ => format!("{cell:.decimals$}"),
-        });
+        let cells: Vec<String> = (cells.iter().zip(&self.columns))
+            .map(|(cell, &(_, _, decimals))| match decimals {
+                0 => cell.to_string(),
+                _ => format!("{cell:.decimals$}"),
+            })
+            .collect();
         self.cells(cells);
     }
 
@@ -205,15 +216,13 @@ impl<'a> Table<'a> {
 
     /// Adds a row of cells that are text already.
     pub(super) fn cells(&mut self, cells: impl IntoIterator<Item = String>) {
-        let cells = cells.into_iter().zip(self.columns);
-        let cells = cells.map(|(cell, &(_, width, _))| {
-            let wide = width.unsigned_abs();
-            match width {
-                ..0 => format!("{cell:<wide$}"),
-                0.. => format!("{cell:>wide$}"),
-            }
+        let cells = cells.into_iter().zip(&self.columns);
+        let cells = cells.map(|(cell, &(begins_left, width, _))| match begins_left {
+            true => format!("{cell:<width$}"),
+            false => format!("{cell:>width$}"),
         });
-        self.line(&cells.collect::<String>());
+        let line: String = cells.collect();
+        self.line(&line);
     }
 
     /// Returns the whole table.
@@ -262,8 +271,7 @@ mod tests {
 
     #[test]
     fn cells_stand_below_their_headings_with_their_decimals() {
-        let columns = [("name", -6, 0), ("load", 6, 1), ("sets", 6, 0)];
-        let mut table = Table::new("a title\n", &columns);
+        let mut table = Table::new("a title\n", "name:<6|load:6.1|sets:6");
         table.row(&[&"one", &0.25, &7]);
         table.line("a line");
         let expected = "a title\nname    load  sets\none      0.2     7\na line\n";

@@ -9,7 +9,7 @@ use std::fs;
 use std::iter;
 use std::path::{Path, PathBuf};
 
-use crate::bench::frame::{Column, Figure, Table};
+use crate::bench::frame::{Figure, Table};
 use crate::golden::Golden;
 use crate::json::{self, Object};
 use crate::qemu::Mode;
@@ -142,11 +142,7 @@ fn heading(figure: &Figure) -> String {
 }
 
 /// Adds a row for each figure, under the workload that it is of.
-fn add_rows(
-    table: &mut Table<'_>,
-    figures: &[Figure],
-    mut cells: impl FnMut(&Figure) -> Vec<String>,
-) {
+fn add_rows(table: &mut Table, figures: &[Figure], mut cells: impl FnMut(&Figure) -> Vec<String>) {
     let mut before = String::new();
     for figure in figures {
         let heading = heading(figure);
@@ -161,14 +157,14 @@ fn add_rows(
 /// Returns the table of all figures, with the modes side by side.
 pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
     let mut units = format!("{:60}", "");
-    let mut columns: Vec<Column<'_>> = vec![("", -60, 0)];
+    let mut columns = String::from(":<60");
     for (mode, _) in measured {
         let unit = match mode {
             Mode::Deterministic => "instructions".into(),
             _ => format!("nanoseconds, {mode}"),
         };
         units += &format!("  {unit:^32}");
-        columns.extend([("median", 12, 0), ("p99", 11, 0), ("max", 11, 0)]);
+        columns += "|median:12|p99:11|max:11";
     }
     let mut table = Table::new(&(units + "\n"), &columns);
     let first = measured.first().map_or(&[][..], |(_, figures)| figures);
@@ -186,16 +182,8 @@ pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
 
 /// Returns the table of baseline, now and their ratio, and what has grown or is missing, a line each.
 pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> (String, Vec<String>) {
-    let columns = [
-        ("instructions", -60, 0),
-        ("baseline", 12, 0),
-        ("now", 11, 0),
-        ("ratio", 8, 0),
-        ("p99 was", 12, 0),
-        ("p99 is", 11, 0),
-        ("", 0, 0),
-    ];
-    let mut table = Table::new("", &columns);
+    let columns = "instructions:<60|baseline:12|now:11|ratio:8|p99 was:12|p99 is:11|:0";
+    let mut table = Table::new("", columns);
     let mut complaints = Vec::new();
     add_rows(&mut table, now, |figure| {
         let [is, p99_is] = [figure.median, figure.p99].map(|number| figure.one(number));

@@ -10,7 +10,7 @@ use std::iter;
 use std::path::Path;
 use std::time::Duration;
 
-use crate::bench::frame::{Column, Figure, Table, judged};
+use crate::bench::frame::{Figure, Table, judged};
 use crate::image;
 use crate::json::Object;
 use crate::outcome::boot;
@@ -215,8 +215,8 @@ fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
 
 /// Returns a table with a row for each size; workload `layered` is the one of that size.
 fn table(what: &str, of: Columns, rows: &[(u64, Vec<Figure>)]) -> String {
-    let mut columns: Vec<Column<'_>> = vec![(what, 8, 0)];
-    columns.extend(of.iter().map(|&(_, _, heading)| (heading, 20, 0)));
+    let of_figures = of.iter().map(|(_, _, heading)| format!("|{heading}:20"));
+    let columns = format!("{what}:8") + &of_figures.collect::<String>();
     let mut table = Table::new("", &columns);
     for (size, figures) in rows {
         let sized = format!("layered-{size}");

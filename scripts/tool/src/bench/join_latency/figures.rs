@@ -286,20 +286,9 @@ fn result_json(condition: Condition, figures: &Figures) -> String {
 
 /// Returns the figures of each policy and N as a table.
 pub(super) fn table(measured: &Measured) -> String {
-    let columns = [
-        ("N", 2, 0),
-        (" joined by", -23, 0),
-        ("joins/job", 9, 3),
-        ("one job", 8, 0),
-        ("across", 8, 0),
-        ("missing", 9, 0),
-        ("latency", 12, 0),
-        ("p99", 12, 0),
-        ("cover", 12, 0),
-        ("p99", 12, 0),
-        ("response", 12, 0),
-    ];
-    let mut table = Table::new("", &columns);
+    let columns = "N:2| joined by:<23|joins/job:9.3|one job:8|across:8|missing:9|\
+                       latency:12|p99:12|cover:12|p99:12|response:12";
+    let mut table = Table::new("", columns);
     for (condition, figures) in pooled(measured) {
         let [latency, cover, _, response] = [0, 1, 2, 3].map(|metric| figures.distribution(metric));
         let [_, _, same_index, cross_index, missing, _] = figures.counts;

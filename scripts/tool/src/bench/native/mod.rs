@@ -152,16 +152,8 @@ fn measure(plan: &Plan) -> Result<bool, String> {
 }
 
 fn table(rows: &[Row]) -> String {
-    let columns = [
-        ("", -14, 0),
-        ("ns", -38, 0),
-        ("bodies, policy", -18, 0),
-        ("workers", 8, 0),
-        ("min", 10, 1),
-        ("median", 10, 1),
-        ("p99", 10, 1),
-    ];
-    let mut table = Table::new("", &columns);
+    let columns = ":<14|ns:<38|bodies, policy:<18|workers:8|min:10.1|median:10.1|p99:10.1";
+    let mut table = Table::new("", columns);
     let mut before = "";
     for (figure, runner) in rows {
         let is_same = std::mem::replace(&mut before, &figure.workload) == figure.workload;
