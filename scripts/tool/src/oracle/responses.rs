@@ -21,8 +21,8 @@ use common::random::Random;
 use sched_dag::analysis::{Overheads, Settings, answer, fix_orders};
 use sched_dag::journal::What;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagSpec, Decision, Instance, Notice, Order, Policy,
-    Preemption, Scheduler, SchedulerOptions, TaskSet, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, Instance, Notice, Order, Policy,
+    Preemption, Scheduler, SchedulerOptions, verify,
 };
 
 use crate::options::{Command, Takes as Value, options};
@@ -102,7 +102,10 @@ impl Seen {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,
-            overheads: costs.overheads(),
+            overheads: Overheads {
+                dispatch_ns: costs.overheads.dispatch_ns + costs.late_ns,
+                ..costs.overheads
+            },
         };
         fix_orders(&mut task_set, &settings);
         let answer = answer(&task_set, &settings);
@@ -119,8 +122,17 @@ impl Seen {
         let until_ns = 12 * longest.unwrap_or(0);
         let mut lines = Vec::new();
         for takes in [Takes::Most, Takes::Drawn] {
-            let seen_ns =
-                longest_responses_ns(&task_set, options, costs, takes, until_ns, &mut random);
+            let machine = Machine {
+                scheduler: Scheduler::new(Arc::clone(&task_set), options),
+                cores: vec![None; options.cores as usize],
+                left_ns: BTreeMap::new(),
+                flying: BTreeMap::new(),
+                longest_ns: Vec::new(),
+                costs,
+                takes,
+                random: &mut random,
+            };
+            let seen_ns = machine.longest_responses_ns(until_ns);
             for (dag, (bound, seen_ns)) in bounds.iter().zip(seen_ns).enumerate() {
                 self.responses += 1;
                 let permille = seen_ns * 1_000 / bound.bound_ns.max(1);
@@ -169,23 +181,20 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
         preemption: random.one_of(&[Preemption::Enabled, Preemption::Disabled]),
         cores,
     };
-    let costs = Costs {
-        switch_ns: random.within(0..=50),
+    let overheads = Overheads {
+        context_switch_ns: random.within(0..=50),
         dispatch_ns: random.within(0..=200),
         interrupt_ns: random.within(0..=200),
         ready_ns: random.within(0..=200),
-        late_ns: random.within(0..=200),
     };
-    (specs, options, costs)
+    let late_ns = random.within(0..=200);
+    (specs, options, Costs { overheads, late_ns })
 }
 
 /// What the platform's own work takes at most.
 #[derive(Clone, Copy, Debug)]
 struct Costs {
-    switch_ns: u64,
-    dispatch_ns: u64,
-    interrupt_ns: u64,
-    ready_ns: u64,
+    overheads: Overheads,
     /// From a nominal release to the interrupt for it.
     late_ns: u64,
 }
@@ -199,86 +208,54 @@ enum Takes {
     Drawn,
 }
 
-impl Costs {
-    /// Returns what an analysis is to charge.
-    fn overheads(self) -> Overheads {
-        Overheads {
-            context_switch_ns: self.switch_ns,
-            dispatch_ns: self.dispatch_ns + self.late_ns,
-            interrupt_ns: self.interrupt_ns,
-            ready_ns: self.ready_ns,
-        }
-    }
-}
-
-/// Runs a set of DAGs with WCETs until some time, and returns each DAG's longest response, that
-/// of a job in flight at the end as far as it is known.
-fn longest_responses_ns(
-    task_set: &Arc<TaskSet>,
-    options: SchedulerOptions,
-    costs: Costs,
-    takes: Takes,
-    until_ns: u64,
-    random: &mut Random,
-) -> Vec<u64> {
-    let dags = task_set.dags().len();
-    let mut machine = Machine {
-        scheduler: Scheduler::new(Arc::clone(task_set), options),
-        cores: vec![None; options.cores as usize],
-        left_ns: BTreeMap::new(),
-        costs,
-        takes,
-        random,
-    };
-    let mut watch = Watch {
-        now_ns: 0,
-        ready: 0,
-        task_set,
-        flying: vec![Vec::new(); dags],
-        longest_ns: vec![0; dags],
-    };
-    machine.run(until_ns, &mut watch);
-    for (longest_ns, flying) in watch.longest_ns.iter_mut().zip(&watch.flying) {
-        let ages = flying
-            .iter()
-            .map(|(_, release_ns)| until_ns.saturating_sub(*release_ns));
-        *longest_ns = ages.fold(*longest_ns, u64::max);
-    }
-    watch.longest_ns
-}
-
 struct Machine<'r> {
     scheduler: Scheduler,
     /// What each core executes, and when it finishes.
     cores: Vec<Option<(Instance, u64)>>,
     /// What is left of each preempted instance.
     left_ns: BTreeMap<Instance, u64>,
+    /// The nominal releases of jobs in flight.
+    flying: BTreeMap<(DagId, u64), u64>,
+    /// Each DAG's longest response.
+    longest_ns: Vec<u64>,
     costs: Costs,
     takes: Takes,
     random: &'r mut Random,
 }
 
 impl Machine<'_> {
-    fn run(&mut self, until_ns: u64, watch: &mut Watch<'_>) {
-        let mut notices = Vec::new();
+    /// Runs a set of DAGs with WCETs until some time, and returns each DAG's longest response, that
+    /// of a job in flight at the end as far as it is known.
+    fn longest_responses_ns(mut self, until_ns: u64) -> Vec<u64> {
+        self.longest_ns = vec![0; self.scheduler.task_set().dags().len()];
+        self.run(until_ns);
+        for ((dag, _), release_ns) in std::mem::take(&mut self.flying) {
+            self.responds(dag, until_ns.saturating_sub(release_ns));
+        }
+        self.longest_ns
+    }
+
+    fn run(&mut self, until_ns: u64) {
+        let (costs, mut notices) = (self.costs, Vec::new());
         self.scheduler.hear([What::Released, What::Completed]);
         // The scheduler's next event, and when its interrupt comes.
         let mut alarm: Option<(u64, u64)> = None;
+        let mut now_ns = 0;
         // When the last step is over.
         let mut over_ns = 0;
         loop {
             let due_ns = self.scheduler.next_event_ns();
             if alarm.map(|(due_ns, _)| due_ns) != due_ns {
-                alarm = due_ns.map(|due_ns| (due_ns, due_ns + self.draw(self.costs.late_ns)));
+                alarm = due_ns.map(|due_ns| (due_ns, due_ns + self.draw(costs.late_ns)));
             }
             let finish_ns = self.cores.iter().flatten().map(|(_, finish_ns)| *finish_ns);
-            let interrupt_ns = alarm.map(|(_, at_ns)| at_ns.max(watch.now_ns));
+            let interrupt_ns = alarm.map(|(_, at_ns)| at_ns.max(now_ns));
             let next_ns = finish_ns.chain(interrupt_ns).min();
             let next_ns = next_ns.map(|next_ns| next_ns.max(over_ns));
-            let Some(now_ns) = next_ns.filter(|next_ns| *next_ns <= until_ns) else {
+            let Some(next_ns) = next_ns.filter(|next_ns| *next_ns <= until_ns) else {
                 return;
             };
-            watch.now_ns = now_ns;
+            now_ns = next_ns;
             for core in &mut self.cores {
                 if let Some((instance, _)) = core.take_if(|(_, finish_ns)| *finish_ns <= now_ns) {
                     self.scheduler.at(now_ns).complete(instance);
@@ -286,11 +263,11 @@ impl Machine<'_> {
             }
             let decisions = self.scheduler.at(now_ns).dispatch().to_vec();
             self.scheduler.log.exchange_notices(&mut notices);
-            notices.iter().for_each(|notice| watch.hear(notice));
+            let ready: u64 = notices.iter().map(|it| self.hear(it, now_ns)).sum();
             for decision in decisions {
                 self.carry_out(decision, now_ns);
             }
-            let takes_ns = self.draw(core::mem::take(&mut watch.ready) * self.costs.ready_ns);
+            let takes_ns = self.draw(ready * costs.overheads.ready_ns);
             over_ns = now_ns + takes_ns;
             for (_, finish_ns) in self.cores.iter_mut().flatten() {
                 *finish_ns += takes_ns;
@@ -298,8 +275,27 @@ impl Machine<'_> {
         }
     }
 
+    /// Notes a release or a completion; returns how many instances it has made ready by releases.
+    fn hear(&mut self, notice: &Notice, now_ns: u64) -> u64 {
+        let (dag, job) = (notice.event.dag, notice.event.job);
+        if notice.event.what == What::Released {
+            self.flying.insert((dag, job), notice.at_ns.unwrap_or(0));
+            return self.scheduler.task_set().dag(dag).sources().len() as u64;
+        }
+        if let Some(release_ns) = self.flying.remove(&(dag, job)) {
+            self.responds(dag, now_ns - release_ns);
+        }
+        0
+    }
+
+    fn responds(&mut self, dag: DagId, response_ns: u64) {
+        let longest_ns = &mut self.longest_ns[dag.index()];
+        *longest_ns = (*longest_ns).max(response_ns);
+    }
+
     fn carry_out(&mut self, decision: Decision, now_ns: u64) {
         let (core, instance) = (decision.core.index(), decision.instance);
+        let overheads = self.costs.overheads;
         let takes_ns = match decision.what {
             What::Suspend => {
                 if let Some((instance, finish_ns)) = self.cores[core].take() {
@@ -309,12 +305,12 @@ impl Machine<'_> {
             }
             What::Resume => {
                 let left_ns = self.left_ns.remove(&instance).unwrap_or(0);
-                left_ns + self.draw(self.costs.interrupt_ns)
+                left_ns + self.draw(overheads.interrupt_ns)
             }
             _ => {
                 let dag = self.scheduler.task_set().dag(instance.dag);
                 let wcet_ns = dag.subtask(instance.subtask).wcet_ns().unwrap_or(0);
-                let own_ns = self.costs.dispatch_ns + 2 * self.costs.switch_ns;
+                let own_ns = overheads.dispatch_ns + 2 * overheads.context_switch_ns;
                 self.draw(wcet_ns).max(1) + self.draw(own_ns)
             }
         };
@@ -325,31 +321,6 @@ impl Machine<'_> {
         match self.takes {
             Takes::Most => most_ns,
             Takes::Drawn => self.random.within(0..=most_ns),
-        }
-    }
-}
-
-struct Watch<'t> {
-    now_ns: u64,
-    /// How many instances the step in hand has made ready by releases.
-    ready: u64,
-    task_set: &'t TaskSet,
-    /// The jobs in flight of each DAG: number and nominal release.
-    flying: Vec<Vec<(u64, u64)>>,
-    longest_ns: Vec<u64>,
-}
-
-impl Watch<'_> {
-    fn hear(&mut self, notice: &Notice) {
-        let (dag, job) = (notice.event.dag, notice.event.job);
-        let flying = &mut self.flying[dag.index()];
-        if notice.event.what == What::Released {
-            self.ready += self.task_set.dag(dag).sources().len() as u64;
-            flying.push((job, notice.at_ns.unwrap_or(0)));
-        } else if let Some(place) = flying.iter().position(|(other, _)| *other == job) {
-            let (_, release_ns) = flying.swap_remove(place);
-            let longest_ns = &mut self.longest_ns[dag.index()];
-            *longest_ns = (*longest_ns).max(self.now_ns - release_ns);
         }
     }
 }
