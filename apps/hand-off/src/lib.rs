@@ -26,7 +26,7 @@ use core::time::Duration;
 use common::each_arity;
 use fass::{Dag, Occupation, SubtaskAttributes, VecToSubs, create_dag};
 
-pub use shape::{LAYER, Shape};
+pub use shape::Shape;
 
 /// Which bodies stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

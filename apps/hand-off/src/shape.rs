@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use common::random::Random;
 
 /// The number of subtasks side by side in a layered graph.
-pub const LAYER: usize = 32;
+const LAYER: usize = 32;
 
 /// A graph to be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum Shape {
     /// A random graph in layers.
     ///
     /// Between source and sink are `subtasks - 2` subtasks, in layers of
-    /// [`LAYER`]; the last layer has what is left. One of the first layer follows
+    /// 32; the last layer has what is left. One of the first layer follows
     /// the source. One of any other layer follows 3 of the layer before, each
     /// drawn by itself, uniformly; one that is drawn twice counts once. The sink
     /// follows all that have no other successor.

@@ -49,7 +49,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::num::NonZeroUsize;
 
-use crate::{Outlet, Set, Stamped, Synchronizer};
+use crate::{Outlet, Stamped, Synchronizer};
 
 /// The parameters of [`ApproximateTime`](ApproximateTime).
 ///
@@ -391,7 +391,7 @@ impl<M> ApproximateTime<M> {
             ring.cursor = 0;
             self.set.extend(ring.take_front());
         }
-        outlet.emitted(Set::new(self.set.drain(..)));
+        outlet.emitted(self.set.drain(..));
     }
 
     /// Makes room in a topic's ring (step 7).

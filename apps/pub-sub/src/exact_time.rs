@@ -21,7 +21,7 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use crate::{Outlet, Set, Stamped, Synchronizer};
+use crate::{Outlet, Stamped, Synchronizer};
 
 /// The policy that makes sets of equal stamps.
 ///
@@ -119,7 +119,7 @@ impl<M> ExactTime<M> {
             message,
         }));
         self.spare.push(entry.slots);
-        outlet.emitted(Set::new(self.set.drain(..)));
+        outlet.emitted(self.set.drain(..));
     }
 
     /// Drops the entry with the smallest stamp.

@@ -49,12 +49,6 @@ pub trait Callbacks<M> {
     fn call(&mut self, call: Call<M>, context: &dyn Context<M>);
 }
 
-impl<M, F: FnMut(Call<M>, &dyn Context<M>)> Callbacks<M> for F {
-    fn call(&mut self, call: Call<M>, context: &dyn Context<M>) {
-        self(call, context);
-    }
-}
-
 /// Why a callback is executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Call<M> {
@@ -320,7 +314,7 @@ pub fn work<M: Clone, C: Callbacks<M>, H: Host<M, C>>(host: &H) {
         let now_ns = host.now_ns();
         match host.with_graph(|graph| graph.take(now_ns)) {
             Next::Call(group, mut callbacks, call) => {
-                execute(&mut callbacks, call, &context);
+                callbacks.call(call, &context);
                 let now_ns = host.now_ns();
                 if host.with_graph(|graph| graph.give_back(group, callbacks, now_ns)) {
                     host.notify();
@@ -330,10 +324,6 @@ pub fn work<M: Clone, C: Callbacks<M>, H: Host<M, C>>(host: &H) {
             Next::End => return,
         }
     }
-}
-
-fn execute<M>(callbacks: &mut impl Callbacks<M>, call: Call<M>, context: &dyn Context<M>) {
-    callbacks.call(call, context);
 }
 
 /// What a callback sees of the host.

@@ -42,7 +42,6 @@ pub mod graph;
 pub mod workload;
 
 use alloc::vec::Drain;
-use core::fmt;
 
 pub use approximate_time::{AgePenalty, ApproximateTime, Parameters};
 pub use exact_time::ExactTime;
@@ -101,36 +100,4 @@ pub trait Outlet<M> {
 /// A set: one message of each topic, in the order of the topics.
 ///
 /// What is not taken out of it is gone with it.
-pub struct Set<'a, M>(Drain<'a, Stamped<M>>);
-
-impl<'a, M> Set<'a, M> {
-    pub(crate) fn new(messages: Drain<'a, Stamped<M>>) -> Self {
-        Self(messages)
-    }
-
-    /// Returns the messages that were not taken yet.
-    #[must_use]
-    pub fn as_slice(&self) -> &[Stamped<M>] {
-        self.0.as_slice()
-    }
-}
-
-impl<M> Iterator for Set<'_, M> {
-    type Item = Stamped<M>;
-
-    fn next(&mut self) -> Option<Stamped<M>> {
-        self.0.next()
-    }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        self.0.size_hint()
-    }
-}
-
-impl<M> ExactSizeIterator for Set<'_, M> {}
-
-impl<M: fmt::Debug> fmt::Debug for Set<'_, M> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Set").field(&self.as_slice()).finish()
-    }
-}
+pub type Set<'a, M> = Drain<'a, Stamped<M>>;
