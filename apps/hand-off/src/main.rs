@@ -19,28 +19,40 @@ kernel::entry!(main);
 
 fn main(machine: &Machine) -> Result<(), Ending> {
     let plan = Plan::read(machine)?;
-    match plan.part {
-        Part::Workloads => workloads(machine, &plan)?,
-        Part::HandOff => {
-            measure::clock();
-            workloads(machine, &plan)?;
-            measure::preemption(machine, plan.jobs)?;
-            for &subtasks in &plan.chain {
-                measure::budgets(machine, subtasks, plan.jobs)?;
-            }
-            wake_ups(machine, &plan)?;
-        }
-        Part::Elsewhere => {
-            measure::woken_cores(machine, plan.jobs)?;
-            measure::joins(machine, plan.jobs)?;
-            measure::preemption(machine, plan.jobs)?;
-            wake_ups(machine, &plan)?;
-        }
-    }
+    (plan.part)(machine, &plan)?;
     machine.report_memory();
     Ok(())
 }
 
+/// Makes some of the measurements.
+type Part = fn(&Machine, &Plan) -> Result<(), Ending>;
+
+const PARTS: [(&str, Part); 3] = [
+    ("hand-off", on_one_core),
+    ("workloads", workloads),
+    ("elsewhere", elsewhere),
+];
+
+/// Measures all that one core is enough for.
+fn on_one_core(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
+    measure::clock();
+    workloads(machine, plan)?;
+    measure::preemption(machine, plan.jobs)?;
+    for &subtasks in &plan.chain {
+        measure::budgets(machine, subtasks, plan.jobs)?;
+    }
+    wake_ups(machine, plan)
+}
+
+/// Measures what needs a second core.
+fn elsewhere(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
+    measure::woken_cores(machine, plan.jobs)?;
+    measure::joins(machine, plan.jobs)?;
+    measure::preemption(machine, plan.jobs)?;
+    wake_ups(machine, plan)
+}
+
+/// Measures chains, fork-joins and layered graphs alone.
 fn workloads(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
     for &subtasks in &plan.chain {
         measure::chain(machine, subtasks, plan.jobs)?;
@@ -58,23 +70,6 @@ fn wake_ups(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
     let mut branches = plan.branches.iter();
     branches.try_for_each(|&parallel| measure::wake_ups(machine, parallel))
 }
-
-/// Which measurements are made.
-#[derive(Clone, Copy)]
-enum Part {
-    /// All that one core is enough for.
-    HandOff,
-    /// Chains, fork-joins and layered graphs alone.
-    Workloads,
-    /// What needs a second core.
-    Elsewhere,
-}
-
-const PARTS: [(&str, Part); 3] = [
-    ("hand-off", Part::HandOff),
-    ("workloads", Part::Workloads),
-    ("elsewhere", Part::Elsewhere),
-];
 
 /// What is to be measured.
 struct Plan {

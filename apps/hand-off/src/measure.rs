@@ -92,18 +92,12 @@ pub(crate) fn fork_join(machine: &Machine, parallel: usize, jobs: u64) -> Result
 /// Prints the times from the last return to the sink's start.
 fn emit_join(name: &str, all: &Measured) {
     let sink = all.workload.shape.subtasks() - 1;
-    let first = |job| all.stamps.first(sink, job);
+    let started = |job| all.stamps.first(sink, job);
     let ready = |job| all.ready_ns(sink, job);
-    let to_start = all
-        .jobs()
-        .filter_map(|job| since(first(job), all.last_return(job)));
-    emit(name, "return_to_start", 1, to_start);
-    let to_ready = all
-        .jobs()
-        .filter_map(|job| since(ready(job), all.last_return(job)));
-    emit(name, "return_to_ready", 1, to_ready);
-    let ready_to_start = all.jobs().filter_map(|job| since(first(job), ready(job)));
-    emit(name, "ready_to_start", 1, ready_to_start);
+    let returned = |job| all.last_return(job);
+    all.emit(name, "return_to_start", &returned, &started);
+    all.emit(name, "return_to_ready", &returned, &ready);
+    all.emit(name, "ready_to_start", &ready, &started);
 }
 
 /// A fork and its join: how often the scheduler makes the sink ready. A system that wakes a sink for
@@ -361,21 +355,27 @@ impl Measured {
         let jitter = from_release.iter().map(|ns| ns - least);
         emit(name, "release_jitter", 1, jitter);
         emit(name, "release_to_start", 1, from_release.iter().copied());
-        emit(
-            name,
-            "commit",
-            self.workload.shape.subtasks() as u64,
-            [self.commit_ns],
-        );
-        emit(
-            name,
-            "allocations",
-            self.workload.jobs,
-            [self.run.allocations()],
-        );
+        let (jobs, subtasks) = (self.workload.jobs, self.workload.shape.subtasks() as u64);
         let locks = u64::from(self.run.lock_acquisitions());
-        let instances = self.workload.jobs * self.workload.shape.subtasks() as u64;
-        emit(name, "locks", instances, [locks]);
+        for (figure, per, count) in [
+            ("commit", subtasks, self.commit_ns),
+            ("allocations", jobs, self.run.allocations()),
+            ("locks", jobs * subtasks, locks),
+        ] {
+            emit(name, figure, per, [count]);
+        }
+    }
+
+    /// Prints the times from one instant of each job to another one.
+    fn emit(
+        &self,
+        name: &str,
+        figure: &str,
+        from: &dyn Fn(u64) -> Option<u64>,
+        to: &dyn Fn(u64) -> Option<u64>,
+    ) {
+        let times = self.jobs().filter_map(|job| since(to(job), from(job)));
+        emit(name, figure, 1, times);
     }
 
     fn jobs(&self) -> impl Iterator<Item = u64> + Clone + use<> {

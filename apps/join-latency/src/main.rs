@@ -12,8 +12,8 @@ extern crate alloc;
 mod by_stamps;
 
 use alloc::format;
-use alloc::string::String;
-use core::fmt::{self, Display};
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 use core::num::NonZeroUsize;
 use core::time::Duration;
 
@@ -227,41 +227,32 @@ fn emit_samples(samples: &Samples) {
     for (subtask, spans) in (0u64..).zip(subtasks) {
         for (batch, spans) in spans.chunks(BATCH).enumerate() {
             json::emit("executions", |line| {
-                let values = spans.iter().map(|span| Times(span, None, &[]));
+                let times = spans
+                    .iter()
+                    .map(|span| list([span.start_ns, span.finish_ns]));
                 line.number("subtask", subtask)
                     .number("first", (batch * BATCH) as u64)
-                    .list("times", values);
+                    .list("times", times);
             });
         }
     }
     for (batch, joins) in samples.joins.chunks(BATCH).enumerate() {
         json::emit("joins", |line| {
-            let values = joins.iter().enumerate().map(|(offset, joined)| {
+            let times = joins.iter().enumerate().map(|(offset, joined)| {
+                let Joined { ready_ns, span } = joined;
                 let indices = samples.indices_of(batch * BATCH + offset);
-                Times(&joined.span, Some(joined.ready_ns), indices)
+                let times = [*ready_ns, span.start_ns, span.finish_ns].into_iter();
+                list(times.chain(indices.iter().copied()))
             });
             line.number("first", (batch * BATCH) as u64)
-                .list("times", values);
+                .list("times", times);
         });
     }
 }
 
-/// A list: the time of readiness if any, start, finish, then numbers if any.
-struct Times<'a>(&'a Span, Option<u64>, &'a [u64]);
-
-impl Display for Times<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(span, ready_ns, numbers) = self;
-        f.write_str("[")?;
-        if let Some(ready_ns) = ready_ns {
-            write!(f, "{ready_ns},")?;
-        }
-        write!(f, "{},{}", span.start_ns, span.finish_ns)?;
-        numbers
-            .iter()
-            .try_for_each(|number| write!(f, ",{number}"))?;
-        f.write_str("]")
-    }
+fn list(numbers: impl IntoIterator<Item = u64>) -> String {
+    let numbers: Vec<String> = numbers.into_iter().map(|it| it.to_string()).collect();
+    format!("[{}]", numbers.join(","))
 }
 
 /// Prints the counts and distributions, as a machine line and for people.

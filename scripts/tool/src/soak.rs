@@ -11,8 +11,8 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -152,7 +152,7 @@ const MEMORY_MIB: u64 = 256;
 const RUNS_A_ROUND: usize = 2;
 
 /// The rounds of one boot, few enough that the serial log stays small.
-const ROUNDS_A_BOOT: usize = 2;
+const ROUNDS_A_BOOT: u64 = 2;
 
 /// How many breaches of a run are told in words.
 const SHOWN: usize = 5;
@@ -247,21 +247,19 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
         ..Qemu::default()
     };
     probe::choose(Some(plan.mode), plan.mode, &qemu, &image.path)?;
-    let boots = Mutex::new(plan.rounds.clone().step_by(ROUNDS_A_BOOT));
-    let next = || {
-        let first = boots
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .next()?;
-        Some(first..plan.rounds.end.min(first + ROUNDS_A_BOOT as u64))
-    };
+    let (next, end) = (AtomicU64::new(plan.rounds.start), plan.rounds.end);
     let mut report = Report::default();
     let (send, receive) = mpsc::channel();
     thread::scope(|scope| {
         for _ in 0..plan.side_by_side.max(1) {
             let (send, next, qemu, path) = (send.clone(), &next, &qemu, &image.path);
             scope.spawn(move || {
-                while let Some(rounds) = next() {
+                loop {
+                    let first = next.fetch_add(ROUNDS_A_BOOT, Ordering::Relaxed);
+                    let rounds = first..end.min(first + ROUNDS_A_BOOT);
+                    if rounds.is_empty() {
+                        return;
+                    }
                     let booted = boot(plan, qemu, path, &rounds);
                     // Nobody listens any more once another guest did not start.
                     if send.send((rounds, booted)).is_err() {
