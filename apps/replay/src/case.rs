@@ -194,12 +194,7 @@ fn parse_dag(
         executions_ns.push(of_subtask_ns);
     }
     let subtasks = spec.subtasks.len();
-    for _ in 0..edges {
-        let line = lines.expect("edge")?;
-        let [earlier, later] = line.fixed()?;
-        let end = |word| line.index("subtask", word, subtasks);
-        spec.edges.push((end(earlier)?, end(later)?));
-    }
+    spec.edges = lines.edges(edges, subtasks)?;
     while let Some(line) = lines.next_if("sink") {
         let [sink, deadline] = line.fixed()?;
         let sink = line.index("subtask", sink, subtasks)?;

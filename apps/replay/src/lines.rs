@@ -86,6 +86,22 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
+    /// Reads so many `edge` records, between vertices of which there are so many.
+    ///
+    /// # Errors
+    ///
+    /// [`Malformed`] for another record, or an end that is none.
+    pub fn edges(&mut self, count: u32, vertices: usize) -> Result<Vec<(usize, usize)>, Malformed> {
+        let mut edges = Vec::new();
+        for _ in 0..count {
+            let line = self.expect("edge")?;
+            let [from, to] = line.fixed()?;
+            let end = |word| line.index("subtask", word, vertices);
+            edges.push((end(from)?, end(to)?));
+        }
+        Ok(edges)
+    }
+
     /// Returns the number of the last line that was read.
     #[must_use]
     pub const fn last(&self) -> usize {

@@ -2,7 +2,7 @@
 //!
 //! A *round* is a random scenario (`tests/scenarios/src/random.rs`). The guest of the boot tests
 //! draws rounds, runs each twice, and checks after each run what can be checked there: rules,
-//! accounts, allocations, memory, stacks. Here the rounds are split into boots, a few at a time,
+//! accounts, allocations, memory, stacks. Here each round is a boot, a few at a time,
 //! and the trace of each run is held against the same rules, from other evidence.
 
 use std::collections::BTreeMap;
@@ -149,10 +149,7 @@ const GUEST: &str = "guest-tests";
 const MEMORY_MIB: u64 = 256;
 
 /// How often a round runs.
-const RUNS_A_ROUND: usize = 2;
-
-/// The rounds of one boot, few enough that the serial log stays small.
-const ROUNDS_A_BOOT: u64 = 2;
+const RUNS_A_ROUND: u64 = 2;
 
 /// How many breaches of a run are told in words.
 const SHOWN: usize = 5;
@@ -247,7 +244,7 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
         ..Qemu::default()
     };
     probe::choose(Some(plan.mode), plan.mode, &qemu, &image.path)?;
-    let (next, end) = (AtomicU64::new(plan.rounds.start), plan.rounds.end);
+    let next = AtomicU64::new(plan.rounds.start);
     let mut report = Report::default();
     let (send, receive) = mpsc::channel();
     thread::scope(|scope| {
@@ -255,14 +252,13 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
             let (send, next, qemu, path) = (send.clone(), &next, &qemu, &image.path);
             scope.spawn(move || {
                 loop {
-                    let first = next.fetch_add(ROUNDS_A_BOOT, Ordering::Relaxed);
-                    let rounds = first..end.min(first + ROUNDS_A_BOOT);
-                    if rounds.is_empty() {
+                    let round = next.fetch_add(1, Ordering::Relaxed);
+                    if round >= plan.rounds.end {
                         return;
                     }
-                    let booted = boot(plan, qemu, path, &rounds);
+                    let booted = boot(plan, qemu, path, round);
                     // Nobody listens any more once another guest did not start.
-                    if send.send((rounds, booted)).is_err() {
+                    if send.send((round, booted)).is_err() {
                         return;
                     }
                 }
@@ -271,7 +267,7 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
         drop(send);
         loop {
             match receive.recv_timeout(SILENCE) {
-                Ok((rounds, booted)) => report.take(plan, rounds, &booted?),
+                Ok((round, booted)) => report.take(plan, round, &booted?),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(report),
             }
@@ -280,8 +276,7 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
     })
 }
 
-fn boot(plan: &Plan, qemu: &Qemu, image: &Path, rounds: &Range<u64>) -> Result<Outcome, String> {
-    let count = rounds.end - rounds.start;
+fn boot(plan: &Plan, qemu: &Qemu, image: &Path, round: u64) -> Result<Outcome, String> {
     // In real time the host's noise would exceed budgets that nobody asked for.
     let budget_factor = match plan.mode {
         Mode::Deterministic => 10,
@@ -289,56 +284,42 @@ fn boot(plan: &Plan, qemu: &Qemu, image: &Path, rounds: &Range<u64>) -> Result<O
     };
     let qemu = Qemu {
         guest_words: format!(
-            "mode={} test=soak first={} rounds={count} round_ms={} seed={} events=on \
+            "mode={} test=soak first={round} round_ms={} seed={} events=on \
              budget_factor={budget_factor}",
-            plan.mode, rounds.start, plan.round_ms, plan.seed
+            plan.mode, plan.round_ms, plan.seed
         ),
         ..qemu.clone()
     };
     // The guest's own time, and far more for its traces, which go through a serial line.
-    let guest_time = Duration::from_millis(plan.round_ms.saturating_mul(count * 2));
+    let guest_time = Duration::from_millis(plan.round_ms.saturating_mul(RUNS_A_ROUND));
     let limit = Duration::from_secs(60) + guest_time.saturating_mul(30);
     outcome::boot(&qemu, image, &system::new_log("soak")?, limit, |_| {})
 }
 
 impl Report {
-    /// Judges a boot and removes its log, unless something is wrong.
-    fn take(&mut self, plan: &Plan, rounds: Range<u64>, outcome: &Outcome) {
-        let (mut ending, log) = (outcome.judge().err(), outcome.log.display());
+    /// Judges a round and removes its log, unless something is wrong.
+    fn take(&mut self, plan: &Plan, round: u64, outcome: &Outcome) {
+        let mut wrong = Vec::from_iter(outcome.judge().err().map(|fault| fault.reason));
         let lines: Vec<_> = outcome.transcript.of_kind("scenario").collect();
-        let runs = read(&outcome.serial).unwrap_or_else(|fault| {
-            self.failures.push(format!("the trace in {log}: {fault}"));
-            Vec::new()
-        });
-        let mut both = lines.into_iter().zip(&runs);
-        let failed_before = self.failed;
-        for round in rounds.clone() {
-            let ran: Vec<_> = both.by_ref().take(RUNS_A_ROUND).collect();
-            let is_whole = ran.len() == RUNS_A_ROUND;
-            let judged = ran
-                .into_iter()
-                .map(|(line, run)| self.judge(round, line, run, plan.bound_ns));
-            let mut wrong: Vec<String> = judged.flatten().collect();
-            if !is_whole || round + 1 == rounds.end {
-                wrong.extend(ending.take().map(|fault| fault.reason));
+        match read(&outcome.serial) {
+            Ok(runs) if [lines.len() as u64, runs.len() as u64] == [RUNS_A_ROUND; 2] => {
+                for (line, run) in lines.into_iter().zip(&runs) {
+                    wrong.extend(self.judge(round, line, run, plan.bound_ns));
+                }
             }
-            if !is_whole {
-                wrong.push("did not run to its end".into());
-            }
-            if wrong.is_empty() {
-                self.passed += 1;
-                continue;
-            }
-            self.failed += 1;
-            wrong.push(format!("again by: {}", plan.command(round)));
-            let wrong = wrong.into_iter().map(|why| format!("round {round}: {why}"));
-            self.failures.extend(wrong);
+            Ok(_) => wrong.push("did not run to its end".into()),
+            Err(fault) => wrong.push(format!("its trace: {fault}")),
         }
-        if self.failed > failed_before {
-            self.failures.push(format!("the serial log is {log}"));
-        } else {
+        if wrong.is_empty() {
+            self.passed += 1;
             let _ = fs::remove_file(&outcome.log);
+            return;
         }
+        self.failed += 1;
+        wrong.push(format!("the serial log is {}", outcome.log.display()));
+        wrong.push(format!("again by: {}", plan.command(round)));
+        let wrong = wrong.into_iter().map(|why| format!("round {round}: {why}"));
+        self.failures.extend(wrong);
     }
 
     /// Judges a run by what the guest says of it and by its trace; returns what is wrong.

@@ -120,13 +120,7 @@ fn parse_task(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
     let subtasks = header.at_least_one(subtasks)? as usize;
     let edge_count: u32 = header.number(edge_count)?;
     let wcets_ns = lines.expect("wcet")?.numbers(subtasks)?;
-    let mut edges = Vec::new();
-    for _ in 0..edge_count {
-        let edge = lines.expect("edge")?;
-        let [from, to] = edge.fixed()?;
-        let end = |word| edge.index("subtask", word, subtasks);
-        edges.push((end(from)?, end(to)?));
-    }
+    let edges = lines.edges(edge_count, subtasks)?;
     Task::new(period_ns, deadline_ns, wcets_ns, &edges)
         .map_err(|error| header.malformed(error.to_string()))
 }
