@@ -9,7 +9,7 @@
 //! the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
 //!
 //! - [`json`], [`protocol`]: what a guest prints, read strictly;
-//! - [`elf`], [`image`], [`efi`], [`medium`], [`places`], [`tiny`]: what is booted;
+//! - [`elf`], [`image`], [`medium`], [`places`], [`tiny`]: what is booted;
 //! - [`child`], [`qemu`], [`outcome`]: booting it and judging the end;
 //! - [`install`], [`probe`], [`system`]: what the host has;
 //! - [`options`]: command lines by a table; [`files`]: what they name;
@@ -22,7 +22,7 @@
 //! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
 //! - [`mod@bench`]: what is measured, and compared with a baseline;
 //! - [`oracle`]: reference schedules, bounds and synchronizers;
-//! - [`run`](mod@run), [`stick`], [`test`](mod@test), [`soak`](mod@soak),
+//! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
 //!   [`new_app`](mod@new_app): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
@@ -40,7 +40,6 @@ pub mod child;
 pub mod dag_file;
 pub mod debian;
 pub mod dot;
-pub mod efi;
 pub mod elf;
 pub mod files;
 pub mod golden;
@@ -64,7 +63,6 @@ pub mod record;
 pub mod recordings;
 pub mod run;
 pub mod soak;
-pub mod stick;
 pub mod system;
 pub mod test;
 pub mod tiny;

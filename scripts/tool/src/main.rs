@@ -19,7 +19,7 @@ static TOOL: Menu = Menu {
         "run": "boot an app in QEMU and judge the run", tool::run::run;
         "debug": "boot an app in QEMU, under gdb", tool::run::debug;
         "boot": "boot an image, and run any other program as it is: for cargo", tool::run::boot;
-        "image": "make a file that boots an app on a PC", tool::stick::image;
+        "image": "make a file that boots an app on a PC", tool::medium::image;
         "new-app": "make an app of your own, in a repository of its own or under apps/",
             tool::new_app::new_app;
         "test": "run every test, on the host and in QEMU", tool::test::test;

@@ -18,7 +18,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use sched_dag::analysis::{self, Overheads, Settings};
-use sched_dag::{Clusters, Dag, DagId, DagSpec, Preemption, SchedulerOptions, SubtaskSpec};
+use sched_dag::{Clusters, Dag, DagId, DagSpec, Preemption, SchedulerOptions};
 
 use super::observed::{OfDag, shown};
 use crate::files;
@@ -217,7 +217,9 @@ pub fn of(commit: &Committed, dag: DagId) -> Slack {
     let cluster = task_set.dag(dag).cluster();
     let is_here = |(_, model): &(usize, &Dag)| model.cluster() == cluster;
     let here = || task_set.dags().iter().enumerate().filter(is_here);
-    let mut all: Vec<DagSpec> = here().map(|(_, model)| spec(model)).collect();
+    let specs = here().map(|(place, _)| &commit.specs[place]);
+    let mut all: Vec<DagSpec> = specs.cloned().collect();
+    (all.iter_mut()).for_each(|dag| dag.cluster = None);
     let index = here().take_while(|(place, _)| *place < dag.index()).count();
     let full = commit.told.dags[dag.index()].bound_ns;
     let mut settings = commit.settings();
@@ -242,39 +244,6 @@ pub fn of(commit: &Committed, dag: DagId) -> Slack {
         interference_ns: part(preemptible, alone),
         own_order_ns: part(alone, length),
         length_ns: length,
-    }
-}
-
-/// Returns what a verified DAG could have been stated as.
-fn spec(dag: &Dag) -> DagSpec {
-    let ids = || (0..).map(sched_dag::SubtaskId).take(dag.subtasks().len());
-    let subtasks = ids().zip(dag.subtasks()).map(|(id, subtask)| SubtaskSpec {
-        name: subtask.name().into(),
-        wcet_ns: subtask.wcet_ns(),
-        priority: Some(subtask.priority()),
-        non_preemptive: subtask.is_non_preemptive(),
-        relative_deadline_ns: (dag.successors(id).is_empty())
-            .then(|| subtask.relative_deadline_ns()),
-        ..SubtaskSpec::default()
-    });
-    let edges = ids().flat_map(|from| {
-        let after = dag.successors(from).iter();
-        after.map(move |to| (from.index(), to.index()))
-    });
-    DagSpec {
-        name: dag.name().into(),
-        activation: match dag.is_sporadic() {
-            true => sched_dag::Activation::Sporadic,
-            false => sched_dag::Activation::Periodic,
-        },
-        period_ns: Some(dag.period_ns()),
-        relative_deadline_ns: Some(dag.relative_deadline_ns()),
-        offset_ns: dag.offset_ns(),
-        in_flight: Some(dag.in_flight()),
-        overrun: dag.overrun(),
-        subtasks: subtasks.collect(),
-        edges: edges.collect(),
-        ..DagSpec::default()
     }
 }
 

@@ -308,6 +308,8 @@ pub struct Committed {
     pub number: usize,
     /// The commit as the record has it.
     pub told: Commit,
+    /// The same as specifications.
+    pub specs: Vec<DagSpec>,
     /// The same as a model.
     pub task_set: TaskSet,
 }
@@ -326,18 +328,18 @@ impl Committed {
                 told.cores
             )));
         }
-        let specs: Result<Vec<DagSpec>, String> = told.dags.iter().map(spec).collect();
+        let specs: Result<_, String> = told.dags.iter().map(spec).collect();
         let clusters = match &told.clusters[..] {
             [] => Clusters::Undivided,
             sizes => Clusters::Of(sizes.to_vec()),
         };
         let mut committed = Self {
             number,
+            specs: specs.map_err(in_commit)?,
             task_set: TaskSet::default(),
             told,
         };
-        let options = committed.options();
-        let task_set = specs.and_then(|specs| task_set(options, clusters, &specs));
+        let task_set = task_set(committed.options(), clusters, &committed.specs);
         committed.task_set = task_set.map_err(in_commit)?;
         Ok(committed)
     }

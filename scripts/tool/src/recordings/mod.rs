@@ -129,12 +129,8 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         let line = "it has values alone; `./scripts/run --keep FILE` keeps all of a run";
         return Err(format!("`--{name}`: {line}"));
     }
-    if let Some(path) = options.path("dot") {
-        files::write_named("dot", path, dot::text(&record)?)?;
-        println!("{}", files::place(path));
-    }
-    if let Some(path) = options.path("witness") {
-        println!("{}", report::write(path, record.proven()?)?);
+    for line in drawn_and_proven(&record, options)? {
+        println!("{line}");
     }
     if let Some(path) = options.path("observe") {
         let mut observed = Vec::new();
@@ -144,6 +140,23 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         println!("{}", files::place(path));
     }
     Ok(())
+}
+
+/// Writes the picture and the witnesses that the options want of a record, and returns the words
+/// that announce them.
+pub(crate) fn drawn_and_proven(record: &Record, options: &Parsed) -> Result<Vec<String>, String> {
+    let mut announced = Vec::new();
+    if let Some(path) = options.path("dot") {
+        files::write_named("dot", path, dot::text(record)?)?;
+        let file = files::place(path);
+        announced.push(format!(
+            "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
+        ));
+    }
+    if let Some(path) = options.path("witness") {
+        announced.push(report::write(path, record.proven()?)?);
+    }
+    Ok(announced)
 }
 
 /// Makes sure of the options and of all files, before any is opened.

@@ -16,11 +16,9 @@ use recording::{Chunk, Header, Recording, Writer};
 
 use super::screen::Screen;
 use super::{Booted, handed};
-use crate::dot;
 use crate::files::{self, Temporary};
 use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
-use crate::proof::report;
 use crate::protocol::Status;
 use crate::qemu::Ending;
 use crate::recordings;
@@ -193,22 +191,6 @@ impl Kept {
     }
 }
 
-/// Writes the views that the options want. Returns the words that announce them.
-pub(super) fn write_views(options: &Parsed, outcome: &Outcome) -> Result<Vec<String>, String> {
-    let mut announced = Vec::new();
-    if let Some(path) = options.path("dot") {
-        files::write_named("dot", path, dot::text(&outcome.record()?)?)?;
-        let file = files::place(path);
-        announced.push(format!(
-            "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
-        ));
-    }
-    if let Some(path) = options.path("witness") {
-        announced.push(report::write(path, outcome.record()?.proven()?)?);
-    }
-    Ok(announced)
-}
-
 /// Writes what the options want in files of a run, and says so; of a run that has failed it speaks
 /// only of trace and recording.
 pub(super) fn write(
@@ -224,7 +206,10 @@ pub(super) fn write(
     }
     // Else there are worse news.
     if outcome.judge().is_ok() {
-        let views = write_views(options, &outcome)?;
+        let views = match options.given_of(&["dot", "witness"]) {
+            Some(_) => recordings::drawn_and_proven(&outcome.record()?, options)?,
+            None => Vec::new(),
+        };
         let warning = handed::warning(options, &outcome);
         views
             .iter()
