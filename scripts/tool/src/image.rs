@@ -15,7 +15,7 @@ use replay::shown::quoted;
 use crate::elf;
 use crate::files;
 use crate::json::Value;
-use crate::options::nearest;
+use crate::options::did_you_mean;
 use crate::progress::Lasting;
 use crate::system;
 
@@ -70,8 +70,7 @@ pub fn check_app(name: &str) -> Result<(), String> {
         return Ok(());
     }
     let names: Vec<&str> = apps.iter().map(String::as_str).collect();
-    let hint =
-        nearest(name, &names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    let hint = did_you_mean(name, &names);
     Err(format!(
         "no app {}; there are: {}{hint}",
         quoted(name),

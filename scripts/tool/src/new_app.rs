@@ -62,26 +62,27 @@ const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
 /// A file of an app: where it goes in the app's folder, and its text.
 type AppFile = (&'static str, &'static str);
 
+/// Returns a file of the template, which lies there by this name or another one.
+macro_rules! template {
+    ($file:literal) => {
+        template!($file, $file)
+    };
+    ($file:literal, $name:literal) => {
+        ($file, include_str!(concat!("../template/", $name)))
+    };
+}
+
 /// What says how an app under `apps/` is built.
-const MANIFEST: AppFile = ("Cargo.toml", include_str!("../template/manifest.toml"));
+const MANIFEST: AppFile = template!("Cargo.toml", "manifest.toml");
 
 /// The template's other files, which any app has.
 const FILES: &[AppFile] = &[
-    ("build.rs", include_str!("../template/build.rs")),
-    ("src/lib.rs", include_str!("../template/src/lib.rs")),
-    ("src/main.rs", include_str!("../template/src/main.rs")),
-    (
-        "examples/app-template-linux.rs",
-        include_str!("../template/examples/app-template-linux.rs"),
-    ),
-    (
-        "examples/replay.rs",
-        include_str!("../template/examples/replay.rs"),
-    ),
-    (
-        "tests/virtual_time.rs",
-        include_str!("../template/tests/virtual_time.rs"),
-    ),
+    template!("build.rs"),
+    template!("src/lib.rs"),
+    template!("src/main.rs"),
+    template!("examples/app-template-linux.rs"),
+    template!("examples/replay.rs"),
+    template!("tests/virtual_time.rs"),
 ];
 
 /// Texts of the template, and those that stand for them in an app.
@@ -324,23 +325,11 @@ const PACKAGES: [&str; 5] = [
 
 /// The files that an app under `apps/` does without, or has others for.
 const OWN_FILES: [AppFile; 6] = [
-    (
-        "Cargo.toml",
-        include_str!("../template/repository/manifest.toml"),
-    ),
-    (
-        ".cargo/config.toml",
-        include_str!("../template/repository/config.toml"),
-    ),
-    (
-        ".github/workflows/ci.yml",
-        include_str!("../template/repository/ci.yml"),
-    ),
+    template!("Cargo.toml", "repository/manifest.toml"),
+    template!(".cargo/config.toml", "repository/config.toml"),
+    template!(".github/workflows/ci.yml", "repository/ci.yml"),
     (".gitignore", "/target\n"),
-    (
-        "README.md",
-        include_str!("../template/repository/README.md"),
-    ),
+    template!("README.md", "repository/README.md"),
     (
         "rust-toolchain.toml",
         include_str!("../../../rust-toolchain.toml"),

@@ -130,16 +130,17 @@ impl Qemu {
     /// going to `serial`. For a [`Loader`] with a firmware `image` is a whole stick.
     #[must_use]
     pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<OsString> {
-        let mut arguments: Vec<OsString> = vec!["-machine".into(), self.machine.name().into()];
-        arguments.extend(self.mode.arguments().iter().map(OsString::from));
-        arguments.extend(["-smp".into(), self.cores.to_string().into()]);
-        arguments.extend(["-m".into(), format!("{}M", self.memory_mib).into()]);
+        let (machine, mode, cores) = (self.machine, self.mode.arguments(), self.cores);
+        let mut arguments = words(&format!(
+            "-machine {machine} {mode} -smp {cores} -m {}M",
+            self.memory_mib
+        ));
         arguments.extend(self.loading(image));
         if self.has_input || self.stops {
             // The log file gets every byte; QEMU's own output goes nowhere.
             let port = file_value("stdio,id=console,signal=off,logfile=", serial);
             arguments.extend(["-chardev".into(), port]);
-            arguments.extend(["-serial", "chardev:console"].map(OsString::from));
+            arguments.extend(words("-serial chardev:console"));
         } else {
             arguments.extend(["-serial".into(), file_value("file:", serial)]);
         }
@@ -147,13 +148,12 @@ impl Qemu {
         if let Some(path) = &self.records {
             let port = file_value("file,id=edge,path=", path);
             arguments.extend(["-chardev".into(), port]);
-            let device = "isa-debugcon,iobase=0x402,chardev=edge";
-            arguments.extend(["-device", device].map(OsString::from));
+            arguments.extend(words("-device isa-debugcon,iobase=0x402,chardev=edge"));
         }
-        let exit_device = "isa-debug-exit,iobase=0xf4,iosize=0x04";
-        arguments.extend(["-device", exit_device].map(OsString::from));
-        arguments.extend(["-nodefaults", "-no-user-config"].map(OsString::from));
-        arguments.extend(["-display", "none", "-no-reboot"].map(OsString::from));
+        arguments.extend(words(
+            "-device isa-debug-exit,iobase=0xf4,iosize=0x04 -nodefaults -no-user-config \
+             -display none -no-reboot",
+        ));
         if let Some(device) = &self.debugger {
             arguments.extend(["-S".into(), "-gdb".into(), device.clone()]);
         }
@@ -165,8 +165,7 @@ impl Qemu {
         if self.loader.needs_stick() {
             let drive = file_value("if=none,id=stick,format=raw,readonly=on,file=", image);
             let mut arguments: Vec<OsString> = vec!["-drive".into(), drive];
-            let devices = ["-device", "qemu-xhci", "-device", "usb-storage,drive=stick"];
-            arguments.extend(devices.map(OsString::from));
+            arguments.extend(words("-device qemu-xhci -device usb-storage,drive=stick"));
             if self.loader.is_by_uefi() {
                 arguments.extend(["-bios", OVMF_FILE].map(OsString::from));
             }
@@ -235,7 +234,12 @@ fn log_instructions(program: &Path, arguments: &mut Vec<OsString>) {
     } else {
         arguments.push("-singlestep".into());
     }
-    arguments.extend(["-d", "exec,nochain", "-D", "/dev/stdout"].map(OsString::from));
+    arguments.extend(words("-d exec,nochain -D /dev/stdout"));
+}
+
+/// Returns arguments without blanks in them, each a word of the text.
+pub(crate) fn words(text: &str) -> Vec<OsString> {
+    text.split_whitespace().map(OsString::from).collect()
 }
 
 /// Returns a value that ends in a file's name. A comma would end the name in QEMU's syntax unless
@@ -320,23 +324,16 @@ impl Mode {
         }
     }
 
-    fn arguments(self) -> &'static [&'static str] {
+    /// Returns QEMU's words for it.
+    pub(crate) fn arguments(self) -> &'static str {
         match self {
-            Mode::Kvm => &["-accel", "kvm", "-cpu", "host"],
+            Mode::Kvm => "-accel kvm -cpu host",
             // The sleep=off makes an idle guest jump to its next timer.
-            Mode::Deterministic => &[
-                "-accel",
-                "tcg",
-                "-icount",
-                "shift=0,sleep=off",
-                "-cpu",
-                "max",
-                "-seed",
-                "1",
-                "-rtc",
-                "base=2000-01-01,clock=vm",
-            ],
-            Mode::Threads => &["-accel", "tcg,thread=multi", "-cpu", "max"],
+            Mode::Deterministic => {
+                "-accel tcg -icount shift=0,sleep=off -cpu max -seed 1 \
+                 -rtc base=2000-01-01,clock=vm"
+            }
+            Mode::Threads => "-accel tcg,thread=multi -cpu max",
         }
     }
 }

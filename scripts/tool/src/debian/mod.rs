@@ -19,7 +19,7 @@ use std::process::Command;
 use crate::files::{self, Temporary, write};
 use crate::install;
 use crate::progress::Lasting;
-use crate::qemu::{Mode, PROGRAM, file_value};
+use crate::qemu::{self, Mode, PROGRAM, file_value};
 use crate::system::{self, find_program, run};
 
 /// What the guest runs first, and all that it runs besides the program.
@@ -81,24 +81,21 @@ impl Guest {
             pack(folder, &packages, archive.path())
         })?;
         write(end.path(), "")?;
-        let mut words: Vec<OsString> = Vec::new();
-        let accelerator: &[&str] = match order.mode {
-            Mode::Kvm => &["-accel", "kvm", "-cpu", "host"],
+        let mut words = qemu::words(match order.mode {
             // Two instructions of Linux's a nanosecond are nearer to a PC than one.
-            Mode::Deterministic => &["-icount", "shift=1,sleep=off", "-cpu", "max"],
-            Mode::Threads => &["-accel", "tcg,thread=multi", "-cpu", "max"],
-        };
-        words.extend(accelerator.iter().map(OsString::from));
+            Mode::Deterministic => "-icount shift=1,sleep=off -cpu max",
+            other => other.arguments(),
+        });
         // Not by standard output: the port would be closed with the end of standard input.
         for (port, path) in [("out", log), ("end", end.path())] {
             let file = file_value(&format!("file,id={port},path="), path);
             words.extend(["-chardev".into(), file]);
         }
-        let fixed = "-machine q35 -nodefaults -display none -no-reboot \
-                     -device virtio-serial-pci \
-                     -device virtserialport,nr=1,chardev=out \
-                     -device virtserialport,nr=2,chardev=end -append";
-        words.extend(fixed.split_whitespace().map(OsString::from));
+        words.extend(qemu::words(
+            "-machine q35 -nodefaults -display none -no-reboot -device virtio-serial-pci \
+             -device virtserialport,nr=1,chardev=out -device virtserialport,nr=2,chardev=end \
+             -append",
+        ));
         // Where instructions are counted, a processor that computes keeps the emulator until a
         // timer ends: processors whose ticks are apart wait less for each other.
         words.push("console=ttyS0 quiet panic=-1 skew_tick=1".into());

@@ -465,8 +465,7 @@ impl Opt {
         match (self.takes, text) {
             (_, None) => must = format!("is not UTF-8 text; {must}"),
             (Takes::OneOf(words), Some(text)) => {
-                let near = nearest(text, words);
-                must += &near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+                must += &did_you_mean(text, words);
             }
             _ => {}
         }
@@ -519,6 +518,11 @@ impl Opt {
         }
         format!("{} [{}]", self.help, parts.join("; "))
     }
+}
+
+/// Asks whether the nearest of the names was meant, behind a semicolon; nothing if none is near.
+pub(crate) fn did_you_mean(name: &str, names: &[&str]) -> String {
+    nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
 
 fn number(text: &str) -> Option<u64> {

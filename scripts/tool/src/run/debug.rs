@@ -29,7 +29,7 @@ use crate::child;
 use crate::files;
 use crate::image::{self, Profile};
 use crate::install;
-use crate::options::{Command, Opt, Parsed, Refusal, Takes, nearest};
+use crate::options::{Command, Opt, Parsed, Refusal, Takes, did_you_mean};
 use crate::qemu::{Mode, Qemu};
 use crate::system;
 
@@ -294,8 +294,7 @@ fn choose(
     let shown = quoted(place);
     if meant.is_empty() {
         let names: Vec<&str> = known.iter().map(|path| last(path)).collect();
-        let hint = nearest(last(place), &names)
-            .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        let hint = did_you_mean(last(place), &names);
         return Err(format!(
             "`--break`: the image has no function {shown}; a closure is found by `FILE:LINE`{hint}"
         ));
