@@ -122,7 +122,7 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let mode = mode.unwrap_or(Mode::Deterministic);
     let mut qemu = super::describe(&run, &program, mode, memory_mib, None);
     qemu.stops = false; // ctrl-C is gdb's
-    qemu.guest_words += &format!(" budget_factor=0{}", handed.guest_words());
+    qemu.guest_words += &format!(" budget_factor=0{}", handed.words);
     qemu.module = handed.module();
     qemu.check_words().map_err(Refusal::Usage)?;
 

@@ -25,12 +25,9 @@ use crate::wire_script;
 
 /// Files on their way to the guest.
 pub(super) struct Handed {
-    /// How many bytes at the module's beginning are WCETs.
-    wcets_bytes: usize,
-    /// How many bytes at the module's end are a wire's.
-    input_bytes: usize,
-    /// How many bytes after the WCETs are a recording.
-    replay_bytes: usize,
+    /// The words that tell the guest how many bytes of the module are whose, and its parameters,
+    /// each after a blank.
+    pub(super) words: String,
     /// Where the module lies, if there is something in it. It is removed with this value.
     module: Temporary,
 }
@@ -60,31 +57,22 @@ impl Handed {
             module.0 = Some(path.clone());
             files::write(&path, content)?;
         }
-        Ok(Handed {
-            wcets_bytes: text.len(),
-            input_bytes: input.len(),
-            replay_bytes: replayed.len(),
-            module,
-        })
+        let mut words = parameters(options)?;
+        for (name, part) in [
+            ("wcets", text.as_bytes()),
+            ("replay", &replayed),
+            ("input", &input),
+        ] {
+            if !part.is_empty() {
+                words += &format!(" {name}={}", part.len());
+            }
+        }
+        Ok(Handed { words, module })
     }
 
     /// Returns the module that was written.
     pub(super) fn module(&self) -> Option<PathBuf> {
         self.module.0.clone()
-    }
-
-    /// Returns the words that tell the guest where the files end, and where the input begins,
-    /// each after a blank.
-    pub(super) fn guest_words(&self) -> String {
-        let parts = [
-            ("wcets", self.wcets_bytes),
-            ("replay", self.replay_bytes),
-            ("input", self.input_bytes),
-        ];
-        let parts = parts.into_iter().filter(|(_, bytes)| *bytes > 0);
-        parts
-            .map(|(name, bytes)| format!(" {name}={bytes}"))
-            .collect()
     }
 }
 
@@ -103,8 +91,8 @@ fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     }
 }
 
-/// Returns the guest's word after a blank, if one is wanted.
-pub(super) fn guest_word(options: &Parsed) -> Result<String, Refusal> {
+/// Returns the word for the guest's parameters after a blank, if some are given.
+fn parameters(options: &Parsed) -> Result<String, Refusal> {
     let mut parts = Vec::new();
     if let Some(path) = options.path("params") {
         let place = files::place(path);
@@ -187,7 +175,7 @@ pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
 }
 
 /// Returns the script for the guest of the file that `--input` names; empty if it names none.
-pub(super) fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
+fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path("input").filter(|_| !is_live(options)) else {
         return Ok(Vec::new());
     };

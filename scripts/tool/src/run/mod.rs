@@ -125,12 +125,10 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     install::ensure_loader(loading::chosen(options))?;
 
     let handed = Handed::read(options, dags)?;
-    let parameters = handed::guest_word(options)?;
     let kept = Kept::new(options, &app)?;
     let describe = |mode| {
         let mut qemu = describe(options, &program, mode, memory_mib, dags);
-        qemu.guest_words += &handed.guest_words();
-        qemu.guest_words += &parameters;
+        qemu.guest_words += &handed.words;
         qemu.guest_words += &kept.guest_word();
         qemu.records = kept.raw();
         qemu.module = handed.module();
@@ -213,14 +211,7 @@ fn describe(
     memory_mib: u64,
     dags: Option<&Prepared>,
 ) -> Qemu {
-    let mut words = vec![format!("mode={mode}")];
-    for name in table::GUEST_WORDS {
-        words.extend(options.text(name).map(|value| format!("{name}={value}")));
-    }
-    words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
-    words.extend(screen::guest_words(options));
-    words.extend(several::bounds_word(options));
-    words.extend(options.text("append").map(String::from));
+    let words = words(options, dags, screen::guest_words(options)).join(" ");
     Qemu {
         program: program.into(),
         mode,
@@ -228,7 +219,7 @@ fn describe(
         loader: loading::chosen(options),
         cores: options.number("cores").unwrap_or(1),
         memory_mib,
-        guest_words: words.join(" "),
+        guest_words: format!("mode={mode} {words}").trim_end().into(),
         module: None,
         records: None,
         has_input: options.is_given("console"),
@@ -237,6 +228,21 @@ fn describe(
         logs_instructions: false,
         debugger: options.is_given("gdb").then(|| "tcp::1234".into()),
     }
+}
+
+/// Returns the words that the options make for an app, with a platform's own, and last those that
+/// the person adds.
+fn words(options: &Parsed, dags: Option<&Prepared>, own: Vec<String>) -> Vec<String> {
+    let mut words = Vec::new();
+    for name in table::GUEST_WORDS {
+        words.extend(options.text(name).map(|value| format!("{name}={value}")));
+    }
+    words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
+    words.extend(own);
+    words.extend(several::bounds_word(options));
+    let more = options.text("append").unwrap_or_default();
+    words.extend(more.split_whitespace().map(String::from));
+    words
 }
 
 /// The person's limit, or one that is generous also where a job takes its

@@ -6,19 +6,17 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use super::Booted;
 use super::handed::{self, Handed};
 use super::kept::{self, Kept, Log};
 use super::screen::Screen;
-use super::table;
-use super::{limit, several};
+use super::{Booted, limit};
 
 use crate::dag_file::Prepared;
 use crate::debian::{Guest, Order};
 use crate::image;
 use crate::options::{Parsed, Refusal};
 use crate::program;
-use crate::qemu::{Ending, Mode};
+use crate::qemu::{self, Ending, Mode};
 
 /// The options that are about QEMU, its guest, or what the kernel alone does.
 const FOREIGN: [&str; 6] = ["boot", "gdb", "latest", "machine", "memory", "qemu"];
@@ -95,8 +93,11 @@ pub(super) fn run_app(
         image::check_linux(app).map_err(Refusal::Usage)?;
     }
     let handed = Handed::read(options, dags)?;
-    let mut words = words(options, dags);
-    words.extend(handed.guest_words().split_whitespace().map(OsString::from));
+    let mut words: Vec<OsString> = super::words(options, dags, own_words(options))
+        .iter()
+        .map(OsString::from)
+        .collect();
+    words.extend(qemu::words(&handed.words));
     let kept = Kept::new(options, app)?;
     let replayed = options.path("replay").map(Path::to_path_buf);
     for (name, path) in [("module=", handed.module()), ("replay=", replayed)] {
@@ -210,20 +211,15 @@ fn meaning(mode: Mode) -> &'static str {
     }
 }
 
-/// Returns the program's words.
-fn words(options: &Parsed, dags: Option<&Prepared>) -> Vec<OsString> {
+/// Returns the words that only a program of Linux is given.
+fn own_words(options: &Parsed) -> Vec<String> {
     let mut words = Vec::new();
-    for name in ["cores", "mechanism"].iter().chain(table::GUEST_WORDS) {
+    for name in ["cores", "mechanism", "output"] {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
-    words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
-    words.extend(several::bounds_word(options));
     words.extend(options.is_given("console").then(|| "console=on".into()));
     words.extend(handed::is_live(options).then(|| "input=-".into()));
-    words.extend(options.text("output").map(|path| format!("output={path}")));
-    let more = options.text("append").unwrap_or_default();
-    words.extend(more.split_whitespace().map(String::from));
-    words.into_iter().map(OsString::from).collect()
+    words
 }
 
 #[cfg(test)]
