@@ -11,26 +11,11 @@ use sched_dag::{DagId, Journal, Scheduler, TaskSet};
 
 use crate::control::{self, Control};
 use crate::edge;
-use crate::level::Levels;
 use crate::office::Office;
-use crate::run::Launched;
+use crate::run::{Launched, Threads};
 use crate::state::State;
 use crate::sys;
 use crate::team::{Team, with_own_worker};
-
-/// What the commits to come run on.
-#[derive(Clone, Debug)]
-pub(crate) struct Threads {
-    /// The terms of the commits to come.
-    pub(crate) terms: Terms,
-    pub(crate) processors: Box<[u32]>,
-    pub(crate) levels: Option<Levels>,
-    /// Whether idle threads watch instead of sleeping.
-    pub(crate) polls: bool,
-    /// Whether the run's time skips what would pass idly.
-    pub(crate) skips_idle: bool,
-    pub(crate) allocations: fn() -> u64,
-}
 
 /// The platform of the program.
 pub(crate) struct Host {
@@ -155,9 +140,7 @@ impl Platform for Host {
         let launched = Launched {
             control,
             proven,
-            cores: threads.terms.scheduler.cores,
-            budget_factor: threads.terms.budget_factor,
-            allocations: threads.allocations,
+            threads,
         };
         let mut place = self.launched.lock().unwrap_or_else(PoisonError::into_inner);
         *place = Some(launched);

@@ -5,11 +5,13 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
 
+use fass::Terms;
 use fass::edge::Kept;
 use sched_dag::engine::{self, Proven};
 
 use crate::control::Control;
 use crate::edge::{self, File, Sending};
+use crate::level::Levels;
 use crate::release::Budgets;
 use crate::state::{Fault, Number, RunTime};
 use crate::sys;
@@ -21,14 +23,26 @@ const STACK_BYTES: usize = 512 * 1024;
 /// Time between the start of a run and its first release.
 const LEAD_NS: u64 = 1_000_000;
 
+/// What the commits to come run on.
+#[derive(Clone, Debug)]
+pub(crate) struct Threads {
+    /// The terms of the commits to come.
+    pub(crate) terms: Terms,
+    pub(crate) processors: Box<[u32]>,
+    pub(crate) levels: Option<Levels>,
+    /// Whether idle threads watch instead of sleeping.
+    pub(crate) polls: bool,
+    /// Whether the run's time skips what would pass idly.
+    pub(crate) skips_idle: bool,
+    /// Counts what the program has allocated so far.
+    pub(crate) allocations: fn() -> u64,
+}
+
 /// A plan that was committed.
 pub(crate) struct Launched {
     pub(crate) control: Control,
-    pub(crate) cores: u32,
     pub(crate) proven: Proven,
-    pub(crate) budget_factor: u64,
-    /// Counts what the program has allocated so far.
-    pub(crate) allocations: fn() -> u64,
+    pub(crate) threads: Threads,
 }
 
 /// How often the run's threads did what.
@@ -64,7 +78,7 @@ impl Deref for Run {
 /// Starts the threads of a committed plan, waits for the end of all its jobs, and
 /// returns what happened. Releases count from `epoch_ns`, or from right now.
 pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
-    let Control { office, teams } = &launched.control;
+    let (threads, Control { office, teams }) = (&launched.threads, &launched.control);
     let workers = teams.iter().map(|team| {
         let numbers = 0..team.workers.len();
         numbers.map(|number| worker(team, number)).collect()
@@ -73,27 +87,27 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     for (team, workers) in teams.iter().zip(&workers) {
         team.wait_until_ready(workers.len());
     }
-    let release = |team| release(team, launched.budget_factor);
+    let release = |team| release(team, threads.terms.budget_factor);
     let releases: Vec<_> = teams.iter().map(release).collect();
     for (team, workers) in teams.iter().zip(&workers) {
         team.wait_until_ready(workers.len() + 1);
     }
     let epoch_ns = epoch_ns.unwrap_or_else(|| sys::now_ns() + LEAD_NS);
-    for team in &**teams {
+    for team in teams.iter() {
         team.lock().time = RunTime::beginning(epoch_ns);
     }
     let sending = edge::begin_run(epoch_ns, events(launched.control.clone()));
-    let allocations = (launched.allocations)();
+    let allocations = (threads.allocations)();
     teams.iter().for_each(|team| office.ring(team.cluster));
     office.wait_until_over();
-    let allocations = (launched.allocations)() - allocations;
+    let allocations = (threads.allocations)() - allocations;
     releases.into_iter().for_each(join);
     sending.into_iter().for_each(Sending::end);
     let mut states: Vec<_> = teams.iter().map(|team| team.lock()).collect();
     let abandoned: Vec<Vec<Number>> = states.iter().map(|state| state.abandoned.clone()).collect();
     let mut parts = states.iter_mut().map(|state| &mut state.engine);
     let first = parts.next().expect("there is a cluster at least");
-    let mut run = engine::Run::of(first, launched.proven, launched.cores);
+    let mut run = engine::Run::of(first, launched.proven, threads.terms.scheduler.cores);
     // Nobody writes any more: those that were abandoned see that they were.
     parts.for_each(|other| run.absorb(other));
     let mut counts = Counts::default();

@@ -13,9 +13,8 @@ use sched_dag::{FaultLimit, OnFault};
 
 use super::dag::Dag;
 use super::subtask::Subtask;
-use super::uses::Using;
-use super::uses::{ResettableUses, Uses};
-use crate::run::replaceable::{Alternatives, Anew, Functions, Two, defer};
+use super::uses::{ResettableUses, Uses, Using};
+use crate::run::replaceable::{Alternatives, Anew, Two, defer};
 use crate::run::state::Reset;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
@@ -213,10 +212,6 @@ impl<'d> Subtask<'d> {
         alternatives: Box<dyn Alternatives<Args, Ret>>,
         states: Vec<Arc<dyn Reset>>,
     ) -> Self {
-        let functions = Functions {
-            alternatives,
-            states,
-        };
-        Self::new::<Args, Ret>(dag, defer(functions)).replaceable()
+        Self::new::<Args, Ret>(dag, defer(alternatives, states)).replaceable()
     }
 }

@@ -29,8 +29,7 @@ pub(super) struct OfMachine {
     own: Header,
     lines: Vec<LineOf>,
     /// From the launch on.
-    replay: Option<Replay>,
-    signals: Option<Signals>,
+    replay: Option<(Replay, Signals)>,
 }
 
 impl OfMachine {
@@ -42,7 +41,6 @@ impl OfMachine {
             own: Header::default(),
             lines: Vec::new(),
             replay: None,
-            signals: None,
         }
     }
 }
@@ -64,20 +62,20 @@ impl Crossing for OfMachine {
         replay.prepare(plan)?;
         replay.guard(plan);
         self.lines = mem::take(&mut plan.lines);
-        self.signals = Some(Signals::take_over(plan, &mut replay));
-        self.replay = Some(replay);
+        let signals = Signals::take_over(plan, &mut replay);
+        self.replay = Some((replay, signals));
         Ok(())
     }
 
     fn record(&mut self, value: &Recorded<'_>, _at_ns: u64) {
-        if let Some(replay) = &mut self.replay {
+        if let Some((replay, _)) = &mut self.replay {
             replay.compare(value);
         }
     }
 
     fn happened(&mut self, notice: &Notice) {
         if let What::Due | What::Skipped = notice.event.what
-            && let (Some(replay), Some(signals)) = (&mut self.replay, &self.signals)
+            && let Some((replay, signals)) = &mut self.replay
         {
             let dag = notice.event.dag;
             signals.follow(dag, replay.next_signal_ns(dag));
@@ -85,7 +83,7 @@ impl Crossing for OfMachine {
     }
 
     fn failed(&mut self, instance: Instance, at_ns: u64, _clock_ns: u64) {
-        if let Some(replay) = &mut self.replay {
+        if let Some((replay, _)) = &mut self.replay {
             for of in self.lines.iter().filter(|of| of.is_found_by(instance)) {
                 of.line.show(at_ns, |found| replay.compare(found));
             }
@@ -94,22 +92,24 @@ impl Crossing for OfMachine {
     }
 
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, _at_ns: u64) -> u64 {
-        let told = (self.replay.as_mut()).and_then(|replay| replay.next_told_ns(instance));
+        let told = (self.replay.as_mut()).and_then(|(replay, _)| replay.next_told_ns(instance));
         told.unwrap_or(clock_ns)
     }
 
     fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        if let Some(value) = (self.replay.as_ref()).and_then(|replay| replay.value(channel, job)) {
+        if let Some(value) =
+            (self.replay.as_ref()).and_then(|(replay, _)| replay.value(channel, job))
+        {
             take(value);
         }
     }
 
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
-        self.signals.as_ref()?.raiser(self.host)
+        self.replay.as_ref()?.1.raiser(self.host)
     }
 
     fn outcome(&self, is_over: bool) -> Option<Outcome> {
-        (self.replay.as_ref()).map(|replay| replay.outcome(is_over))
+        (self.replay.as_ref()).map(|(replay, _)| replay.outcome(is_over))
     }
 }
 

@@ -36,9 +36,7 @@ pub(crate) struct RecordedTopic<T> {
 }
 
 /// A recorded topic of whatever type.
-pub(crate) trait AnyRecorded {
-    fn topic(&self) -> &str;
-
+pub(crate) trait AnyRecorded: AnyLatest {
     fn edge(&self) -> &'static Edge;
 
     /// Returns the type of its values, and their way.
@@ -249,10 +247,6 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
 }
 
 impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
-    fn topic(&self) -> &str {
-        &self.topic
-    }
-
     fn edge(&self) -> &'static Edge {
         self.line.edge
     }

@@ -23,12 +23,6 @@ use super::state::Reset;
 use super::subtask::MakeBody;
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
-/// The functions of a subtask, and the states that they use.
-pub(crate) struct Functions<Args, Ret> {
-    pub(crate) alternatives: Box<dyn Alternatives<Args, Ret>>,
-    pub(crate) states: Vec<Arc<dyn Reset>>,
-}
-
 /// Functions of which one is the *present* one.
 pub(crate) trait Alternatives<Args, Ret>: Send {
     /// Reports whether the one after the present one is made anew, each time.
@@ -117,23 +111,30 @@ where
 
 /// Defers making the body until the commit knows the wiring.
 pub(crate) fn defer<Args: VecToSubs, Ret: VecToPubs>(
-    mut functions: Functions<Args, Ret>,
+    mut alternatives: Box<dyn Alternatives<Args, Ret>>,
+    states: Vec<Arc<dyn Reset>>,
 ) -> MakeBody {
     Box::new(move |wiring, subtask| {
-        functions.alternatives.prepare();
-        let restarts = functions.alternatives.restarts();
+        alternatives.prepare();
+        let restarts = alternatives.restarts();
         let both = Shared::new((
             <Args as VecToSubs>::gen_subs(wiring.ports(subtask)),
             <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask)),
         ));
         let next = AtomicU8::new(if restarts { ANEW } else { FALLBACK });
         let ends = Arc::new(Ends { both, next });
-        Body::new(Box::new(Replaceable { functions, ends }))
+        Body::new(Box::new(Replaceable {
+            alternatives,
+            states,
+            ends,
+        }))
     })
 }
 
 struct Replaceable<Args: VecToSubs, Ret: VecToPubs> {
-    functions: Functions<Args, Ret>,
+    alternatives: Box<dyn Alternatives<Args, Ret>>,
+    /// The states that they use.
+    states: Vec<Arc<dyn Reset>>,
     ends: Arc<Ends<(Args::Subs, Ret::Pubs)>>,
 }
 
@@ -174,7 +175,7 @@ impl<Args: VecToSubs, Ret: VecToPubs> Subtask for Replaceable<Args, Ret> {
         // A fault in here ends the DAG: what makes functions may be half changed.
         let next = self.ends.next.load(Ordering::Relaxed);
         self.ends.next.store(NONE, Ordering::Relaxed);
-        self.functions.alternatives.prepare();
+        self.alternatives.prepare();
         self.ends.next.store(next, Ordering::Relaxed);
         ends.0.grant(job);
         ends.1.grant(job);
@@ -183,7 +184,7 @@ impl<Args: VecToSubs, Ret: VecToPubs> Subtask for Replaceable<Args, Ret> {
         let Poll::Ready(args) = received else {
             return;
         };
-        let results = self.functions.alternatives.call(args);
+        let results = self.alternatives.call(args);
         let sent = pin!(self.ends.claim().1.send_all(results)).poll(context);
         debug_assert!(sent.is_ready());
     }
@@ -200,15 +201,15 @@ impl<Args: VecToSubs, Ret: VecToPubs> Subtask for Replaceable<Args, Ret> {
     }
 
     fn replace(&mut self) {
-        self.functions.alternatives.lose();
-        self.functions.states.iter().for_each(|state| state.reset());
+        self.alternatives.lose();
+        self.states.iter().for_each(|state| state.reset());
         if self.ends.is_fallback() {
             self.ends.next.store(NONE, Ordering::Relaxed);
         }
     }
 
     fn forget(self: Box<Self>) {
-        self.functions.alternatives.forget();
+        self.alternatives.forget();
     }
 }
 
