@@ -223,9 +223,6 @@ pub(super) fn write(
     })
 }
 
-/// The options that name the log, of which one may be given.
-const NAMES: [&str; 1] = ["serial"];
-
 /// The serial log of a run.
 pub(super) struct Log {
     pub(super) path: PathBuf,
@@ -237,23 +234,24 @@ pub(super) struct Log {
 
 /// Makes sure that the named log can be read back while it is written.
 pub(super) fn check(options: &Parsed) -> Result<(), String> {
-    for named in options.named(&NAMES) {
-        if fs::metadata(named.path).is_ok_and(|data| !data.is_file()) {
-            let (option, place) = (named.option, files::place(named.path));
-            return Err(format!(
-                "`--{option} {place}`: it is a device or a pipe, and the log is read while it \
-                 is written; name a file"
-            ));
-        }
-    }
-    Ok(())
+    let is_other = |path: &&Path| fs::metadata(path).is_ok_and(|data| !data.is_file());
+    options
+        .path("serial")
+        .filter(is_other)
+        .map_or(Ok(()), |path| {
+            let place = files::place(path);
+            Err(format!(
+                "`--serial {place}`: it is a device or a pipe, and the log is read while it is \
+             written; name a file"
+            ))
+        })
 }
 
 impl Log {
     /// Settles where it goes. The file is made when the guest starts.
     pub(super) fn choose(options: &Parsed, app: &str) -> Result<Log, String> {
         let own = system::new_log(app)?;
-        let Some(named) = options.named(&NAMES).first().copied() else {
+        let Some(named) = options.path("serial") else {
             return Ok(Log {
                 path: own,
                 stays: false,
@@ -261,13 +259,13 @@ impl Log {
             });
         };
         let own = own.with_extension("before");
-        let has_content = fs::metadata(named.path).is_ok_and(|data| data.len() > 0);
+        let has_content = fs::metadata(named).is_ok_and(|data| data.len() > 0);
         if has_content {
-            fs::copy(named.path, &own)
+            fs::copy(named, &own)
                 .map_err(|error| format!("cannot write `{}`: {error}", own.display()))?;
         }
         Ok(Log {
-            path: named.path.into(),
+            path: named.into(),
             stays: true,
             before: has_content.then_some(own),
         })

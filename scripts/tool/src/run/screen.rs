@@ -26,7 +26,7 @@ use crate::protocol::{MachineLine, read_line};
 use crate::system;
 
 /// The width of the bar.
-const BAR: u64 = 30;
+const BAR: usize = 30;
 
 /// As the value of `quiet`: no machine lines, either. Of a run that only prepares another one.
 pub(super) const NOTHING: &str = "nothing";
@@ -120,16 +120,10 @@ impl Screen {
             return;
         }
         let done = done.min(total);
-        // In `u128` no product of two `u64` overflows.
-        let part_of = |whole: u64| {
-            let part = u128::from(done) * u128::from(whole) / u128::from(total);
-            u64::try_from(part).unwrap_or(whole)
-        };
+        let part_of = |whole: u64| done.saturating_mul(whole) / total;
         if self.on_terminal {
-            let filled: String = (0..BAR)
-                .map(|i| if i < part_of(BAR) { '#' } else { '.' })
-                .collect();
-            eprint!("\r\x1b[K[{filled}] {done} of {total} jobs");
+            let filled = "#".repeat(usize::try_from(part_of(BAR as u64)).unwrap_or(BAR));
+            eprint!("\r\x1b[K[{filled:.<BAR$}] {done} of {total} jobs");
             self.bar_is_shown = true;
         } else if part_of(10) != self.tenths_shown {
             self.tenths_shown = part_of(10);
