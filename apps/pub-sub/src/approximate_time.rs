@@ -51,7 +51,7 @@ use core::num::NonZeroUsize;
 
 use crate::{Outlet, Stamped, Synchronizer};
 
-/// The parameters of [`ApproximateTime`](ApproximateTime).
+/// The parameters of [`ApproximateTime`].
 ///
 /// ```
 /// use core::num::NonZeroUsize;
