@@ -393,16 +393,11 @@ impl Edge {
         if let Some(echo) = &mut self.echo {
             echo.launch();
         }
-        let word = match self.wish {
+        let (word, is_asked_for, is_needed) = match self.wish {
             None => return Ok(false),
-            Some(Wish::Record { .. }) => "record",
-            Some(Wish::Replay { .. }) => "replay",
-            Some(Wish::Latest { .. }) => "latest",
-        };
-        let is_asked_for = !matches!(self.wish, Some(Wish::Latest { .. }));
-        let is_needed = match self.wish {
-            Some(Wish::Record { is_needed, .. }) => *is_needed,
-            _ => is_asked_for,
+            Some(Wish::Record { is_needed, .. }) => ("record", true, *is_needed),
+            Some(Wish::Replay { .. }) => ("replay", true, true),
+            Some(Wish::Latest { .. }) => ("latest", false, false),
         };
         let launched = match &mut self.crossing {
             None if !is_needed => return Ok(false),

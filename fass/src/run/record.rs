@@ -47,7 +47,11 @@ pub(crate) trait AnyRecorded: AnyLatest {
 
     /// Sets a probe for samples of the topic, and returns the type of the samples, and the
     /// probe's line; none if the latest value is of another type.
-    fn probe(&self, latest: &dyn AnyLatest, sampler: usize) -> Option<(Schema, Arc<SampleLine>)>;
+    fn probe(
+        &self,
+        latest: &(dyn AnyLatest + 'static),
+        sampler: usize,
+    ) -> Option<(Schema, Arc<SampleLine>)>;
 
     /// Numbers all recorded topics of a DAG, what its subtasks sample of such topics, and its
     /// recorded states, tells the platform, and adds their lines to those before. Returns what is
@@ -240,10 +244,6 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
         let effect = self.line.is_open().then(|| self.line.effect());
         effect.into_iter().collect()
     }
-
-    fn as_any(&self) -> &dyn Any {
-        self
-    }
 }
 
 impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
@@ -262,8 +262,12 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
         })
     }
 
-    fn probe(&self, latest: &dyn AnyLatest, sampler: usize) -> Option<(Schema, Arc<SampleLine>)> {
-        let shared = latest.as_any().downcast_ref::<SharedLatest<T>>()?;
+    fn probe(
+        &self,
+        latest: &(dyn AnyLatest + 'static),
+        sampler: usize,
+    ) -> Option<(Schema, Arc<SampleLine>)> {
+        let shared = (latest as &dyn Any).downcast_ref::<SharedLatest<T>>()?;
         Some(probe(shared, sampler, self.line.edge))
     }
 }

@@ -53,7 +53,7 @@ impl<T> SharedLatest<T> {
 }
 
 /// A latest value of whatever type.
-pub(crate) trait AnyLatest {
+pub(crate) trait AnyLatest: Any {
     fn topic(&self) -> &str;
 
     /// Returns the topic with the type that is read.
@@ -68,9 +68,6 @@ pub(crate) trait AnyLatest {
 
     /// Returns what the writer's completion does.
     fn effects(&self) -> Vec<Box<dyn Effect>>;
-
-    /// Returns itself, by its type.
-    fn as_any(&self) -> &dyn Any;
 }
 
 impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
@@ -99,10 +96,6 @@ impl<T: Message + Sync> AnyLatest for SharedLatest<T> {
         (triples.iter())
             .map(|triple| -> Box<dyn Effect> { Box::new(Arc::clone(triple)) })
             .collect()
-    }
-
-    fn as_any(&self) -> &dyn Any {
-        self
     }
 }
 
