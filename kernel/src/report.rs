@@ -1,8 +1,8 @@
-//! The report of a run when it is over: the [`Run`](crate::Run) that an app gets, and what its
+//! The report of a run when it is over: the [`Run`] that an app gets, and what its
 //! functions have left in the heap and used of their stacks.
 //!
 //! All of it is computed from the journal. Nothing here is called while a run goes on, but
-//! [`latest`], by a panic. What knows no machine is the front's.
+//! `latest`, by a panic. What knows no machine is the front's.
 //!
 //! # What a fault leaves
 //!

@@ -31,6 +31,6 @@ fn a_chain_of_ten_thousand_subtasks_takes_a_few_stacks() {
     let guest = Guest::test("stacks_of_chain").cores(2);
     let outcome = guest.memory_mib(128).succeed();
     // One for each job in flight, and two for each core.
-    let line = outcome.line("chain");
+    let line = outcome.line("stacks_of_chain");
     line.has([("contexts", 6), ("violations", 0)]);
 }

@@ -233,7 +233,7 @@ pub(crate) fn text<'b>(input: &mut Decoder<'b>) -> Result<&'b str, Malformed> {
 /// Defines structs whose values can be written down: a struct is written field by field.
 ///
 /// Takes structs with named fields and without parameters, as they would be written without it;
-/// the fields' types have to be [`Recordable`](crate::Recordable).
+/// the fields' types have to be [`Recordable`].
 ///
 /// ```
 /// use recording::Recordable;

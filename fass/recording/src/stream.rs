@@ -28,8 +28,8 @@ use super::recordable::to_bytes;
 pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 
 /// The version of the format that is written, of values included. Those before are read, too: the
-/// first has no entries of [`What::Clock`](crate::What::Clock), and neither of
-/// [`What::Fault`](crate::What::Fault); those before 4 have no text, and
+/// first has no entries of [`What::Clock`], and neither of
+/// [`What::Fault`]; those before 4 have no text, and
 /// those before 5 no commits, events and times, and no [states](crate::Role::State).
 pub const VERSION: u16 = 5;
 

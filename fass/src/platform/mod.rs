@@ -345,7 +345,7 @@ pub fn now_ns() -> u64 {
     CLOCK.get()()
 }
 
-/// Has functions told the time by that from now on, in place of by [`Platform::now_ns`](Platform::now_ns).
+/// Has functions told the time by that from now on, in place of by [`Platform::now_ns`].
 ///
 /// For platforms: one that writes down what functions were told has a way to do so, and all
 /// others a shorter one.

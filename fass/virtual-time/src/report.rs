@@ -316,7 +316,7 @@ impl<'r> DagReport<'r> {
 
 /// An instance that became ready, with its [times](law::InstanceRecord).
 ///
-/// See [`Report`](crate::Report).
+/// See [`Report`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstanceRecord {
     /// The instance.
@@ -328,7 +328,7 @@ pub struct InstanceRecord {
 
 /// A job that was released, with its [times](law::JobRecord).
 ///
-/// See [`Report`](crate::Report).
+/// See [`Report`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JobRecord {
     /// The DAG.
@@ -376,7 +376,7 @@ impl JobRecord {
 
     /// Returns the time from the nominal release to the end, if there was one.
     ///
-    /// See [`Report`](crate::Report).
+    /// See [`Report`].
     #[must_use]
     pub fn response_time_ns(&self) -> Option<u64> {
         self.ended_ns.map(|ended_ns| ended_ns - self.release_ns)

@@ -33,7 +33,7 @@
 //! ```
 //!
 //! A waiting core halts; its instance keeps it, as the scheduler knows nothing of
-//! this. So waits belong to what is no DAG (see [`Lock`](crate::Lock)): in a DAG an
+//! this. So waits belong to what is no DAG (see [`Lock`]): in a DAG an
 //! instance becomes ready when its inputs are there and never waits.
 
 use core::sync::atomic::{AtomicU64, Ordering};

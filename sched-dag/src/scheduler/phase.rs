@@ -61,7 +61,7 @@
 //!   depends on them any more, so a driver that can take an instance's context
 //!   away for good may complete it at once.
 //! - **E5, jobs.** Each job in flight ends when no instance of it is left, with
-//!   [`JobOutcome::DagEnded`](crate::JobOutcome::DagEnded), or as aborted if it
+//!   [`JobOutcome::DagEnded`], or as aborted if it
 //!   was that before.
 //! - **E6, deadlines.** A deadline that has passed before the instant of the end
 //!   is a miss. No later deadline of the DAG is, and the run of consecutive

@@ -61,7 +61,7 @@ pub(crate) fn chain(machine: &Machine) -> Result<(), Ending> {
     finish_create_dags(&[dag])?;
     let contexts = machine.resources().contexts;
     let run = machine.run()?;
-    json::emit("chain", |line| {
+    json::emit("stacks_of_chain", |line| {
         line.number("contexts", contexts as u64)
             .number("violations", run.violations().count() as u64);
     });

@@ -7,7 +7,7 @@
 //! It is not suspended within a *slice* of the status or the console, which holds a lock, with
 //! interrupts off: one line, and for the status a look at what the journal has of the time
 //! since the last one, 2,048 events at most. A release, or an instance that another core
-//! hands over, may come later by that; [`patience`] waits for a time at which no event is near.
+//! hands over, may come later by that; `status` waits for a time at which no event is near.
 //!
 //! Under overload the background may never run again, and then a person wants most to see
 //! what goes on, and to stop it. So if it has not run for [`STARVED_NS`], core 0's heartbeat

@@ -97,7 +97,7 @@ impl Port<Loan> for SmpPort<'_> {
 /// A subtask's [runner](fass::Runner), and what running an instance of it takes here.
 ///
 /// There is one for each subtask, as a subtask has one started instance at a time
-/// (R2). Between its place and the core that runs it moves a [`Loan`](super::Loan).
+/// (R2). Between its place and the core that runs it moves a [`Loan`].
 pub struct Runner {
     pub(super) inner: fass::Runner,
     cluster: &'static Cluster,
