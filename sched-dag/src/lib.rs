@@ -55,7 +55,7 @@
 //! or by a [stop](lifecycle::Request::Stop): it starts nothing any more, and the others are
 //! scheduled on. The rules E1 to E8 for that stand in `scheduler/phase.rs`,
 //! their scenarios in `tests/scenarios/ending.txt`; those for a fault that costs only its job, D1 to D7,
-//! in `scheduler/dropping.rs` and `tests/scenarios/faults.txt`.
+//! in `scheduler/phase.rs` and `tests/scenarios/faults.txt`.
 //!
 //! # The parts, in the order of their use
 //!

@@ -1,9 +1,9 @@
 //! What functions ask of a run as a whole, and how it comes about.
 //!
 //! A function may ask for more than values: that a sporadic DAG gets a signal, that a DAG rests
-//! or goes on, that another set of DAGs runs (M1 to M7, in the module `modes`), that the run ends. As all that a function does, a *request* takes effect with
-//! the completion of its instance (R3), never before. The rules, whose tests in `tests/lifecycle.rs`
-//! bear their numbers:
+//! or goes on, that another set of DAGs runs (M1 to M7, below), that the run ends. As all that a
+//! function does, a *request* takes effect with the completion of its instance (R3), never before.
+//! The rules, whose tests in `tests/lifecycle.rs` bear their numbers:
 //!
 //! - **L1, when.** A request takes effect at the instant of the completion, after all completions
 //!   and faults of that instant and before its releases. An instance that fails has asked for

@@ -1,7 +1,7 @@
 //! The commit's own clusters: cores of its own for each DAG that needs several, single cores
 //! for the others.
 //!
-//! This is federated scheduling (see `federated` for the papers). A DAG is *heavy* if a job of
+//! This is federated scheduling (the papers are named below). A DAG is *heavy* if a job of
 //! it is more work than one core does by its deadline, or by the next release if that comes
 //! first; it gets a cluster of as many cores as its multi-path bound needs, or the order that may
 //! be fixed for it. The others are

@@ -16,7 +16,7 @@
 //! 2022. So none of these can be better, but for the rounding: here divisions round up,
 //! since preemptions need not be at whole nanoseconds.
 //!
-//! Where long steps may keep cores (`bursts`), `m - j` times that is added to the right side.
+//! Where long steps may keep cores (bursts, in `workload`), `m - j` times that is added to the right side.
 //!
 //! Assumes: no core idles while a subtask is ready; `R <= T`, that is one job of the DAG at
 //! a time, which each solution is limited to. Any order inside the DAG.

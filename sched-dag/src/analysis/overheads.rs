@@ -11,7 +11,7 @@
 //!   preempting one's second switch.
 //!
 //! These are of a step in which few instances become ready. For each one that does, `ready` is
-//! what it adds to a step, whatever is then delayed: `bursts` has that term of the bounds.
+//! what it adds to a step, whatever is then delayed: `workload` has that term of the bounds.
 //!
 //! Not covered: timer interrupts, caches refilled after a preemption, bus
 //! contention. Measure WCETs with these in them. `docs/proving.md` has the argument for

@@ -16,8 +16,6 @@
 //!   before the function begins.
 //! - After [`Engine::new`] nothing is allocated here, and no step is unbounded but by the releases
 //!   and deadlines that have passed since the last one.
-//!
-//! # The two traits between the engine and a platform: what it runs, and what it runs on
 
 mod run;
 

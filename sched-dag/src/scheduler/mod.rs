@@ -34,7 +34,6 @@
 //! It does not know execution times: a subtask that never returns keeps its
 //! core (or, preempted, its place in line). It does not measure, it believes
 //! the driver's times; a time earlier than one before counts as that one.
-//!
 
 mod bits;
 mod dispatch;

@@ -83,7 +83,7 @@ impl<'s> Moment<'s> {
     /// function for its subtask. If the DAG [survives](crate::FaultLimit) the fault, only
     /// the instance's job is cut, and the subtask is
     /// [restarted](What::Restarted); else the DAG is ended, as by
-    /// [`fail`](Self::fail). (The module `dropping` states the rules.)
+    /// [`fail`](Self::fail). (The module `phase` states the rules.)
     ///
     /// # Panics
     ///

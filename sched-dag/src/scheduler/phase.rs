@@ -44,7 +44,7 @@
 //!
 //! An instance *fails* when a fault has ended it: its function will never
 //! return. A DAG is *ended* by the first instance of it that fails, unless
-//! that costs the job only (the module `dropping`), or by a *stop*, which needs no fault; it
+//! that costs the job only (see below), or by a *stop*, which needs no fault; it
 //! stays ended. It is *over* when nothing of it is in flight or to come.
 //!
 //! - **E1, failure.** A failing instance has started. It ends at that instant:

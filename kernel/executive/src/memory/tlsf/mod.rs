@@ -11,7 +11,7 @@
 //!   which a caller holds while the block is *used*. Block sizes count the
 //!   header and are multiples of the *granule*, 16 bytes.
 //! - A *class* is a range of block sizes. Each has a list of its *free* blocks;
-//!   two levels of bitmaps say which lists have any (`free_lists.rs`).
+//!   two levels of bitmaps say which lists have any.
 //! - The *end marker* is a header with no payload that closes a region.
 //!
 //! # Invariants

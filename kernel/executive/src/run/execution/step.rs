@@ -1,8 +1,8 @@
 //! One step of the scheduler, and following what it decides.
 //!
 //! # Events of a core
-//! completes it, is interrupted, or ends it because of a fault.
 //!
+//! A core finds work, starts it, completes it, is interrupted, or ends it because of a fault.
 //! Each of these takes the cluster's lock once, makes a step of the scheduler where
 //! there is something to decide, and wakes the other cores after the lock is
 //! free again.
