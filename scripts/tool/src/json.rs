@@ -95,20 +95,6 @@ impl Value {
             _ => &[],
         }
     }
-
-    /// Names the type, for messages.
-    #[must_use]
-    pub fn type_name(&self) -> &'static str {
-        match self {
-            Value::Null => "null",
-            Value::Bool(_) => "truth value",
-            Value::Integer(_) => "integer",
-            Value::Decimal(_) => "decimal number",
-            Value::Text(_) => "string",
-            Value::Array(_) => "array",
-            Value::Object(_) => "object",
-        }
-    }
 }
 
 /// Why a text is no JSON value.

@@ -40,9 +40,9 @@ const REFUSED: &str = r#" | the file has no `graphs`
 {"name":"a","c":[18446744073709551615,1]} | choose a shorter unit
 {"name":"b","c":[1]},//{"name":"a","c":[0]} | line 3: graph `a` has no cost above 0
 {"name":"b","c":[1]},/{"c":[1]} | line 2: graph 1 of the list has no `name`; give it a word
-{"name":"b","c":[1]},/5 | line 2: graph 1 of the list is no object but a value of type integer
+{"name":"b","c":[1]},/5 | line 2: graph 1 of the list is no object
 {"name":"{a","c":[1]} | `{a` is no name; give a word
-{"name":"a","c":[1,2],"edges":5} | graph `a`: `edges` is no list but a value of type integer
+{"name":"a","c":[1,2],"edges":5} | graph `a`: `edges` is no list
 {"name":"a","c":[1,2],"edges":[[0,1],[0,1]]} | graph `a`: edge [0,1] stands twice; drop one
 {"name":"a","c":[3,0],"edges":[[1,1]]} | graph `a`: vertex 1 has cost 0 and stands between others"#;
 
@@ -62,14 +62,10 @@ fn a_refusal_names_line_offender_and_remedy() {
 }
 
 #[test]
-fn very_many_graphs_are_read_and_very_many_vertices_refused() {
+fn very_many_graphs_are_read() {
     // Looking for each graph's line from the beginning would take long.
     let graphs = (0..20_000).map(|n| format!("{{\"name\":\"g{n}\",\"c\":[1]}}"));
     let graphs: Vec<String> = graphs.collect();
     let graphs = read_graphs(&format!("{{\"graphs\":[{}]}}", graphs.join(",\n"))).unwrap();
     assert_eq!((graphs.len(), graphs[19_999].line), (20_000, 20_000));
-    let costs = ["1"; 100_001].join(",");
-    let text = format!("{{\"graphs\":[{{\"name\":\"a\",\"c\":[{costs}]}}]}}");
-    let words = "100001 vertices, and 100000 at most are read";
-    assert!(refusal(&text, None, 1).ends_with(words));
 }
