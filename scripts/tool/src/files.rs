@@ -10,7 +10,7 @@
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::io::Read;
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -261,29 +261,6 @@ fn try_output(output: &Named<'_>) -> Result<(), String> {
     Ok(())
 }
 
-/// Makes sure that there is room for more in a file, which stays as it is.
-///
-/// # Errors
-///
-/// Why there is none, in words.
-pub fn check_room(path: &Path) -> Result<(), String> {
-    // More than what is left of a block.
-    static MORE: [u8; 64 << 10] = [0; 64 << 10];
-    let add = || {
-        let mut file = OpenOptions::new().append(true).open(path)?;
-        let length = file.metadata()?.len();
-        let added = file.write_all(&MORE);
-        if file.metadata()?.is_file() {
-            file.set_len(length)?;
-        }
-        added
-    };
-    add().map_err(|error: io::Error| {
-        let place = place(path);
-        format!("`{place}` takes no more: {error}; make room, or name a file elsewhere")
-    })
-}
-
 /// Makes sure that files can be written into a folder, which need not exist yet; nothing
 /// is left behind.
 ///
@@ -339,7 +316,7 @@ impl Drop for Temporary {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST_BYTES, Named, check, check_folder, check_once, check_room, read, read_text};
+    use super::{MOST_BYTES, Named, check, check_folder, check_once, read, read_text};
     use std::fs::{self, File};
     use std::os::unix::fs::symlink;
     use std::path::{Path, PathBuf};
@@ -386,10 +363,7 @@ mod tests {
         assert_eq!(check_folder(&named("out", &folder.join("to/come"))), Ok(()));
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 3);
 
-        assert_eq!(check_room(&file), Ok(()));
         assert_eq!(fs::read(&file).unwrap(), b"kept");
-        let full = check_room(Path::new("/dev/full")).unwrap_err();
-        assert!(full.starts_with("`/dev/full` takes no more: No space left"));
         fs::remove_dir_all(folder).unwrap();
     }
 
