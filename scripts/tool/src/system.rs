@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use crate::json::{self, Value};
 
@@ -158,43 +159,28 @@ pub fn new_log(name: &str) -> Result<PathBuf, String> {
     Ok(folder.join(format!("{name}-{}-{number}.log", std::process::id())))
 }
 
-/// How the names end of files that only a running process needs.
-const LEAVINGS: [&str; 9] = [
-    "dag", "module", "before", "iso", "img", "log.qemu", "sent", "gdb", "socket",
-];
+/// How long what is in the folder for logs is kept: longer than any run lasts.
+const KEPT: Duration = Duration::from_secs(7 * 86_400);
 
-/// Removes what processes that were ended from outside have left: boot modules, sticks, contents
-/// of logs from before, and logs of guests that were running. The log of a guest that
-/// failed stays, for it was shown to a person.
+/// Removes old files: logs of guests that failed, which a person has read by now, and what
+/// processes that were ended from outside have left.
 fn clear(folder: &Path) {
-    let is_alive = |process: &str| Path::new("/proc").join(process).exists();
-    if !is_alive("self") {
-        return;
-    }
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let path = entry.path();
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        let (stem, ending) = name.split_once('.').unwrap_or((&name, ""));
-        let process = stem.rsplit('-').nth(1).unwrap_or("self");
-        let is_process = process.bytes().all(|byte| byte.is_ascii_digit());
-        if !is_process || is_alive(process) || !LEAVINGS.contains(&ending) {
-            continue;
-        }
-        // It is ours, and in the way of no one if it cannot be removed.
-        let _ = fs::remove_file(&path);
-        if ending == "log.qemu" {
-            let _ = fs::remove_file(path.with_extension(""));
+        let changed = entry.metadata().and_then(|data| data.modified());
+        let age = changed.ok().and_then(|changed| changed.elapsed().ok());
+        if age > Some(KEPT) {
+            // It is ours, and in the way of no one if it cannot be removed.
+            let _ = fs::remove_file(entry.path());
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{can_move, clear};
+    use super::{KEPT, can_move, clear};
     use std::ffi::OsStr;
     use std::fs;
-    use std::process::{Command, id};
+    use std::time::SystemTime;
 
     #[test]
     fn a_dumb_terminal_renews_no_line() {
@@ -204,26 +190,15 @@ mod tests {
     }
 
     #[test]
-    fn what_killed_processes_left_is_removed() {
-        let folder = std::env::temp_dir().join(format!("leavings-{}", id()));
+    fn what_is_old_is_removed() {
+        let folder = std::env::temp_dir().join(format!("old-logs-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
-        let mut gone = Command::new("true").spawn().unwrap();
-        let (dead, alive) = (gone.id(), id());
-        gone.wait().unwrap();
-        let endings = ["dag", "before", "iso", "img", "log", "log.qemu", "gdb"];
-        let names = |process| endings.map(|ending| format!("dag-file-{process}-3.{ending}"));
-        let others = [
-            format!("soak-{dead}-7.log"),
-            "notes.dag".into(),
-            "a-b-c.dag".into(),
-        ];
-        let kept = [&names(alive)[..], &others].concat();
-        for name in names(dead).iter().chain(&kept) {
-            fs::write(folder.join(name), "").unwrap();
-        }
+        let [old, new] = ["old.log", "new.log"].map(|name| folder.join(name));
+        fs::write(&new, "").unwrap();
+        let file = fs::File::create(&old).unwrap();
+        file.set_modified(SystemTime::now() - KEPT * 2).unwrap();
         clear(&folder);
-        assert!(kept.iter().all(|name| folder.join(name).exists()));
-        assert_eq!(fs::read_dir(&folder).unwrap().count(), kept.len());
+        assert!(new.exists() && !old.exists());
         fs::remove_dir_all(folder).unwrap();
     }
 }
