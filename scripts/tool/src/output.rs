@@ -8,6 +8,8 @@
 //!
 //! So this library has macros of the same names, which hide those of the standard
 //! library in all its modules; nobody has to think of it where something is printed.
+//!
+//! A [`Table`] is what people read of figures: columns of fixed widths, under their headings.
 
 /// Writes to standard output; as the standard library's, but it never panics.
 #[macro_export]
@@ -41,8 +43,9 @@ macro_rules! eprintln {
     };
 }
 
-use std::fmt::Arguments;
+use std::fmt::{Arguments, Display};
 use std::io::{self, ErrorKind, Write, stderr, stdout};
+use std::mem;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
@@ -81,4 +84,83 @@ pub fn conclude(code: ExitCode) -> ExitCode {
         return ExitCode::FAILURE;
     }
     code
+}
+
+/// A table that grows row by row.
+#[derive(Debug)]
+pub(crate) struct Table {
+    /// Whether the cells of a column begin at the left, how wide it is, and the decimals of its
+    /// numbers.
+    columns: Vec<(bool, usize, usize)>,
+    text: String,
+}
+
+impl Table {
+    /// Begins a table, below a line if there is a `title`. A column is `heading:width`, or
+    /// `heading:width.decimals`, or `heading:<width` if its cells begin at the left; `|` stands
+    /// between.
+    pub(crate) fn new(title: &str, columns: &str) -> Self {
+        let number = |digits: &str| digits.parse().unwrap_or(0);
+        let column = |column| {
+            let (heading, form) = str::rsplit_once(column, ':').unwrap_or((column, "0"));
+            let (width, decimals) = form.split_once('.').unwrap_or((form, "0"));
+            let wide = number(width.trim_start_matches('<'));
+            (
+                heading.into(),
+                (width.starts_with('<'), wide, number(decimals)),
+            )
+        };
+        let (headings, columns): (Vec<String>, _) = columns.split('|').map(column).unzip();
+        let text = title.into();
+        let mut table = Self { columns, text };
+        table.cells(headings);
+        table
+    }
+
+    /// Adds a row with a cell for each column.
+    pub(crate) fn row(&mut self, cells: &[&dyn Display]) {
+        let cells: Vec<String> = (cells.iter().zip(&self.columns))
+            .map(|(cell, &(_, _, decimals))| match decimals {
+                0 => cell.to_string(),
+                _ => format!("{cell:.decimals$}"),
+            })
+            .collect();
+        self.cells(cells);
+    }
+
+    /// Adds a line between the rows, or after them.
+    pub(crate) fn line(&mut self, line: &str) {
+        self.text += line;
+        self.text.push('\n');
+    }
+
+    /// Adds a row of cells that are text already.
+    pub(crate) fn cells(&mut self, cells: impl IntoIterator<Item = String>) {
+        let cells = cells.into_iter().zip(&self.columns);
+        let cells = cells.map(|(cell, &(begins_left, width, _))| match begins_left {
+            true => format!("{cell:<width$}"),
+            false => format!("{cell:>width$}"),
+        });
+        let line: String = cells.collect();
+        self.line(&line);
+    }
+
+    /// Returns the whole table, or what was added since the last call.
+    pub(crate) fn text(&mut self) -> String {
+        mem::take(&mut self.text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Table;
+
+    #[test]
+    fn cells_stand_below_their_headings_with_their_decimals() {
+        let mut table = Table::new("a title\n", "name:<6|load:6.1|sets:6");
+        table.row(&[&"one", &0.25, &7]);
+        table.line("a line");
+        let expected = "a title\nname    load  sets\none      0.2     7\na line\n";
+        assert_eq!(table.text(), expected);
+    }
 }

@@ -24,10 +24,11 @@ use sched_dag::analysis::{
 };
 use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Order, Policy, Preemption, verify};
 
-use super::frame::{Table, by_plan};
+use super::frame::by_plan;
 use crate::dag_file::stg;
 use crate::options::{Command, Parsed, Takes, options};
 use crate::oracle::older_bounds::{Width, graham, long_paths, melani_edf, melani_fp};
+use crate::output::Table;
 use crate::random::graph;
 
 static COMMAND: Command = Command {

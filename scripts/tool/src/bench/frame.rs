@@ -3,7 +3,6 @@
 //! - [`by_plan`]: from a command line to an exit code;
 //! - [`judged`]: a run whose lines are read if it is good, a guest's or a program's;
 //! - [`Figure`]: one measured quantity, as a guest prints it and as a baseline keeps it;
-//! - [`Table`]: figures for people, in columns of fixed widths, under their headings;
 //! - [`draw`]: pictures, by the Python scripts of `scripts/plot`, if there is what they need.
 
 use std::ffi::OsString;
@@ -166,71 +165,6 @@ impl Figure {
     }
 }
 
-/// A table that grows row by row.
-#[derive(Debug)]
-pub(super) struct Table {
-    /// Whether the cells of a column begin at the left, how wide it is, and the decimals of its
-    /// numbers.
-    columns: Vec<(bool, usize, usize)>,
-    text: String,
-}
-
-impl Table {
-    /// Begins a table, below a line if there is a `title`. A column is `heading:width`, or
-    /// `heading:width.decimals`, or `heading:<width` if its cells begin at the left; `|` stands
-    /// between.
-    pub(super) fn new(title: &str, columns: &str) -> Self {
-        let number = |digits: &str| digits.parse().unwrap_or(0);
-        let column = |column| {
-            let (heading, form) = str::rsplit_once(column, ':').unwrap_or((column, "0"));
-            let (width, decimals) = form.split_once('.').unwrap_or((form, "0"));
-            let wide = number(width.trim_start_matches('<'));
-            (
-                heading.into(),
-                (width.starts_with('<'), wide, number(decimals)),
-            )
-        };
-        let (headings, columns): (Vec<String>, _) = columns.split('|').map(column).unzip();
-        let text = title.into();
-        let mut table = Self { columns, text };
-        table.cells(headings);
-        table
-    }
-
-    /// Adds a row with a cell for each column.
-    pub(super) fn row(&mut self, cells: &[&dyn Display]) {
-        let cells: Vec<String> = (cells.iter().zip(&self.columns))
-            .map(|(cell, &(_, _, decimals))| match decimals {
-                0 => cell.to_string(),
-                _ => format!("{cell:.decimals$}"),
-            })
-            .collect();
-        self.cells(cells);
-    }
-
-    /// Adds a line between the rows, or after them.
-    pub(super) fn line(&mut self, line: &str) {
-        self.text += line;
-        self.text.push('\n');
-    }
-
-    /// Adds a row of cells that are text already.
-    pub(super) fn cells(&mut self, cells: impl IntoIterator<Item = String>) {
-        let cells = cells.into_iter().zip(&self.columns);
-        let cells = cells.map(|(cell, &(begins_left, width, _))| match begins_left {
-            true => format!("{cell:<width$}"),
-            false => format!("{cell:>width$}"),
-        });
-        let line: String = cells.collect();
-        self.line(&line);
-    }
-
-    /// Returns the whole table.
-    pub(super) fn text(self) -> String {
-        self.text
-    }
-}
-
 /// Has a script of `scripts/plot` draw into `out/plots` what is in `out`.
 ///
 /// # Errors
@@ -263,18 +197,4 @@ pub(super) fn draw(script: &str, out: &Path) -> Result<(), String> {
          apt-get install python3-matplotlib; else: pip install matplotlib) and run this again, \
          nothing is measured twice"
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cells_stand_below_their_headings_with_their_decimals() {
-        let mut table = Table::new("a title\n", "name:<6|load:6.1|sets:6");
-        table.row(&[&"one", &0.25, &7]);
-        table.line("a line");
-        let expected = "a title\nname    load  sets\none      0.2     7\na line\n";
-        assert_eq!(table.text(), expected);
-    }
 }

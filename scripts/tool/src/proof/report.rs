@@ -14,7 +14,6 @@
 //!
 //! The witnesses of a guest's bounds go to files, for `./scripts/check-witness`.
 
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use sched_dag::analysis::{self, Overheads, Settings};
@@ -23,6 +22,7 @@ use sched_dag::{Clusters, Dag, DagId, DagSpec, Preemption, SchedulerOptions};
 use super::observed::{OfDag, shown};
 use crate::files;
 use crate::json::Object;
+use crate::output::Table;
 use crate::record::{self, Committed};
 
 /// One DAG of one commit.
@@ -133,32 +133,32 @@ impl Row {
 pub fn table(rows: &[Row]) -> String {
     let names = rows.iter().map(|row| row.name().chars().count() + 1);
     let width = names.max().unwrap_or(0).max(20);
-    let mut text = format!(
-        "\n{:<width$}{:>12}{:>12}{:>9}   where the bound is from:\n{:<width$}{:>12}{:>12}{:>9}",
-        "", "", "", "", "dag", "bound", "longest", "ratio"
+    let title = format!("\n{:1$}   where the bound is from:\n", "", width + 33);
+    let columns = format!(
+        "dag:<{width}|bound:12|longest:12|ratio:9|path:12|own order:12|others:12|blocking:12|\
+         overheads:12"
     );
-    // Writing into a `String` cannot fail.
-    for name in ["path", "own order", "others", "blocking", "overheads"] {
-        let _ = write!(text, "{name:>12}");
-    }
-    text.push('\n');
+    let mut table = Table::new(&title, &columns);
     for row in rows {
-        let ratio = |permille| format!("{}.{} %", permille / 10, permille % 10);
-        let none = || "-".to_string();
-        let _ = write!(
-            text,
-            "{:<width$}{:>12}{:>12}{:>9}",
+        let bound = row.bound_ns.map_or("not proven".into(), shown);
+        let whole = [
             row.name(),
-            row.bound_ns.map_or("not proven".into(), shown),
+            bound,
             shown(row.longest_ns),
-            row.permille().map_or_else(none, ratio)
-        );
-        for (_, part) in row.parts().into_iter().filter(|_| row.bound_ns.is_some()) {
-            let _ = write!(text, "{:>12}", part.map_or_else(none, shown));
-        }
-        text.push('\n');
+            ratio(row.permille()),
+        ];
+        let parts = row.parts().map(|(_, part)| part.map_or("-".into(), shown));
+        let parts = parts.into_iter().filter(|_| row.bound_ns.is_some());
+        table.cells(whole.into_iter().chain(parts));
     }
-    text
+    table.text()
+}
+
+/// Returns thousandths as hundredths for people.
+pub(crate) fn ratio(permille: Option<u64>) -> String {
+    permille.map_or("-".into(), |permille| {
+        format!("{}.{} %", permille / 10, permille % 10)
+    })
 }
 
 /// Returns how many DAGs are proven, and how many responses were above their bounds.

@@ -9,7 +9,6 @@
 //! their names: one boot each, with `--prove` two boots each, in one table. One that is refused, or
 //! fails, does not keep the others from being run.
 
-use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -21,9 +20,9 @@ use crate::files::{self, Temporary};
 use crate::json::quoted;
 use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
+use crate::output::Table;
 use crate::progress::Progress;
 use crate::proof::observed::{self, Measured, OfDag};
-
 use crate::proof::report;
 use crate::protocol::Status;
 use crate::record::Record;
@@ -270,8 +269,9 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
         return of_files(options, &files);
     }
     let shows_lines = options.is_given("json");
+    let mut table = Table::new("", COLUMNS);
     if !shows_lines {
-        println!("{}", heading());
+        print!("{}", table.text());
     }
     let (refused, failed) = each(&files, |file| {
         let one = options.with("dag", file).with("quiet", "yes");
@@ -288,7 +288,8 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
             lines(file, &booted.outcome).for_each(|line| println!("{line}"));
         } else {
             let cores = options.number("cores").unwrap_or(1);
-            print!("{}", rows(file, cores, &booted.outcome));
+            add_rows(&mut table, file, cores, &booted.outcome);
+            print!("{}", table.text());
         }
         Ok(status)
     })?;
@@ -359,54 +360,34 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(files)
 }
 
-/// The heading of the table.
-fn heading() -> String {
-    format!(
-        "{:<18}{:<18}{:>8}{:>6}{:>6}{:>8}{:>11}{:>14}{:>14}{:>10}",
-        "file",
-        "dag",
-        "subtasks",
-        "cores",
-        "jobs",
-        "misses",
-        "violations",
-        "bound ms",
-        "max ms",
-        "max/bound"
-    )
-}
+/// The columns of the table of a folder.
+const COLUMNS: &str = "file:<18|dag:<18|subtasks:8|cores:6|jobs:6|misses:8|violations:11|\
+                       bound ms:14|max ms:14|max/bound:10";
 
-/// The rows of a file: one for each of its DAGs.
-fn rows(file: &Path, cores: u64, outcome: &Outcome) -> String {
+/// Adds the rows of a file: one for each of its DAGs.
+fn add_rows(table: &mut Table, file: &Path, cores: u64, outcome: &Outcome) {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let violations: u64 = outcome
         .transcript
         .of_kind("dag_set")
         .filter_map(|line| line.number_at("violations"))
         .sum();
-    let mut text = String::new();
     for line in outcome.transcript.of_kind("dag_run") {
         let number = |name: &str| line.number_at(name).unwrap_or(0);
         let milliseconds = |ns: Option<u64>| ns.map_or("-".into(), decimal);
-        // Writing into a `String` cannot fail.
-        let _ = writeln!(
-            text,
-            "{name:<18}{:<18}{:>8}{cores:>6}{:>6}{:>8}{violations:>11}{:>14}{:>14}{:>10}",
-            line.text_at("dag").unwrap_or("?"),
-            number("subtasks"),
-            number("completed"),
-            number("deadline_misses"),
-            milliseconds(line.number_at("bound_ns")),
-            milliseconds(line.number_at("response_time_ns.max")),
-            line.number_at("tightness_permille")
-                .map_or("-".into(), |permille| format!(
-                    "{}.{} %",
-                    permille / 10,
-                    permille % 10
-                )),
-        );
+        table.row(&[
+            &name,
+            &line.text_at("dag").unwrap_or("?"),
+            &number("subtasks"),
+            &cores,
+            &number("completed"),
+            &number("deadline_misses"),
+            &violations,
+            &milliseconds(line.number_at("bound_ns")),
+            &milliseconds(line.number_at("response_time_ns.max")),
+            &report::ratio(line.number_at("tightness_permille")),
+        ]);
     }
-    text
 }
 
 /// Writes nanoseconds as milliseconds with three places.

@@ -9,9 +9,10 @@ use std::fs;
 use std::iter;
 use std::path::{Path, PathBuf};
 
-use crate::bench::frame::{Figure, Table};
+use crate::bench::frame::Figure;
 use crate::golden::Golden;
 use crate::json::{self, Object};
+use crate::output::Table;
 use crate::qemu::Mode;
 use crate::system;
 

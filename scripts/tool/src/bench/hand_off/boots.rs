@@ -10,10 +10,11 @@ use std::iter;
 use std::path::Path;
 use std::time::Duration;
 
-use crate::bench::frame::{Figure, Table, judged};
+use crate::bench::frame::{Figure, judged};
 use crate::image;
 use crate::json::Object;
 use crate::outcome::boot;
+use crate::output::Table;
 use crate::qemu::{Mode, Qemu};
 
 /// How long a boot may take in wall time.

@@ -14,8 +14,8 @@ use join_latency::{Joined, Samples, Span};
 use sched_dag::law::Distribution;
 
 use super::{Condition, Setting};
-use crate::bench::frame::Table;
 use crate::json::{Object, Value};
+use crate::output::Table;
 use crate::protocol::Transcript;
 
 /// The columns. `subtask` 0 is the source, 1 to N are the parallel ones, the next one is the join.

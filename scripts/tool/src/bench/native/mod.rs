@@ -29,9 +29,10 @@ use linux::{Linux, Mechanism};
 use replay::shown::quoted;
 use sched_dag::DagId;
 
-use super::frame::{Figure, Table, by_plan};
+use super::frame::{Figure, by_plan};
 use crate::json::Object;
 use crate::options::{Command, Parsed, Takes, options};
+use crate::output::Table;
 use crate::progress::Progress;
 
 static TABLE: Command = Command {
