@@ -228,8 +228,8 @@ pub(super) struct Log {
     pub(super) path: PathBuf,
     /// Whether the person has named it.
     stays: bool,
-    /// Where the content from before is kept, if there was any.
-    before: Option<PathBuf>,
+    /// What was in the file before.
+    before: Option<Vec<u8>>,
 }
 
 /// Makes sure that the named log can be read back while it is written.
@@ -250,24 +250,13 @@ pub(super) fn check(options: &Parsed) -> Result<(), String> {
 impl Log {
     /// Settles where it goes. The file is made when the guest starts.
     pub(super) fn choose(options: &Parsed, app: &str) -> Result<Log, String> {
-        let own = system::new_log(app)?;
-        let Some(named) = options.path("serial") else {
-            return Ok(Log {
-                path: own,
-                stays: false,
-                before: None,
-            });
-        };
-        let own = own.with_extension("before");
-        let has_content = fs::metadata(named).is_ok_and(|data| data.len() > 0);
-        if has_content {
-            fs::copy(named, &own)
-                .map_err(|error| format!("cannot write `{}`: {error}", own.display()))?;
-        }
+        let named = options.path("serial").map(Path::to_path_buf);
+        let stays = named.is_some();
+        let path = named.map_or_else(|| system::new_log(app), Ok)?;
         Ok(Log {
-            path: named.into(),
-            stays: true,
-            before: has_content.then_some(own),
+            before: fs::read(&path).ok(),
+            path,
+            stays,
         })
     }
 
@@ -283,16 +272,8 @@ impl Log {
     pub(super) fn restore(&self) {
         // The person is told of the refusal, which is what matters.
         let _ = match &self.before {
-            Some(before) => fs::copy(before, &self.path).map(drop),
+            Some(before) => fs::write(&self.path, before),
             None => fs::remove_file(&self.path),
         };
-    }
-}
-
-impl Drop for Log {
-    fn drop(&mut self) {
-        if let Some(before) = &self.before {
-            let _ = fs::remove_file(before);
-        }
     }
 }
