@@ -8,9 +8,8 @@
 //!
 //! Names and lines are found by `addr2line`, which reads the image's symbols and
 //! debugging information and knows both ways in which the compiler writes names. It
-//! is part of binutils, which C compilers bring along; where it is missing, one
-//! sentence says so. An image that cannot be read adds nothing: the report of a fault
-//! is no place for another one.
+//! is part of binutils, which C compilers bring along. Where it is missing, or the image cannot be
+//! read, nothing is added: the report of a fault is no place for another one.
 //!
 //! For a backtrace the guest tells for each word of the stack that follows a call instruction where
 //! it returns to and, if the instruction says so, what it called. Some are left over from calls
@@ -18,7 +17,6 @@
 //! the first that called the function we are in. If none did, it was called through a pointer or
 //! reached by a jump, and the next one is taken.
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::env;
 use std::path::{Path, PathBuf};
@@ -27,9 +25,6 @@ use std::process::{Command, Stdio};
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
 use crate::system;
-
-/// The program that finds names and lines.
-const PROGRAM: &str = "addr2line";
 
 /// The kinds whose `place` may be an address.
 const KINDS: [&str; 3] = ["panic", "fault", BACKTRACE];
@@ -44,9 +39,6 @@ const OF_OTHERS: [&str; 4] = ["boot/", "fass/", "kernel/", "sched-dag/"];
 #[derive(Debug)]
 pub struct Places {
     image: PathBuf,
-    program: &'static str,
-    /// Whether it has been said that the program is missing.
-    is_missed: Cell<bool>,
 }
 
 impl Places {
@@ -55,8 +47,6 @@ impl Places {
     pub fn new(image: &Path) -> Places {
         Places {
             image: image.to_path_buf(),
-            program: PROGRAM,
-            is_missed: Cell::new(false),
         }
     }
 
@@ -74,9 +64,7 @@ impl Places {
         let addresses = calls.iter().flat_map(|call| call.addresses());
         let addresses: Vec<u64> = address.into_iter().chain(addresses).collect();
         let first = *addresses.first()?;
-        let Some(program) = system::find_program(self.program) else {
-            return (!self.is_missed.replace(true)).then(|| missed(first, self.program));
-        };
+        let program = system::find_program("addr2line")?;
         let frames = frames(&program, &self.image, &addresses)?;
         if is_backtrace {
             return tell(address, &calls, &frames);
@@ -146,13 +134,6 @@ fn address(line: &MachineLine) -> Option<u64> {
     KINDS
         .contains(&line.kind.as_str())
         .then(|| u64::from_str_radix(digits, 16).ok())?
-}
-
-fn missed(address: u64, program: &str) -> String {
-    format!(
-        "the function at {address:#x} is not named, as `{program}` is not installed; install \
-         the package binutils"
-    )
 }
 
 /// Says in our words what the program has found.
@@ -405,18 +386,6 @@ mod tests {
         let expected = format!("0x20e0b8 is {name}, of apps/my vision/src/lib.rs:7");
         assert_eq!(told(0x20_e0b8), expected);
         assert_eq!(told(0x20_70e9), "0x2070e9 is interrupt_common");
-    }
-
-    #[test]
-    fn without_the_program_its_package_is_named_once() {
-        let places = Places {
-            program: "no-such-addr2line",
-            ..Places::new(Path::new("an image"))
-        };
-        let told = places.explain(&line("panic", "0x200000")).unwrap();
-        assert!(told.starts_with("the function at 0x200000 is not named, as `no-such-addr2line`"));
-        assert!(told.ends_with("; install the package binutils"), "{told}");
-        assert_eq!(places.explain(&line("panic", "0x200000")), None);
     }
 
     /// Addresses with what contains them, the innermost first. The worker (0x10) calls `app`
