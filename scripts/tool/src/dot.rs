@@ -12,6 +12,7 @@ use std::fmt::Write;
 
 use recording::{CommittedDag, CommittedSubtask};
 
+use crate::output::briefly;
 use crate::record::Committed;
 use crate::record::Record;
 
@@ -79,7 +80,7 @@ impl Dag<'_> {
         for &(reader, writer, topic, staleness_ns) in &self.dag.samples {
             let writer = self.id(writer);
             let label = staleness_ns.map_or(String::new(), |ns| {
-                format!(", label=\"less than {} old\"", time(ns))
+                format!(", label=\"less than {} old\"", briefly(ns))
             });
             let _ = writeln!(
                 text,
@@ -102,11 +103,11 @@ impl Dag<'_> {
         let jobs = (dag.jobs).map_or("without end".into(), |jobs| format!("{jobs} jobs"));
         let mut label = format!(
             "{name}\n{period} = {}, D = {}",
-            time(dag.period_ns),
-            time(dag.relative_deadline_ns)
+            briefly(dag.period_ns),
+            briefly(dag.relative_deadline_ns)
         );
         if dag.offset_ns > 0 {
-            label += &format!(", O = {}", time(dag.offset_ns));
+            label += &format!(", O = {}", briefly(dag.offset_ns));
         }
         let overrun = match dag.overrun {
             0 => "queue",
@@ -123,7 +124,7 @@ impl Dag<'_> {
             name => name.to_string(),
         };
         if let Some(wcet_ns) = subtask.wcet_ns {
-            label += &format!("\nWCET {}", time(wcet_ns));
+            label += &format!("\nWCET {}", briefly(wcet_ns));
         }
         // Under EDF the priority is of no effect.
         if !self.commit.told.is_edf {
@@ -174,19 +175,6 @@ fn without_paths(name: &str) -> String {
     short
 }
 
-/// A time in the largest unit in which it is a number with few digits.
-fn time(ns: u64) -> String {
-    let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1000, "us")];
-    let of = |unit: u64| {
-        let text = format!("{}.{:03}", ns / unit, ns % unit * 1000 / unit);
-        text.trim_end_matches('0').trim_end_matches('.').to_string()
-    };
-    let unit = units.into_iter().find(|&(unit, _)| ns >= unit);
-    unit.map_or(format!("{ns} ns"), |(unit, name)| {
-        format!("{} {name}", of(unit))
-    })
-}
-
 /// Text inside quotes as DOT has them: a quote and a backslash are escaped, and a
 /// line's end is `\n`.
 fn quoted(text: &str) -> String {
@@ -198,7 +186,7 @@ fn quoted(text: &str) -> String {
 mod tests {
     use recording::{Commit, CommittedTopic};
 
-    use super::{quoted, text, time, without_paths};
+    use super::{quoted, text, without_paths};
     use crate::made::commit;
     use crate::record::Committed;
     use crate::record::Record;
@@ -261,11 +249,9 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
     }
 
     #[test]
-    fn types_and_times_are_short() {
+    fn types_are_short() {
         let long = "(core::option::Option<a::b::C>, &[x::Y_z; 3])";
         assert_eq!(without_paths(long), "(Option<C>, &[Y_z; 3])");
-        let times = [999, 1_500, 2_000_000_000, 1_234_567_890].map(time);
-        assert_eq!(times, ["999 ns", "1.5 us", "2 s", "1.234 s"]);
         assert_eq!(quoted("a\\b\n\"c\""), r#""a\\b\n\"c\"""#);
     }
 }

@@ -9,7 +9,8 @@
 //! So this library has macros of the same names, which hide those of the standard
 //! library in all its modules; nobody has to think of it where something is printed.
 //!
-//! A [`Table`] is what people read of figures: columns of fixed widths, under their headings.
+//! A [`Table`] is what people read of figures: columns of fixed widths, under their headings;
+//! [`shown`] and [`briefly`] write the times in it.
 
 /// Writes to standard output; as the standard library's, but it never panics.
 #[macro_export]
@@ -151,9 +152,30 @@ impl Table {
     }
 }
 
+/// Returns a time in the unit that has one to three digits before the point.
+pub(crate) fn shown(ns: u64) -> String {
+    let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us")];
+    match units.into_iter().find(|(unit, _)| ns >= *unit) {
+        None => format!("{ns} ns"),
+        Some((unit, name)) => format!("{}.{:03} {name}", ns / unit, ns % unit / (unit / 1000)),
+    }
+}
+
+/// Returns the same without zeros at the end.
+pub(crate) fn briefly(ns: u64) -> String {
+    let text = shown(ns);
+    match text.split_once(' ') {
+        Some((number, unit)) if number.contains('.') => {
+            let number = number.trim_end_matches('0').trim_end_matches('.');
+            format!("{number} {unit}")
+        }
+        _ => text,
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Table;
+    use super::{Table, briefly, shown};
 
     #[test]
     fn cells_stand_below_their_headings_with_their_decimals() {
@@ -162,5 +184,16 @@ mod tests {
         table.line("a line");
         let expected = "a title\nname    load  sets\none      0.2     7\na line\n";
         assert_eq!(table.text(), expected);
+    }
+
+    #[test]
+    fn times_have_a_fitting_unit() {
+        let times = [999, 1_500, 2_000_000_000, 1_234_567_890];
+        assert_eq!(
+            times.map(shown),
+            ["999 ns", "1.500 us", "2.000 s", "1.234 s"]
+        );
+        assert_eq!(times.map(briefly), ["999 ns", "1.5 us", "2 s", "1.234 s"]);
+        assert_eq!(briefly(40), "40 ns");
     }
 }

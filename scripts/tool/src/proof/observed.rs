@@ -21,6 +21,7 @@ use sched_dag::wcets::{self, records};
 
 use crate::files;
 use crate::json::Object;
+use crate::output::shown;
 use crate::record::{Record, Run};
 use crate::trace;
 
@@ -303,16 +304,6 @@ pub fn table(all: &[OfDag], margin_percent: u64) -> String {
         }
     }
     text
-}
-
-/// Returns a time in the unit that has one to three digits before the point.
-#[must_use]
-pub fn shown(ns: u64) -> String {
-    let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us")];
-    match units.into_iter().find(|(unit, _)| ns >= *unit) {
-        None => format!("{ns} ns"),
-        Some((unit, name)) => format!("{}.{:03} {name}", ns / unit, ns % unit / (unit / 1000)),
-    }
 }
 
 /// Returns a histogram of ten equal parts between the smallest and the largest value.

@@ -19,10 +19,10 @@ use std::path::{Path, PathBuf};
 use sched_dag::analysis::{self, Overheads, Settings};
 use sched_dag::{Clusters, Dag, DagId, DagSpec, Preemption, SchedulerOptions};
 
-use super::observed::{OfDag, shown};
+use super::observed::OfDag;
 use crate::files;
 use crate::json::Object;
-use crate::output::Table;
+use crate::output::{Table, shown};
 use crate::record::{self, Committed};
 
 /// One DAG of one commit.

@@ -21,6 +21,7 @@ use replay::shown::{quoted, visible};
 use crate::dot;
 use crate::files::{self, Named};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::output;
 use crate::proof::{observed, report};
 use crate::record::Record;
 
@@ -335,7 +336,7 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
         let times = observed::distribution(counted);
         let figures = [times.min(), times.median(), times.p99(), times.max()];
         let figures = figures
-            .map(|ns| format!("{:>12}", observed::shown(ns)))
+            .map(|ns| format!("{:>12}", output::shown(ns)))
             .concat();
         // Writing into a `String` cannot fail.
         let _ = match times.count() {

@@ -15,7 +15,7 @@ use sched_dag::law::Distribution;
 
 use super::{Condition, Setting};
 use crate::json::{Object, Value};
-use crate::output::Table;
+use crate::output::{Table, shown};
 use crate::protocol::Transcript;
 
 /// The columns. `subtask` 0 is the source, 1 to N are the parallel ones, the next one is the join.
@@ -299,25 +299,14 @@ pub(super) fn table(measured: &Measured) -> String {
             &same_index,
             &cross_index,
             &missing,
-            &ns(latency.median()),
-            &ns(latency.p99()),
-            &ns(cover.median()),
-            &ns(cover.p99()),
-            &ns(response.median()),
+            &shown(latency.median()),
+            &shown(latency.p99()),
+            &shown(cover.median()),
+            &shown(cover.p99()),
+            &shown(response.median()),
         ]);
     }
     table.text()
-}
-
-/// Returns nanoseconds as people read them.
-fn ns(ns: u64) -> String {
-    let value = ns as f64;
-    match ns {
-        0..1_000 => format!("{ns} ns"),
-        1_000..1_000_000 => format!("{:.2} µs", value / 1e3),
-        1_000_000..1_000_000_000 => format!("{:.2} ms", value / 1e6),
-        _ => format!("{:.2} s", value / 1e9),
-    }
 }
 
 #[cfg(test)]
@@ -393,11 +382,5 @@ mod tests {
         both.add(&figures);
         assert_eq!(both.counts, [6, 2, 0, 2, 4, 2]);
         assert_eq!((both.distribution(1).count(), both.mean_ns(2)), (4, 12));
-    }
-
-    #[test]
-    fn times_have_a_fitting_unit() {
-        let texts = [614, 1_874, 36_500_000, 22_644_000_000].map(ns);
-        assert_eq!(texts, ["614 ns", "1.87 µs", "36.50 ms", "22.64 s"]);
     }
 }

@@ -51,6 +51,7 @@ use super::{check, read_file};
 use crate::files;
 use crate::json::{Object, quoted};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::output::briefly;
 use crate::record::{Run, bound};
 
 /// Returns runs as one text of JSON. Breaches are looked for with `bound_ns`, as
@@ -293,8 +294,8 @@ fn draw_dags(view: &View<'_>, prefix: &str, flows: &mut Flows, output: &mut Outp
             } else {
                 ""
             },
-            milliseconds(model.period_ns()),
-            milliseconds(model.relative_deadline_ns())
+            briefly(model.period_ns()),
+            briefly(model.relative_deadline_ns())
         );
         let name = format!("{prefix}dag {}", name_or(model.name(), dag.0));
         let group = output.group(&name, &label);
@@ -431,12 +432,6 @@ fn jobs_of<'v>(
     dag: DagId,
 ) -> impl Iterator<Item = (&'v (DagId, u64), &'v JobHistory)> {
     view.jobs.range((dag, 0)..=(dag, u64::MAX))
-}
-
-fn milliseconds(ns: u64) -> String {
-    let text = format!("{}.{:06}", ns / 1_000_000, ns % 1_000_000);
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    format!("{text} ms")
 }
 
 /// An arrow, as it is drawn once.
