@@ -231,30 +231,20 @@ fn refuse(name: &str, why: &str) -> Result<(), String> {
 ///
 /// As of [`check`].
 fn check_word(name: &str) -> Result<(), String> {
-    let refuse = |why: &str| refuse(name, why);
-    if name.is_empty() {
-        return Err("the name is empty; give one, such as `brake-assist`".into());
-    }
-    if let Some(odd) = name.chars().find(|&c| !is_allowed(c)) {
-        let suggestion = suggestion(name);
-        return refuse(&format!(
-            "{odd:?} is in it; use small letters, digits and hyphens{suggestion}"
-        ));
-    }
-    if !name.starts_with(|first: char| first.is_ascii_lowercase()) {
-        return refuse("it does not begin with a letter; put one first");
-    }
-    if name.ends_with('-') || name.contains("--") {
-        return refuse("a hyphen in it joins nothing; write each between two words");
-    }
-    if name.len() > LONGEST {
-        return refuse(&format!(
-            "it has {} letters; give at most {LONGEST}",
-            name.len()
-        ));
+    let is_allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    let is_right = (name.len() <= LONGEST && name.chars().all(is_allowed))
+        && name.split('-').all(|part| !part.is_empty())
+        && name.starts_with(|first: char| first.is_ascii_lowercase());
+    if !is_right {
+        let why = format!(
+            "give small letters, digits and single hyphens, a letter first, {LONGEST} at most, as \
+             in `brake-assist`"
+        );
+        return refuse(name, &why);
     }
     if RESERVED.split(' ').any(|word| word == name) {
-        return refuse("Rust or cargo use the word themselves; add another, such as `my-`");
+        let why = "Rust or cargo use the word themselves; add another, such as `my-`";
+        return refuse(name, why);
     }
     Ok(())
 }
@@ -262,19 +252,6 @@ fn check_word(name: &str) -> Result<(), String> {
 /// Says that there is an app of the name.
 fn taken(name: &str) -> String {
     format!("there is an app `{name}` already; choose another name, or edit apps/{name}")
-}
-
-fn is_allowed(c: char) -> bool {
-    c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-'
-}
-
-/// Says how the name could be written, if small letters and hyphens suffice.
-fn suggestion(name: &str) -> String {
-    let better = name.to_ascii_lowercase().replace(['_', ' '], "-");
-    if better.chars().all(is_allowed) {
-        return format!(", as in `{better}`");
-    }
-    String::new()
 }
 
 /// Returns the folder, within the workspace, of the package with such a name.
@@ -473,12 +450,7 @@ mod tests {
     }
 
     /// Names, and why they are refused.
-    const BAD: &str = " | the name is empty; give one, such as `brake-assist`
-Brake_Assist | `Brake_Assist` cannot be an app's name: 'B' is in it; use small letters, digits and hyphens, as in `brake-assist`
-../fork | `../fork` cannot be an app's name: '.' is in it; use small letters, digits and hyphens
-2nd | `2nd` cannot be an app's name: it does not begin with a letter; put one first
-brake- | `brake-` cannot be an app's name: a hyphen in it joins nothing; write each between two words
-a-name-that-has-more-letters-than-32 | `a-name-that-has-more-letters-than-32` cannot be an app's name: it has 36 letters; give at most 32
+    const BAD: &str = "Brake_Assist | `Brake_Assist` cannot be an app's name: give small letters, digits and single hyphens, a letter first, 32 at most, as in `brake-assist`
 struct | `struct` cannot be an app's name: Rust or cargo use the word themselves; add another, such as `my-`
 fork-join | there is an app `fork-join` already; choose another name, or edit apps/fork-join
 virtual-time | `virtual-time` cannot be an app's name: the package in fass/virtual-time has it; choose another
@@ -489,6 +461,14 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
         for row in BAD.lines() {
             let (name, line) = row.split_once(" | ").expect(row);
             assert_eq!(check(workspace(), name), Err(line.to_string()));
+        }
+        let long = "a".repeat(33);
+        for name in ["", "../fork", "2nd", "brake-", "-a", "a--b", &long] {
+            let said = check(workspace(), name).unwrap_err();
+            assert!(
+                said.ends_with(", 32 at most, as in `brake-assist`"),
+                "{said}"
+            );
         }
         assert_eq!(check(workspace(), "brake-assist-2"), Ok(()));
     }
@@ -541,7 +521,7 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
                     "boot-link",
                     "of a package that the app needs; choose",
                 ),
-                (out.join("new"), "Brake", "'B' is in it; "),
+                (out.join("new"), "Brake", ": give small letters, digits and"),
             ] {
                 match create_repository(&out, name, source) {
                     Err(Refusal::Usage(line)) => assert!(line.contains(part), "{line}"),

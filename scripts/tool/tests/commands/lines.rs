@@ -92,7 +92,7 @@ bench native --only join,join | `--only`: `join` stands twice
 bench join-latency --once --mode threads | `--once`
 new-app | new-app: which name? give one, such as `./scripts/new-app brake-assist`
 new-app fork-join | new-app: there is an app `fork-join` already; choose another name, or edit apps/fork-join
-new-app Fork-Join | new-app: `Fork-Join` cannot be an app's name: 'F' is in it; use small letters, digits and hyphens, as in `fork-join`
+new-app Fork-Join | new-app: `Fork-Join` cannot be an app's name: give small letters, digits and single hyphens, a letter first, 32 at most, as in `brake-assist`
 new-app one two | new-app: `two`: only one NAME is allowed, and `one` is one
 new-app one --git https://example.org | new-app: `--git` is for a repository; add its folder, `--out DIR`";
     assert_refused(workspace(), rows);
