@@ -41,7 +41,6 @@ const CHUNK: u8 = 0x06;
 const MESSAGE_INDEX: u8 = 0x07;
 const CHUNK_INDEX: u8 = 0x08;
 const STATISTICS: u8 = 0x0b;
-const SUMMARY_OFFSET: u8 = 0x0e;
 const DATA_END: u8 = 0x0f;
 
 /// The bytes of messages after which a chunk ends.
@@ -299,22 +298,11 @@ impl File<'_> {
         let indexes = indexes.into_iter().map(|content| (CHUNK_INDEX, content));
         let statistics = [(STATISTICS, statistics)];
         let all = channels.iter().cloned().chain(indexes).chain(statistics);
-        let mut groups: Vec<(u8, u64, u64)> = Vec::new();
         for (kind, content) in all {
-            let start = self.length;
             self.record(kind, &content)?;
-            match groups.last_mut().filter(|(of, ..)| *of == kind) {
-                Some((_, start, length)) => *length = self.length - *start,
-                None => groups.push((kind, start, self.length - start)),
-            }
         }
-        let offsets = self.length;
-        for (kind, start, length) in groups {
-            let mut content = vec![kind];
-            content.extend(longs([start, length]));
-            self.record(SUMMARY_OFFSET, &content)?;
-        }
-        let mut footer: Vec<u8> = longs([start, offsets]).collect();
+        // The summary is short: readers get no offsets within it.
+        let mut footer: Vec<u8> = longs([start, 0]).collect();
         footer.extend(0_u32.to_le_bytes());
         self.record(FOOTER, &footer)?;
         self.put(MAGIC)?;
