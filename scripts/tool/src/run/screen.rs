@@ -2,9 +2,8 @@
 //!
 //! Lines for people and machine lines go to standard output in the order of
 //! the serial log, so that `grep '^{'` works there as on the log itself.
-//! Progress lines become one line on standard error that renews itself if
-//! that is a terminal, and otherwise a line each tenth of the way. Status lines
-//! take its place on a terminal. A fault at an address gets a line of our own that
+//! Progress lines become one line on standard error, as the progress of every command.
+//! Status lines take its place on a terminal. A fault at an address gets a line of our own that
 //! names the function.
 //!
 //! The console's input comes from standard input, byte by byte; the terminal
@@ -22,11 +21,9 @@ use std::time::{Duration, Instant};
 use super::handed;
 use crate::options::Parsed;
 use crate::places::Places;
+use crate::progress::Progress;
 use crate::protocol::{MachineLine, read_line};
 use crate::system;
-
-/// The width of the bar.
-const BAR: usize = 30;
 
 /// As the value of `quiet`: no machine lines, either. Of a run that only prepares another one.
 pub(super) const NOTHING: &str = "nothing";
@@ -39,7 +36,8 @@ pub(super) struct Screen {
     on_terminal: bool,
     bar_is_shown: bool,
     status: StatusLine,
-    tenths_shown: u64,
+    /// That of a run, and how many jobs were over.
+    progress: Option<(Progress, u64)>,
     places: Places,
 }
 
@@ -53,7 +51,7 @@ impl Screen {
             on_terminal: system::stderr_moves(),
             bar_is_shown: false,
             status: StatusLine::default(),
-            tenths_shown: 0,
+            progress: None,
             places: Places::new(image),
         }
     }
@@ -119,16 +117,13 @@ impl Screen {
         if self.quiet || total == 0 {
             return;
         }
-        let done = done.min(total);
-        let part_of = |whole: u64| done.saturating_mul(whole) / total;
-        if self.on_terminal {
-            let filled = "#".repeat(usize::try_from(part_of(BAR as u64)).unwrap_or(BAR));
-            eprint!("\r\x1b[K[{filled:.<BAR$}] {done} of {total} jobs");
-            self.bar_is_shown = true;
-        } else if part_of(10) != self.tenths_shown {
-            self.tenths_shown = part_of(10);
-            eprintln!("progress: {done} of {total} jobs");
-        }
+        // Another run of the same boot begins at 0 again.
+        let begun = self.progress.take().filter(|(_, before)| *before <= done);
+        let begun = begun.map(|(progress, _)| progress);
+        let mut progress = begun.unwrap_or_else(|| Progress::new(total, "jobs"));
+        progress.show(done.min(total));
+        self.progress = Some((progress, done));
+        self.bar_is_shown = self.on_terminal;
     }
 }
 
