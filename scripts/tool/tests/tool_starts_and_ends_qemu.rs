@@ -3,8 +3,6 @@
 //! tool's or the host's.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use tool::outcome::{Outcome, boot};
@@ -92,40 +90,6 @@ fn a_guest_that_does_not_end_is_killed() {
         };
         assert_eq!(shown, ["no line end"]);
     }
-}
-
-/// What QEMU says and does where KVM cannot run the guest: it stays, paused.
-#[test]
-fn a_guest_that_kvm_has_given_up_is_killed_at_once() {
-    let stub = system::new_log("kvm-stub").expect("a log");
-    let script = "#!/bin/sh\necho 'KVM internal error. Suberror: 1' >&2\nexec sleep 600\n";
-    fs::write(&stub, script).expect("the stub is written");
-    fs::set_permissions(&stub, fs::Permissions::from_mode(0o755)).expect("it is ours");
-    for mode in [Mode::Kvm, Mode::Deterministic] {
-        let qemu = Qemu {
-            program: stub.clone(),
-            mode,
-            ..Qemu::default()
-        };
-        let (outcome, _) = quick(&qemu, "", TinyEnd::Never);
-        assert_eq!(outcome.ending, Ending::KvmFailed);
-        let reason = outcome.judge().unwrap_err().reason;
-        let said = "QEMU says: KVM internal error. Suberror: 1";
-        assert!(reason.ends_with(said), "{reason}");
-    }
-    fs::remove_file(&stub).expect("the stub is removed");
-}
-
-#[test]
-fn a_wrong_image_ends_with_qemus_own_words() {
-    install::ensure_qemu().unwrap();
-    let log = system::new_log("wrong").unwrap();
-    let image = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
-    let outcome = boot(&Qemu::default(), &image, &log, FAR, |_| {}).unwrap();
-    fs::remove_file(&log).unwrap();
-    let fault = outcome.judge().unwrap_err();
-    let words = "QEMU ended with status 1; QEMU says: ";
-    assert!(fault.reason.starts_with(words), "{fault:?}");
 }
 
 #[test]
