@@ -195,10 +195,7 @@ fn members<'n>(node: &'n Node, what: &str) -> Result<&'n [(String, Node)], Malfo
         Value::Mapping(members) => Ok(members),
         _ => Err(malformed(
             node.line,
-            format!(
-                "{what} must be a mapping of keys, here is a {}",
-                node.kind()
-            ),
+            format!("{what} must be a mapping of keys"),
         )),
     }
 }
@@ -206,10 +203,7 @@ fn members<'n>(node: &'n Node, what: &str) -> Result<&'n [(String, Node)], Malfo
 fn items<'n>(node: &'n Node, key: &str) -> Result<&'n [Node], Malformed> {
     match &node.value {
         Value::Sequence(items) => Ok(items),
-        _ => Err(malformed(
-            node.line,
-            format!("`{key}` must be a sequence, here is a {}", node.kind()),
-        )),
+        _ => Err(malformed(node.line, format!("`{key}` must be a sequence"))),
     }
 }
 

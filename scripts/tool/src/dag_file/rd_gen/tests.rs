@@ -51,7 +51,7 @@ fn times_and_defaults_are_those_of_the_file() {
 const REFUSED: &str = r"directed: true\n | line 1: the file has no nodes
 directed: false\n | line 1: `directed` must be true, found `false`
 multigraph: true\n | line 1: `multigraph` must be false
-nodes: 3\n | line 1: `nodes` must be a sequence, here is a scalar
+nodes: 3\n | line 1: `nodes` must be a sequence
 nods:\n- id: 0\n | line 2: unknown key `nods`; a node-link document has directed
 nodes:\n- id: 0\n | line 2: node `0` has no `execution_time`
 nodes:\n- execution_time: 1\n | line 2: this node has no `id`

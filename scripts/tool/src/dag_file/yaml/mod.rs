@@ -14,9 +14,6 @@ use dag_file::{Malformed, quoted};
 /// The deepest nesting that is read.
 const DEEPEST: usize = 32;
 
-/// The most keys of a mapping that are compared one by one.
-const FEW: usize = 16;
-
 /// A value and where it begins.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Node {
@@ -35,18 +32,6 @@ pub enum Value {
     Sequence(Vec<Node>),
     /// A mapping, in the order of the file.
     Mapping(Vec<(String, Node)>),
-}
-
-impl Node {
-    /// Names the kind of value, for messages.
-    #[must_use]
-    pub fn kind(&self) -> &'static str {
-        match self.value {
-            Value::Scalar(_) => "scalar",
-            Value::Sequence(_) => "sequence",
-            Value::Mapping(_) => "mapping",
-        }
-    }
 }
 
 /// Reads the one document that `text` consists of.
@@ -201,7 +186,6 @@ impl<'t> Reader<'t> {
 
     fn mapping(&mut self, indent: usize, depth: usize) -> Result<Node, Malformed> {
         let mut members: Vec<(String, Node)> = Vec::new();
-        // Of few keys each is compared with each: that takes no memory.
         let mut known: HashSet<String> = HashSet::new();
         let first = self.peek().map_or(1, |line| line.number);
         while let Some(line) = self.sibling(indent).filter(|line| !is_item(line.text)) {
@@ -209,14 +193,7 @@ impl<'t> Reader<'t> {
                 let reason = format!("{} is no `key: value`", quoted(line.text));
                 return Err(malformed(line.number, reason));
             };
-            if members.len() == FEW {
-                known.extend(members.iter().map(|(key, _)| key.clone()));
-            }
-            let is_known = match members.len() < FEW {
-                true => members.iter().any(|(known, _)| *known == key),
-                false => !known.insert(key.clone()),
-            };
-            if is_known {
+            if !known.insert(key.clone()) {
                 let reason = format!("key {} stands here twice; give it once", quoted(&key));
                 return Err(malformed(line.number, reason));
             }
