@@ -12,10 +12,7 @@
 //! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
 //! 5. *Launch.* The platform takes the plan.
 
-pub(crate) mod accepted;
 pub(crate) mod answer;
-mod checks;
-mod staleness;
 mod tie;
 
 use alloc::format;
@@ -31,11 +28,11 @@ use sched_dag::{
 };
 
 use crate::api::dag::Dag;
+use crate::draft::checks::{self, Drafts};
 use crate::draft::fault::{CommitError, Fault};
 use crate::platform;
 use crate::platform::{LaunchError, Platform};
-use accepted::Commit;
-use answer::Answers;
+use answer::{Answers, Commit, staleness};
 use tie::tie;
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
@@ -122,11 +119,12 @@ pub fn finish_create_dags_with(
         writers: Count::One,
         ..construction
     };
+    let drafts: Vec<_> = dags.iter().map(|dag| Rc::clone(&dag.draft)).collect();
     let with = |policy, cores| CommitOptions::new(policy, cores).with_construction(construction);
     let Some(platform) = platform::installed() else {
         // What else is wrong does not depend on the platform, except for the
         // attributes; under EDF none is needed.
-        let mut error = match verify(dags, with(Policy::Edf, 1), None) {
+        let mut error = match verify(&drafts, with(Policy::Edf, 1), None) {
             Ok(accepted) => CommitError {
                 faults: Vec::new(),
                 warnings: accepted.warnings,
@@ -142,7 +140,7 @@ pub fn finish_create_dags_with(
     let Verified {
         mut task_set,
         mut warnings,
-    } = verify(dags, options, terms.wcets.as_deref())?;
+    } = verify(&drafts, options, terms.wcets.as_deref())?;
     if terms.assigns
         && let Err(error) = platform.assign(&mut task_set)
     {
@@ -152,14 +150,14 @@ pub fn finish_create_dags_with(
     let answers = Answers::new(&task_set, &terms);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
-    let faults = lacking_proofs(dags, &answers);
+    let faults = lacking_proofs(&drafts, &answers);
     if !faults.is_empty() {
         return Err(CommitError { faults, warnings });
     }
-    let staleness = Arc::new(staleness::of_all(dags, &task_set, &answers.of_dags));
+    let staleness = Arc::new(staleness(&drafts, &task_set, &answers.of_dags));
     let task_set = Arc::new(task_set);
     let plan = tie(
-        dags,
+        &drafts,
         Arc::clone(&task_set),
         &answers,
         Arc::clone(&staleness),
@@ -176,9 +174,9 @@ pub fn finish_create_dags_with(
 }
 
 /// Returns a fault for each DAG that demands a proof and has none.
-fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
+fn lacking_proofs(drafts: &Drafts, answers: &Answers) -> Vec<Fault> {
     let demanding =
-        (dags.iter().zip(&answers.of_dags)).filter(|(dag, _)| dag.draft.borrow().demands_proof);
+        (drafts.iter().zip(&answers.of_dags)).filter(|(draft, _)| draft.borrow().demands_proof);
     let lacking = demanding.filter_map(|(_, answer)| {
         Some(Fault::NotProven {
             dag: answer.dag.clone(),
@@ -189,10 +187,10 @@ fn lacking_proofs(dags: &[Dag], answers: &Answers) -> Vec<Fault> {
 }
 
 /// Reports for each DAG whether it stands in the list before, too.
-fn repeated(dags: &[Dag]) -> Vec<bool> {
-    let address = |number: usize| Rc::as_ptr(&dags[number].draft);
-    let mut is_repeated = alloc::vec![false; dags.len()];
-    for pair in sorted_by_key(dags.len(), address).windows(2) {
+fn repeated(drafts: &Drafts) -> Vec<bool> {
+    let address = |number: usize| Rc::as_ptr(&drafts[number]);
+    let mut is_repeated = alloc::vec![false; drafts.len()];
+    for pair in sorted_by_key(drafts.len(), address).windows(2) {
         is_repeated[pair[1]] = address(pair[0]) == address(pair[1]);
     }
     is_repeated
@@ -200,15 +198,14 @@ fn repeated(dags: &[Dag]) -> Vec<bool> {
 
 /// Verifies all DAGs, and collects the faults of both crates.
 fn verify(
-    dags: &[Dag],
+    drafts: &Drafts,
     options: CommitOptions,
     observed: Option<&str>,
 ) -> Result<Verified, CommitError> {
     let mut faults = Vec::new();
-    let drafts: Vec<_> = dags.iter().map(|dag| dag.draft.borrow()).collect();
-    let mut specs = Vec::with_capacity(dags.len());
-    let all = drafts.iter().enumerate();
-    for ((number, draft), is_repeated) in all.zip(repeated(dags)) {
+    let open: Vec<_> = drafts.iter().map(|draft| draft.borrow()).collect();
+    let mut specs = Vec::with_capacity(drafts.len());
+    for ((number, draft), is_repeated) in open.iter().enumerate().zip(repeated(drafts)) {
         let label = DagLabel {
             id: DagId(u32::try_from(number).unwrap_or(u32::MAX)),
             name: draft.spec.name.clone(),
@@ -235,10 +232,10 @@ fn verify(
             let dag = label.clone();
             faults.push(Fault::WcetsRefused { dag, fault });
         }
-        checks::check_dag(dags, draft, &label, &mut faults);
+        checks::check_dag(drafts, draft, &label, &mut faults);
         specs.push(spec);
     }
-    checks::check_all(dags, &mut faults);
+    checks::check_all(drafts, &mut faults);
     // A commit of nothing but repeated DAGs has been told what is wrong.
     if specs.is_empty() && !faults.is_empty() {
         let warnings = Vec::new();

@@ -10,13 +10,11 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{Activation, DagId, OnFault, SubtaskSpec, TaskSet};
 
 use super::answer::Answers;
-use super::staleness::writer_of;
-use crate::api::dag::Dag;
 use crate::draft::Draft;
+use crate::draft::checks::{Drafts, writer_of};
 use crate::run::latest::Staleness;
 use crate::run::plan::{Body, Plan};
 use crate::run::record::{AnyRecorded, OfDag, Sampled};
@@ -28,28 +26,30 @@ static PLANS: AtomicU64 = AtomicU64::new(0);
 
 /// Turns verified DAGs into a plan, and closes their handles.
 pub(crate) fn tie(
-    dags: &[Dag],
+    drafts: &Drafts,
     task_set: Arc<TaskSet>,
     answers: &Answers,
     staleness: Arc<Vec<Staleness>>,
 ) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
-    let recorded = dags
-        .iter()
-        .map(|dag| core::mem::take(&mut dag.draft.borrow_mut().recorded));
+    let recorded = (drafts.iter()).map(|draft| core::mem::take(&mut draft.borrow_mut().recorded));
     let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
     let any = recorded.iter().flatten().next();
-    let samples = dags.iter().map(|dag| samples(dags, dag, &recorded));
+    let samples = drafts
+        .iter()
+        .map(|draft| samples(drafts, &draft.borrow(), &recorded));
     let samples: Vec<Vec<Sampled>> = samples.collect();
-    let lifecycle = lifecycle(dags);
+    // What serves the requests of the DAGs, if there can be any.
+    let lifecycle = drafts.iter().find_map(|draft| draft.borrow().lifecycle);
+    let lifecycle = lifecycle.map(|make| make(drafts));
     let mut lines = Vec::new();
     let bodies = ((0..)
         .map(DagId)
-        .zip(dags)
+        .zip(drafts)
         .zip(task_set.dags())
         .zip(&recorded))
-    .map(|(((id, dag), verified), of_dag)| {
-        let draft = dag.draft.borrow_mut().close();
+    .map(|(((id, draft), verified), of_dag)| {
+        let draft = draft.borrow_mut().close();
         let (spec, latest) = (draft.spec, draft.latest);
         draft.target.set(number, id);
         if spec.activation == Activation::Sporadic {
@@ -105,39 +105,26 @@ pub(crate) fn tie(
         bodies
     })
     .collect();
-    let handler = |dag: &Dag| Some(dag.draft.borrow().on_fault.as_ref()?.get()?.1);
+    let handler = |draft: &Rc<RefCell<Draft>>| Some(draft.borrow().on_fault.as_ref()?.get()?.1);
     Plan {
         task_set,
         number,
         bodies,
-        proven: answers.proven(),
-        after_fault: dags.iter().map(handler).collect(),
+        proven: answers.proven.clone(),
+        after_fault: drafts.iter().map(handler).collect(),
         lifecycle,
         staleness,
         lines,
     }
 }
 
-/// Returns what serves the requests of the DAGs, if there can be any.
-fn lifecycle(dags: &[Dag]) -> Option<Box<dyn Lifecycle>> {
-    let make = dags.iter().find_map(|dag| dag.draft.borrow().lifecycle)?;
-    Some(make(&drafts(dags)))
-}
-
-/// Returns what has been registered of DAGs.
-#[inline(never)]
-pub(super) fn drafts(dags: &[Dag]) -> Vec<Rc<RefCell<Draft>>> {
-    dags.iter().map(|dag| Rc::clone(&dag.draft)).collect()
-}
-
 /// Returns what a DAG's subtasks sample of recorded topics.
-fn samples(dags: &[Dag], dag: &Dag, recorded: &[Vec<Rc<dyn AnyRecorded>>]) -> Vec<Sampled> {
-    let draft = dag.draft.borrow();
+fn samples(drafts: &Drafts, draft: &Draft, recorded: &[Vec<Rc<dyn AnyRecorded>>]) -> Vec<Sampled> {
     let samples = draft
         .samples
         .iter()
         .filter_map(|(subtask, latest, sampler)| {
-            let writer = writer_of(dags, &**latest)?;
+            let writer = writer_of(drafts, latest)?;
             let mut topics = recorded[writer].iter();
             Some(Sampled {
                 subtask: *subtask,

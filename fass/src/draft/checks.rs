@@ -1,5 +1,10 @@
-//! The modes that are stated before the commit, and what may be wrong with them; and whether what a
-//! DAG records suffices for a replay, which calls no recorded source.
+//! The checks of a commit that the model does not make: what DAGs use of DAGs that are not in it; the
+//! functions that subtasks have for after faults; the inputs of a DAG from outside, which only sources
+//! take, and each thing once, so that a job has one value of it; the modes; and whether what a DAG
+//! records suffices for a replay, which calls no recorded source.
+//!
+//! The faults of modes, and of topics that are recorded, are asked only where there are some, so that
+//! no other image has the code.
 
 use alloc::format;
 use alloc::rc::{Rc, Weak};
@@ -9,10 +14,119 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::ptr;
 
-use sched_dag::{DagId, DagLabel};
+use sched_dag::{DagId, DagLabel, OnFault, SubtaskSpec};
 
 use super::Draft;
+use super::fault::Fault;
+use crate::run::effect::Target;
 use crate::run::latest::AnyLatest;
+
+/// Adds what is wrong with a DAG of these.
+pub(crate) fn check_dag(drafts: &Drafts, draft: &Draft, label: &DagLabel, faults: &mut Vec<Fault>) {
+    check_others(drafts, draft, label, faults);
+    check_replaceable(draft, label, faults);
+    check_inputs(draft, label, faults);
+}
+
+/// Adds each use of something of a DAG that is not in the commit.
+fn check_others(drafts: &Drafts, draft: &Draft, label: &DagLabel, faults: &mut Vec<Fault>) {
+    for (subtask, latest, _) in &draft.samples {
+        if writer_of(drafts, latest).is_none() {
+            faults.push(Fault::LatestNotCommitted {
+                dag: label.clone(),
+                subtask: draft.label(*subtask),
+                topic: latest.topic().into(),
+            });
+        }
+    }
+    // The fault of any subtask raises the DAG's; the first stands for them.
+    let of_faults = draft.on_fault.iter().take(draft.spec.subtasks.len());
+    let raises = draft
+        .raises
+        .iter()
+        .map(|(subtask, signal)| (*subtask, signal));
+    for (subtask, signal) in raises.chain(of_faults.map(|signal| (0, signal))) {
+        if dag_of(drafts, signal).is_none() {
+            let (dag, subtask) = (label.clone(), draft.label(subtask));
+            faults.push(Fault::SignalNotCommitted { dag, subtask });
+        }
+    }
+    for (subtask, target) in &draft.switches {
+        if dag_of(drafts, target).is_none() {
+            let (dag, subtask) = (label.clone(), draft.label(*subtask));
+            faults.push(Fault::SwitchedNotCommitted { dag, subtask });
+        }
+    }
+}
+
+/// Adds what is wrong with the functions for after faults.
+fn check_replaceable(draft: &Draft, label: &DagLabel, faults: &mut Vec<Fault>) {
+    let dag = label.clone();
+    let drops_jobs = draft.spec.on_fault != OnFault::EndDag;
+    match draft.replaceable.first() {
+        Some(&subtask) if !drops_jobs => faults.push(Fault::ReplacedInVain {
+            dag,
+            subtask: draft.label(subtask),
+        }),
+        None if drops_jobs => faults.push(Fault::NothingReplaceable { dag }),
+        _ => {}
+    }
+    for (position, state) in draft.spec.states.iter().enumerate() {
+        let mut users = state.users.iter().map(|user| user.subtask);
+        if let Some(subtask) = users.find(|user| draft.replaceable.contains(user))
+            && draft.resets.iter().all(|(state, _)| *state != position)
+        {
+            faults.push(Fault::StateWithoutReset {
+                dag: label.clone(),
+                subtask: draft.label(subtask),
+                state: state.name.clone(),
+            });
+        }
+    }
+}
+
+/// Adds what is wrong with the inputs from outside.
+fn check_inputs(draft: &Draft, dag: &DagLabel, faults: &mut Vec<Fault>) {
+    let mut add = |code, text| faults.push(Fault::Worded { code, text });
+    for (number, (subtask, takes)) in draft.outside.iter().enumerate() {
+        let label = draft.label(*subtask);
+        let is_same =
+            |(first, other): &&(usize, String)| other == takes && is_source(draft, *first);
+        if !is_source(draft, *subtask) {
+            let text = format!(
+                "{label} of {dag} is no source and {takes}; let the source do that, and send it \
+                 along an edge"
+            );
+            add("taken_by_no_source", text);
+        } else if let Some((first, _)) = draft.outside[..number].iter().find(is_same) {
+            let first = draft.label(*first);
+            let text = format!(
+                "{label} of {dag} {takes}, and so does {first}, but a job has one value of it; let \
+                 one source do that, once, and send it along edges"
+            );
+            add("taken_twice", text);
+        }
+    }
+}
+
+/// Reports whether nothing precedes a subtask.
+fn is_source(draft: &Draft, subtask: usize) -> bool {
+    let has_inputs = |spec: &SubtaskSpec| !spec.inputs.is_empty();
+    let follows = |&(_, to): &(usize, usize)| to == subtask;
+    let spec = &draft.spec;
+    !spec.subtasks.get(subtask).is_some_and(has_inputs) && !spec.edges.iter().any(follows)
+}
+
+/// Adds what is wrong with the modes of a commit, and with what it records.
+#[inline(never)]
+pub(crate) fn check_all(drafts: &Drafts, faults: &mut Vec<Fault>) {
+    let checks: [fn(&Draft) -> Option<Check>; 2] = [|of| of.check_modes, |of| of.check_recorded];
+    for pick in checks {
+        if let Some(check) = drafts.iter().find_map(|draft| pick(&draft.borrow())) {
+            check(drafts, faults);
+        }
+    }
+}
 
 /// A mode as stated so far.
 pub(crate) struct ModeDraft {
@@ -26,13 +140,10 @@ pub(crate) struct ModeDraft {
 pub(crate) type Modes = Rc<RefCell<Vec<ModeDraft>>>;
 
 /// All drafts of a commit.
-type Drafts = [Rc<RefCell<Draft>>];
+pub(crate) type Drafts = [Rc<RefCell<Draft>>];
 
-/// Takes a fault, by its code and its text.
-type Add<'a> = &'a mut dyn FnMut(&'static str, String);
-
-/// Reports all that is wrong with the modes of a commit, or with what it records.
-pub(crate) type Check = fn(&Drafts, Add<'_>);
+/// Adds all that is wrong with the modes of a commit, or with what it records.
+pub(crate) type Check = fn(&Drafts, &mut Vec<Fault>);
 
 /// Returns the DAGs of each mode of a commit.
 pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
@@ -43,8 +154,9 @@ pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
     modes.map_or(Vec::new(), |modes| modes.iter().map(dags).collect())
 }
 
-/// Reports all that is wrong with the modes of a commit.
-pub(crate) fn check_modes(drafts: &Drafts, add: Add<'_>) {
+/// Adds all that is wrong with the modes of a commit.
+pub(crate) fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
+    let mut add = |code, text| faults.push(Fault::Worded { code, text });
     let found = of_commit(drafts);
     if found.len() > 1 {
         let text = "the commit has modes of more than one `Modes`; make all of them by one";
@@ -81,7 +193,9 @@ pub(crate) fn check_modes(drafts: &Drafts, add: Add<'_>) {
             add("mode_starts_paused", text);
         }
         // What brings about a safe state is on wherever the DAG is that may need it.
-        let Some(handler) = handler(drafts, &draft).filter(|&handler| in_some(handler)) else {
+        let handler = draft.on_fault.as_ref();
+        let handler = handler.and_then(|target| dag_of(drafts, target));
+        let Some(handler) = handler.filter(|&handler| in_some(handler)) else {
             continue;
         };
         let lacks =
@@ -118,11 +232,16 @@ fn place(drafts: &Drafts, dag: &Weak<RefCell<Draft>>) -> Option<usize> {
     drafts.iter().position(is_it)
 }
 
-/// Returns the DAG that a fault of another releases.
-fn handler(drafts: &Drafts, draft: &Draft) -> Option<DagId> {
-    let target = draft.on_fault.as_ref()?;
+/// Returns the DAG that is meant.
+fn dag_of(drafts: &Drafts, target: &Arc<Target>) -> Option<DagId> {
     let is_it = |other: &Rc<RefCell<Draft>>| Arc::ptr_eq(&other.borrow().target, target);
     (0..).map(DagId).nth(drafts.iter().position(is_it)?)
+}
+
+/// Returns the position of the DAG whose topic a latest value is of.
+pub(crate) fn writer_of(drafts: &Drafts, latest: &Rc<dyn AnyLatest>) -> Option<usize> {
+    let is_it = |offered: &Rc<dyn AnyLatest>| ptr::addr_eq(Rc::as_ptr(offered), Rc::as_ptr(latest));
+    (drafts.iter()).position(|draft| draft.borrow().latest.iter().any(is_it))
 }
 
 fn label(drafts: &Drafts, dag: DagId) -> DagLabel {
@@ -133,9 +252,10 @@ fn label(drafts: &Drafts, dag: DagId) -> DagLabel {
     DagLabel { id: dag, name }
 }
 
-/// Reports what the DAGs of a commit do not record that a replay would need: of each DAG a source
+/// Adds what the DAGs of a commit do not record that a replay would need: of each DAG a source
 /// of which is recorded, all else that its sources write, and what its other subtasks sample.
-pub(crate) fn check_recorded(drafts: &Drafts, add: Add<'_>) {
+pub(crate) fn check_recorded(drafts: &Drafts, faults: &mut Vec<Fault>) {
+    let mut add = |code, text| faults.push(Fault::Worded { code, text });
     for (id, draft) in (0..).map(DagId).zip(drafts) {
         let draft = draft.borrow();
         let dag = label(drafts, id);
@@ -162,9 +282,8 @@ pub(crate) fn check_recorded(drafts: &Drafts, add: Add<'_>) {
         let samples = draft.samples.iter();
         for (subtask, latest, _) in samples.filter(|(subtask, ..)| !is_source(*subtask)) {
             let (subtask, topic) = (draft.label(*subtask), latest.topic());
-            let offers = |other: &Draft| other.latest.iter().any(|own| is_same(own, latest));
-            let mut others = drafts.iter().map(|other| other.borrow());
-            if others.any(|other| offers(&other) && !records(&other, topic)) {
+            let writer = writer_of(drafts, latest);
+            if writer.is_some_and(|writer| !records(&drafts[writer].borrow(), topic)) {
                 let text = format!(
                     "{subtask} of {dag} samples topic `{topic}`, which is not recorded, and a \
                      replay could not give it the same, though topic `{first}` of a source is; \
@@ -179,8 +298,4 @@ pub(crate) fn check_recorded(drafts: &Drafts, add: Add<'_>) {
 fn records(draft: &Draft, topic: &str) -> bool {
     let mut recorded = draft.recorded.iter();
     recorded.any(|recorded| recorded.topic() == topic)
-}
-
-fn is_same(one: &Rc<dyn AnyLatest>, other: &Rc<dyn AnyLatest>) -> bool {
-    ptr::addr_eq(Rc::as_ptr(one), Rc::as_ptr(other))
 }

@@ -26,7 +26,7 @@ use super::latest::{AnyLatest, Entry, Probe, SharedLatest, Slot};
 use super::line::{Edge, Found, KeptState, Line, LineOf};
 use super::message::{Message, MessageType};
 use super::plan::{Body, Subtask};
-use super::topic::{Ports, Publisher, Relay, Wiring, Wrap};
+use super::topic::{Ports, Publisher, Wiring, Wrap};
 
 /// A recorded topic while DAGs are built.
 pub(crate) struct RecordedTopic<T> {
@@ -43,15 +43,15 @@ pub(crate) trait AnyRecorded: AnyLatest {
     fn line(&self) -> (Schema, Arc<Line>);
 
     /// Returns what sends recorded values, in the place of the writer's next output port.
-    fn replayed(&self, ports: &mut Ports<'_>) -> Box<dyn Replayed>;
+    fn replayed(&self, ports: &mut Ports<'_>) -> Replayed;
 
-    /// Sets a probe for samples of the topic, and returns the type of the samples, and the
-    /// probe's line; none if the latest value is of another type.
+    /// Sets a probe for samples of the topic, and returns it, with the type of the samples and
+    /// their line; none if the latest value is of another type.
     fn probe(
         &self,
-        latest: &(dyn AnyLatest + 'static),
+        latest: &dyn Any,
         sampler: usize,
-    ) -> Option<(Schema, Arc<SampleLine>)>;
+    ) -> Option<(Arc<dyn Probe>, Schema, Arc<Line>)>;
 
     /// Numbers all recorded topics of a DAG, what its subtasks sample of such topics, and its
     /// recorded states, tells the platform, and adds their lines to those before. Returns what is
@@ -90,12 +90,11 @@ pub(crate) trait AnyRecorded: AnyLatest {
         let mut around = Vec::new();
         for sample in of.samples {
             let latest = &*sample.latest;
-            if let Some((schema, line)) = sample.of.probe(latest, sample.sampler) {
-                let found = Arc::clone(&line.way);
-                let way = (schema, Arc::clone(&found));
+            if let Some((probe, schema, line)) = sample.of.probe(latest, sample.sampler) {
+                let way = (schema, Arc::clone(&line));
                 open(sample.subtask, Role::Sample, latest.topic(), way, None);
-                let look = move |job| line.begin(job);
-                around.push((sample.subtask, looking(found, look)));
+                let look = move |job| probe.begin(job);
+                around.push((sample.subtask, looking(line, look)));
             }
         }
         for (position, of_state) in of.states {
@@ -204,10 +203,8 @@ fn writer(topic: &dyn AnyRecorded, spec: &DagSpec) -> (usize, Role) {
     (writer.map_or(0, |(number, _)| number), role)
 }
 
-/// What sends recorded values to a topic.
-pub(crate) trait Replayed: Send {
-    fn send(&mut self, job: u64);
-}
+/// What sends the recorded value of a job to a topic.
+type Replayed = Box<dyn FnMut(u64) + Send>;
 
 impl<T: Recordable> RecordedTopic<T> {
     pub(crate) fn new(topic: &str, edge: &'static Edge) -> Self {
@@ -235,7 +232,13 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
 
     fn stages(&self) -> Box<dyn Any> {
         let line = Arc::clone(&self.line);
-        let tap = |to| Publisher::by_way_of(Tap { line, to });
+        // The tap of a topic looks at each value on its way.
+        let tap = |mut to: Publisher<T>| {
+            Publisher::by_way_of(move |job, value: T| {
+                line.stage::<T>(job, |out| value.encode(out));
+                to.send(job, value);
+            })
+        };
         let wrap: Wrap<T> = (self.line.is_open()).then(|| Box::new(tap) as _);
         Box::new(wrap)
     }
@@ -255,61 +258,43 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
         (T::schema(), Arc::clone(&self.line))
     }
 
-    fn replayed(&self, ports: &mut Ports<'_>) -> Box<dyn Replayed> {
-        Box::new(Source {
-            publisher: ports.publisher::<T>(),
-            line: Arc::clone(&self.line),
+    fn replayed(&self, ports: &mut Ports<'_>) -> Replayed {
+        let (mut publisher, line) = (ports.publisher::<T>(), Arc::clone(&self.line));
+        Box::new(move |job| {
+            let mut value = None;
+            (line.edge.replay)(line.number(), job, &mut |bytes| {
+                value = T::from_bytes(bytes).ok();
+            });
+            match value {
+                Some(value) => publisher.send(job, value),
+                None => panic!("the recording has no value of this job, or one of another type"),
+            }
         })
     }
 
     fn probe(
         &self,
-        latest: &(dyn AnyLatest + 'static),
+        latest: &dyn Any,
         sampler: usize,
-    ) -> Option<(Schema, Arc<SampleLine>)> {
-        let shared = (latest as &dyn Any).downcast_ref::<SharedLatest<T>>()?;
-        Some(probe(shared, sampler, self.line.edge))
-    }
-}
-
-/// The tap of a topic: looks at each value on its way.
-struct Tap<T> {
-    line: Arc<Line>,
-    to: Publisher<T>,
-}
-
-impl<T: Message + Recordable> Relay<T> for Tap<T> {
-    fn send(&mut self, job: u64, value: T) {
-        self.line.stage::<T>(job, |out| value.encode(out));
-        self.to.send(job, value);
-    }
-}
-
-/// Sends recorded values.
-struct Source<T> {
-    publisher: Publisher<T>,
-    line: Arc<Line>,
-}
-
-impl<T: Message + Recordable> Replayed for Source<T> {
-    fn send(&mut self, job: u64) {
-        let mut value = None;
-        (self.line.edge.replay)(self.line.number(), job, &mut |bytes| {
-            value = T::from_bytes(bytes).ok()
+    ) -> Option<(Arc<dyn Probe>, Schema, Arc<Line>)> {
+        let shared = latest.downcast_ref::<SharedLatest<T>>()?;
+        let line = Arc::new(Line::new(self.line.edge));
+        let probe: Arc<dyn Probe> = Arc::new(SampleProbe::<T> {
+            line: Arc::clone(&line),
+            job: AtomicU64::new(0),
+            of: PhantomData,
         });
-        match value {
-            Some(value) => self.publisher.send(job, value),
-            None => panic!("the recording has no value of this job, or one of another type"),
-        }
+        shared.set_probe(sampler, Arc::clone(&probe));
+        Some((probe, Sample::<T>::schema(), line))
     }
 }
 
 /// A source that is not called.
-struct ReplayedSource(Vec<Box<dyn Replayed>>);
+struct ReplayedSource(Vec<Replayed>);
 
 impl Subtask for ReplayedSource {
     fn take_turn(&mut self, job: u64) {
-        self.0.iter_mut().for_each(|output| output.send(job));
+        self.0.iter_mut().for_each(|send| send(job));
     }
 
     fn discard(&mut self, _job: u64) {}
@@ -318,55 +303,26 @@ impl Subtask for ReplayedSource {
     fn forget(self: Box<Self>) {}
 }
 
-/// What the probe of a sampling subtask, its body and its completion share.
-pub(crate) struct SampleLine {
-    way: Arc<Line>,
-    /// The job whose instance runs.
-    job: AtomicU64,
-}
-
 /// A sample as it is written down: its job, when that was complete, and the value.
 type Sample<T> = Option<(u64, u64, T)>;
 
-/// Sets a probe, and returns the type of the samples, and what the probe has of its instance.
-fn probe<T: Recordable + Send + 'static>(
-    shared: &SharedLatest<T>,
-    sampler: usize,
-    edge: &'static Edge,
-) -> (Schema, Arc<SampleLine>) {
-    let line = Arc::new(SampleLine {
-        way: Arc::new(Line::new(edge)),
-        job: AtomicU64::new(0),
-    });
-    shared.set_probe(
-        sampler,
-        Box::new(SampleProbe {
-            line: Arc::clone(&line),
-            of: PhantomData::<fn() -> T>,
-        }),
-    );
-    (Sample::<T>::schema(), line)
-}
-
-impl SampleLine {
-    /// Notes the job whose instance runs.
-    fn begin(&self, job: u64) {
-        self.job.store(job, Ordering::Relaxed);
-    }
-}
-
 /// The probe of a subtask that samples values of this type.
 struct SampleProbe<T> {
-    line: Arc<SampleLine>,
+    line: Arc<Line>,
+    /// The job whose instance runs.
+    job: AtomicU64,
     of: PhantomData<fn() -> T>,
 }
 
 impl<T: Recordable + 'static> Probe for SampleProbe<T> {
+    fn begin(&self, job: u64) {
+        self.job.store(job, Ordering::Relaxed);
+    }
+
     fn replay(&self, slot: &dyn Any) -> bool {
-        let way = &self.line.way;
         let mut found = None;
-        let job = self.line.job.load(Ordering::Relaxed);
-        (way.edge.replay)(way.number(), job, &mut |bytes| {
+        let job = self.job.load(Ordering::Relaxed);
+        (self.line.edge.replay)(self.line.number(), job, &mut |bytes| {
             found = Sample::<T>::from_bytes(bytes).ok();
         });
         let slot = slot.downcast_ref::<Slot<T>>();
@@ -386,8 +342,8 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
         let Some(sample) = slot.and_then(Slot::look) else {
             return;
         };
-        let job = self.line.job.load(Ordering::Relaxed);
-        self.line.way.stage::<Sample<T>>(job, |out| {
+        let job = self.job.load(Ordering::Relaxed);
+        self.line.stage::<Sample<T>>(job, |out| {
             // As an `Option` of a tuple is written.
             sample.is_some().encode(out);
             if let Some(entry) = &*sample {

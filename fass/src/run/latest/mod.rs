@@ -46,7 +46,7 @@ impl<T> SharedLatest<T> {
     }
 
     /// Sets what looks at each sample of a sampling subtask.
-    pub(crate) fn set_probe(&self, sampler: usize, probe: Box<dyn Probe>) {
+    pub(crate) fn set_probe(&self, sampler: usize, probe: Arc<dyn Probe>) {
         // The commit, which comes once, does so for each sampler once.
         let _ = self.triples.borrow()[sampler].probe.set(probe);
     }
@@ -108,6 +108,9 @@ pub(crate) trait Stage<T>: Send + Sync {
 /// a [`Slot<T>`] whose type it knows, so that a subtask whose samples are not recorded has next to
 /// no code for it.
 pub(crate) trait Probe: Send + Sync {
+    /// Notes the job whose instance runs.
+    fn begin(&self, job: u64);
+
     /// Puts into the slot what the instance found when it was recorded, and reports whether that
     /// is known.
     fn replay(&self, slot: &dyn Any) -> bool;
@@ -129,7 +132,7 @@ struct Triple<T> {
     /// Whether the writer's slot has a value that shall show at its completion.
     staged: AtomicBool,
     /// Looks at what the reader finds, if the topic is recorded.
-    probe: SetOnce<Box<dyn Probe>>,
+    probe: SetOnce<Arc<dyn Probe>>,
 }
 
 /// A value, the job that it is of, and when its writer was complete.
