@@ -14,8 +14,8 @@ use sched_dag::{FaultLimit, OnFault};
 use super::dag::Dag;
 use super::subtask::Subtask;
 use super::uses::{ResettableUses, Uses, Using};
+use crate::run::replaceable::Reset;
 use crate::run::replaceable::{Alternatives, Anew, Two, defer};
-use crate::run::state::Reset;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 impl Dag {

@@ -33,7 +33,7 @@ use alloc::vec::Vec;
 use super::dag::Dag;
 use super::subtask::{Subtask, Untyped};
 use crate::draft::SubtaskAttributes;
-use crate::run::state::Reset;
+use crate::run::replaceable::Reset;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 pub(crate) mod sealed {

@@ -17,7 +17,6 @@ mod echo;
 mod excerpt;
 mod kept;
 pub(crate) mod latest;
-mod machine;
 mod replay;
 mod tape;
 
@@ -31,8 +30,8 @@ use recording::{Channel, DagHeader, Header, Schema, Stream};
 use sched_dag::journal::What;
 use sched_dag::{DagId, Instance, Notice, TaskSet};
 
-use crate::run::line::Recorded;
 use crate::run::plan::Plan;
+use crate::run::record::Recorded;
 
 pub use excerpt::Excerpt;
 pub use kept::Kept;
@@ -240,7 +239,7 @@ impl Drained {
 pub(crate) fn begin(wish: Wish, host: Host) -> Box<dyn Crossing> {
     match wish {
         Wish::Record { app, bytes, .. } => Box::new(tape::Tape::new(app, bytes)),
-        Wish::Replay { bytes, from } => Box::new(machine::OfMachine::new(bytes, from, host)),
+        Wish::Replay { bytes, from } => Box::new(replay::OfMachine::new(bytes, from, host)),
         Wish::Latest { app, jobs } => Box::new(latest::Latest::new(app, jobs)),
     }
 }

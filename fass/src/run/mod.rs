@@ -10,15 +10,12 @@
     reason = "the four cells of job slots, shared values and records"
 )]
 pub(crate) mod cell;
-pub(crate) mod effect;
 pub(crate) mod latest;
-pub(crate) mod line;
 pub mod log;
 pub(crate) mod message;
 pub(crate) mod plan;
 pub(crate) mod record;
 pub(crate) mod replaceable;
-pub(crate) mod state;
 pub(crate) mod subtask;
 pub(crate) mod topic;
 pub(crate) mod tuple;

@@ -5,7 +5,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::{Departure, Framing, Incoming, Outgoing};
-use crate::run::effect::Effect;
+use crate::run::plan::Effect;
 
 /// Takes all packets that are there, as text.
 fn packets(incoming: &Incoming) -> Vec<String> {
