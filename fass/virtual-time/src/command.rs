@@ -142,7 +142,7 @@ fn replay(
         return Ok(ExitCode::from(u8::from(report.divergence.is_some())));
     };
     let (dag, job) = (panic.instance.dag, panic.instance.job);
-    println!("{}", machine.machine.show(&report, dag, job));
+    println!("{}", machine.show(&report, dag, job));
     Ok(ExitCode::FAILURE)
 }
 

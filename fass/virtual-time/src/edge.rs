@@ -95,7 +95,7 @@ impl VirtualTime {
     ///
     /// See [`Dag::record`](fass::Dag::record) for an example.
     pub fn replay(self, recording: &[u8]) -> Result<Self, Malformed> {
-        self.machine.surroundings.edge.replay(recording)?;
+        self.machine.edge.replay(recording)?;
         Ok(self)
     }
 
@@ -108,7 +108,7 @@ impl VirtualTime {
     /// See [`State::record`](fass::State::record) for an example.
     #[must_use = "the machine itself is returned"]
     pub fn from(self, dag: &str, job: u64) -> Self {
-        let edge = &self.machine.surroundings.edge;
+        let edge = &self.machine.edge;
         edge.of_replay(|replay| replay.begin_before(dag, job));
         self
     }
@@ -127,16 +127,6 @@ impl VirtualTime {
     #[must_use = "the machine itself is returned"]
     pub fn keep_latest(self, jobs: u32) -> Self {
         self.set(|settings| settings.most_jobs = Some(jobs))
-    }
-
-    /// Returns the record of all that was run since the commit: the model, the values of the
-    /// topics that [`Dag::record`](fass::Dag::record) names, signals, jobs that were skipped or
-    /// cut, and the events of the schedule with their times. It is empty if nothing was committed.
-    ///
-    /// See [`Dag::record`](fass::Dag::record).
-    #[must_use]
-    pub fn recording(&self) -> Vec<u8> {
-        self.machine.recording()
     }
 }
 

@@ -37,9 +37,7 @@ mod edge;
 mod job;
 mod platform;
 mod report;
-mod session;
 mod settings;
-mod surroundings;
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -55,12 +53,11 @@ pub use command::replay_command;
 pub use edge::Divergence;
 pub use job::{JobShown, Passed, SubtaskShown, Value};
 use platform::Machine;
-pub use report::{DagReport, InstanceRecord, JobRecord, Report};
+pub use platform::RunError;
+pub use report::{DagReport, InstanceRecord, JobRecord, PanicRecord, Report};
 pub use sched_dag::journal::{Event, What};
-pub use session::RunError;
 use settings::Settings;
 pub use settings::Silent;
-pub use surroundings::PanicRecord;
 
 /// A machine in virtual time, belonging to the thread that makes it.
 ///
@@ -106,6 +103,13 @@ pub struct VirtualTime {
     machine: Rc<Machine>,
 }
 
+/// Ends the run, which has the machine, too.
+impl Drop for VirtualTime {
+    fn drop(&mut self) {
+        drop(self.machine.session.take());
+    }
+}
+
 /// Returns a duration as a number, the last one if it is beyond that.
 fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
@@ -129,7 +133,7 @@ impl VirtualTime {
     }
 
     fn set(self, change: impl FnOnce(&mut Settings)) -> Self {
-        change(&mut self.machine.surroundings.settings.borrow_mut());
+        change(&mut self.machine.settings.borrow_mut());
         self
     }
 
@@ -322,7 +326,8 @@ impl VirtualTime {
     ///
     /// See [`RunError`]; `docs/guide.md`, section 12, has an example.
     pub fn until(&self, dag: &str, job: u64) -> Result<JobShown, RunError> {
-        self.machine.until(dag, job)
+        let report = self.run_until(None, Some((dag, job)))?;
+        Ok(self.show(&report, report.task_set().find(dag), job))
     }
 
     /// Runs as [`run`](Self::run) does.
@@ -331,7 +336,7 @@ impl VirtualTime {
     ///
     /// See [`RunError`]. The run is over then.
     pub fn try_run(&self) -> Result<Report, RunError> {
-        self.machine.run(None, None)
+        self.run_until(None, None)
     }
 
     /// Runs as [`run_for`](Self::run_for) does.
@@ -340,6 +345,6 @@ impl VirtualTime {
     ///
     /// See [`RunError`]. The run is over then.
     pub fn try_run_for(&self, duration: Duration) -> Result<Report, RunError> {
-        self.machine.run(Some(duration), None)
+        self.run_until(Some(duration), None)
     }
 }

@@ -4,32 +4,66 @@
 //! the calling thread's current machine. A machine keeps its session; while that
 //! runs, it is taken out of there, so that a function's calls into the platform
 //! meet nothing borrowed but the settings, which no function changes.
+//!
+//! Bytes arrive at their times, between the completions and the releases of that instant, as
+//! signals do. What an instance sends is gone at its completion: no device is slow here, so only
+//! an instance that sends more than its wire has room for loses bytes.
+//!
+//! # A plan while it runs
+//!
+//! The driver is `sched_dag::virtual_time`, the one loop in virtual time, which has the engine
+//! with the bodies and the journal; it asks for the execution time of each instance at its start.
+//! [`Calls`] answers by running the instance's real body and adding up what it executed. Why a run
+//! could not go on is a [`RunError`].
 
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::rc::{Rc, Weak};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use fass::edge::Begin;
+use fass::edge::{Begin, Replay};
 use fass::log::{Level, Line, set_level};
-use fass::{LaunchError, Occupation, Plan, Platform, Recorded, Terms};
-
+use fass::{LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms, Wire};
 use recording::Channel;
-use sched_dag::{DagId, TaskSet};
+use sched_dag::engine::{Alternate, Cost};
+use sched_dag::journal::What;
+use sched_dag::lifecycle::Request;
+use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
+use sched_dag::{Dag, DagId, DagLabel, Instance, Notice, SchedulerOptions, SubtaskLabel, TaskSet};
 
+use crate::edge::Edge;
 use crate::job::JobShown;
-use crate::nanoseconds;
-use crate::report::Report;
-use crate::session::RunError;
-use crate::session::Session;
-use crate::surroundings::Surroundings;
+use crate::report::{PanicRecord, Report};
+use crate::settings::Settings;
+use crate::{VirtualTime, nanoseconds};
 
-/// What one thread's virtual machine is and does.
-#[derive(Debug, Default)]
+/// What one thread's virtual machine is and does: the time, what crosses the edge of the run, and
+/// what is to come.
+#[derive(Default)]
 pub(crate) struct Machine {
-    /// What it shares with its run.
-    pub(crate) surroundings: Rc<Surroundings>,
-    session: RefCell<Option<Session>>,
+    pub(crate) settings: RefCell<Settings>,
+    /// What is recorded and replayed.
+    pub(crate) edge: Edge,
+    /// The wires that are connected, and what has been sent on each.
+    connected: RefCell<Vec<(Wire, Vec<u8>)>>,
+    /// The time that functions are told: the start of the instance and what it
+    /// has executed.
+    pub(crate) now_ns: Cell<u64>,
+    /// What the running function has executed; `None` outside functions.
+    pub(crate) executed_ns: Cell<Option<u64>>,
+    /// The instance of the running function.
+    pub(crate) running: Cell<Option<Instance>>,
+    /// The lines of the log so far.
+    pub(crate) logs: RefCell<Vec<Line>>,
+    /// What is to come, by time and in the order in which it was made.
+    arrivals: RefCell<BTreeMap<(u64, u64), Arrival>>,
+    /// How much of that there has been.
+    count: Cell<u64>,
+    pub(crate) session: RefCell<Option<Session>>,
     /// The number of the launched plan.
     plan: Cell<Option<u64>>,
     has_launched: Cell<bool>,
@@ -37,6 +71,19 @@ pub(crate) struct Machine {
 
 thread_local! {
     static CURRENT: RefCell<Weak<Machine>> = const { RefCell::new(Weak::new()) };
+}
+
+impl fmt::Debug for Machine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Machine").finish_non_exhaustive()
+    }
+}
+
+/// Something that comes from outside of the scheduler at an instant.
+#[derive(Debug)]
+enum Arrival {
+    Request(Request),
+    Bytes(Wire, Vec<u8>),
 }
 
 /// Makes a machine and makes it this thread's.
@@ -56,25 +103,79 @@ impl Machine {
     /// Notes a signal of a plan; one of another plan does nothing.
     pub(crate) fn raise_at(&self, time_ns: u64, (plan, dag): (u64, DagId)) {
         if self.plan.get() == Some(plan) {
-            self.surroundings.signal_at(time_ns, dag);
+            self.signal_at(time_ns, dag);
         }
     }
 
-    /// Returns the recording of the run so far.
-    pub(crate) fn recording(&self) -> Vec<u8> {
-        let session = self.session.borrow();
-        session.as_ref().map_or(Vec::new(), Session::recording)
+    /// Notes a signal to a DAG of the launched plan; in a replay all signals are recorded ones.
+    pub(crate) fn signal_at(&self, time_ns: u64, dag: DagId) {
+        if !self.edge.is_replay() {
+            self.keep(time_ns, Arrival::Request(Request::Signal(dag)));
+        }
     }
 
-    /// Runs until a job of a DAG has ended, and returns what its subtasks got and gave.
-    pub(crate) fn until(self: &Rc<Self>, dag: &str, job: u64) -> Result<JobShown, RunError> {
-        let report = self.run(None, Some((dag, job)))?;
-        Ok(self.show(&report, report.task_set().find(dag), job))
+    /// Notes the next signal of a replay, which comes not before `now_ns`. One follows when the one
+    /// before it has led to something, for else it would be dropped where functions take longer
+    /// than they took.
+    pub(crate) fn follow_signal(&self, dag: DagId, now_ns: u64) {
+        let next_ns = self.edge.of_replay(|replay| replay.next_signal_ns(dag));
+        if let Some(time_ns) = next_ns {
+            self.keep(time_ns.max(now_ns), Arrival::Request(Request::Signal(dag)));
+        }
+    }
+
+    /// Notes what comes at a time.
+    fn keep(&self, time_ns: u64, arrival: Arrival) {
+        let place = self.count.get();
+        self.count.set(place + 1);
+        self.arrivals.borrow_mut().insert((time_ns, place), arrival);
+    }
+
+    /// Returns the time of the next request, or of bytes that may raise a signal.
+    fn next_request_ns(&self) -> Option<u64> {
+        let arrivals = self.arrivals.borrow();
+        arrivals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
+    }
+
+    /// Takes the next request that is due by `now_ns`.
+    fn take_request(&self, now_ns: u64) -> Option<Request> {
+        loop {
+            self.next_request_ns().filter(|&at_ns| at_ns <= now_ns)?;
+            let ((at_ns, _), arrival) = self.arrivals.borrow_mut().pop_first()?;
+            match arrival {
+                Arrival::Request(request) => return Some(request),
+                Arrival::Bytes(wire, bytes) => {
+                    if let Some((_, dag)) = wire.arrive(&bytes, at_ns) {
+                        self.signal_at(now_ns, dag);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes what has been sent on wires.
+    pub(crate) fn collect(&self) {
+        for (wire, sent) in self.connected.borrow_mut().iter_mut() {
+            sent.extend(std::iter::from_fn(|| wire.depart()));
+        }
+    }
+}
+
+impl VirtualTime {
+    /// Returns the record of all that was run since the commit: the model, the values of the
+    /// topics that [`Dag::record`](fass::Dag::record) names, signals, jobs that were skipped or
+    /// cut, and the events of the schedule with their times. It is empty if nothing was committed.
+    ///
+    /// See [`Dag::record`](fass::Dag::record).
+    #[must_use]
+    pub fn recording(&self) -> Vec<u8> {
+        let session = self.machine.session.borrow();
+        session.as_ref().map_or(Vec::new(), Session::recording)
     }
 
     /// Returns what the subtasks of a job got and gave.
     pub(crate) fn show(&self, report: &Report, dag: DagId, job: u64) -> JobShown {
-        let edge = &self.surroundings.edge;
+        let edge = &self.machine.edge;
         JobShown {
             unmet_fault: edge.of_replay(|replay| replay.unmet_fault(Some((dag, job)))),
             ..JobShown::new(report, &self.recording(), dag, job)
@@ -83,20 +184,61 @@ impl Machine {
 
     /// Runs to the end, for a duration, or until a job has ended. Meanwhile this machine is the
     /// thread's, whichever was made last.
-    pub(crate) fn run(
-        self: &Rc<Self>,
+    pub(crate) fn run_until(
+        &self,
         duration: Option<Duration>,
         until: Option<(&str, u64)>,
     ) -> Result<Report, RunError> {
-        let mut session = self.session.take().ok_or(RunError::NothingToRun)?;
-        let newest = CURRENT.replace(Rc::downgrade(self));
+        let kept = &self.machine.session;
+        let mut session = kept.take().ok_or(RunError::NothingToRun)?;
+        let newest = CURRENT.replace(Rc::downgrade(&self.machine));
         let result = session.run(duration, until);
         CURRENT.set(newest);
         // A failed session is not put back: its functions cannot continue.
         if let Ok(_) | Err(RunError::Endless { .. } | RunError::NoSuchDag { .. }) = result {
-            self.session.replace(Some(session));
+            kept.replace(Some(session));
         }
         result
+    }
+
+    /// Connects a wire: what is sent on it can be had by [`sent`](Self::sent).
+    ///
+    /// See [`Wire`].
+    #[must_use = "the machine itself is returned"]
+    pub fn connect(self, wire: &Wire) -> Self {
+        let mut connected = self.machine.connected.borrow_mut();
+        connected.push((wire.clone(), Vec::new()));
+        drop(connected);
+        self
+    }
+
+    /// Lets bytes arrive on a wire at a time of the run, counted from the start of scheduling;
+    /// at once if that is past.
+    ///
+    /// See [`Wire`].
+    pub fn arrive_at(&self, wire: &Wire, time: Duration, bytes: &[u8]) {
+        let at_ns = nanoseconds(time).max(self.machine.now_ns.get());
+        self.machine
+            .keep(at_ns, Arrival::Bytes(wire.clone(), bytes.to_vec()));
+    }
+
+    /// Returns all that complete instances have sent so far on a wire that is connected.
+    ///
+    /// See [`Wire`].
+    ///
+    /// # Panics
+    ///
+    /// If the wire is not connected.
+    #[must_use]
+    pub fn sent(&self, wire: &Wire) -> Vec<u8> {
+        let connected = self.machine.connected.borrow();
+        match connected.iter().find(|(of, _)| of == wire) {
+            Some((_, sent)) => sent.clone(),
+            None => panic!(
+                "wire `{}` is not connected; call `connect` before the run",
+                wire.name()
+            ),
+        }
     }
 }
 
@@ -105,7 +247,7 @@ struct HostPlatform;
 
 impl Platform for HostPlatform {
     fn terms(&self) -> Terms {
-        let terms = |machine: Rc<Machine>| machine.surroundings.settings.borrow().terms.clone();
+        let terms = |machine: Rc<Machine>| machine.settings.borrow().terms.clone();
         // Without a machine, those that one has at first.
         current().map(terms).unwrap_or_default()
     }
@@ -115,31 +257,31 @@ impl Platform for HostPlatform {
     }
 
     fn now_ns(&self) -> u64 {
-        let surroundings = surroundings();
-        surroundings.edge.answer_ns(surroundings.now_ns.get())
+        let machine = expect_current();
+        machine.edge.answer_ns(machine.now_ns.get())
     }
 
     fn execute_for(&self, duration: Duration, _how: Occupation) {
-        let surroundings = surroundings();
-        let Some(executed_ns) = surroundings.executed_ns.get() else {
+        let machine = expect_current();
+        let Some(executed_ns) = machine.executed_ns.get() else {
             panic!("`execute_for` is called outside a subtask; call it in a subtask's function");
         };
         // A sum that does not fit is reported by the driver as a finish beyond
         // the last time there is.
         let ns = nanoseconds(duration);
-        (surroundings.executed_ns).set(Some(executed_ns.saturating_add(ns)));
-        let now_ns = &surroundings.now_ns;
+        (machine.executed_ns).set(Some(executed_ns.saturating_add(ns)));
+        let now_ns = &machine.now_ns;
         now_ns.set(now_ns.get().saturating_add(ns));
     }
 
     fn raise(&self, plan: u64, dag: DagId) {
         let machine = expect_current();
         assert!(
-            machine.surroundings.executed_ns.get().is_none(),
+            machine.executed_ns.get().is_none(),
             "a subtask raises a signal that it was not registered with; register it by \
              `dag.using(signal.raising())`"
         );
-        machine.raise_at(machine.surroundings.now_ns.get(), (plan, dag));
+        machine.raise_at(machine.now_ns.get(), (plan, dag));
     }
 
     fn crosses(&self) -> bool {
@@ -150,29 +292,28 @@ impl Platform for HostPlatform {
         let machine = expect_current();
         // Those of a second plan, which will be refused, are not this run's.
         if !machine.has_launched.get() {
-            machine.surroundings.edge.open(dag, graph, channels);
+            machine.edge.open(dag, graph, channels);
         }
         false
     }
 
     fn record(&self, value: &Recorded<'_>) {
-        surroundings().edge.record(value);
+        expect_current().edge.record(value);
     }
 
     fn replays(&self) -> bool {
-        current().is_some_and(|machine| machine.surroundings.edge.is_replay())
+        current().is_some_and(|machine| machine.edge.is_replay())
     }
 
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        surroundings().edge.lend(channel, job, take);
+        expect_current().edge.lend(channel, job, take);
     }
 
     fn log(&self, mut line: Line) {
         if let Some(machine) = current() {
-            let surroundings = &machine.surroundings;
-            line.instance = surroundings.running.get();
-            line.at_ns = surroundings.now_ns.get();
-            surroundings.logs.borrow_mut().push(line);
+            line.instance = machine.running.get();
+            line.at_ns = machine.now_ns.get();
+            machine.logs.borrow_mut().push(line);
         }
     }
 
@@ -188,8 +329,7 @@ impl Platform for HostPlatform {
                  or make a new `VirtualTime`",
             ));
         }
-        let surroundings = &machine.surroundings;
-        let settings = surroundings.settings.borrow();
+        let settings = machine.settings.borrow();
         let faults = settings.faults.iter();
         let mut absent = faults.filter_map(|fault| fault.absent(&plan.task_set));
         if let Some((dag, subtask)) = absent.next() {
@@ -198,11 +338,11 @@ impl Platform for HostPlatform {
                  name one that is"
             )));
         }
-        let launched = surroundings.edge.launch(&mut plan, settings.most_jobs);
+        let launched = machine.edge.launch(&mut plan, settings.most_jobs);
         launched.map_err(LaunchError::new)?;
-        (surroundings.edge).commit(&plan, &settings.terms);
+        machine.edge.commit(&plan, &settings.terms);
         machine.plan.set(Some(plan.number));
-        let session = Session::new(plan, settings.terms.scheduler, surroundings);
+        let session = Session::new(plan, settings.terms.scheduler, &machine);
         machine.session.replace(Some(session));
         Ok(())
     }
@@ -216,6 +356,377 @@ fn expect_current() -> Rc<Machine> {
     current().expect("this thread has no `VirtualTime`; make one on the thread that commits")
 }
 
-fn surroundings() -> Rc<Surroundings> {
-    Rc::clone(&expect_current().surroundings)
+/// A plan that runs, or can go on running.
+#[derive(Debug)]
+pub(crate) struct Session {
+    driver: Driver<Runner>,
+    calls: Calls,
+    /// Whether a function may end the run.
+    may_shut_down: bool,
+    /// Up to when it has run.
+    until_ns: u64,
 }
+
+fn dags(task_set: &TaskSet) -> impl Iterator<Item = (DagId, &Dag)> + Clone {
+    (0..).map(DagId).zip(task_set.dags())
+}
+
+impl Session {
+    pub(crate) fn new(plan: Plan, options: SchedulerOptions, machine: &Rc<Machine>) -> Self {
+        let task_set: Arc<TaskSet> = plan.task_set;
+        for (dag, _) in dags(&task_set).filter(|(_, model)| model.is_sporadic()) {
+            machine.follow_signal(dag, 0);
+        }
+        let bodies = Runner::all(&task_set, plan.bodies);
+        let driver = Driver::of_bodies(&task_set, options, bodies, &plan.after_fault);
+        Self {
+            may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
+            driver: driver.with_lifecycle(plan.lifecycle).recording(),
+            calls: Calls::new(&task_set, machine),
+            until_ns: 0,
+        }
+    }
+
+    /// Returns the number of the DAG of this name.
+    fn find(&self, name: &str) -> Result<DagId, RunError> {
+        let dags = dags(&self.calls.task_set);
+        let mut of_name = dags.clone().filter(|(_, dag)| dag.name() == name);
+        of_name.next().map(|(dag, _)| dag).ok_or_else(|| {
+            let there = dags.map(|(_, dag)| format!("`{}`", dag.name()));
+            RunError::NoSuchDag {
+                name: name.into(),
+                there: there.collect::<Vec<String>>().join(", "),
+            }
+        })
+    }
+
+    /// Runs for a duration, or to the end; in either case not beyond the end of a job.
+    pub(crate) fn run(
+        &mut self,
+        duration: Option<Duration>,
+        until: Option<(&str, u64)>,
+    ) -> Result<Report, RunError> {
+        let machine = Rc::clone(&self.calls.machine);
+        let until_ns = match duration {
+            Some(duration) => self.until_ns.saturating_add(nanoseconds(duration)),
+            None => u64::MAX,
+        };
+        if duration.is_none() && until.is_none() {
+            self.require_end()?;
+        }
+        let until = until.map(|(dag, job)| Ok((self.find(dag)?, job)));
+        let until = until.transpose()?;
+        self.calls.until = until;
+        self.calls.has_arrived = until.is_some_and(|(dag, last)| {
+            let run = self.driver.run_so_far();
+            let mut jobs = run.record().numbered(dag);
+            jobs.any(|(job, times)| job >= last && times.ended_ns.is_some())
+        });
+        let end = self.driver.run_until(until_ns, &mut self.calls);
+        let now_ns = self.driver.now_ns();
+        // What has no event any more has run as far as it was asked to.
+        let (clock_ns, reached_ns) = match end {
+            End::TimeReached => (until_ns, until_ns),
+            End::Finished | End::TimeOverflow(_) => (now_ns, until_ns),
+            End::Stopped => (now_ns, now_ns),
+        };
+        machine.now_ns.set(clock_ns);
+        self.until_ns = reached_ns;
+        let is_over = end == End::Finished;
+        let outcome = (machine.edge).of_replay(|replay| replay.outcome(is_over));
+        let (run, calls) = (self.driver.run_so_far(), &self.calls);
+        let report = Report {
+            panics: calls.panics.clone(),
+            degraded: calls.degraded.clone(),
+            is_late: machine.settings.borrow().late.most_ns > 0,
+            ..Report::new(
+                run,
+                now_ns,
+                &calls.executed_ns,
+                &machine.logs.borrow(),
+                outcome,
+            )
+        };
+        if let Some(PanicRecord { instance, message }) = self.calls.panic.take() {
+            let (dag, subtask) = self.labels(instance);
+            return Err(RunError::Panicked {
+                dag,
+                subtask,
+                job: instance.job,
+                message,
+                report: Box::new(report),
+            });
+        }
+        if let End::TimeOverflow(instance) = end {
+            let ((dag, subtask), job) = (self.labels(instance), instance.job);
+            return Err(RunError::TimeOverflow { dag, subtask, job });
+        }
+        Ok(report)
+    }
+
+    fn labels(&self, Instance { dag, subtask, .. }: Instance) -> (DagLabel, SubtaskLabel) {
+        let task_set = &self.calls.task_set;
+        (task_set.label(dag), task_set.subtask_label(dag, subtask))
+    }
+
+    fn require_end(&self) -> Result<(), RunError> {
+        let task_set = &self.calls.task_set;
+        let is_endless = |dag: &Dag| dag.jobs().is_none() && !dag.is_sporadic();
+        match dags(task_set).find(|(_, dag)| is_endless(dag)) {
+            Some((dag, _)) if !self.may_shut_down => Err(RunError::Endless {
+                dag: task_set.label(dag),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the recording of the run so far.
+    pub(crate) fn recording(&self) -> Vec<u8> {
+        let edge = &self.calls.machine.edge;
+        edge.recording(&self.driver.run_so_far())
+    }
+}
+
+/// The message of a fault that a test asked for.
+const FAULT: &str = "a fault that was asked for";
+
+/// The workload of the driver: the functions of the bodies, and what is known of their calls
+/// besides the events.
+#[derive(Debug)]
+struct Calls {
+    pub(crate) task_set: Arc<TaskSet>,
+    pub(crate) machine: Rc<Machine>,
+    /// How long each instance executes in all.
+    pub(crate) executed_ns: BTreeMap<Instance, u64>,
+    /// The contained panics.
+    pub(crate) panics: Vec<PanicRecord>,
+    /// For each DAG whether a subtask of it has fallen back.
+    pub(crate) degraded: Vec<bool>,
+    /// The panic that fails the run and stops it.
+    pub(crate) panic: Option<PanicRecord>,
+    /// The job with whose end the run stops.
+    pub(crate) until: Option<(DagId, u64)>,
+    /// Whether it has ended.
+    pub(crate) has_arrived: bool,
+}
+
+impl Calls {
+    pub(crate) fn new(task_set: &Arc<TaskSet>, machine: &Rc<Machine>) -> Self {
+        Self {
+            task_set: Arc::clone(task_set),
+            machine: Rc::clone(machine),
+            executed_ns: BTreeMap::new(),
+            panics: Vec::new(),
+            degraded: vec![false; task_set.dags().len()],
+            panic: None,
+            until: None,
+            has_arrived: false,
+        }
+    }
+
+    /// Calls a function, or fails in its place. The error is the message of its panic.
+    fn call(&self, runner: &mut Runner, fails: bool) -> Result<(), String> {
+        // Unwind safety: a body that panicked is never run again, and the
+        // machine's cells hold plain numbers.
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            if fails {
+                runner.body.discard(runner.instance.job);
+                resume_unwind(Box::new(FAULT));
+            }
+            runner.run();
+        }));
+        result.map_err(|payload| {
+            let text = payload.downcast_ref::<String>().map(String::as_str);
+            let text = text.or_else(|| payload.downcast_ref::<&str>().copied());
+            text.unwrap_or("(a payload that is no text)").to_owned()
+        })
+    }
+}
+
+impl Workload<Runner> for Calls {
+    fn execute(&mut self, runner: &mut Runner, now_ns: u64) -> Option<u64> {
+        let (machine, instance) = (Rc::clone(&self.machine), runner.instance);
+        let passes_over = |replay: &mut Replay| replay.passes_over(instance);
+        if machine.edge.of_replay(passes_over) {
+            runner.body.discard(instance.job);
+            return Some(0);
+        }
+        machine.now_ns.set(now_ns);
+        machine.executed_ns.set(Some(0));
+        machine.running.set(Some(instance));
+        machine.edge.begin(instance);
+        let settings = machine.settings.borrow();
+        let mut faults = settings.faults.iter();
+        let fails = faults.any(|fault| fault.is(instance, &self.task_set));
+        let mut result = self.call(runner, fails);
+        machine.edge.end(instance, now_ns);
+        machine.running.set(None);
+        let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
+        let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
+        if executed_ns == 0 && (result.is_ok() || fails) {
+            executed_ns = settings.silent.of_call_ns(instance, subtask.wcet_ns());
+        }
+        // The function has run to its end, but nobody may see what it did beyond its budget.
+        let budget_ns = subtask.most_execution_ns(0);
+        if executed_ns > budget_ns {
+            executed_ns = budget_ns;
+            let budget = Duration::from_nanos(budget_ns);
+            result = Err(format!("executed for more than its budget of {budget:?}"));
+        }
+        if let Err(message) = result {
+            runner.body.failed(now_ns);
+            let panic = PanicRecord { instance, message };
+            if !settings.contains_panics {
+                self.panic = Some(panic);
+                return None;
+            }
+            self.panics.push(panic);
+            if machine.edge.is_replayed(instance.dag) {
+                // What it cuts is recorded, and is passed over.
+                if let Some(next) = runner.body.replacement().filter(Alternate::is_there) {
+                    self.degraded[instance.dag.index()] |= next.is_fallback();
+                    runner.body.replace();
+                }
+                let task_set = &self.task_set;
+                let cut = |replay: &mut Replay| replay.cut_behind(instance, task_set);
+                machine.edge.of_replay(cut);
+            }
+        }
+        self.executed_ns.insert(instance, executed_ns);
+        Some(executed_ns)
+    }
+
+    fn fails(&mut self, instance: Instance) -> bool {
+        let mut panics = self.panics.iter();
+        !self.machine.edge.is_replayed(instance.dag)
+            && panics.any(|panic| panic.instance == instance)
+    }
+
+    fn ended(&mut self, instance: Instance, fault: Option<Cost>) {
+        self.degraded[instance.dag.index()] |= fault == Some(Cost::Degraded);
+        self.machine.collect();
+    }
+
+    fn hear(&mut self, notice: &Notice) {
+        let event = &notice.event;
+        let ended = match event.what {
+            What::Released => None,
+            // All jobs of it.
+            What::Stopped => Some(u64::MAX),
+            _ => Some(event.job),
+        };
+        self.has_arrived |=
+            (self.until).is_some_and(|(dag, job)| dag == event.dag && Some(job) <= ended);
+        // In a replay, a signal follows when the one before it has led to something.
+        if let What::Released | What::Skipped = event.what {
+            self.machine.follow_signal(event.dag, event.time_ns);
+        }
+    }
+
+    fn request(&mut self, request: Request, now_ns: u64) {
+        match request {
+            Request::Signal(dag) => self.machine.signal_at(now_ns, dag),
+            _ => self.machine.keep(now_ns, Arrival::Request(request)),
+        }
+    }
+
+    fn next_request_ns(&self) -> Option<u64> {
+        self.machine.next_request_ns()
+    }
+
+    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
+        self.machine.take_request(now_ns)
+    }
+
+    fn late_ns(&self, due_ns: u64) -> u64 {
+        self.machine.settings.borrow().late.of_interrupt_ns(due_ns)
+    }
+
+    fn stops(&self) -> bool {
+        self.has_arrived
+    }
+}
+
+/// Why a run in virtual time ended early, or could not begin.
+///
+/// ```
+/// use virtual_time::{RunError, VirtualTime};
+///
+/// let machine = VirtualTime::new(); // and nothing is committed
+/// assert!(matches!(machine.try_run(), Err(RunError::NothingToRun)));
+/// ```
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum RunError {
+    /// Nothing has been committed on this thread since the machine was made, or
+    /// an earlier run has failed.
+    NothingToRun,
+    /// A run to the end was asked for, but this DAG has no end.
+    Endless {
+        /// The DAG.
+        dag: DagLabel,
+    },
+    /// A subtask's function panicked, and the machine was not told to
+    /// [contain](crate::VirtualTime::contain_panics) that. No function runs
+    /// after it.
+    Panicked {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The job.
+        job: u64,
+        /// The panic's message.
+        message: String,
+        /// What happened up to the panic.
+        report: Box<Report>,
+    },
+    /// A job of a DAG was asked for that is not in the commit.
+    NoSuchDag {
+        /// The name.
+        name: String,
+        /// Those that are there.
+        there: String,
+    },
+    /// An instance would finish after `u64::MAX` nanoseconds.
+    TimeOverflow {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The job.
+        job: u64,
+    },
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NothingToRun => f.write_str(
+                "there is nothing to run; commit DAGs on this thread after making the `VirtualTime`",
+            ),
+            Self::Endless { dag } => write!(
+                f,
+                "{dag} has no limit of jobs, so its run has no end; set `jobs` or use `run_for`"
+            ),
+            Self::Panicked {
+                dag,
+                subtask,
+                job,
+                message,
+                ..
+            } => write!(f, "{subtask} of {dag} panicked in job {job}: {message}"),
+            Self::NoSuchDag { name, there } => {
+                write!(f, "there is no dag `{name}`; there are {there}")
+            }
+            Self::TimeOverflow { dag, subtask, job } => write!(
+                f,
+                "{subtask} of {dag} would finish job {job} after {} ns, the last time there is; \
+                 execute for less",
+                u64::MAX
+            ),
+        }
+    }
+}
+
+impl Error for RunError {}

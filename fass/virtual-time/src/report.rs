@@ -1,5 +1,6 @@
 //! What a run leaves behind: of the whole, of each DAG, each job and each instance.
 
+use std::collections::BTreeMap;
 use std::ops::Deref;
 
 use fass::edge::Outcome;
@@ -10,7 +11,6 @@ use sched_dag::law::{self, Terms, Violation};
 use sched_dag::{DagId, DagKey, DagStatistics, Instance, SubtaskKey};
 
 use crate::edge::Divergence;
-use crate::surroundings::{Calls, PanicRecord};
 
 /// Everything that happened from the commit to the end of a run: the engine's [`Run`], and what
 /// only virtual time knows.
@@ -66,9 +66,9 @@ pub struct Report {
     /// In a replay, a DAG and its first job that is recorded, if that is not the first one it had:
     /// what its functions remember of jobs before is lacking.
     pub lacking: Option<(String, u64)>,
-    run: Run,
+    pub(crate) run: Run,
     /// Whether interrupts may have been late.
-    is_late: bool,
+    pub(crate) is_late: bool,
 }
 
 impl Deref for Report {
@@ -80,13 +80,20 @@ impl Deref for Report {
 }
 
 impl Report {
-    /// Adds what is known of the calls to a run, which has come to `end_ns`.
-    pub(crate) fn new(run: Run, end_ns: u64, calls: &Calls, outcome: Outcome) -> Self {
+    /// Makes the report of a run which has come to `end_ns`, whose instances have executed for so
+    /// long, and in which nothing panicked.
+    pub(crate) fn new(
+        run: Run,
+        end_ns: u64,
+        executed_ns: &BTreeMap<Instance, u64>,
+        logs: &[Line],
+        outcome: Outcome,
+    ) -> Self {
         let events: Vec<Event> = run.journal().events().collect();
         let of = |what| events.iter().filter(move |event| event.what == what);
         let ready = of(What::Ready).filter_map(Event::instance);
         let instances = ready.filter_map(|instance| {
-            let execution_ns = calls.executed_ns.get(&instance).copied();
+            let execution_ns = executed_ns.get(&instance).copied();
             Some(InstanceRecord {
                 instance,
                 execution_ns: execution_ns.unwrap_or(0),
@@ -94,13 +101,12 @@ impl Report {
             })
         });
         let jobs = of(What::Released).filter_map(|event| JobRecord::new(&run, event));
-        let logs = calls.machine.logs.borrow();
         let shown = |line: &Line| line.shown(Some(run.task_set())).to_string();
         Self {
             instances: instances.collect(),
             jobs: jobs.collect(),
-            panics: calls.panics.clone(),
-            degraded: calls.degraded.clone(),
+            panics: Vec::new(),
+            degraded: Vec::new(),
             logs: logs.iter().map(shown).collect(),
             end_ns,
             compared: outcome.compared,
@@ -109,7 +115,7 @@ impl Report {
             lacking: outcome.lacking,
             events,
             run,
-            is_late: calls.machine.settings.borrow().late.most_ns > 0,
+            is_late: false,
         }
     }
 
@@ -381,6 +387,17 @@ impl JobRecord {
     pub fn response_time_ns(&self) -> Option<u64> {
         self.ended_ns.map(|ended_ns| ended_ns - self.release_ns)
     }
+}
+
+/// A panic that was contained: it ended its DAG, and the run went on.
+///
+/// See [`contain_panics`](crate::VirtualTime::contain_panics).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PanicRecord {
+    /// The instance whose function panicked.
+    pub instance: Instance,
+    /// The panic's message.
+    pub message: String,
 }
 
 #[cfg(test)]
