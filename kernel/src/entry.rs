@@ -8,7 +8,7 @@
 use core::panic::PanicInfo;
 use core::sync::atomic::Ordering;
 
-use front::app::verdict::IS_UNOPTIMIZED;
+use front::app::ending::IS_UNOPTIMIZED;
 
 pub use boot::BootInfo;
 pub use executive::console::write_as;

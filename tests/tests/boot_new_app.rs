@@ -314,20 +314,18 @@ const RUN: &str = r#"
 
 #[test]
 fn a_main_with_every_call_of_the_machine_is_one_source_on_the_machine_and_on_linux() {
-    for file in ["machine", "services", "division"] {
-        let source = workspace().join(format!("kernel/front/src/app/{file}.rs"));
-        let source = fs::read_to_string(source).expect("the front's");
-        for call in source.split("pub fn ").skip(1) {
-            let (name, arguments) = call.split_once('(').expect("a function");
-            if !arguments.starts_with("&self") {
-                continue;
-            }
-            let is_made = [BEFORE, RUN].concat().contains(&format!("machine.{name}("));
-            assert!(
-                is_made,
-                "`{name}` is not called; write it into `BEFORE` or `RUN`"
-            );
+    let source = workspace().join("kernel/front/src/app/machine.rs");
+    let source = fs::read_to_string(source).expect("the front's");
+    for call in source.split("pub fn ").skip(1) {
+        let (name, arguments) = call.split_once('(').expect("a function");
+        if !arguments.starts_with("&self") {
+            continue;
         }
+        let is_made = [BEFORE, RUN].concat().contains(&format!("machine.{name}("));
+        assert!(
+            is_made,
+            "`{name}` is not called; write it into `BEFORE` or `RUN`"
+        );
     }
     let app = repository("every-call", NAME);
     for (file, old, new) in [

@@ -18,11 +18,9 @@ const FOLDERS: [&str; 6] = [
     "fass/src/run",
     "fass/virtual-time/src",
 ];
-const FILES: [&str; 10] = [
+const FILES: [&str; 8] = [
     "kernel/src/lib.rs",
-    "kernel/front/src/app/division.rs",
     "kernel/front/src/app/machine.rs",
-    "kernel/front/src/app/services.rs",
     "sched-dag/src/engine/run.rs",
     "kernel/front/src/options.rs",
     "kernel/front/src/text/json.rs",

@@ -43,8 +43,6 @@ mod look_out;
 mod machine;
 mod office;
 mod platform;
-mod release;
-mod run;
 mod state;
 #[allow(
     unsafe_code,
@@ -52,11 +50,9 @@ mod state;
 )]
 mod sys;
 mod team;
-mod wires;
 mod worker;
 
 pub use control::{Control, EndSignals};
-pub use machine::{Linux, Mechanism, StartError, now_ns, own_core, processors};
-pub use run::{Counts, Run};
+pub use machine::{Connection, Linux, Mechanism, StartError, now_ns, own_core, processors};
+pub use platform::{Counts, Run};
 pub use state::Fault;
-pub use wires::Connection;

@@ -51,7 +51,6 @@
 extern crate alloc;
 
 mod bytes;
-mod commit;
 mod entry;
 mod read;
 mod recordable;
@@ -60,10 +59,10 @@ mod shown;
 mod stream;
 
 pub use bytes::{Decoder, Encoder, Full, Malformed};
-pub use commit::{
+pub use entry::{Channel, DagHeader, Entry, Header, Role, What};
+pub use entry::{
     Commit, CommittedDag, CommittedSubtask, CommittedTopic, Counted, DagTimes, SubtaskTimes, Times,
 };
-pub use entry::{Channel, DagHeader, Entry, Header, Role, What};
 pub use read::{Chunk, Events, Mismatch, Recording, mended};
 #[doc(hidden)]
 pub use recordable::deepest;

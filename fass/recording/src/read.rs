@@ -7,8 +7,8 @@ use alloc::vec::Vec;
 use core::fmt::{self, Debug};
 
 use super::bytes::{Decoder, Malformed};
-use super::commit::{Commit, Times};
 use super::entry::{Channel, Entry, Header, What};
+use super::entry::{Commit, Times};
 use super::recordable::Recordable;
 use super::stream::{
     COMMIT, CUT, Crc, END, ENTRY, EVENTS, HEADER, MAGIC, Stream, TEXT, TIMES, VERSION,

@@ -19,7 +19,7 @@
 use alloc::vec::Vec;
 
 use super::bytes::Encoder;
-use super::commit::{Commit, Times};
+use super::entry::{Commit, Times};
 use super::entry::{Entry, Header, What};
 use super::recordable::to_bytes;
 

@@ -1,20 +1,46 @@
 //! The program's way to the app's function, and its end.
+//!
+//! # The words of the command line that Linux takes, and those that it has no use for
+//!
+//! | word | meaning | default |
+//! | --- | --- | --- |
+//! | `cores=N` | how many of the processors that the program may use are its cores | all of them |
+//! | `share=off\|on` | whether several cores share a processor where there are more cores | `off` |
+//! | `mechanism=fifo\|sched_ext\|normal\|poll` | by which class of Linux's threads run | `fifo` |
+//! | `module=FILE` | a file for the app | |
+//! | `wcets=N` | the first N bytes of it are WCETs that were observed | 0 |
+//! | `input=-` | what comes on standard input arrives on the app's wire | |
+//! | `output=FILE` | what the app sends on its wire goes there | |
+//! | `console=off\|on` | whether a person at standard input can talk with a run | `off` |
+//! | `keep=FILE` | the record of the run is written there, also while it goes on | |
+//! | `record=FILE` | the same, and it is an error if no topic is recorded | |
+//! | `events=FILE\|on` | if neither is given: its commits, events and times are, when a run is over; `on` is for lines of the output | |
+//! | `replay=FILE` | the run replays that recording | |
+//! | `from=DAG/JOB` | from that job on, or the last one before it of which all states are recorded | all jobs |
+//! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
+//!
+//! Besides, `policy`, `preemption`, `budget_factor`, `overheads_ns`, `bounds` and `log` mean
+//! what they mean on the machine.
 
+use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
+use std::time::Duration;
 
-use linux::{EndSignals, Linux};
-
-pub use crate::output::write_as;
-pub use front::output;
-
-use crate::app::linux_system::{LinuxSystem, Machine, memory_kib};
-use crate::app::words;
-use crate::options::Options;
-use front::app::ending::{self, Ending, Told};
-use front::app::verdict::Verdict;
+use fass::edge::Sink;
+use front::app::ending::{self, Ending, Told, Verdict};
+use front::app::terms::{self, Chosen};
 use front::json;
+use front::options::{Options, UsageError};
+pub use front::output;
+use front::report::Lines;
+use linux::{EndSignals, Linux, Mechanism};
+
+use crate::linux_system::{LinuxSystem, Machine, memory_kib};
+pub use crate::output::write_as;
 
 /// Makes an app's function the one that the program runs: the function `program`, for the file
 /// that has the app's `main.rs` as its module.
@@ -62,7 +88,7 @@ fn run(
     // Who sees the first line may ask for an end.
     let signals = EndSignals::catch_first();
     let options = Options::parse(line)?;
-    let (linux, module) = words::apply(name, &options)?;
+    let (linux, module) = apply(name, &options)?;
     json::report("boot", |object| {
         object
             .text("version", env!("CARGO_PKG_VERSION"))
@@ -88,4 +114,116 @@ fn run(
     let result = Machine::serve(system, options, module, verdict, app);
     let kept = Linux::end_record();
     result.and_then(|()| kept.map_err(|why| Ending::Failure(format!("the record: {why}"))))
+}
+
+/// The kernel's words that are about its machine, or about what Linux does not do yet.
+const FOREIGN: [(&str, &str); 12] = [
+    ("trace_events", "the journal takes what memory it needs"),
+    ("measure", "interrupts are Linux's"),
+    ("idle", "idle cores are Linux's"),
+    ("status", "the console tells it, by `stats`"),
+    ("mode", "time is real"),
+    ("probe", "there is no machine to look at"),
+    ("end", "the program ends, and Linux goes on"),
+    ("clock", "the clock is Linux's"),
+    ("avx", "Linux saves all registers"),
+    ("x2apic", "interrupts are Linux's"),
+    ("smt", "processors are Linux's"),
+    (
+        "latest",
+        "a run is recorded from its begin, by `record=FILE`",
+    ),
+];
+
+/// Takes the words, and makes the machine that they describe. Returns what they say besides, and
+/// the app's file.
+pub(crate) fn apply(
+    app: &'static str,
+    options: &Options<'static>,
+) -> Result<(Linux, Option<&'static [u8]>), UsageError> {
+    if let Some((word, why)) = FOREIGN
+        .iter()
+        .find(|(word, _)| options.text(word).is_some())
+    {
+        let line = format!("`{word}` is for the bare machine: on Linux {why}; leave it out");
+        return Err(UsageError::new(line));
+    }
+    let chosen = Chosen::read(options)?;
+    let mechanisms = [
+        ("fifo", Mechanism::Fifo),
+        ("sched_ext", Mechanism::SchedExt),
+        ("normal", Mechanism::Normal),
+        ("poll", Mechanism::Poll),
+    ];
+    let mechanism = options.choice("mechanism", &mechanisms)?;
+    let cores = options.number("cores", 1..=1024, u64::from(linux::processors()))?;
+    let limit_ms = options.number("limit_ms", 0..=86_400_000, 0)?;
+    let module = options.text("module").map(|path| read("module", path));
+    let module = module.transpose()?;
+    let (wcets, module) = terms::split_wcets(options, module)?;
+    let cores = u32::try_from(cores).unwrap_or(u32::MAX);
+    let make = options.choice(
+        "share",
+        &[
+            ("off", Linux::new as fn(u32, Mechanism) -> _),
+            ("on", Linux::sharing),
+        ],
+    )?;
+    let machine = make(cores, mechanism).map_err(|error| UsageError::new(error.to_string()))?;
+    let machine = machine
+        .with(|terms| {
+            chosen.apply(terms);
+            terms.wcets = wcets.map(Cow::Borrowed);
+        })
+        .allocations(crate::heap::allocations);
+    let replayed = options.text("replay");
+    let words = ["record", "keep", "events"].map(|word| Some((word, options.text(word)?)));
+    match (words.into_iter().flatten().next(), replayed) {
+        (Some(("record" | "keep", _)), Some(_)) => {
+            let line = "`record` and `keep` exclude `replay`; give one";
+            return Err(UsageError::new(line));
+        }
+        (Some(("events", "on")), _) => machine.keep_events(ToConsole(Lines::new())),
+        (Some((word, path)), _) => {
+            let file = File::create(path);
+            let file = file.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
+            let file = BufWriter::new(file);
+            match word {
+                "record" => machine.record(app, file),
+                "keep" => machine.keep(app, file),
+                _ => machine.keep_events(file),
+            }
+        }
+        (None, _) => {}
+    }
+    if let Some(path) = replayed {
+        machine.replay(read("replay", path)?, terms::from(options)?);
+    }
+    if limit_ms > 0 {
+        let limited = machine.limit_real_time(Duration::from_millis(limit_ms));
+        limited.map_err(|why| UsageError::new(format!("`limit_ms={limit_ms}`: {why}")))?;
+    }
+    Ok((machine, module))
+}
+
+/// Reads the file that a word names. It stays as long as the program, as the loader's does.
+fn read(word: &str, path: &str) -> Result<&'static [u8], UsageError> {
+    let bytes = fs::read(path);
+    let bytes = bytes.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
+    Ok(bytes.leak())
+}
+
+/// The record as lines of the program's output.
+struct ToConsole(Lines);
+
+impl Write for ToConsole {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.put(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush();
+        Ok(())
+    }
 }

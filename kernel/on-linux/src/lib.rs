@@ -29,16 +29,14 @@
 
 #![deny(unsafe_code)]
 
-mod app;
 #[doc(hidden)]
 pub mod entry;
 #[allow(unsafe_code, reason = "an allocator that counts")]
 mod heap;
+mod linux_system;
+mod lock;
 mod output;
 
-pub use crate::app::lock::Event;
-pub use app::linux_system::Machine;
-pub use app::lock::Lock;
 pub use front::app::ending::Ending;
 #[doc(inline)]
 pub use front::named::{console, json, options};
@@ -47,6 +45,8 @@ pub use front::report::Resources;
 pub use front::{print, println};
 #[doc(hidden)]
 pub use heap::Heap;
+pub use linux_system::Machine;
+pub use lock::{Event, Lock};
 #[doc(inline)]
 pub use sched_dag::engine::Run;
 

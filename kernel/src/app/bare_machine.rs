@@ -11,7 +11,7 @@ use fass::{Platform, Signal, Terms, Wire};
 use super::calibration;
 use crate::options::{Options, UsageError};
 use crate::report::{self, Ns};
-use crate::watch::background::live_run::KernelRun;
+use crate::watch::background::KernelRun;
 use crate::watch::background::{Background, LINE, Wishes, wire};
 use executive::machine::{self, interrupts_off, this_core};
 use executive::memory::heap;
@@ -159,7 +159,7 @@ impl System for BareMachine {
 }
 
 #[cfg(feature = "clusters")]
-impl front::app::division::Divisible for BareMachine {}
+impl front::app::machine::Divisible for BareMachine {}
 
 fn report_interrupts_off(longest_ns: u64, place: &Location<'_>) {
     let place = fmt::from_fn(|f| write!(f, "{}:{}", place.file(), place.line()));

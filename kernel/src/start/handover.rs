@@ -1,4 +1,8 @@
 //! From the handover by `boot` to the app's function, and its end.
+//!
+//! On the way stand the line of kind `boot`, which says what machine this is, and warnings of what in
+//! it harms real time. A hypervisor hides what the processor states of itself, so on one nothing is said of that but
+//! in the line.
 
 use alloc::borrow::Cow;
 use alloc::format;
@@ -8,17 +12,10 @@ use core::ops::Range;
 use boot::acpi::{self, MAX_IO_APICS, Platform};
 use boot::physical::LowMemory;
 use boot::{BootInfo, Framebuffer, List, MAX_PROCESSORS, MAX_REGIONS, Module};
-
-use super::announcement::announce;
-use super::{probe, selection, settings};
-use crate::app::bare_machine::{BareMachine, Machine};
-use crate::options::{Options, UsageError};
-use crate::println;
-use crate::watch::{self, panic};
 use executive::machine::calibration::{self, KnownClock, Rate};
 use executive::machine::paging::MapError;
 use executive::machine::power::{self, End};
-use executive::machine::this_core::{self, Stacks};
+use executive::machine::this_core::{self, Core, Stacks};
 use executive::machine::{
     agreement, avx, clock, cpu, interrupt, interrupt_flag, legacy, local_apic, processors, screen,
     serial,
@@ -27,9 +24,15 @@ use executive::run::platform::KERNEL;
 use executive::run::{containment, contexts, heartbeat, record, worker};
 use executive::text::console;
 use executive::{interrupts, memory};
-use front::app::ending::{self, Ending};
+use front::app::ending::{self, Ending, Verdict};
 use front::app::terms;
-use front::app::verdict::Verdict;
+use front::json;
+
+use super::{probe, settings};
+use crate::app::bare_machine::{BareMachine, Machine};
+use crate::options::{Options, UsageError};
+use crate::println;
+use crate::watch::{self, panic};
 
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
@@ -290,7 +293,7 @@ fn by_number(platform: &Platform) -> impl Iterator<Item = u32> {
 /// Returns the APIC ids of the processors that become cores. What is wrong in the words is refused
 /// later.
 fn selected(info: &BootInfo, platform: &Platform) -> Vec<u32> {
-    let is_right = |list: &&str| selection::check(list, by_number(platform).count()).is_ok();
+    let is_right = |list: &&str| settings::check(list, by_number(platform).count()).is_ok();
     let list = info.value("cores").filter(is_right);
     assert!(
         platform.processors <= MAX_PROCESSORS || list.is_some(),
@@ -301,7 +304,7 @@ fn selected(info: &BootInfo, platform: &Platform) -> Vec<u32> {
     );
     let drops_siblings = info.value("smt") == Some("off");
     let bits = drops_siblings.then(processors::sibling_bits);
-    selection::select(by_number(platform), list, bits.unwrap_or(0))
+    settings::select(by_number(platform), list, bits.unwrap_or(0))
 }
 
 /// Returns what each core needs, the boot processor's first.
@@ -367,4 +370,60 @@ fn end(result: Result<(), Ending>) -> ! {
     let told = ending::tell(&result);
     console::resume();
     power::exit(told)
+}
+
+/// Says what machine this is, and of what an app has to beware.
+pub(super) fn announce(info: &BootInfo, app: &str, memory_bytes: u64, rate: &Rate) {
+    let all = this_core::all();
+    let cores = all.len();
+    let ids: Vec<u32> = all.iter().map(Core::apic_id).collect();
+    let siblings = settings::siblings(&ids, processors::sibling_bits());
+    let efficiency_cores = all.iter().filter(|core| core.is_efficient()).count();
+    let command_line = info.command_line().unwrap_or("(not UTF-8)");
+    json::report("boot", |line| {
+        line.text("version", env!("CARGO_PKG_VERSION"))
+            .text("app", app)
+            .number("cpus", cores as u64)
+            .number("siblings", siblings as u64)
+            .number("efficiency_cores", efficiency_cores as u64)
+            .number("memory_kib", memory_bytes / 1024)
+            .text("clock", rate.clock)
+            .number("counter_khz", rate.khz)
+            .flag("counter_invariant", cpu::has_invariant_counter())
+            .flag("timer_in_halt", cpu::has_timer_in_halt())
+            .flag("x2apic", local_apic::is_x2apic())
+            .flag("avx", avx::is_on())
+            .flag("clock_undisputed", rate.is_undisputed());
+        if let Some((clock, khz)) = rate.check {
+            line.text("clock_check", clock)
+                .number("clock_check_khz", khz);
+        }
+        line.number("skew_ns", agreement::skew_ns())
+            .number("ready_ns", clock::now_ns())
+            .text("command_line", command_line);
+    });
+    if siblings > 0 {
+        println!(
+            "warning: {siblings} of {cores} cores share a physical core with another, and slow it \
+             down; `smt=off` leaves them out"
+        );
+    }
+    if efficiency_cores > 0 {
+        println!(
+            "warning: {efficiency_cores} of {cores} cores are efficiency cores, slower than the \
+             others; `cores=` chooses"
+        );
+    }
+    if cpu::hypervisor().is_none() && !cpu::has_invariant_counter() {
+        println!(
+            "warning: the processor does not state that its counter keeps one rate; if its \
+             frequency changes, times are wrong"
+        );
+    }
+    if interrupt_flag::stays_awake() {
+        println!(
+            "warning: halting may stop the processor's timer, so idle cores stay awake; \
+             `idle=halt` lets them halt"
+        );
+    }
 }

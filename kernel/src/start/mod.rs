@@ -5,11 +5,9 @@
 //! is, and `probe` is what the image does in place of an app if a word asks for it. All of the
 //! kernel but its entry may be named here: this is where it is put together.
 
-mod announcement;
 #[allow(unsafe_code, reason = "the way up to the first safe state")]
 mod handover;
 mod probe;
-mod selection;
 mod settings;
 
 pub use handover::CLOCK;

@@ -1,16 +1,40 @@
 //! How an app's function may end, besides well.
-
-use core::fmt;
+//!
+//! # The verdict on faults, and on response times beyond their proven bounds
+//!
+//! An app that ignores a fault in one of its DAGs has failed, and so says its verdict. An
+//! app to which faults belong says so
+//! (`Machine::accept_faults`) and judges them by itself.
+//!
+//! A bound holds as long as no instance takes longer than its WCET, and the machine no
+//! longer than the overheads that the commit was told. So a job that took longer shows
+//! that something was stated too small, and that what the commit has proven is not so:
+//! such a run is no success, even if it meets its deadlines. An app whose WCETs are not meant
+//! for this machine says so
+//! (`Machine::accept_exceeded_bounds`).
+//!
+//! In mode `threads` a line says it, and the verdict does not: there emulated
+//! processors wait for the host's, which no overhead can state.
+//!
+//! # Calls that took longer than their WCETs
+//!
+//! What is proven rests on the WCETs, so a WCET that does not hold is worth a line even
+//! where every bound has held. A call includes the kernel's own work for it; so a subtask
+//! is named only if its longest call is above its WCET by more than the commit has charged
+//! for that.
 
 use alloc::format;
 use alloc::string::String;
+use core::cell::{Cell, RefCell};
+use core::fmt;
+use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::CommitError;
-use sched_dag::DagId;
+use fass::{CommitError, Overheads};
 use sched_dag::engine::Run;
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 use crate::options::UsageError;
-use crate::report;
+use crate::report::{self, Ns};
 use crate::text::json;
 
 /// Why an app ends other than by success.
@@ -117,5 +141,291 @@ impl fmt::Display for Ending {
             Self::Failure(message) => f.write_str(message),
             Self::Shutdown => f.write_str("shut down before its end"),
         }
+    }
+}
+
+/// Whether the app was compiled without optimization, as its entry says.
+pub static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
+
+/// The faults and exceeded bounds that are known of the runs so far.
+#[derive(Debug)]
+pub struct Verdict {
+    judges_faults: Cell<bool>,
+    judges_bounds: Cell<bool>,
+    /// Whether several cores share one clock.
+    shares_clock: bool,
+    /// Why the app fails for a fault, if it does.
+    fault: RefCell<Option<String>>,
+    /// Why the app fails for a bound, if it does.
+    exceeded: RefCell<Option<String>>,
+}
+
+/// The jobs of a DAG that took longer than is proven, until all of them or one sink had
+/// finished.
+struct Exceeded {
+    dag: DagId,
+    sink: Option<SubtaskId>,
+    jobs: u64,
+    /// The longest of them.
+    job: u64,
+    response_ns: u64,
+    bound_ns: u64,
+}
+
+impl Verdict {
+    /// Begins without a run. `shares_clock`: several cores share one clock.
+    #[must_use]
+    pub const fn new(judges_bounds: bool, shares_clock: bool) -> Self {
+        Self {
+            judges_faults: Cell::new(true),
+            judges_bounds: Cell::new(judges_bounds),
+            shares_clock,
+            fault: RefCell::new(None),
+            exceeded: RefCell::new(None),
+        }
+    }
+
+    /// Leaves the faults of all runs to the app.
+    pub fn accept_faults(&self) {
+        self.judges_faults.set(false);
+    }
+
+    /// Leaves the bounds of all runs to the app.
+    pub fn accept_exceeded_bounds(&self) {
+        self.judges_bounds.set(false);
+    }
+
+    /// Notes which DAGs of a run have been ended by faults, and says and notes which took longer
+    /// than is proven. Allocates only if there are any.
+    pub fn note(&self, run: &Run) {
+        self.note_faults(run.task_set(), |dag| {
+            run.statistics(dag).faults - run.statistics(dag).restarts
+        });
+        let dags = (0..).map(DagId).take(run.task_set().dags().len());
+        let ends = dags.flat_map(|dag| {
+            let sinks = run.task_set().dag(dag).sinks();
+            let several = sinks.iter().filter(|_| sinks.len() > 1).copied().map(Some);
+            several.chain([None]).map(move |sink| (dag, sink))
+        });
+        for exceeded in ends.filter_map(|(dag, sink)| Exceeded::find(run, dag, sink)) {
+            let is_unoptimized = IS_UNOPTIMIZED.load(Ordering::Relaxed);
+            let also = causes(is_unoptimized, self.shares_clock);
+            let text = exceeded.report(run.task_set(), also);
+            // What the app judges itself is not kept: it would count as in use.
+            if self.judges_bounds.get() {
+                self.exceeded.borrow_mut().get_or_insert(text);
+            }
+        }
+    }
+
+    fn note_faults(&self, task_set: &TaskSet, faults: impl Fn(DagId) -> u64) {
+        let dags = (0..).map(DagId).zip(task_set.dags());
+        let mut ended = dags.filter(|(dag, _)| faults(*dag) > 0);
+        let mut complaint = self.fault.borrow_mut();
+        if complaint.is_some() {
+            return;
+        }
+        *complaint = ended.next().map(|(_, dag)| {
+            let others = match ended.count() {
+                0 => String::new(),
+                count => format!(", and {count} more"),
+            };
+            format!(
+                "a fault ended dag `{}`{others}; the line that begins with `fault:` says which",
+                dag.name()
+            )
+        });
+    }
+
+    /// Takes why the app fails, if it does.
+    pub fn complaint(&self) -> Option<String> {
+        let fault = self.fault.take().filter(|_| self.judges_faults.get());
+        let exceeded = self.exceeded.take();
+        fault.or(exceeded.filter(|_| self.judges_bounds.get()))
+    }
+}
+
+/// Says what may have made calls longer than WCETs that are right elsewhere.
+const fn causes(is_unoptimized: bool, shares_clock: bool) -> &'static str {
+    match (is_unoptimized, shares_clock) {
+        (false, false) => "",
+        (true, false) => "; the image's profile does not optimize: boot one that does",
+        (false, true) => {
+            "; in mode deterministic cores that compute share one clock: `--cores 1` shows what \
+             each call takes alone"
+        }
+        (true, true) => {
+            "; the image's profile does not optimize: boot one that does; and in mode \
+             deterministic cores that compute share one clock: `--cores 1` shows what each call \
+             takes alone"
+        }
+    }
+}
+
+impl Exceeded {
+    /// Looks at a DAG's jobs that are complete.
+    fn find(run: &Run, dag: DagId, sink: Option<SubtaskId>) -> Option<Self> {
+        let bound_ns = match sink {
+            Some(sink) => run.sink_bound_ns(dag, sink)?,
+            None => run.bound_ns(dag)?,
+        };
+        let record = run.record();
+        let end_ns = |job| match sink {
+            Some(subtask) => record.instance(Instance { dag, job, subtask })?.finish_ns,
+            None => record.completion_ns(dag, job),
+        };
+        let complete = |(job, times): (u64, &sched_dag::law::JobRecord)| {
+            times.outcome?;
+            Some((end_ns(job)?.saturating_sub(times.release_ns?), job))
+        };
+        let responses = record.numbered(dag).filter_map(complete);
+        let late = responses.filter(|(response_ns, _)| *response_ns > bound_ns);
+        let (mut jobs, mut longest) = late.fold((0, (0, 0)), |(jobs, longest), of_job| {
+            (jobs + 1, of_job.max(longest))
+        });
+        // Of jobs that are not recorded any more, the longest one is known.
+        if record.first_job(dag) > 0
+            && sink.is_none()
+            && let Some(times) = run.times()
+            && times.dag(dag).longest().0 > bound_ns
+        {
+            jobs = jobs.max(1);
+            longest = times.dag(dag).longest();
+        }
+        let (response_ns, job) = longest;
+        (jobs > 0).then_some(Self {
+            dag,
+            sink,
+            jobs,
+            job,
+            response_ns,
+            bound_ns,
+        })
+    }
+
+    /// Prints it, and returns it in words.
+    fn report(&self, task_set: &TaskSet, also: &str) -> String {
+        let dag = task_set.dag(self.dag);
+        let name = dag.name();
+        let sink = self.sink.map_or(String::new(), |sink| {
+            format!("sink `{}` of ", dag.subtask(sink).name())
+        });
+        let text = format!(
+            "{sink}dag `{name}` took {} in job {}, beyond its proven bound of {}; a WCET, or \
+             `overheads_ns`, is stated too small{also}",
+            Ns(self.response_ns),
+            self.job,
+            Ns(self.bound_ns)
+        );
+        crate::println!("bound exceeded: {text}");
+        json::emit("bound_exceeded", |line| {
+            line.number("dag", self.dag.0).text("dag_name", name);
+            if let Some(sink) = self.sink {
+                line.number("sink", sink.0);
+            }
+            line.number("jobs", self.jobs)
+                .number("job", self.job)
+                .number("response_ns", self.response_ns)
+                .number("bound_ns", self.bound_ns);
+        });
+        text
+    }
+}
+
+/// Names the subtasks of a run that took longer than their WCET and these overheads, which are
+/// those of the commit.
+pub(super) fn note(run: &Run, overheads: Overheads) {
+    let set = run.task_set();
+    let mut subtasks = set.dags().iter().flat_map(|dag| dag.subtasks());
+    if !subtasks.any(|subtask| subtask.wcet_ns().is_some()) {
+        return;
+    }
+    let charged_ns = overheads.of_an_instance_ns(run.options().preemption);
+    let (Some(charged_ns), Some(counts)) = (charged_ns, run.coarse_times()) else {
+        return;
+    };
+    for (dag, model) in (0..).map(DagId).zip(set.dags()) {
+        for (subtask, of_subtask) in (0..).map(SubtaskId).zip(model.subtasks()) {
+            let Some(wcet_ns) = of_subtask.wcet_ns() else {
+                continue;
+            };
+            let job = 0;
+            let counted = counts.subtask(set.vertex(Instance { dag, job, subtask }));
+            let times = counted.execution_time.distribution();
+            let (calls, longest_ns) = (times.count(), times.max());
+            if longest_ns <= wcet_ns.saturating_add(charged_ns) {
+                continue;
+            }
+            crate::println!(
+                "WCET exceeded: subtask `{}` of dag `{}`, {} of {} calls, by {} at most; its WCET \
+                 is {}",
+                of_subtask.name(),
+                model.name(),
+                counted.beyond_wcet,
+                calls,
+                Ns(longest_ns - wcet_ns),
+                Ns(wcet_ns)
+            );
+            json::emit("wcet_exceeded", |line| {
+                line.number("dag", dag.0)
+                    .text("dag_name", model.name())
+                    .number("subtask", subtask.0)
+                    .text("subtask_name", of_subtask.name())
+                    .number("calls", calls)
+                    .number("beyond", counted.beyond_wcet)
+                    .number("longest_ns", longest_ns)
+                    .number("wcet_ns", wcet_ns);
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fass::Policy;
+    use sched_dag::{CommitOptions, DagSpec, SubtaskSpec, verify};
+
+    use super::*;
+    use crate::app::ending::Ending;
+
+    /// Judges an app that had one run of the DAGs `a`, `b` and `c`.
+    fn judged(faults: [u64; 3], accepts: bool, result: Result<(), Ending>) -> String {
+        let dags = ["a", "b", "c"].map(|name| DagSpec {
+            name: name.into(),
+            period_ns: Some(10),
+            relative_deadline_ns: Some(10),
+            subtasks: alloc::vec![SubtaskSpec::default()],
+            ..DagSpec::default()
+        });
+        let options = CommitOptions::new(Policy::Edf, 1);
+        let task_set = verify(&dags, &options).expect("sound DAGs").task_set;
+        let verdict = Verdict::new(true, false);
+        verdict.note_faults(&task_set, |dag| faults[dag.index()]);
+        if accepts {
+            verdict.accept_faults();
+        }
+        match Ending::or_complaint(result, verdict.complaint()) {
+            Ok(()) => "success".into(),
+            Err(ending) => format!("{ending}"),
+        }
+    }
+
+    #[test]
+    fn faults_that_nobody_has_accepted_are_a_failure() {
+        assert_eq!(judged([0; 3], false, Ok(())), "success");
+        let one = "a fault ended dag `b`; the line that begins with `fault:` says which";
+        assert_eq!(judged([0, 2, 0], false, Ok(())), one);
+        assert_eq!(judged([0, 2, 0], false, Err(Ending::Shutdown)), one);
+        assert_eq!(
+            judged([1, 0, 1], false, Ok(())),
+            "a fault ended dag `a`, and 1 more; the line that begins with `fault:` says which"
+        );
+    }
+
+    #[test]
+    fn the_app_has_the_last_word() {
+        assert_eq!(judged([1; 3], true, Ok(())), "success");
+        let own = || Err(Ending::Failure("late".into()));
+        assert_eq!(judged([1; 3], false, own()), "late");
     }
 }

@@ -1,9 +1,6 @@
 //! The machine as an app sees it, how its runs are judged and how it ends, and the words by which
 //! it lets people take part.
 
-pub mod division;
 pub mod ending;
 pub mod machine;
-mod services;
 pub mod terms;
-pub mod verdict;

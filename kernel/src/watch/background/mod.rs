@@ -13,25 +13,37 @@
 //! what goes on, and to stop it. So if it has not run for [`STARVED_NS`], core 0's heartbeat
 //! does the slices instead. The heartbeat also notices that an instance keeps its core for
 //! long ([`stall`]).
+//!
+//! # Bytes from the serial port where no conversation takes them
+//!
+//! They come as events, each of which raises the signal of a sporadic DAG; and one ends the run in
+//! order before its time. That byte is what ctrl-C is on a serial line (ETX in ASCII). With `console=stop` core 0's
+//! heartbeat looks for it, four times a second, so it counts however busy the cores are.
+//!
+//! For events the port is looked at by core 0's background, each time that the core wakes up and
+//! has nothing else to do, and at least every [`PERIOD_NS`] if it is idle. What the byte is does
+//! not matter, but for the one that ends the run. How fast the bytes come does not either: the
+//! DAG's minimum inter-arrival time is enforced by the scheduler.
+//!
+//! [`PERIOD_NS`]: front::shell::PERIOD_NS
 
-mod listener;
-pub(crate) mod live_run;
 pub(crate) mod stall;
 mod status;
 pub(crate) mod wire;
 
-use core::sync::atomic::{AtomicU64, Ordering};
+use alloc::sync::Arc;
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use executive::machine::clock;
 use executive::machine::spinlock::SpinLock;
-use executive::run::{execution, heartbeat};
+use executive::machine::{clock, serial};
+use executive::run::{edge, execution, heartbeat};
 use executive::text::console;
 use fass::SetOnce;
+use fass::edge::Seen;
 use front::report::tell_log;
-use front::shell::{self, Session};
-use listener::Listener;
-use live_run::KernelRun;
-use sched_dag::DagId;
+use front::shell::{self, END, LiveRun, Session, shut_down};
+use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, Scheduler, TaskSet};
 use status::{Progress, Status};
 
 /// What the command line says about the background.
@@ -111,7 +123,7 @@ pub(crate) fn beat(now_ns: u64) {
         line.beat(now_ns);
     }
     stall::beat(now_ns);
-    listener::beat();
+    look_for_end();
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
         return;
     }
@@ -156,7 +168,7 @@ impl Background {
         // What a person says to the console is no event.
         let input = input.filter(|_| wishes.console.is_none());
         let listener = input.map(|input| Listener::new(input, wishes.stops));
-        listener::watch(wishes.stops && wishes.console.is_none() && listener.is_none());
+        watch_for_end(wishes.stops && wishes.console.is_none() && listener.is_none());
         if let Some(line) = LINE.get() {
             line.begin(clock::now_ns());
         }
@@ -195,7 +207,88 @@ impl Background {
         let mut sliced = SLICED.lock();
         sliced.status = None;
         sliced.session = None;
-        listener::watch(false);
+        watch_for_end(false);
         shell::IS_SHUT_DOWN.swap(false, Ordering::Relaxed)
+    }
+}
+
+/// Whether the heartbeat looks.
+static IS_WATCHED: AtomicBool = AtomicBool::new(false);
+
+/// Has the heartbeat look for the byte that ends the run, or not.
+fn watch_for_end(is_watched: bool) {
+    IS_WATCHED.store(is_watched, Ordering::Relaxed);
+}
+
+/// Looks for that byte. In core 0's heartbeat.
+fn look_for_end() {
+    /// The size of the port's FIFO.
+    const MOST_BYTES: usize = 16;
+    let is_watched = IS_WATCHED.load(Ordering::Relaxed);
+    let mut bytes = (0..MOST_BYTES).map_while(|_| serial::FIRST.receive());
+    if is_watched && bytes.any(|byte| byte == END) {
+        shut_down::<KernelRun>();
+    }
+}
+
+/// The DAG that bytes are for.
+#[derive(Debug)]
+pub(super) struct Listener {
+    plan: u64,
+    dag: DagId,
+    /// Whether one byte ends the run instead.
+    stops: bool,
+}
+
+impl Listener {
+    pub(super) const fn new((plan, dag): (u64, DagId), stops: bool) -> Self {
+        Self { plan, dag, stops }
+    }
+
+    /// Raises the signal for each byte that has come.
+    pub(super) fn step(&self) {
+        /// The port may not end to have some.
+        const MOST_BYTES: usize = 256;
+        for _ in 0..MOST_BYTES {
+            match serial::FIRST.receive() {
+                None => return,
+                Some(END) if self.stops => shut_down::<KernelRun>(),
+                Some(_) => execution::raise(self.plan, self.dag),
+            }
+        }
+    }
+}
+
+/// The kernel's run.
+#[derive(Debug)]
+pub struct KernelRun;
+
+impl LiveRun for KernelRun {
+    fn task_set() -> Option<Arc<TaskSet>> {
+        execution::task_set()
+    }
+
+    fn control(dag: DagId, change: fn(DagId) -> Request) {
+        execution::control(dag, change);
+    }
+
+    fn now_ns() -> u64 {
+        clock::now_ns()
+    }
+
+    fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
+        execution::with_scheduler(cluster, look)
+    }
+
+    fn receive() -> Option<u8> {
+        serial::FIRST.receive()
+    }
+
+    fn watch(topic: Option<&str>) -> bool {
+        edge::get().watch(topic)
+    }
+
+    fn take_seen(into: &mut [u8]) -> Option<Seen> {
+        edge::get().take_seen(into)
     }
 }

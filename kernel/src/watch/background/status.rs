@@ -24,7 +24,7 @@ use front::shell::{look_back, snapshot};
 use sched_dag::DagId;
 use sched_dag::journal::{Event, What};
 
-use super::live_run::KernelRun;
+use super::KernelRun;
 
 /// How many events are read where time is short.
 const FEW_EVENTS: u64 = 128;

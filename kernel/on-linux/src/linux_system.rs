@@ -1,23 +1,31 @@
 //! What Linux does for an app's machine: so many cores of this computer.
+//!
+//! While a run goes on, people see the log, and at the console a person at standard input talks with
+//! the run.
 
 use std::cell::{Cell, RefCell};
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
-use std::sync::Arc;
+use std::io::{self, BufReader, Read, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
+use std::thread;
 use std::time::Duration;
 
+use fass::edge::Seen;
 use fass::{Signal, Terms, Wire};
-use linux::{Connection, EndSignals, Linux};
-
-use super::console;
-use crate::heap;
-use front::app::division::Divisible;
 use front::app::ending::Ending;
-use front::app::machine::System;
+use front::app::machine::{Divisible, System};
+use front::json;
 use front::options::{Options, UsageError};
-use front::report::Memory;
-use front::{json, report};
+use front::report::{self, Memory, tell_log};
+use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, Session};
+use linux::{Connection, Control, EndSignals, Linux};
 use sched_dag::engine::Run;
+use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, Scheduler, TaskSet};
+
+use crate::heap;
 
 /// The machine, lent to the app's function for the time of the run.
 pub type Machine = front::app::machine::Machine<LinuxSystem>;
@@ -67,7 +75,7 @@ impl Ends {
 }
 
 impl System for LinuxSystem {
-    type Run = console::LinuxRun;
+    type Run = LinuxRun;
 
     fn has_console(&self) -> bool {
         self.has_console
@@ -114,7 +122,7 @@ impl System for LinuxSystem {
             Some(epoch_ns) => self.linux.run_from(epoch_ns),
             None => self.linux.run(),
         };
-        let (run, is_closed) = console::talk_during(self.has_console, run);
+        let (run, is_closed) = talk_during(self.has_console, run);
         self.is_closed.set(is_closed);
         let run = run.map_err(|why| failure(why.to_string()))?;
         drop(connection);
@@ -236,4 +244,110 @@ pub(crate) fn memory_kib() -> u64 {
     let line = text.lines().find(|line| line.starts_with("MemTotal:"));
     let number = line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok());
     number.unwrap_or(0)
+}
+
+/// What comes on standard input; the thread that reads it lasts as long as the program.
+static INPUT: OnceLock<Mutex<Receiver<u8>>> = OnceLock::new();
+
+/// The run of this program.
+#[derive(Debug)]
+pub struct LinuxRun;
+
+impl LiveRun for LinuxRun {
+    fn task_set() -> Option<Arc<TaskSet>> {
+        Some(Arc::clone(Control::get()?.task_set()))
+    }
+
+    fn control(dag: DagId, change: fn(DagId) -> Request) {
+        if let Some(live) = Control::get() {
+            live.change(dag, change);
+        }
+    }
+
+    fn now_ns() -> u64 {
+        linux::now_ns()
+    }
+
+    fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
+        Control::get()?.with_scheduler(cluster, look)
+    }
+
+    fn receive() -> Option<u8> {
+        let input = INPUT.get()?.lock().unwrap_or_else(PoisonError::into_inner);
+        match input.try_recv() {
+            Ok(byte) => Some(byte),
+            // Nobody could end it any more.
+            Err(TryRecvError::Disconnected) if is_endless() => Some(END),
+            Err(_) => None,
+        }
+    }
+
+    fn watch(topic: Option<&str>) -> bool {
+        Control::get().is_some_and(|live| live.see(topic))
+    }
+
+    fn take_seen(into: &mut [u8]) -> Option<Seen> {
+        Control::get()?.take_seen(into)
+    }
+}
+
+/// Reports whether a run goes on that does not end by itself.
+fn is_endless() -> bool {
+    let has_end = |live: Control| {
+        live.task_set()
+            .dags()
+            .iter()
+            .all(|dag| dag.jobs().is_some())
+    };
+    !IS_SHUT_DOWN.load(Ordering::Relaxed) && !Control::get().is_none_or(has_end)
+}
+
+/// Shows the log and, if there is a console, talks, from another thread, as long as `run` takes.
+/// Reports whether the person has ended it.
+pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, bool) {
+    let listen = || {
+        let (bytes, input) = channel();
+        thread::spawn(move || {
+            let all = BufReader::new(io::stdin()).bytes().map_while(Result::ok);
+            // The last line may lack its end.
+            for byte in all.chain(*b"\n") {
+                if bytes.send(byte).is_err() {
+                    break;
+                }
+            }
+        });
+        Mutex::new(input)
+    };
+    if has_console {
+        INPUT.get_or_init(listen);
+    }
+    IS_SHUT_DOWN.store(false, Ordering::Relaxed);
+    // It is not scoped: where `run` panics, nobody waits for it.
+    let shared = Arc::new((Barrier::new(2), AtomicBool::new(false)));
+    let (has_begun, is_over) = &*shared;
+    let own = Arc::clone(&shared);
+    let thread = thread::spawn(move || {
+        let (has_begun, is_over) = &*own;
+        let mut session = has_console.then(|| Session::<LinuxRun>::new(false));
+        let mut is_raised = !has_console;
+        has_begun.wait();
+        while !is_over.load(Ordering::Acquire) {
+            if let Some(control) = Control::get() {
+                if !is_raised {
+                    control.raise();
+                    is_raised = true;
+                }
+                tell_log(|| Some(Arc::clone(control.task_set())));
+            }
+            while session.as_mut().is_some_and(Session::slice) {}
+            thread::park_timeout(Duration::from_nanos(PERIOD_NS));
+        }
+    });
+    // What it allocates to begin is not the run's.
+    has_begun.wait();
+    let result = run();
+    is_over.store(true, Ordering::Release);
+    thread.thread().unpark();
+    thread.join().expect("what it prints does not panic");
+    (result, IS_SHUT_DOWN.load(Ordering::Relaxed))
 }
