@@ -9,12 +9,11 @@ mod support;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicI64, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
 use common::random::Random;
-use fass::{Body, Dag, Plan, Raiser, Request, Sample, Unique, create_dag};
-use sched_dag::DagId;
+use fass::{Body, Dag, Plan, Unique, create_dag};
 use support::{PERIOD, Shared, commit, inside, named, panic_message, run_job};
 
 #[test]
@@ -49,23 +48,6 @@ fn a_platform_that_keeps_no_order_is_told() {
     ] {
         assert_eq!(panic_message(|| body.run(job)), told);
     }
-}
-
-#[test]
-fn r3_nothing_is_visible_before_the_function_has_returned() {
-    let dag = create_dag();
-    let source = || {
-        inside();
-        (1, 2)
-    };
-    dag.register_periodic_subtask(source, vec!["one", "two"], PERIOD, named("source"));
-    let sink = |_: (i32, i32)| ();
-    dag.register_sink_subtask(sink, vec!["one", "two"], PERIOD, named("sink"));
-    let [source, sink] = Shared::all(commit(&[dag]));
-    source.run_while(0, move || {
-        let told = panic_message(|| sink.run(0));
-        assert!(told.contains("an input of job 0 is missing"), "{told}");
-    });
 }
 
 /// A value that counts how often it was cloned.
@@ -355,111 +337,4 @@ fn readers_share_a_state_and_an_update_at_the_same_time_is_refused() {
         });
     });
     join.run(0);
-}
-
-#[test]
-fn a_state_that_is_being_changed_is_refused_to_readers() {
-    let [update, first, second, _] = with_state();
-    update.run(0);
-    let full = panic_message(|| {
-        // The pair is (2, 1) now.
-        let look = move || assert_eq!(panic_message(|| first.run(0)), IN_USE);
-        update.run_while(1, look);
-    });
-    // Its readers have not run: they hold no value of job 1, and both slots.
-    assert!(full.contains("finds no free slot"), "{full}");
-    // The update has ended, if by a panic, and given the state back: it is (2, 2).
-    let late = panic_message(|| second.run(0));
-    assert!(
-        late.contains("in mid-change"),
-        "it is not job 0's any more: {late}"
-    );
-}
-
-/// A job's number, in more words than a processor stores at once.
-#[derive(Clone)]
-struct Whole {
-    copies: [u64; 8],
-    _alive: Arc<()>,
-}
-
-/// Of which job a sample was, and when that was complete.
-type Told = mpsc::Receiver<Option<(u64, u64)>>;
-
-/// A writer of values, and a subtask of another DAG that samples them twice in each instance.
-fn sampled(alive: &Arc<()>) -> ([Shared; 2], Told) {
-    let (tells, told) = mpsc::channel();
-    let (writer, reader) = (create_dag(), create_dag());
-    let (mut next, of_writer) = (0, Arc::clone(alive));
-    let count = move || {
-        next += 1;
-        let (copies, _alive) = ([next - 1; 8], Arc::clone(&of_writer));
-        (Whole { copies, _alive },)
-    };
-    writer.register_periodic_subtask(count, vec!["count"], PERIOD, named("count"));
-    let latest = writer.relative_deadline(PERIOD).latest::<Whole>("count");
-    let sample = move |sample: Option<Sample<'_, Whole>>| {
-        let look = || {
-            let sample = sample?;
-            assert_eq!(sample.value.copies, [sample.job; 8], "torn");
-            Some((sample.job, sample.completed_ns))
-        };
-        let first = look();
-        inside();
-        assert_eq!(look(), first, "a sample does not change during an instance");
-        tells.send(first).expect("the test listens");
-    };
-    reader.period(PERIOD).relative_deadline(PERIOD);
-    let source = reader.using(latest.sample()).source(sample);
-    source.register(named("sample"));
-    (Shared::all(commit(&[writer, reader])), told)
-}
-
-#[test]
-fn a_sample_stays_whole_while_its_writer_goes_on() {
-    let (jobs, alive) = (if cfg!(miri) { 20 } else { 5_000 }, Arc::new(()));
-    let ([writer, reader], told) = sampled(&alive);
-    for (round, expected) in [(0, None), (1, Some((jobs - 1, jobs - 1)))] {
-        let writer = writer.clone();
-        reader.run_while(round, move || {
-            for job in round * jobs..(round + 1) * jobs {
-                writer.run(job);
-                writer.complete(job);
-            }
-        });
-        assert_eq!(told.try_recv(), Ok(expected));
-    }
-    drop((writer, reader));
-    assert_eq!(Arc::strong_count(&alive), 1);
-}
-
-#[test]
-fn a_signal_is_raised_once_however_often_it_is_completed() {
-    let sporadic = create_dag();
-    sporadic.relative_deadline(PERIOD);
-    let signal = sporadic.sporadic(PERIOD);
-    sporadic.source(|| ()).register(named("answer"));
-    let dag = create_dag();
-    dag.relative_deadline(PERIOD);
-    let mut is_first = true;
-    dag.period(PERIOD)
-        .using(signal.raising())
-        .source(move |mut signal: Raiser<'_>| {
-            if std::mem::take(&mut is_first) {
-                signal.raise();
-                signal.raise();
-            }
-        })
-        .register(named("ask"));
-    let mut plan = commit(&[dag, sporadic]);
-    let ask = &mut plan.bodies[0][0];
-    let mut raised = Vec::new();
-    ask.complete(0, &mut |request| raised.push(request));
-    assert_eq!(raised, [], "not run yet");
-    ask.run(0);
-    ask.run(0);
-    for _ in 0..3 {
-        ask.complete(0, &mut |request| raised.push(request));
-    }
-    assert_eq!(raised, [Request::Signal(DagId(1))]);
 }

@@ -36,64 +36,6 @@ fn faultless(name: &str) -> Dag {
 }
 
 #[test]
-fn a_topic_of_values_has_one_writer_under_any_construction_policy() {
-    let dag = create_dag();
-    dag.register_periodic_subtask(|| (1,), vec!["a"], PERIOD, named("source"));
-    for name in ["near", "far"] {
-        dag.register_subtask(|(a,): (i32,)| (a,), vec!["a"], vec!["b"], named(name));
-    }
-    dag.register_sink_subtask(|_: (i32,)| (), vec!["b"], PERIOD, named("sink"));
-    assert_refused(&[dag], &["topic `b` of dag 0 has 2 writers"]);
-}
-
-#[test]
-fn arity_faults_name_subtask_and_both_numbers_and_nothing_else_is_blamed() {
-    let dag = create_dag();
-    dag.name("demo");
-    dag.register_periodic_subtask(|| (1, 2_u8), vec!["number"], PERIOD, named("source"));
-    let middle = |(number,): (i32,)| (number,);
-    let inputs = vec!["number", "surplus"];
-    dag.register_subtask(middle, inputs, vec!["next", "surplus"], named("middle"));
-    dag.register_sink_subtask(|_: (i32,)| (), vec!["next"], PERIOD, named("sink"));
-    assert_refused(
-        &[dag],
-        &[
-            "subtask `source` of dag `demo` returns 2 outputs but lists 1 output topic;",
-            "subtask `middle` of dag `demo` takes 1 input but lists 2 input topics;",
-            "subtask `middle` of dag `demo` returns 1 output but lists 2 output topics;",
-            "subtask `middle` of dag `demo` reads topic `surplus`, which it writes itself;",
-        ],
-    );
-}
-
-#[test]
-fn a_duration_beyond_64_bits_of_nanoseconds_is_a_fault_and_never_wraps() {
-    let long = Duration::from_nanos(u64::MAX) + Duration::from_nanos(1);
-    let dag = create_dag();
-    dag.name("slow").offset(long);
-    dag.register_periodic_subtask(|| (1,), vec!["number"], long, named("source").wcet(long));
-    dag.register_sink_subtask(|_: (i32,)| (), vec!["number"], long, named("sink"));
-    assert_refused(
-        &[dag],
-        &[
-            "the offset of dag `slow` ",
-            "the WCET of subtask `source` of dag `slow` ",
-            "the period of subtask `source` of dag `slow` ",
-            "the relative deadline of subtask `sink` of dag `slow` ",
-        ],
-    );
-}
-
-#[test]
-fn a_signal_of_a_fault_that_releases_nothing_is_a_fault() {
-    let dag = faultless("steering");
-    dag.on_fault(&create_dag().sporadic(PERIOD));
-    let expected =
-        "subtask `source` of dag `steering` may raise the signal of a dag that is not in";
-    assert_refused(&[dag], &[expected]);
-}
-
-#[test]
 fn what_is_committed_or_of_another_dag_cannot_be_changed() {
     let dag = faultless("done");
     drop(support::commit(slice::from_ref(&dag)));
@@ -122,23 +64,47 @@ fn a_refused_commit_changes_nothing() {
     support::run_job(&mut support::commit(&[dag]), 0);
 }
 
-/// One without a name is called by its position, even after one that is left out.
 #[test]
-fn all_faults_of_all_dags_come_at_once() {
+fn all_faults_of_all_dags_come_at_once_and_nothing_else_is_blamed() {
     let done = faultless("done");
     drop(support::commit(slice::from_ref(&done)));
-    let [arity, types] = ["arity", "types"].map(|name| create_dag().name(name).clone());
-    arity.register_periodic_subtask(|| (1, 2), vec!["x"], PERIOD, named("source"));
-    arity.register_sink_subtask(|_: (i32,)| (), vec!["x"], PERIOD, named("sink"));
+    let names = ["arity", "slow", "types", "writers"];
+    let [arity, slow, types, writers] = names.map(|name| create_dag().name(name).clone());
+    arity.register_periodic_subtask(|| (1, 2_u8), vec!["number"], PERIOD, named("source"));
+    let middle = |(number,): (i32,)| (number,);
+    let inputs = vec!["number", "surplus"];
+    arity.register_subtask(middle, inputs, vec!["next", "surplus"], named("middle"));
+    arity.register_sink_subtask(|_: (i32,)| (), vec!["next"], PERIOD, named("sink"));
+    // One more than 64 bits have room for.
+    let long = Duration::from_nanos(u64::MAX) + Duration::from_nanos(1);
+    slow.offset(long);
+    slow.register_periodic_subtask(|| (1,), vec!["late"], long, named("source").wcet(long));
+    slow.register_sink_subtask(|_: (i32,)| (), vec!["late"], long, named("sink"));
+    let steering = faultless("steering");
+    steering.on_fault(&create_dag().sporadic(PERIOD));
     types.register_periodic_subtask(|| (1_i32,), vec!["y"], PERIOD, named("source"));
     types.register_sink_subtask(|_: (u64,)| (), vec!["y"], PERIOD, named("sink"));
+    writers.register_periodic_subtask(|| (1,), vec!["a"], PERIOD, named("source"));
+    for name in ["near", "far"] {
+        writers.register_subtask(|(a,): (i32,)| (a,), vec!["a"], vec!["b"], named(name));
+    }
+    writers.register_sink_subtask(|_: (i32,)| (), vec!["b"], PERIOD, named("sink"));
     assert_refused(
-        &[done, arity, types, create_dag()],
+        &[done, arity, slow, steering, types, writers, create_dag()],
         &[
             "dag `done` ",
-            "subtask `source` of dag `arity` returns 2 outputs",
+            "subtask `source` of dag `arity` returns 2 outputs but lists 1 output topic;",
+            "subtask `middle` of dag `arity` takes 1 input but lists 2 input topics;",
+            "subtask `middle` of dag `arity` returns 1 output but lists 2 output topics;",
+            "the offset of dag `slow` ",
+            "the WCET of subtask `source` of dag `slow` ",
+            "the period of subtask `source` of dag `slow` ",
+            "the relative deadline of subtask `sink` of dag `slow` ",
+            "subtask `source` of dag `steering` may raise the signal of a dag that is not in",
+            "subtask `middle` of dag `arity` reads topic `surplus`, which it writes itself;",
             "topic `y` of dag `types` is written as `i32`",
-            "dag `3` has no subtask",
+            "topic `b` of dag `writers` has 2 writers",
+            "dag `6` has no subtask",
         ],
     );
 }

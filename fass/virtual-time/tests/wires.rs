@@ -61,23 +61,6 @@ fn a_periodic_source_takes_all_that_came_since_its_last_job() {
 }
 
 #[test]
-fn what_is_not_taken_stays_for_the_next_job() {
-    let (wire, seen) = (Wire::new("numbers"), Seen::default());
-    let mut look = look(&seen);
-    let one_by_one = move |mut packets: Received<'_, u32>| {
-        let _first = packets.next();
-        if packets.next().is_some() {
-            look(packets);
-        }
-    };
-    let machine = VirtualTime::new();
-    commit(&[periodic(&wire, 3, one_by_one)]);
-    arrive(&machine, &wire, &[(1, b"1\n"), (11, b"2\n3\n4\n")]);
-    machine.run();
-    assert_eq!(seen.all(), [[(4, 11)]]);
-}
-
-#[test]
 fn a_packet_raises_the_sporadic_dag_that_receives_it() {
     let (wire, seen) = (Wire::new("numbers"), Seen::default());
     let dag = create_dag();

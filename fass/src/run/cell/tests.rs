@@ -1,7 +1,7 @@
 //! Tests of the cells, on real threads. They also serve under Miri, where the
 //! counts shrink so that a run ends.
 
-use super::{Current, SetOnce, Shared, ring};
+use super::{SetOnce, Shared, ring};
 use common::random::Random;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -153,14 +153,6 @@ fn set_once_has_one_winner_and_all_see_it() {
         assert_eq!(winners.load(Ordering::Relaxed), 1);
         assert!(cell.get().is_some());
     }
-}
-
-#[test]
-fn the_last_one_that_was_set_counts() {
-    static CURRENT: Current<u32> = Current::new(&1);
-    assert_eq!(*CURRENT.get(), 1);
-    CURRENT.set(&2);
-    assert_eq!(*CURRENT.get(), 2);
 }
 
 #[test]

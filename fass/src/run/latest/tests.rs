@@ -35,6 +35,22 @@ fn what_is_staged_shows_only_when_it_happens() {
     triple.happen(30, &mut |_| ()); // an instance that has staged nothing
     assert_eq!(sample(&mut sampler), Some((1, 20)));
     assert_eq!(sample(&mut sampler), Some((1, 20)), "again");
+    let guard = sampler.look();
+    for job in 2..10 {
+        triple.stage(job, [job; 8]);
+        triple.happen(10 * job, &mut |_| ());
+    }
+    let held = guard.entry().map(|entry| (entry.job, entry.value));
+    assert_eq!(held, Some((1, [1; 8])), "while the writer goes on");
+    drop(guard);
+    assert_eq!(sample(&mut sampler), Some((9, 90)));
+    let (alive, mut triple) = (Arc::new(()), Arc::new(Triple::new()));
+    for job in 0..5 {
+        triple.stage(job, Arc::clone(&alive));
+        triple.happen(job, &mut |_| ());
+    }
+    drop(triple);
+    assert_eq!(Arc::strong_count(&alive), 1, "none is left");
 }
 
 #[test]

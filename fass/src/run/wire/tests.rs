@@ -1,11 +1,9 @@
 //! Tests of both ways of a wire, one of them on real threads.
 
 use alloc::string::{String, ToString};
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use super::{Departure, Framing, Incoming, Outgoing};
-use crate::run::plan::Effect;
+use super::{Framing, Incoming};
 
 /// Takes all packets that are there, as text.
 fn packets(incoming: &Incoming) -> Vec<String> {
@@ -52,12 +50,13 @@ fn each_framing_finds_the_packets_and_too_long_ones_are_none() {
 #[test]
 fn what_comes_after_the_mark_waits() {
     let incoming = Incoming::new(Framing::Lines, 20, 64);
-    incoming.arrive(b"one\n", 7);
+    incoming.arrive(b"one\ntwo\n", 7);
     let (mark, mut buffer) = (incoming.mark(), incoming.buffer());
-    incoming.arrive(b"two\n", 8);
+    incoming.arrive(b"three\n", 8);
     assert_eq!(incoming.take(mark, &mut buffer), Some((&b"one"[..], 7)));
+    assert_eq!(incoming.take(mark, &mut buffer), Some((&b"two"[..], 7)));
     assert_eq!(incoming.take(mark, &mut buffer), None);
-    assert_eq!(packets(&incoming), ["two"]);
+    assert_eq!(packets(&incoming), ["three"]);
 }
 
 #[test]
@@ -89,19 +88,4 @@ fn packets_pass_from_one_thread_to_another_whole_and_in_order() {
     });
     assert_eq!(incoming.too_long.get(), 0);
     assert!(incoming.packets.get() > 0);
-}
-
-/// When bytes go, and how many, is told in virtual time.
-#[test]
-fn what_is_never_complete_does_not_go_with_the_next_instance() {
-    let outgoing = Arc::new(Outgoing::new(16));
-    let mut departure = Departure(Arc::clone(&outgoing));
-    outgoing.stage(b"never complete");
-    outgoing.begin();
-    outgoing.stage(b"twelve ");
-    outgoing.stage(b"bytes");
-    departure.happen(0, &mut |_| ());
-    departure.happen(1, &mut |_| ());
-    let gone: Vec<u8> = core::iter::from_fn(|| outgoing.take()).collect();
-    assert_eq!(gone, b"twelve bytes");
 }

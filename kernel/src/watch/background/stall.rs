@@ -279,13 +279,4 @@ mod tests {
     fn up_to_its_wcet_an_instance_may_run_without_a_word() {
         assert_eq!(named(&[Some(1); 20], 5 * LOOK_NS), [5]);
     }
-
-    #[test]
-    fn a_core_is_asked_before_it_is_accused() {
-        assert_eq!(judge(0), Doubt::None);
-        assert_eq!(judge(QUIET_NS - 1), Doubt::None);
-        assert_eq!(judge(QUIET_NS), Doubt::Ask);
-        assert_eq!(judge(SILENT_NS - 1), Doubt::Ask);
-        assert_eq!(judge(SILENT_NS), Doubt::Accuse);
-    }
 }
