@@ -132,10 +132,10 @@ pub use platform::{
 pub use recording::Channel;
 pub use run::cell::SetOnce;
 pub use run::latest::Staleness;
+pub use run::line::Recorded;
 pub use run::log;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::plan::{Body, Plan, Replacement, Runner};
-pub use run::record::Recorded;
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use run::wire::Framing;

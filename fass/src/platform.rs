@@ -22,9 +22,9 @@ use sched_dag::{Clusters, DagId, Policy, Preemption, SchedulerOptions, TaskSet};
 
 use crate::edge::Begin;
 use crate::run::cell::{Current, SetOnce};
+use crate::run::line::Recorded;
 use crate::run::log::{Field, Level, Line};
 use crate::run::plan::Plan;
-use crate::run::record::Recorded;
 
 /// A machine that schedules committed DAGs.
 ///

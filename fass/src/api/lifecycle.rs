@@ -22,7 +22,7 @@ use super::dag::Dag;
 use super::uses::{Uses, implement_asking, sealed};
 use crate::draft::Draft;
 use crate::draft::checks::{self, ModeDraft, dags_of_modes};
-use crate::run::plan::{AT_ONCE, GO, Of, STOP, Target, WHEN_IDLE, Wish};
+use crate::run::effect::{AT_ONCE, GO, Of, STOP, Target, WHEN_IDLE, Wish};
 
 /// The use of a DAG by a subtask that may pause and resume it: the function gets a [`Switch`].
 /// Made by [`Dag::switching`].

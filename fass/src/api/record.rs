@@ -8,8 +8,8 @@ use super::dag::Dag;
 use crate::draft::checks::check_recorded;
 use crate::edge::{self, Begin, Host};
 use crate::platform::{expect_installed, record};
+use crate::run::line::Edge;
 use crate::run::message::Message;
-use crate::run::record::Edge;
 use crate::run::record::RecordedTopic;
 
 static EDGE: Edge = Edge {

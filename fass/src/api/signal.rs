@@ -23,8 +23,8 @@ use super::dag::Dag;
 use super::uses::{Uses, implement_asking, sealed};
 use crate::draft::Draft;
 use crate::platform;
-use crate::run::plan::Target;
-use crate::run::plan::{GO, Of, Wish};
+use crate::run::effect::Target;
+use crate::run::effect::{GO, Of, Wish};
 
 /// What releases a sporadic DAG. Clones are handles of the same signal.
 ///

@@ -38,7 +38,7 @@ use sched_dag::{StateSpec, StateUser};
 use super::dag::Dag;
 use super::uses::{ResettableUses, Uses, sealed};
 use crate::run::cell::{Changing, Looking};
-use crate::run::record::KeptState;
+use crate::run::line::KeptState;
 use crate::run::replaceable::{Reset, Resettable};
 
 /// What can be a state: any type that several cores may use in turn.

@@ -37,7 +37,7 @@ use sched_dag::DagId;
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
 use crate::run::cell::SetOnce;
-use crate::run::plan::Target;
+use crate::run::effect::Target;
 use crate::run::wire::{Departure, Framing, Incoming, Outgoing};
 
 /// A way for bytes in and out of a run. Clones are handles of the same wire.

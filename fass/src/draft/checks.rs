@@ -18,8 +18,8 @@ use sched_dag::{DagId, DagLabel, OnFault, SubtaskSpec};
 
 use super::Draft;
 use super::fault::Fault;
+use crate::run::effect::Target;
 use crate::run::latest::AnyLatest;
-use crate::run::plan::Target;
 
 /// Adds what is wrong with a DAG of these.
 pub(crate) fn check_dag(drafts: &Drafts, draft: &Draft, label: &DagLabel, faults: &mut Vec<Fault>) {

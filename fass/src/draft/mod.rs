@@ -26,11 +26,11 @@ use sched_dag::{
     TopicPort,
 };
 
+use crate::run::effect::{Asked, Effect, Of, Target, Wish};
 use crate::run::latest::AnyLatest;
+use crate::run::line::KeptState;
 use crate::run::message::MessageType;
-use crate::run::plan::{Asked, Effect, Of, Target, Wish};
 use crate::run::record::AnyRecorded;
-use crate::run::record::KeptState;
 use crate::run::subtask::{MakeBody, defer_untyped};
 use fault::Fault;
 

@@ -14,7 +14,7 @@ use core::fmt;
 use recording::{Channel, Schema, Shown};
 
 use super::{Echoing, Seen};
-use crate::run::record::Recorded;
+use crate::run::line::Recorded;
 
 /// The longest value that is shown, in bytes.
 const ROOM: usize = 512;

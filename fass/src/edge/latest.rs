@@ -22,8 +22,8 @@ use sched_dag::{DagId, Instance, Notice, journal};
 use super::replay::narrow;
 use super::tape::{Releases, SIGNALS, place_of};
 use super::{Crossing, Drain, Drained, Record, name, open};
+use crate::run::line::{LineOf, Recorded, room_for};
 use crate::run::plan::Plan;
-use crate::run::record::{LineOf, Recorded, room_for};
 
 /// Keeps the last jobs.
 pub(super) struct Latest {

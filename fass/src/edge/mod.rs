@@ -30,8 +30,8 @@ use recording::{Channel, DagHeader, Header, Schema, Stream};
 use sched_dag::journal::What;
 use sched_dag::{DagId, Instance, Notice, TaskSet};
 
+use crate::run::line::Recorded;
 use crate::run::plan::Plan;
-use crate::run::record::Recorded;
 
 pub use excerpt::Excerpt;
 pub use kept::Kept;

@@ -21,8 +21,8 @@ use sched_dag::{DagId, Instance, Notice, SubtaskId, TaskSet};
 use super::replay::narrow;
 use super::{Crossing, Drain, Drained, Record, name, open, recorded};
 use crate::run::cell::outbox::{Outbox, OutboxReader, Published, outbox, words_of};
+use crate::run::line::{LineOf, Recorded};
 use crate::run::plan::Plan;
-use crate::run::record::{LineOf, Recorded};
 
 /// Records a run.
 pub(super) struct Tape {

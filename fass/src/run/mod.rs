@@ -10,7 +10,9 @@
     reason = "the four cells of job slots, shared values and records"
 )]
 pub(crate) mod cell;
+pub(crate) mod effect;
 pub(crate) mod latest;
+pub(crate) mod line;
 pub mod log;
 pub(crate) mod message;
 pub(crate) mod plan;

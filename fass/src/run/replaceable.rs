@@ -32,8 +32,8 @@ use recording::{Recordable, Schema};
 use sched_dag::engine::Alternate;
 
 use super::cell::{Changing, SetOnce, Shared};
+use super::line::{AnyState, Line};
 use super::plan::{Body, Replacement, Subtask};
-use super::record::{AnyState, Line};
 use super::subtask::MakeBody;
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 

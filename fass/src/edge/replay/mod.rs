@@ -29,8 +29,8 @@ use recording::{Channel, Entry, Header, Malformed, Recordable, Recording, Role, 
 use sched_dag::{DagId, Instance, Notice, SubtaskId, TaskSet, journal};
 
 use super::{Crossing, Drain, Drained, Host, Record, name, open};
+use crate::run::line::{LineOf, Recorded};
 use crate::run::plan::{Body, Plan};
-use crate::run::record::{LineOf, Recorded};
 
 /// A recording that takes the place of what enters.
 #[derive(Debug, Default)]

@@ -19,8 +19,8 @@ use sched_dag::lifecycle::Request;
 use sched_dag::{DagLabel, SubtaskLabel, TopicPort};
 
 use super::cell::{Looking, SetOnce, Shared};
+use super::effect::Effect;
 use super::message::{Message, MessageType};
-use super::plan::Effect;
 
 /// A latest value while DAGs are built.
 pub(crate) struct SharedLatest<T> {

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use super::{Sampler, Stage, Triple};
-use crate::run::plan::Effect;
+use crate::run::effect::Effect;
 
 const JOBS: u64 = if cfg!(miri) { 100 } else { 300_000 };
 

@@ -29,7 +29,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering}
 use sched_dag::lifecycle::Request;
 
 use super::cell::Shared;
-use super::plan::Effect;
+use super::effect::Effect;
 
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,122 @@
+//! What an instance leaves outside its DAG, held back until it is complete.
+//!
+//! Values on edges need no holding back: their readers are started by the
+//! scheduler, and only after the completion. Latest values, signals and requests to the
+//! run as a whole have readers that do not wait for it. So the function only *prepares*
+//! them, and the platform publishes them when it reports the completion
+//! ([`Body::complete`](crate::Body::complete)): the completion boundary (R3) holds
+//! for them as it does for edges, also in virtual time, where a function has run
+//! long before its instance is complete.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
+
+use sched_dag::lifecycle::{Entry, Request};
+use sched_dag::{DagId, ModeId};
+
+/// An effect without its signals.
+pub(crate) struct Muted(pub(crate) Box<dyn Effect>);
+
+impl Effect for Muted {
+    fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
+        self.0.happen(completed_ns, &mut |request| match request {
+            Request::Signal(_) => {}
+            other => ask(other),
+        });
+    }
+
+    fn fail(&mut self, failed_ns: u64) {
+        self.0.fail(failed_ns);
+    }
+}
+
+/// Something that a function has prepared, perhaps.
+pub(crate) trait Effect: Send {
+    /// Publishes it if it was prepared since the last time. `ask` takes what the scheduler is
+    /// to be told.
+    fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request));
+
+    /// Does what is to be done for an instance that has failed.
+    fn fail(&mut self, _failed_ns: u64) {}
+}
+
+/// What a platform does at a completion.
+impl Effect for Box<dyn FnMut() + Send> {
+    fn happen(&mut self, _completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        self();
+    }
+}
+
+/// Which DAG is meant, by a signal that releases it or a switch: known from the commit on.
+#[derive(Debug, Default)]
+pub(crate) struct Target {
+    /// The plan's number, 0 before the commit.
+    plan: AtomicU64,
+    dag: AtomicU32,
+}
+
+impl Target {
+    /// Returns the plan's number and the DAG, once there are any.
+    pub(crate) fn get(&self) -> Option<(u64, DagId)> {
+        let plan = self.plan.load(Ordering::Acquire);
+        (plan > 0).then(|| (plan, self.dag()))
+    }
+
+    /// Returns the DAG; to be called behind the commit.
+    pub(crate) fn dag(&self) -> DagId {
+        DagId(self.dag.load(Ordering::Relaxed))
+    }
+
+    /// Tells the signal its DAG.
+    pub(crate) fn set(&self, plan: u64, dag: DagId) {
+        self.dag.store(dag.0, Ordering::Relaxed);
+        self.plan.store(plan, Ordering::Release);
+    }
+}
+
+/// No wish.
+const NOTHING: u8 = 0;
+/// The wish that a DAG is paused, or that the run ends.
+pub(crate) const STOP: u8 = 1;
+/// The wish that a DAG is resumed, or released by its signal.
+pub(crate) const GO: u8 = 2;
+/// The wish that a mode is entered at once.
+pub(crate) const AT_ONCE: u8 = 1;
+/// The wish that a mode is entered when what leaves is idle.
+pub(crate) const WHEN_IDLE: u8 = 2;
+
+/// A place for what an instance wishes, at first nothing; the last word counts.
+pub(crate) type Wish = Arc<AtomicU8>;
+
+/// What a wish is about.
+pub(crate) enum Of {
+    Run,
+    Signal(Arc<Target>),
+    Dag(Arc<Target>),
+    Mode(ModeId),
+}
+
+/// What an instance may ask for.
+pub(crate) struct Asked {
+    pub(crate) wish: Wish,
+    pub(crate) of: Of,
+}
+
+impl Effect for Asked {
+    fn happen(&mut self, _completed_ns: u64, ask: &mut dyn FnMut(Request)) {
+        let wish = self.wish.load(Ordering::Relaxed);
+        if wish == NOTHING {
+            return;
+        }
+        self.wish.store(NOTHING, Ordering::Relaxed);
+        ask(match &self.of {
+            Of::Run => Request::ShutDown,
+            Of::Signal(target) => Request::Signal(target.dag()),
+            Of::Dag(target) if wish == STOP => Request::Pause(target.dag()),
+            Of::Dag(target) => Request::Resume(target.dag()),
+            Of::Mode(mode) if wish == AT_ONCE => Request::Enter(*mode, Entry::AtOnce),
+            Of::Mode(mode) => Request::Enter(*mode, Entry::WhenIdle),
+        });
+    }
+}

@@ -1,0 +1,293 @@
+//! The way of a channel's values across the edge of a DAG, to the platform.
+//!
+//! A value is written into an [outbox](super::cell::outbox) when its instance has it, and goes on
+//! when the instance is complete: the platform's reader finds it there, or, if it has none, is
+//! given it at once.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use core::fmt;
+use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering};
+
+use recording::{Channel, Encoder, Recordable, Role, Schema};
+use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, Instance};
+
+use super::cell::SetOnce;
+use super::effect::Effect;
+use crate::run::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
+
+/// The number of a channel while it has none.
+const NO_CHANNEL: u16 = u16::MAX;
+
+/// What those share who write a channel's values, publish them, or replay them.
+pub(crate) struct Line {
+    number: AtomicU16,
+    pub(super) edge: &'static Edge,
+    /// Whether the platform reads the values; else it is given each.
+    is_read: AtomicBool,
+    /// Where the values are written, if anybody wants them.
+    outbox: SetOnce<Outbox>,
+}
+
+impl Line {
+    pub(super) const fn new(edge: &'static Edge) -> Self {
+        Self {
+            number: AtomicU16::new(NO_CHANNEL),
+            edge,
+            is_read: AtomicBool::new(false),
+            outbox: SetOnce::new(),
+        }
+    }
+
+    /// Reports whether the channel has a number, for else nobody wants its values.
+    pub(super) fn is_open(&self) -> bool {
+        self.number() != NO_CHANNEL
+    }
+
+    /// Returns the number of the channel.
+    pub(super) fn number(&self) -> u16 {
+        self.number.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn set_number(&self, number: u16) {
+        self.number.store(number, Ordering::Relaxed);
+    }
+
+    /// Notes whether the platform reads the values, which have at least so many bytes.
+    pub(super) fn open(&self, is_read: bool, least_bytes: usize) {
+        self.is_read.store(is_read, Ordering::Relaxed);
+        if !is_read && let Some((outbox, _)) = outbox(words_of(room_for(least_bytes))) {
+            // The commit, which comes once, does this or the other.
+            let _ = self.outbox.set(outbox);
+        }
+    }
+
+    /// Returns what the writer's completion does.
+    pub(super) fn effect(self: &Arc<Self>) -> Box<dyn Effect> {
+        match self.is_read.load(Ordering::Relaxed) {
+            true => Box::new(Publishing(Arc::clone(self))),
+            false => Box::new(Giving(Arc::clone(self))),
+        }
+    }
+
+    /// Returns what reads the values, which have at least so many bytes, from a place of so many
+    /// words, or more where that would hold too few of them; `None`: there is no memory. If values
+    /// are given, also what whoever takes them puts them into.
+    pub(crate) fn reader(
+        &self,
+        words: usize,
+        least_bytes: usize,
+    ) -> Option<(OutboxReader, Option<Outbox>)> {
+        // Half of it is in one piece, wherever the next value comes.
+        let least = 2 * words_of(room_for(least_bytes)) + 1;
+        let (outbox, reader) = outbox(words.max(least))?;
+        if !self.is_read.load(Ordering::Relaxed) {
+            return Some((reader, Some(outbox)));
+        }
+        let _ = self.outbox.set(outbox);
+        Some((reader, None))
+    }
+
+    /// Writes the value of an instance that is not complete.
+    #[inline(always)]
+    pub(super) fn stage<T: Recordable>(&self, job: u64, write: impl Fn(&mut Encoder<'_>)) {
+        if let Some(outbox) = self.outbox.get() {
+            let most = const { room_for(T::LEAST_BYTES) };
+            outbox.stage(job, most, |bytes| {
+                let mut out = Encoder::new(bytes);
+                write(&mut out);
+                out.finish()
+            });
+        }
+    }
+
+    /// Lets the reader have the value, if there is one: its instance is complete.
+    #[inline(always)]
+    fn publish(&self, completed_ns: u64) {
+        if let Some(outbox) = self.outbox.get()
+            && !outbox.publish(completed_ns)
+        {
+            self.show(completed_ns, self.edge.record);
+        }
+    }
+
+    /// Gives what is there to the platform: the value, or that it had no room.
+    #[inline(never)]
+    pub(crate) fn show(&self, completed_ns: u64, take: impl FnOnce(&Recorded<'_>)) {
+        if let Some(outbox) = self.outbox.get() {
+            outbox.show(|job, bytes| {
+                take(&Recorded {
+                    channel: self.number(),
+                    job,
+                    completed_ns,
+                    bytes,
+                });
+            });
+        }
+    }
+
+    /// Publishes or gives the value, whichever it is.
+    pub(super) fn give(&self, completed_ns: u64) {
+        self.end(completed_ns, self.edge.record);
+    }
+
+    /// Publishes the value, or gives it to that, as what has no room to be published.
+    pub(crate) fn end(&self, at_ns: u64, take: impl FnOnce(&Recorded<'_>)) {
+        let is_read = self.is_read.load(Ordering::Relaxed);
+        if !is_read || !(self.outbox.get()).is_some_and(|outbox| outbox.publish(at_ns)) {
+            self.show(at_ns, take);
+        }
+    }
+}
+
+/// Lets the reader have a value.
+struct Publishing(Arc<Line>);
+
+impl Effect for Publishing {
+    // Compiled with the app: this crate's own code is compiled for size.
+    #[inline]
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        self.0.publish(completed_ns);
+    }
+}
+
+/// Gives a value to the platform.
+struct Giving(Arc<Line>);
+
+impl Effect for Giving {
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        self.0.show(completed_ns, self.0.edge.record);
+    }
+}
+
+/// Publishes or gives what an instance has found, also if it has failed: without that nobody
+/// could compute its fault again.
+pub(super) struct Found(pub(super) Arc<Line>);
+
+impl Effect for Found {
+    fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        self.0.give(completed_ns);
+    }
+
+    fn fail(&mut self, failed_ns: u64) {
+        self.0.give(failed_ns);
+    }
+}
+
+/// A state that is written down, of whatever type.
+pub(crate) trait AnyState: Send + Sync {
+    fn schema(&self) -> Schema;
+
+    /// Writes down what it is now, unless somebody changes it.
+    fn stage(&self, line: &Line, job: u64);
+
+    /// Makes it what was written down; `false`: it cannot be.
+    fn restore(&self, bytes: &[u8]) -> bool;
+}
+
+/// A state that is written down, and how often.
+pub(crate) struct KeptState {
+    pub(crate) state: Arc<dyn AnyState>,
+    /// It is written down in each job whose number is a multiple of that.
+    every: AtomicU32,
+}
+
+impl KeptState {
+    pub(crate) fn new(state: Arc<dyn AnyState>, every: u32) -> Self {
+        Self {
+            state,
+            every: AtomicU32::new(every.max(1)),
+        }
+    }
+
+    /// Writes it down, if that is due in the job.
+    pub(super) fn keep(&self, line: &Line, job: u64) {
+        if job.is_multiple_of(self.every.load(Ordering::Relaxed).into()) {
+            self.state.stage(line, job);
+        }
+    }
+
+    /// Has it written down every so many jobs, if that is more often.
+    pub(crate) fn keep_every(&self, jobs: u32) {
+        self.every.fetch_min(jobs.max(1), Ordering::Relaxed);
+    }
+}
+
+/// The line of a channel of a plan, and of which subtask it is.
+pub(crate) struct LineOf {
+    pub(crate) dag: DagId,
+    pub(crate) subtask: usize,
+    pub(crate) role: Role,
+    pub(crate) line: Arc<Line>,
+    /// The state whose values they are, if they are of one.
+    pub(crate) state: Option<Arc<KeptState>>,
+}
+
+impl LineOf {
+    /// Reports whether it has what an instance has found: samples, or a state.
+    pub(crate) fn is_found_by(&self, instance: Instance) -> bool {
+        let of = (self.dag, self.subtask);
+        !self.role.is_written() && of == (instance.dag, instance.subtask.index())
+    }
+}
+
+impl fmt::Debug for LineOf {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("LineOf")
+    }
+}
+
+/// The least room for a value.
+const ROOM: usize = 4096;
+
+/// A value that a recorded topic gives to the platform, when its writer's instance is complete.
+///
+/// ```
+/// fn show(value: &fass::Recorded<'_>) {
+///     match value.bytes {
+///         Some(bytes) => println!("channel {}, job {}: {bytes:?}", value.channel, value.job),
+///         None => println!("channel {}, job {} is lost", value.channel, value.job),
+///     }
+/// }
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Recorded<'v> {
+    /// The number of the channel ([`Platform::open_channels`](crate::Platform::open_channels)).
+    pub channel: u16,
+    /// The job.
+    pub job: u64,
+    /// When the instance was complete, on the clock of [`crate::now_ns`].
+    pub completed_ns: u64,
+    /// The value; `None` if there was no room for it.
+    pub bytes: Option<&'v [u8]>,
+}
+
+/// The way from a topic to the platform, and back. What a commit does about recorded topics is
+/// reached through them only, so that an image without any has no code for it.
+pub(crate) struct Edge {
+    /// Reports whether anything is recorded or replayed.
+    pub(crate) crosses: fn() -> bool,
+    /// Reports whether that is so of what other subtasks than sources write, too.
+    pub(crate) has_results: fn() -> bool,
+    /// Takes the recorded topics of a DAG, and the hash of its graph. Reports whether the plan's
+    /// taker will read the values; else they are given to it.
+    pub(crate) open: fn(DagId, u64, &[Channel]) -> bool,
+    /// Takes a value.
+    pub(crate) record: fn(&Recorded<'_>),
+    /// Reports whether there is a replay.
+    pub(crate) replays: fn() -> bool,
+    /// Lends a value, if there is one.
+    pub(crate) replay: Lend,
+}
+
+/// Lends the value of a channel and a job.
+type Lend = fn(u16, u64, &mut dyn FnMut(&[u8]));
+
+/// Returns the room for a value of at least so many bytes.
+pub(crate) const fn room_for(least_bytes: usize) -> usize {
+    match 2 * least_bytes {
+        room if room > ROOM => room,
+        _ => ROOM,
+    }
+}
