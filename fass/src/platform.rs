@@ -415,6 +415,8 @@ macro_rules! log {
 }
 
 /// Says a line of a level that is on.
+///
+/// See [`log!`](crate::log!).
 #[cold]
 #[inline(never)]
 pub fn say(level: Level, text: &'static str, fields: &[Field]) {
@@ -475,6 +477,8 @@ pub struct Terms {
 impl Terms {
     /// Makes terms of so many cores: they are not divided, static priorities and preemption rule,
     /// nothing is charged, and there are no budgets but stated ones.
+    ///
+    /// See [`Terms`].
     #[must_use]
     pub const fn of_cores(cores: u32) -> Self {
         Self {
@@ -500,6 +504,8 @@ impl Terms {
 
     /// Divides the cores into clusters of so many each, from core 0 on; no number: they are not
     /// divided. Each cluster schedules its own DAGs.
+    ///
+    /// See [`Terms`].
     pub fn divide(&mut self, sizes: &[u32]) {
         self.assigns = false;
         self.clusters = match sizes {
@@ -511,6 +517,8 @@ impl Terms {
     /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
     /// others share clusters of one core each. All subtasks need WCETs. See
     /// [`Placement`](crate::Placement).
+    ///
+    /// See [`Terms`].
     pub fn divide_by_commit(&mut self) {
         (self.clusters, self.assigns) = (Clusters::Undivided, true);
     }
