@@ -34,21 +34,39 @@ pub fn covers(task: &Task, most: usize) -> Vec<u64> {
     exact(task, most).unwrap_or_else(|| sums(&parts(task, most)))
 }
 
-/// Returns the covers, and the work of each of the chains that [`peel`] finds.
-pub(super) fn covers_and_parts(task: &Task, most: usize) -> (Vec<u64>, Vec<u64>) {
-    let parts = parts(task, most);
-    (exact(task, most).unwrap_or_else(|| sums(&parts)), parts)
+/// Returns the most cores that one job can use at an instant, at least 1; the covers for as many
+/// chains; and the work of each of the chains that [`peel`] finds.
+pub(super) fn parallelism_covers_and_parts(task: &Task, cores: u32) -> (u64, Vec<u64>, Vec<u64>) {
+    let most = usize::try_from(cores).unwrap_or(usize::MAX);
+    let covers = exact(task, most);
+    let parallelism = covers.as_ref().map_or(most, Vec::len).max(1);
+    let parts = parts(task, parallelism);
+    let covers = covers.unwrap_or_else(|| sums(&parts));
+    (parallelism as u64, covers, parts)
 }
 
+/// Returns the width, or `None` if the graph is too large to find it.
+#[must_use]
+pub fn width(task: &Task) -> Option<u64> {
+    Some(exact(task, usize::MAX)?.len() as u64)
+}
+
+/// Returns the most cores that one job can use at an instant, at least 1:
+/// `min(cores, width)`, or just `cores` where the width is not known.
+#[must_use]
+pub fn parallelism(task: &Task, cores: u32) -> u64 {
+    parallelism_covers_and_parts(task, cores).0
+}
+
+/// Returns the covers if they can be found within the limit.
 fn exact(task: &Task, most: usize) -> Option<Vec<u64>> {
-    let chains = most.min(task.subtask_count());
-    if !is_small(task, chains) {
-        return None;
-    }
     let mut flow = Flow::none(task);
     let mut covers: Vec<u64> = Vec::new();
     let mut sum = 0;
-    while covers.len() < chains && sum < task.volume_ns() {
+    while covers.len() < most && sum < task.volume_ns() {
+        if !is_small(task, covers.len() + 1) {
+            return None;
+        }
         sum += flow.augment();
         covers.push(sum);
     }
@@ -288,8 +306,9 @@ impl<'a> Flow<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{covering, covers, peel, weight};
+    use super::{covering, covers, parallelism, peel, weight, width};
     use crate::analysis::Task;
+    use common::random::Random;
 
     /// The example in which peeling a longest path first goes wrong.
     fn crossing() -> Task {
@@ -331,5 +350,44 @@ mod tests {
             let sum: u64 = chains.iter().map(|chain| weight(&task, chain)).sum();
             assert_eq!(sum, cover);
         }
+    }
+
+    fn task(count: usize, edges: &[(usize, usize)]) -> Task {
+        Task::new(1000, 1000, vec![1; count], edges).unwrap()
+    }
+
+    #[test]
+    fn agrees_with_all_subsets_of_small_graphs() {
+        let mut random = Random::new(1);
+        for _ in 0..300 {
+            let count = random.index(11);
+            let edges: Vec<_> = random.edges(count, 25).collect();
+            let mut reach = vec![vec![false; count]; count];
+            for from in (0..count).rev() {
+                for &(_, to) in edges.iter().filter(|edge| edge.0 == from) {
+                    reach[from][to] = true;
+                    let beyond = reach[to].clone();
+                    for (here, there) in reach[from].iter_mut().zip(beyond) {
+                        *here |= there;
+                    }
+                }
+            }
+            let antichain = |set: u32| {
+                let members: Vec<usize> = (0..count).filter(|&v| set >> v & 1 == 1).collect();
+                let ordered = |&a: &usize| members.iter().any(|&b| reach[a][b]);
+                !members.iter().any(ordered)
+            };
+            let sets = (0_u32..1 << count).filter(|&set| antichain(set));
+            let largest = sets.map(u32::count_ones).max().map(u64::from);
+            assert_eq!(width(&task(count, &edges)), largest, "edges {edges:?}");
+        }
+    }
+
+    #[test]
+    fn beyond_the_limit_all_cores_count() {
+        let wide = task(1000, &[]);
+        assert_eq!((width(&wide), parallelism(&wide, 200)), (None, 200));
+        assert_eq!(parallelism(&wide, 8), 8);
+        assert_eq!(parallelism(&task(3, &[(0, 1), (1, 2)]), 8), 1);
     }
 }

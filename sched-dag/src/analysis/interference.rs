@@ -8,10 +8,9 @@
 
 use alloc::vec::Vec;
 
-use super::cover::covers_and_parts;
+use super::cover::parallelism_covers_and_parts;
 use super::one_core::{Blocking, largest};
 use super::task::Task;
-use super::width::parallelism;
 use super::workload::{Bursts, Piece, Workload};
 
 /// Which interference the multi-path equations count; each is a bound, the later the tighter.
@@ -41,9 +40,7 @@ pub(super) struct Shape {
 
 impl Shape {
     pub(super) fn of(task: &Task, cores: u32) -> Self {
-        let parallelism = parallelism(task, cores);
-        let most = usize::try_from(parallelism).unwrap_or(usize::MAX);
-        let (covers, chains) = covers_and_parts(task, most);
+        let (parallelism, covers, chains) = parallelism_covers_and_parts(task, cores);
         Self {
             parallelism,
             covers,

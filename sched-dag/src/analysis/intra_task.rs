@@ -12,12 +12,15 @@
 //! code does, is unsafe, because the union is not additive: in example E5 that
 //! gives 63, and a schedule of 64 exists. So paths are enumerated, up to
 //! [`PATH_LIMIT`]; beyond, callers use the multi-path bound.
+//!
+//! Two subtasks are *parallel* if neither reaches the other. That is asked of the transitive
+//! closure, one bit row a subtask: it takes `n * n / 8` bytes and `edges * n / 64` word
+//! operations, so it is only built up to [`SUBTASK_LIMIT`] subtasks (128 KiB).
 
 use alloc::vec;
 use alloc::vec::Vec;
 
 use super::task::Task;
-use super::width::{Closure, contains, insert, remove};
 
 /// The most complete paths that [`intra_task`] enumerates: 4,096.
 pub const PATH_LIMIT: u32 = 4096;
@@ -107,6 +110,74 @@ fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
     let complete = order.len() == count && !ranks.contains(&usize::MAX);
     let respects = |v: usize| task.successors(v).all(|next| ranks[v] < ranks[next]);
     (complete && (0..count).all(respects)).then_some(ranks)
+}
+
+/// The most subtasks of a DAG for which the closure is built: 1,024.
+///
+/// Beyond, intra-task priorities are not exploited. The limit keeps a commit's time
+/// near linear and its temporary memory small.
+pub const SUBTASK_LIMIT: usize = 1024;
+
+/// For each subtask the set of subtasks that it precedes, directly or not.
+struct Closure {
+    words: usize,
+    rows: Vec<u64>,
+}
+
+impl Closure {
+    /// Builds the closure, or returns `None` beyond [`SUBTASK_LIMIT`].
+    fn of(task: &Task) -> Option<Self> {
+        let count = task.subtask_count();
+        if count > SUBTASK_LIMIT {
+            return None;
+        }
+        let words = words_for(count);
+        let mut rows = vec![0; words * count];
+        for subtask in task.topological_order().rev() {
+            for successor in task.successors(subtask) {
+                for word in 0..words {
+                    rows[subtask * words + word] |= rows[successor * words + word];
+                }
+                insert(&mut rows[subtask * words..], successor);
+            }
+        }
+        Some(Self { words, rows })
+    }
+
+    /// Returns the words of a row.
+    const fn words(&self) -> usize {
+        self.words
+    }
+
+    /// Returns the set of subtasks after `subtask`.
+    fn row(&self, subtask: usize) -> &[u64] {
+        &self.rows[subtask * self.words..(subtask + 1) * self.words]
+    }
+
+    /// Reports whether `first` precedes `second`.
+    fn precedes(&self, first: usize, second: usize) -> bool {
+        contains(self.row(first), second)
+    }
+}
+
+/// Returns the number of 64-bit words that hold `count` bits.
+const fn words_for(count: usize) -> usize {
+    count.div_ceil(64)
+}
+
+/// Adds an element to a bit set.
+fn insert(set: &mut [u64], element: usize) {
+    set[element / 64] |= 1 << (element % 64);
+}
+
+/// Removes an element from a bit set.
+fn remove(set: &mut [u64], element: usize) {
+    set[element / 64] &= !(1 << (element % 64));
+}
+
+/// Reports whether a bit set has an element.
+fn contains(set: &[u64], element: usize) -> bool {
+    set[element / 64] >> (element % 64) & 1 == 1
 }
 
 #[cfg(test)]

@@ -69,13 +69,12 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::interference::Delays;
-use super::intra_task::intra_task;
+use super::intra_task::{SUBTASK_LIMIT, intra_task};
 use super::one_core::{Due, Load, Response, demand};
 use super::pipelined::{Figures, STEP_LIMIT, Unsolved};
 use super::set::{Failure, Set, Steps, constrained};
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
-use super::width::SUBTASK_LIMIT;
 use super::workload::Bursts;
 use super::{Answer, DagBound, NotProven, Reason, Settings, Test, multi_path};
 use crate::ids::{DagId, SubtaskId, to_u32};

@@ -11,8 +11,7 @@
 //! | module | what | source |
 //! |---|---|---|
 //! | `task`, `graph` | length, volume, bottom levels | |
-//! | `width` | largest antichain, by matching | Dilworth; Hopcroft and Karp |
-//! | `cover` | the most work of disjoint chains, by a flow | Ahuja 1993 |
+//! | `cover` | the most work of disjoint chains, and the width, by a flow | Ahuja 1993; Dilworth |
 //! | `multi_path` | one job of a DAG at a time, alone or among others | derived here |
 //! | `intra_task` | one DAG alone, by its subtasks' priorities | He 2019 |
 //! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
@@ -75,7 +74,6 @@ mod pipelined;
 mod set;
 mod task;
 mod utilisation;
-mod width;
 mod witness;
 mod workload;
 
@@ -88,10 +86,10 @@ use crate::policy::{Policy, Preemption};
 use crate::worded::texts;
 
 pub use assign::{Federation, NotAssigned, Unassigned, assign, federated};
-pub use cover::covers;
+pub use cover::{covers, parallelism, width};
 pub use fixed_order::fix_orders;
 pub use interference::Clip;
-pub use intra_task::{PATH_LIMIT, intra_task};
+pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;
 pub use multi_path::multi_path;
 pub use overheads::{OverheadSource, Overheads};
@@ -99,7 +97,6 @@ pub use pipelined::Refusal;
 pub use set::{multi_path_edf, multi_path_fp};
 pub use task::{Task, TaskError};
 pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
-pub use width::{SUBTASK_LIMIT, parallelism, width};
 pub use witness::witness;
 
 /// Under what conditions the DAGs will run.
