@@ -2,9 +2,6 @@
 //! guest is the image `guest-tests`, which runs the test named by the word
 //! `test=NAME` on its command line.
 
-use std::collections::BTreeSet;
-
-use harness::fault_page::{self, documented_faults};
 use harness::markdown::page;
 use harness::{Guest, Members, Said};
 use tool::Mode;
@@ -216,20 +213,6 @@ fn stacks_that_faults_have_taken_come_back() {
     for cores in [1, 4] {
         let _ = Guest::test("spend_stacks").cores(cores).succeed();
     }
-}
-
-#[test]
-fn every_commit_fault_is_printed_as_documented() {
-    let outcome = Guest::test("commit_faults").succeed();
-    let cases = guest_tests::faults::CASES.iter().map(|(fault, _)| *fault);
-    let mut cases: BTreeSet<&str> = cases.collect();
-    let documented = documented_faults();
-    for line in outcome.lines("provoked") {
-        let fault = line.member("fault");
-        assert!(cases.remove(fault), "{}", line.text);
-        fault_page::assert_is(fault, &documented[fault], line.member("message"));
-    }
-    assert_eq!(cases, BTreeSet::new(), "they are not printed");
 }
 
 /// Timer interrupts, over all processors, hit computing cores.

@@ -27,7 +27,7 @@ mod upper_halves;
 mod values;
 
 use faults::crimes::{Crime, Unpunished};
-use kernel::{Ending, Machine, json};
+use kernel::{Ending, Machine};
 
 kernel::entry!(main);
 
@@ -36,7 +36,6 @@ type Test = fn(&Machine) -> Result<(), Ending>;
 
 const TESTS: &[(&str, Test)] = &[
     ("attack", attacks::run),
-    ("commit_faults", commit_faults),
     ("crime", crime),
     ("cluster_scale", cluster_scale::run),
     ("deaf_alone", |machine| single::deaf(machine, false)),
@@ -68,19 +67,6 @@ const TESTS: &[(&str, Test)] = &[
 fn main(machine: &Machine) -> Result<(), Ending> {
     let test: Test = machine.options().choice("test", TESTS)?;
     test(machine)
-}
-
-/// Commits every faulty DAG and prints what the commit says of it.
-fn commit_faults(machine: &Machine) -> Result<(), Ending> {
-    machine.options().finish(&["test"])?;
-    guest_tests::faults::provoke(|case, fault, message| {
-        json::emit("provoked", |line| {
-            line.text("case", case)
-                .text("fault", fault)
-                .text("message", message);
-        });
-    });
-    Ok(())
 }
 
 /// Commits the crime that the command line names, outside any subtask.
