@@ -31,6 +31,11 @@ fn a_dag_and_equal_stamps_join_every_job() {
         let line = summary(&format!("policy_under_test={policy} subtasks=6"));
         line.has([("same_index", JOBS), ("cross_index", 0), ("missing", 0)]);
     }
+    // On threads of the host, too.
+    let words = "jobs=40 policy_under_test=exact subtasks=2";
+    let outcome = guest(words).in_real_time().succeed();
+    let line = outcome.line("join_latency");
+    line.has([("same_index", 40), ("cross_index", 0), ("missing", 0)]);
 }
 
 #[test]

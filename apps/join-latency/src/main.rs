@@ -15,11 +15,11 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::num::NonZeroUsize;
-use core::time::Duration;
 
+use by_stamps::{Experiment, Matching};
 use fass::Occupation;
-use fork_join::{MOST_PARALLEL, PERIOD, Work, Workload};
-use join_latency::{Experiment, Joined, Matching, Samples, Span};
+use fork_join::{MOST_PARALLEL, Work, Workload};
+use join_latency::{Joined, Samples, Span};
 use kernel::options::UsageError;
 use kernel::report::{Distribution, Ns};
 use kernel::{Ending, Machine, Run, json, println};
@@ -91,8 +91,6 @@ fn main(machine: &Machine) -> Result<(), Ending> {
                 matching,
                 queue: at_least_one(queue),
                 depth: at_least_one(depth),
-                period_ns: u64::try_from(PERIOD.as_nanos()).unwrap_or(u64::MAX),
-                execute: hold,
             };
             by_stamps::run(machine, experiment)?
         }
@@ -107,11 +105,6 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     outcome
         .complaint(jobs)
         .map_or(Ok(()), |text| Err(Ending::Failure(text)))
-}
-
-/// Executes by holding the core while the processor halts.
-fn hold(time: Duration) {
-    fass::execute_for(time, Occupation::Hold);
 }
 
 /// Converts a number that is within the bounds of a word.

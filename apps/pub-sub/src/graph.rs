@@ -8,7 +8,7 @@
 //! *worker* executes callbacks; several share a graph.
 //!
 //! Callbacks of a group never overlap, so they can own state in common: a group is
-//! one value of a type that implements [`Callbacks`]. A worker [takes](Graph::take)
+//! one value. A worker [takes](Graph::take)
 //! the value out of the graph, calls it while the graph is free for others, and
 //! [gives it back](Graph::give_back); meanwhile nobody else can. No lock is needed
 //! for that state, and when all is over [`Graph::into_callbacks`] returns it.
@@ -24,16 +24,13 @@
 //! and that nothing is allocated after registration. There is no clock here: times
 //! are given.
 //!
-//! Any number of workers call [`work`] with the same [`Host`], as in ROS 2's
-//! `MultiThreadedExecutor`. Each takes a ready callback out of the graph, executes it while the
-//! graph is free, gives it back, and waits when nothing is ready. The host is what they run on: it
-//! has the one graph under a lock, a clock, and something to wait for. So the same loop runs on
-//! threads, as in the tests of `join-latency`, and on a machine's cores. A callback that publishes
-//! wakes all workers that wait; the first finds the message, the others wait again.
+//! Any number of workers share a graph under a lock, as in ROS 2's `MultiThreadedExecutor`. Each
+//! takes a ready callback out of it, executes it while the graph is free, gives it back, and waits
+//! when nothing is ready. A callback that publishes wakes all workers that wait; the first finds the
+//! message, the others wait again. (`apps/join-latency` has them.)
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
-use core::marker::PhantomData;
 
 /// A topic of a [`Graph`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,12 +39,6 @@ pub struct TopicId(usize);
 /// A group of a [`Graph`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GroupId(usize);
-
-/// A group's callbacks, with the state that they share.
-pub trait Callbacks<M> {
-    /// Executes one of them. Publishing is allowed anywhere in it.
-    fn call(&mut self, call: Call<M>, context: &dyn Context<M>);
-}
 
 /// Why a callback is executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,25 +55,6 @@ pub enum Call<M> {
         /// The message.
         message: M,
     },
-}
-
-/// What a callback can do besides computing.
-pub trait Context<M> {
-    /// Returns the time in nanoseconds.
-    fn now_ns(&self) -> u64;
-
-    /// Publishes a message, at once.
-    ///
-    /// # Panics
-    ///
-    /// If the graph has no such topic.
-    fn publish(&self, topic: TopicId, message: M);
-
-    /// Returns how many messages the graph's subscriptions have dropped.
-    fn dropped(&self) -> u64;
-
-    /// Makes all workers end when they have executed what they are at.
-    fn shut_down(&self);
 }
 
 /// Topics, groups, timers and subscriptions that belong together. `M` is the type of
@@ -284,68 +256,6 @@ impl<M> Subscription<M> {
             self.dropped += 1;
         }
         self.queue.push_back(message);
-    }
-}
-
-/// What workers run on.
-pub trait Host<M, C>: Sync {
-    /// Returns the time in nanoseconds.
-    fn now_ns(&self) -> u64;
-
-    /// Lends the graph to one worker at a time, for a short section.
-    fn with_graph<R>(&self, section: impl FnOnce(&mut Graph<M, C>) -> R) -> R;
-
-    /// Returns the number of notices given so far.
-    fn version(&self) -> u64;
-
-    /// Waits until the version is not `seen`, or until a time, `u64::MAX` forever.
-    /// May return early.
-    fn wait(&self, seen: u64, until_ns: u64);
-
-    /// Raises the version, so that all workers that wait look again.
-    fn notify(&self);
-}
-
-/// Executes callbacks until the graph is shut down.
-pub fn work<M: Clone, C: Callbacks<M>, H: Host<M, C>>(host: &H) {
-    let context = OnHost(host, PhantomData);
-    loop {
-        let seen = host.version();
-        let now_ns = host.now_ns();
-        match host.with_graph(|graph| graph.take(now_ns)) {
-            Next::Call(group, mut callbacks, call) => {
-                callbacks.call(call, &context);
-                let now_ns = host.now_ns();
-                if host.with_graph(|graph| graph.give_back(group, callbacks, now_ns)) {
-                    host.notify();
-                }
-            }
-            Next::WaitUntil(until_ns) => host.wait(seen, until_ns),
-            Next::End => return,
-        }
-    }
-}
-
-/// What a callback sees of the host.
-struct OnHost<'a, H, C>(&'a H, PhantomData<fn() -> C>);
-
-impl<M: Clone, C, H: Host<M, C>> Context<M> for OnHost<'_, H, C> {
-    fn now_ns(&self) -> u64 {
-        self.0.now_ns()
-    }
-
-    fn publish(&self, topic: TopicId, message: M) {
-        self.0.with_graph(|graph| graph.publish(topic, message));
-        self.0.notify();
-    }
-
-    fn dropped(&self) -> u64 {
-        self.0.with_graph(|graph| graph.dropped())
-    }
-
-    fn shut_down(&self) {
-        self.0.with_graph(Graph::shut_down);
-        self.0.notify();
     }
 }
 
