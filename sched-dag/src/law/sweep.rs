@@ -10,7 +10,8 @@
 //!
 //! Besides, at the start of an instance that will keep its core: those of higher
 //! priority that have been waiting for longer than the bound must have idle cores to
-//! go to. Without that, a wrong choice would show no longer than it takes to make.
+//! go to. Without that, a wrong choice would show no longer than it takes to make. Where times
+//! are exact, so must those that wait since an earlier event, be it of the same instant.
 //!
 //! A sweep takes changes one after the other and keeps only what waits and what
 //! runs, so it judges a run of any length.
@@ -142,14 +143,16 @@ pub(super) struct Sweep<'m> {
     now_ns: u64,
     /// How many cores there are of which it is known what they do.
     pub(super) known_cores: usize,
-    /// Since when each waits.
-    waiting: BTreeMap<Key, u64>,
+    /// How many events there were.
+    events: u64,
+    /// Since when each waits, and since which event.
+    waiting: BTreeMap<Key, (u64, u64)>,
     running: BTreeMap<Key, CoreId>,
     stopped: BTreeSet<DagId>,
     owed: BTreeMap<Key, Owed>,
     /// Became ready, or started, at this instant.
     fresh: Vec<Key>,
-    started: Vec<(Key, CoreId)>,
+    started: Vec<(Key, CoreId, u64)>,
     /// What has not started yet.
     unstarted: BTreeSet<Key>,
     wrong: Vec<Wrong>,
@@ -169,6 +172,7 @@ impl<'m> Sweep<'m> {
             bound_ns,
             now_ns,
             known_cores: 0,
+            events: 0,
             waiting: BTreeMap::new(),
             running: BTreeMap::new(),
             stopped: BTreeSet::new(),
@@ -208,6 +212,8 @@ impl<'m> Sweep<'m> {
     /// An instance enters a stage.
     pub(super) fn enter(&mut self, instance: Instance, stage: Stage) {
         let key = self.model.key(instance);
+        self.events += 1;
+        let since = (self.now_ns, self.events);
         self.waiting.remove(&key);
         self.running.remove(&key);
         let is_owed_nothing = self.stopped.contains(&key.1.dag);
@@ -215,17 +221,17 @@ impl<'m> Sweep<'m> {
         match stage {
             Stage::Ready | Stage::Suspended if is_owed_nothing => {}
             Stage::Ready => {
-                self.waiting.insert(key, self.now_ns);
+                self.waiting.insert(key, since);
                 self.unstarted.insert(key);
                 self.fresh.push(key);
             }
             Stage::Suspended => {
-                self.waiting.insert(key, self.now_ns);
+                self.waiting.insert(key, since);
             }
             Stage::Running(core) => {
                 self.running.insert(key, core);
                 if is_first {
-                    self.started.push((key, core));
+                    self.started.push((key, core, self.events));
                 }
             }
             Stage::Absent | Stage::Over => {}
@@ -236,8 +242,7 @@ impl<'m> Sweep<'m> {
     fn settle(&mut self, until_ns: u64) {
         let idle = self.known_cores.saturating_sub(self.running.len());
         for place in 0..self.started.len() {
-            let (key, core) = self.started[place];
-            let wrong = self.out_of_turn(key, core, idle);
+            let wrong = self.out_of_turn(self.started[place], idle);
             self.wrong.extend(wrong);
         }
         let should_run = self.should_run();
@@ -313,7 +318,7 @@ impl<'m> Sweep<'m> {
         let length_ns = self.now_ns.saturating_sub(owed.since_ns);
         self.waits.longest_owed_ns = self.waits.longest_owed_ns.max(length_ns);
         let mut started = self.started.iter();
-        if owed.finds_idle_core && started.any(|(started, _)| *started == key) {
+        if owed.finds_idle_core && started.any(|(started, ..)| *started == key) {
             self.waits.ready_to_start_ns.push(length_ns);
         }
         if length_ns > self.bound_ns {
@@ -327,15 +332,16 @@ impl<'m> Sweep<'m> {
     }
 
     /// Judges the start of an instance that keeps its core from now on.
-    fn out_of_turn(&self, key: Key, core: CoreId, idle: usize) -> Option<Wrong> {
+    fn out_of_turn(&self, (key, core, start): (Key, CoreId, u64), idle: usize) -> Option<Wrong> {
         if !self.model.keeps_its_core(key.1) {
             return None;
         }
-        let mut before = self.waiting.range(..key).filter(|(_, since_ns)| {
-            let longest_ns = self.now_ns.saturating_sub(**since_ns);
-            longest_ns > self.bound_ns
+        // On a machine the one may have become ready when the other was chosen already.
+        let mut before = (self.waiting.range(..key)).filter(|(_, (since_ns, event))| {
+            let longest_ns = self.now_ns.saturating_sub(*since_ns);
+            longest_ns > self.bound_ns || self.bound_ns == 0 && *event < start
         });
-        let (first, since_ns) = before.nth(idle)?;
+        let (first, (since_ns, _)) = before.nth(idle)?;
         Some(Wrong::OutOfTurn {
             started: key.1,
             core,

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::replay::{stage_after, stage_before};
-use super::sweep::{Key, Model, Stage, Sweep, Waits, Wrong};
+use super::sweep::{Model, Stage, Sweep, Waits};
 use super::{Terms, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, What};
@@ -87,9 +87,6 @@ fn of_cluster(
     }
     let wrong = sweep.end(end_ns);
     violations.extend(wrong.into_iter().map(Violation::PassedOver));
-    if terms.tolerance_ns == 0 {
-        violations.extend(chosen_wrongly(model, events.clone()));
-    }
     violations.extend(wrong_cores(model, events));
 }
 
@@ -125,53 +122,6 @@ fn before(
     let busy = cores.map(CoreId);
     let busy = busy.filter(|core| first_of_core.get(core).is_some_and(is_busy));
     (busy.collect(), first_of_instance)
-}
-
-/// Returns what started and keeps its core, although one that goes first had been ready
-/// before in the same instant and got none. Only exact times tell: on a machine the one
-/// may have become ready when the other was chosen already.
-fn chosen_wrongly(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
-    let mut fresh: BTreeSet<Key> = BTreeSet::new();
-    // The one that goes first, and the start of the other one.
-    let mut passed: Vec<(Key, Event)> = Vec::new();
-    let mut found = Vec::new();
-    let mut now_ns = 0;
-    for event in events {
-        if event.time_ns > now_ns {
-            now_ns = event.time_ns;
-            found.append(&mut passed);
-            fresh.clear();
-        }
-        let Some(instance) = event.instance() else {
-            continue;
-        };
-        let key = model.key(instance);
-        if event.what == What::Ready {
-            fresh.insert(key);
-        }
-        if matches!(event.what, What::Start | What::Cancelled) {
-            fresh.remove(&key);
-            passed.retain(|(first, ..)| *first != key);
-        }
-        if event.what == What::Start
-            && let Some(first) = fresh.first().filter(|first| **first < key)
-            && model.keeps_its_core(instance)
-        {
-            passed.push((*first, event));
-        }
-    }
-    found.extend(passed);
-    let wrong = |(first, event): (Key, Event)| {
-        event.instance().map(|started| Wrong::OutOfTurn {
-            started,
-            core: event.core,
-            at_ns: event.time_ns,
-            first: first.1,
-            since_ns: event.time_ns,
-        })
-    };
-    let found = found.into_iter().filter_map(wrong);
-    found.map(Violation::PassedOver).collect()
 }
 
 /// Returns what was on a core of another cluster, or lost a core that it keeps.
