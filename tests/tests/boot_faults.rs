@@ -7,28 +7,26 @@ use tool::protocol::Status;
 #[test]
 fn a_thousand_faults_cost_no_more_than_a_hundred() {
     const FAULTS: u64 = 1000;
-    for preemption in ["on", "off"] {
-        for cores in [1, 2, 4, 8] {
-            let words = format!("trace_events=1000 preemption={preemption} faults={FAULTS}");
-            let outcome = Guest::new("faults").cores(cores).word(&words).succeed();
-            let lines = outcome.lines("endurance");
-            let [few, many] = lines[..] else {
-                panic!("not two lines of kind `endurance`\n{}", outcome.tail());
-            };
-            for (line, faults) in [(few, 100), (many, FAULTS)] {
-                line.has(["faults", "restarts", "completed"].map(|member| (member, faults)));
-                line.has([
-                    ("healthy_jobs", 2 * faults),
-                    ("misses", 0),
-                    ("violations", 0),
-                ]);
-            }
-            // While the run is held, where the journal's size varies a little, and after it.
-            let held = [few, many].map(|line| line.number("held_bytes"));
-            assert!(held[0] > 0 && held[1] <= held[0] + 64, "{held:?}");
-            for member in ["heap_bytes", "contexts"] {
-                assert_eq!(few.number(member), many.number(member), "{member}");
-            }
+    for (cores, preemption) in [(1, "on"), (2, "off"), (4, "on"), (8, "off")] {
+        let words = format!("trace_events=1000 preemption={preemption} faults={FAULTS}");
+        let outcome = Guest::new("faults").cores(cores).word(&words).succeed();
+        let lines = outcome.lines("endurance");
+        let [few, many] = lines[..] else {
+            panic!("not two lines of kind `endurance`\n{}", outcome.tail());
+        };
+        for (line, faults) in [(few, 100), (many, FAULTS)] {
+            line.has(["faults", "restarts", "completed"].map(|member| (member, faults)));
+            line.has([
+                ("healthy_jobs", 2 * faults),
+                ("misses", 0),
+                ("violations", 0),
+            ]);
+        }
+        // While the run is held, where the journal's size varies a little, and after it.
+        let held = [few, many].map(|line| line.number("held_bytes"));
+        assert!(held[0] > 0 && held[1] <= held[0] + 64, "{held:?}");
+        for member in ["heap_bytes", "contexts"] {
+            assert_eq!(few.number(member), many.number(member), "{member}");
         }
     }
 }

@@ -79,19 +79,12 @@ fn faults_of_a_subtask_end_its_dag_alone_in_its_cluster() {
 }
 
 #[test]
-fn a_fault_that_the_app_does_not_look_at_is_a_failure() {
+fn a_fault_that_the_app_does_not_look_at_is_a_failure_and_its_function_has_said_lines_before() {
     let outcome = Guest::test("unnoticed").end_in(Status::Failure);
     outcome.only("fault");
     let reason = outcome.reason();
-    assert!(
-        reason.starts_with("a fault ended dag `careless`"),
-        "{reason}"
-    );
-}
-
-#[test]
-fn functions_say_lines_in_the_log_also_those_that_fail_afterwards() {
-    let outcome = Guest::test("unnoticed").end_in(Status::Failure);
+    let ended = "a fault ended dag `careless`";
+    assert!(reason.starts_with(ended), "{reason}");
     let lines = outcome.lines("log");
     let [begins, _, last] = lines[..] else {
         panic!("{} lines", lines.len());

@@ -63,7 +63,7 @@ const OTHERS: [(u64, &str); 3] = [
 fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
     let file = File::new("recorded");
     for machine in [Machine::Microvm, Machine::Q35] {
-        assert_eq!(record(guest("").cores(2).machine(machine), &file), 150);
+        assert_eq!(record(guest("").cores(2).machine(machine), &file), 250);
     }
     let bytes = file.bytes();
     let recording = Recording::read(&bytes).expect("it is whole");
@@ -72,6 +72,15 @@ fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
         .values::<u64>("counts", "input")
         .expect("there are");
     assert!(inputs.eq((0..50).map(|job| (job, job + 1))));
+    let told = recording
+        .entries()
+        .filter(|entry| entry.what == What::Clock);
+    for entry in told {
+        let times = Vec::<u64>::from_bytes(entry.value).expect("a list of times");
+        assert_eq!(times.len(), 1);
+        // From the kernel's entry on, and not from the first release.
+        assert!(times[0] > entry.at_ns && entry.at_ns > entry.release_ns);
+    }
     let releases = recording
         .entries()
         .map(|entry| (entry.release_ns, entry.job));
@@ -87,27 +96,6 @@ fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
     assert_eq!(replay(1, "policy=static", &file), [100, 0]);
     let divided = replay(4, "clusters=2,2 policy=edf", &file);
     assert_eq!(divided, [100, 0]);
-}
-
-#[test]
-fn functions_are_told_the_time_again_that_they_were_told() {
-    let file = File::new("told");
-    assert_eq!(record(guest("asks=yes").cores(2), &file), 250);
-    let bytes = file.bytes();
-    let recording = Recording::read(&bytes).expect("it is whole");
-    let told = recording
-        .entries()
-        .filter(|entry| entry.what == What::Clock);
-    for entry in told {
-        let times = Vec::<u64>::from_bytes(entry.value).expect("a list of times");
-        assert_eq!(times.len(), 1);
-        // From the kernel's entry on, and not from the first release.
-        assert!(times[0] > entry.at_ns && entry.at_ns > entry.release_ns);
-    }
-    for (cores, words) in OTHERS {
-        let compared = replay(cores, &format!("asks=yes {words}"), &file);
-        assert_eq!(compared, [100, 0], "{cores} {words}");
-    }
 }
 
 #[test]
@@ -158,7 +146,7 @@ fn of_a_run_that_dies_there_is_what_came_before() {
     let recording = Recording::read(&mended).expect("it is mended");
     assert!(recording.is_cut());
     let count = recording.count();
-    assert!((40..=63).contains(&count), "{count}");
+    assert!((66..=105).contains(&count), "{count}");
     fs::write(&file.0, &mended).expect("it is our file");
     let [compared, _] = replay(1, "policy=static", &file);
     assert!((30..=42).contains(&compared), "{compared}");
