@@ -30,7 +30,7 @@
 //! A *mode* is a set of DAGs that run together, such as those of a flight, or of a landing. A
 //! DAG that is in some mode is *on* in its modes and off, that is paused, in the others; a
 //! DAG that is in none runs in all. The rules, whose scenarios in `tests/scenarios/modes.txt` bear
-//! their numbers (M7 has its test in `tests/modes.rs`):
+//! their numbers (M7 has its test in `tests/rules/modes.rs`):
 //!
 //! - **M1, what is on.** A run begins in mode 0. When a mode is entered, its DAGs are resumed, and
 //!   the others that are in some mode are paused (P1 to P5). DAGs that are on in the old

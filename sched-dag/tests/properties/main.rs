@@ -2,7 +2,7 @@
 //!
 //! The rules are judged by the law ([`sched_dag::law`]), which shares no code with the scheduler,
 //! and where that does not judge by `releases.rs`. `walk.rs` is the driver. That the law
-//! finds what is wrong is shown in `tests/journal.rs`.
+//! finds what is wrong is shown in `tests/rules/journal.rs`.
 //!
 //! Each set comes from a seed. More or other sets: `SCHED_DAG_SETS=100000 SCHED_DAG_SEED=7 cargo
 //! test -p sched-dag --test properties`.

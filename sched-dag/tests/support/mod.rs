@@ -8,6 +8,7 @@
 
 #![allow(dead_code, reason = "each test uses a part of this")]
 
+pub(crate) mod events;
 pub(crate) mod hand;
 pub(crate) mod script;
 

@@ -1,9 +1,8 @@
 //! Large commits and runs: no recursion, no quadratic loop.
 
-mod support;
-
 use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SubtaskSpec, verify};
-use support::{PREEMPTIVE, Spec, cores, dag, run};
+
+use crate::support::{PREEMPTIVE, Spec, cores, dag, run};
 
 const LARGE: usize = 200_000;
 

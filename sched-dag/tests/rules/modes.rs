@@ -2,15 +2,14 @@
 //! rules M1 to M5: sets of bits, told what is released and completed. `tests/scenarios/modes.txt`
 //! tells each of M1 to M6 apart.
 
-mod support;
-
 use std::collections::BTreeSet;
 
 use common::random::Random;
 use sched_dag::journal::{Event, What};
 use sched_dag::lifecycle::{Changes, Entry, Lifecycle, Request};
 use sched_dag::{DagId, DagSpec, ModeId};
-use support::{Run, Script, Spec, TWO_CORES, Takes, dag, driver, number};
+
+use crate::support::{Run, Script, Spec, TWO_CORES, Takes, dag, driver, number};
 
 /// Runs all jobs of DAGs on two cores.
 fn run(specs: &[DagSpec], lifecycle: Changes, script: Script<'_, impl Takes>) -> Run {

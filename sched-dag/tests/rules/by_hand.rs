@@ -1,11 +1,19 @@
-//! The ends of time, and numbers that go on.
+//! What a test that drives the scheduler itself shows, and runs in virtual time do not: the ends of
+//! time and numbers that go on; what else happens at the instant at which a completion takes the
+//! short way, [`Scheduler::pass_on`](sched_dag::Scheduler::pass_on); and what drivers of a real
+//! machine may do: mistakes, clocks that go back, cores that are preferred. (That they come late, or
+//! end what has lost its core meanwhile, and that the short way comes to the same as the long one,
+//! random walks tell: `properties`.)
 
-mod support;
+use std::panic::catch_unwind;
 
 use sched_dag::virtual_time::{End, ExecutionTimes};
 use sched_dag::{DagSpec, OverrunPolicy, Policy};
-use support::hand::Hand;
-use support::{PREEMPTIVE, Run, Script, Spec, dag, driver, instance, under};
+
+use crate::support::hand::Hand;
+use crate::support::{
+    PREEMPTIVE, Run, Script, Spec, TWO_CORES, cores, dag, driver, instance, under,
+};
 
 /// Runs one that has further jobs, of which none can be due.
 fn unlimited(spec: DagSpec, policy: Policy) -> Run {
@@ -103,4 +111,110 @@ fn numbers_go_on_over_many_skipped_jobs() {
          50004: released 0.50004",
         skipped.join(", ")
     ));
+}
+
+fn chain(period_ns: u64, deadline_ns: u64, jobs: u64) -> DagSpec {
+    dag(period_ns, deadline_ns, jobs, &[0, 0], &[(0, 1)])
+}
+
+#[test]
+fn a_deadline_or_a_release_of_the_same_instant_leaves_it_open() {
+    for (deadline_ns, script) in [
+        // The deadline itself is in time. A later miss is reported by the rest of the instant.
+        (10, "10 hand 0.0.0: start 0.0.1 on 0, done=on 0"),
+        (
+            10,
+            "11 hand 0.0.0: done=Some(Open)
+             11: missed 0.0, start 0.0.1 on 0",
+        ),
+        // So is the sink's, and it reports its own miss.
+        (
+            10,
+            "4 hand 0.0.0: start 0.0.1 on 0
+             10 hand 0.0.1: completed 0.0 Met, done=Some(Idle)",
+        ),
+        (
+            10,
+            "4 hand 0.0.0: start 0.0.1 on 0
+             11 hand 0.0.1: missed 0.0, completed 0.0 Missed, done=Some(Idle)",
+        ),
+        (200, "99 hand 0.0.0: start 0.0.1 on 0, done=on 0"),
+        (
+            200,
+            "100 hand 0.0.0: done=Some(Open)
+             100: released 0.1, start 0.0.1 on 0, start 0.1.0 on 1",
+        ),
+        // The job that is due is skipped by the rest of the instant, too.
+        (
+            200,
+            "2 pause: off 0
+             99 hand 0.0.0: start 0.0.1 on 0, done=on 0",
+        ),
+        (
+            200,
+            "2 pause: off 0
+             100 hand 0.0.0: done=Some(Open)
+             100: skipped 0.1, start 0.0.1 on 0",
+        ),
+    ] {
+        let script = format!("0: released 0.0, start 0.0.0 on 0\n{script}");
+        Hand::new(&[chain(100, deadline_ns, 2)], TWO_CORES).must(&script);
+    }
+}
+
+#[test]
+fn a_signal_of_the_same_instant_leaves_it_open() {
+    let signalled = dag(5, 5, 2, &[0], &[]).sporadic();
+    Hand::new(&[chain(100, 100, 1), signalled], TWO_CORES).must(
+        "0: released 0.0
+         7 signal 1, open
+         7 hand 0.0.0: done=Some(Open)",
+    );
+}
+
+/// DAG 0, which DAG 1 preempts at 2.
+fn preempted_at_2(count: u32) -> Hand {
+    let urgent = dag(100, 100, 1, &[0], &[]).offset(2);
+    let mut hand = Hand::new(
+        &[dag(100, 100, 1, &[5, 5], &[(0, 1)]), urgent],
+        cores(count),
+    );
+    hand.must("0: released 0.0, start 0.0.0 on 0");
+    hand
+}
+
+#[test]
+fn a_clock_that_goes_back_stands_still() {
+    preempted_at_2(1).must("50: released 1.0\n40: now=50");
+}
+
+#[test]
+fn an_end_of_what_does_not_run_is_refused() {
+    for (script, expected) in [
+        (
+            "1 finish 0.0.1",
+            "dag 0 job 0 subtask 1 is completed and has not started",
+        ),
+        (
+            "1 fail 0.0.1",
+            "dag 0 job 0 subtask 1 fails and has not started",
+        ),
+        ("1 finish 0.0.0, finish 0.0.0", "complete each once"),
+        ("1 finish 0.1.0", "dag 0 job 1 subtask 0"),
+    ] {
+        let run = catch_unwind(|| _ = preempted_at_2(1).must(script));
+        let refused = run.expect_err(script);
+        let said: &String = refused.downcast_ref().expect("a text");
+        assert!(said.contains(expected), "{said}");
+    }
+}
+
+#[test]
+fn an_idle_core_that_the_driver_prefers_is_taken_first() {
+    // Core 1 would be; core 2 is taken if it is preferred, and a busy one is not.
+    for (preferred, taken) in [(0, 1), (1, 1), (2, 2)] {
+        preempted_at_2(3).must(&format!(
+            "2 prefer {preferred}: released 1.0, start 1.0.0 on {taken}"
+        ));
+    }
 }

@@ -2,25 +2,19 @@
 //! and of small ones that are wrong in what random sets do not have.
 //!
 //! More or other sets: `JOURNALS=100000 JOURNAL_SEED=7 cargo test -p sched-dag --test
-//! journal`.
-
-#[path = "support/events.rs"]
-mod events;
-#[allow(dead_code, reason = "its own test uses all of it")]
-#[path = "properties/set.rs"]
-mod set;
-mod support;
+//! rules journal`.
 
 use common::random::Random;
-use events::events;
 use sched_dag::journal::{Event, What};
 use sched_dag::law::{
     Histogram, InstanceRecord, JobRecord, Record, Tally, Terms, Violation, dispatch_violations,
     violations,
 };
 use sched_dag::{DagId, Instance, JobOutcome, SubtaskId};
-use set::{Overruns, Set};
-use support::{PREEMPTIVE, Run, Script, Spec, commit, driver, number};
+
+use crate::set::{self, Overruns, Set};
+use crate::support::events::events;
+use crate::support::{self, PREEMPTIVE, Run, Script, Spec, commit, driver, number};
 
 fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
     let (count, first_seed) = (number("JOURNALS", 500), number("JOURNAL_SEED", 1));

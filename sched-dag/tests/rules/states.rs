@@ -1,13 +1,12 @@
 //! Shared states become precedence: which edges, and that they suffice.
 
-mod support;
-
 use common::random::Random;
 use sched_dag::{
     CommitOptions, DagId, DagSpec, Fault, LatestSpec, Policy, StateSpec, StateUser, SubtaskId,
     SubtaskSpec, TopicPort, verify,
 };
-use support::{PREEMPTIVE, commit, dag, shuffled_edges};
+
+use crate::support::{PREEMPTIVE, commit, dag, shuffled_edges};
 
 /// A state with its users, and whether each updates it.
 fn state(name: &str, users: &[(usize, bool)]) -> StateSpec {

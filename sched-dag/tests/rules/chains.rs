@@ -1,14 +1,12 @@
 //! Chains on a journal by hand: which there are, and their times as they are computed by hand.
 
-#[path = "support/events.rs"]
-mod events;
-
-use events::events;
 use sched_dag::chains::{Chain, Latencies, SampledJobs, Sampling};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, SubtaskId, SubtaskSpec,
     TaskSet, verify,
 };
+
+use crate::support::events::events;
 
 /// `camera` (period 100, `expose` before `detect`), `plan` (period 60), `motor` (period 20):
 /// `plan` samples what `detect` writes, `motor/drive` what `plan` writes.

@@ -1,9 +1,8 @@
 //! Priorities from the graph.
 
-mod support;
-
 use sched_dag::{CommitOptions, DagSpec, Fault, Policy, verify};
-use support::{Spec, dag};
+
+use crate::support::{Spec, dag};
 
 /// 0 -> {1, 2, 3} -> 4 without priorities.
 fn fork(deadline_ns: u64, wcets_ns: [Option<u64>; 5]) -> DagSpec {

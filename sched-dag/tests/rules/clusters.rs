@@ -1,12 +1,7 @@
 //! Clusters: each runs as if it were alone on a machine of its own, and is bounded as such.
 //!
 //! More or other sets: `CLUSTERED=100000 CLUSTER_SEED=7 cargo test -p sched-dag --test
-//! clusters`.
-
-#[allow(dead_code, reason = "its own test uses all of it")]
-#[path = "properties/set.rs"]
-mod set;
-mod support;
+//! rules clusters`.
 
 use std::sync::Arc;
 
@@ -18,8 +13,9 @@ use sched_dag::{
     ClusterId, Clusters, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, Instance,
     Policy, SchedulerOptions, SubtaskId, TaskSet, verify,
 };
-use set::Set;
-use support::{Script, Spec, TWO_CORES, number};
+
+use crate::set::{self, Set};
+use crate::support::{self, Script, Spec, TWO_CORES, number};
 
 fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: Clusters) -> Arc<TaskSet> {
     let options = CommitOptions::new(options.policy, options.cores)
