@@ -93,7 +93,6 @@ pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;
 pub use multi_path::multi_path;
 pub use overheads::{OverheadSource, Overheads};
-pub use pipelined::Refusal;
 pub use set::{multi_path_edf, multi_path_fp};
 pub use task::{Task, TaskError};
 pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};

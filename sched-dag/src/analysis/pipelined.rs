@@ -45,7 +45,6 @@ use alloc::vec::Vec;
 use super::interference::{Delays, Shape, on_all_cores};
 use super::task::Task;
 use super::workload::Piece;
-use crate::worded::texts;
 
 /// The most evaluations of equations' right-hand sides that the DAGs of one analysis share; a
 /// DAG that needs more is "not proven".
@@ -84,39 +83,6 @@ pub(super) enum Unsolved {
     BeyondDeadline,
     /// A limit on steps, on overlapping jobs or on the numbers' size was hit.
     Limit,
-}
-
-texts! {
-    /// Why a sufficient test did not prove a set of DAGs schedulable.
-    ///
-    /// None of these says that the set is infeasible. DAGs are named by their position.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Refusal {
-        /// The set is outside the test's assumptions: there are no cores, or a
-        /// deadline or priority is not of the kind the test is about.
-        DoesNotApply = "the test does not apply to these DAGs";
-        /// This DAG has no bound within its relative deadline.
-        Fails { position: usize } =
-            "dag {position} has no bound within its relative deadline; give it more time, more \
-             cores or less interference";
-        /// The computation reached a limit on steps, on jobs in flight or on the
-        /// size of numbers, at this DAG.
-        Limit { position: usize } =
-            "the analysis of dag {position} reached a limit; shorten its deadline in periods or \
-             use a coarser unit of time";
-    }
-}
-
-impl core::error::Error for Refusal {}
-
-impl Unsolved {
-    /// Names the DAG whose equation has no usable solution.
-    pub(super) const fn at(self, position: usize) -> Refusal {
-        match self {
-            Self::BeyondDeadline => Refusal::Fails { position },
-            Self::Limit => Refusal::Limit { position },
-        }
-    }
 }
 
 impl Figures {
@@ -295,6 +261,6 @@ mod tests {
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
         let other = Task::new(25, 50, vec![1, 3, 3, 1], &diamond).unwrap();
         let bounds = multi_path_fp(&[&chain, &other], 3, Clip::Window);
-        assert_eq!(bounds, Ok(vec![13, 14]));
+        assert_eq!(bounds, Some(vec![13, 14]));
     }
 }

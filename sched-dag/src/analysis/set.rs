@@ -23,7 +23,7 @@ use alloc::vec::Vec;
 
 use super::interference::{Clip, Delays, Other, Shape};
 use super::multi_path::{Equations, alone};
-use super::pipelined::{Figures, OWN_STEPS, Refusal, STEP_LIMIT, Unsolved};
+use super::pipelined::{Figures, OWN_STEPS, STEP_LIMIT, Unsolved};
 use super::task::Task;
 use super::workload::{Bursts, Workload};
 
@@ -53,16 +53,6 @@ pub(super) struct Solution {
     pub(super) first_failing: Option<(usize, Unsolved)>,
     /// Why a DAG has no response time, by DAG.
     pub(super) failures: Vec<Option<Failure>>,
-}
-
-impl Solution {
-    /// Returns the bounds if there is one for each DAG.
-    pub(super) fn complete(self) -> Result<Vec<u64>, Refusal> {
-        match self.first_failing {
-            Some((position, why)) => Err(why.at(position)),
-            None => Ok(self.responses.into_iter().flatten().collect()),
-        }
-    }
 }
 
 /// Why a DAG has no response-time bound.
@@ -120,7 +110,7 @@ impl<'a> Set<'a> {
             }
         }
         if let Some((_, Unsolved::Limit)) = solution.first_failing
-            && let Ok(coarse) = self.down_from_deadlines(&may_outrank)
+            && let Some(coarse) = self.down_from_deadlines(&may_outrank)
         {
             solution.responses = coarse.into_iter().map(Some).collect();
             solution.first_failing = None;
@@ -194,7 +184,7 @@ impl<'a> Set<'a> {
     pub(super) fn down_from_deadlines(
         &self,
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<Vec<u64>, (usize, Unsolved)> {
+    ) -> Option<Vec<u64>> {
         let mut steps = Steps::of(self.tasks.len());
         let mut bounds: Vec<u64> = (self.known.iter().zip(self.tasks))
             .map(|(known, task)| known.unwrap_or(task.relative_deadline_ns()))
@@ -203,19 +193,17 @@ impl<'a> Set<'a> {
         loop {
             let responses: Vec<Option<u64>> = bounds.iter().copied().map(Some).collect();
             let lower = (0..self.tasks.len()).map(|dag| {
-                if let Some(known) = self.known[dag] {
-                    return Ok(known);
+                if self.known[dag].is_some() {
+                    return self.known[dag];
                 }
-                let delays = self.delays_of_job(dag, &responses, &may_outrank);
-                let delays = delays.map_err(|_| (dag, Unsolved::Limit))?;
-                let response = self.respond(dag, &delays, 0, &mut steps);
-                response.map_err(|why| (dag, why))
+                let delays = self.delays_of_job(dag, &responses, &may_outrank).ok()?;
+                self.respond(dag, &delays, 0, &mut steps).ok()
             });
-            match lower.collect::<Result<Vec<u64>, _>>() {
-                Err(_) if has_round => return Ok(bounds),
-                Err(why) => return Err(why),
-                Ok(lower) if lower == bounds => return Ok(bounds),
-                Ok(lower) => bounds = lower,
+            match lower.collect::<Option<Vec<u64>>>() {
+                None if has_round => return Some(bounds),
+                None => return None,
+                Some(lower) if lower == bounds => return Some(bounds),
+                Some(lower) => bounds = lower,
             }
             has_round = true;
         }
@@ -309,36 +297,26 @@ pub(super) fn constrained(tasks: &[&Task], cores: u32) -> bool {
 }
 
 /// Bounds the response times under global fixed priorities, the DAGs given from the highest
-/// priority to the lowest; also of jobs that overlap.
-///
-/// # Errors
-///
-/// [`Refusal`] if there is no core, or a DAG has no bound within its deadline.
-pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64>, Refusal> {
-    if cores == 0 {
-        return Err(Refusal::DoesNotApply);
-    }
-    let mut set = Set::new(tasks, cores);
+/// priority to the lowest; also of jobs that overlap. `None` if there is no core, or a DAG has no
+/// bound within its deadline.
+#[must_use]
+pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: Clip) -> Option<Vec<u64>> {
+    let mut set = (cores > 0).then(|| Set::new(tasks, cores))?;
     set.clip = clip;
     let order: Vec<usize> = (0..tasks.len()).collect();
-    set.solve(&order, |other, dag| other < dag).complete()
+    let solution = set.solve(&order, |other, dag| other < dag);
+    solution.responses.into_iter().collect()
 }
 
 /// Bounds the response times under global EDF, in the order given: down from the
-/// deadlines, so it accepts a little less than [`answer()`](super::answer()).
-///
-/// # Errors
-///
-/// [`Refusal`] if a DAG has `D > T`, or no bound within its deadline.
-pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: Clip) -> Result<Vec<u64>, Refusal> {
-    if !constrained(tasks, cores) {
-        return Err(Refusal::DoesNotApply);
-    }
-    let mut set = Set::new(tasks, cores);
+/// deadlines, so it accepts a little less than [`answer()`](super::answer()). `None` if a DAG has
+/// `D > T`, or no bound within its deadline.
+#[must_use]
+pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: Clip) -> Option<Vec<u64>> {
+    let mut set = constrained(tasks, cores).then(|| Set::new(tasks, cores))?;
     set.clip = clip;
     set.deadlines_limit = true;
     set.down_from_deadlines(|_, _| true)
-        .map_err(|(position, why)| why.at(position))
 }
 
 #[cfg(test)]
@@ -351,7 +329,7 @@ mod tests {
         let high = Task::new(100, 100, vec![3, 3], &[]).unwrap();
         let low = Task::new(100, 100, vec![5], &[]).unwrap();
         for clip in [Clip::Window, Clip::Waiting, Clip::Chains] {
-            assert_eq!(multi_path_fp(&[&high, &low], 2, clip), Ok(vec![3, 8]));
+            assert_eq!(multi_path_fp(&[&high, &low], 2, clip), Some(vec![3, 8]));
         }
     }
 

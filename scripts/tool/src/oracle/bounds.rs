@@ -247,7 +247,7 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
     let bounds = |bounds: Option<Vec<u64>>| bounds.map(|bounds| list(&bounds));
     let is_constrained = |task: &&Task| task.relative_deadline_ns() <= task.period_ns();
     let by_priority = |clip: Clip| {
-        let bounds = multi_path_fp(&by_deadline, cores, clip).ok();
+        let bounds = multi_path_fp(&by_deadline, cores, clip);
         bounds.filter(|_| tasks.iter().all(is_constrained))
     };
     let computed = match name {
@@ -262,8 +262,8 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
         "melani_gedf" => bounds(older::melani_edf(tasks, cores, older::Width::Ignored)),
         "mp_gfp_dm" => bounds(by_priority(Clip::Window)),
         "mp_gfp_dm_clip" => bounds(by_priority(Clip::Waiting)),
-        "mp_gedf" => bounds(multi_path_edf(tasks, cores, Clip::Window).ok()),
-        "mp_gedf_clip" => bounds(multi_path_edf(tasks, cores, Clip::Waiting).ok()),
+        "mp_gedf" => bounds(multi_path_edf(tasks, cores, Clip::Window)),
+        "mp_gedf_clip" => bounds(multi_path_edf(tasks, cores, Clip::Waiting)),
         "gedf_capacity" => gedf_capacity(tasks, cores).map(accepted),
         "bonifaci_gedf" => Some(accepted(bonifaci_edf(tasks, cores))),
         "federated" => federated(tasks, cores).map(|federation| words_of(&federation)),
