@@ -3,11 +3,13 @@
 use harness::{Guest, Members, Said};
 use sched_dag::chains::Chain;
 use sched_dag::law::Distribution;
+use tool::Outcome;
+use tool::protocol::MachineLine;
 
 #[test]
-fn the_hot_path_keeps_its_bounds() {
+fn the_hot_path_keeps_its_bounds_and_the_trace_tells_the_ages_that_its_values_tell() {
     for policy in ["policy=static", "policy=edf"] {
-        let guest = Guest::new("autoware").cores(4).word("jobs=40");
+        let guest = Guest::new("autoware").cores(4).word("jobs=40 events=on");
         let outcome = guest.word(policy).succeed();
         let line = outcome.line("autoware");
         line.has([("subtasks", 24), ("allocations", 0)]);
@@ -18,15 +20,11 @@ fn the_hot_path_keeps_its_bounds() {
             let bound = line.number(&format!("{path}_bound_ns"));
             assert!(0 < longest && longest < bound, "{}", line.text);
         }
+        tells_its_ages(&outcome, line);
     }
 }
 
-#[test]
-fn its_trace_tells_the_ages_that_its_values_tell() {
-    let guest = Guest::new("autoware").cores(4);
-    let outcome = guest.word("jobs=40 events=on").succeed();
-    let line = outcome.line("autoware");
-
+fn tells_its_ages(outcome: &Outcome, line: &MachineLine) {
     let mut runs = tool::trace::read(&outcome.serial).expect("a trace");
     let run = runs.remove(0);
     let place = |name| Chain::place(&run.task_set, name).expect(name);

