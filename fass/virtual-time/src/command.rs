@@ -152,7 +152,7 @@ fn name_remedy() {
     panic::set_hook(Box::new(move |info| {
         show(info);
         eprintln!(
-            "replay: this build ends at a panic; by `cargo run --profile host`, that is a profile \
+            "replay: this build ends at a panic; by `cargo run --profile linux`, that is a profile \
              with `panic = \"unwind\"`, the job is shown instead"
         );
     }));

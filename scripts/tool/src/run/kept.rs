@@ -171,7 +171,7 @@ impl Kept {
         fs::write(&path, bytes).map_err(|error| format!("{file}: cannot be written: {error}"))?;
         let shown = self.replay_package().map_or(String::new(), |package| {
             format!(
-                ", and `cargo run --profile host{package} --example replay -- {file}` shows the job \
+                ", and `cargo run --profile linux{package} --example replay -- {file}` shows the job \
                  that crashed"
             )
         });
