@@ -1,6 +1,6 @@
 //! Between the first job and the last nothing is allocated.
 
-#[path = "../../../sched-dag/tests/support/counting.rs"]
+#[path = "../../../sched-dag/tests/it/counting.rs"]
 mod counting;
 
 use std::sync::Arc;

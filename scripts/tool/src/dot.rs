@@ -234,7 +234,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
   c0_d0_t0 -> c0_d0_s2 [style=dashed];
 "#;
 
-    /// Samples of other DAGs are shown by `tests/tests/boot_seeing.rs`.
+    /// Samples of other DAGs are shown by `tests/tests/boots/seeing.rs`.
     #[test]
     fn a_dag_is_a_cluster_with_all_that_was_committed() {
         let dot = text(&committed(false)).expect("a commit");

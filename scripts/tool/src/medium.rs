@@ -496,7 +496,7 @@ mod tests {
     use crate::tiny::{TinyEnd, tiny_image};
     use boot_efi::file::{is_whole, section};
 
-    /// That a module is there is shown by `tests/tests/boot_by_grub.rs`.
+    /// That a module is there is shown by `tests/tests/boots/by_grub.rs`.
     #[test]
     fn grub_gets_each_word_as_it_is_or_it_is_refused_by_name() {
         let words = "jobs=3  a=$x;{}#";

@@ -481,7 +481,7 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
         assert_eq!(found, ["virtual-time", "virtual-time", "tool"]);
     }
 
-    /// That the app is built and boots is shown by `tests/tests/boot_new_app.rs`.
+    /// That the app is built and boots is shown by `tests/tests/boots/new_app.rs`.
     #[test]
     fn from_git_the_url_is_all_that_is_named_and_from_a_folder_nothing_is_installed() {
         let url = "https://example.org/kernel.git";

@@ -90,7 +90,7 @@ fn every_command_is_one_that_its_script_accepts() {
 
 #[test]
 fn what_it_says_of_the_compiler_is_what_the_compilers_test_expects() {
-    let test = page("fass/tests/diagnostics.rs");
+    let test = page("fass/tests/it/diagnostics.rs");
     let lines = lines_of("text diagnostic");
     assert!(lines.len() >= 5, "{lines:?}");
     for line in lines {

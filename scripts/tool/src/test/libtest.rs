@@ -21,15 +21,18 @@ use crate::system;
 /// host makes slow. Each guest has a limit of its own.
 const LIMIT: Duration = Duration::from_secs(3600);
 
-/// The programs that test programs need besides QEMU.
+/// The integration test of a package that boots guests; no other does.
+const BOOTS: &str = "boots";
+
+/// The programs that modules of such tests need besides QEMU.
 const NEEDS: [(&str, &[&Need]); 4] = [
-    ("boot_by_efi", &[&install::MTOOLS, &install::OVMF]),
+    ("by_efi::", &[&install::MTOOLS, &install::OVMF]),
     (
-        "boot_on_screen",
+        "on_screen::",
         &[&install::GRUB, &install::MTOOLS, &install::OVMF],
     ),
-    ("boot_by_grub", &[&install::GRUB, &install::OVMF]),
-    ("boot_in_bochs", &[&install::GRUB, &install::BOCHS]),
+    ("by_grub::", &[&install::GRUB, &install::OVMF]),
+    ("in_bochs::", &[&install::GRUB, &install::BOCHS]),
 ];
 
 /// A compiled libtest binary.
@@ -50,19 +53,26 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
         tally.run("all tests compile", || Err(why.into()));
     }
     for binary in binaries {
-        let (name, boots) = (binary.name(), binary.boots_guests());
-        if boots && !binary.has_matches(plan) {
-            continue;
+        let name = binary.name();
+        let mut command = binary.command(plan);
+        if binary.boots_guests() {
+            let Some(tests) = binary.wanted(plan) else {
+                continue;
+            };
+            let obstacle = match plan.quick {
+                true => Err("left out by --quick".into()),
+                false => plan.boots.clone(),
+            };
+            if let Err(why) = obstacle {
+                tally.skip(&name, &why);
+                continue;
+            }
+            for (module, why) in lacking(&tests) {
+                tally.skip(&format!("{name}: {module}"), &why);
+                command.args(["--skip", module]);
+            }
         }
-        let obstacle = match &plan.boots {
-            _ if !boots => Ok(()),
-            _ if plan.quick => Err("left out by --quick".into()),
-            boots => boots.clone().and_then(|()| binary.ensure_needs()),
-        };
-        match obstacle {
-            Err(why) => tally.skip(&name, &why),
-            Ok(()) => run(plan, &name, binary.command(plan), tally),
-        }
+        run(plan, &name, command, tally);
     }
     if !plan.quick {
         run(plan, "doctests", doctests(plan), tally);
@@ -114,15 +124,7 @@ impl TestBinary {
 
     /// Whether its tests need QEMU; they say so by the target's name.
     fn boots_guests(&self) -> bool {
-        self.target.starts_with("boot_") || self.target.ends_with("_qemu")
-    }
-
-    /// Installs what its tests need besides QEMU, if it is missing; they say so by the
-    /// target's name.
-    fn ensure_needs(&self) -> Result<(), String> {
-        let needs = NEEDS.iter().filter(|(target, _)| *target == self.target);
-        let mut needs = needs.flat_map(|(_, needs)| needs.iter());
-        needs.try_for_each(|need| install::ensure(need))
+        self.target == BOOTS
     }
 
     /// Returns what runs the tests that the filter wants. As cargo does it: tests run in their
@@ -136,15 +138,31 @@ impl TestBinary {
         command
     }
 
-    /// Whether it has tests that the filter wants. One that cannot say so counts as if it had.
-    fn has_matches(&self, plan: &Plan) -> bool {
+    /// Lists the tests that the filter wants, if there are any. A program that cannot say so
+    /// counts as if it had some.
+    fn wanted(&self, plan: &Plan) -> Option<String> {
         let mut listed = self.command(plan);
         listed.args(["--list", "--format=terse"]);
         match listed.stdin(Stdio::null()).stderr(Stdio::null()).output() {
-            Ok(output) if output.status.success() => !output.stdout.is_empty(),
-            _ => true,
+            Ok(output) if output.status.success() => {
+                let tests = String::from_utf8_lossy(&output.stdout).into_owned();
+                (!tests.is_empty()).then_some(tests)
+            }
+            _ => Some(String::new()),
         }
     }
+}
+
+/// Installs what these tests need besides QEMU; returns the modules for which that cannot be had,
+/// and why.
+fn lacking(tests: &str) -> Vec<(&'static str, String)> {
+    let is_there = |module| tests.lines().any(|test| test.starts_with(module));
+    let needed = NEEDS.iter().filter(|(module, _)| is_there(*module));
+    let lacks = needed.filter_map(|(module, needs)| {
+        let had = needs.iter().try_for_each(|need| install::ensure(need));
+        had.err().map(|why| (*module, why))
+    });
+    lacks.collect()
 }
 
 /// Returns what runs the examples in the documentation.
@@ -324,10 +342,10 @@ test result: ok. 40 passed; 0 failed; 0 ignored; 0 measured; 9 filtered out; fin
     #[test]
     fn a_message_about_a_test_binary_is_told_from_others() {
         let message = r#"{"reason":"compiler-artifact","manifest_path":"/w/a/Cargo.toml",
-            "target":{"kind":["test"],"name":"boot_x"},
-            "profile":{"test":true},"executable":"/w/target/boot_x-1"}"#;
+            "target":{"kind":["test"],"name":"boots"},
+            "profile":{"test":true},"executable":"/w/target/boots-1"}"#;
         let found = TestBinary::read(&parse(message).unwrap()).unwrap();
-        assert!(found.name() == "/w/a: boot_x" && found.boots_guests());
+        assert!(found.name() == "/w/a: boots" && found.boots_guests());
         let of_product = message.replace("true", "false");
         for other in [&of_product, r#"{"reason":"build-finished","success":true}"#] {
             assert_eq!(TestBinary::read(&parse(other).unwrap()), None);

@@ -1,0 +1,188 @@
+//! What can happen to a run from within and from outside, and what goes on regardless.
+
+use std::io::{Read as _, Write as _};
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::thread;
+
+use crate::support::{alone, alone_on, breaches, chain, mechanisms, ms};
+use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
+use linux::{Control, Linux, Mechanism};
+
+#[test]
+fn a_chain_on_one_core_wakes_nobody() {
+    for mechanism in mechanisms() {
+        let alone = alone(1, mechanism);
+        finish_create_dags(&[chain("chain", 12, 40, ms(2), 10)]).unwrap();
+        let run = alone.machine.run().unwrap();
+        assert_eq!(breaches(&run), []);
+        let (releases, counts) = (run.statistics("chain").completed, run.counts());
+        assert!(
+            counts.calls <= releases && counts.hand_offs > 0,
+            "{counts:?}"
+        );
+    }
+}
+
+#[test]
+fn the_runs_time_skips_what_is_idle() {
+    for sizes in [&[1][..], &[2], &[1, 1]] {
+        let share = || Linux::sharing(sizes.iter().sum(), Mechanism::Poll).unwrap();
+        let alone = alone_on(|| {
+            share()
+                .with(|terms| terms.divide(sizes))
+                .skipping_idle_time()
+        });
+        let clusters = (0..).take(sizes.len());
+        let dags: Vec<_> = clusters
+            .map(|cluster| {
+                let dag = chain(&format!("dag {cluster}"), 3, 500, ms(3_600_000), 0);
+                dag.in_flight(1).cluster(cluster).clone()
+            })
+            .collect();
+        finish_create_dags(&dags).unwrap();
+        let run = alone.machine.run().unwrap();
+        assert_eq!(breaches(&run), []);
+        for dag in &dags {
+            let of = run.statistics(dag);
+            assert_eq!((of.completed, of.misses, of.faults), (500, 0, 0));
+        }
+    }
+}
+
+#[test]
+fn s1_signals_come_from_other_threads_and_from_files() {
+    let alone = alone(1, Mechanism::Fifo);
+    let (mut near, far) = UnixStream::pair().unwrap();
+    let heard = Arc::new(AtomicU64::new(0));
+    let dag = create_dag();
+    dag.name("answer").jobs(2).relative_deadline(ms(5));
+    let (count, mut source) = (Arc::clone(&heard), far.try_clone().unwrap());
+    let function = move || {
+        let mut byte = [0];
+        if count.fetch_add(1, Relaxed) == 0 {
+            source.read_exact(&mut byte).unwrap();
+        }
+    };
+    let named = SubtaskAttributes::named("answer");
+    let signal = dag.sporadic(ms(1));
+    dag.source(function).register(named);
+    finish_create_dags(&[dag]).unwrap();
+    alone.machine.raise_on_input(&signal, &far).unwrap();
+    let (first, of_thread) = (Arc::clone(&heard), signal.clone());
+    thread::spawn(move || {
+        near.write_all(b"x").unwrap();
+        while first.load(Relaxed) == 0 {
+            thread::yield_now();
+        }
+        of_thread.raise();
+    });
+    let run = alone.machine.run().unwrap();
+    assert_eq!(run.violations().count(), 0);
+    assert_eq!(run.statistics("answer").completed, 2);
+    assert_eq!(heard.load(Relaxed), 2);
+}
+
+#[test]
+fn a_dag_is_paused_resumed_and_stopped_from_outside() {
+    for mechanism in mechanisms() {
+        let alone = alone(1, mechanism);
+        let endless = create_dag();
+        endless.name("endless");
+        endless.period(ms(1)).relative_deadline(ms(1));
+        let ticks = Arc::new(AtomicU64::new(0));
+        let count = Arc::clone(&ticks);
+        let tick = move |_job| _ = count.fetch_add(1, Relaxed);
+        endless.register_untyped_subtask(tick, SubtaskAttributes::named("tick"));
+        finish_create_dags(&[endless]).unwrap();
+        let control = alone.machine.control().unwrap();
+        thread::spawn(move || {
+            let wait_for = |more: u64| {
+                let until = ticks.load(Relaxed) + more;
+                while ticks.load(Relaxed) < until {
+                    thread::sleep(ms(1));
+                }
+            };
+            wait_for(3);
+            control.pause("endless");
+            thread::sleep(ms(20));
+            control.resume("endless");
+            wait_for(3);
+            control.stop("endless");
+        });
+        let run = alone.machine.run().unwrap();
+        assert_eq!(run.violations().count(), 0);
+        let statistics = run.statistics("endless");
+        assert!(
+            statistics.skips > 0 && statistics.completed >= 6,
+            "{statistics:?}"
+        );
+    }
+}
+
+#[test]
+fn after_a_run_there_can_be_another() {
+    for _ in 0..3 {
+        let alone = alone(1, Mechanism::Normal);
+        finish_create_dags(&[chain("tick", 1, 3, ms(1), 10)]).unwrap();
+        assert_eq!(alone.machine.run().unwrap().statistics("tick").completed, 3);
+        let error = alone.machine.run().unwrap_err();
+        assert!(error.to_string().starts_with("nothing is committed"));
+        finish_create_dags(&[chain("tick", 1, 2, ms(1), 10)]).unwrap();
+        assert_eq!(alone.machine.run().unwrap().statistics("tick").completed, 2);
+    }
+}
+
+#[test]
+fn a_topic_is_seen_and_what_is_set_is_for_the_jobs_to_come() {
+    for mechanism in mechanisms() {
+        let alone = alone(1, mechanism);
+        alone.machine.let_look();
+        let gain = Parameter::new("gain", 10, 1..=1000_u64);
+        let dag = create_dag();
+        dag.name("scaling").record::<u64>("scaled");
+        let mut count = 0;
+        let scale = move |gain: u64| {
+            count += 1;
+            (gain * count,)
+        };
+        let named = SubtaskAttributes::named;
+        dag.period(ms(2))
+            .using(gain.reading())
+            .source(scale)
+            .writes(&["scaled"])
+            .register(named("scale"));
+        dag.register_sink_subtask(|_: (u64,)| (), vec!["scaled"], ms(2), named("sink"));
+        finish_create_dags(&[dag]).unwrap();
+        let person = thread::spawn(move || {
+            let live = loop {
+                match Control::get() {
+                    Some(live) => break live,
+                    None => thread::sleep(ms(1)),
+                }
+            };
+            assert!(!live.see(Some("gian")) && live.see(Some("scaled")));
+            let wait_for = |gain: u64| {
+                let mut buffer = [0; 64];
+                loop {
+                    match live.take_seen(&mut buffer) {
+                        Some(seen) => {
+                            let expected = (gain * (seen.job + 1)).to_string();
+                            if seen.shown(&buffer).to_string() == expected {
+                                break;
+                            }
+                        }
+                        None => thread::sleep(ms(1)),
+                    }
+                }
+            };
+            wait_for(10);
+            gain.set(1000).expect("it is in range");
+            wait_for(1000);
+            live.close();
+        });
+        alone.machine.run().unwrap();
+        person.join().expect("it has seen both");
+    }
+}

@@ -1,0 +1,8 @@
+//! The machine on Linux: runs by each mechanism, their ends, recordings and wires.
+
+mod ends;
+mod lives;
+mod recordings;
+#[path = "../support/mod.rs"]
+mod support;
+mod wires;

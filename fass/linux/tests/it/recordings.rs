@@ -1,0 +1,94 @@
+//! Runs that are recorded, and replayed.
+
+use std::fs::{self, File};
+use std::process::Command;
+use std::sync::{Arc, Mutex};
+
+use crate::support::{alone, mechanisms, ms};
+use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
+use linux::Mechanism;
+
+/// What one job after the other has computed.
+type Results = Arc<Mutex<Vec<u64>>>;
+
+/// A DAG that counts in steps of `step`, and squares that.
+fn squaring(step: u64) -> (Dag, Results) {
+    let dag = create_dag();
+    dag.name("squaring").jobs(20);
+    dag.record::<u64>("count").record::<u64>("square");
+    let named = SubtaskAttributes::named;
+    let mut count = 0;
+    let source = move || {
+        count += step;
+        (count,)
+    };
+    dag.register_periodic_subtask(source, vec!["count"], ms(2), named("count"));
+    let square = |(count,): (u64,)| (count * count,);
+    dag.register_subtask(square, vec!["count"], vec!["square"], named("square"));
+    let results = Results::default();
+    let keep = Arc::clone(&results);
+    let sink = move |(square,): (u64,)| keep.lock().expect("nobody panics").push(square);
+    dag.register_sink_subtask(sink, vec!["square"], ms(2), named("keep"));
+    (dag, results)
+}
+
+const PART: &str = "FASS_LINUX_PART";
+
+/// One run of this very program, started anew, as a recording is of one commit: its source counts
+/// in steps of `step`.
+#[test]
+fn part() {
+    let Ok(part) = std::env::var(PART) else {
+        return;
+    };
+    let [mechanism, step, path] = part.split(' ').collect::<Vec<_>>()[..] else {
+        panic!("{part}");
+    };
+    let mechanism = mechanisms().find(|found| format!("{found:?}") == mechanism);
+    let machine = alone(2, mechanism.expect("this computer has it")).machine;
+    let replays = step != "1";
+    if replays {
+        machine.replay(fs::read(path).expect("it is recorded").leak(), None);
+    } else {
+        machine.record("recordings", File::create(path).expect("a file"));
+    }
+    let (dag, results) = squaring(step.parse().expect("a number"));
+    finish_create_dags(&[dag]).expect("the DAG is right");
+    machine.run().expect("it is committed");
+    let (outcome, _) = machine.end_recording(true);
+    linux::Linux::end_record().expect("it is written");
+    assert_eq!(linux::Linux::objections(), [None, None]);
+    let compared = outcome.map(|outcome| (outcome.compared, outcome.divergence));
+    assert_eq!(compared, replays.then_some((20, None)));
+    let expected: Vec<u64> = (1..=20).map(|count| count * count).collect();
+    assert_eq!(*results.lock().expect("nobody panics"), expected);
+}
+
+/// Records by one mechanism, and replays by another one. A replay does not call the source, which
+/// would count otherwise.
+fn record_and_replay(by: [Mechanism; 2]) {
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _alone = ONE_AT_A_TIME.lock();
+    let name = format!("fass-linux-{}.rec", std::process::id());
+    let path = std::env::temp_dir().join(name);
+    for (mechanism, step) in by.into_iter().zip([1, 7]) {
+        let program = std::env::current_exe().expect("the program is there");
+        let mut part = Command::new(program);
+        part.args(["--exact", "recordings::part", "--nocapture"])
+            .env(PART, format!("{mechanism:?} {step} {}", path.display()));
+        let output = part.output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{mechanism:?}, {step}: {said}");
+    }
+    fs::remove_file(path).expect("it is ours");
+}
+
+#[test]
+fn what_each_mechanism_records_is_replayed() {
+    mechanisms().for_each(|mechanism| record_and_replay([mechanism, Mechanism::Normal]));
+}
+
+#[test]
+fn each_mechanism_replays_what_is_recorded() {
+    mechanisms().for_each(|mechanism| record_and_replay([Mechanism::Normal, mechanism]));
+}

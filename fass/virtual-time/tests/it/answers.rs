@@ -1,0 +1,264 @@
+//! What the commit answers about deadlines and clusters, and that runs keep to it.
+
+use std::time::Duration;
+
+use crate::support::{every, ms, named, taking, ticking, work};
+use fass::{
+    Answer, Commit, ConstructionPolicy, Dag, Fault, OverheadSource, Overheads, Policy, Preemption,
+    create_dag, finish_create_dags, finish_create_dags_with,
+};
+use virtual_time::{Report, VirtualTime};
+
+/// A chain of two subtasks that execute for their WCETs, of one priority; all in milliseconds.
+fn chain(name: &str, priority: u32, [period, deadline]: [u64; 2], wcets: [u64; 2]) -> Dag {
+    let dag = create_dag();
+    dag.name(name).jobs(50);
+    dag.period(ms(period)).relative_deadline(ms(deadline));
+    let [source, sink] = ["source", "sink"].map(|of| taking(of, 0).priority(priority));
+    let [first, second] = wcets;
+    let source = dag.register_untyped_subtask(move |_job| work(first), source.wcet(ms(first)));
+    let sink = dag.register_untyped_subtask(move |_job| work(second), sink.wcet(ms(second)));
+    dag.precede(&source, &sink);
+    dag
+}
+
+/// Commits DAGs and runs them; no job takes longer than its DAG's bound. Of each answer the
+/// beginning is compared, and a part of the rest.
+#[track_caller]
+fn answered(machine: &VirtualTime, dags: &[Dag], expected: &[[&str; 2]]) -> (Commit, Report) {
+    let commit = finish_create_dags(dags).expect("nothing is wrong");
+    assert_eq!(commit.answers().len(), expected.len());
+    for (answer, [start, part]) in commit.answers().iter().zip(expected) {
+        let text = answer.to_string();
+        assert!(text.starts_with(start) && text.contains(part), "{text}");
+    }
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    for job in &report.jobs {
+        let taken = Duration::from_nanos(job.response_time_ns().expect("it has ended"));
+        let bound = commit.answer(job.dag).verdict.bound();
+        assert!(bound.is_none_or(|bound| taken <= bound));
+    }
+    (commit, report)
+}
+
+fn codes(dags: &[Dag]) -> Vec<&'static str> {
+    let error = finish_create_dags(dags).expect_err("it is refused");
+    error.faults().iter().map(Fault::code).collect()
+}
+
+fn late_and_busy() -> [Dag; 2] {
+    let late = chain("late", 0, [10, 4], [2, 1]);
+    let busy = chain("busy", 0, [10, 7], [3, 3]);
+    busy.offset(ms(4)); // of which the bound knows nothing
+    [late, busy]
+}
+
+#[test]
+fn the_answer_is_for_the_policy_the_preemption_and_the_cores_of_the_platform() {
+    let two = || {
+        let urgent = chain("urgent", 0, [10, 10], [2, 2]);
+        [urgent, chain("long", 1, [100, 100], [8, 1])]
+    };
+    let (preempts, keeps) = (Preemption::Enabled, Preemption::Disabled);
+    let (ranked, edf) = (Policy::StaticPriority, Policy::Edf);
+    let unproven = "dag `urgent` is not proven";
+    for (policy, preemption, cores, said) in [
+        (ranked, preempts, 1, "dag `urgent` takes at most 4ms"),
+        // A started subtask of `long` keeps the only core for 8 ms: 12 > 10.
+        (ranked, keeps, 1, unproven),
+        // Four cores are rarely all kept.
+        (ranked, keeps, 4, "dag `urgent` takes at most"),
+        (edf, preempts, 1, "dag `urgent` takes at most"),
+    ] {
+        let machine = VirtualTime::new().policy(policy).preemption(preemption);
+        let expected = [[said, ""], ["dag `long`", ""]];
+        answered(&machine.cores(cores), &two(), &expected);
+    }
+}
+
+#[test]
+fn not_proven_is_accepted_and_says_why() {
+    let machine = VirtualTime::new().policy(Policy::Edf);
+    let expected = [
+        ["dag `late` is not proven", ""],
+        ["dag `busy` is not proven", "`late`"],
+    ];
+    let (commit, report) = answered(&machine, &late_and_busy(), &expected);
+    let first = commit.first_unproven().expect("one fails first");
+    assert_eq!(first.dag.name, "late");
+    assert!(commit.warnings().is_empty(), "nothing is certain");
+    // It does meet them: not proven is not infeasible.
+    assert!(report.dags().all(|dag| dag.statistics().misses == 0));
+}
+
+#[test]
+fn a_demanded_proof_that_is_missing_refuses_the_commit() {
+    let _machine = VirtualTime::new().policy(Policy::Edf);
+    let [late, busy] = late_and_busy();
+    busy.demand_proof();
+    let both = [late.clone(), busy];
+    assert_eq!(
+        codes(&both),
+        ["not_proven"],
+        "of `late` nothing is demanded"
+    );
+    late.demand_proof();
+    assert_eq!(codes(&both), ["not_proven"; 2]);
+    // Other faults come before that question.
+    let none = chain("none", 0, [10, 4], [3, 3]);
+    none.demand_proof().jobs(0);
+    assert_eq!(codes(&[none]), ["zero_jobs"]);
+    // The handles are as they were: alone it is proven.
+    let commit = finish_create_dags(&[late]).expect("nothing delays it");
+    assert_eq!(commit.answer("late").verdict.bound(), Some(ms(3)));
+}
+
+#[test]
+fn dags_without_all_wcets_say_so() {
+    let machine = VirtualTime::new().policy(Policy::StaticPriority);
+    let unknown = every(10, "unknown");
+    let source = unknown.register_untyped_subtask(|_| (), taking("source", 1).priority(1));
+    let sink = unknown.register_untyped_subtask(|_| (), named("sink").priority(1));
+    unknown.precede(&source, &sink).jobs(50);
+    let urgent = chain("urgent", 0, [10, 10], [1, 1]);
+    let lax = chain("lax", 2, [10, 10], [1, 1]);
+    let reason = "no WCET above 0 is given for subtask `sink`";
+    let expected = [
+        ["dag `unknown` is not proven", reason],
+        ["dag `urgent` takes at most 2ms", ""],
+        ["dag `lax` is not proven", "dag `unknown`"],
+    ];
+    let (commit, _) = answered(&machine, &[unknown, urgent, lax], &expected);
+    let first = commit.first_unproven().expect("one fails first");
+    assert_eq!(first.dag.name, "unknown");
+}
+
+#[test]
+fn what_is_certain_to_miss_is_accepted_with_a_warning() {
+    let machine = VirtualTime::new().policy(Policy::Edf);
+    let long = chain("long", 0, [10, 9], [5, 5]);
+    let expected = ["dag `long` is not proven", "its longest path alone"];
+    let (commit, report) = answered(&machine, &[long], &[expected]);
+    let codes: Vec<_> = commit.warnings().iter().map(|w| w.code()).collect();
+    assert_eq!(codes, ["certain_miss"]);
+    assert_eq!(
+        commit.warnings()[0].to_string(),
+        "dag `long` cannot keep its deadlines at its WCETs: its longest path alone takes 10ms, \
+         which is more than its relative deadline; shorten the path or relax the deadline"
+    );
+    assert_eq!(report.dag("long").statistics().misses, 50);
+}
+
+#[test]
+fn overheads_are_added_to_every_wcet() {
+    let overheads = Overheads {
+        context_switch_ns: 100,
+        dispatch_ns: 300,
+        interrupt_ns: 1_000,
+        ready_ns: 0,
+    };
+    for (preemption, said) in [
+        (Preemption::Enabled, "dag `two` takes at most 5.003ms"),
+        (Preemption::Disabled, "dag `two` takes at most 5.001ms"),
+    ] {
+        let machine = VirtualTime::new().preemption(preemption);
+        let machine = machine.overheads(overheads);
+        let two = chain("two", 0, [10, 10], [2, 3]);
+        let (commit, report) = answered(&machine, &[two], &[[said, ""]]);
+        // They are no part of the run in virtual time.
+        let mut jobs = report.dag("two").jobs();
+        assert!(jobs.all(|job| job.response_time_ns() == Some(5_000_000)));
+        let mut answer: Answer = commit.answer("two").clone();
+        assert_eq!(answer.overheads, OverheadSource::Stated);
+        answer.overheads = OverheadSource::Measured {
+            dispatches: 500,
+            margin_percent: 20,
+        };
+        let said = "; overheads are the longest of 500 measured and 20 %";
+        assert!(answer.to_string().ends_with(said), "{answer}");
+    }
+    // What they make too long is not proven any more.
+    let _machine = VirtualTime::new().overheads(overheads);
+    let tight = chain("tight", 0, [10, 5], [2, 3]);
+    tight.demand_proof();
+    assert_eq!(codes(&[tight]), ["not_proven"]);
+}
+
+#[test]
+fn the_bound_counts_the_precedence_of_a_state() {
+    for (shares, said) in [
+        (false, "dag `map` takes at most 11ms"),
+        (true, "dag `map` takes at most 21ms"),
+    ] {
+        let machine = VirtualTime::new().cores(3);
+        let dag = every(100, "map");
+        dag.jobs(1);
+        let source = dag.register_untyped_subtask(|_| work(1), taking("source", 1));
+        let state = shares.then(|| dag.state("state", 0));
+        for name in ["left", "right"] {
+            let attributes = taking(name, 10);
+            let branch = match &state {
+                Some(state) => (dag.using(state.update()))
+                    .register_untyped_subtask(|_: &mut i32, _| work(10), attributes),
+                None => dag.register_untyped_subtask(|_| work(10), attributes),
+            };
+            dag.precede(&source, &branch);
+        }
+        let any_graph = ConstructionPolicy::any_graph();
+        let commit = finish_create_dags_with(&[dag], any_graph).expect("nothing is wrong");
+        let text = commit.answer("map").to_string();
+        assert!(text.starts_with(said), "{text}");
+        assert_eq!(machine.run().violations(), []);
+    }
+}
+
+#[test]
+fn the_commit_divides_the_cores_and_says_why() {
+    let machine = VirtualTime::new().cores(4).assign_clusters();
+    let heavy = every(10, "heavy");
+    for name in ["left", "middle", "right"] {
+        heavy.register_untyped_subtask(|_job| work(4), taking(name, 4));
+    }
+    let [a, b, c] = [("a", 7), ("b", 5), ("c", 4)].map(|(name, time)| ticking(name, time));
+    let dags = [a, heavy, b, c];
+    dags.iter().for_each(|dag| _ = dag.jobs(5));
+    let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph());
+    let commit = commit.expect("nothing is wrong");
+    let place = |answer: &Answer| answer.cluster.as_ref().map(ToString::to_string);
+    let places: Vec<String> = commit.answers().iter().filter_map(place).collect();
+    assert_eq!(
+        places,
+        [
+            "in cluster 1, on 1 core from core 2 on: the emptiest one",
+            "in cluster 0, on 2 cores from core 0 on: its own, as a job is 12ms of work within 10ms",
+            "in cluster 2, on 1 core from core 3 on: the emptiest one",
+            "in cluster 2, on 1 core from core 3 on: the emptiest one",
+        ]
+    );
+    assert!(commit.first_unproven().is_none());
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert!(report.dags().all(|dag| dag.statistics().misses == 0));
+}
+
+#[test]
+fn cores_are_divided_by_the_app_or_by_the_commit_and_the_last_word_counts() {
+    let calm = || {
+        let dag = ticking("calm", 6);
+        dag.cluster(0).jobs(1);
+        [dag]
+    };
+    let machine = VirtualTime::new().clusters(&[1]).assign_clusters();
+    let error = finish_create_dags(&calm()).expect_err("the commit divides them");
+    assert_eq!(
+        error.to_string(),
+        "dag `calm` gets no cores: it states a cluster, and the commit is to make them; leave its \
+         cluster out"
+    );
+    drop(machine);
+    let _machine = VirtualTime::new().assign_clusters().clusters(&[1]);
+    let commit = finish_create_dags(&calm()).expect("the app divides them");
+    let place = commit.answer("calm").cluster.as_ref();
+    assert_eq!(place.map(|place| &place.why), Some(&None));
+}

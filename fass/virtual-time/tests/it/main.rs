@@ -1,0 +1,13 @@
+//! The machine in virtual time: what runs on it, what it answers, records and replays.
+
+mod answers;
+mod chains;
+mod faults;
+mod latest;
+mod lifecycle;
+mod machine;
+mod parameters;
+mod recordings;
+mod replays;
+mod support;
+mod wires;

@@ -1,0 +1,241 @@
+//! The analysis against the scheduler: no observed response exceeds a bound.
+//!
+//! [`kinds`] holds bounds of random sets of every kind against virtual time. The other tests
+//! are worked examples, and the counterexamples to forms that look like bounds and are not.
+
+#[path = "../../../../scripts/tool/src/random.rs"]
+mod drawn;
+mod forged;
+mod kinds;
+mod one_core;
+mod random;
+mod simulate;
+mod witnesses;
+mod worked;
+
+use common::random::Random;
+use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer, fix_orders};
+use sched_dag::{
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, DagSpec, Order, Policy,
+    Preemption, SubtaskId, verify,
+};
+
+use kinds::breach;
+use random::sample;
+use simulate::{commit, responses, spec};
+
+const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
+const DIAMOND: [(usize, usize); 4] = [(0, 1), (0, 2), (1, 3), (2, 3)];
+
+fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> Settings {
+    Settings {
+        policy,
+        preemption,
+        cores,
+        overheads: Overheads::default(),
+    }
+}
+
+/// A DAG with a WCET of 0 gets no bound, and neither does what it may delay; where
+/// others have one, they keep it.
+#[test]
+fn no_bound_rests_on_a_wcet_of_zero() {
+    let mut bounds = 0;
+    for seed in 1..3_000 {
+        let mut random = Random::new(seed);
+        let mut sample = sample(&mut random);
+        let dag = random.index(sample.specs.len());
+        let subtasks = &mut sample.specs[dag].subtasks;
+        let subtask = random.index(subtasks.len());
+        subtasks[subtask].wcet_ns = Some(0);
+        let Some(task_set) = sample.task_set() else {
+            continue;
+        };
+        let answer = answer(&task_set, &sample.settings());
+        let subtask = SubtaskId(u32::try_from(subtask).unwrap());
+        let missing = Reason::Unknown(TaskError::MissingWcet { subtask });
+        assert_eq!(answer.reasons[dag], Some(missing), "seed {seed}");
+        let breach = breach(&task_set, &sample.settings(), &answer, &mut random);
+        assert_eq!(breach, None, "seed {seed}");
+        bounds += answer.bounds.iter().flatten().count();
+    }
+    assert!(bounds > 200, "too few bounds say little: {bounds}");
+}
+
+#[test]
+fn e4_blocking_is_observed_beyond_the_published_bound() {
+    let fork: Vec<(usize, usize)> = (1..6).flat_map(|v| [(0, v), (v, 6)]).collect();
+    let wcets = [vec![1, 3, 3, 1], vec![1, 4, 4, 4, 4, 4, 1]];
+    let mut high = spec(100, 100, &wcets[0], &DIAMOND, 0);
+    high.offset_ns = 2;
+    let specs = [high, spec(100, 100, &wcets[1], &fork, 1)];
+    let kind = (Policy::StaticPriority, Preemption::Disabled);
+    let task_set = commit(&specs, kind.0, 2);
+    let observed = responses(&task_set, (kind.0, kind.1, 2), 100, |instance| {
+        wcets[instance.dag.index()][instance.subtask.index()]
+    });
+    assert_eq!(observed[0], 11);
+    let bound = answer(&task_set, &settings(kind, 2)).bounds[0].unwrap();
+    assert_eq!((bound.bound_ns, bound.test), (15, Test::NonPreemptive));
+}
+
+#[test]
+fn overlapping_jobs_take_more_cores() {
+    // Two of the chain's jobs run for 8 of each 10: then two of four cores are left, on which
+    // six subtasks of 3 take 9. An earlier form claimed 8.
+    let mut wide = spec(100, 60, &[3; 6], &[], 1);
+    wide.offset_ns = 20;
+    let chain = spec(10, 30, &[6, 6, 6], &[(0, 1), (1, 2)], 0);
+    let stacked = commit(&[chain, wide], FP.0, 4);
+    let observed = responses(&stacked, (FP.0, FP.1, 4), 200, |instance| {
+        if instance.dag.0 == 0 { 6 } else { 3 }
+    });
+    assert_eq!(observed[1], 9);
+    let bound = answer(&stacked, &settings(FP, 4)).bounds[1];
+    assert!(bound.is_some_and(|bound| bound.bound_ns >= 9), "{bound:?}");
+}
+
+#[test]
+fn delays_that_are_handed_on_count() {
+    // Once a period of 1000 all four cores are busy for 5, and each time the second DAG's long
+    // subtask falls behind by 5. Without slack it never catches up. An earlier form claimed 18.
+    let with = |long_ns: u64| {
+        let burst = spec(1000, 1000, &[5; 4], &[], 0);
+        let behind = spec(10, 30, &[1, long_ns], &[(0, 1)], 1);
+        let task_set = commit(&[burst, behind], FP.0, 4);
+        let observed = responses(&task_set, (FP.0, FP.1, 4), 3500, |instance| {
+            [[5; 4], [1, long_ns, 0, 0]][instance.dag.index()][instance.subtask.index()]
+        });
+        (observed[1], answer(&task_set, &settings(FP, 4)))
+    };
+    let (observed, full) = with(10);
+    assert!(observed > 18 + 10, "{observed}");
+    let failing = full.first_failing.unwrap();
+    assert_eq!((failing.dag.0, failing.reason), (1, Reason::NoBound));
+    assert!(with(9).1.is_proven());
+}
+
+#[test]
+fn each_dag_without_a_bound_has_its_reason_and_the_surest_one_is_the_first() {
+    let one = |priority| spec(100, 100, &[10], &[], priority);
+    let wide = |priority| spec(100, 20, &[10, 10, 10], &[], priority);
+    let heavy = spec(100, 100, &[60, 50], &[], 1);
+    let long = spec(100, 10, &[6, 6], &[(0, 1)], 2);
+    let mut unknown = one(1);
+    unknown.subtasks[0].wcet_ns = None;
+    let mut narrow = spec(10, 40, &[8, 8], &[(0, 1)], 1);
+    narrow.in_flight = Some(1);
+
+    let (no_bound, overload) = (Some(Reason::NoBound), Some(Reason::Overload));
+    let behind = |dag| Some(Reason::DelayedBy { dag: DagId(dag) });
+    let too_few = Some(Reason::InFlightTooFew { in_flight: 1 });
+    let too_long = Some(Reason::LengthBeyondDeadline { length_ns: 12 });
+    let subtask = SubtaskId(0);
+    let missing = Some(Reason::Unknown(TaskError::MissingWcet { subtask }));
+    let around_unknown = [one(0), unknown, one(2)];
+    let held_up = [behind(1), missing, behind(1)];
+    let no_preemption = (Policy::StaticPriority, Preemption::Disabled);
+    let edf = (Policy::Edf, Preemption::Enabled);
+
+    let holds = |kind: (Policy, Preemption),
+                 cores,
+                 specs: &[DagSpec],
+                 expected: &[Option<Reason>],
+                 first: Option<usize>| {
+        let task_set = commit(specs, kind.0, cores);
+        let answer = answer(&task_set, &settings(kind, cores));
+        assert_eq!(answer.reasons, expected);
+        for (bound, reason) in answer.bounds.iter().zip(expected) {
+            assert_ne!(bound.is_some(), reason.is_some());
+        }
+        let failing = answer.first_failing.map(|it| (it.dag.index(), it.reason));
+        assert_eq!(failing, first.and_then(|dag| Some((dag, expected[dag]?))));
+    };
+    holds(FP, 1, &[one(0)], &[None], None);
+    holds(FP, 1, &[one(0), heavy], &[None, overload], Some(1));
+    holds(FP, 2, &[one(0), narrow], &[None, too_few], Some(1));
+    holds(
+        FP,
+        1,
+        &[one(0), one(0), wide(1)],
+        &[None, None, no_bound],
+        Some(2),
+    );
+    // What is certain to fail comes first.
+    let reasons = [no_bound, behind(0), too_long];
+    holds(FP, 1, &[wide(0), one(1), long], &reasons, Some(2));
+    holds(FP, 1, &around_unknown, &[None, missing, behind(1)], Some(1));
+    // It may hold a core that the urgent one waits for.
+    holds(no_preemption, 1, &around_unknown, &held_up, Some(1));
+    holds(edf, 1, &around_unknown, &held_up, Some(1));
+}
+
+#[test]
+fn overheads_are_charged_to_every_subtask() {
+    let task_set = commit(&[spec(100, 100, &[10, 10], &[(0, 1)], 0)], FP.0, 2);
+    let mut with = settings(FP, 2);
+    with.overheads = Overheads {
+        context_switch_ns: 2,
+        dispatch_ns: 1,
+        interrupt_ns: 3,
+        ready_ns: 0,
+    };
+    assert_eq!(
+        answer(&task_set, &with).bounds[0].unwrap().bound_ns,
+        20 + 2 * 8
+    );
+}
+
+#[test]
+fn what_becomes_ready_at_once_is_charged_whatever_its_rank() {
+    let fork: Vec<(usize, usize)> = (1..=18).map(|branch| (0, branch)).collect();
+    let one = |priority| spec(100, 100, &[10], &[], priority);
+    let on = |policy, cores, last: DagSpec| {
+        let task_set = commit(&[one(0), last], policy, cores);
+        let mut with = settings((policy, Preemption::Enabled), cores);
+        with.overheads.ready_ns = 1;
+        let bounds = answer(&task_set, &with).bounds;
+        bounds
+            .iter()
+            .map(|bound| bound.map(|bound| bound.bound_ns))
+            .collect::<Vec<_>>()
+    };
+    // Two releases, and a window begins 2 before the first may be served.
+    assert_eq!(on(Policy::StaticPriority, 1, one(1)), [Some(12), Some(22)]);
+    assert_eq!(on(Policy::StaticPriority, 2, one(1)), [Some(12), Some(15)]);
+    // The two that a fork makes ready beyond 16, in two jobs.
+    let wide = spec(100, 100, &[1; 19], &fork, 1);
+    assert_eq!(on(Policy::StaticPriority, 1, wide)[0], Some(12 + 2 * 2));
+}
+
+#[test]
+fn a_fixed_order_is_taken_where_it_proves_more() {
+    let on = |cores, clusters: &[u32], order: Order, wcets: &[u64]| {
+        let mut spec = spec(100, 100, wcets, &[], 0);
+        spec.order = order;
+        spec.cluster = (!clusters.is_empty()).then_some(ClusterId(0));
+        // Under EDF, so that no priorities within the DAG help.
+        let options = CommitOptions::new(Policy::Edf, cores)
+            .with_construction(ConstructionPolicy::any_graph())
+            .with_clusters(Clusters::Of(clusters.to_vec()));
+        let mut task_set = verify(&[spec], &options).unwrap().task_set;
+        let settings = settings((Policy::Edf, Preemption::Enabled), cores);
+        fix_orders(&mut task_set, &settings);
+        let added: usize = (0..)
+            .map(SubtaskId)
+            .take(wcets.len())
+            .map(|subtask| task_set.dags()[0].successors(subtask).len())
+            .sum();
+        let bound = answer(&task_set, &settings).bounds[0].unwrap();
+        (bound.bound_ns, added)
+    };
+    let bound = |order, wcets: &[u64]| on(2, &[], order, wcets);
+    // Three of 2 after two of 3, on two cores: 3 + 2 + 2, in whatever order they are taken.
+    let wcets = [3, 3, 2, 2, 2];
+    assert_eq!(bound(Order::Free, &wcets), (8, 0));
+    assert_eq!(bound(Order::Fixed, &wcets), (7, 3));
+    // Made for the cores of its cluster, be there more on the machine.
+    assert_eq!(on(8, &[2, 6], Order::Fixed, &wcets), (7, 3));
+    // Here one job alone takes no longer anyway.
+    assert_eq!(bound(Order::Fixed, &[5, 5]), (5, 0));
+}

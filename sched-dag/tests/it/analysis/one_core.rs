@@ -1,0 +1,85 @@
+//! The tests of one core are exact: in virtual time their worst case comes.
+
+use common::random::Random;
+use sched_dag::analysis::{Answer, Test, answer};
+use sched_dag::{DagSpec, Policy, Preemption, TaskSet};
+
+use super::simulate::{commit, responses, spec};
+use super::{FP, settings};
+
+/// Draws DAGs of one subtask that are all released at once, and again after 120, and that are no
+/// overload in the long run; answers, and observes the longest responses.
+fn one_set(random: &mut Random, policy: Policy) -> (TaskSet, Answer, Vec<u64>) {
+    const PERIODS: [u64; 10] = [4, 5, 6, 8, 10, 12, 20, 30, 60, 120];
+    let count = random.within(2..=5);
+    let (mut most, mut left) = (random.within(2..=8), 120);
+    let specs: Vec<DagSpec> = (0..count)
+        .filter_map(|priority| {
+            let period = random.one_of(&PERIODS);
+            most += period / 10;
+            most = most.min(period * left / 120);
+            let wcet = (most > 0).then(|| random.within(1..=most))?;
+            left -= wcet * 120 / period;
+            let latest = period * random.within(1..=3);
+            let deadline = random.within(wcet..=latest);
+            Some(spec(period, deadline, &[wcet], &[], priority))
+        })
+        .collect();
+    let task_set = commit(&specs, policy, 1);
+    let kind = (policy, Preemption::Enabled);
+    let answer = answer(&task_set, &settings(kind, 1));
+    let seen = responses(&task_set, (kind.0, kind.1, 1), 720, |instance| {
+        let subtask = task_set.dag(instance.dag).subtask(instance.subtask);
+        subtask.wcet_ns().expect("given")
+    });
+    (task_set, answer, seen)
+}
+
+#[test]
+fn static_priorities_on_one_core_have_their_exact_response_times() {
+    let (mut sets, mut below, mut overlapping) = (0, 0, 0);
+    for seed in 1.. {
+        let (task_set, answer, seen) = one_set(&mut Random::new(seed), FP.0);
+        if !answer.is_proven() {
+            continue;
+        }
+        let bounds = answer.bounds.iter().flatten();
+        let bounds: Vec<u64> = bounds.map(|bound| bound.bound_ns).collect();
+        assert_eq!(bounds, seen, "seed {seed}: {task_set:#?}");
+        let periods = task_set.dags().iter().map(|dag| dag.period_ns());
+        overlapping += u64::from(periods.zip(bounds).any(|(period, bound)| bound > period));
+        let tests = answer.bounds.iter().flatten().map(|bound| bound.test);
+        below += u64::from(tests.filter(|&test| test == Test::OneCore).count() > 0);
+        sets += 1;
+        if sets == 1_000 {
+            break;
+        }
+    }
+    assert!(below > 800 && overlapping > 100, "{below}, {overlapping}");
+}
+
+#[test]
+fn edf_on_one_core_is_proven_just_if_nothing_is_late() {
+    let mut proven = 0;
+    for seed in 1..=1_000 {
+        let (task_set, answer, seen) = one_set(&mut Random::new(seed), Policy::Edf);
+        let deadlines = task_set.dags().iter().map(|dag| dag.relative_deadline_ns());
+        let is_met = deadlines.zip(seen).all(|(deadline, seen)| seen <= deadline);
+        assert_eq!(answer.is_proven(), is_met, "seed {seed}: {task_set:#?}");
+        proven += u64::from(is_met);
+    }
+    assert!((500..900).contains(&proven), "{proven}");
+}
+
+#[test]
+fn what_a_carry_in_would_count_twice_is_proven() {
+    // 4.2 of 10 ms, 43.5 of 100 and 0.1 of 100, in units of 0.1 ms.
+    let dags = [(100, 42), (1000, 435), (1000, 1)];
+    let specs = (0..).zip(dags);
+    let specs =
+        specs.map(|(priority, (period, wcet))| spec(period, period, &[wcet], &[], priority));
+    let task_set = commit(&specs.collect::<Vec<_>>(), FP.0, 1);
+    let bounds = answer(&task_set, &settings(FP, 1)).bounds;
+    let bounds = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
+    assert!(bounds.eq([Some(42), Some(771), Some(772)]));
+}

@@ -1,0 +1,184 @@
+//! Witnesses against the checker that shares no code with the analysis.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use common::random::Random;
+use sched_dag::analysis::{Answer, DagBound, answer, witness};
+use sched_dag::{ClusterId, Clusters, Policy, Preemption, TaskSet};
+
+use super::forged;
+use super::kinds::tighter;
+use super::random::{Sample, sample};
+use super::simulate::spec;
+use crate::support::number;
+
+pub(crate) fn output(files: &[String]) -> Output {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/check-witness");
+    let output = Command::new("python3").arg(script).args(files).output();
+    output.expect("python3 checks witnesses; install it")
+}
+
+/// Runs the checker, which must accept all files, and returns its lines.
+pub(crate) fn accepted(files: &[String]) -> String {
+    let output = output(files);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{files:?}: {said}{complaint}");
+    said
+}
+
+#[test]
+fn every_bound_has_a_witness_and_no_altered_one_passes() {
+    let folder = std::env::temp_dir().join(format!("witnesses-{}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let mut by_test: BTreeMap<String, u64> = BTreeMap::new();
+    let mut files = Vec::new();
+    let mut expected = Vec::new();
+    let mut to_alter = Vec::new();
+    for seed in 0..=number("WITNESS_SETS", 1_000) {
+        let mut random = Random::new(seed);
+        let sample = match seed {
+            0 => full_core(),
+            1 => behind_unknown(),
+            _ => sample(&mut random),
+        };
+        let is_divided = sample.clusters != Clusters::Undivided;
+        let Some(task_set) = sample.task_set() else {
+            continue;
+        };
+        let mut settings = sample.settings();
+        settings.overheads.dispatch_ns = random.within(0..=2.min(seed));
+        settings.overheads.ready_ns = u64::from(seed % 4 == 2);
+        let path = folder.join(seed.to_string());
+        fs::write(&path, witness(&task_set, &settings)).unwrap();
+        let file = path.to_string_lossy().into_owned();
+        let answer = answer(&task_set, &settings);
+        expected.push(lines(&task_set, &answer));
+        let mut is_new = false;
+        let tests = answer.bounds.iter().flatten();
+        let tests = tests.map(|bound| bound.test.to_string());
+        let sinks = (tighter(&answer) > 0).then(|| String::from("of a sink"));
+        for test in tests.chain(sinks) {
+            let count = by_test.entry(test).or_default();
+            *count += 1;
+            is_new |= *count <= 4;
+        }
+        // What is altered is one witness.
+        if seed == 1 || is_new && !is_divided {
+            to_alter.push(file.clone());
+        }
+        files.push(file);
+    }
+    let said = accepted(&files);
+    for (file, expected) in files.iter().zip(&expected) {
+        let said = lines_about(file, &said);
+        let agree = said
+            .iter()
+            .zip(expected)
+            .all(|(said, it)| said.starts_with(it));
+        assert!(
+            agree && said.len() == expected.len(),
+            "{said:?} {expected:?}"
+        );
+    }
+    println!("{} witnesses pass; bounds: {by_test:?}", files.len());
+    let counts = to_alter.iter().map(|file| forged::refused(file));
+    let [refused, same, sound] = counts.fold([0; 3], |[a, b, c], [d, e, f]| [a + d, b + e, c + f]);
+    println!("altered: {refused} refused, {same} prove the same bounds, {sound} sound ones");
+    // More of the same are numbers that the checker no longer computes.
+    assert!(refused > 2_000 && same <= 23, "{refused}, {same}");
+    assert!(sound > 100, "no statement was altered: {sound}");
+    assert!(by_test.len() >= 11, "some test was never used: {by_test:?}");
+    fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_witness_that_lacks_a_cluster_is_refused() {
+    let mut sample = full_core();
+    for (spec, cluster) in sample.specs.iter_mut().zip(0..) {
+        spec.cluster = Some(ClusterId(cluster));
+    }
+    (sample.cores, sample.clusters) = (2, Clusters::Of(vec![1, 1]));
+    let text = witness(&sample.task_set().unwrap(), &sample.settings());
+    let second = text.rfind("machine ").unwrap();
+    let (first, second) = text.split_at(second);
+    let path = std::env::temp_dir().join(format!("witness-{}", std::process::id()));
+    let is_accepted = |parts: &[&str]| {
+        fs::write(&path, parts.concat()).unwrap();
+        let file = path.to_string_lossy().into_owned();
+        output(&[file]).status.success()
+    };
+    assert!(is_accepted(&[first, second]));
+    let wrong: [&[&str]; 4] = [&[first], &[second], &[second, first], &[first, first]];
+    for parts in wrong {
+        assert!(!is_accepted(parts), "{parts:?}");
+    }
+    fs::remove_file(&path).unwrap();
+}
+
+/// Returns how the lines begin that the checker is to say.
+fn lines(task_set: &TaskSet, answer: &Answer) -> Vec<String> {
+    let mut lines = Vec::new();
+    for cluster in task_set.clusters() {
+        let place = match task_set.is_divided() {
+            true => format!("cluster {}: ", cluster.0),
+            false => String::new(),
+        };
+        lines.push(format!("{place}statement "));
+        let dags = task_set.dags().iter().zip(0..);
+        let own = dags.filter(|(dag, _)| dag.cluster() == cluster);
+        for (number, (model, dag)) in own.enumerate() {
+            let begin = format!("{place}dag {number} {:?}: ", model.name());
+            let Some(DagBound { bound_ns, .. }) = answer.bounds[dag] else {
+                lines.push(begin + "not proven");
+                continue;
+            };
+            lines.push(format!("{begin}at most {bound_ns} ns: "));
+            let deadline_ns = model.relative_deadline_ns();
+            for (sink, own_ns) in model.sinks().iter().zip(&answer.sinks_ns[dag]) {
+                let due_ns = model.subtask(*sink).relative_deadline_ns();
+                let own_ns = own_ns.expect("as its DAG has one");
+                if due_ns < deadline_ns || own_ns < bound_ns {
+                    lines.push(format!("{begin}sink {}: at most {own_ns} ns", sink.0));
+                }
+            }
+        }
+    }
+    lines
+}
+
+/// Returns what the checker says of a file.
+pub(crate) fn lines_about(file: &str, said: &str) -> Vec<String> {
+    let begin = format!("{file}: ");
+    let lines = said.lines().filter_map(|line| line.strip_prefix(&begin));
+    lines.map(String::from).collect()
+}
+
+/// A chain that is more urgent than subtasks of unknown WCETs, which it may preempt.
+fn behind_unknown() -> Sample {
+    let mut unknown = spec(100, 100, &[1, 1], &[], 1);
+    for subtask in &mut unknown.subtasks {
+        subtask.wcet_ns = None;
+    }
+    Sample {
+        specs: vec![spec(100, 100, &[5, 5], &[(0, 1)], 0), unknown],
+        policy: Policy::StaticPriority,
+        cores: 2,
+        ..full_core()
+    }
+}
+
+/// Two DAGs that nearly use up one core, which only the utilisation proves.
+fn full_core() -> Sample {
+    let specs = [spec(6, 6, &[3], &[], 0), spec(9, 9, &[4], &[], 0)];
+    Sample {
+        specs: specs.to_vec(),
+        policy: Policy::Edf,
+        preemption: Preemption::Enabled,
+        cores: 1,
+        clusters: Clusters::Undivided,
+    }
+}

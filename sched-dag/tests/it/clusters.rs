@@ -1,0 +1,157 @@
+//! Clusters: each runs as if it were alone on a machine of its own, and is bounded as such.
+//!
+//! More or other sets: `CLUSTERED=100000 CLUSTER_SEED=7 cargo test -p sched-dag --test
+//! rules clusters`.
+
+use std::sync::Arc;
+
+use common::random::Random;
+use sched_dag::analysis::{self, Answer, Overheads, Reason, Settings};
+use sched_dag::journal::Event;
+use sched_dag::virtual_time::VirtualTime;
+use sched_dag::{
+    ClusterId, Clusters, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, Instance,
+    Policy, SchedulerOptions, SubtaskId, TaskSet, verify,
+};
+
+use crate::support::set::{self, Set};
+use crate::support::{self, Script, Spec, TWO_CORES, number};
+
+fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: Clusters) -> Arc<TaskSet> {
+    let options = CommitOptions::new(options.policy, options.cores)
+        .with_construction(ConstructionPolicy::any_graph())
+        .with_clusters(clusters);
+    Arc::new(verify(specs, &options).expect("sets are right").task_set)
+}
+
+/// Runs a set, of which DAG k is that of the original with the number `originals[k]`, and returns
+/// what happens, by the original's numbers.
+fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[u32]) -> Vec<Event> {
+    let original = |dag: DagId| DagId(originals[dag.index()]);
+    let of = |it: Instance| Instance {
+        dag: original(it.dag),
+        ..it
+    };
+    let options = SchedulerOptions {
+        cores,
+        ..set.options
+    };
+    let script = Script::new(|it| set.execution_ns(of(it))).failing(|it| set.fails(of(it)));
+    let run = script.run(VirtualTime::new(task_set, options));
+    assert!(run.driver.is_finished());
+    let named = |event: &Event| Event {
+        dag: original(event.dag),
+        ..*event
+    };
+    run.events.iter().map(named).collect()
+}
+
+#[test]
+fn a_cluster_runs_as_if_it_were_alone() {
+    let (count, first_seed) = (number("CLUSTERED", 400), number("CLUSTER_SEED", 1));
+    println!("{count} sets from seed {first_seed} on");
+    for seed in first_seed..first_seed + count {
+        let mut random = Random::new(seed);
+        let mut set = set::draw(&mut random, set::Overruns::Often);
+        let sizes: Vec<u32> = (0..random.within(1..=3))
+            .map(|_| random.within(1..=3))
+            .collect();
+        set.options.cores = sizes.iter().sum();
+        let mut specs = set.specs();
+        for spec in &mut specs {
+            let cluster = u32::try_from(random.index(sizes.len())).expect("few clusters");
+            spec.cluster = Some(ClusterId(cluster));
+        }
+        let all: Vec<u32> = (0..).take(specs.len()).collect();
+        let divided = commit(&specs, set.options, Clusters::Of(sizes.clone()));
+        let together = events(&set, &divided, set.options.cores, &all);
+        let mut first = 0;
+        for (cluster, &cores) in (0..).map(ClusterId).zip(&sizes) {
+            let is_here = |dag: &u32| specs[*dag as usize].cluster == Some(cluster);
+            let here: Vec<u32> = all.iter().copied().filter(is_here).collect();
+            let alone = match &here[..] {
+                [] => Vec::new(),
+                _ => {
+                    let spec = |dag: &u32| specs[*dag as usize].clone();
+                    let apart = |spec: DagSpec| spec.with(|spec| spec.cluster = None);
+                    let specs: Vec<DagSpec> = here.iter().map(spec).map(apart).collect();
+                    let task_set = commit(&specs, set.options, Clusters::Undivided);
+                    events(&set, &task_set, cores, &here)
+                }
+            };
+            let same = |event: Event, first: u32| {
+                assert!((first..first + cores).contains(&event.core.0), "{event:?}");
+                // Which of them it is may depend on the driver's calls.
+                let core = CoreId(0);
+                Event { core, ..event }
+            };
+            let events = together.iter().filter(|event| is_here(&event.dag.0));
+            let events: Vec<Event> = events.map(|event| same(*event, first)).collect();
+            let alone: Vec<Event> = alone.iter().map(|event| same(*event, 0)).collect();
+            assert_eq!(events, alone, "seed {seed}, {cluster:?}");
+            first += cores;
+        }
+    }
+}
+
+/// Two DAGs of 6 ms each in 10, and one of unknown length.
+fn three() -> [DagSpec; 3] {
+    [(0, Some(6)), (1, Some(6)), (1, None)].map(|(cluster, wcet_ns)| {
+        let mut dag = support::dag(10, 10, 1, &[1], &[]);
+        dag.subtasks[0].wcet_ns = wcet_ns;
+        dag.cluster = Some(ClusterId(cluster));
+        dag
+    })
+}
+
+const EDF: SchedulerOptions = SchedulerOptions {
+    policy: Policy::Edf,
+    ..TWO_CORES
+};
+
+/// Analyses DAGs in two clusters of one core.
+fn answer(specs: &[DagSpec]) -> (Answer, String) {
+    let settings = Settings {
+        policy: EDF.policy,
+        preemption: EDF.preemption,
+        cores: EDF.cores,
+        overheads: Overheads::default(),
+    };
+    let task_set = commit(specs, EDF, Clusters::Of(vec![1, 1]));
+    let answer = analysis::answer(&task_set, &settings);
+    (answer, analysis::witness(&task_set, &settings))
+}
+
+#[test]
+fn each_cluster_is_analysed_on_its_own_cores() {
+    let (one_each, _) = answer(&three()[..2]);
+    let bounds = one_each.bounds.iter().map(|bound| bound.unwrap().bound_ns);
+    assert_eq!(bounds.collect::<Vec<_>>(), [6, 6]);
+    assert_eq!(one_each.sinks_ns, [[Some(6)], [Some(6)]]);
+    // Both on one core: that is too much for it, and the other cluster's core is no help.
+    let (one_for_both, _) = answer(&[three()[1].clone(), three()[1].clone()]);
+    assert!(one_for_both.reasons.contains(&Some(Reason::Overload)));
+}
+
+#[test]
+fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
+    let (answer, witness) = answer(&three());
+    assert_eq!(answer.bounds[0].unwrap().bound_ns, 6);
+    assert_eq!(answer.reasons[1], Some(Reason::DelayedBy { dag: DagId(2) }));
+    let unknown = answer.first_failing.unwrap();
+    assert_eq!(unknown.dag, DagId(2));
+    assert!(matches!(unknown.reason, Reason::Unknown(_)), "{unknown:?}");
+    let begins = |line: &&str| line.starts_with("machine 1 ");
+    assert_eq!(witness.lines().filter(begins).count(), 2, "one for each");
+}
+
+#[test]
+fn an_undivided_machine_is_cluster_0() {
+    let mut dag = support::dag(10, 10, 1, &[1], &[]);
+    dag.cluster = Some(ClusterId(0));
+    let task_set = commit(&[dag], EDF, Clusters::Undivided);
+    assert!(!task_set.is_divided());
+    assert_eq!(task_set.clusters().collect::<Vec<_>>(), [ClusterId(0)]);
+    assert_eq!(task_set.cores_of(ClusterId(0), 2), 0..2);
+    assert_eq!(task_set.dag(DagId(0)).subtask(SubtaskId(0)).priority().0, 1);
+}

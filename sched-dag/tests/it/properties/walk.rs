@@ -1,0 +1,358 @@
+//! A driver that does at each instant what it is told to, and whether the scheduler keeps the rules.
+//!
+//! Here happens what a driver in virtual time does not meet: several dispatches at one time, a
+//! driver that comes late, ends of instances that have lost their core meanwhile, ends of several in
+//! any order, faults, stops, pauses and closings at any time. The journal is judged by the law
+//! ([`Walk::judged`]); what that does not judge, by [`Releases`] after each instant.
+//!
+//! Each end that is the last thing of an instant is told by [`Scheduler::pass_on`], and the long way
+//! by a copy, too: both have to come to the same.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use sched_dag::journal::What;
+use sched_dag::law::sweep::Stage;
+use sched_dag::law::{JobRecord, Record, Terms, Violation, dispatch_violations, violations};
+use sched_dag::lifecycle::Request;
+use sched_dag::{CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler};
+
+use super::releases::{Releases, SAID};
+use crate::support::set::Set;
+use crate::support::{pass_on, scheduler};
+
+/// What happens at an instant before its releases.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Step {
+    Complete(Instance),
+    Fail(Instance),
+    /// It fails, and another function is there.
+    Replace(Instance),
+    Ask(Request),
+}
+
+/// A run that has come so far.
+#[derive(Clone)]
+pub(crate) struct Walk<'s> {
+    pub(crate) set: &'s Set,
+    pub(crate) scheduler: Scheduler,
+    pub(crate) now_ns: u64,
+    /// What each core executes.
+    cores: Vec<Option<Instance>>,
+    /// What has lost its core.
+    preempted: Vec<Instance>,
+    /// The idle cores; the last one has to be taken first.
+    idle: Vec<CoreId>,
+    releases: Vec<Releases>,
+    /// Whether it has come later than it should, or an end after a core was lost.
+    is_late: bool,
+}
+
+impl<'s> Walk<'s> {
+    pub(crate) fn new(set: &'s Set) -> Self {
+        let mut scheduler = scheduler(&set.specs(), set.options);
+        scheduler.log.journal = Journal::growing();
+        scheduler.hear(SAID);
+        let cores = set.options.cores;
+        Self {
+            set,
+            scheduler,
+            now_ns: 0,
+            cores: vec![None; cores as usize],
+            preempted: Vec::new(),
+            idle: (0..cores).rev().map(CoreId).collect(),
+            releases: set.specs.iter().map(Releases::new).collect(),
+            is_late: false,
+        }
+    }
+
+    pub(crate) fn running(&self) -> impl Iterator<Item = Instance> {
+        self.cores.iter().flatten().copied()
+    }
+
+    /// Returns what has started and not ended.
+    pub(crate) fn started(&self) -> Vec<Instance> {
+        self.running()
+            .chain(self.preempted.iter().copied())
+            .collect()
+    }
+
+    /// Reports whether nothing happens any more of itself, and no job is in flight.
+    pub(crate) fn is_over(&self) -> bool {
+        let mut dags = (0..).map(DagId).take(self.releases.len());
+        let is_idle = dags.all(|dag| self.scheduler.in_flight(dag) == 0);
+        is_idle && self.scheduler.next_event_ns().is_none()
+    }
+
+    pub(crate) fn is_paused(&self, dag: DagId) -> bool {
+        self.scheduler.phase(dag) == DagPhase::Paused
+    }
+
+    /// Returns a hash of all that what follows depends on.
+    pub(crate) fn hash(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.scheduler.hash(&mut hasher);
+        (&self.releases, &self.cores, &self.preempted).hash(&mut hasher);
+        hasher.finish()
+    }
+
+    /// Goes through an instant.
+    pub(crate) fn instant(&mut self, now_ns: u64, steps: &[Step]) -> Result<(), String> {
+        let due_ns = self.scheduler.next_event_ns();
+        self.is_late |= due_ns.is_some_and(|due_ns| due_ns < now_ns);
+        self.now_ns = now_ns;
+        let mut decisions = None;
+        for (number, &step) in (1..).zip(steps) {
+            match step {
+                Step::Complete(instance) if number == steps.len() => {
+                    decisions = Some(self.pass_on(instance)?);
+                }
+                step => self.take(step),
+            }
+            self.hear()?;
+        }
+        let end = |scheduler: &mut Scheduler| scheduler.at(now_ns).dispatch().to_vec();
+        let decisions = decisions.unwrap_or_else(|| end(&mut self.scheduler));
+        self.hear()?;
+        self.carry_out(&decisions)?;
+        for (core, running) in (0..).map(CoreId).zip(&self.cores) {
+            if self.scheduler.running(core) != *running {
+                return Err(format!("{core:?} should run {running:?}"));
+            }
+        }
+        for (id, dag) in (0..).map(DagId).zip(self.scheduler.task_set().dags()) {
+            let suspended = self.preempted.iter().filter(|of| of.dag == id).count();
+            if suspended > dag.most_suspended() {
+                return Err(format!("{suspended} instances of {id:?} are suspended"));
+            }
+        }
+        let next_ns = self.scheduler.next_event_ns();
+        if next_ns.is_some_and(|next_ns| next_ns <= now_ns) {
+            return Err(format!("the instant is over before {next_ns:?}"));
+        }
+        let dags = (0..).map(DagId).zip(&self.set.specs).zip(&self.releases);
+        let mut differences = dags
+            .filter_map(|((id, spec), releases)| releases.difference(id, &self.scheduler, spec));
+        differences.next().map_or(Ok(()), Err)
+    }
+
+    fn take(&mut self, step: Step) {
+        let (specs, releases) = (&self.set.specs, &mut self.releases);
+        match step {
+            Step::Complete(_) => {}
+            Step::Fail(Instance { dag, job, .. }) => {
+                releases[dag.index()].fault(&specs[dag.index()], job, false);
+            }
+            Step::Replace(Instance { dag, job, .. }) => {
+                releases[dag.index()].fault(&specs[dag.index()], job, true);
+            }
+            Step::Ask(request) => {
+                let (dag, answer) = match request {
+                    Request::Pause(dag) => (dag, What::Off),
+                    Request::Resume(dag) => (dag, What::On),
+                    Request::Close(dag) => (dag, What::Closed),
+                    Request::Stop(dag) => (dag, What::Stopped),
+                    Request::Signal(dag) => (dag, What::Signalled),
+                    _ => unreachable!("it is not asked of a scheduler"),
+                };
+                releases[dag.index()].ask(answer);
+            }
+        }
+        if let Step::Complete(instance) | Step::Fail(instance) | Step::Replace(instance) = step {
+            self.scheduler.log.here = self.leave(instance);
+        }
+        let mut moment = self.scheduler.at(self.now_ns);
+        match step {
+            Step::Complete(instance) => moment.complete(instance),
+            Step::Fail(instance) => moment.fail(instance),
+            Step::Replace(instance) => moment.fail_replaceable(instance),
+            Step::Ask(request) => moment.serve(request),
+        }
+    }
+
+    /// Takes an instance from its core, or from what has lost its core. Returns the core.
+    fn leave(&mut self, instance: Instance) -> CoreId {
+        let mut cores = (0..).map(CoreId).zip(&mut self.cores);
+        let core = cores.find(|(_, runs)| **runs == Some(instance));
+        let Some((core, runs)) = core else {
+            self.is_late = true;
+            self.preempted.retain(|preempted| *preempted != instance);
+            return CoreId(0);
+        };
+        *runs = None;
+        self.idle.push(core);
+        core
+    }
+
+    /// Completes an instance and ends the instant by the short way; and, on copies, by the long
+    /// one, and by the short one of a core that does not run it any more.
+    fn pass_on(&mut self, instance: Instance) -> Result<Vec<Decision>, String> {
+        let core = self.leave(instance);
+        let mut long = self.scheduler.clone();
+        long.log.here = core;
+        long.at(self.now_ns).complete(instance);
+        let expected = long.at(self.now_ns).dispatch().to_vec();
+        let mut elsewhere = self.scheduler.clone();
+        let other = CoreId(instance.subtask.0 % self.set.options.cores);
+        end_shortly(&mut elsewhere, self.now_ns, other, instance);
+        let decisions = end_shortly(&mut self.scheduler, self.now_ns, core, instance);
+        if seen(&elsewhere) != seen(&long) || seen(&self.scheduler) != seen(&long) {
+            return Err(format!("the short way of {instance:?} is not the long one"));
+        }
+        match decisions == expected {
+            true => Ok(decisions),
+            false => Err(format!(
+                "the short way comes to {decisions:?}, not {expected:?}"
+            )),
+        }
+    }
+
+    /// Hands what the scheduler tells to the judges of releases.
+    fn hear(&mut self) -> Result<(), String> {
+        let mut notices = Vec::new();
+        self.scheduler.log.exchange_notices(&mut notices);
+        for notice in &notices {
+            let dag = notice.event.dag.index();
+            let spec = &self.set.specs[dag];
+            if !self.releases[dag].takes(spec, notice, self.now_ns) {
+                return Err(format!("no rule allows {notice:?}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets the cores do what was decided, on the cores that the docs state.
+    fn carry_out(&mut self, decisions: &[Decision]) -> Result<(), String> {
+        let mut freed = None;
+        for &decision in decisions {
+            let (core, instance) = (decision.core, decision.instance);
+            let place = &mut self.cores[core.index()];
+            let (what, is_right) = match decision.what {
+                What::Suspend => {
+                    freed = Some(core);
+                    self.preempted.push(instance);
+                    (What::Suspend, place.take() == Some(instance))
+                }
+                _ => {
+                    let is_free = freed.take().or_else(|| self.idle.pop()) == Some(core);
+                    let is_free = is_free && place.replace(instance).is_none();
+                    match self.preempted.iter().position(|it| *it == instance) {
+                        Some(at) => {
+                            self.preempted.remove(at);
+                            let is_resumed = decision.what == What::Resume;
+                            (What::Resume, is_free && is_resumed)
+                        }
+                        None => {
+                            let is_cut = self.releases[instance.dag.index()].is_cut(instance.job);
+                            let is_started = decision.what == What::Start;
+                            (What::Start, is_free && is_started && !is_cut)
+                        }
+                    }
+                }
+            };
+            if !is_right {
+                return Err(format!("{decision:?} of {decisions:?}"));
+            }
+            (self.scheduler.log).on_core(core, what, self.now_ns, instance);
+        }
+        Ok(())
+    }
+
+    /// Returns what the law finds in all that has happened.
+    pub(crate) fn judged(&self, is_complete: bool) -> Result<(), String> {
+        let terms = Terms {
+            is_complete,
+            ..Terms::EXACT
+        };
+        let task_set = self.scheduler.task_set();
+        let events = || self.scheduler.log.journal.events();
+        let mut found = violations(task_set, terms, events());
+        found.extend(dispatch_violations(
+            task_set,
+            &self.set.options,
+            terms,
+            events(),
+        ));
+        found.retain(|it| !(self.is_late && is_of_lateness(it)));
+        match &found[..] {
+            [] if is_complete && !self.is_late => self.counted_misses(),
+            [] => Ok(()),
+            [first, ..] => Err(format!("the law finds: {first}")),
+        }
+    }
+
+    /// R4: holds the misses that are counted of each sink against the times of a punctual run. Those
+    /// of jobs that were not released are in no record.
+    fn counted_misses(&self) -> Result<(), String> {
+        let task_set = self.scheduler.task_set();
+        let events = self.scheduler.log.journal.events();
+        let record = Record::of_events(task_set, true, events).expect("it is short");
+        for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
+            let statistics = self.scheduler.statistics(dag);
+            if statistics.skips + statistics.dropped > 0 {
+                continue;
+            }
+            for &sink in model.sinks() {
+                let relative_ns = model.subtask(sink).relative_deadline_ns();
+                let is_late = |&(number, job): &(u64, &JobRecord)| {
+                    let finish_ns = record.instances(dag, number)[sink.index()].finish_ns;
+                    let is_late = |release_ns: u64| {
+                        let is_after = |ns: u64| ns > release_ns + relative_ns;
+                        finish_ns.is_none_or(is_after) && job.cut_ns.is_none_or(is_after)
+                    };
+                    job.release_ns.is_some_and(is_late)
+                };
+                let late = record.numbered(dag).filter(is_late).count() as u64;
+                let counted = self.scheduler.sink_misses(dag, sink);
+                if late != counted {
+                    return Err(format!(
+                        "{sink:?} of {dag:?} was late {late} times, not {counted}"
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reports whether that is right if a driver comes late, or ends what has lost its core.
+fn is_of_lateness(violation: &Violation) -> bool {
+    match violation {
+        Violation::Unpunctual { .. }
+        | Violation::StillQueued { .. }
+        | Violation::MissedLate { .. } => true,
+        Violation::OutOfTurn { event, stage } => {
+            event.what == What::Finish && *stage == Stage::Suspended
+        }
+        _ => false,
+    }
+}
+
+/// Ends an instance by the short way, and the instant.
+fn end_shortly(
+    scheduler: &mut Scheduler,
+    now_ns: u64,
+    core: CoreId,
+    instance: Instance,
+) -> Vec<Decision> {
+    let vertex = scheduler.vertex(instance);
+    match pass_on(scheduler, now_ns, core, vertex) {
+        HandOff::To(next, decision) => {
+            assert_eq!(scheduler.vertex(decision.instance), next);
+            vec![decision]
+        }
+        HandOff::Idle => Vec::new(),
+        HandOff::Open => scheduler.at(now_ns).dispatch().to_vec(),
+    }
+}
+
+/// Returns all that a driver sees of a scheduler.
+fn seen(of: &Scheduler) -> String {
+    let cores = (0..of.options().cores).map(|core| of.running(CoreId(core)));
+    let dags = (0..).map(DagId).take(of.task_set().dags().len());
+    let dags: Vec<_> = dags.map(|dag| of.snapshot(dag)).collect();
+    format!(
+        "{:?} {dags:?} {:?}",
+        cores.collect::<Vec<_>>(),
+        of.next_event_ns()
+    )
+}

@@ -1,0 +1,206 @@
+//! Random sets of DAGs: all that a run depends on comes from one seed.
+
+use common::random::Random;
+use sched_dag::{
+    Activation, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
+    Priority, SchedulerOptions, SubtaskSpec,
+};
+
+use super::shuffled_edges;
+
+/// One set with all that a run depends on.
+#[derive(Clone, Debug)]
+pub(crate) struct Set {
+    pub(crate) options: SchedulerOptions,
+    pub(crate) specs: Vec<DagSpec>,
+    /// The seed of execution times, of faults, and of what a driver is free to choose.
+    pub(crate) choices: u64,
+    /// Whether one instance of ten takes no time.
+    pub(crate) has_instances_of_no_length: bool,
+}
+
+/// Whether releases may find no room.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Overruns {
+    /// As many jobs as there are may be in flight.
+    Never,
+    /// At most three jobs may be in flight.
+    Often,
+}
+
+/// The most that a set has of everything.
+struct Limits {
+    cores: u32,
+    dags: u64,
+    subtasks: u64,
+    jobs: u32,
+    period_ns: u64,
+    deadline_ns: u64,
+    offset_ns: u64,
+}
+
+const USUAL: Limits = Limits {
+    cores: 4,
+    dags: 4,
+    subtasks: 7,
+    jobs: 6,
+    period_ns: 24,
+    deadline_ns: 40,
+    offset_ns: 20,
+};
+
+/// Few enough that each order of events can be gone through.
+const TINY: Limits = Limits {
+    cores: 2,
+    dags: 2,
+    subtasks: 3,
+    jobs: 2,
+    period_ns: 3,
+    deadline_ns: 4,
+    offset_ns: 1,
+};
+
+pub(crate) fn draw(random: &mut Random, overruns: Overruns) -> Set {
+    let mut set = draw_within(random, &USUAL, overruns);
+    if random.chance(5) {
+        set.options.cores = 64;
+    }
+    set
+}
+
+/// Draws a set with sporadic DAGs, too.
+pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
+    let overruns = match random.chance(40) {
+        true => Overruns::Never,
+        false => Overruns::Often,
+    };
+    with_sporadic(draw(random, overruns), random)
+}
+
+/// Draws a set of at most three subtasks.
+pub(crate) fn draw_tiny(random: &mut Random) -> Set {
+    loop {
+        let set = draw_within(random, &TINY, Overruns::Often);
+        let subtasks = set.specs.iter().map(|spec| spec.subtasks.len());
+        if subtasks.sum::<usize>() <= 3 {
+            return with_sporadic(set, random);
+        }
+    }
+}
+
+fn with_sporadic(mut set: Set, random: &mut Random) -> Set {
+    for spec in &mut set.specs {
+        if random.chance(40) {
+            spec.activation = Activation::Sporadic;
+        }
+    }
+    set
+}
+
+fn draw_within(random: &mut Random, limits: &Limits, overruns: Overruns) -> Set {
+    let options = SchedulerOptions {
+        policy: random.one_of(&[Policy::Edf, Policy::StaticPriority]),
+        preemption: match random.chance(75) {
+            true => Preemption::Enabled,
+            false => Preemption::Disabled,
+        },
+        cores: random.within(1..=limits.cores),
+    };
+    let dags = 0..random.within(1..=limits.dags);
+    let specs = dags.map(|_| draw_dag(random, limits, overruns));
+    Set {
+        options,
+        specs: specs.collect(),
+        choices: random.number(),
+        has_instances_of_no_length: false,
+    }
+}
+
+fn draw_dag(random: &mut Random, limits: &Limits, overruns: Overruns) -> DagSpec {
+    let jobs = random.within(1..=limits.jobs);
+    let priorities = random.within(0..=6);
+    let often_non_preemptive = if random.chance(30) { 40 } else { 0 };
+    let subtasks = 0..random.within(1..=limits.subtasks);
+    let subtasks = subtasks.map(|_| SubtaskSpec {
+        priority: Some(Priority(random.within(0..=priorities))),
+        non_preemptive: random.chance(often_non_preemptive),
+        ..SubtaskSpec::default()
+    });
+    let mut subtasks: Vec<SubtaskSpec> = subtasks.collect();
+    let period_ns = random.within(1..=limits.period_ns);
+    let deadline_ns = match random.chance(40) {
+        true => period_ns,
+        false => random.within(1..=limits.deadline_ns),
+    };
+    let percent = random.within(5..=70);
+    let edges = shuffled_edges(random, subtasks.len(), percent);
+    let has_own_deadlines = random.chance(50);
+    for (number, subtask) in subtasks.iter_mut().enumerate() {
+        let is_sink = edges.iter().all(|&(from, _)| from != number);
+        let is_own = is_sink && has_own_deadlines && random.chance(70);
+        subtask.relative_deadline_ns = is_own.then(|| random.within(1..=deadline_ns));
+    }
+    let policies = [
+        OverrunPolicy::Queue,
+        OverrunPolicy::Skip,
+        OverrunPolicy::Abort,
+    ];
+    let (in_flight, overrun) = match overruns {
+        Overruns::Never => (jobs, OverrunPolicy::Queue),
+        Overruns::Often => (random.within(1..=jobs.min(3)), random.one_of(&policies)),
+    };
+    let limit = FaultLimit {
+        faults: random.within(1..=3),
+        window: random.within(1..=4),
+        in_all: random.within(1..=5),
+    };
+    DagSpec {
+        period_ns: Some(period_ns),
+        relative_deadline_ns: Some(deadline_ns),
+        offset_ns: random.within(0..=limits.offset_ns) * random.within(0..=1),
+        jobs: Some(jobs.into()),
+        in_flight: Some(in_flight),
+        overrun,
+        on_fault: random.one_of(&[OnFault::DropJob(limit), OnFault::EndDag]),
+        subtasks,
+        edges,
+        ..DagSpec::default()
+    }
+}
+
+impl Set {
+    pub(crate) fn specs(&self) -> Vec<DagSpec> {
+        self.specs.clone()
+    }
+
+    /// Reports whether a DAG takes signals.
+    pub(crate) fn is_sporadic(&self, dag: DagId) -> bool {
+        self.specs[dag.index()].activation == Activation::Sporadic
+    }
+
+    /// Returns how long an instance executes: at most 8, or less where its DAG is a short one.
+    pub(crate) fn execution_ns(&self, instance: Instance) -> u64 {
+        let of_dag = self.choices ^ u64::from(instance.dag.0);
+        let longest_ns = Random::new(of_dag).within(1..=8);
+        let mut random = self.of(instance);
+        let execution_ns = random.within(1..=longest_ns);
+        match self.has_instances_of_no_length && random.chance(10) {
+            true => 0,
+            false => execution_ns,
+        }
+    }
+
+    /// Reports whether an instance fails, which one of 50 does.
+    pub(crate) fn fails(&self, instance: Instance) -> bool {
+        let mut random = self.of(instance);
+        random.number();
+        random.chance(2)
+    }
+
+    /// Returns what is drawn for one instance.
+    fn of(&self, instance: Instance) -> Random {
+        let Instance { dag, job, subtask } = instance;
+        let number = (u64::from(dag.0) << 40) + (job << 20) + u64::from(subtask.0);
+        Random::new(self.choices.wrapping_add(number.wrapping_mul(0x9e37)))
+    }
+}

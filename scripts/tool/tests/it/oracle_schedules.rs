@@ -1,0 +1,161 @@
+//! The scheduler against reference schedules, and the refusal of broken files.
+
+use fass::{ConstructionPolicy, finish_create_dags_with};
+use replay::{Epoch, Scale, build};
+use tool::oracle::schedules::{Case, Deviation, check, compare, parse};
+use virtual_time::VirtualTime;
+
+const PUBLIC: &str = include_str!("../../../../tests/oracle/schedules.txt");
+const CLUSTERS: &str = include_str!("../../../../tests/oracle/clusters.txt");
+
+/// One core, a chain of two, two jobs that overlap.
+const SMALL: &str = "case small 1 0 1 1
+dag 4 4 0 2 2 1
+sub 1 0 1 1
+sub 4 0 4 4
+edge 0 1
+x 0 0 0 0 1 0
+x 0 0 1 1 5 0
+x 0 1 0 5 6 0
+x 0 1 1 6 10 0
+j 0 0 0 5 5 1
+j 0 1 4 10 6 1
+end
+";
+
+/// Splits a row of a table.
+fn split<const N: usize>(row: &str) -> [&str; N] {
+    let cells: Vec<&str> = row.split(" | ").collect();
+    cells.try_into().expect(row)
+}
+
+#[test]
+fn all_public_schedules_agree() {
+    for (text, count) in [(PUBLIC, 40), (CLUSTERS, 30)] {
+        let cases = parse(text).expect("the file is well formed");
+        assert_eq!(cases.len(), count);
+        for case in &cases {
+            assert_eq!(check(case), Ok(()), "{}", case.name);
+            assert_eq!(built(case, 0, 0), Ok(Deviation::default()), "{}", case.name);
+        }
+    }
+}
+
+/// Compares a case with how the DAGs run that the app `replay` builds of it, in virtual time with
+/// units of 1000 ns and this guard.
+fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, String> {
+    let machine = VirtualTime::new()
+        .cores(case.cores)
+        .clusters(case.clusters.sizes())
+        .policy(case.policy)
+        .preemption(case.preemption);
+    let scale = Scale {
+        unit_ns: 1000,
+        guard_ns,
+    };
+    let dags = build(case, scale, &Epoch::default(), None).expect("short times");
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("any graph is right");
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    compare(case, report.task_set(), report.record(), 1000, tolerance_ns)
+}
+
+#[test]
+fn what_is_near_passes_and_by_how_much_is_told() {
+    let case = parse(SMALL).expect("well formed").remove(0);
+    let deviation = Deviation {
+        earliest_ns: -10,
+        latest_ns: 0,
+    };
+    assert_eq!(built(&case, 10, 10), Ok(deviation));
+    let far = "dag 0 job 0 subtask 0: finish: expected 1, found 0.990";
+    assert_eq!(built(&case, 10, 9), Err(far.to_owned()));
+}
+
+/// What stands in the small case, what is put in its place, and the difference that makes.
+const WRONG: &str =
+    "x 0 1 0 5 6 0 | x 0 1 0 4 6 0 | dag 0 job 1 subtask 0: start: expected 4, found 5
+x 0 1 1 6 10 0 | x 0 1 1 6 11 0 | dag 0 job 1 subtask 1: finish: expected 11, found 10
+j 0 1 4 10 6 1 | j 0 1 5 10 6 1 | dag 0 job 1: release: expected 5, found 4
+j 0 1 4 10 6 1 | j 0 1 4 11 6 1 | dag 0 job 1: finish: expected 11, found 10
+x 0 1 1 6 10 0 | x 0 1 1 6 10 1 | dag 0 job 1 subtask 1: preemptions: expected 1, found 0
+j 0 0 0 5 5 1 | j 0 0 0 5 5 0 | dag 0 job 0: missed: expected 0, found 1
+j 0 1 4 10 6 1 | j 0 1 4 10 7 1 | dag 0 job 1: response: expected 7, found 6";
+
+#[test]
+fn the_first_difference_is_named() {
+    for row in WRONG.lines() {
+        let [from, to, difference] = split(row);
+        let cases = parse(&SMALL.replace(from, to)).expect("still well formed");
+        assert_eq!(check(&cases[0]), Err(difference.to_owned()));
+    }
+}
+
+/// What stands in the small case, what is put in its place, and the line and the reason of the
+/// refusal.
+const MALFORMED: &str = r"case small 1 0 1 1 | case small 0 0 1 1 | 1 | expected 1 to 64 cores, found 0
+case small 1 0 1 1 | case small 4294967295 0 1 1 | 1 | expected 1 to 64 cores, found 4294967295
+case small 1 0 1 1 | case small 1 2 1 1 | 1 | expected 0 or 1
+case small 1 0 1 1 | case small 1 0 1 | 1 | takes 5 words
+case small 1 0 1 1 | case small 1 0 1 2 | 6 | expected a `dag` record
+dag 4 4 0 2 2 1 | clusters 1 1\ndag 4 4 0 2 2 1\nin 0 | 2 | clusters of 1 cores in all, found 2
+dag 4 4 0 2 2 1 | clusters 1 0\ndag 4 4 0 2 2 1\nin 0 | 2 | at least 1 core for each cluster
+dag 4 4 0 2 2 1 | clusters 1\ndag 4 4 0 2 2 1 | 4 | expected a `in` record
+dag 4 4 0 2 2 1 | clusters 1\ndag 4 4 0 2 2 1\nin 1 | 4 | no cluster 1
+dag 4 4 0 2 2 1 | dag 4 4 0 2 2 1\nin 0 | 3 | expected a `sub` record
+dag 4 4 0 2 2 1 | dag 0 4 0 2 2 1 | 2 | period of 0
+dag 4 4 0 2 2 1 | dag 4 0 0 2 2 1 | 2 | deadline of 0
+dag 4 4 0 2 2 1 | dag 4 4 0 0 2 1 | 2 | needs at least 1
+dag 4 4 0 2 2 1 | dag 4 4 0 4294967296 2 1 | 2 | too large
+dag 4 4 0 2 2 1 | dag 4 4 0 2 2 2 | 6 | expected a `edge` record
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551615 2 2 1 | 2 | exceeds 18446744073709551615
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551616 2 2 1 | 2 | too large
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551605 2 2 1 | 1 | may end after
+dag 4 4 0 2 2 1 | dag 4 -4 0 2 2 1 | 2 | not a whole number
+sub 1 0 1 1 | sub 1 0 1 | 3 | for each of 2 jobs, found 1
+sub 1 0 1 1 | sub 1 0 1 2 | 3 | not between 1 and the WCET 1
+sub 1 0 1 1 | sub 1 0 0 1 | 3 | not between 1 and the WCET 1
+sub 1 0 1 1 | sub 1 4294967296 1 1 | 3 | too large
+edge 0 1 | edge 0 2 | 5 | no subtask 2
+edge 0 1 | edge 1 1 | 2 | precedes itself
+1 0 1 1\ndag 4 4 0 2 2 1\nsub 1 0 1 1\nsub 4 0 4 4 | 1 0 1 1\ndag 4 4 0 2 2 2\nsub 1 0 1 1\nsub 4 0 4 4\nedge 1 0 | 2 | subtask 0 -> subtask 1 -> subtask 0
+edge 0 1 | edge 0 1\nsink 2 3 | 6 | no subtask 2
+edge 0 1 | edge 0 1\nsink 1 | 6 | takes 2 words
+edge 0 1 | edge 0 1\nsink 1 3\nsink 1 3 | 7 | twice
+edge 0 1 | edge 0 1\nsink 1 0 | 2 | deadline of 0
+edge 0 1 | edge 0 1\nsink 1 5 | 2 | longer than its DAG's
+edge 0 1 | edge 0 1\nsink 0 3 | 2 | is no sink
+x 0 0 1 1 5 0\n |  | 11 | without 1 `x` records
+x 0 0 1 1 5 0 | x 0 0 0 1 5 0 | 7 | twice
+x 0 0 1 1 5 0 | x 0 2 1 1 5 0 | 7 | no job 2
+x 0 0 1 1 5 0 | x 1 0 1 1 5 0 | 7 | no dag 1
+j 0 1 4 10 6 1 | j 0 1 4 10 6 2 | 11 | expected 0 or 1
+j 0 1 4 10 6 1 | k 0 1 4 10 6 1 | 11 | expected `x`, `j` or `end`
+end\n |  | 12 | the file ends";
+
+#[test]
+fn malformed_files_are_refused_with_their_line() {
+    for row in MALFORMED.lines() {
+        let row = row.replace(r"\n", "\n");
+        let [from, to, line, reason] = split(&row);
+        let malformed = parse(&SMALL.replacen(from, to, 1)).expect_err(to);
+        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
+        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
+    }
+    assert_eq!(parse("").expect_err("no case").line, 1);
+}
+
+#[test]
+fn far_apart_times_and_as_many_cores_as_there_can_be_are_no_trouble() {
+    let text = "case far 64 1 1 1
+dag 9000000000000000000 9000000000000000000 5 2 1 0
+sub 3 0 1 3
+x 0 0 0 5 6 0
+x 0 1 0 9000000000000000005 9000000000000000008 0
+j 0 0 5 6 1 0
+j 0 1 9000000000000000005 9000000000000000008 3 0
+end
+";
+    let cases = parse(text).expect("well formed");
+    assert_eq!(check(&cases[0]), Ok(()));
+}

@@ -1,0 +1,73 @@
+//! The recorded walk, from the data to the results, on the host, on the machine and on Linux.
+
+mod machine;
+mod walk;
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::PathBuf;
+
+use fass::{Policy, finish_create_dags};
+use gait::{DAG, Sample, TOPIC, Walk, build};
+use recording::{Recordable, Recording};
+use tool::system::workspace;
+use virtual_time::VirtualTime;
+
+/// The table of both sensors.
+const TABLE: &str = "apps/gait/data/walking.csv";
+
+/// The recording that `./scripts/recording` makes of the data, removed with this value.
+struct File(PathBuf);
+
+impl File {
+    /// Makes it.
+    fn new() -> File {
+        Self::of(&workspace().join(TABLE).to_string_lossy())
+    }
+
+    /// Makes it of another table.
+    fn of(table: &str) -> File {
+        let name = format!("walking-{:?}.rec", std::thread::current().id());
+        let out = std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
+        let schema = Sample::schema().to_string();
+        let words = [
+            "--from-csv",
+            table,
+            "--dag",
+            DAG,
+            "--topic",
+            TOPIC,
+            "--ignore",
+            "sample",
+        ];
+        let more = ["--period", "8333333ns", "--type", &schema, "--out"];
+        let words = words.into_iter().chain(more).map(OsString::from);
+        let words: Vec<OsString> = words.chain([out.clone().into()]).collect();
+        let _ = tool::recordings::recording(&words);
+        File(out)
+    }
+
+    /// Reads it.
+    fn read(&self) -> Recording<'static> {
+        let bytes = fs::read(&self.0).expect("the recording");
+        Recording::read(bytes.leak()).expect("it is whole")
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+/// Walks in virtual time.
+fn walk(recording: &Recording<'static>, cores: u32, policy: Policy) -> Walk {
+    let machine = VirtualTime::new().cores(cores).policy(policy);
+    let (dag, walk) = build(recording).expect("it has the samples");
+    let commit = finish_create_dags(&[dag]).expect("the DAG is proven");
+    assert!(commit.answers()[0].verdict.bound().is_some());
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert_eq!(report.dag("gait").statistics().completed, 3_511);
+    walk
+}

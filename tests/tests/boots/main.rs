@@ -1,0 +1,30 @@
+//! What only a booted guest shows: the kernel, the apps, the media that a PC boots from.
+
+mod attacks;
+mod autoware;
+mod by_efi;
+mod by_grub;
+mod cruise;
+mod cruise_replay;
+mod dag_file;
+mod debian;
+mod drone;
+mod faults;
+mod fork_join;
+mod gait;
+mod in_bochs;
+mod input;
+mod join_latency;
+mod kernel;
+mod module;
+mod new_app;
+mod on_screen;
+mod oracle_in_kernel;
+mod parameters;
+mod preemption;
+mod processors;
+mod recordings;
+mod scenarios;
+mod seeing;
+mod stacks;
+mod topics;

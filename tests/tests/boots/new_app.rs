@@ -1,0 +1,362 @@
+//! A new app as a person gets it, in a repository of its own and under `apps/`: it passes its own
+//! test and the linters, boots, says what the guide shows, and is told what its repository
+//! lacks. So does the README's first app, when the README is followed. Its `main` may make every
+//! call that a machine has, and stays one source for all platforms.
+//!
+//! All of them share a target folder and the profiles of a new repository, so that each crate is
+//! compiled once; the folder stays from one run of this test to the next.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use harness::guide::{documented_output, without_numbers};
+use harness::markdown::{blocks, page};
+use tool::golden::{Golden, excerpt};
+use tool::new_app::{self, Source};
+use tool::system::{self, workspace};
+
+/// The guide's app.
+const NAME: &str = "first-steps";
+
+/// The README's app.
+const README_NAME: &str = "vision";
+
+/// Our folder, in which nothing but `target` is from before.
+fn ours() -> &'static Path {
+    static OURS: OnceLock<PathBuf> = OnceLock::new();
+    OURS.get_or_init(|| {
+        let ours = Path::new(env!("CARGO_TARGET_TMPDIR")).join("new-app");
+        fs::create_dir_all(&ours).expect("a folder of ours");
+        for entry in fs::read_dir(&ours).expect("it is there").flatten() {
+            if entry.path().is_dir() && entry.file_name() != "target" {
+                fs::remove_dir_all(entry.path()).expect("it is ours");
+            }
+        }
+        ours
+    })
+}
+
+/// Makes an app in a repository of its own, and returns the folder.
+fn repository(folder: &str, name: &str) -> PathBuf {
+    let out = ours().join(folder);
+    new_app::create_repository(&out, name, Source::Folder(workspace())).expect("the name is free");
+    share_target(&out);
+    out
+}
+
+/// Has all that is built in a folder land in ours, whoever builds there.
+fn share_target(folder: &Path) {
+    let target = ours().join("target");
+    fs::create_dir_all(&target).expect("a folder of ours");
+    symlink(target, folder.join("target")).expect("there is none yet");
+}
+
+/// Runs cargo in a folder, and returns its exit code, what it prints, and of what it complains.
+fn try_cargo(folder: &Path, words: &str) -> (Option<i32>, String, String) {
+    let (command, options) = words.split_once(' ').unwrap_or((words, ""));
+    let output = system::cargo()
+        .current_dir(folder)
+        .args([command, "--offline"])
+        .args(options.split_whitespace())
+        .output()
+        .expect("cargo can be started");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let code = output.status.code();
+    (code, text(&output.stdout), text(&output.stderr))
+}
+
+/// Runs cargo in a folder, where it must succeed, and returns what it prints.
+#[track_caller]
+fn cargo(folder: &Path, words: &str) -> String {
+    let (code, printed, complaints) = try_cargo(folder, words);
+    assert_eq!(code, Some(0), "cargo {words}:\n{complaints}");
+    printed
+}
+
+/// Runs cargo in a folder, where it must end with this code, and say this.
+#[track_caller]
+fn cargo_refuses(folder: &Path, words: &str, code: i32, says: &str) {
+    let (found, printed, complaints) = try_cargo(folder, words);
+    let said = printed + &complaints;
+    assert_eq!(found, Some(code), "cargo {words}:\n{said}");
+    assert!(said.contains(says), "cargo {words}:\n{said}");
+}
+
+/// Boots the app of a repository, as a person does.
+fn boot(repository: &Path) -> String {
+    cargo(repository, "run -- --cores 2 --mode deterministic")
+}
+
+/// What cargo says of the test that each new app has, when it passes.
+const PASSES: &str = "test every_job_is_in_time_and_within_its_bound ... ok";
+
+#[test]
+fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_guide_shows() {
+    let app = repository("own", NAME);
+    let said = cargo(&app, "test");
+    assert!(said.contains(PASSES), "{said}");
+
+    let said = boot(&app);
+    let documented = documented_output("new-app");
+    // The bound does not depend on the kernel's speed, so it is exact.
+    let shown = |line: &str| match line.contains("takes at most") {
+        true => line.into(),
+        false => without_numbers(line),
+    };
+    let golden = Golden {
+        file: "docs/guide.md",
+        below: "```text output-new-app\n",
+        text: &documented,
+    };
+    golden.assert_is(&excerpt(&documented, &said, shown));
+
+    // The same lines on Linux, whatever it takes there. Without preemption the bound is another.
+    let said = cargo(&app, "run --quiet -- --on linux --jobs 20");
+    for part in [
+        "takes at most",
+        "20 jobs complete, ",
+        "{\"kind\":\"verdict\",\"status\":\"success\"}\n",
+    ] {
+        assert!(said.contains(part), "{said}");
+    }
+
+    // Started on the host by mistake, the image says what to do.
+    let image = ours().join("target/debug").join(NAME);
+    let output = Command::new(image).output().expect("the host loads it");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.ends_with("boot it by `./scripts/boot FILE`, or by `fass-tool boot FILE`\n"));
+}
+
+#[test]
+fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
+    let app = repository("replayed", NAME);
+    let file = app.join("run.rec").display().to_string();
+    let record = format!("run -- --mode deterministic --record {file}");
+    cargo(&app, &record);
+    let there = app.join("linux.rec").display().to_string();
+    let said = cargo(&app, &format!("run -- --on linux --record {there}"));
+    assert!(said.contains("on Linux, "), "{said}");
+    // What either has recorded, the other repeats.
+    for (place, file) in [("--on linux", &file), ("--mode deterministic", &there)] {
+        let said = cargo(&app, &format!("run -- {place} --replay {file}"));
+        let replayed = "\"kind\":\"replayed\",\"compared\":0,\"uncompared\":0";
+        assert!(said.contains(replayed), "{place}: {said}");
+    }
+    let replay = format!("run --example replay -- {file}");
+    let said = cargo(&app, &replay);
+    assert_eq!(said, "0 values are compared: nothing differs\n");
+    let said = cargo(&app, &format!("{replay} --until {NAME}/17"));
+    assert!(said.contains("    gives `distance`: 82\n"), "{said}");
+
+    let library = app.join("src/lib.rs");
+    let text = fs::read_to_string(&library).expect("the new app's");
+    let careless = text.replace("force > 80", "force > 81");
+    assert_ne!(careless, text);
+    fs::write(&library, careless).expect("it is ours");
+    for (words, code, says) in [
+        ("", 1, "`cargo run --profile linux --example replay -- "),
+        (" --prove --seeds 2", 1, "leave `--seeds` out"),
+    ] {
+        let words = format!("run -- --mode deterministic{words}");
+        cargo_refuses(&app, &words, code, says);
+    }
+}
+
+#[test]
+fn what_its_repository_lacks_is_named_with_the_remedy() {
+    let app = repository("lacking", "brake-assist");
+    for (file, line, command, remedy) in [
+        (
+            "src/main.rs",
+            "#![no_std]",
+            "check",
+            "lacks `#![no_std]`; write it above all items",
+        ),
+        (
+            "src/main.rs",
+            "#![no_main]",
+            "check",
+            "lacks `#![no_main]`; write it above all items",
+        ),
+        (
+            "build.rs",
+            "boot_link::link_image();",
+            "check",
+            "let `build.rs` call `boot_link::link_image()`",
+        ),
+        (
+            "Cargo.toml",
+            "\ntest = false",
+            "check --all-targets",
+            "write `test = false` below `[[bin]]`",
+        ),
+        (
+            "Cargo.toml",
+            "[profile.dev]\npanic = \"abort\"\n",
+            "check",
+            "write `panic = \"abort\"` below `[profile.dev]`",
+        ),
+    ] {
+        let path = app.join(file);
+        let whole = fs::read_to_string(&path).expect("it is there");
+        assert!(whole.contains(line), "{file} has no `{line}`");
+        fs::write(&path, whole.replace(line, "")).expect("it is ours");
+        cargo_refuses(&app, command, 101, remedy);
+        fs::write(&path, whole).expect("it is ours");
+    }
+}
+
+#[test]
+fn the_linters_are_content_with_a_new_app_wherever_it_is() {
+    let of_its_own = repository("linted", NAME);
+    let clippy = "clippy --all-targets -- -D warnings";
+    cargo(&of_its_own, clippy);
+
+    // A workspace that has our crates and no app but the new one, so that nothing is copied.
+    let manifest = page("Cargo.toml");
+    let (manifest, _) = manifest.split_once("[profile.dev]").expect("the profiles");
+    let (_, manifest) = manifest.split_once("\n]\n").expect("the members");
+    let paths = format!("path = \"{}/", workspace().display());
+    let profiles = fs::read_to_string(of_its_own.join("Cargo.toml")).expect("the new app's");
+    let (_, profiles) = profiles.split_once("[profile.dev]").expect("the profiles");
+    let manifest = format!(
+        "[workspace]\nresolver = \"3\"\nmembers = [\"apps/*\"]\n{}\n[profile.dev]{profiles}",
+        manifest.replace("path = \"", &paths)
+    );
+    let small = ours().join("small");
+    fs::create_dir_all(&small).expect("a folder of ours");
+    fs::write(small.join("Cargo.toml"), manifest).expect("it is ours");
+    let app = new_app::create(&small, NAME).expect("the name is free");
+    assert_eq!(app, small.join("apps").join(NAME));
+    share_target(&small);
+    cargo(&app, clippy);
+    let format = system::cargo()
+        .current_dir(&app)
+        .args(["fmt", "--check"])
+        .status();
+    assert!(format.expect("cargo can be started").success());
+}
+
+#[test]
+fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
+    let readme = page("README.md");
+    let blocks = blocks(&readme);
+    let code = blocks.iter().find(|block| block.info.starts_with("rust"));
+    let code = &code.expect("the app's code").text;
+    let place = "`src/lib.rs`, in place of what follows `#![forbid(unsafe_code)]`";
+    assert!(readme.contains(place), "the README puts it elsewhere");
+    let app = repository("readme", README_NAME);
+    let library = app.join("src/lib.rs");
+    let template = fs::read_to_string(&library).expect("the new app's");
+    let (head, _) = template
+        .split_once("#![forbid(unsafe_code)]\n")
+        .expect("the place that the README names");
+    let put = |code: &str| {
+        let text = format!("{head}#![forbid(unsafe_code)]\n\n{code}");
+        fs::write(&library, text).expect("it is ours");
+    };
+
+    // A mistake in the DAG is one that the app's test sees: it runs this very DAG.
+    let wrong = code.replace("frame * 100", "frame * 101");
+    assert_ne!(&wrong, code);
+    put(&wrong);
+    cargo_refuses(&app, "test", 101, "assertion `left == right` failed");
+
+    put(code);
+    let said = cargo(&app, "test");
+    assert!(said.contains(PASSES), "{said}");
+    let shown = (blocks.iter().map(|block| &block.text))
+        .find(|text| text.contains("vision: "))
+        .expect("what the app says");
+    let golden = Golden {
+        file: "README.md",
+        below: place,
+        text: shown,
+    };
+    golden.assert_is(&excerpt(shown, &boot(&app), str::to_string));
+}
+
+/// The names that these need.
+const USES: &str = r"
+use core::time::Duration;
+use fass::{Parameter, Policy, Preemption, SubtaskAttributes, Wire, create_dag, finish_create_dags};
+";
+
+/// What `main` may do before it commits, in the place of asking for its options' end.
+const BEFORE: &str = r#"
+    machine.configure(Policy::Edf, Preemption::Enabled);
+    machine.offer_clusters()?;
+    machine.divide(&[1, machine.cores() - 1]);
+    machine.offer_overheads()?;
+    machine.set_coincidence(Duration::ZERO);
+    machine.accept_faults();
+    machine.accept_exceeded_bounds();
+    machine.show_topics();
+    let (log, gain) = (Wire::new("log"), Parameter::new("gain", 1_u64, 1..=9));
+    machine.connect(&log)?;
+    machine.offer(&[&gain])?;
+    options.finish(&["jobs", "output", "clusters", "overheads"])?;
+    let other = create_dag();
+    other.name("other").relative_deadline(Duration::from_millis(9));
+    let signal = other.sporadic(Duration::from_millis(9));
+    let read = other.using((gain.reading(), log.sending())).source(|_| ());
+    read.register(SubtaskAttributes::named("read"));
+    let dags = [first_steps::build(jobs), other];
+    machine.spread(&dags);
+"#;
+
+/// What it may do in the place of a plain run.
+const RUN: &str = r#"
+    machine.raise_on_input(&signal);
+    println!("{} and {:?}", machine.has_console(), machine.clusters());
+    println!("{:?} and {:?}", machine.resources(), machine.module());
+    let run = match jobs {
+        20 => machine.run_from(fass::now_ns() + 50_000_000)?,
+        _ => machine.run()?,
+    };
+    machine.report_memory();
+"#;
+
+#[test]
+fn a_main_with_every_call_of_the_machine_is_one_source_on_the_machine_and_on_linux() {
+    let source = workspace().join("kernel/front/src/app/machine.rs");
+    let source = fs::read_to_string(source).expect("the front's");
+    for call in source.split("pub fn ").skip(1) {
+        let (name, arguments) = call.split_once('(').expect("a function");
+        if !arguments.starts_with("&self") {
+            continue;
+        }
+        let is_made = [BEFORE, RUN].concat().contains(&format!("machine.{name}("));
+        assert!(
+            is_made,
+            "`{name}` is not called; write it into `BEFORE` or `RUN`"
+        );
+    }
+    let app = repository("every-call", NAME);
+    for (file, old, new) in [
+        ("src/main.rs", "    options.finish(&[\"jobs\"])?;\n", BEFORE),
+        ("src/main.rs", "&[first_steps::build(jobs)]", "&dags"),
+        ("src/main.rs", "    let run = machine.run()?;\n", RUN),
+        ("src/main.rs", "use fass::finish_create_dags;", USES),
+        (
+            "Cargo.toml",
+            "/kernel\" }",
+            "/kernel\", features = [\"clusters\"] }",
+        ),
+    ] {
+        let text = fs::read_to_string(app.join(file)).expect("the new app's");
+        assert_eq!(text.matches(old).count(), 1, "{file}: `{old}`");
+        fs::write(app.join(file), text.replace(old, new)).expect("it is ours");
+    }
+    for place in ["--on linux --jobs 20", "--mode deterministic"] {
+        let output = app.join("log").display().to_string();
+        let words = format!("run -- {place} --cores 2 --output {output}");
+        let said = cargo(&app, &words);
+        let success = "{\"kind\":\"verdict\",\"status\":\"success\"}\n";
+        assert!(said.contains(success), "{place}: {said}");
+    }
+}
