@@ -26,7 +26,7 @@ use super::latest::{AnyLatest, Entry, Probe, SharedLatest, Slot};
 use super::line::{Edge, Found, KeptState, Line, LineOf};
 use super::message::{Message, MessageType};
 use super::plan::{Body, Subtask};
-use super::topic::{Ports, Publisher, Wiring, Wrap};
+use super::topic::{Ports, Publisher, Relay, Wiring, Wrap};
 
 /// A recorded topic while DAGs are built.
 pub(crate) struct RecordedTopic<T> {
@@ -232,13 +232,7 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
 
     fn stages(&self) -> Box<dyn Any> {
         let line = Arc::clone(&self.line);
-        // The tap of a topic looks at each value on its way.
-        let tap = |mut to: Publisher<T>| {
-            Publisher::by_way_of(move |job, value: T| {
-                line.stage::<T>(job, |out| value.encode(out));
-                to.send(job, value);
-            })
-        };
+        let tap = |to| Publisher::by_way_of(Tap { line, to });
         let wrap: Wrap<T> = (self.line.is_open()).then(|| Box::new(tap) as _);
         Box::new(wrap)
     }
@@ -286,6 +280,19 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
         });
         shared.set_probe(sampler, Arc::clone(&probe));
         Some((probe, Sample::<T>::schema(), line))
+    }
+}
+
+/// The tap of a topic: looks at each value on its way.
+struct Tap<T> {
+    line: Arc<Line>,
+    to: Publisher<T>,
+}
+
+impl<T: Message + Recordable> Relay<T> for Tap<T> {
+    fn send(&mut self, job: u64, value: T) {
+        self.line.stage::<T>(job, |out| value.encode(out));
+        self.to.send(job, value);
     }
 }
 

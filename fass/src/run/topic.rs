@@ -65,27 +65,38 @@ enum End<T> {
     /// To the one reading port, where nobody else reads the topic.
     One(Writer<T>),
     /// To any number of readers, or by way of somebody who looks at the values.
-    Other(Box<dyn FnMut(u64, T) + Send + Sync>),
+    Other(Box<dyn Relay<T>>),
+}
+
+/// What takes values on their way to a topic's readers.
+pub(super) trait Relay<T>: Send + Sync {
+    fn send(&mut self, job: u64, value: T);
 }
 
 /// What puts something between a writer and its readers.
 pub(super) type Wrap<T> = Option<Box<dyn FnOnce(Publisher<T>) -> Publisher<T>>>;
 
+/// Any number of readers.
+struct Several<T> {
+    /// One a reading port.
+    writers: Box<[Writer<T>]>,
+    /// One a subtask that samples the topic's latest value.
+    stages: Box<[Box<dyn Stage<T>>]>,
+}
+
 impl<T: Message> Publisher<T> {
-    /// Makes one of a writer a reading port, and a stage a subtask that samples the latest value.
-    fn new(mut writers: Vec<Writer<T>>, mut stages: Box<[Box<dyn Stage<T>>]>) -> Self {
+    fn new(mut writers: Vec<Writer<T>>, stages: Box<[Box<dyn Stage<T>>]>) -> Self {
         if stages.is_empty()
             && writers.len() == 1
             && let Some(writer) = writers.pop()
         {
             return Self(End::One(writer));
         }
-        let mut writers: Box<[_]> = writers.into();
-        Self::by_way_of(move |job, value| send_to_all(&mut writers, &mut stages, job, value))
+        let writers = writers.into();
+        Self::by_way_of(Several { writers, stages })
     }
 
-    /// Makes one that leads to what takes values on their way to the readers.
-    pub(super) fn by_way_of(relay: impl FnMut(u64, T) + Send + Sync + 'static) -> Self {
+    pub(super) fn by_way_of(relay: impl Relay<T> + 'static) -> Self {
         Self(End::Other(Box::new(relay)))
     }
 
@@ -102,34 +113,31 @@ impl<T: Message> Publisher<T> {
     pub(crate) fn send(&mut self, job: u64, value: T) {
         match &mut self.0 {
             End::One(writer) => put(writer, job, value),
-            End::Other(relay) => relay(job, value),
+            End::Other(relay) => relay.send(job, value),
         }
     }
 }
 
-fn send_to_all<T: Message>(
-    writers: &mut [Writer<T>],
-    stages: &mut [Box<dyn Stage<T>>],
-    job: u64,
-    value: T,
-) {
-    // The commit refuses several readers of a type that gives `None`.
-    let stage = |stage: &mut Box<dyn Stage<T>>| {
-        if let Some(clone) = value.for_another_reader() {
-            stage.stage(job, clone);
-        }
-    };
-    if let Some((last, others)) = writers.split_last_mut() {
-        stages.iter_mut().for_each(stage);
-        for writer in others {
+impl<T: Message> Relay<T> for Several<T> {
+    fn send(&mut self, job: u64, value: T) {
+        // The commit refuses several readers of a type that gives `None`.
+        let stage = |stage: &mut Box<dyn Stage<T>>| {
             if let Some(clone) = value.for_another_reader() {
-                put(writer, job, clone);
+                stage.stage(job, clone);
             }
+        };
+        if let Some((last, others)) = self.writers.split_last_mut() {
+            self.stages.iter_mut().for_each(stage);
+            for writer in others {
+                if let Some(clone) = value.for_another_reader() {
+                    put(writer, job, clone);
+                }
+            }
+            put(last, job, value);
+        } else if let Some((last, others)) = self.stages.split_last_mut() {
+            others.iter_mut().for_each(stage);
+            last.stage(job, value);
         }
-        put(last, job, value);
-    } else if let Some((last, others)) = stages.split_last_mut() {
-        others.iter_mut().for_each(stage);
-        last.stage(job, value);
     }
 }
 
