@@ -443,7 +443,7 @@ pub struct Terms {
     /// How these are divided. If they are, DAGs say which cluster is theirs
     /// ([`Dag::cluster`](crate::Dag::cluster)).
     pub clusters: Clusters,
-    /// Whether the commit divides them ([`Platform::assign`](crate::Platform::assign)).
+    /// Whether the commit divides them ([`Platform::assign`]).
     pub assigns: bool,
     /// The cost of the platform's own work for an instance at most, as measured on it. The commit adds
     /// it to each WCET before it answers about deadlines

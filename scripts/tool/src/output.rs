@@ -9,8 +9,8 @@
 //! So this library has macros of the same names, which hide those of the standard
 //! library in all its modules; nobody has to think of it where something is printed.
 //!
-//! A [`Table`] is what people read of figures: columns of fixed widths, under their headings;
-//! [`shown`] and [`briefly`] write the times in it.
+//! A `Table` is what people read of figures: columns of fixed widths, under their headings;
+//! `shown` and `briefly` write the times in it.
 
 /// Writes to standard output; as the standard library's, but it never panics.
 #[macro_export]
