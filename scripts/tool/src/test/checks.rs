@@ -55,21 +55,6 @@ pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
         Ok(complain(sources, budgets::escape)?)
     });
 
-    let lint = |words: &str, remedy: &str| match plan.quick {
-        true => Err(Why::Skipped("left out by --quick".into())),
-        false => Ok(cargo(sources, words, remedy)?),
-    };
-    run("rustfmt has nothing to change", &|| {
-        lint("fmt --check", "run `cargo fmt`")
-    });
-    run("clippy has nothing to say", &|| {
-        lint("clippy --quiet --all-targets -- -D warnings", "see above")
-    });
-    let doc = "doc --quiet --no-deps";
-    run("rustdoc has nothing to say", &|| lint(doc, "see above"));
-    run("rustdoc has nothing to say of private items", &|| {
-        lint(&format!("{doc} --document-private-items"), "see above")
-    });
     run(
         "an independent reader opens MCAP files in their test",
         &|| {
@@ -89,6 +74,35 @@ pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
         let probed = image.and_then(|image| probe::kvm(&Qemu::default(), &image.path));
         probed.map_err(Why::Skipped)
     });
+}
+
+/// Runs those checks of them that cargo makes, beside whatever else runs.
+pub(super) fn lint_all(plan: &Plan, sources: &[Source]) -> Tally {
+    let mut tally = Tally::default();
+    let mut run = |name: &str, words: &str, remedy: &str| {
+        if plan.wants(name) {
+            tally.run(name, || match plan.quick {
+                true => Err(Why::Skipped("left out by --quick".into())),
+                false => Ok(cargo(sources, words, remedy)?),
+            });
+        }
+    };
+    run(
+        "rustfmt has nothing to change",
+        "fmt --check",
+        "run `cargo fmt`",
+    );
+    let clippy = "clippy --quiet --all-targets -- -D warnings";
+    run("clippy has nothing to say", clippy, "see above");
+    let doc = "doc --quiet --no-deps";
+    run("rustdoc has nothing to say", doc, "see above");
+    let private = format!("{doc} --document-private-items");
+    run(
+        "rustdoc has nothing to say of private items",
+        &private,
+        "see above",
+    );
+    tally
 }
 
 /// Runs cargo on the packages of these files; whatever it says goes to the terminal only if it fails.

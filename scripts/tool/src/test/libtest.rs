@@ -37,7 +37,7 @@ const NEEDS: [(&str, &[&Need]); 4] = [
 
 /// A compiled libtest binary.
 #[derive(Debug, PartialEq, Eq)]
-struct TestBinary {
+pub(super) struct TestBinary {
     /// The package's folder.
     folder: PathBuf,
     /// The target: the library's or the integration test's name.
@@ -45,10 +45,11 @@ struct TestBinary {
     executable: PathBuf,
 }
 
+/// Test programs, and whether all are compiled.
+pub(super) type Compiled = (Vec<TestBinary>, Result<(), String>);
+
 /// Runs the tests of all packages.
-pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
-    println!("compiling the tests");
-    let (binaries, compiled) = compile();
+pub(super) fn run_all(plan: &Plan, (binaries, compiled): Compiled, tally: &mut Tally) {
     if let Err(why) = compiled {
         tally.run("all tests compile", || Err(why.into()));
     }
@@ -80,7 +81,8 @@ pub(super) fn run_all(plan: &Plan, tally: &mut Tally) {
 }
 
 /// Compiles the tests of all packages. Cargo's errors go to standard error.
-fn compile() -> (Vec<TestBinary>, Result<(), String>) {
+pub(super) fn compile() -> Compiled {
+    println!("compiling the tests");
     let _lasting = Lasting::new("compiling the tests");
     let mut command = system::cargo();
     let words = "test --workspace --no-run --no-fail-fast --quiet \

@@ -24,6 +24,8 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::mpsc;
+use std::thread;
 use std::time::Instant;
 
 use crate::image::{self, package_name};
@@ -95,10 +97,26 @@ pub fn test(words: &[OsString]) -> ExitCode {
             blessed: list.transpose()?,
         };
         let mut tally = Tally::default();
-        let sources = sources();
-        build_images(&plan, &sources, &mut tally);
-        libtest::run_all(&plan, &mut tally);
-        checks::run_all(&plan, &sources, &mut tally);
+        let sources = &sources()[..];
+        let plan = &plan;
+        let (send, compiled) = mpsc::channel();
+        thread::scope(|scope| {
+            // Cargo keeps images apart from what tests and lints are made of, so while it makes
+            // the one on a processor, it makes the other, and lints while tests run.
+            let aside = scope.spawn(move || {
+                let _ = send.send(libtest::compile());
+                checks::lint_all(plan, sources)
+            });
+            build_images(plan, sources, &mut tally);
+            let compiled = compiled.recv().map_err(|error| error.to_string())?;
+            libtest::run_all(plan, compiled, &mut tally);
+            checks::run_all(plan, sources, &mut tally);
+            let linted = aside
+                .join()
+                .map_err(|_| "the thread of the lints panicked")?;
+            tally.take(linted);
+            Ok::<(), String>(())
+        })?;
         if let Some(list) = &plan.blessed {
             // There is none if nothing was rewritten.
             tally.bless(&fs::read_to_string(list).unwrap_or_default());
@@ -255,6 +273,13 @@ impl Tally {
             }
             Err(Why::Skipped(why)) => self.skip(name, &why),
         }
+    }
+
+    /// Counts what another one has counted.
+    fn take(&mut self, other: Tally) {
+        self.passed += other.passed;
+        self.failures.extend(other.failures);
+        self.skips.extend(other.skips);
     }
 
     /// Counts tests that passed.
