@@ -138,7 +138,10 @@ pub fn parse_with_places<'t>(
     text: &'t str,
     name: &'t str,
 ) -> Result<(Value, Vec<usize>), JsonError> {
-    Parser::new(text).with_places(name)
+    let mut parser = Parser::new(text);
+    parser.watched = Some(name);
+    let value = parser.whole()?;
+    Ok((value, parser.places))
 }
 
 struct Parser<'t> {
@@ -162,13 +165,6 @@ impl<'t> Parser<'t> {
             is_watched: false,
             places: Vec::new(),
         }
-    }
-
-    /// Reads as [`whole`](Self::whole), and notes where the elements of a member begin.
-    fn with_places(mut self, of: &'t str) -> Result<(Value, Vec<usize>), JsonError> {
-        self.watched = Some(of);
-        let value = self.whole()?;
-        Ok((value, self.places))
     }
 
     /// Reads one value and makes sure that nothing follows it.

@@ -48,7 +48,7 @@ use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
 
 use crate::files;
 use crate::json::{Object, quoted};
-use crate::options::{Command, Parsed, Refusal, Takes, nearest, options};
+use crate::options::{Command, Parsed, Refusal, Takes, did_you_mean, options};
 use crate::record::{Record, Run, bound};
 
 pub use viewer::TRACE;
@@ -384,12 +384,8 @@ fn place(run: &Run, option: &str, name: &str) -> Result<Place, String> {
             })
             .collect();
         let names: Vec<&str> = all.iter().map(String::as_str).collect();
-        let hint = match nearest(name, &names) {
-            Some(nearest) => format!("did you mean `{nearest}`?"),
-            None => format!("its subtasks are {}", names.join(", ")),
-        };
-        let number = run.number;
-        format!("`--{option} {name}`: run {number} has no such subtask; {hint}")
+        let (number, hint) = (run.number, did_you_mean(name, &names));
+        format!("`--{option} {name}`: run {number} has no such subtask{hint}")
     })
 }
 

@@ -13,7 +13,7 @@ use dag_file::{DagFile, FileDag, FileSubtask, Malformed, Set, is_name, no_name, 
 use sched_dag::{DagSpec, SubtaskSpec};
 
 use crate::json::{Value, parse_with_places};
-use crate::options::nearest;
+use crate::options::did_you_mean;
 
 /// A task graph.
 struct TaskGraph {
@@ -37,8 +37,7 @@ pub fn read(text: &str, graph: Option<&str>, unit_ns: u64) -> Result<DagFile, Ma
         graphs.retain(|graph| graph.name == wanted);
         if graphs.is_empty() {
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            let near = nearest(wanted, &names).or(names.first().copied());
-            let hint = near.map_or(String::new(), |near| format!(", such as `{near}`"));
+            let hint = did_you_mean(wanted, &names);
             let reason = format!(
                 "there is no graph {}; name one of the {} there are{hint}",
                 quoted(wanted),
