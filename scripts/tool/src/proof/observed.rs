@@ -222,20 +222,45 @@ fn with_margin(longest_ns: u64, margin_percent: u64) -> u64 {
 pub fn read(path: &Path) -> Result<String, String> {
     let text = files::read_text(path)?;
     let refuse = |line: usize, why: &str| format!("{}:{line}: {why}", files::place(path));
-    let mut last = None;
+    let (mut last, mut has_dag, mut hashes) = (0, false, Vec::new());
+    let mut numbers = Vec::new();
+    let mut has_ended = false;
     for record in records(&text) {
-        let record = record.map_err(|fault| refuse(fault.line, fault.problem))?;
-        if let Some((line, wcets::Record::End)) = last.replace(record) {
+        let (line, record) = record.map_err(|fault| refuse(fault.line, fault.problem))?;
+        if has_ended {
             return Err(refuse(line, "more follows after `end`; put it before"));
         }
-    }
-    match last {
-        Some((_, wcets::Record::End)) => Ok(text),
-        _ => {
-            let line = last.map_or(1, |(line, _)| line);
-            let why = "the file does not end by `end`; is a part of it missing?";
-            Err(refuse(line, why))
+        last = line;
+        match record {
+            wcets::Record::Margin(_) => {}
+            wcets::Record::Dag { hash, .. } if hashes.contains(&hash) => {
+                return Err(refuse(line, "this DAG stands here twice; give it once"));
+            }
+            wcets::Record::Dag { hash, .. } => {
+                hashes.push(hash);
+                numbers.clear();
+                has_dag = true;
+            }
+            wcets::Record::Wcet { .. } if !has_dag => {
+                return Err(refuse(
+                    line,
+                    "a WCET before the first DAG; put a `dag` before it",
+                ));
+            }
+            wcets::Record::Wcet { subtask, .. } if numbers.contains(&subtask) => {
+                return Err(refuse(line, "this subtask stands here twice; give it once"));
+            }
+            wcets::Record::Wcet { subtask, .. } => numbers.push(subtask),
+            wcets::Record::End => has_ended = true,
         }
+    }
+    match (has_ended, has_dag) {
+        (false, _) => {
+            let why = "the file does not end by `end`; is a part of it missing?";
+            Err(refuse(last.max(1), why))
+        }
+        (_, false) => Err(refuse(last, "there is no `dag` in it; observe a run")),
+        _ => Ok(text),
     }
 }
 

@@ -144,7 +144,10 @@ const WRONG: &str = "\
 wcet 11 | wcet 0 | 7 | a WCET of 0
 wcet 11 | wect 11 | 7 | this is no record
 end/ |  | 7 | the file does not end by `end`
-end/ | end/margin 3/ | 8 | more follows after `end`";
+end/ | end/margin 3/ | 9 | more follows after `end`
+end/ | dag 5 demo/end/ | 8 | this DAG stands here twice
+end/ | wcet 1 0 a/end/ | 8 | this subtask stands here twice
+dag 5 demo/ |  | 6 | a WCET before the first DAG";
 
 #[test]
 fn wcets_that_are_written_are_read_and_have_the_margin() {
