@@ -19,7 +19,7 @@ fn bytes_release_a_dag() {
 #[test]
 fn what_comes_before_time_0_releases_nothing_yet() {
     let typed = [("\"kind\":\"listening\"", "a")];
-    let guest = Guest::test("input").cores(2).word("later_ms=400 events=on");
+    let guest = Guest::test("input").cores(2).word("later_ms=50 events=on");
     let outcome = guest.typing(&typed).succeed();
     outcome
         .line("input")

@@ -102,7 +102,7 @@ fn lost_inputs_make_a_condition_worthless() {
 #[test]
 fn long_runs_print_the_same_bytes() {
     let boot = |policy| {
-        let words = format!("policy_under_test={policy} subtasks=6 jobs=2000");
+        let words = format!("policy_under_test={policy} subtasks=6 jobs=1000");
         guest(&words).succeed().serial
     };
     let boots = |policy| {

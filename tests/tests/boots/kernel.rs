@@ -212,8 +212,8 @@ fn stacks_that_faults_have_taken_come_back() {
 #[test]
 fn a_storm_of_timer_interrupts_leaves_every_checksum_alone() {
     for (mode, cores, interrupts) in [
-        (Mode::Deterministic, 4, 1_000_000),
-        (Mode::Threads, 2, 200_000),
+        (Mode::Deterministic, 4, 200_000),
+        (Mode::Threads, 2, 50_000),
     ] {
         let guest = Guest::test("storm").mode(mode).cores(cores);
         let outcome = guest.word(&format!("interrupts={interrupts}")).succeed();

@@ -55,10 +55,10 @@ fn longest_of_the_source(run: &Run) -> u64 {
 fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
     for cores in [1, 2, 4, 8] {
         for policy in ["static", "edf"] {
-            let words = format!("ms=500 rounds=6 budgets=yes events=on policy={policy}");
+            let words = format!("ms=250 rounds=5 budgets=yes events=on policy={policy}");
             let guest = preemption(Mode::Deterministic, cores).word(&words);
             let outcome = guest.succeed();
-            keeps_all(&outcome, true, 100);
+            keeps_all(&outcome, true, 50);
             let line = outcome.line("preemption");
             line.has([("passed_over", 0), ("allocations", 0)]);
             let runs = lawful_runs(&outcome, TURN_NS);
@@ -80,7 +80,7 @@ fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
 fn preempted_instances_lose_nothing_in_real_time() {
     for (cores, policy) in [(2, "static"), (4, "edf")] {
         // Emulated AVX is slow: where too much is to be done, only the most urgent DAG runs.
-        let words = format!("ms=500 rounds=4 policy={policy}");
+        let words = format!("ms=200 rounds=4 policy={policy}");
         let outcome = preemption(Mode::Threads, cores).word(&words).succeed();
         keeps_all(&outcome, true, 1);
     }
