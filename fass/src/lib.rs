@@ -143,6 +143,6 @@ pub use sched_dag::analysis::{OverheadSource, Overheads, Reason, Test};
 pub use sched_dag::lifecycle::Request;
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{
-    ClusterId, Clusters, ConstructionPolicy, Count, FaultLimit, Order, OverrunPolicy, Policy,
-    Preemption, Warning, Why,
+    AssignmentReason, ClusterId, ConstructionPolicy, CoreDivision, Count, FaultLimit,
+    OverrunPolicy, Policy, Preemption, SubtaskOrder, Warning,
 };

@@ -18,7 +18,7 @@ use core::time::Duration;
 
 use recording::Channel;
 use sched_dag::analysis::{OverheadSource, Overheads, Settings};
-use sched_dag::{Clusters, DagId, Policy, Preemption, SchedulerOptions, TaskSet};
+use sched_dag::{CoreDivision, DagId, Policy, Preemption, SchedulerOptions, TaskSet};
 
 use crate::edge::Begin;
 use crate::run::cell::{Current, SetOnce};
@@ -428,12 +428,12 @@ pub fn say(level: Level, text: &'static str, fields: &[Field]) {
 /// The terms on which a platform runs the DAGs of the commits to come.
 ///
 /// ```
-/// use fass::{Clusters, Policy, Terms};
+/// use fass::{CoreDivision, Policy, Terms};
 ///
 /// let mut terms = Terms::of_cores(3);
 /// terms.scheduler.policy = Policy::Edf;
 /// terms.divide(&[1, 2]);
-/// assert_eq!(terms.clusters, Clusters::Of(vec![1, 2]));
+/// assert_eq!(terms.clusters, CoreDivision::Of(vec![1, 2]));
 /// ```
 #[derive(Clone, Debug)]
 pub struct Terms {
@@ -442,7 +442,7 @@ pub struct Terms {
     pub scheduler: SchedulerOptions,
     /// How these are divided. If they are, DAGs say which cluster is theirs
     /// ([`Dag::cluster`](crate::Dag::cluster)).
-    pub clusters: Clusters,
+    pub clusters: CoreDivision,
     /// Whether the commit divides them ([`Platform::assign`]).
     pub assigns: bool,
     /// The cost of the platform's own work for an instance at most, as measured on it. The commit adds
@@ -487,7 +487,7 @@ impl Terms {
                 preemption: Preemption::Enabled,
                 cores,
             },
-            clusters: Clusters::Undivided,
+            clusters: CoreDivision::Undivided,
             assigns: false,
             overheads: Overheads {
                 context_switch_ns: 0,
@@ -509,8 +509,8 @@ impl Terms {
     pub fn divide(&mut self, sizes: &[u32]) {
         self.assigns = false;
         self.clusters = match sizes {
-            [] => Clusters::Undivided,
-            sizes => Clusters::Of(sizes.to_vec()),
+            [] => CoreDivision::Undivided,
+            sizes => CoreDivision::Of(sizes.to_vec()),
         };
     }
 
@@ -520,7 +520,7 @@ impl Terms {
     ///
     /// See [`Terms`].
     pub fn divide_by_commit(&mut self) {
-        (self.clusters, self.assigns) = (Clusters::Undivided, true);
+        (self.clusters, self.assigns) = (CoreDivision::Undivided, true);
     }
 
     /// Returns what the analysis of a commit reckons with.

@@ -86,24 +86,24 @@ use alloc::vec::Vec;
 use core::fmt;
 
 use crate::ids::{DagId, Instance, SubtaskId};
-use crate::journal::{Event, What};
+use crate::journal::{Event, EventKind};
 use crate::task_set::{Dag, Subtask, TaskSet};
 
 /// A subtask of a DAG.
-pub type Place = (DagId, SubtaskId);
+pub type SubtaskRef = (DagId, SubtaskId);
 
 /// The sampling of a topic: the subtask that writes it, and the one that samples it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Sampling {
+pub struct SampledEdge {
     /// The subtask that writes the topic.
-    pub writer: Place,
+    pub writer: SubtaskRef,
     /// The subtask that samples it.
-    pub reader: Place,
+    pub reader: SubtaskRef,
 }
 
 /// The part of a chain that lies in one DAG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Segment {
+struct ChainSegment {
     dag: DagId,
     /// Where the chain enters: a sampling subtask, or where it begins.
     entry: SubtaskId,
@@ -116,13 +116,13 @@ struct Segment {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chain {
     /// One for each DAG, at least one.
-    segments: Vec<Segment>,
+    segments: Vec<ChainSegment>,
 }
 
 impl Chain {
     /// Finds a subtask that is named as `dag/subtask`, each part by its name or its number.
     #[must_use]
-    pub fn place(task_set: &TaskSet, name: &str) -> Option<Place> {
+    pub fn place(task_set: &TaskSet, name: &str) -> Option<SubtaskRef> {
         // Names may have a `/` in them.
         let splits = name
             .match_indices('/')
@@ -139,10 +139,10 @@ impl Chain {
     /// `dag/subtask`.
     pub fn names<'t>(&'t self, task_set: &'t TaskSet) -> impl Iterator<Item = impl fmt::Display> {
         self.segments.iter().flat_map(move |segment| {
-            let Segment { dag, entry, exit } = *segment;
+            let ChainSegment { dag, entry, exit } = *segment;
             let exit = (exit != entry).then_some(exit);
             let of_segment = [Some(entry), exit].into_iter().flatten();
-            of_segment.map(move |subtask| Named(task_set, (dag, subtask)))
+            of_segment.map(move |subtask| SubtaskName(task_set, (dag, subtask)))
         })
     }
 
@@ -182,7 +182,7 @@ impl Chain {
 
 /// Returns the sum of period and response time over DAGs.
 fn sum(
-    segments: &[Segment],
+    segments: &[ChainSegment],
     task_set: &TaskSet,
     responses_ns: &[Option<u64>],
 ) -> Result<u64, DagId> {
@@ -210,9 +210,9 @@ fn number_of<'n>(names: impl Iterator<Item = &'n str> + Clone, wanted: &str) -> 
 }
 
 /// A subtask as `dag/subtask`; what has no name has its number.
-struct Named<'t>(&'t TaskSet, Place);
+struct SubtaskName<'t>(&'t TaskSet, SubtaskRef);
 
-impl fmt::Display for Named<'_> {
+impl fmt::Display for SubtaskName<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(task_set, (dag, subtask)) = self;
         let model = task_set.dag(*dag);
@@ -234,8 +234,8 @@ impl Chain {
     /// Finds the chains that cross DAGs and are part of no longer one: from a source that samples
     /// nothing to a sink that no DAG samples. At most 1000.
     #[must_use]
-    pub fn all(task_set: &TaskSet, samplings: &[Sampling]) -> Vec<Chain> {
-        let mut search = Search::new(task_set, samplings);
+    pub fn all(task_set: &TaskSet, samplings: &[SampledEdge]) -> Vec<Chain> {
+        let mut search = ChainSearch::new(task_set, samplings);
         for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
             for &source in model.sources() {
                 let place = (dag, source);
@@ -256,31 +256,31 @@ impl Chain {
     #[must_use]
     pub fn between(
         task_set: &TaskSet,
-        samplings: &[Sampling],
-        from: Place,
-        to: Place,
+        samplings: &[SampledEdge],
+        from: SubtaskRef,
+        to: SubtaskRef,
     ) -> Vec<Chain> {
-        let mut search = Search::new(task_set, samplings);
+        let mut search = ChainSearch::new(task_set, samplings);
         search.go_on_from(from, &|_, exit| exit == to);
         search.found
     }
 }
 
-fn model_of<'t>(search: &Search<'t>, (dag, _): Place) -> &'t Dag {
+fn model_of<'t>(search: &ChainSearch<'t>, (dag, _): SubtaskRef) -> &'t Dag {
     search.task_set.dag(dag)
 }
 
-struct Search<'t> {
+struct ChainSearch<'t> {
     task_set: &'t TaskSet,
     /// Each once: a subtask may sample a topic twice.
-    samplings: Vec<Sampling>,
+    samplings: Vec<SampledEdge>,
     /// The segments up to the one that is looked at.
-    path: Vec<Segment>,
+    path: Vec<ChainSegment>,
     found: Vec<Chain>,
 }
 
-impl<'t> Search<'t> {
-    fn new(task_set: &'t TaskSet, samplings: &[Sampling]) -> Self {
+impl<'t> ChainSearch<'t> {
+    fn new(task_set: &'t TaskSet, samplings: &[SampledEdge]) -> Self {
         let mut samplings = samplings.to_vec();
         samplings.sort_unstable();
         samplings.dedup();
@@ -293,19 +293,19 @@ impl<'t> Search<'t> {
     }
 
     /// Finds the chains that go on from a subtask. It calls itself at most once for each DAG.
-    fn go_on_from(&mut self, (dag, entry): Place, is_end: &dyn Fn(&Self, Place) -> bool) {
+    fn go_on_from(&mut self, (dag, entry): SubtaskRef, is_end: &dyn Fn(&Self, SubtaskRef) -> bool) {
         for exit in self.reached_from((dag, entry)) {
             if self.found.len() >= MOST {
                 return;
             }
-            let segment = Segment { dag, entry, exit };
+            let segment = ChainSegment { dag, entry, exit };
             if is_end(self, (dag, exit)) {
                 let segments = [&self.path[..], &[segment]].concat();
                 self.found.push(Chain { segments });
             }
             self.path.push(segment);
             for at in 0..self.samplings.len() {
-                let Sampling { writer, reader } = self.samplings[at];
+                let SampledEdge { writer, reader } = self.samplings[at];
                 let is_new = self.path.iter().all(|passed| passed.dag != reader.0);
                 if writer == (dag, exit) && is_new {
                     self.go_on_from(reader, is_end);
@@ -316,7 +316,7 @@ impl<'t> Search<'t> {
     }
 
     /// Returns a subtask and all that follow it in its DAG.
-    fn reached_from(&self, (dag, entry): Place) -> Vec<SubtaskId> {
+    fn reached_from(&self, (dag, entry): SubtaskRef) -> Vec<SubtaskId> {
         let model = self.task_set.dag(dag);
         let mut is_reached = vec![false; model.subtasks().len()];
         is_reached[entry.index()] = true;
@@ -335,7 +335,7 @@ impl<'t> Search<'t> {
 
 /// The times of a chain in one run, in nanoseconds; `chains` says what they are.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Latencies {
+pub struct ChainLatencies {
     /// Of each output: its age at its finish.
     pub output_age_ns: Vec<u64>,
     /// Of each output that was followed by another one: its data age.
@@ -351,14 +351,14 @@ impl Chain {
         &self,
         task_set: &TaskSet,
         events: impl Iterator<Item = Event> + Clone,
-    ) -> Latencies {
-        let hops = self.segments.windows(2).map(|hop| Sampling {
+    ) -> ChainLatencies {
+        let hops = self.segments.windows(2).map(|hop| SampledEdge {
             writer: (hop[0].dag, hop[0].exit),
             reader: (hop[1].dag, hop[1].entry),
         });
-        let hops: Vec<Sampling> = hops.collect();
+        let hops: Vec<SampledEdge> = hops.collect();
         let sampled = SampledJobs::new(&hops, events.clone());
-        let releases = Releases::of(task_set, events.clone());
+        let releases = NominalReleases::of(task_set, events.clone());
         let end_ns = self.segments.iter().map(|segment| {
             let model = task_set.dag(segment.dag);
             let last = releases.0.keys().rfind(|(dag, _)| *dag == segment.dag);
@@ -369,11 +369,11 @@ impl Chain {
         });
         let end_ns = end_ns.min().unwrap_or(u64::MAX);
         let (first, last) = (self.segments[0], self.segments[self.segments.len() - 1]);
-        let mut latencies = Latencies::default();
+        let mut latencies = ChainLatencies::default();
         // The job that the output before goes back to, and its release.
         let mut before: Option<(u64, u64)> = None;
         let is_output = |event: &Event| {
-            (event.what, event.dag, event.subtask) == (What::Finish, last.dag, Some(last.exit))
+            (event.what, event.dag, event.subtask) == (EventKind::Finish, last.dag, Some(last.exit))
                 && event.time_ns <= end_ns
         };
         for output in events.filter(is_output) {
@@ -405,19 +405,19 @@ impl Chain {
 }
 
 /// The nominal releases of all jobs that were released.
-struct Releases(BTreeMap<(DagId, u64), u64>);
+struct NominalReleases(BTreeMap<(DagId, u64), u64>);
 
-impl Releases {
+impl NominalReleases {
     fn of(task_set: &TaskSet, events: impl Iterator<Item = Event>) -> Self {
         let mut due_ns = BTreeMap::new();
         let mut releases = BTreeMap::new();
         for event in events {
             let of = (event.dag, event.job);
             match event.what {
-                What::Due => {
+                EventKind::Due => {
                     due_ns.insert(of, event.time_ns);
                 }
-                What::Released => {
+                EventKind::Released => {
                     let model = task_set.dag(event.dag);
                     let due_ns = due_ns.get(&of).copied().unwrap_or(event.time_ns);
                     releases.insert(of, model.release_ns(event.job, due_ns));
@@ -433,16 +433,16 @@ impl Releases {
 #[derive(Clone, Debug, Default)]
 pub struct SampledJobs {
     /// By instance, and by the writer of what it samples: the job.
-    jobs: BTreeMap<(Instance, Place), u64>,
+    jobs: BTreeMap<(Instance, SubtaskRef), u64>,
 }
 
 impl SampledJobs {
     /// Follows the events of a run, in the order of the journal.
     #[must_use]
-    pub fn new(samplings: &[Sampling], events: impl Iterator<Item = Event>) -> Self {
-        let mut readers: BTreeMap<Place, Vec<Place>> = BTreeMap::new();
+    pub fn new(samplings: &[SampledEdge], events: impl Iterator<Item = Event>) -> Self {
+        let mut readers: BTreeMap<SubtaskRef, Vec<SubtaskRef>> = BTreeMap::new();
         // Of the writers: the last job that is complete.
-        let mut latest: BTreeMap<Place, Option<u64>> = BTreeMap::new();
+        let mut latest: BTreeMap<SubtaskRef, Option<u64>> = BTreeMap::new();
         for sampling in samplings {
             let writers = readers.entry(sampling.reader).or_default();
             writers.push(sampling.writer);
@@ -455,14 +455,14 @@ impl SampledJobs {
             };
             let place = (instance.dag, instance.subtask);
             match event.what {
-                What::Start => {
+                EventKind::Start => {
                     for writer in readers.get(&place).into_iter().flatten() {
                         if let Some(Some(job)) = latest.get(writer) {
                             jobs.insert((instance, *writer), *job);
                         }
                     }
                 }
-                What::Finish => {
+                EventKind::Finish => {
                     if let Some(latest) = latest.get_mut(&place) {
                         *latest = Some(event.job);
                     }
@@ -476,7 +476,7 @@ impl SampledJobs {
     /// Returns the job whose value an instance has sampled of a writer; `None`: it has not
     /// started, or found nothing.
     #[must_use]
-    pub fn job(&self, reader: Instance, writer: Place) -> Option<u64> {
+    pub fn job(&self, reader: Instance, writer: SubtaskRef) -> Option<u64> {
         self.jobs.get(&(reader, writer)).copied()
     }
 

@@ -12,7 +12,7 @@ use crate::ids::{SubtaskId, to_u32};
 
 /// For each subtask a list of neighbours, all lists in one allocation.
 #[derive(Clone, Debug)]
-pub(crate) struct Adjacency {
+pub(crate) struct AdjacencyList {
     /// `starts[v]..starts[v + 1]` is the range of `v`'s neighbours.
     starts: Box<[u32]>,
     pub(crate) neighbours: Box<[SubtaskId]>,
@@ -22,9 +22,9 @@ pub(crate) struct Adjacency {
 #[derive(Clone, Debug)]
 pub(crate) struct Graph {
     /// Each once, ascending.
-    pub(crate) predecessors: Adjacency,
+    pub(crate) predecessors: AdjacencyList,
     /// Each once, ascending.
-    pub(crate) successors: Adjacency,
+    pub(crate) successors: AdjacencyList,
     /// The subtasks without predecessor, ascending.
     pub(crate) sources: Box<[SubtaskId]>,
     /// The subtasks without successor, ascending.
@@ -33,7 +33,7 @@ pub(crate) struct Graph {
     pub(crate) topological_order: Box<[SubtaskId]>,
 }
 
-impl Adjacency {
+impl AdjacencyList {
     /// Lists for each subtask the other ends of its edges in the order of these, which may be
     /// stated in the other direction: a counting sort.
     fn new(count: usize, edges: &[(u32, u32)], is_reversed: bool) -> Self {
@@ -91,11 +91,11 @@ impl Graph {
     pub(crate) fn new(count: usize, edges: &[(u32, u32)]) -> Self {
         // A radix sort by successor, then by predecessor; then repeated edges
         // are neighbours.
-        let by_successor = Adjacency::new(count, edges, true).edges();
-        let mut sorted = Adjacency::new(count, &by_successor, true).edges();
+        let by_successor = AdjacencyList::new(count, edges, true).edges();
+        let mut sorted = AdjacencyList::new(count, &by_successor, true).edges();
         sorted.dedup();
-        let successors = Adjacency::new(count, &sorted, false);
-        let predecessors = Adjacency::new(count, &sorted, true);
+        let successors = AdjacencyList::new(count, &sorted, false);
+        let predecessors = AdjacencyList::new(count, &sorted, true);
         let mut graph = Self {
             sources: predecessors.without_neighbours(),
             sinks: successors.without_neighbours(),

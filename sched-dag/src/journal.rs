@@ -6,7 +6,7 @@
 //! the rules and statistics by [`law`](crate::law), the lines of a trace, what a
 //! viewer draws.
 //!
-//! [`What`] is the only list of words. Here they are printed and read, and here an
+//! [`EventKind`] is the only list of words. Here they are printed and read, and here an
 //! event is packed into three [words](Event::words) of 64 bits and unpacked.
 //!
 //! # Order
@@ -29,9 +29,9 @@ pub struct Event {
     /// When, in nanoseconds from the run's epoch.
     pub time_ns: u64,
     /// What.
-    pub what: What,
+    pub what: EventKind,
     /// The core that it happened on, or that made the scheduler's step; of a
-    /// [`Request`](What::Request) the core that shall switch.
+    /// [`Request`](EventKind::Request) the core that shall switch.
     pub core: CoreId,
     /// The DAG.
     pub dag: DagId,
@@ -43,7 +43,7 @@ pub struct Event {
 
 /// The subject of an event, packed: an instance or a whole job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Subject {
+pub struct EventSubject {
     /// The DAG in bits 44 to 63, the subtask in bits 24 to 43: at most 2^20 instances
     /// may be in flight, so at most so many DAGs and subtasks there are.
     pub ids: u64,
@@ -56,7 +56,7 @@ const SUBTASK: u32 = 24;
 const CORE: u32 = 8;
 const ID: u64 = (1 << 20) - 1;
 
-impl Subject {
+impl EventSubject {
     /// Packs an instance.
     #[inline]
     #[must_use]
@@ -93,7 +93,12 @@ impl Event {
     /// Returns the words of something that happened: time, job, and the rest.
     #[inline]
     #[must_use]
-    pub const fn words(time_ns: u64, what: What, core: CoreId, subject: Subject) -> [u64; 3] {
+    pub const fn words(
+        time_ns: u64,
+        what: EventKind,
+        core: CoreId,
+        subject: EventSubject,
+    ) -> [u64; 3] {
         let rest = subject.ids | (core.0 as u64) << CORE | what as u64;
         [time_ns, subject.job, rest]
     }
@@ -111,8 +116,8 @@ impl Event {
     #[must_use]
     #[allow(clippy::cast_possible_truncation, reason = "parts of a word are meant")]
     pub fn unpack([time_ns, job, rest]: [u64; 3]) -> Option<Self> {
-        let what = What::from_number(rest as u8)?;
-        let Instance { dag, job, subtask } = Subject { ids: rest, job }.instance();
+        let what = EventKind::from_number(rest as u8)?;
+        let Instance { dag, job, subtask } = EventSubject { ids: rest, job }.instance();
         Some(Self {
             time_ns,
             what,
@@ -133,7 +138,7 @@ impl Event {
 
 /// To what an event happens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Object {
+enum EventTarget {
     /// A job as a whole.
     Job,
     /// A DAG, or the run.
@@ -150,19 +155,19 @@ macro_rules! events {
         /// What has happened. Printed, and read, as its name in lower case.
         ///
         /// ```
-        /// use sched_dag::journal::What;
+        /// use sched_dag::journal::EventKind;
         ///
-        /// assert_eq!(What::Suspend.to_string(), "suspend");
-        /// assert_eq!("suspend".parse(), Ok(What::Suspend));
+        /// assert_eq!(EventKind::Suspend.to_string(), "suspend");
+        /// assert_eq!("suspend".parse(), Ok(EventKind::Suspend));
         /// ```
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[repr(u8)]
-        pub enum What {
+        pub enum EventKind {
             $($(#[$doc])+ $name,)+
         }
 
         /// All of it, by number: the word, and to what it happens.
-        const EVENTS: &[(What, &str, Object)] = &[$((What::$name, $word, Object::$object),)+];
+        const EVENTS: &[(EventKind, &str, EventTarget)] = &[$((EventKind::$name, $word, EventTarget::$object),)+];
     };
 }
 
@@ -224,7 +229,7 @@ events! {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnknownWord;
 
-impl What {
+impl EventKind {
     /// Returns what has a number; the inverse of `as u8`.
     #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
@@ -240,29 +245,29 @@ impl What {
     /// Reports whether it happens to a DAG as a whole, or to the run, and to no job.
     #[must_use]
     pub const fn is_of_dag(self) -> bool {
-        matches!(EVENTS[self as usize].2, Object::Dag)
+        matches!(EVENTS[self as usize].2, EventTarget::Dag)
     }
 
     /// Reports whether it happens to a job or a DAG, not to an instance.
     #[must_use]
     pub const fn is_of_job(self) -> bool {
-        matches!(EVENTS[self as usize].2, Object::Job | Object::Dag)
+        matches!(EVENTS[self as usize].2, EventTarget::Job | EventTarget::Dag)
     }
 
     /// Reports whether it happens on a core, not only in the scheduler's books.
     #[must_use]
     pub const fn is_of_machine(self) -> bool {
-        matches!(EVENTS[self as usize].2, Object::Core)
+        matches!(EVENTS[self as usize].2, EventTarget::Core)
     }
 }
 
-impl fmt::Display for What {
+impl fmt::Display for EventKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.word())
     }
 }
 
-impl FromStr for What {
+impl FromStr for EventKind {
     type Err = UnknownWord;
 
     fn from_str(text: &str) -> Result<Self, UnknownWord> {
@@ -279,7 +284,7 @@ mod tests {
 
     #[test]
     fn the_largest_ids_do_not_get_in_each_others_way() {
-        for what in (0..).map_while(What::from_number) {
+        for what in (0..).map_while(EventKind::from_number) {
             let event = Event {
                 time_ns: u64::MAX,
                 what,
@@ -288,8 +293,8 @@ mod tests {
                 job: u64::MAX,
                 subtask: (!what.is_of_job()).then_some(SubtaskId(0xf_fffe)),
             };
-            let of_job = Subject::of_job(event.dag, event.job);
-            let subject = event.instance().map_or(of_job, Subject::of);
+            let of_job = EventSubject::of_job(event.dag, event.job);
+            let subject = event.instance().map_or(of_job, EventSubject::of);
             let words = Event::words(event.time_ns, what, event.core, subject);
             assert_eq!(Event::unpack(words), Some(event));
         }
@@ -300,10 +305,10 @@ mod tests {
     fn every_word_is_read_back_and_stands_at_its_number() {
         for (number, &(what, ..)) in (0..).zip(EVENTS) {
             assert_eq!(what as u8, number);
-            assert_eq!(What::from_number(number), Some(what));
+            assert_eq!(EventKind::from_number(number), Some(what));
             assert_eq!(what.to_string().parse(), Ok(what));
         }
-        assert_eq!(What::from_number(23), None);
-        assert_eq!("Start".parse::<What>(), Err(UnknownWord));
+        assert_eq!(EventKind::from_number(23), None);
+        assert_eq!("Start".parse::<EventKind>(), Err(UnknownWord));
     }
 }

@@ -81,7 +81,7 @@
 //! - *A platform that keeps values on edges*: at most [`Dag::in_flight`] jobs of
 //!   a DAG are in flight, and no two of them have the same number modulo that.
 //!   An instance that was released ends exactly once, by a completion, by a
-//!   failure or by [`What::Cancelled`](journal::What::Cancelled).
+//!   failure or by [`EventKind::Cancelled`](journal::EventKind::Cancelled).
 //! - *An app's author*: schedules that, core numbers apart, do not depend on the
 //!   number or the order of a driver's calls, only on their times; with the same
 //!   execution times, the same schedule on every driver.
@@ -120,15 +120,15 @@ pub mod virtual_time;
 pub mod wcets;
 mod worded;
 
-pub use crate::policy::{Clusters, Why};
+pub use crate::policy::{AssignmentReason, CoreDivision};
 pub use ids::{ClusterId, CoreId, DagId, Instance, ModeId, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use key::{DagKey, SubtaskKey};
 pub use nearest::{nearest, nearest_of};
 pub use order::sorted_by_key;
 pub use policy::{
-    Activation, FaultLimit, JobOutcome, OnFault, Order, OverrunPolicy, Policy, Preemption,
-    Priority, SchedulerOptions,
+    Activation, FaultLimit, JobOutcome, OnFault, OverrunPolicy, Policy, Preemption, Priority,
+    SchedulerOptions, SubtaskOrder,
 };
 pub use scheduler::{
     DagPhase, DagStatistics, Decision, HandOff, Log, Moment, Notice, Scheduler, Snapshot,

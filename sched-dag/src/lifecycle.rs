@@ -19,9 +19,9 @@
 //! - **L6, replays.** What came of a request to a DAG whose inputs are recorded is in the recording:
 //!   the jobs that were skipped. In a replay requests do not touch such a DAG.
 //!
-//! Where clusters have no instant in common, requests cross them as [`Letters`].
+//! Where clusters have no instant in common, requests cross them as [`Mailboxes`].
 //!
-//! A driver has [`Requests`], which keeps them from a completion to the scheduler's step, and
+//! A driver has [`PendingRequests`], which keeps them from a completion to the scheduler's step, and
 //! the plan's [`Lifecycle`], which serves all but signals. It is behind a trait so that an
 //! image none of whose functions asks for such a thing has no code for it.
 //!
@@ -76,11 +76,11 @@ use crate::order::sorted;
 use crate::scheduler::Moment;
 use crate::task_set::TaskSet;
 
-pub use crate::request::{Entry, Request};
+pub use crate::request::{ModeEntry, Request};
 
 /// What a request comes to, in a scheduler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Change {
+pub enum LifecycleChange {
     /// A DAG is paused (P1 to P5).
     Pause(DagId),
     /// A DAG's pause ends.
@@ -97,7 +97,7 @@ pub enum Change {
 /// Serves requests other than signals.
 pub trait Lifecycle: fmt::Debug + Send {
     /// Says what a request comes to. There is [`room`](Self::room) for the changes.
-    fn serve(&mut self, request: Request, changes: &mut Vec<Change>);
+    fn serve(&mut self, request: Request, changes: &mut Vec<LifecycleChange>);
 
     /// Leaves a DAG alone from now on (L6).
     fn leave_alone(&mut self, dag: DagId);
@@ -119,14 +119,14 @@ pub trait Lifecycle: fmt::Debug + Send {
 
 /// The requests of a run that are on their way to its scheduler.
 #[derive(Debug)]
-pub struct Requests {
+pub struct PendingRequests {
     /// Each once; there is room for all.
     kept: Vec<Request>,
     lifecycle: Option<Box<dyn Lifecycle>>,
-    changes: Vec<Change>,
+    changes: Vec<LifecycleChange>,
 }
 
-impl Requests {
+impl PendingRequests {
     /// Takes room for the requests of a plan of so many DAGs.
     #[must_use]
     pub fn new(dags: usize, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
@@ -163,7 +163,12 @@ impl Requests {
     /// Takes what has come from other clusters and from outside. What concerns one DAG only, and
     /// no [`Lifecycle`], is passed on at once.
     #[inline(always)]
-    pub fn take_letters(&mut self, letters: &Letters, cluster: ClusterId, moment: &mut Moment<'_>) {
+    pub fn take_letters(
+        &mut self,
+        letters: &Mailboxes,
+        cluster: ClusterId,
+        moment: &mut Moment<'_>,
+    ) {
         letters.take(cluster, |request| {
             if self.lifecycle.is_some() && request.is_of_lifecycle() {
                 self.keep(request);
@@ -186,15 +191,15 @@ impl Requests {
             }
             for change in self.changes.drain(..) {
                 match change {
-                    Change::Pause(dag) => moment.serve(Request::Pause(dag)),
-                    Change::Resume(dag) => moment.serve(Request::Resume(dag)),
-                    Change::Close(dag) => moment.serve(Request::Close(dag)),
-                    Change::Await(dag) if moment.in_flight(dag) == 0 => {}
-                    Change::Await(_) => {
+                    LifecycleChange::Pause(dag) => moment.serve(Request::Pause(dag)),
+                    LifecycleChange::Resume(dag) => moment.serve(Request::Resume(dag)),
+                    LifecycleChange::Close(dag) => moment.serve(Request::Close(dag)),
+                    LifecycleChange::Await(dag) if moment.in_flight(dag) == 0 => {}
+                    LifecycleChange::Await(_) => {
                         waits = true;
                         break;
                     }
-                    Change::Enter(mode) => {
+                    LifecycleChange::Enter(mode) => {
                         waits = false;
                         moment.entered(mode);
                     }
@@ -209,25 +214,25 @@ impl Requests {
 
 /// The modes of a run.
 #[derive(Clone, Debug, Default)]
-struct Modes {
-    modes: Vec<Mode>,
+struct ModeTable {
+    modes: Vec<ModeMembers>,
     /// The one that was asked for last. As long as it waits, it may be asked to go on.
     last: ModeId,
 }
 
 #[derive(Clone, Debug)]
-struct Mode {
+struct ModeMembers {
     /// The DAGs that are in it.
     joining: Vec<DagId>,
     /// Those that are only in others.
     leaving: Vec<DagId>,
 }
 
-impl Modes {
+impl ModeTable {
     fn new(modes: Vec<Vec<DagId>>) -> Self {
         let mut all = sorted(&modes.concat());
         all.dedup();
-        let of_dags = |joining: Vec<DagId>| Mode {
+        let of_dags = |joining: Vec<DagId>| ModeMembers {
             leaving: (all.iter().copied())
                 .filter(|dag| !joining.contains(dag))
                 .collect(),
@@ -251,24 +256,24 @@ impl Modes {
     }
 
     /// Takes the request for a mode.
-    fn ask(&mut self, mode: ModeId, entry: Entry, changes: &mut Vec<Change>) {
+    fn ask(&mut self, mode: ModeId, entry: ModeEntry, changes: &mut Vec<LifecycleChange>) {
         if let Some(asked) = self.modes.get(mode.index()) {
             let leaving = || asked.leaving.iter().copied();
-            changes.extend(leaving().map(Change::Pause));
-            if entry == Entry::WhenIdle {
-                changes.extend(leaving().map(Change::Await));
+            changes.extend(leaving().map(LifecycleChange::Pause));
+            if entry == ModeEntry::WhenIdle {
+                changes.extend(leaving().map(LifecycleChange::Await));
             }
-            changes.extend(asked.joining.iter().copied().map(Change::Resume));
-            changes.push(Change::Enter(mode));
+            changes.extend(asked.joining.iter().copied().map(LifecycleChange::Resume));
+            changes.push(LifecycleChange::Enter(mode));
             self.last = mode;
         }
     }
 
     /// Asks once more for the mode that waits, and leaves paused DAGs to a person until it is there.
-    fn go_on(&mut self, changes: &mut Vec<Change>) {
+    fn go_on(&mut self, changes: &mut Vec<LifecycleChange>) {
         if let Some(asked) = self.modes.get(self.last.index()) {
-            changes.extend(asked.leaving.iter().copied().map(Change::Await));
-            self.ask(self.last, Entry::AtOnce, changes);
+            changes.extend(asked.leaving.iter().copied().map(LifecycleChange::Await));
+            self.ask(self.last, ModeEntry::AtOnce, changes);
         }
     }
 
@@ -282,18 +287,18 @@ impl Modes {
 
 /// What an app states of its run's life, and how far that has come.
 #[derive(Clone, Debug, Default)]
-pub struct Changes {
+pub struct LifecyclePlan {
     /// The DAGs of the plan that requests may touch.
     dags: Vec<DagId>,
     /// Those that are paused from the beginning on.
     paused: Vec<DagId>,
-    modes: Modes,
+    modes: ModeTable,
     may_shut_down: bool,
     /// How many DAGs the plan has.
     count: usize,
 }
 
-impl Changes {
+impl LifecyclePlan {
     /// Makes it for a plan of so many DAGs.
     #[must_use]
     pub fn new(dags: u32, may_shut_down: bool) -> Self {
@@ -315,7 +320,7 @@ impl Changes {
     #[must_use]
     pub fn with_modes(self, modes: Vec<Vec<DagId>>) -> Self {
         Self {
-            modes: Modes::new(modes),
+            modes: ModeTable::new(modes),
             ..self
         }
     }
@@ -325,20 +330,20 @@ impl Changes {
     }
 }
 
-impl Lifecycle for Changes {
-    fn serve(&mut self, request: Request, changes: &mut Vec<Change>) {
+impl Lifecycle for LifecyclePlan {
+    fn serve(&mut self, request: Request, changes: &mut Vec<LifecycleChange>) {
         match request {
             Request::Begin => {
-                changes.extend(self.paused.drain(..).map(Change::Pause));
-                self.modes.ask(ModeId(0), Entry::AtOnce, changes);
+                changes.extend(self.paused.drain(..).map(LifecycleChange::Pause));
+                self.modes.ask(ModeId(0), ModeEntry::AtOnce, changes);
             }
             Request::GoOn => self.modes.go_on(changes),
             Request::Enter(mode, entry) => self.modes.ask(mode, entry, changes),
-            Request::Pause(dag) if self.touches(dag) => changes.push(Change::Pause(dag)),
-            Request::Resume(dag) if self.touches(dag) => changes.push(Change::Resume(dag)),
+            Request::Pause(dag) if self.touches(dag) => changes.push(LifecycleChange::Pause(dag)),
+            Request::Resume(dag) if self.touches(dag) => changes.push(LifecycleChange::Resume(dag)),
             Request::ShutDown => {
-                self.modes = Modes::default();
-                changes.extend(self.dags.drain(..).map(Change::Close));
+                self.modes = ModeTable::default();
+                changes.extend(self.dags.drain(..).map(LifecycleChange::Close));
             }
             // Of one DAG, and touching none of its own.
             Request::Pause(_)
@@ -367,7 +372,7 @@ impl Lifecycle for Changes {
             paused: here(&self.paused),
             modes: match has_modes {
                 true => self.modes.clone(),
-                false => Modes::default(),
+                false => ModeTable::default(),
             },
             ..*self
         })
@@ -389,16 +394,16 @@ impl Lifecycle for Changes {
 
 /// What is on its way to each cluster.
 #[derive(Debug)]
-pub struct Letters {
-    dags: Box<[ToDag]>,
-    clusters: Box<[ToCluster]>,
+pub struct Mailboxes {
+    dags: Box<[DagMailbox]>,
+    clusters: Box<[ClusterMailbox]>,
     /// The cluster that serves modes.
     of_modes: ClusterId,
 }
 
 /// What waits for one DAG's cluster about that DAG.
 #[derive(Debug)]
-struct ToDag {
+struct DagMailbox {
     cluster: ClusterId,
     signals: AtomicU32,
     /// [`NOTHING`], [`PAUSE`] or [`RESUME`].
@@ -409,7 +414,7 @@ struct ToDag {
 
 /// What waits for a cluster about its whole.
 #[derive(Debug, Default)]
-struct ToCluster {
+struct ClusterMailbox {
     /// [`NOTHING`], or a mode and how to enter it, as [`packed`].
     mode: AtomicU32,
     ends: AtomicBool,
@@ -432,7 +437,7 @@ pub type Parts = Vec<Option<Box<dyn Lifecycle>>>;
 pub fn divide(
     task_set: &TaskSet,
     lifecycle: Option<&dyn Lifecycle>,
-) -> Result<(Letters, Parts), &'static str> {
+) -> Result<(Mailboxes, Parts), &'static str> {
     let cluster_of = |dag: DagId| task_set.dag(dag).cluster();
     let in_modes = lifecycle.map_or_else(Vec::new, Lifecycle::dags_of_modes);
     let mut of_modes = in_modes.into_iter().map(cluster_of);
@@ -447,22 +452,25 @@ pub fn divide(
         let is_here = |dag| cluster_of(dag) == cluster;
         lifecycle.map(|whole| whole.part(&is_here, cluster == first))
     };
-    let letters = Letters {
+    let letters = Mailboxes {
         dags: (task_set.dags().iter())
-            .map(|dag| ToDag {
+            .map(|dag| DagMailbox {
                 cluster: dag.cluster(),
                 signals: AtomicU32::new(0),
                 change: AtomicU32::new(NOTHING),
                 end: AtomicU32::new(NOTHING),
             })
             .collect(),
-        clusters: task_set.clusters().map(|_| ToCluster::default()).collect(),
+        clusters: task_set
+            .clusters()
+            .map(|_| ClusterMailbox::default())
+            .collect(),
         of_modes: first,
     };
     Ok((letters, task_set.clusters().map(part).collect()))
 }
 
-impl Letters {
+impl Mailboxes {
     /// Leaves a request for the clusters that it concerns, other than the one that it comes `from`,
     /// if any; calls `sent` for each of them, and reports whether it does not concern that one.
     pub fn send(
@@ -540,18 +548,18 @@ impl Letters {
 }
 
 /// Returns a word for a mode and how to enter it, which is not [`NOTHING`].
-const fn packed(mode: ModeId, entry: Entry) -> u32 {
+const fn packed(mode: ModeId, entry: ModeEntry) -> u32 {
     let entry = match entry {
-        Entry::AtOnce => 1,
-        Entry::WhenIdle => 2,
+        ModeEntry::AtOnce => 1,
+        ModeEntry::WhenIdle => 2,
     };
     mode.0 << 2 | entry
 }
 
-const fn unpacked(word: u32) -> Option<(ModeId, Entry)> {
+const fn unpacked(word: u32) -> Option<(ModeId, ModeEntry)> {
     let entry = match word & 3 {
-        1 => Entry::AtOnce,
-        2 => Entry::WhenIdle,
+        1 => ModeEntry::AtOnce,
+        2 => ModeEntry::WhenIdle,
         _ => return None,
     };
     Some((ModeId(word >> 2), entry))
@@ -561,8 +569,8 @@ const fn unpacked(word: u32) -> Option<(ModeId, Entry)> {
 mod tests {
     use alloc::vec;
 
-    use super::{Changes, *};
-    use crate::{Clusters, CommitOptions, DagSpec, Policy, SubtaskSpec, verify};
+    use super::{LifecyclePlan, *};
+    use crate::{CommitOptions, CoreDivision, DagSpec, Policy, SubtaskSpec, verify};
 
     /// Three DAGs, in clusters 0, 1 and 1.
     fn task_set() -> TaskSet {
@@ -573,17 +581,19 @@ mod tests {
             subtasks: vec![SubtaskSpec::default()],
             ..DagSpec::default()
         };
-        let options = CommitOptions::new(Policy::Edf, 2).with_clusters(Clusters::Of(vec![1, 1]));
+        let options =
+            CommitOptions::new(Policy::Edf, 2).with_clusters(CoreDivision::Of(vec![1, 1]));
         let verified = verify(&[spec(0), spec(1), spec(1)], &options);
         verified.expect("it is right").task_set
     }
 
     #[test]
     fn requests_go_where_they_concern_something_and_the_later_one_counts() {
-        let changes = Changes::new(3, true).with_modes(vec![vec![DagId(1)], vec![DagId(2)]]);
+        let changes = LifecyclePlan::new(3, true).with_modes(vec![vec![DagId(1)], vec![DagId(2)]]);
         let (letters, _) = divide(&task_set(), Some(&changes)).expect("modes are in one cluster");
         let [here, there] = [0, 1].map(ClusterId);
-        let modes = [Entry::AtOnce, Entry::WhenIdle].map(|entry| Request::Enter(ModeId(1), entry));
+        let modes =
+            [ModeEntry::AtOnce, ModeEntry::WhenIdle].map(|entry| Request::Enter(ModeId(1), entry));
         for (request, is_away) in [
             (Request::Signal(DagId(0)), false),
             (Request::Signal(DagId(1)), true),
@@ -621,7 +631,7 @@ mod tests {
 
     #[test]
     fn each_cluster_serves_what_concerns_its_own_dags() {
-        let changes = Changes::new(3, true).with_paused(vec![DagId(0), DagId(2)]);
+        let changes = LifecyclePlan::new(3, true).with_paused(vec![DagId(0), DagId(2)]);
         let (_, mut parts) = divide(&task_set(), Some(&changes)).expect("there are no modes");
         let mut served = |cluster: usize, request| {
             let mut changes = Vec::new();
@@ -629,7 +639,7 @@ mod tests {
             part.serve(request, &mut changes);
             changes
         };
-        use crate::lifecycle::Change::{Close, Pause};
+        use crate::lifecycle::LifecycleChange::{Close, Pause};
         assert_eq!(served(0, Request::Begin), [Pause(DagId(0))]);
         assert_eq!(served(1, Request::Begin), [Pause(DagId(2))]);
         assert_eq!(
@@ -641,7 +651,7 @@ mod tests {
 
     #[test]
     fn modes_of_several_clusters_are_refused() {
-        let changes = Changes::new(3, false).with_modes(vec![vec![DagId(0)], vec![DagId(2)]]);
+        let changes = LifecyclePlan::new(3, false).with_modes(vec![vec![DagId(0)], vec![DagId(2)]]);
         let why = divide(&task_set(), Some(&changes)).expect_err("DAG 0 is elsewhere");
         assert!(why.contains("into one cluster"), "{why}");
     }

@@ -110,7 +110,7 @@ pub struct FaultLimit {
 
 /// Whether the commit may fix an order in which a DAG's subtasks use the cores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum Order {
+pub enum SubtaskOrder {
     /// It may not: the policy decides at every instant.
     #[default]
     Free,
@@ -149,7 +149,7 @@ pub enum JobOutcome {
 
 /// How a commit divides the cores.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
-pub enum Clusters {
+pub enum CoreDivision {
     /// Not at all: every DAG may use every core.
     #[default]
     Undivided,
@@ -158,7 +158,7 @@ pub enum Clusters {
     Of(Vec<u32>),
 }
 
-impl Clusters {
+impl CoreDivision {
     /// Returns the cores of each cluster, nothing if they are not divided.
     #[must_use]
     pub fn sizes(&self) -> &[u32] {
@@ -172,7 +172,7 @@ impl Clusters {
 texts! {
     /// Why the commit has put a DAG into its cluster.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Why {
+    pub enum AssignmentReason {
         /// It is heavy: so much work of a job, overheads included, is to be done within that time.
         Heavy { volume_ns: u64, within_ns: u64 } =
             "its own, as a job is {:?} of work within {:?}",

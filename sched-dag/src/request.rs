@@ -17,7 +17,7 @@ pub enum Request {
     /// A DAG is ended: nothing of it starts any more. Asked from outside only.
     Stop(DagId),
     /// Another set of DAGs runs.
-    Enter(ModeId, Entry),
+    Enter(ModeId, ModeEntry),
     /// The run ends: no DAG releases a further job.
     ShutDown,
     /// The run begins. No function asks for that, but a driver, before all else.
@@ -43,7 +43,7 @@ impl Request {
 
 /// When a mode is entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Entry {
+pub enum ModeEntry {
     /// At the instant of the request (M2).
     AtOnce,
     /// When nothing is in flight of the DAGs that leave (M3).

@@ -9,7 +9,7 @@ use core::any::TypeId;
 use core::ops::RangeInclusive;
 
 use crate::ids::ClusterId;
-use crate::policy::{Activation, OnFault, Order, OverrunPolicy, Priority};
+use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
 
 /// A DAG task as its app describes it.
 #[derive(Clone, Debug, Default)]
@@ -33,7 +33,7 @@ pub struct DagSpec {
     /// What a fault of an instance costs.
     pub on_fault: OnFault,
     /// Whether the commit may fix an order of the subtasks.
-    pub order: Order,
+    pub order: SubtaskOrder,
     /// The cluster whose cores run it; `None` where they are not divided.
     pub cluster: Option<ClusterId>,
     /// The number of jobs to release; `None`: without end.

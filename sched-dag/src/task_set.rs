@@ -22,8 +22,8 @@ use core::ops::Range;
 
 use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
-use crate::policy::Why;
-use crate::policy::{Activation, OnFault, Order, OverrunPolicy, Priority};
+use crate::policy::AssignmentReason;
+use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -52,8 +52,8 @@ pub struct Dag {
     pub(crate) overrun: OverrunPolicy,
     pub(crate) on_fault: OnFault,
     pub(crate) cluster: Option<ClusterId>,
-    pub(crate) why_there: Option<Why>,
-    pub(crate) order: Order,
+    pub(crate) why_there: Option<AssignmentReason>,
+    pub(crate) order: SubtaskOrder,
     pub(crate) first_job: u64,
     pub(crate) jobs: Option<u64>,
     pub(crate) subtasks: Box<[Subtask]>,
@@ -432,7 +432,7 @@ impl Dag {
 
 impl TaskSet {
     /// Divides the cores, and puts each DAG into a cluster for a reason.
-    pub(crate) fn divide(&mut self, sizes: &[u32], of_dags: &[(ClusterId, Why)]) {
+    pub(crate) fn divide(&mut self, sizes: &[u32], of_dags: &[(ClusterId, AssignmentReason)]) {
         self.clusters = sizes.into();
         for (dag, (cluster, why)) in self.dags.iter_mut().zip(of_dags) {
             (dag.cluster, dag.why_there) = (Some(*cluster), Some(*why));
@@ -484,7 +484,7 @@ impl Dag {
 
     /// Returns why the commit has chosen that; `None` if it has not.
     #[must_use]
-    pub const fn why_there(&self) -> Option<Why> {
+    pub const fn why_there(&self) -> Option<AssignmentReason> {
         self.why_there
     }
 

@@ -19,7 +19,7 @@
 //!
 //! ```
 //! use std::sync::Arc;
-//! use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
+//! use sched_dag::virtual_time::{RunOutcome, ExecutionTimes, VirtualTime};
 //! use sched_dag::{
 //!     CommitOptions, DagId, DagSpec, Policy, Preemption, SchedulerOptions, SubtaskSpec, verify,
 //! };
@@ -35,7 +35,7 @@
 //! let verified = verify(&[dag], &CommitOptions::new(Policy::Edf, 1)).expect("the DAG is right");
 //! let options = SchedulerOptions { policy: Policy::Edf, preemption: Preemption::Enabled, cores: 1 };
 //! let mut run = VirtualTime::new(&Arc::new(verified.task_set), options);
-//! assert_eq!(run.run(&mut ExecutionTimes(|_instance| 20)), End::Finished);
+//! assert_eq!(run.run(&mut ExecutionTimes(|_instance| 20)), RunOutcome::Finished);
 //! assert_eq!(run.now_ns(), 240);
 //! assert_eq!(run.scheduler_of(DagId(0)).statistics(DagId(0)).misses, 0);
 //! ```
@@ -52,9 +52,9 @@ use core::fmt;
 
 use crate::engine::{Body, Continuation, Cost, Engine, Port, Run};
 use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
-use crate::journal::{Event, Subject, What};
+use crate::journal::{Event, EventKind, EventSubject};
 use crate::kept::Journal;
-use crate::lifecycle::{Change, Lifecycle, Request, Requests};
+use crate::lifecycle::{Lifecycle, LifecycleChange, PendingRequests, Request};
 use crate::placement::Next;
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{Moment, Notice, Scheduler};
@@ -62,7 +62,7 @@ use crate::task_set::TaskSet;
 
 /// A scheduler in virtual time with its bodies, or those of all clusters.
 pub struct VirtualTime<B: Body = Instance> {
-    clusters: Box<[Cluster<B>]>,
+    clusters: Box<[ClusterRun<B>]>,
     now_ns: u64,
     /// What fails at the present instant.
     failing: Vec<(Instance, CoreId, B)>,
@@ -75,7 +75,7 @@ pub struct VirtualTime<B: Body = Instance> {
 /// Why a run in virtual time has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
-pub enum End {
+pub enum RunOutcome {
     /// Every job of every DAG has ended; an ended DAG has no further ones. Or
     /// nothing happens any more, because a sporadic DAG gets no further signal.
     Finished,
@@ -117,10 +117,10 @@ impl<B: Body> VirtualTime<B> {
     ) -> Self {
         let clusters = task_set.clusters().map(|cluster| {
             let scheduler = Scheduler::of_cluster(Arc::clone(task_set), options, cluster);
-            Cluster::new(scheduler, cluster, after_fault.to_vec())
+            ClusterRun::new(scheduler, cluster, after_fault.to_vec())
         });
-        let clusters: Box<[Cluster<B>]> = clusters.collect();
-        let cores = |cluster: &Cluster<B>| cluster.engine.scheduler.options().cores as usize;
+        let clusters: Box<[ClusterRun<B>]> = clusters.collect();
+        let cores = |cluster: &ClusterRun<B>| cluster.engine.scheduler.options().cores as usize;
         let mut this = Self {
             failing: Vec::with_capacity(clusters.iter().map(cores).sum()),
             now_ns: 0,
@@ -155,8 +155,8 @@ impl<B: Body> VirtualTime<B> {
     /// Returns the run so far, of all clusters, as if it were over.
     #[must_use]
     pub fn run_so_far(&self) -> Run {
-        let journal = |cluster: &Cluster<B>| cluster.engine.scheduler.log.journal.clone();
-        let cores = |cluster: &Cluster<B>| cluster.engine.scheduler.options().cores;
+        let journal = |cluster: &ClusterRun<B>| cluster.engine.scheduler.log.journal.clone();
+        let cores = |cluster: &ClusterRun<B>| cluster.engine.scheduler.options().cores;
         let cores = self.clusters.iter().map(cores).sum();
         let first = &self.clusters[0];
         let mut run = Run::so_far(&first.engine, journal(first), cores);
@@ -176,21 +176,21 @@ impl<B: Body> VirtualTime<B> {
     ///
     /// With a DAG without a limit of jobs this is the end of time; see
     /// [`run_until`](Self::run_until).
-    pub fn run(&mut self, workload: &mut impl Workload<B>) -> End {
+    pub fn run(&mut self, workload: &mut impl Workload<B>) -> RunOutcome {
         self.run_until(u64::MAX, workload)
     }
 
     /// Runs all events up to and including those at `until_ns`. May be called
     /// again with a later time.
-    pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload<B>) -> End {
+    pub fn run_until(&mut self, until_ns: u64, workload: &mut impl Workload<B>) -> RunOutcome {
         let begun_ns = Ok(0);
-        let now = &mut Now {
+        let now = &mut VirtualInstant {
             now_ns: self.now_ns,
             workload,
             begun_ns,
         };
         while !now.workload.stops() {
-            let of_scheduler = |cluster: &Cluster<B>| cluster.engine.scheduler.next_event_ns();
+            let of_scheduler = |cluster: &ClusterRun<B>| cluster.engine.scheduler.next_event_ns();
             let due = self.clusters.iter().filter_map(of_scheduler);
             // The time may have passed the due one already, by another event.
             let interrupts = due.map(|due_ns| {
@@ -201,17 +201,17 @@ impl<B: Body> VirtualTime<B> {
             let request_ns = request_ns.map(|request_ns| request_ns.max(self.now_ns));
             let events = [self.next_finish_ns(), scheduler_ns, request_ns];
             let Some(event_ns) = events.into_iter().flatten().min() else {
-                return End::Finished;
+                return RunOutcome::Finished;
             };
             if event_ns > until_ns {
-                return End::TimeReached;
+                return RunOutcome::TimeReached;
             }
             now.now_ns = event_ns;
             if let Err(end) = self.step(now) {
                 return end;
             }
         }
-        End::Stopped
+        RunOutcome::Stopped
     }
 
     /// Returns the time of the last event, in nanoseconds.
@@ -238,12 +238,12 @@ impl<B: Body> VirtualTime<B> {
     }
 
     fn next_finish_ns(&self) -> Option<u64> {
-        let of_cores = |cluster: &Cluster<B>| cluster.next_finish_ns();
+        let of_cores = |cluster: &ClusterRun<B>| cluster.next_finish_ns();
         self.clusters.iter().filter_map(of_cores).min()
     }
 
     /// Goes through one instant. That the run cannot go on is the error.
-    fn step(&mut self, now: &mut Now<'_, impl Workload<B>>) -> Result<(), End> {
+    fn step(&mut self, now: &mut VirtualInstant<'_, impl Workload<B>>) -> Result<(), RunOutcome> {
         self.now_ns = now.now_ns;
         if self.finish(now)? {
             return Ok(());
@@ -271,7 +271,10 @@ impl<B: Body> VirtualTime<B> {
     /// Completes what finishes now, and notes what fails instead.
     /// If it is one instance and nothing else happens, that may be the whole
     /// instant, which is the result.
-    fn finish(&mut self, now: &mut Now<'_, impl Workload<B>>) -> Result<bool, End> {
+    fn finish(
+        &mut self,
+        now: &mut VirtualInstant<'_, impl Workload<B>>,
+    ) -> Result<bool, RunOutcome> {
         let mut is_first = true;
         for place in 0..self.clusters.len() {
             while let Some((core, body)) = self.clusters[place].take_finished(now.now_ns) {
@@ -291,7 +294,7 @@ impl<B: Body> VirtualTime<B> {
     }
 
     /// Serves a request at this instant.
-    fn serve(&mut self, request: Request, now: &mut Now<'_, impl Workload<B>>) {
+    fn serve(&mut self, request: Request, now: &mut VirtualInstant<'_, impl Workload<B>>) {
         let mut changes = Vec::new();
         match (request, &mut self.lifecycle) {
             (Request::Signal(dag), _) => _ = self.change(dag, request, now),
@@ -303,15 +306,17 @@ impl<B: Body> VirtualTime<B> {
         let mut latest = 0;
         for change in changes {
             let (dag, request) = match change {
-                Change::Pause(dag) => (dag, Request::Pause(dag)),
-                Change::Resume(dag) => (dag, Request::Resume(dag)),
-                Change::Close(dag) => (dag, Request::Close(dag)),
-                Change::Await(dag) if self.scheduler_of(dag).in_flight(dag) == 0 => continue,
-                Change::Await(_) => {
+                LifecycleChange::Pause(dag) => (dag, Request::Pause(dag)),
+                LifecycleChange::Resume(dag) => (dag, Request::Resume(dag)),
+                LifecycleChange::Close(dag) => (dag, Request::Close(dag)),
+                LifecycleChange::Await(dag) if self.scheduler_of(dag).in_flight(dag) == 0 => {
+                    continue;
+                }
+                LifecycleChange::Await(_) => {
                     self.waits = true;
                     break;
                 }
-                Change::Enter(mode) => {
+                LifecycleChange::Enter(mode) => {
                     self.waits = false;
                     self.clusters[latest].tell(now, |moment| moment.entered(mode));
                     continue;
@@ -326,7 +331,7 @@ impl<B: Body> VirtualTime<B> {
         &mut self,
         dag: DagId,
         request: Request,
-        now: &mut Now<'_, impl Workload<B>>,
+        now: &mut VirtualInstant<'_, impl Workload<B>>,
     ) -> Option<usize> {
         let place = self.place(dag);
         let cluster = &mut self.clusters[place];
@@ -355,7 +360,7 @@ impl<B: Body> fmt::Debug for VirtualTime<B> {
 /// What instances do and how long it takes them.
 pub trait Workload<B = Instance> {
     /// Returns the execution time of an instance in nanoseconds; 0 is allowed. Called once for
-    /// each instance, at its start. `None`: the run is [stopped](End::Stopped) at once.
+    /// each instance, at its start. `None`: the run is [stopped](RunOutcome::Stopped) at once.
     fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
 
     /// Reports whether an instance fails, instead of finishing, when its
@@ -434,8 +439,8 @@ impl Body for Instance {
         self.job = job;
     }
 
-    fn subject(&self) -> Subject {
-        Subject::of(*self)
+    fn subject(&self) -> EventSubject {
+        EventSubject::of(*self)
     }
 
     fn discard(&mut self, _: u64) {}
@@ -454,7 +459,7 @@ impl Body for Instance {
 }
 
 /// What runs by itself.
-struct Cluster<B: Body> {
+struct ClusterRun<B: Body> {
     /// Parked is a body, behind the time that its instance has left.
     engine: Engine<B, (u64, B)>,
     /// By core, the body of its instance, and when that finishes if nothing intervenes.
@@ -462,19 +467,19 @@ struct Cluster<B: Body> {
 }
 
 /// An instant in virtual time.
-struct Now<'a, W> {
+struct VirtualInstant<'a, W> {
     now_ns: u64,
     workload: &'a mut W,
     /// How long the instance that has begun last executes.
-    begun_ns: Result<u64, End>,
+    begun_ns: Result<u64, RunOutcome>,
 }
 
-impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
-    const HEARS: &'static [What] = &[
-        What::Released,
-        What::Skipped,
-        What::Stopped,
-        What::Completed,
+impl<B: Body, W: Workload<B>> Port<B> for VirtualInstant<'_, W> {
+    const HEARS: &'static [EventKind] = &[
+        EventKind::Released,
+        EventKind::Skipped,
+        EventKind::Stopped,
+        EventKind::Completed,
     ];
     const SUSPENDS_LATER: bool = false;
 
@@ -484,7 +489,7 @@ impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
 
     fn start(&mut self, _: CoreId, body: &mut B) -> u64 {
         let execution_ns = self.workload.execute(body, self.now_ns);
-        self.begun_ns = execution_ns.ok_or(End::Stopped);
+        self.begun_ns = execution_ns.ok_or(RunOutcome::Stopped);
         self.now_ns
     }
 
@@ -502,11 +507,11 @@ impl<B: Body, W: Workload<B>> Port<B> for Now<'_, W> {
     }
 }
 
-impl<B: Body> Cluster<B> {
+impl<B: Body> ClusterRun<B> {
     fn new(scheduler: Scheduler, cluster: ClusterId, after_fault: Vec<Option<DagId>>) -> Self {
-        type Any<'a> = Now<'a, ExecutionTimes<fn(Instance) -> u64>>;
+        type Any<'a> = VirtualInstant<'a, ExecutionTimes<fn(Instance) -> u64>>;
         let cores = scheduler.options().cores;
-        let (journal, none) = (Journal::none(), Requests::new(0, None));
+        let (journal, none) = (Journal::none(), PendingRequests::new(0, None));
         Self {
             engine: Engine::new::<Any<'_>>(cluster, scheduler, journal, none, after_fault),
             running: (0..cores).map(|_| None).collect(),
@@ -528,7 +533,11 @@ impl<B: Body> Cluster<B> {
     }
 
     /// Makes a change at an instant, which stays open.
-    fn tell(&mut self, now: &mut Now<'_, impl Workload<B>>, change: impl FnOnce(&mut Moment<'_>)) {
+    fn tell(
+        &mut self,
+        now: &mut VirtualInstant<'_, impl Workload<B>>,
+        change: impl FnOnce(&mut Moment<'_>),
+    ) {
         let here = self.engine.scheduler.log.here;
         self.engine.tell((now.now_ns, here), now, change);
     }
@@ -539,8 +548,8 @@ impl<B: Body> Cluster<B> {
         core: CoreId,
         body: B,
         is_alone: bool,
-        now: &mut Now<'_, impl Workload<B>>,
-    ) -> Result<bool, End> {
+        now: &mut VirtualInstant<'_, impl Workload<B>>,
+    ) -> Result<bool, RunOutcome> {
         let (engine, now_ns) = (&mut self.engine, now.now_ns);
         let instance = body.subject().instance();
         let vertex = engine.task_set.vertex(instance);
@@ -560,7 +569,7 @@ impl<B: Body> Cluster<B> {
     }
 
     /// Ends what has failed on a core.
-    fn fail(&mut self, core: CoreId, body: B, now: &mut Now<'_, impl Workload<B>>) {
+    fn fail(&mut self, core: CoreId, body: B, now: &mut VirtualInstant<'_, impl Workload<B>>) {
         let instance = body.subject().instance();
         if let Some(vertex) = self.engine.placement.lose(core.index()) {
             let body = Some(body).filter(|_| now.workload.is_replaceable(instance));
@@ -570,13 +579,13 @@ impl<B: Body> Cluster<B> {
     }
 
     /// Ends the instant, and has its cores follow.
-    fn decide(&mut self, now: &mut Now<'_, impl Workload<B>>) -> Result<(), End> {
+    fn decide(&mut self, now: &mut VirtualInstant<'_, impl Workload<B>>) -> Result<(), RunOutcome> {
         let now_ns = now.now_ns;
         self.engine.decide(now_ns, now);
         for place in 0..self.engine.decisions().len() {
             let decision = self.engine.decisions()[place];
             let core = decision.core;
-            if decision.what == What::Suspend {
+            if decision.what == EventKind::Suspend {
                 if let Some((finish_ns, body)) = self.running[core.index()].take() {
                     let parked = (finish_ns - now_ns, body);
                     self.engine.suspend(core, now_ns, parked);
@@ -589,14 +598,18 @@ impl<B: Body> Cluster<B> {
     }
 
     /// Has a core without an instance begin or continue what it should.
-    fn go_on(&mut self, core: CoreId, now: &mut Now<'_, impl Workload<B>>) -> Result<(), End> {
+    fn go_on(
+        &mut self,
+        core: CoreId,
+        now: &mut VirtualInstant<'_, impl Workload<B>>,
+    ) -> Result<(), RunOutcome> {
         let (engine, now_ns) = (&mut self.engine, now.now_ns);
         match engine.next(core, now) {
             Next::Nothing => Ok(()),
             Next::Start(_, body) => self.run(core, body, now_ns, now.begun_ns),
             Next::Continue((left_ns, body)) => {
                 let vertex = engine.task_set.vertex(body.subject().instance());
-                engine.note(What::Resume, core, vertex, now_ns);
+                engine.note(EventKind::Resume, core, vertex, now_ns);
                 self.run(core, body, now_ns, Ok(left_ns))
             }
         }
@@ -607,10 +620,10 @@ impl<B: Body> Cluster<B> {
         core: CoreId,
         body: B,
         now_ns: u64,
-        left_ns: Result<u64, End>,
-    ) -> Result<(), End> {
+        left_ns: Result<u64, RunOutcome>,
+    ) -> Result<(), RunOutcome> {
         let finish_ns = now_ns.checked_add(left_ns?);
-        let finish_ns = finish_ns.ok_or(End::TimeOverflow(body.subject().instance()))?;
+        let finish_ns = finish_ns.ok_or(RunOutcome::TimeOverflow(body.subject().instance()))?;
         self.running[core.index()] = Some((finish_ns, body));
         Ok(())
     }

@@ -34,7 +34,7 @@ pub enum WcetSource {
 
 /// One line of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Record<'t> {
+pub enum WcetRecord<'t> {
     /// What was added to each longest call, in hundredths.
     Margin(u32),
     /// A DAG begins.
@@ -73,11 +73,11 @@ const UNKNOWN: &str = "the DAG has no such subtask; observe it again";
 const FOREIGN: &str = "the DAG of this name has another graph now; observe it again";
 
 /// Returns the records of a file with their lines, counted from 1.
-pub fn records(text: &str) -> impl Iterator<Item = Result<(usize, Record<'_>), WcetFault>> {
+pub fn records(text: &str) -> impl Iterator<Item = Result<(usize, WcetRecord<'_>), WcetFault>> {
     let lines = (1..).zip(text.lines());
     let lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     lines.map(|(line, text)| match record(text) {
-        Some(Record::Wcet { wcet_ns: 0, .. }) => Err(WcetFault {
+        Some(WcetRecord::Wcet { wcet_ns: 0, .. }) => Err(WcetFault {
             line,
             problem: ZERO,
         }),
@@ -89,25 +89,25 @@ pub fn records(text: &str) -> impl Iterator<Item = Result<(usize, Record<'_>), W
     })
 }
 
-fn record(line: &str) -> Option<Record<'_>> {
+fn record(line: &str) -> Option<WcetRecord<'_>> {
     let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
     let (number, name) = rest.split_once(' ').unwrap_or((rest, ""));
     let number: Option<u64> = number.parse().ok();
     Some(match word {
-        "margin" => Record::Margin(u32::try_from(number?).ok()?),
-        "dag" => Record::Dag {
+        "margin" => WcetRecord::Margin(u32::try_from(number?).ok()?),
+        "dag" => WcetRecord::Dag {
             hash: number?,
             name,
         },
         "wcet" => {
             let (subtask, name) = name.split_once(' ').unwrap_or((name, ""));
-            Record::Wcet {
+            WcetRecord::Wcet {
                 wcet_ns: number?,
                 subtask: subtask.parse().ok()?,
                 name,
             }
         }
-        "end" => Record::End,
+        "end" => WcetRecord::End,
         _ => return None,
     })
 }
@@ -124,15 +124,15 @@ pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
     for record in records(text) {
         let (line, record) = record?;
         match record {
-            Record::Margin(percent) => margin_percent = percent,
-            Record::Dag { hash, name } => {
+            WcetRecord::Margin(percent) => margin_percent = percent,
+            WcetRecord::Dag { hash, name } => {
                 is_own = hash == own;
                 was_found |= is_own;
                 if name == spec.name {
                     foreign = foreign.or(Some(line));
                 }
             }
-            Record::Wcet {
+            WcetRecord::Wcet {
                 wcet_ns,
                 subtask,
                 name,
@@ -144,7 +144,7 @@ pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
                 found.wcet_ns = Some(wcet_ns);
                 found.wcet_margin_percent = Some(margin_percent);
             }
-            Record::Wcet { .. } | Record::End => {}
+            WcetRecord::Wcet { .. } | WcetRecord::End => {}
         }
     }
     match foreign {

@@ -111,9 +111,9 @@ fn edge_line(dag: &FileDag, ends: (Option<&SubtaskLabel>, Option<&SubtaskLabel>)
 mod tests {
     use super::*;
     use crate::parse::parse;
-    use sched_dag::{Clusters, Policy};
+    use sched_dag::{CoreDivision, Policy};
 
-    fn faults_on(clusters: Clusters, text: &str, length: Length) -> Vec<String> {
+    fn faults_on(clusters: CoreDivision, text: &str, length: Length) -> Vec<String> {
         let machine = CommitOptions::new(Policy::StaticPriority, 2).with_clusters(clusters);
         let file = parse(text).unwrap();
         let faults = check(&file.sets[0], &machine, length).unwrap_err();
@@ -151,7 +151,7 @@ period 584000s\nsubtask a wcet 1ms
             } else {
                 1
             });
-            let found = faults_on(Clusters::Undivided, &text, jobs);
+            let found = faults_on(CoreDivision::Undivided, &text, jobs);
             let rows: Vec<&str> = rows.map(str::trim_start).collect();
             let pairs = || found.iter().zip(&rows);
             assert!(
@@ -167,7 +167,7 @@ period 584000s\nsubtask a wcet 1ms
         let text = "dag x period 9ms cluster 0\nsubtask a wcet 1ms\n\
                     dag y period 9ms cluster 2\nsubtask a wcet 1ms\n\
                     dag z period 9ms\nsubtask a wcet 1ms\nend";
-        let divided = Clusters::Of(alloc::vec![1, 1]);
+        let divided = CoreDivision::Of(alloc::vec![1, 1]);
         let found = faults_on(divided, text, Length::Jobs(1));
         assert!(
             found[0].starts_with("line 3: dag `y` is in cluster 2"),
@@ -179,7 +179,7 @@ period 584000s\nsubtask a wcet 1ms
             "{}",
             found[1]
         );
-        let found = faults_on(Clusters::Undivided, text, Length::Jobs(1));
+        let found = faults_on(CoreDivision::Undivided, text, Length::Jobs(1));
         assert!(found[0].ends_with("leave its cluster out"), "{}", found[0]);
     }
 
@@ -187,7 +187,7 @@ period 584000s\nsubtask a wcet 1ms
     fn the_remedy_is_in_the_words_of_the_file() {
         let text =
             "dag x period 1s in-flight 4294967295\nsubtask a wcet 1ms\nsubtask b wcet 1ms\nend";
-        let found = faults_on(Clusters::Undivided, text, Length::Jobs(u64::MAX));
+        let found = faults_on(CoreDivision::Undivided, text, Length::Jobs(u64::MAX));
         assert!(
             found[0].ends_with("needs most; lower its in-flight"),
             "{}",

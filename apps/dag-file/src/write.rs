@@ -5,7 +5,7 @@
 
 use core::fmt::{Display, Formatter, Result};
 
-use sched_dag::{Order, OverrunPolicy, SubtaskSpec};
+use sched_dag::{OverrunPolicy, SubtaskOrder, SubtaskSpec};
 
 use crate::file::{DagFile, FileDag, FileSubtask};
 use crate::time::Time;
@@ -45,7 +45,7 @@ fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
         OverrunPolicy::Skip => out.write_str(" overrun skip")?,
         OverrunPolicy::Abort => out.write_str(" overrun abort")?,
     }
-    if spec.order == Order::Fixed {
+    if spec.order == SubtaskOrder::Fixed {
         out.write_str(" order fixed")?;
     }
     if let Some(jobs) = spec.in_flight {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drone::{FRAME, Workload};
 use fass::{Parameter, Policy, finish_create_dags};
-use virtual_time::{Report, VirtualTime, What};
+use virtual_time::{EventKind, Report, VirtualTime};
 
 const WORKLOAD: Workload = Workload {
     seconds: 8,
@@ -41,14 +41,14 @@ fn fly(workload: Workload, cores: u32, policy: Policy) -> (drone::Flight, Report
 
 /// Returns when the landing began, which no frame and no look for a waypoint comes after.
 fn landed_ns(report: &Report) -> u64 {
-    let is_landing = |what, job| what == What::Entered && job == 1;
+    let is_landing = |what, job| what == EventKind::Entered && job == 1;
     let mut entered = (report.events.iter()).filter(|event| is_landing(event.what, event.job));
     let landed_ns = entered.next().expect("it has landed").time_ns;
     assert!(entered.next().is_none(), "once");
     let [camera, mission, descent] =
         ["camera", "mission", "descent"].map(|dag| report.task_set().find(dag));
     for event in &report.events {
-        if event.what == What::Released && event.time_ns != landed_ns {
+        if event.what == EventKind::Released && event.time_ns != landed_ns {
             let is_late = event.time_ns > landed_ns;
             let is_of_flight = [camera, mission].contains(&event.dag);
             let is_of_landing = event.dag == descent;

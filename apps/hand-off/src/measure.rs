@@ -19,7 +19,7 @@ use fass::{
 use hand_off::{Pen, Shape, Stamping, Stamps, Workload, build};
 use kernel::report::Distribution;
 use kernel::{Ending, Machine, Run, json};
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::InstanceRecord;
 use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 
@@ -107,7 +107,8 @@ pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), Ending>
     let shape = Shape::ForkJoin(parallel);
     let ends = Measured::run(machine, workload(shape, JOBS, Stamping::Ends))?;
     let is_sinks = |of: SubtaskId| of.index() == parallel + 1;
-    let wakes = |event: &Event| event.what == What::Ready && event.subtask.is_some_and(is_sinks);
+    let wakes =
+        |event: &Event| event.what == EventKind::Ready && event.subtask.is_some_and(is_sinks);
     let count = ends.run.journal().events().filter(wakes).count() as u64;
     emit(
         &format!("fork-join-{parallel}"),
@@ -235,7 +236,7 @@ fn parts(run: &Run, preemptor: DagId, is_told: bool) -> [(&'static str, Vec<u64>
     let mut events: Vec<Event> = run.journal().events().collect();
     events.sort_by_key(|event| event.time_ns);
     for (place, request) in events.iter().enumerate() {
-        let is_meant = request.what == What::Request && request.dag == preemptor;
+        let is_meant = request.what == EventKind::Request && request.dag == preemptor;
         if !is_meant || (request.core != CoreId(0)) != is_told {
             continue;
         }
@@ -249,10 +250,10 @@ fn parts(run: &Run, preemptor: DagId, is_told: bool) -> [(&'static str, Vec<u64>
             Some(event.time_ns)
         };
         let times = [
-            next(What::Suspend, false),
-            next(What::Start, true),
-            next(What::Finish, true),
-            next(What::Resume, false),
+            next(EventKind::Suspend, false),
+            next(EventKind::Start, true),
+            next(EventKind::Finish, true),
+            next(EventKind::Resume, false),
         ];
         if let [Some(suspended), Some(start), Some(finish), Some(resumed)] = times {
             parts[0].1.push(suspended - request.time_ns);

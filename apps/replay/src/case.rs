@@ -28,7 +28,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use sched_dag::{
-    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy,
+    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Instance, Policy,
     Preemption, Priority, SubtaskId, SubtaskSpec, TaskSet, verify,
 };
 
@@ -44,7 +44,7 @@ pub struct Case {
     /// The number of cores.
     pub cores: u32,
     /// How these are divided.
-    pub clusters: Clusters,
+    pub clusters: CoreDivision,
     /// How ready instances are ordered.
     pub policy: Policy,
     /// Whether a started instance may lose its core.
@@ -112,8 +112,8 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
         false => Preemption::Disabled,
     };
     let clusters = match lines.next_if("clusters") {
-        Some(line) => Clusters::Of(parse_clusters(&line, cores)?),
-        None => Clusters::Undivided,
+        Some(line) => CoreDivision::Of(parse_clusters(&line, cores)?),
+        None => CoreDivision::Undivided,
     };
     let options = CommitOptions::new(policy, cores)
         .with_clusters(clusters.clone())
@@ -166,7 +166,7 @@ fn parse_clusters(line: &Line<'_>, cores: u32) -> Result<Vec<u32>, Malformed> {
 fn parse_dag(
     header: &Line<'_>,
     lines: &mut Lines<'_>,
-    clusters: &Clusters,
+    clusters: &CoreDivision,
 ) -> Result<(DagSpec, Vec<Vec<u64>>), Malformed> {
     let [period, deadline, offset, jobs, subtasks, edges] = header.fixed()?;
     let jobs = header.at_least_one(jobs)?;
@@ -181,7 +181,7 @@ fn parse_dag(
         jobs: Some(u64::from(jobs)),
         ..DagSpec::default()
     };
-    if *clusters != Clusters::Undivided {
+    if *clusters != CoreDivision::Undivided {
         let line = lines.expect("in")?;
         let [cluster] = line.fixed()?;
         let cluster = line.index("cluster", cluster, clusters.sizes().len())?;

@@ -15,7 +15,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-use sched_dag::lifecycle::{Letters, Request};
+use sched_dag::lifecycle::{Mailboxes, Request};
 use sched_dag::{ClusterId, DagId, TaskSet};
 
 use crate::level::Levels;
@@ -28,7 +28,7 @@ pub(crate) struct Office {
     pub(crate) plan: u64,
     pub(crate) levels: Option<Levels>,
     pub(crate) task_set: Arc<TaskSet>,
-    pub(crate) letters: Letters,
+    pub(crate) letters: Mailboxes,
     doors: Box<[Door]>,
     /// How many clusters do not rest, and how many have letters.
     reasons: AtomicU64,
@@ -52,7 +52,7 @@ impl Office {
     pub(crate) fn new(
         plan: u64,
         task_set: &Arc<TaskSet>,
-        letters: Letters,
+        letters: Mailboxes,
         levels: Option<Levels>,
     ) -> Self {
         let doors: Box<[Door]> = task_set.clusters().map(|_| Door::default()).collect();
@@ -148,7 +148,7 @@ mod tests {
 
     use sched_dag::lifecycle::{Request, divide};
     use sched_dag::{
-        ClusterId, Clusters, CommitOptions, DagId, DagSpec, Policy, SubtaskSpec, verify,
+        ClusterId, CommitOptions, CoreDivision, DagId, DagSpec, Policy, SubtaskSpec, verify,
     };
 
     use super::Office;
@@ -162,7 +162,8 @@ mod tests {
             subtasks: vec![SubtaskSpec::default()],
             ..DagSpec::default()
         };
-        let options = CommitOptions::new(Policy::Edf, 2).with_clusters(Clusters::Of(vec![1, 1]));
+        let options =
+            CommitOptions::new(Policy::Edf, 2).with_clusters(CoreDivision::Of(vec![1, 1]));
         let task_set = verify(&[spec(0), spec(1)], &options).expect("it is right");
         let task_set = Arc::new(task_set.task_set);
         let (letters, _) = divide(&task_set, None).expect("there are no modes");

@@ -12,7 +12,7 @@ use fass::edge::{Begin, Kept};
 use fass::log::Line;
 use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms};
 use sched_dag::engine::{self, Proven};
-use sched_dag::lifecycle::{self, Parts, Request, Requests};
+use sched_dag::lifecycle::{self, Parts, PendingRequests, Request};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
 
 use crate::control::{self, Control};
@@ -169,7 +169,7 @@ fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> A
     let clusters = task_set.clusters().zip(runners).zip(parts);
     let team = |((cluster, runners), lifecycle)| {
         let cores = task_set.cores_of(cluster, options.cores);
-        let requests = Requests::new(dags, lifecycle);
+        let requests = PendingRequests::new(dags, lifecycle);
         let state = State::new(
             (cluster, office),
             Scheduler::of_cluster(Arc::clone(task_set), options, cluster),

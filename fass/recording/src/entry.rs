@@ -121,9 +121,9 @@ kinds! {
     /// What happened.
     ///
     /// ```
-    /// assert_eq!(recording::What::Value.name(), "value");
+    /// assert_eq!(recording::EntryKind::Value.name(), "value");
     /// ```
-    pub enum What("what happened, a number from 0 to 7") {
+    pub enum EntryKind("what happened, a number from 0 to 7") {
         /// A value of a channel.
         Value = "value",
         /// A signal released the job of a sporadic DAG.
@@ -162,10 +162,10 @@ impl Role {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry<'v> {
     /// What.
-    pub what: What,
+    pub what: EntryKind,
     /// The number of the DAG.
     pub dag: u16,
-    /// The number of the channel or of the subtask; [`What`] says which.
+    /// The number of the channel or of the subtask; [`EntryKind`] says which.
     pub place: u16,
     /// The job.
     pub job: u64,
@@ -187,7 +187,7 @@ impl<'v> Entry<'v> {
 
     pub(super) fn decode(payload: &'v [u8]) -> Result<Self, Malformed> {
         let mut input = Decoder::new(payload);
-        let what = What::decode(&mut input)?;
+        let what = EntryKind::decode(&mut input)?;
         let (dag, place, job, release_ns, at_ns) = Recordable::decode(&mut input)?;
         Ok(Self {
             what,
@@ -212,18 +212,22 @@ impl<'v> Entry<'v> {
         }
         let mut rest = Decoder::new(self.value);
         let checked = match self.what {
-            What::Value | What::Lost => {
+            EntryKind::Value | EntryKind::Lost => {
                 let channel = header.channels.get(usize::from(self.place));
                 let Some(channel) = channel.filter(|channel| channel.dag == self.dag) else {
                     return Err(malformed(PLACE, "the number of a channel of the DAG"));
                 };
                 match self.what {
-                    What::Value => channel.schema.walk(&mut rest, &mut |_| ()),
+                    EntryKind::Value => channel.schema.walk(&mut rest, &mut |_| ()),
                     _ => Ok(()),
                 }
             }
-            What::Clock => Vec::<u64>::schema().walk(&mut rest, &mut |_| ()),
-            What::Signal | What::Skip | What::Cut | What::Restart | What::Fault => Ok(()),
+            EntryKind::Clock => Vec::<u64>::schema().walk(&mut rest, &mut |_| ()),
+            EntryKind::Signal
+            | EntryKind::Skip
+            | EntryKind::Cut
+            | EntryKind::Restart
+            | EntryKind::Fault => Ok(()),
         };
         checked
             .and_then(|()| rest.end())

@@ -59,7 +59,7 @@ mod shown;
 mod stream;
 
 pub use bytes::{Decoder, Encoder, Full, Malformed};
-pub use entry::{Channel, DagHeader, Entry, Header, Role, What};
+pub use entry::{Channel, DagHeader, Entry, EntryKind, Header, Role};
 pub use entry::{
     Commit, CommittedDag, CommittedSubtask, CommittedTopic, Counted, DagTimes, SubtaskTimes, Times,
 };

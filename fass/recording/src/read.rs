@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use core::fmt::{self, Debug};
 
 use super::bytes::{Decoder, Malformed};
-use super::entry::{Channel, Entry, Header, What};
+use super::entry::{Channel, Entry, EntryKind, Header};
 use super::entry::{Commit, Times};
 use super::recordable::Recordable;
 use super::stream::{
@@ -268,7 +268,7 @@ impl Progress {
                 Some(Chunk::Entry(entry)) => {
                     entry.check(&self.header).map_err(inside)?;
                     self.count += 1;
-                    self.lost += u64::from(entry.what == What::Lost);
+                    self.lost += u64::from(entry.what == EntryKind::Lost);
                 }
                 Some(_) => {}
                 None => {
@@ -436,7 +436,7 @@ impl<'b> Recording<'b> {
             )));
         }
         let is_of_channel =
-            move |entry: &Entry<'_>| entry.what == What::Value && entry.place == number;
+            move |entry: &Entry<'_>| entry.what == EntryKind::Value && entry.place == number;
         // Each is one of the type: the recording was read by the same schema.
         let value = |entry: Entry<'_>| Some((entry.job, T::from_bytes(entry.value).ok()?));
         Ok(self.entries().filter(is_of_channel).filter_map(value))

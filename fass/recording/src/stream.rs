@@ -20,7 +20,7 @@ use alloc::vec::Vec;
 
 use super::bytes::Encoder;
 use super::entry::{Commit, Times};
-use super::entry::{Entry, Header, What};
+use super::entry::{Entry, EntryKind, Header};
 use super::recordable::to_bytes;
 
 /// The first bytes of each recording. The first one is no text, so that a transfer of text is
@@ -28,8 +28,8 @@ use super::recordable::to_bytes;
 pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 
 /// The version of the format that is written, of values included. Those before are read, too: the
-/// first has no entries of [`What::Clock`], and neither of
-/// [`What::Fault`]; those before 4 have no text, and
+/// first has no entries of [`EntryKind::Clock`], and neither of
+/// [`EntryKind::Fault`]; those before 4 have no text, and
 /// those before 5 no commits, events and times, and no [states](crate::Role::State).
 pub const VERSION: u16 = 5;
 
@@ -157,7 +157,7 @@ pub struct Stream<S: ?Sized> {
 /// Writes a recording into memory.
 ///
 /// ```
-/// use recording::{Channel, DagHeader, Entry, Header, Recordable, Recording, Role, What, Writer};
+/// use recording::{Channel, DagHeader, Entry, Header, Recordable, Recording, Role, EntryKind, Writer};
 ///
 /// let header = Header {
 ///     app: "demo".into(),
@@ -172,7 +172,7 @@ pub struct Stream<S: ?Sized> {
 /// };
 /// let mut writer = Writer::new(&header);
 /// writer.write(&Entry {
-///     what: What::Value,
+///     what: EntryKind::Value,
 ///     dag: 0,
 ///     place: 0,
 ///     job: 0,
@@ -276,7 +276,7 @@ impl<S: Sink + ?Sized> Stream<S> {
     /// See [`Writer`].
     pub fn write(&mut self, entry: &Entry<'_>) {
         self.entries += 1;
-        self.lost += u64::from(entry.what == What::Lost);
+        self.lost += u64::from(entry.what == EntryKind::Lost);
         let mut head = [0; ENTRY_HEAD];
         let mut out = Encoder::new(&mut head);
         Entry {

@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
 use core::time::Duration;
 
-use sched_dag::{ClusterId, DagId, DagKey, Order, OverrunPolicy, TaskSet};
+use sched_dag::{ClusterId, DagId, DagKey, OverrunPolicy, SubtaskOrder, TaskSet};
 
 use crate::draft::Draft;
 use crate::draft::SubtaskAttributes;
@@ -114,10 +114,10 @@ impl Dag {
     /// shorter response time.
     ///
     /// ```
-    /// fass::create_dag().order(fass::Order::Fixed);
+    /// fass::create_dag().order(fass::SubtaskOrder::Fixed);
     /// ```
     #[track_caller]
-    pub fn order(&self, order: Order) -> &Self {
+    pub fn order(&self, order: SubtaskOrder) -> &Self {
         self.open().spec.order = order;
         self
     }

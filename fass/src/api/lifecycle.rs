@@ -15,7 +15,7 @@ use core::cell::RefCell;
 use core::fmt;
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use sched_dag::lifecycle::{Changes, Lifecycle};
+use sched_dag::lifecycle::{Lifecycle, LifecyclePlan};
 use sched_dag::{DagId, ModeId};
 
 use super::dag::Dag;
@@ -206,7 +206,7 @@ fn lifecycle(dags: &[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle> {
     let paused: Vec<DagId> = paused.map(|(dag, _)| dag).collect();
     let may_shut_down = drafts().any(|(_, draft)| draft.borrow().may_shut_down);
     let count = u32::try_from(dags.len()).unwrap_or(u32::MAX);
-    let changes = Changes::new(count, may_shut_down).with_paused(paused);
+    let changes = LifecyclePlan::new(count, may_shut_down).with_paused(paused);
     Box::new(changes.with_modes(dags_of_modes(dags)))
 }
 

@@ -42,10 +42,12 @@ use core::ops::Range;
 use core::time::Duration;
 
 use sched_dag::analysis::{self, OverheadSource, Reason, Settings, Test};
-use sched_dag::chains::{Chain, Sampling};
+use sched_dag::chains::{Chain, SampledEdge};
 use sched_dag::engine::Proven;
 use sched_dag::wcets::WcetSource;
-use sched_dag::{ClusterId, DagId, DagKey, DagLabel, Subtask, SubtaskLabel, TaskSet, Warning, Why};
+use sched_dag::{
+    AssignmentReason, ClusterId, DagId, DagKey, DagLabel, Subtask, SubtaskLabel, TaskSet, Warning,
+};
 
 use crate::draft::checks::{Drafts, writer_of};
 use crate::draft::fault::{Count, Unproven};
@@ -273,12 +275,12 @@ impl Commit {
         self.with_bounds(chains)
     }
 
-    fn samplings(&self) -> Vec<Sampling> {
+    fn samplings(&self) -> Vec<SampledEdge> {
         let of_sample = |sample: &Staleness| {
             let (writer, reader) = (sample.writer_dag.id, sample.reader_dag.id);
             let topics = self.task_set.dag(writer).topics();
             let topic = topics.iter().find(|topic| topic.name == sample.topic)?;
-            Some(Sampling {
+            Some(SampledEdge {
                 writer: (writer, topic.writer),
                 reader: (reader, sample.reader.id),
             })
@@ -361,7 +363,7 @@ pub struct Placement {
     /// The numbers of its cores.
     pub cores: Range<u32>,
     /// Why the commit has put it there; `None` if the app has.
-    pub why: Option<Why>,
+    pub why: Option<AssignmentReason>,
 }
 
 /// What is known at commit about the deadline of one sink.

@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use core::mem;
 use core::ops::Range;
 
-use recording::{Channel, Header, Role, What};
+use recording::{Channel, EntryKind, Header, Role};
 use sched_dag::{DagId, Instance, Notice, journal};
 
 use super::replay::narrow;
@@ -91,7 +91,7 @@ impl Crossing for Latest {
     fn happened(&mut self, notice: &Notice) {
         let (dag, job) = (notice.event.dag.index(), notice.event.job);
         // A skipped job counts, or those after it would be others in a replay.
-        if let journal::What::Due | journal::What::Skipped = notice.event.what
+        if let journal::EventKind::Due | journal::EventKind::Skipped = notice.event.what
             && let Some(kept) = &mut self.kept
             && let Some(release_ns) = notice.at_ns
             && kept.latest.is_of_interest(dag, job)
@@ -142,19 +142,19 @@ impl Drain for OfLatest {
         for (dag, _) in dags.filter(|(_, model)| model.is_sporadic()) {
             for job in latest.jobs(dag.into()) {
                 if let Some(release_ns) = releases.of(dag.into(), job) {
-                    write(What::Signal, [dag, 0], job, release_ns, &[]);
+                    write(EntryKind::Signal, [dag, 0], job, release_ns, &[]);
                 }
             }
         }
         for value in latest.values() {
             let dag = header.channels[usize::from(value.channel)].dag;
-            let what = value.bytes.map_or(What::Lost, |_| What::Value);
+            let what = value.bytes.map_or(EntryKind::Lost, |_| EntryKind::Value);
             let (at_ns, bytes) = (value.completed_ns, value.bytes.unwrap_or_default());
             write(what, [dag, value.channel], value.job, at_ns, bytes);
         }
         for &(instance, at_ns) in faults {
             if let Some((dag, place)) = narrow(instance) {
-                write(What::Fault, [dag, place], instance.job, at_ns, &[]);
+                write(EntryKind::Fault, [dag, place], instance.job, at_ns, &[]);
             }
         }
     }

@@ -27,7 +27,7 @@ use alloc::sync::Arc;
 use core::fmt;
 
 use recording::{Channel, DagHeader, Header, Schema, Stream};
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use sched_dag::{DagId, Instance, Notice, TaskSet};
 
 use crate::run::line::Recorded;
@@ -268,17 +268,22 @@ pub fn name(header: &mut Header, app: &str, task_set: &TaskSet) {
 }
 
 /// The events that a platform tells a [`Crossing`] of.
-pub const HEARS: &[What] = &[What::Due, What::Skipped, What::Cancelled, What::Restarted];
+pub const HEARS: &[EventKind] = &[
+    EventKind::Due,
+    EventKind::Skipped,
+    EventKind::Cancelled,
+    EventKind::Restarted,
+];
 
 /// Returns what a recording says of an event, if it says anything.
 #[must_use]
-pub const fn recorded(what: What) -> Option<recording::What> {
+pub const fn recorded(what: EventKind) -> Option<recording::EntryKind> {
     match what {
-        What::Due => Some(recording::What::Signal),
-        What::Skipped => Some(recording::What::Skip),
-        What::Cancelled => Some(recording::What::Cut),
-        What::Restarted => Some(recording::What::Restart),
-        What::Ended => Some(recording::What::Fault),
+        EventKind::Due => Some(recording::EntryKind::Signal),
+        EventKind::Skipped => Some(recording::EntryKind::Skip),
+        EventKind::Cancelled => Some(recording::EntryKind::Cut),
+        EventKind::Restarted => Some(recording::EntryKind::Restart),
+        EventKind::Ended => Some(recording::EntryKind::Fault),
         _ => None,
     }
 }

@@ -15,7 +15,7 @@ use alloc::vec::Vec;
 use core::mem;
 use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-use recording::{Channel, Encoder, Entry, Header, Recordable, What};
+use recording::{Channel, Encoder, Entry, EntryKind, Header, Recordable};
 use sched_dag::{DagId, Instance, Notice, SubtaskId, TaskSet};
 
 use super::replay::narrow;
@@ -78,7 +78,7 @@ impl Tape {
     }
 
     /// Puts an event into its ring; without room the recording ends.
-    fn put(&mut self, what: What, of: Instance, release_ns: Option<u64>, at_ns: u64) {
+    fn put(&mut self, what: EntryKind, of: Instance, release_ns: Option<u64>, at_ns: u64) {
         let mut bytes = [0; EVENT_BYTES];
         let mut out = Encoder::new(&mut bytes);
         let (dag, subtask) = narrow(of).unwrap_or((u16::MAX, u16::MAX));
@@ -141,14 +141,14 @@ impl Crossing for Tape {
                 take(&self.given, &self.lost, sample, at_ns);
             });
         }
-        self.put(What::Fault, instance, None, at_ns);
+        self.put(EntryKind::Fault, instance, None, at_ns);
     }
 
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
         let number = u16::try_from(instance.dag.0);
         let mut channels = self.header.channels.iter();
         if channels.any(|channel| Ok(channel.dag) == number) {
-            self.put(What::Clock, instance, None, at_ns);
+            self.put(EntryKind::Clock, instance, None, at_ns);
         }
         clock_ns
     }
@@ -160,7 +160,7 @@ impl Crossing for Tape {
 
 /// An event in its record: what it is, of which DAG and subtask, and when the job was due, where
 /// that is known.
-type Event = (What, u16, u16, Option<u64>);
+type Event = (EntryKind, u16, u16, Option<u64>);
 
 /// The most bytes of an event.
 const EVENT_BYTES: usize = 14;
@@ -230,7 +230,7 @@ impl Releases {
     /// Returns what happened to a job at a time, which takes the place of an unknown release.
     pub(super) fn entry<'v>(
         &self,
-        what: What,
+        what: EntryKind,
         [dag, place]: [u16; 2],
         job: u64,
         at_ns: u64,
@@ -281,7 +281,7 @@ impl OfTape {
                 let release_ns = || self.releases.of(dag.into(), job).unwrap_or(0);
                 let at_ns = next.map_or_else(release_ns, |(_, at_ns)| at_ns);
                 let of = [dag, channel];
-                to.write(&self.releases.entry(What::Lost, of, job, at_ns, &[]));
+                to.write(&self.releases.entry(EntryKind::Lost, of, job, at_ns, &[]));
             }
         }
     }
@@ -296,7 +296,7 @@ impl OfTape {
         let of = [self.header.channels[number].dag, channel];
         let records = &mut self.records[number];
         if let Some(Published { bytes, .. }) = records.next() {
-            to.write(&self.releases.entry(What::Value, of, job, at_ns, bytes));
+            to.write(&self.releases.entry(EntryKind::Value, of, job, at_ns, bytes));
         }
         records.forget();
     }
@@ -313,12 +313,12 @@ impl OfTape {
         };
         let mut told = [0; TOLD];
         let value = match what {
-            What::Clock => write_told(at_ns + self.epoch_ns, &mut told),
+            EntryKind::Clock => write_told(at_ns + self.epoch_ns, &mut told),
             _ => &[],
         };
         let entry = self.releases.entry(what, [dag, place], job, at_ns, value);
         let release_ns = known_ns.unwrap_or(entry.release_ns);
-        if what == What::Signal {
+        if what == EntryKind::Signal {
             self.releases.note(dag.into(), job, release_ns);
         }
         to.write(&Entry {

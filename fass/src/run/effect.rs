@@ -12,7 +12,7 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
-use sched_dag::lifecycle::{Entry, Request};
+use sched_dag::lifecycle::{ModeEntry, Request};
 use sched_dag::{DagId, ModeId};
 
 /// An effect without its signals.
@@ -115,8 +115,8 @@ impl Effect for Asked {
             Of::Signal(target) => Request::Signal(target.dag()),
             Of::Dag(target) if wish == STOP => Request::Pause(target.dag()),
             Of::Dag(target) => Request::Resume(target.dag()),
-            Of::Mode(mode) if wish == AT_ONCE => Request::Enter(*mode, Entry::AtOnce),
-            Of::Mode(mode) => Request::Enter(*mode, Entry::WhenIdle),
+            Of::Mode(mode) if wish == AT_ONCE => Request::Enter(*mode, ModeEntry::AtOnce),
+            Of::Mode(mode) => Request::Enter(*mode, ModeEntry::WhenIdle),
         });
     }
 }

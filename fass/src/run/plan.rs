@@ -8,7 +8,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use sched_dag::engine::{Alternate, Proven};
-use sched_dag::journal::Subject;
+use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
 
@@ -413,7 +413,7 @@ impl Runner {
                     body,
                     vertex: task_set.vertex(instance),
                     instance,
-                    ids: Subject::of(instance).ids,
+                    ids: EventSubject::of(instance).ids,
                 }
             })
         })
@@ -437,9 +437,9 @@ impl engine::Body for Runner {
     }
 
     #[inline]
-    fn subject(&self) -> Subject {
+    fn subject(&self) -> EventSubject {
         let (ids, job) = (self.ids, self.instance.job);
-        Subject { ids, job }
+        EventSubject { ids, job }
     }
 
     fn discard(&mut self, job: u64) {

@@ -10,7 +10,7 @@ use std::cell::RefCell;
 
 use fass::edge::{self, Replay};
 use fass::{LatestJobs, Plan, Recorded, Terms};
-use recording::{Channel, Entry, Header, Malformed, What};
+use recording::{Channel, Entry, EntryKind, Header, Malformed};
 use sched_dag::engine::Run;
 use sched_dag::journal::{self, Event};
 use sched_dag::{DagId, Instance, TaskSet};
@@ -52,7 +52,7 @@ struct Told {
 }
 
 /// Returns an entry without its value, of a job whose release is not known yet.
-fn entry(what: What, [dag, place]: [u16; 2], job: u64, at_ns: u64) -> Entry<'static> {
+fn entry(what: EntryKind, [dag, place]: [u16; 2], job: u64, at_ns: u64) -> Entry<'static> {
     Entry {
         what,
         dag,
@@ -67,7 +67,7 @@ fn entry(what: What, [dag, place]: [u16; 2], job: u64, at_ns: u64) -> Entry<'sta
 impl Kept {
     fn new(header: &Header, value: &Recorded<'_>) -> Self {
         let Recorded { channel, job, .. } = *value;
-        let what = value.bytes.map_or(What::Lost, |_| What::Value);
+        let what = value.bytes.map_or(EntryKind::Lost, |_| EntryKind::Value);
         let of = [header.channels[usize::from(channel)].dag, channel];
         Self {
             entry: entry(what, of, job, value.completed_ns),
@@ -221,7 +221,7 @@ impl Edge {
         }
         let of = [instance.dag.0, instance.subtask.0].map(narrow);
         values.push(Kept {
-            entry: entry(What::Clock, of, instance.job, start_ns),
+            entry: entry(EntryKind::Clock, of, instance.job, start_ns),
             bytes: recording::to_bytes(&answers),
         });
     }
@@ -288,8 +288,10 @@ impl Edge {
     fn recorded(&self, event: &Event, task_set: &TaskSet) -> Option<Entry<'static>> {
         let what = match event.what {
             // A signal is one at the instant of the release.
-            journal::What::Due => return None,
-            journal::What::Released if task_set.dag(event.dag).is_sporadic() => journal::What::Due,
+            journal::EventKind::Due => return None,
+            journal::EventKind::Released if task_set.dag(event.dag).is_sporadic() => {
+                journal::EventKind::Due
+            }
             what => what,
         };
         let what = edge::recorded(what).filter(|_| !self.is_replayed(event.dag))?;

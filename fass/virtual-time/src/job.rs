@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use recording::{Channel, Entry, Recordable, Recording, Shown, What};
+use recording::{Channel, Entry, EntryKind, Recordable, Recording, Shown};
 use sched_dag::{DagId, Instance, JobOutcome, SubtaskId, Topic};
 
 use crate::edge::Divergence;
@@ -77,14 +77,16 @@ impl JobShown {
         let passed = |entry: Entry<'_>| {
             let is_of_job = (u32::from(entry.dag), entry.job) == (dag.0, job);
             let channel = match entry.what {
-                What::Value | What::Lost if is_of_job => Some(&channels[usize::from(entry.place)]),
-                What::Clock if is_of_job => None,
+                EntryKind::Value | EntryKind::Lost if is_of_job => {
+                    Some(&channels[usize::from(entry.place)])
+                }
+                EntryKind::Clock if is_of_job => None,
                 _ => return None,
             };
             let subtask = channel.map_or(entry.place, |channel| channel.subtask);
             let (schema, bytes) = (channel.map_or(&times, |it| &it.schema), entry.value);
             let value = match entry.what {
-                What::Lost => Value::None,
+                EntryKind::Lost => Value::None,
                 _ => Value::Json(Shown { schema, bytes }.to_string()),
             };
             Some((channel, SubtaskId(subtask.into()), value))

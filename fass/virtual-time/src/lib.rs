@@ -55,7 +55,7 @@ pub use job::{JobShown, Passed, SubtaskShown, Value};
 use platform::Machine;
 pub use platform::RunError;
 pub use report::{DagReport, InstanceRecord, JobRecord, PanicRecord, Report};
-pub use sched_dag::journal::{Event, What};
+pub use sched_dag::journal::{Event, EventKind};
 use settings::Settings;
 pub use settings::Silent;
 

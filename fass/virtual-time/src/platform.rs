@@ -30,9 +30,9 @@ use fass::log::{Level, Line, set_level};
 use fass::{LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms, Wire};
 use recording::Channel;
 use sched_dag::engine::{Alternate, Cost};
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::Request;
-use sched_dag::virtual_time::{End, VirtualTime as Driver, Workload};
+use sched_dag::virtual_time::{RunOutcome, VirtualTime as Driver, Workload};
 use sched_dag::{Dag, DagId, DagLabel, Instance, Notice, SchedulerOptions, SubtaskLabel, TaskSet};
 
 use crate::edge::Edge;
@@ -426,13 +426,13 @@ impl Session {
         let now_ns = self.driver.now_ns();
         // What has no event any more has run as far as it was asked to.
         let (clock_ns, reached_ns) = match end {
-            End::TimeReached => (until_ns, until_ns),
-            End::Finished | End::TimeOverflow(_) => (now_ns, until_ns),
-            End::Stopped => (now_ns, now_ns),
+            RunOutcome::TimeReached => (until_ns, until_ns),
+            RunOutcome::Finished | RunOutcome::TimeOverflow(_) => (now_ns, until_ns),
+            RunOutcome::Stopped => (now_ns, now_ns),
         };
         machine.now_ns.set(clock_ns);
         self.until_ns = reached_ns;
-        let is_over = end == End::Finished;
+        let is_over = end == RunOutcome::Finished;
         let outcome = (machine.edge).of_replay(|replay| replay.outcome(is_over));
         let (run, calls) = (self.driver.run_so_far(), &self.calls);
         let report = Report {
@@ -457,7 +457,7 @@ impl Session {
                 report: Box::new(report),
             });
         }
-        if let End::TimeOverflow(instance) = end {
+        if let RunOutcome::TimeOverflow(instance) = end {
             let ((dag, subtask), job) = (self.labels(instance), instance.job);
             return Err(RunError::TimeOverflow { dag, subtask, job });
         }
@@ -610,15 +610,15 @@ impl Workload<Runner> for Calls {
     fn hear(&mut self, notice: &Notice) {
         let event = &notice.event;
         let ended = match event.what {
-            What::Released => None,
+            EventKind::Released => None,
             // All jobs of it.
-            What::Stopped => Some(u64::MAX),
+            EventKind::Stopped => Some(u64::MAX),
             _ => Some(event.job),
         };
         self.has_arrived |=
             (self.until).is_some_and(|(dag, job)| dag == event.dag && Some(job) <= ended);
         // In a replay, a signal follows when the one before it has led to something.
-        if let What::Released | What::Skipped = event.what {
+        if let EventKind::Released | EventKind::Skipped = event.what {
             self.machine.follow_signal(event.dag, event.time_ns);
         }
     }

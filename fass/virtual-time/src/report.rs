@@ -6,7 +6,7 @@ use std::ops::Deref;
 use fass::edge::Outcome;
 use fass::log::Line;
 use sched_dag::engine::Run;
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::{self, Terms, Violation};
 use sched_dag::{DagId, DagKey, DagStatistics, Instance, SubtaskKey};
 
@@ -91,7 +91,7 @@ impl Report {
     ) -> Self {
         let events: Vec<Event> = run.journal().events().collect();
         let of = |what| events.iter().filter(move |event| event.what == what);
-        let ready = of(What::Ready).filter_map(Event::instance);
+        let ready = of(EventKind::Ready).filter_map(Event::instance);
         let instances = ready.filter_map(|instance| {
             let execution_ns = executed_ns.get(&instance).copied();
             Some(InstanceRecord {
@@ -100,7 +100,7 @@ impl Report {
                 times: *run.record().instance(instance)?,
             })
         });
-        let jobs = of(What::Released).filter_map(|event| JobRecord::new(&run, event));
+        let jobs = of(EventKind::Released).filter_map(|event| JobRecord::new(&run, event));
         let shown = |line: &Line| line.shown(Some(run.task_set())).to_string();
         Self {
             instances: instances.collect(),
@@ -199,10 +199,12 @@ impl Report {
         };
         let outcome = || self.record().job(dag, job)?.outcome;
         let more = match what {
-            What::Entered => return format!("{time_ns} entered mode {job}"),
+            EventKind::Entered => return format!("{time_ns} entered mode {job}"),
             _ if what.is_of_dag() => return format!("{time_ns} {what} {name}"),
             _ if what.is_of_machine() => format!(" core {}", event.core.0),
-            What::Completed => outcome().map_or(String::new(), |outcome| format!(" {outcome:?}")),
+            EventKind::Completed => {
+                outcome().map_or(String::new(), |outcome| format!(" {outcome:?}"))
+            }
             _ => String::new(),
         };
         format!("{time_ns} {what} {name}[{job}]{}", more.to_lowercase())

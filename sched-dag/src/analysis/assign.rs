@@ -35,7 +35,7 @@ use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, sort_largest_first};
 use super::{Settings, fixed_order};
 use crate::ids::{ClusterId, DagId, to_u32};
-use crate::policy::Why;
+use crate::policy::AssignmentReason;
 use crate::task_set::TaskSet;
 use crate::worded::texts;
 
@@ -92,7 +92,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssi
     }
     let mut assignment = Assignment {
         sizes: Vec::new(),
-        of_dags: vec![(ClusterId(0), Why::Light); tasks.len()],
+        of_dags: vec![(ClusterId(0), AssignmentReason::Light); tasks.len()],
     };
     let mut left = settings.cores;
     let mut light = Vec::new();
@@ -122,7 +122,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssi
             return Err(NotAssigned { dag, reason });
         };
         let cluster = ClusterId(to_u32(assignment.sizes.len()));
-        let why = Why::Heavy {
+        let why = AssignmentReason::Heavy {
             volume_ns,
             within_ns,
         };
@@ -140,7 +140,7 @@ struct Assignment {
     /// The cores of each cluster.
     sizes: Vec<u32>,
     /// The cluster of each DAG, and why it is that.
-    of_dags: Vec<(ClusterId, Why)>,
+    of_dags: Vec<(ClusterId, AssignmentReason)>,
 }
 
 /// Returns the work of a job, and the time in which one core would have to do it.
@@ -295,11 +295,11 @@ mod tests {
         assert_eq!(sizes(&found), [4, 1, 1]);
         let clusters = found.dags().iter().map(|dag| dag.cluster().0);
         assert_eq!(clusters.collect::<Vec<_>>(), [2, 0, 1, 2, 1]);
-        let heavy = Why::Heavy {
+        let heavy = AssignmentReason::Heavy {
             volume_ns: 24,
             within_ns: 10,
         };
-        let light = Some(Why::Light);
+        let light = Some(AssignmentReason::Light);
         let whys = found.dags().iter().map(Dag::why_there);
         assert_eq!(
             whys.collect::<Vec<_>>(),
@@ -322,7 +322,7 @@ mod tests {
     fn an_order_that_may_be_fixed_needs_fewer_cores() {
         let mut dag = parallel(&[3, 3, 2, 2, 2], 7);
         assert_eq!(sizes(&assigned(&[dag.clone()], 4).unwrap()), [3]);
-        dag.order = crate::Order::Fixed;
+        dag.order = crate::SubtaskOrder::Fixed;
         assert_eq!(sizes(&assigned(&[dag], 4).unwrap()), [2]);
     }
 

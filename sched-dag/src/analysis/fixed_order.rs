@@ -25,7 +25,7 @@ use super::multi_path::multi_path;
 use super::task::Task;
 use super::{Answer, Settings};
 use crate::ids::{DagId, to_u32};
-use crate::policy::Order;
+use crate::policy::SubtaskOrder;
 use crate::task_set::{Dag, TaskSet};
 
 /// Fixes the order of each DAG that allows it, where that proves more: a shorter bound of it,
@@ -61,7 +61,7 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &Settings) {
 
 /// Reports whether an order of a DAG's subtasks may be fixed.
 pub(super) fn allows(dag: &Dag) -> bool {
-    dag.order == Order::Fixed && dag.least_deadline_ns() == dag.relative_deadline_ns()
+    dag.order == SubtaskOrder::Fixed && dag.least_deadline_ns() == dag.relative_deadline_ns()
 }
 
 /// Returns the edges of a schedule and its length, if that is below the bound of one job alone.

@@ -25,9 +25,9 @@ use alloc::vec::Vec;
 use core::ops::DerefMut;
 
 use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex};
-use crate::journal::{Subject, What};
+use crate::journal::{EventKind, EventSubject};
 use crate::kept::Journal;
-use crate::lifecycle::{Letters, Request, Requests};
+use crate::lifecycle::{Mailboxes, PendingRequests, Request};
 use crate::placement::{Next, Placement};
 use crate::scheduler::{Decision, HandOff, Moment, Notice, Scheduler};
 use crate::task_set::{Dag, TaskSet};
@@ -47,7 +47,7 @@ pub struct Engine<B: Body, P> {
     /// The model.
     pub task_set: Arc<TaskSet>,
     /// What is asked of the run, on its way to the scheduler.
-    pub requests: Requests,
+    pub requests: PendingRequests,
     /// The bodies whose functions faults have ended for good.
     pub lost: Vec<B>,
     /// By vertex.
@@ -67,14 +67,14 @@ impl<B: Body, P> Engine<B, P> {
         cluster: ClusterId,
         mut scheduler: Scheduler,
         journal: Journal,
-        requests: Requests,
+        requests: PendingRequests,
         after_fault: Vec<Option<DagId>>,
     ) -> Self {
         let task_set = Arc::clone(scheduler.task_set());
         let (vertices, cores) = (task_set.vertices(), scheduler.options().cores as usize);
         let of_dag = |dag: &Dag| dag.slots() * dag.subtasks().len();
         let instances: usize = task_set.dags().iter().map(of_dag).sum();
-        let room = scheduler.hear(C::HEARS.iter().copied().chain([What::Cancelled]));
+        let room = scheduler.hear(C::HEARS.iter().copied().chain([EventKind::Cancelled]));
         scheduler.log.journal = journal;
         Self {
             placement: Placement::empty(vertices, cores),
@@ -97,7 +97,7 @@ impl<B: Body, P> Engine<B, P> {
     }
 
     /// Writes down what a core does with the instance of a vertex.
-    pub fn note(&mut self, what: What, core: CoreId, vertex: Vertex, time_ns: u64) {
+    pub fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex, time_ns: u64) {
         let instance = self.scheduler.instance_of(vertex);
         self.scheduler.log.on_core(core, what, time_ns, instance);
     }
@@ -203,10 +203,10 @@ impl<B: Body, P> Engine<B, P> {
             body.set_job(decision.instance.job);
             let log = &mut self.scheduler.log;
             let to = body.subject();
-            let start = (What::Start, port.start(core, &mut body), to);
+            let start = (EventKind::Start, port.start(core, &mut body), to);
             if is_unwritten {
-                let finish = (What::Finish, finish_ns, from);
-                let ready = (What::Ready, log.now_ns(), to);
+                let finish = (EventKind::Finish, finish_ns, from);
+                let ready = (EventKind::Ready, log.now_ns(), to);
                 log.journal.write_all(core, [finish, ready, start]);
             } else {
                 log.journal.write_all(core, [start]);
@@ -311,7 +311,7 @@ impl<B: Body, P> Engine<B, P> {
             body.set_job(instance.job);
             let subject = body.subject();
             let start_ns = port.start(core, body);
-            (self.scheduler.log.journal).write(core, What::Start, start_ns, subject);
+            (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
         }
         next
     }
@@ -320,13 +320,13 @@ impl<B: Body, P> Engine<B, P> {
     /// it.
     pub fn suspend(&mut self, core: CoreId, now_ns: u64, parked: P) -> Option<CoreId> {
         let vertex = self.placement.detach(core.index())?;
-        self.note(What::Suspend, core, vertex, now_ns);
+        self.note(EventKind::Suspend, core, vertex, now_ns);
         self.placement.suspend(vertex, parked)
     }
 
     /// A body that goes and comes stays in a register.
     #[inline]
-    fn publish(requests: &mut Requests, mut body: B, finish_ns: u64) -> B {
+    fn publish(requests: &mut PendingRequests, mut body: B, finish_ns: u64) -> B {
         body.complete(finish_ns, &mut |request| requests.keep(request));
         body
     }
@@ -344,7 +344,7 @@ impl<B: Body, P> Engine<B, P> {
         self.scheduler.log.exchange_notices(&mut self.notices);
         for notice in &self.notices {
             port.hear(notice);
-            if notice.event.what == What::Cancelled
+            if notice.event.what == EventKind::Cancelled
                 && let Some(instance) = notice.event.instance()
             {
                 let vertex = self.task_set.vertex(instance);
@@ -379,14 +379,14 @@ impl<B: Body, P> Engine<B, P> {
         for decision in decisions {
             let (core, instance) = (decision.core, decision.instance);
             port.retarget(core);
-            if decision.what == What::Suspend {
+            if decision.what == EventKind::Suspend {
                 self.placement.set_target(core, None);
                 preempted = Some(core);
             } else {
                 let vertex = self.task_set.vertex(instance);
                 self.placement.set_target(core, Some(vertex));
                 if C::SUSPENDS_LATER && preempted == Some(core) {
-                    log.on_core(core, What::Request, port.now_ns(), instance);
+                    log.on_core(core, EventKind::Request, port.now_ns(), instance);
                 }
             }
         }
@@ -403,7 +403,7 @@ pub trait Body {
     fn set_job(&mut self, job: u64);
 
     /// Returns its instance as events are written of it.
-    fn subject(&self) -> Subject;
+    fn subject(&self) -> EventSubject;
 
     /// Gives up the inputs that have arrived for a job which it will not run.
     fn discard(&mut self, job: u64);
@@ -432,7 +432,7 @@ impl<D: DerefMut<Target: Body>> Body for D {
     }
 
     #[inline]
-    fn subject(&self) -> Subject {
+    fn subject(&self) -> EventSubject {
         (**self).subject()
     }
 
@@ -485,7 +485,7 @@ impl Alternate for () {
 /// suspends cores by the platform's own means, mostly after the lock.
 pub trait Port<B> {
     /// The kinds of events that the platform acts on itself.
-    const HEARS: &'static [What] = &[];
+    const HEARS: &'static [EventKind] = &[];
 
     /// Whether a core gives up what it runs some time after it was asked to.
     const SUSPENDS_LATER: bool = true;
@@ -514,7 +514,7 @@ pub trait Port<B> {
     }
 
     /// Returns them, if there may be any, and takes note that they are read.
-    fn take_letters(&mut self) -> Option<&Letters> {
+    fn take_letters(&mut self) -> Option<&Mailboxes> {
         None
     }
 

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use core::cell::OnceCell;
 
 use super::{Body, Engine};
-use crate::chains::{Chain, Latencies};
+use crate::chains::{Chain, ChainLatencies};
 use crate::ids::{DagId, SubtaskId};
 use crate::kept::{FINEST, Journal};
 use crate::key::{DagKey, SubtaskKey};
@@ -343,7 +343,7 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn latencies(&self, chain: &Chain) -> Latencies {
+    pub fn latencies(&self, chain: &Chain) -> ChainLatencies {
         chain.latencies(&self.task_set, self.journal.events())
     }
 

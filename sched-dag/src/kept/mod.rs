@@ -24,7 +24,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::ids::{ClusterId, CoreId};
-use crate::journal::{Event, Subject, What};
+use crate::journal::{Event, EventKind, EventSubject};
 use crate::law::{Costs, Tally};
 use crate::task_set::{Dag, TaskSet};
 
@@ -120,14 +120,18 @@ impl Journal {
 
     /// Writes down that something has happened.
     #[inline]
-    pub fn write(&mut self, core: CoreId, what: What, time_ns: u64, subject: Subject) {
+    pub fn write(&mut self, core: CoreId, what: EventKind, time_ns: u64, subject: EventSubject) {
         self.write_all(core, [(what, time_ns, subject)]);
     }
 
     /// Writes down several things that have happened on one core: room for all is looked
     /// at once.
     #[inline]
-    pub fn write_all<const N: usize>(&mut self, core: CoreId, happened: [(What, u64, Subject); N]) {
+    pub fn write_all<const N: usize>(
+        &mut self,
+        core: CoreId,
+        happened: [(EventKind, u64, EventSubject); N],
+    ) {
         let words =
             happened.map(|(what, time_ns, subject)| Event::words(time_ns, what, core, subject));
         if self.events.capacity() - self.events.len() >= N {

@@ -1,6 +1,6 @@
 //! Journals that are too small for their run, and two as one.
 
-use crate::{ClusterId, Clusters, CommitOptions, DagId, DagSpec, Instance, Policy, SubtaskId};
+use crate::{ClusterId, CommitOptions, CoreDivision, DagId, DagSpec, Instance, Policy, SubtaskId};
 use crate::{SubtaskSpec, verify};
 
 use super::*;
@@ -20,7 +20,7 @@ fn task_set(clusters: u32, jobs: Option<u64>) -> Arc<TaskSet> {
         ..DagSpec::default()
     };
     let specs: Vec<DagSpec> = (0..clusters).map(spec).collect();
-    let divided = Clusters::Of(vec![1; specs.len()]);
+    let divided = CoreDivision::Of(vec![1; specs.len()]);
     let options = CommitOptions::new(Policy::Edf, clusters).with_clusters(divided);
     Arc::new(verify(&specs, &options).expect("it is right").task_set)
 }
@@ -28,14 +28,14 @@ fn task_set(clusters: u32, jobs: Option<u64>) -> Arc<TaskSet> {
 /// Writes a job of a DAG down that ends after so long.
 fn run(journal: &mut Journal, dag: DagId, job: u64, end_ns: u64) {
     let subtask = SubtaskId(0);
-    let of_job = Subject::of_job(dag, job);
-    let instance = Subject::of(Instance { dag, job, subtask });
+    let of_job = EventSubject::of_job(dag, job);
+    let instance = EventSubject::of(Instance { dag, job, subtask });
     for (time_ns, what, subject) in [
-        (0, What::Released, of_job),
-        (0, What::Ready, instance),
-        (1, What::Start, instance),
-        (end_ns, What::Finish, instance),
-        (end_ns, What::Completed, of_job),
+        (0, EventKind::Released, of_job),
+        (0, EventKind::Ready, instance),
+        (1, EventKind::Start, instance),
+        (end_ns, EventKind::Finish, instance),
+        (end_ns, EventKind::Completed, of_job),
     ] {
         journal.write(CoreId(0), what, 10 * job + time_ns, subject);
     }
@@ -64,8 +64,8 @@ fn small() -> Journal {
 #[test]
 fn what_is_written_together_is_kept_one_by_one_where_room_ends() {
     let mut journal = whole(&task_set(1, Some(JOBS)), 4 * 24 * 4);
-    let subject = Subject::of_job(DagId(0), 0);
-    let at = |time_ns| (What::Released, time_ns, subject);
+    let subject = EventSubject::of_job(DagId(0), 0);
+    let at = |time_ns| (EventKind::Released, time_ns, subject);
     for time_ns in [0, 3, 6] {
         journal.write_all(CoreId(0), [0, 1, 2].map(|more| at(time_ns + more)));
     }
@@ -81,11 +81,14 @@ fn keeps_the_latest_events_and_counts_the_lost_ones() {
         (5 * JOBS - 12, 5 * JOBS)
     );
     let kept = journal.events().map(|event| (event.job, event.what));
-    let kept: Vec<(u64, What)> = kept.collect();
-    assert_eq!(kept[..2], [(47, What::Finish), (47, What::Completed)]);
+    let kept: Vec<(u64, EventKind)> = kept.collect();
+    assert_eq!(
+        kept[..2],
+        [(47, EventKind::Finish), (47, EventKind::Completed)]
+    );
     assert_eq!(
         (kept[2], kept[11]),
-        ((48, What::Released), (49, What::Completed))
+        ((48, EventKind::Released), (49, EventKind::Completed))
     );
 }
 

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 use core::fmt;
 
 use crate::ids::Instance;
-use crate::journal::{Event, What};
+use crate::journal::{Event, EventKind};
 use crate::task_set::TaskSet;
 
 /// What was measured, in nanoseconds.
@@ -46,13 +46,13 @@ impl Costs {
             };
             let core = event.core.0 as usize;
             match event.what {
-                What::Ready | What::Suspend => waiting.push((instance, event.time_ns)),
-                What::Finish => {
+                EventKind::Ready | EventKind::Suspend => waiting.push((instance, event.time_ns)),
+                EventKind::Finish => {
                     free_ns.resize(free_ns.len().max(core + 1), 0);
                     free_ns[core] = event.time_ns;
                 }
-                What::Start | What::Resume => {
-                    costs.dispatches += u64::from(event.what == What::Start);
+                EventKind::Start | EventKind::Resume => {
+                    costs.dispatches += u64::from(event.what == EventKind::Start);
                     let free_ns = free_ns.get(core).copied().unwrap_or(0);
                     let waits = waiting.iter().position(|(other, _)| *other == instance);
                     let since_ns = waits.map(|place| waiting.swap_remove(place).1.max(free_ns));
@@ -69,7 +69,10 @@ impl Costs {
     #[must_use]
     pub fn of_releases(task_set: &TaskSet, events: impl Iterator<Item = Event> + Clone) -> Self {
         let mut costs = Self::default();
-        for event in events.clone().filter(|event| event.what == What::Released) {
+        for event in events
+            .clone()
+            .filter(|event| event.what == EventKind::Released)
+        {
             costs.releases += 1;
             let dag = task_set.dag(event.dag);
             let late_ns = event.time_ns.saturating_sub(dag.grid_ns(event.job));
@@ -77,7 +80,7 @@ impl Costs {
             // was queued waited for an older job.
             let is_longer = late_ns > costs.late_ns && !dag.is_sporadic();
             let waited = |other: Event| {
-                other.what == What::Queued && (other.dag, other.job) == (event.dag, event.job)
+                other.what == EventKind::Queued && (other.dag, other.job) == (event.dag, event.job)
             };
             if is_longer && !events.clone().any(waited) {
                 costs.late_ns = late_ns;
@@ -112,8 +115,8 @@ mod tests {
     use crate::law::dispatch::tests::dags;
     use crate::policy::{Policy, Preemption, SchedulerOptions};
 
-    fn events(happened: &[(u64, What, u32, u64)]) -> Vec<Event> {
-        let event = |&(time_ns, what, dag, job): &(u64, What, u32, u64)| Event {
+    fn events(happened: &[(u64, EventKind, u32, u64)]) -> Vec<Event> {
+        let event = |&(time_ns, what, dag, job): &(u64, EventKind, u32, u64)| Event {
             time_ns,
             what,
             core: CoreId(0),
@@ -126,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_core_owes_from_its_last_finish_and_from_what_waits() {
-        use What::{Finish, Ready, Released, Resume, Start, Suspend};
+        use EventKind::{Finish, Ready, Released, Resume, Start, Suspend};
         let task_set = dags(&[0, 0], false);
         let events = events(&[
             (2, Released, 1, 0),
@@ -164,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_release_that_waited_for_an_older_job_is_not_late() {
-        use What::{Queued, Released};
+        use EventKind::{Queued, Released};
         let task_set = dags(&[0, 0], false);
         let happened = [
             (0, Released, 0, 0),

@@ -6,7 +6,7 @@ use core::ops::Range;
 
 use super::Record;
 use crate::ids::{DagId, Instance};
-use crate::journal::{Event, What};
+use crate::journal::{Event, EventKind};
 use crate::policy::JobOutcome;
 use crate::task_set::TaskSet;
 
@@ -30,15 +30,15 @@ impl Record {
         for event in events {
             let index = event.dag.index();
             match event.what {
-                What::Due => due_ns[index] = event.time_ns,
-                What::Stopped => {
+                EventKind::Due => due_ns[index] = event.time_ns,
+                EventKind::Stopped => {
                     stopped_ns[index].get_or_insert(event.time_ns);
                 }
                 what if what.is_of_dag() => {}
                 _ => match event.instance() {
                     Some(instance) => {
                         record.note_instance(instance, &event);
-                        if event.what == What::Restarted {
+                        if event.what == EventKind::Restarted {
                             record.note_failure(&event);
                         }
                     }
@@ -69,13 +69,13 @@ impl Record {
         };
         let time_ns = event.time_ns;
         match event.what {
-            What::Released => {
+            EventKind::Released => {
                 job.release_ns = Some(release_ns);
                 job.released_ns = Some(time_ns);
             }
-            What::Aborted => job.cut_ns = Some(time_ns),
-            What::Missed => job.missed_ns = Some(time_ns),
-            What::Completed => {
+            EventKind::Aborted => job.cut_ns = Some(time_ns),
+            EventKind::Missed => job.missed_ns = Some(time_ns),
+            EventKind::Completed => {
                 job.ended_ns = Some(time_ns);
                 job.outcome = Some(match (job.cut_ns, stopped_ns, job.missed_ns) {
                     (Some(_), _, _) if job.has_failed => JobOutcome::Failed,
@@ -103,19 +103,19 @@ impl Record {
         };
         let time_ns = Some(event.time_ns);
         match event.what {
-            What::Ready => times.ready_ns = time_ns,
-            What::Start => {
+            EventKind::Ready => times.ready_ns = time_ns,
+            EventKind::Start => {
                 times.start_ns = time_ns;
                 times.core = Some(event.core);
             }
-            What::Resume => times.core = Some(event.core),
-            What::Suspend => times.preemptions += 1,
-            What::Finish => {
+            EventKind::Resume => times.core = Some(event.core),
+            EventKind::Suspend => times.preemptions += 1,
+            EventKind::Finish => {
                 times.finish_ns = time_ns;
                 times.core = Some(event.core);
                 times.runs += 1;
             }
-            What::Ended => times.failed_ns = time_ns,
+            EventKind::Ended => times.failed_ns = time_ns,
             _ => {}
         }
     }
@@ -134,14 +134,14 @@ fn jobs(
     for event in events {
         let of_dag = &mut jobs[event.dag.index()];
         match event.what {
-            What::Due => due_ns[event.dag.index()] = event.time_ns,
-            What::Signalled | What::Dropped => {}
+            EventKind::Due => due_ns[event.dag.index()] = event.time_ns,
+            EventKind::Signalled | EventKind::Dropped => {}
             what if what.is_of_dag() => {}
             _ if is_whole => {
                 let first = task_set.dag(event.dag).first_job();
                 *of_dag = (first, of_dag.1.max(event.job + 1));
             }
-            What::Released => {
+            EventKind::Released => {
                 let model = task_set.dag(event.dag);
                 let release_ns = model.release_ns(event.job, due_ns[event.dag.index()]);
                 if release_ns > oldest_ns {

@@ -20,7 +20,7 @@ use alloc::vec;
 
 use super::Histogram;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
-use crate::journal::{Event, What};
+use crate::journal::{Event, EventKind};
 use crate::task_set::{Dag, TaskSet};
 
 /// The statistics, and the jobs in flight.
@@ -170,16 +170,16 @@ impl Tally {
         let model = self.task_set.dag(event.dag);
         let dag = &mut self.dags[event.dag.index()];
         match event.what {
-            What::Due => {
+            EventKind::Due => {
                 dag.due_ns = event.time_ns;
                 return;
             }
-            What::Released => {
+            EventKind::Released => {
                 let release_ns = model.release_ns(event.job, dag.due_ns);
                 dag.begin(event, release_ns, model.subtasks().len());
                 return;
             }
-            What::Stopped => {
+            EventKind::Stopped => {
                 for job in &mut dag.open {
                     job.is_cut = true;
                 }
@@ -191,7 +191,10 @@ impl Tally {
         let Some(place) = dag.place(event.job) else {
             return;
         };
-        let Some(instance) = event.instance().filter(|_| event.what != What::Restarted) else {
+        let Some(instance) = event
+            .instance()
+            .filter(|_| event.what != EventKind::Restarted)
+        else {
             dag.of_job(place, event.what);
             return;
         };
@@ -233,11 +236,11 @@ impl OfDag {
         self.release_jitter.add(jitter_ns);
     }
 
-    fn of_job(&mut self, place: usize, what: What) {
+    fn of_job(&mut self, place: usize, what: EventKind) {
         let job = &mut self.open[place];
         match what {
-            What::Aborted | What::Restarted => job.is_cut = true,
-            What::Completed => {
+            EventKind::Aborted | EventKind::Restarted => job.is_cut = true,
+            EventKind::Completed => {
                 if !job.is_cut {
                     let response_ns = job.last_finish_ns.saturating_sub(job.release_ns);
                     self.response_time.add(response_ns);
@@ -261,16 +264,16 @@ impl OfDag {
         let instances = &mut self.instances[place * subtasks..][..subtasks];
         let times = &mut instances[instance.subtask.index()];
         match event.what {
-            What::Start => {
+            EventKind::Start => {
                 times.since_ns = event.time_ns;
                 if !model.predecessors(instance.subtask).is_empty() {
                     let latency_ns = event.time_ns.saturating_sub(times.join_ns);
                     statistics.join_latency.add(latency_ns);
                 }
             }
-            What::Resume => times.since_ns = event.time_ns,
-            What::Suspend => times.executed_ns += event.time_ns.saturating_sub(times.since_ns),
-            What::Finish => {
+            EventKind::Resume => times.since_ns = event.time_ns,
+            EventKind::Suspend => times.executed_ns += event.time_ns.saturating_sub(times.since_ns),
+            EventKind::Finish => {
                 let last_ns = event.time_ns.saturating_sub(times.since_ns);
                 let executed_ns = times.executed_ns + last_ns;
                 statistics.execution_time.add(executed_ns);

@@ -14,7 +14,7 @@ use Shown::{At, By};
 
 use super::sweep::{Blame, Stage, Wrong};
 use crate::ids::{CoreId, DagId, Instance, named};
-use crate::journal::{Event, What};
+use crate::journal::{Event, EventKind};
 use crate::task_set::{Subtask, TaskSet};
 use crate::worded;
 use crate::worded::texts;
@@ -97,7 +97,7 @@ worded! {
         StillQueued { event: Event } = "still_queued", (Release, By(event)),
             " although it waits, and no job has ended";
         /// R1: a job was released, queued or skipped once more, or after what excludes it.
-        ReleasedAgain { event: Event, before: What, before_ns: u64 } =
+        ReleasedAgain { event: Event, before: EventKind, before_ns: u64 } =
             "released_again", (Release, By(event)),
             " although it was {before} at {before_ns} ns";
         /// R2: an instance was ready, or started, before one was over that it waits for.
@@ -120,7 +120,7 @@ worded! {
             "{} is never ready although all that it waits for was over at {since_ns} ns on core {}",
             names.instance(*instance), core.0;
         /// R4: a job was aborted, missed or completed once more.
-        EndedAgain { event: Event, before: What, before_ns: u64 } =
+        EndedAgain { event: Event, before: EventKind, before_ns: u64 } =
             "ended_again", (JobCompletion, By(event)),
             " although it was {before} at {before_ns} ns";
         /// R4: a job was completed before one of its instances was over.
@@ -182,7 +182,7 @@ worded! {
         OutOfTurn { event: Event, stage: Stage } = "out_of_turn", (OneLife, By(event)),
             " although it {}", does(*stage);
         /// One life: something happened to an instance before the event that comes first.
-        Backwards { event: Event, before: What, before_ns: u64 } =
+        Backwards { event: Event, before: EventKind, before_ns: u64 } =
             "backwards", (OneLife, By(event)),
             " before its `{before}` at {before_ns} ns, which comes first";
         /// One life: an instance was cancelled of a job that nothing had cut.
@@ -269,11 +269,11 @@ impl Names<'_> {
         fmt::from_fn(move |f| {
             write!(f, "{} ", self.subject(event))?;
             match event.what {
-                What::Start => f.write_str("starts"),
-                What::Suspend => f.write_str("is suspended"),
-                What::Resume => f.write_str("is resumed"),
-                What::Finish => f.write_str("finishes"),
-                What::Restarted => f.write_str("is replaced"),
+                EventKind::Start => f.write_str("starts"),
+                EventKind::Suspend => f.write_str("is suspended"),
+                EventKind::Resume => f.write_str("is resumed"),
+                EventKind::Finish => f.write_str("finishes"),
+                EventKind::Restarted => f.write_str("is replaced"),
                 what => write!(f, "is {what}"),
             }
         })

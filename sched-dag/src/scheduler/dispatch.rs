@@ -58,7 +58,7 @@ use super::key::Key;
 use super::vertices::{Phase, Vertices};
 use super::{OWED, Scheduler};
 use crate::ids::{CoreId, Instance, Vertex};
-use crate::journal::What;
+use crate::journal::EventKind;
 
 /// One change of what a core executes.
 ///
@@ -67,11 +67,11 @@ use crate::journal::What;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[must_use]
 pub struct Decision {
-    /// [`Start`](What::Start) or [`Resume`](What::Resume): the core, idle or just preempted,
+    /// [`Start`](EventKind::Start) or [`Resume`](EventKind::Resume): the core, idle or just preempted,
     /// begins or continues the instance, perhaps one that ran on another core before.
-    /// [`Suspend`](What::Suspend): it gives up the instance, which keeps its progress; the next
+    /// [`Suspend`](EventKind::Suspend): it gives up the instance, which keeps its progress; the next
     /// decision of the dispatch gives it another one.
-    pub what: What,
+    pub what: EventKind,
     /// The core.
     pub core: CoreId,
     /// The instance.
@@ -110,8 +110,8 @@ impl Scheduler {
         let vertex = self.vertices.get_mut(key.vertex());
         let instance = vertex.present_instance();
         let what = match vertex.phase {
-            Phase::Preempted => What::Resume,
-            _ => What::Start,
+            Phase::Preempted => EventKind::Resume,
+            _ => EventKind::Start,
         };
         vertex.phase = Phase::Running(core);
         self.cores.run(core, key, vertex.is_preemptible);
@@ -129,7 +129,7 @@ impl Scheduler {
         vertex.phase = Phase::Preempted;
         let instance = vertex.present_instance();
         self.decisions.push(Decision {
-            what: What::Suspend,
+            what: EventKind::Suspend,
             core,
             instance,
         });
@@ -217,7 +217,8 @@ impl Scheduler {
     fn write_finish(&mut self, core: CoreId, vertex: Vertex, finish_ns: u64) {
         self.log.here = core;
         let instance = self.instance_of(vertex);
-        self.log.on_core(core, What::Finish, finish_ns, instance);
+        self.log
+            .on_core(core, EventKind::Finish, finish_ns, instance);
     }
 
     /// Leaves the instant to be begun again, and the core idle.
@@ -243,7 +244,7 @@ impl Scheduler {
         next.phase = Phase::Running(core);
         self.cores.run(core, key, next.is_preemptible);
         let decision = Decision {
-            what: What::Start,
+            what: EventKind::Start,
             core,
             instance,
         };

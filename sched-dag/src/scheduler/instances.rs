@@ -10,7 +10,7 @@ use super::ready_queue::ReadyQueue;
 use super::vertices::{Phase, Vertex, Vertices};
 use super::{DagPhase, Log, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
-use crate::journal::What;
+use crate::journal::EventKind;
 
 impl Scheduler {
     /// Ends an instance that has started.
@@ -86,7 +86,7 @@ impl Scheduler {
             if vertex.phase == Phase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
                 self.ready.remove(self.ready.key(number, vertex, || job));
-                self.log.of(What::Cancelled, vertex.instance(job));
+                self.log.of(EventKind::Cancelled, vertex.instance(job));
                 vertex.phase = Phase::Absent;
                 self.ending.push(number);
             }
@@ -146,7 +146,7 @@ impl Scheduler {
             let next = vertices.successor(place);
             if let Some(successor) = vertices.arrive(next, sequence) {
                 if is_cut {
-                    log.of(What::Cancelled, successor.instance(job));
+                    log.of(EventKind::Cancelled, successor.instance(job));
                     ending.push(next);
                 } else {
                     line_up(next, successor, job, ready, log);
@@ -170,7 +170,7 @@ impl Scheduler {
             let jobs = &self.dags[vertex.dag.index()].jobs;
             let job = jobs.job(vertex.progress);
             if job.cut.is_some() {
-                self.log.of(What::Cancelled, vertex.instance(job));
+                self.log.of(EventKind::Cancelled, vertex.instance(job));
                 self.ending.push(number);
             } else {
                 line_up(number, vertex, job, &mut self.ready, &mut self.log);
@@ -205,7 +205,7 @@ impl Scheduler {
         state.jobs.end_oldest();
         let has_limit = self.task_set.dag(dag).jobs().is_some();
         self.log.jobs_ended += u64::from(has_limit);
-        self.log.of_job(What::Completed, dag, job.number, None);
+        self.log.of_job(EventKind::Completed, dag, job.number, None);
         self.set_timer(dag);
     }
 
@@ -236,5 +236,5 @@ pub(super) fn line_up(
     vertex.phase = Phase::Ready;
     vertex.job = job.number;
     ready.insert(ready.key(number, vertex, || job));
-    log.of(What::Ready, vertex.instance(job));
+    log.of(EventKind::Ready, vertex.instance(job));
 }

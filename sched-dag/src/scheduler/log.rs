@@ -7,7 +7,7 @@
 use alloc::vec::Vec;
 
 use crate::ids::{CoreId, DagId, Instance};
-use crate::journal::{Event, Subject, What};
+use crate::journal::{Event, EventKind, EventSubject};
 use crate::kept::Journal;
 
 /// An event that a driver acts on, with a time that the journal has no room for.
@@ -30,7 +30,7 @@ pub struct Log {
     has_job_event: bool,
     /// Jobs of DAGs with a limit that have ended.
     pub jobs_ended: u64,
-    /// By bits of [`What`], which events are kept as notices.
+    /// By bits of [`EventKind`], which events are kept as notices.
     heard: u32,
     /// How many notices one event may come to; there is room for twice as many.
     most_at_once: usize,
@@ -59,7 +59,7 @@ impl Log {
     /// brings about so many at most. Returns how many there is room for.
     pub(super) fn hear(
         &mut self,
-        kinds: impl IntoIterator<Item = What>,
+        kinds: impl IntoIterator<Item = EventKind>,
         most_at_once: usize,
     ) -> usize {
         self.heard = kinds.into_iter().fold(0, |heard, what| heard | bit(what));
@@ -103,51 +103,55 @@ impl Log {
 
     /// Writes down what a core does with an instance.
     #[inline]
-    pub fn on_core(&mut self, core: CoreId, what: What, time_ns: u64, instance: Instance) {
-        (self.journal).write(core, what, time_ns, Subject::of(instance));
+    pub fn on_core(&mut self, core: CoreId, what: EventKind, time_ns: u64, instance: Instance) {
+        (self.journal).write(core, what, time_ns, EventSubject::of(instance));
     }
 
     /// Writes down what the core that makes this step has done with an instance.
     #[inline]
-    pub(super) fn on_this(&mut self, what: What, time_ns: u64, instance: Instance) {
+    pub(super) fn on_this(&mut self, what: EventKind, time_ns: u64, instance: Instance) {
         self.on_core(self.here, what, time_ns, instance);
     }
 
     /// Writes down what has happened to an instance, at this instant.
     #[inline]
-    pub(super) fn of(&mut self, what: What, instance: Instance) {
-        self.write(what, self.now_ns, Subject::of(instance));
-        self.notify(what, Subject::of(instance), None);
+    pub(super) fn of(&mut self, what: EventKind, instance: Instance) {
+        self.write(what, self.now_ns, EventSubject::of(instance));
+        self.notify(what, EventSubject::of(instance), None);
     }
 
     /// Does the same of a job as a whole, or of a DAG, and says when that was due or late.
     #[inline]
-    pub(super) fn of_job(&mut self, what: What, dag: DagId, job: u64, at_ns: Option<u64>) {
+    pub(super) fn of_job(&mut self, what: EventKind, dag: DagId, job: u64, at_ns: Option<u64>) {
         self.has_job_event = true;
-        self.write(what, self.now_ns, Subject::of_job(dag, job));
-        self.notify(what, Subject::of_job(dag, job), at_ns);
+        self.write(what, self.now_ns, EventSubject::of_job(dag, job));
+        self.notify(what, EventSubject::of_job(dag, job), at_ns);
     }
 
     /// Does the same of a DAG.
     #[inline]
-    pub(super) fn of_dag(&mut self, what: What, dag: DagId) {
+    pub(super) fn of_dag(&mut self, what: EventKind, dag: DagId) {
         self.of_job(what, dag, 0, None);
     }
 
     /// Writes down that a sporadic DAG's job was due then, right before its release.
     #[inline]
     pub(super) fn due(&mut self, dag: DagId, job: u64, release_ns: u64) {
-        self.write(What::Due, release_ns, Subject::of_job(dag, job));
-        self.notify(What::Due, Subject::of_job(dag, job), Some(release_ns));
+        self.write(EventKind::Due, release_ns, EventSubject::of_job(dag, job));
+        self.notify(
+            EventKind::Due,
+            EventSubject::of_job(dag, job),
+            Some(release_ns),
+        );
     }
 
     #[inline]
-    fn write(&mut self, what: What, time_ns: u64, subject: Subject) {
+    fn write(&mut self, what: EventKind, time_ns: u64, subject: EventSubject) {
         self.journal.write(self.here, what, time_ns, subject);
     }
 
     #[inline]
-    fn notify(&mut self, what: What, subject: Subject, at_ns: Option<u64>) {
+    fn notify(&mut self, what: EventKind, subject: EventSubject, at_ns: Option<u64>) {
         if self.heard & bit(what) != 0 {
             self.keep(what, subject, at_ns);
         }
@@ -155,7 +159,7 @@ impl Log {
 
     #[cold]
     #[inline(never)]
-    fn keep(&mut self, what: What, subject: Subject, at_ns: Option<u64>) {
+    fn keep(&mut self, what: EventKind, subject: EventSubject, at_ns: Option<u64>) {
         let words = Event::words(self.now_ns, what, self.here, subject);
         let event = Event::unpack(words);
         (self.notices).extend(event.map(|event| Notice { event, at_ns }));
@@ -163,6 +167,6 @@ impl Log {
 }
 
 #[inline]
-const fn bit(what: What) -> u32 {
+const fn bit(what: EventKind) -> u32 {
     1 << what as u32
 }

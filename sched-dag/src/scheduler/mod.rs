@@ -54,7 +54,7 @@ use alloc::vec::Vec;
 use core::hash::{Hash, Hasher};
 
 use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
-use crate::journal::What;
+use crate::journal::EventKind;
 use crate::policy::SchedulerOptions;
 use crate::scheduler::dispatch::Cores;
 use crate::scheduler::jobs::Jobs;
@@ -195,7 +195,7 @@ impl Scheduler {
 
     /// Has events of these kinds kept as [notices](Log::has_notices), and returns how many there is
     /// room for.
-    pub fn hear(&mut self, kinds: impl IntoIterator<Item = What>) -> usize {
+    pub fn hear(&mut self, kinds: impl IntoIterator<Item = EventKind>) -> usize {
         // At one instant a DAG's end may skip and cancel all that it has, and a change of mode
         // each other DAG's waiting job.
         let of_dag = |dag: &Dag| dag.slots() * (dag.subtasks().len() + 4);

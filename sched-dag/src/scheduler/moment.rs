@@ -2,7 +2,7 @@
 
 use super::{Decision, Scheduler};
 use crate::ids::{CoreId, DagId, Instance, ModeId, to_u32};
-use crate::journal::What;
+use crate::journal::EventKind;
 use crate::request::Request;
 
 /// One instant, in which completions are still taken.
@@ -54,7 +54,7 @@ impl<'s> Moment<'s> {
     pub fn complete(&mut self, instance: Instance) {
         self.scheduler
             .log
-            .on_this(What::Finish, self.told_ns, instance);
+            .on_this(EventKind::Finish, self.told_ns, instance);
         self.scheduler.finish(instance);
     }
 
@@ -75,14 +75,14 @@ impl<'s> Moment<'s> {
     pub fn fail(&mut self, instance: Instance) {
         self.scheduler
             .log
-            .on_this(What::Ended, self.told_ns, instance);
+            .on_this(EventKind::Ended, self.told_ns, instance);
         self.scheduler.fail(instance);
     }
 
     /// Takes note that an instance has ended by a fault, and that the driver has another
     /// function for its subtask. If the DAG [survives](crate::FaultLimit) the fault, only
     /// the instance's job is cut, and the subtask is
-    /// [restarted](What::Restarted); else the DAG is ended, as by
+    /// [restarted](EventKind::Restarted); else the DAG is ended, as by
     /// [`fail`](Self::fail). (The module `phase` states the rules.)
     ///
     /// # Panics
@@ -92,7 +92,7 @@ impl<'s> Moment<'s> {
     pub fn fail_replaceable(&mut self, instance: Instance) {
         self.scheduler
             .log
-            .on_this(What::Ended, self.told_ns, instance);
+            .on_this(EventKind::Ended, self.told_ns, instance);
         self.scheduler.fail_replaceable(instance);
     }
 
@@ -126,7 +126,7 @@ impl<'s> Moment<'s> {
     #[inline]
     pub fn entered(&mut self, mode: ModeId) {
         let job = u64::from(mode.0);
-        (self.scheduler.log).of_job(What::Entered, DagId(0), job, None);
+        (self.scheduler.log).of_job(EventKind::Entered, DagId(0), job, None);
     }
 
     /// Makes a core, if it is idle, the first that is given an instance, instead of the one that

@@ -41,7 +41,7 @@
 
 use super::Scheduler;
 use crate::ids::DagId;
-use crate::journal::What;
+use crate::journal::EventKind;
 use crate::policy::OverrunPolicy;
 
 impl Scheduler {
@@ -88,7 +88,8 @@ impl Scheduler {
         }
         if self.is_waiting(dag, job) {
             self.dags[dag.index()].statistics.queued += 1;
-            self.log.of_job(What::Queued, dag, job, Some(release_ns));
+            self.log
+                .of_job(EventKind::Queued, dag, job, Some(release_ns));
         }
     }
 
@@ -116,7 +117,7 @@ impl Scheduler {
             if is_sporadic {
                 self.log.due(dag, job, release_ns);
             }
-            (self.log).of_job(What::Released, dag, job, Some(release_ns));
+            (self.log).of_job(EventKind::Released, dag, job, Some(release_ns));
             self.release_sources(dag, sequence);
         }
     }
@@ -130,7 +131,7 @@ impl Scheduler {
         };
         state.statistics.aborts += 1;
         let job = state.jobs.job(sequence).number;
-        self.log.of_job(What::Aborted, dag, job, None);
+        self.log.of_job(EventKind::Aborted, dag, job, None);
         self.cancel_ready(dag, sequence);
     }
 
@@ -139,6 +140,7 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         let (job, release_ns) = state.jobs.skip_waiting(self.task_set.dag(dag));
         state.statistics.skips += 1;
-        self.log.of_job(What::Skipped, dag, job, Some(release_ns));
+        self.log
+            .of_job(EventKind::Skipped, dag, job, Some(release_ns));
     }
 }

@@ -110,7 +110,7 @@ use alloc::vec;
 
 use super::{DagStatistics, Scheduler};
 use crate::ids::{DagId, Instance};
-use crate::journal::What;
+use crate::journal::EventKind;
 use crate::policy::{JobOutcome, OnFault};
 
 /// A phase of a DAG's life. A DAG is paused and goes on any number of times; it never comes back
@@ -222,7 +222,7 @@ impl Scheduler {
         self.judge(dag, None);
         let phase = &mut self.dags[dag.index()].jobs.phase;
         if core::mem::replace(phase, DagPhase::Paused) != DagPhase::Paused {
-            self.log.of_dag(What::Off, dag);
+            self.log.of_dag(EventKind::Off, dag);
         }
         self.skip_waiting(dag);
     }
@@ -234,7 +234,7 @@ impl Scheduler {
         if state.jobs.phase == DagPhase::Paused {
             state.jobs.phase = DagPhase::Running;
             state.resumed_ns = self.log.now_ns;
-            self.log.of_dag(What::On, dag);
+            self.log.of_dag(EventKind::On, dag);
         }
     }
 
@@ -246,7 +246,7 @@ impl Scheduler {
         }
         self.judge(dag, None);
         self.dags[dag.index()].jobs.close(DagPhase::Closed);
-        self.log.of_dag(What::Closed, dag);
+        self.log.of_dag(EventKind::Closed, dag);
         self.skip_waiting(dag);
     }
 
@@ -273,7 +273,7 @@ impl Scheduler {
         state.statistics.cut_short += cut_short;
         state.statistics.dropped += dropped;
         self.set_timer(dag);
-        self.log.of_dag(What::Stopped, dag);
+        self.log.of_dag(EventKind::Stopped, dag);
         self.cancel_ready(dag, u64::MAX);
     }
 
@@ -362,7 +362,7 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         state.statistics.faults += 1;
         state.statistics.restarts += 1;
-        self.log.of(What::Restarted, instance);
+        self.log.of(EventKind::Restarted, instance);
         if state.jobs.cut(sequence, JobOutcome::Failed) {
             state.statistics.failed += 1;
             self.cancel_ready(dag, sequence);

@@ -26,7 +26,7 @@
 
 use super::Scheduler;
 use crate::ids::DagId;
-use crate::journal::What;
+use crate::journal::EventKind;
 
 impl Scheduler {
     /// Takes a signal to a sporadic DAG.
@@ -50,8 +50,8 @@ impl Scheduler {
             state.statistics.dropped_signals += 1;
         }
         let what = match release_ns {
-            Some(_) => What::Signalled,
-            None => What::Dropped,
+            Some(_) => EventKind::Signalled,
+            None => EventKind::Dropped,
         };
         self.log.of_job(what, dag, job, release_ns);
         self.set_timer(dag);

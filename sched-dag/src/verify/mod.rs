@@ -25,7 +25,7 @@ use core::borrow::Borrow;
 use core::fmt;
 
 use crate::order::sorted_by_key;
-use crate::policy::{Clusters, Policy};
+use crate::policy::{CoreDivision, Policy};
 use crate::spec::DagSpec;
 use crate::task_set::TaskSet;
 
@@ -226,7 +226,7 @@ pub struct CommitOptions {
     /// The number of cores that the scheduler will serve, at least 1.
     pub cores: u32,
     /// How these are divided.
-    pub clusters: Clusters,
+    pub clusters: CoreDivision,
     /// Which shapes of graph are wanted.
     pub construction: ConstructionPolicy,
     /// The most instances that the jobs in flight of all DAGs may have: the sum
@@ -270,7 +270,7 @@ impl CommitOptions {
         Self {
             policy,
             cores,
-            clusters: Clusters::Undivided,
+            clusters: CoreDivision::Undivided,
             construction: ConstructionPolicy::paper(),
             instance_limit: 1 << 20,
         }
@@ -285,7 +285,7 @@ impl CommitOptions {
 
     /// Returns the same options with the cores divided.
     #[must_use]
-    pub fn with_clusters(mut self, clusters: Clusters) -> Self {
+    pub fn with_clusters(mut self, clusters: CoreDivision) -> Self {
         self.clusters = clusters;
         self
     }

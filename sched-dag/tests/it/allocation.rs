@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::counting::allocated;
 use common::random::Random;
-use sched_dag::virtual_time::{End, VirtualTime, Workload};
+use sched_dag::virtual_time::{RunOutcome, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, DagStatistics, Instance, OverrunPolicy,
     Policy, Preemption, SchedulerOptions, SubtaskSpec, verify,
@@ -66,7 +66,7 @@ fn run(seed: u64, policy: Policy, preemption: Preemption, may_fail: bool) -> [Da
     let end = run.run(&mut work);
     let allocated = allocated().0 - before;
 
-    assert_eq!(end, End::Finished);
+    assert_eq!(end, RunOutcome::Finished);
     assert_eq!(allocated, 0, "seed {seed}, {policy:?} {preemption:?}");
     [0, 1, 2].map(|dag| *run.scheduler_of(DagId(dag)).statistics(DagId(dag)))
 }

@@ -7,7 +7,7 @@
 
 use std::panic::catch_unwind;
 
-use sched_dag::virtual_time::{End, ExecutionTimes};
+use sched_dag::virtual_time::{ExecutionTimes, RunOutcome};
 use sched_dag::{DagSpec, OverrunPolicy, Policy};
 
 use crate::support::hand::Hand;
@@ -55,7 +55,7 @@ fn an_instance_that_cannot_end_before_the_end_of_time_says_so() {
     let spec = dag(1, 4, 1, &[0], &[]).offset(u64::MAX - 5);
     let mut run = driver(&[spec], PREEMPTIVE);
     let end = run.run(&mut ExecutionTimes(|_| 6));
-    assert_eq!(end, End::TimeOverflow(instance(0, 0, 0)));
+    assert_eq!(end, RunOutcome::TimeOverflow(instance(0, 0, 0)));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Chains on a journal by hand: which there are, and their times as they are computed by hand.
 
-use sched_dag::chains::{Chain, Latencies, SampledJobs, Sampling};
+use sched_dag::chains::{Chain, ChainLatencies, SampledEdge, SampledJobs};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, SubtaskId, SubtaskSpec,
     TaskSet, verify,
@@ -10,7 +10,7 @@ use crate::support::events::events;
 
 /// `camera` (period 100, `expose` before `detect`), `plan` (period 60), `motor` (period 20):
 /// `plan` samples what `detect` writes, `motor/drive` what `plan` writes.
-fn model() -> (TaskSet, [Sampling; 2]) {
+fn model() -> (TaskSet, [SampledEdge; 2]) {
     let subtask = |name: &str| SubtaskSpec {
         name: name.into(),
         wcet_ns: Some(10),
@@ -40,8 +40,8 @@ fn model() -> (TaskSet, [Sampling; 2]) {
     (verified.task_set, samplings)
 }
 
-fn sampling(writer: (DagId, SubtaskId), reader: (DagId, SubtaskId)) -> Sampling {
-    Sampling { writer, reader }
+fn sampling(writer: (DagId, SubtaskId), reader: (DagId, SubtaskId)) -> SampledEdge {
+    SampledEdge { writer, reader }
 }
 
 fn place(dag: u32, subtask: u32) -> (DagId, SubtaskId) {
@@ -94,7 +94,7 @@ fn the_times_of_a_small_run_are_those_computed_by_hand() {
     let expected = ["camera/expose", "camera/detect", "plan/plan", "motor/drive"];
     assert_eq!(names, expected);
     let latencies = chain.latencies(&task_set, events(RUN).iter().copied());
-    let expected = Latencies {
+    let expected = ChainLatencies {
         // The outputs at 12 and 64 go back to no image: `plan` 0 had found none. Those at 82, 103
         // and 143 go back to the image of 0, that at 204 to the one of 100.
         output_age_ns: vec![82, 103, 143, 104],
@@ -153,7 +153,7 @@ fn chains_between_two_subtasks_are_found_by_name_and_pass_no_dag_twice() {
     let find = |name| Chain::place(&task_set, name).expect(name);
     assert_eq!(find("camera/1"), place(0, 1));
     assert_eq!(Chain::place(&task_set, "camera/focus"), None);
-    let ways = |samplings: &[Sampling], from, to| {
+    let ways = |samplings: &[SampledEdge], from, to| {
         Chain::between(&task_set, samplings, find(from), find(to)).len()
     };
     assert_eq!(ways(&samplings, "camera/detect", "motor/drive"), 1);

@@ -10,14 +10,14 @@ use sched_dag::analysis::{self, Answer, Overheads, Reason, Settings};
 use sched_dag::journal::Event;
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
-    ClusterId, Clusters, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, Instance,
+    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, CoreId, DagId, DagSpec, Instance,
     Policy, SchedulerOptions, SubtaskId, TaskSet, verify,
 };
 
 use crate::support::set::{self, Set};
 use crate::support::{self, Script, Spec, TWO_CORES, number};
 
-fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: Clusters) -> Arc<TaskSet> {
+fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: CoreDivision) -> Arc<TaskSet> {
     let options = CommitOptions::new(options.policy, options.cores)
         .with_construction(ConstructionPolicy::any_graph())
         .with_clusters(clusters);
@@ -63,7 +63,7 @@ fn a_cluster_runs_as_if_it_were_alone() {
             spec.cluster = Some(ClusterId(cluster));
         }
         let all: Vec<u32> = (0..).take(specs.len()).collect();
-        let divided = commit(&specs, set.options, Clusters::Of(sizes.clone()));
+        let divided = commit(&specs, set.options, CoreDivision::Of(sizes.clone()));
         let together = events(&set, &divided, set.options.cores, &all);
         let mut first = 0;
         for (cluster, &cores) in (0..).map(ClusterId).zip(&sizes) {
@@ -75,7 +75,7 @@ fn a_cluster_runs_as_if_it_were_alone() {
                     let spec = |dag: &u32| specs[*dag as usize].clone();
                     let apart = |spec: DagSpec| spec.with(|spec| spec.cluster = None);
                     let specs: Vec<DagSpec> = here.iter().map(spec).map(apart).collect();
-                    let task_set = commit(&specs, set.options, Clusters::Undivided);
+                    let task_set = commit(&specs, set.options, CoreDivision::Undivided);
                     events(&set, &task_set, cores, &here)
                 }
             };
@@ -117,7 +117,7 @@ fn answer(specs: &[DagSpec]) -> (Answer, String) {
         cores: EDF.cores,
         overheads: Overheads::default(),
     };
-    let task_set = commit(specs, EDF, Clusters::Of(vec![1, 1]));
+    let task_set = commit(specs, EDF, CoreDivision::Of(vec![1, 1]));
     let answer = analysis::answer(&task_set, &settings);
     (answer, analysis::witness(&task_set, &settings))
 }
@@ -149,7 +149,7 @@ fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
 fn an_undivided_machine_is_cluster_0() {
     let mut dag = support::dag(10, 10, 1, &[1], &[]);
     dag.cluster = Some(ClusterId(0));
-    let task_set = commit(&[dag], EDF, Clusters::Undivided);
+    let task_set = commit(&[dag], EDF, CoreDivision::Undivided);
     assert!(!task_set.is_divided());
     assert_eq!(task_set.clusters().collect::<Vec<_>>(), [ClusterId(0)]);
     assert_eq!(task_set.cores_of(ClusterId(0), 2), 0..2);

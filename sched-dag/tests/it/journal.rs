@@ -5,7 +5,7 @@
 //! rules journal`.
 
 use common::random::Random;
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::{
     Histogram, InstanceRecord, JobRecord, Record, Tally, Terms, Violation, dispatch_violations,
     violations,
@@ -78,15 +78,15 @@ fn the_latest_events_have_the_latest_jobs_whole() {
 }
 
 /// What must not be missing, whatever the run.
-const NEEDED: [What; 8] = [
-    What::Released,
-    What::Ready,
-    What::Cancelled,
-    What::Start,
-    What::Suspend,
-    What::Resume,
-    What::Finish,
-    What::Completed,
+const NEEDED: [EventKind; 8] = [
+    EventKind::Released,
+    EventKind::Ready,
+    EventKind::Cancelled,
+    EventKind::Start,
+    EventKind::Suspend,
+    EventKind::Resume,
+    EventKind::Finish,
+    EventKind::Completed,
 ];
 
 #[test]
@@ -112,14 +112,14 @@ fn a_journal_with_one_event_changed_breaks_a_rule() {
             let next = run.events[place + 1..].iter().position(is_next);
             let next = next.filter(|_| event.instance().is_some());
             let next = next.map(|next| place + 1 + next);
-            let next_is = |what: What| next.is_some_and(|next| run.events[next].what == what);
+            let next_is = |what: EventKind| next.is_some_and(|next| run.events[next].what == what);
             // An instance may be cancelled without having been ready.
-            if event.what != What::Ready || !next_is(What::Cancelled) {
+            if event.what != EventKind::Ready || !next_is(EventKind::Cancelled) {
                 objects(0, event, &|events| _ = events.remove(place));
             }
             objects(1, event, &|events| events.insert(place, *event));
             // How long an instance executes, no rule says.
-            if !matches!(event.what, What::Cancelled | What::Finish) {
+            if !matches!(event.what, EventKind::Cancelled | EventKind::Finish) {
                 objects(2, event, &|events| events[place].time_ns += 1);
                 if event.time_ns > 0 {
                     objects(3, event, &|events| events[place].time_ns -= 1);
@@ -216,7 +216,7 @@ fn the_law_accepts_what_is_survived_and_nothing_else() {
     }
     // A subtask goes on without having failed.
     let mut lie = run.events.clone();
-    lie.retain(|event| event.what != What::Ended);
+    lie.retain(|event| event.what != EventKind::Ended);
     assert!(!breaches(right, &lie).is_empty());
 }
 

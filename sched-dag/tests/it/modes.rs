@@ -5,21 +5,21 @@
 use std::collections::BTreeSet;
 
 use common::random::Random;
-use sched_dag::journal::{Event, What};
-use sched_dag::lifecycle::{Changes, Entry, Lifecycle, Request};
+use sched_dag::journal::{Event, EventKind};
+use sched_dag::lifecycle::{Lifecycle, LifecyclePlan, ModeEntry, Request};
 use sched_dag::{DagId, DagSpec, ModeId};
 
 use crate::support::{Run, Script, Spec, TWO_CORES, Takes, dag, driver, number};
 
 /// Runs all jobs of DAGs on two cores.
-fn run(specs: &[DagSpec], lifecycle: Changes, script: Script<'_, impl Takes>) -> Run {
+fn run(specs: &[DagSpec], lifecycle: LifecyclePlan, script: Script<'_, impl Takes>) -> Run {
     let in_virtual_time = driver(specs, TWO_CORES);
     let run = script.run(in_virtual_time.with_lifecycle(Some(Box::new(lifecycle))));
     assert!(run.driver.is_finished());
     run
 }
 
-fn enter(mode: u32, entry: Entry) -> Request {
+fn enter(mode: u32, entry: ModeEntry) -> Request {
     Request::Enter(ModeId(mode), entry)
 }
 
@@ -27,9 +27,12 @@ fn enter(mode: u32, entry: Entry) -> Request {
 fn m7_a_dag_that_is_left_alone_is_neither_paused_nor_waited_for() {
     let ticking = || dag(100, 300, 4, &[1], &[]);
     let modes = vec![vec![DagId(0)], vec![DagId(1)]];
-    let mut lifecycle = Changes::new(2, true).with_modes(modes);
+    let mut lifecycle = LifecyclePlan::new(2, true).with_modes(modes);
     lifecycle.leave_alone(DagId(0));
-    let requests = [(110, enter(1, Entry::WhenIdle)), (250, Request::ShutDown)];
+    let requests = [
+        (110, enter(1, ModeEntry::WhenIdle)),
+        (250, Request::ShutDown),
+    ];
     let script = Script::new(50).asking(requests);
     run(&[ticking(), ticking()], lifecycle, script).must_be(
         "0 off 1, entered 0, skipped 1.0
@@ -40,7 +43,7 @@ fn m7_a_dag_that_is_left_alone_is_neither_paused_nor_waited_for() {
 }
 
 /// A change, and of which DAG or to which mode.
-type Change = (What, u32);
+type Change = (EventKind, u32);
 
 struct Rules {
     modes: Vec<u32>,
@@ -55,9 +58,9 @@ impl Rules {
     }
 
     /// Turns those DAGs on or off that are not, and says so.
-    fn turn(&mut self, what: What, dags: u32, said: &mut Vec<Change>) {
+    fn turn(&mut self, what: EventKind, dags: u32, said: &mut Vec<Change>) {
         let turning = match what {
-            What::Off => dags & !self.is_off,
+            EventKind::Off => dags & !self.is_off,
             _ => dags & self.is_off,
         };
         self.is_off ^= turning;
@@ -69,9 +72,9 @@ impl Rules {
         let leaving = self.all() & !self.modes[mode];
         let is_idle = (0..8).all(|dag| leaving & (1 << dag) == 0 || self.in_flight[dag] == 0);
         if at_once || is_idle {
-            self.turn(What::Off, leaving, said);
-            self.turn(What::On, self.modes[mode], said);
-            said.push((What::Entered, u32::try_from(mode).expect("few modes")));
+            self.turn(EventKind::Off, leaving, said);
+            self.turn(EventKind::On, self.modes[mode], said);
+            said.push((EventKind::Entered, u32::try_from(mode).expect("few modes")));
             self.pending = None;
         }
     }
@@ -80,11 +83,11 @@ impl Rules {
         match request {
             Request::Enter(mode, entry) => {
                 self.pending = Some(mode.index());
-                self.turn(What::Off, self.all() & !self.modes[mode.index()], said);
-                self.look(entry == Entry::AtOnce, said);
+                self.turn(EventKind::Off, self.all() & !self.modes[mode.index()], said);
+                self.look(entry == ModeEntry::AtOnce, said);
             }
-            Request::Pause(dag) => self.turn(What::Off, 1 << dag.0, said),
-            Request::Resume(dag) => self.turn(What::On, 1 << dag.0, said),
+            Request::Pause(dag) => self.turn(EventKind::Off, 1 << dag.0, said),
+            Request::Resume(dag) => self.turn(EventKind::On, 1 << dag.0, said),
             _ => unreachable!("not asked for"),
         }
     }
@@ -93,16 +96,18 @@ impl Rules {
 /// Holds a run against the rules, instant by instant: what completes comes first, then what is
 /// asked for, then what is released.
 fn compare(run: &Run, requests: &[(u64, Request)], mut rules: Rules) {
-    let is_change = |what| matches!(what, What::Off | What::On | What::Entered);
-    let is_release = |what| matches!(what, What::Released | What::Skipped);
+    let is_change = |what| matches!(what, EventKind::Off | EventKind::On | EventKind::Entered);
+    let is_release = |what| matches!(what, EventKind::Released | EventKind::Skipped);
     let of_events = run.events.iter().map(|event| event.time_ns);
     let times_ns = of_events.chain(requests.iter().map(|(at_ns, _)| *at_ns));
     let times_ns: BTreeSet<u64> = times_ns.collect();
     let mut expected = Vec::new();
-    rules.ask(enter(0, Entry::AtOnce), &mut expected);
+    rules.ask(enter(0, ModeEntry::AtOnce), &mut expected);
     for now_ns in times_ns {
         let here = run.events.iter().filter(|event| event.time_ns == now_ns);
-        let completed = here.clone().filter(|event| event.what == What::Completed);
+        let completed = here
+            .clone()
+            .filter(|event| event.what == EventKind::Completed);
         completed.for_each(|event| rules.in_flight[event.dag.index()] -= 1);
         rules.look(false, &mut expected);
         for (_, request) in requests.iter().filter(|(at_ns, _)| *at_ns == now_ns) {
@@ -113,14 +118,14 @@ fn compare(run: &Run, requests: &[(u64, Request)], mut rules: Rules) {
             told.clone().partition(|event| is_change(event.what));
         assert!(told.is_sorted_by_key(|event| is_release(event.what)));
         let changed = changes.iter().map(|event| match event.what {
-            What::Entered => (event.what, u32::try_from(event.job).expect("few modes")),
+            EventKind::Entered => (event.what, u32::try_from(event.job).expect("few modes")),
             what => (what, event.dag.0),
         });
         let changed: Vec<Change> = changed.collect();
         assert_eq!(changed, std::mem::take(&mut expected), "at {now_ns}");
         for event in releases {
             let is_off = rules.is_off & (1 << event.dag.0) != 0;
-            assert_eq!(is_off, event.what == What::Skipped, "{event:?}");
+            assert_eq!(is_off, event.what == EventKind::Skipped, "{event:?}");
             rules.in_flight[event.dag.index()] += u32::from(!is_off);
         }
     }
@@ -142,8 +147,8 @@ fn requests(random: &mut Random, dags: u32, modes: u32) -> Vec<(u64, Request)> {
         let request = match random.within(0..=9) {
             0 => Request::Pause(dag),
             1 => Request::Resume(dag),
-            2..=4 => enter(mode, Entry::AtOnce),
-            _ => enter(mode, Entry::WhenIdle),
+            2..=4 => enter(mode, ModeEntry::AtOnce),
+            _ => enter(mode, ModeEntry::WhenIdle),
         };
         (at_ns, request)
     };
@@ -169,11 +174,13 @@ fn random_modes_are_entered_as_the_rules_say() {
             .collect();
         let requests = requests(&mut random, dags, count);
         let lists = modes.iter().copied().map(listed).collect();
-        let lifecycle = Changes::new(dags, false).with_modes(lists);
+        let lifecycle = LifecyclePlan::new(dags, false).with_modes(lists);
         let script = Script::new(|_| random.within(1..=70)).asking(requests.iter().copied());
         let run = run(&specs, lifecycle, script);
         let events = run.events.iter();
-        entered += events.filter(|event| event.what == What::Entered).count();
+        entered += events
+            .filter(|event| event.what == EventKind::Entered)
+            .count();
         let rules = Rules {
             modes,
             is_off: 0,

@@ -17,7 +17,7 @@ use std::thread;
 use std::time::Duration;
 
 use sched_dag::DagId;
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 
 use crate::options::{Command, Parsed, Takes, options};
 use crate::outcome::{self, Outcome};
@@ -361,8 +361,8 @@ fn fate(run: &Run, dag: DagId) -> String {
         true => "Clusters",
         false => "Together",
     };
-    let kinds = [What::Ended, What::Restarted, What::Off].into_iter();
-    let had = |what: &What| (run.events.iter()).any(|it| it.dag == dag && it.what == *what);
+    let kinds = [EventKind::Ended, EventKind::Restarted, EventKind::Off].into_iter();
+    let had = |what: &EventKind| (run.events.iter()).any(|it| it.dag == dag && it.what == *what);
     let happened: String = (kinds.filter(had)).map(|what| format!(" {what}")).collect();
     format!("{policy:?} {overrun:?} {cores}{happened}")
 }

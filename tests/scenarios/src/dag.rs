@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use alloc::{format, vec};
 use core::time::Duration;
 
-use fass::{FaultLimit, Order, OverrunPolicy};
+use fass::{FaultLimit, OverrunPolicy, SubtaskOrder};
 
 use crate::number;
 
@@ -25,7 +25,7 @@ pub struct DagText {
     pub(crate) jobs: u64,
     pub(crate) in_flight: Option<u32>,
     pub(crate) overrun: OverrunPolicy,
-    pub(crate) order: Order,
+    pub(crate) order: SubtaskOrder,
     pub(crate) survives: Option<FaultLimit>,
     pub(crate) cluster: Option<u32>,
     pub(crate) is_paused: bool,
@@ -132,7 +132,7 @@ impl DagText {
                         _ => OverrunPolicy::Queue,
                     }
                 }
-                "order" => dag.order = value(words).map(|_| Order::Fixed)?,
+                "order" => dag.order = value(words).map(|_| SubtaskOrder::Fixed)?,
                 "survives" => {
                     let limit: Vec<u64> = numbers(words)?;
                     let [faults, window, in_all] = limit[..] else {

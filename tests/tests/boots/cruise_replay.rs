@@ -6,7 +6,7 @@ use std::time::Duration;
 use cruise::{Releases, build, careful};
 use fass::{Wire, finish_create_dags};
 use harness::Guest;
-use recording::{Recording, What};
+use recording::{EntryKind, Recording};
 use tool::{recordings, system};
 use virtual_time::VirtualTime;
 
@@ -42,7 +42,7 @@ fn a_sporadic_dag_is_replayed_without_its_packets_on_the_machine_and_on_the_host
     let recording = Recording::read(&bytes).expect("it is whole");
     let signals = recording
         .entries()
-        .filter(|entry| entry.what == What::Signal);
+        .filter(|entry| entry.what == EntryKind::Signal);
     let signals = signals.count() as u64;
     assert!(
         signals > 3 && wanted.lines().count() as u64 == signals,

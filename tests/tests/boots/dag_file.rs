@@ -45,7 +45,7 @@ fn generated(name: &str) -> String {
         unit_ns: 1_000_000,
         graph: None,
         cores: 4,
-        clusters: sched_dag::Clusters::Undivided,
+        clusters: sched_dag::CoreDivision::Undivided,
         length: Length::Jobs(20),
     };
     load(&path, &import).expect("it is well formed").to_string()

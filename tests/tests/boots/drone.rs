@@ -1,7 +1,7 @@
 //! The drone on one core and on several.
 
 use harness::{Guest, Members, Said, lawful_runs};
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use tool::record::bound::COUNTED_NS;
 
 /// Describes the drone on two cores.
@@ -55,7 +55,7 @@ fn a_reserve_that_is_set_at_boot_sends_it_down_early_in_the_mode_of_the_landing(
     assert!(line.number("descents") >= 10, "{}", line.text);
     let runs = lawful_runs(&outcome, COUNTED_NS);
     let entered = runs[0].events.iter();
-    let entered = entered.filter(|event| event.what == What::Entered);
+    let entered = entered.filter(|event| event.what == EventKind::Entered);
     let modes: Vec<u64> = entered.map(|event| event.job).collect();
     assert_eq!(modes, [0, 1]);
 }

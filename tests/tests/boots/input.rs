@@ -1,7 +1,7 @@
 //! Bytes from the serial port release a DAG.
 
 use harness::{Guest, Members, Said};
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 use tool::trace;
 
 // A text ends its line: two bytes. The second comes early and is kept. Both come while jobs run:
@@ -27,6 +27,6 @@ fn what_comes_before_time_0_releases_nothing_yet() {
     assert_eq!(outcome.lines("fault").len(), 0);
     let runs = trace::read(&outcome.serial).expect("its events are there");
     let mut events = runs.iter().flat_map(|run| &run.events);
-    let is_early = |event: &Event| (event.time_ns, event.what) == (0, What::Signalled);
+    let is_early = |event: &Event| (event.time_ns, event.what) == (0, EventKind::Signalled);
     assert!(events.any(is_early), "the byte came late");
 }

@@ -3,7 +3,7 @@
 //! AVX they use it; where it is off they are told so, by the same image.
 
 use harness::{Guest, Members, Said, lawful_runs};
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 use tool::protocol::{MachineLine, Status};
 use tool::record::Run;
 use tool::{Mode, Outcome};
@@ -41,8 +41,8 @@ fn longest_of_the_source(run: &Run) -> u64 {
     let mut longest_ns = 0;
     for event in run.events.iter().filter(is_of) {
         match event.what {
-            What::Start => started_ns = event.time_ns,
-            What::Finish => longest_ns = longest_ns.max(event.time_ns - started_ns),
+            EventKind::Start => started_ns = event.time_ns,
+            EventKind::Finish => longest_ns = longest_ns.max(event.time_ns - started_ns),
             _ => {}
         }
     }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use harness::{Guest, Members, Said, lawful_runs};
-use recording::{Entry, Recordable, Recording, What};
+use recording::{Entry, EntryKind, Recordable, Recording};
 use tool::protocol::Status;
 use tool::{Machine, recordings, system};
 
@@ -74,7 +74,7 @@ fn a_recorded_run_is_replayed_on_other_cores_and_policies() {
     assert!(inputs.eq((0..50).map(|job| (job, job + 1))));
     let told = recording
         .entries()
-        .filter(|entry| entry.what == What::Clock);
+        .filter(|entry| entry.what == EntryKind::Clock);
     for entry in told {
         let times = Vec::<u64>::from_bytes(entry.value).expect("a list of times");
         assert_eq!(times.len(), 1);
@@ -119,14 +119,14 @@ fn what_does_not_fit_is_named_job_by_job() {
     let bytes = file.bytes();
     let recording = Recording::read(&bytes).expect("it is whole");
     assert!(!recording.is_cut() && recording.lost() > 0);
-    let of = |wanted: What| {
+    let of = |wanted: EntryKind| {
         let entries = recording
             .entries()
             .filter(move |entry| entry.what == wanted);
         let places = entries.map(|entry: Entry<'_>| (entry.place, entry.job));
         places.collect::<BTreeSet<(u16, u64)>>()
     };
-    let (kept, lost) = (of(What::Value), of(What::Lost));
+    let (kept, lost) = (of(EntryKind::Value), of(EntryKind::Lost));
     assert!(kept.is_disjoint(&lost) && kept.len() > 8);
     let all = (0..8).flat_map(|link| (0..20).map(move |job| (link, job)));
     assert_eq!(&kept | &lost, all.collect());

@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use replay::lines::{Line, Lines, Malformed, quoted};
 use replay::repeated;
 use replay::shown::is_seen;
-use sched_dag::{ClusterId, DagSpec, Order, OverrunPolicy, Priority, SubtaskSpec};
+use sched_dag::{ClusterId, DagSpec, OverrunPolicy, Priority, SubtaskOrder, SubtaskSpec};
 
 use keys::Keys;
 
@@ -298,8 +298,8 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
             }
             "order" => {
                 spec.order = match keys.value(key)? {
-                    "free" => Order::Free,
-                    "fixed" => Order::Fixed,
+                    "free" => SubtaskOrder::Free,
+                    "fixed" => SubtaskOrder::Fixed,
                     other => {
                         let other = quoted(other);
                         return Err(

@@ -25,8 +25,8 @@ use std::sync::Arc;
 
 use fass::Runner;
 use sched_dag::engine::{Cost, Engine, Port};
-use sched_dag::journal::What;
-use sched_dag::lifecycle::{Letters, Request, Requests};
+use sched_dag::journal::EventKind;
+use sched_dag::lifecycle::{Mailboxes, PendingRequests, Request};
 use sched_dag::placement::Next;
 use sched_dag::{ClusterId, CoreId, DagId, Instance, Journal, Moment, Notice, Scheduler, Vertex};
 
@@ -135,7 +135,7 @@ pub(crate) struct ThreadPort<'s> {
 
 impl Port<Box<Runner>> for ThreadPort<'_> {
     /// The edge tells of these, where a topic is recorded.
-    const HEARS: &'static [What] = fass::edge::HEARS;
+    const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
     fn hear(&mut self, notice: &Notice) {
         edge::happened(notice);
@@ -164,7 +164,7 @@ impl Port<Box<Runner>> for ThreadPort<'_> {
         self.office.has_letters(self.cluster)
     }
 
-    fn take_letters(&mut self) -> Option<&Letters> {
+    fn take_letters(&mut self) -> Option<&Mailboxes> {
         let has_letters = self.office.open(self.cluster);
         *self.opened += u64::from(has_letters);
         has_letters.then_some(&self.office.letters)
@@ -177,7 +177,7 @@ impl State {
         (cluster, office): (ClusterId, &Arc<Office>),
         scheduler: Scheduler,
         runners: Vec<Runner>,
-        (requests, after_fault): (Requests, Vec<Option<DagId>>),
+        (requests, after_fault): (PendingRequests, Vec<Option<DagId>>),
         journal: Journal,
         processors: Box<[u32]>,
         levels: Option<Levels>,
@@ -237,12 +237,12 @@ impl State {
     }
 
     /// Writes down what has happened now to an instance.
-    pub(crate) fn note(&mut self, what: What, core: CoreId, vertex: Vertex) {
+    pub(crate) fn note(&mut self, what: EventKind, core: CoreId, vertex: Vertex) {
         self.note_at(sys::now_ns(), what, core, vertex);
     }
 
     /// Writes down what happened to an instance at a time on the clock.
-    fn note_at(&mut self, time_ns: u64, what: What, core: CoreId, vertex: Vertex) {
+    fn note_at(&mut self, time_ns: u64, what: EventKind, core: CoreId, vertex: Vertex) {
         let time_ns = self.since_epoch(time_ns);
         self.engine.note(what, core, vertex, time_ns);
     }
@@ -300,7 +300,7 @@ impl State {
             let now_ns = sys::now_ns();
             // It may have returned already, and wait for the lock.
             self.resumed_ns[self.active[core.index()]] = now_ns;
-            self.note_at(now_ns, What::Resume, core, occupant);
+            self.note_at(now_ns, EventKind::Resume, core, occupant);
         }
         for place in 0..self.engine.decisions().len() {
             let core = self.engine.decisions()[place].core;
@@ -398,7 +398,7 @@ impl State {
                 }
                 if let Some(vertex) = self.engine.placement.current(core.index()) {
                     self.resumed_ns[parked] = sys::now_ns();
-                    self.note_at(self.resumed_ns[parked], What::Resume, core, vertex);
+                    self.note_at(self.resumed_ns[parked], EventKind::Resume, core, vertex);
                 }
                 None
             }
@@ -467,9 +467,9 @@ impl State {
         let (core, vertex) = (self.core_of(worker), runner.vertex);
         let occupant = self.engine.placement.current(core.index());
         if let Some(occupant) = occupant {
-            self.note(What::Suspend, core, occupant);
+            self.note(EventKind::Suspend, core, occupant);
         }
-        self.note(What::Resume, core, vertex);
+        self.note(EventKind::Resume, core, vertex);
         // It goes on after the step that the end brings about, and within it nothing does.
         self.interrupted = occupant.map(|occupant| (core, occupant));
         let finish_ns = self.since_epoch(finish_ns);

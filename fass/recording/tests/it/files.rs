@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use common::random::Random;
 use recording::{
-    Channel, Chunk, Commit, CommittedDag, Counted, Crc, DagHeader, DagTimes, Entry, Header, MAGIC,
-    MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Times, VERSION, What, Writer,
-    mended, to_bytes,
+    Channel, Chunk, Commit, CommittedDag, Counted, Crc, DagHeader, DagTimes, Entry, EntryKind,
+    Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Times, VERSION,
+    Writer, mended, to_bytes,
 };
 
 fn header() -> Header {
@@ -78,13 +78,13 @@ fn recording() -> Vec<u8> {
             value,
         };
         writer.write(&match job {
-            5 => entry(What::Lost, 0, 0, &[]),
-            6 => entry(What::Skip, 0, 0, &[]),
-            7 => entry(What::Cut, 0, 3, &[]),
-            8 => entry(What::Fault, 0, 3, &[]),
-            _ => entry(What::Value, 0, 0, &value),
+            5 => entry(EntryKind::Lost, 0, 0, &[]),
+            6 => entry(EntryKind::Skip, 0, 0, &[]),
+            7 => entry(EntryKind::Cut, 0, 3, &[]),
+            8 => entry(EntryKind::Fault, 0, 3, &[]),
+            _ => entry(EntryKind::Value, 0, 0, &value),
         });
-        writer.write(&entry(What::Value, 1, 1, &sample));
+        writer.write(&entry(EntryKind::Value, 1, 1, &sample));
         writer.events(0, 2 * job, &[[job, 1, 2], [job, 3, 4]]);
     }
     writer.times(&times());
@@ -99,7 +99,7 @@ fn what_is_written_is_read() {
     assert_eq!((recording.count(), recording.lost()), (20, 1));
     let entries: Vec<Entry<'_>> = recording.entries().collect();
     assert_eq!(entries.len(), 20);
-    assert_eq!((entries[10].what, entries[10].job), (What::Lost, 5));
+    assert_eq!((entries[10].what, entries[10].job), (EntryKind::Lost, 5));
     assert_eq!(Vec::<f64>::from_bytes(entries[6].value), Ok(vec![0.5; 3]));
     let mut events = Vec::new();
     for chunk in recording.chunks() {
@@ -188,7 +188,7 @@ fn what_was_written_wrongly_is_refused_in_spite_of_its_checksum() {
     };
     let value = to_bytes(&vec![1.0]);
     let right = Entry {
-        what: What::Value,
+        what: EntryKind::Value,
         dag: 0,
         place: 0,
         job: 0,
@@ -200,7 +200,7 @@ fn what_was_written_wrongly_is_refused_in_spite_of_its_checksum() {
     let of_no_channel = Entry { place: 1, ..right };
     let value = &value[..9];
     let too_short = Entry { value, ..right };
-    let what = What::Skip;
+    let what = EntryKind::Skip;
     let with_value = Entry { what, ..right };
     let of_bytes = "how many elements follow, as many as there are bytes for";
     let payload = refused(of_no_dag).offset - 1;
@@ -248,7 +248,7 @@ fn of_weightless_parts(parts: usize) -> Vec<u8> {
     let mut writer = Writer::new(&header);
     for job in 0..100 {
         writer.write(&Entry {
-            what: What::Value,
+            what: EntryKind::Value,
             dag: 0,
             place: 0,
             job,

@@ -10,7 +10,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use alloc::{format, vec};
 
-use recording::{Channel, Header, Role, What};
+use recording::{Channel, EntryKind, Header, Role};
 use sched_dag::{DagId, SubtaskId, TaskSet};
 
 use super::{Passed, Replay, guard, is_compared};
@@ -239,7 +239,8 @@ impl Replay {
     /// has fallen back on before is no state.
     fn has_states(&self, dag: u16, job: u64) -> bool {
         let events = self.events.iter();
-        let mut restarts = events.filter(|event| (event.dag, event.what) == (dag, What::Restart));
+        let mut restarts =
+            events.filter(|event| (event.dag, event.what) == (dag, EntryKind::Restart));
         self.channels_of_states(dag).next().is_some()
             && self.is_whole(dag, job)
             && restarts.all(|event| event.job >= job)

@@ -25,7 +25,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use core::{fmt, mem};
 
 pub use fit::job_of;
-use recording::{Channel, Entry, Header, Malformed, Recordable, Recording, Role, Shown, What};
+use recording::{Channel, Entry, EntryKind, Header, Malformed, Recordable, Recording, Role, Shown};
 use sched_dag::{DagId, Instance, Notice, SubtaskId, TaskSet, journal};
 
 use super::{Crossing, Drain, Drained, Host, Record, name, open};
@@ -159,7 +159,7 @@ impl Replay {
             offset: bytes.len(),
             expected: "fewer entries, for whose places there is memory",
         };
-        let is_value = |entry: &Entry<'_>| entry.what == What::Value;
+        let is_value = |entry: &Entry<'_>| entry.what == EntryKind::Value;
         let count = recording.entries().filter(is_value).count();
         let mut replay = Self {
             header: recording.header().clone(),
@@ -181,34 +181,34 @@ impl Replay {
                 ..
             } = entry;
             let id = DagId(dag.into());
-            if !matches!(what, What::Value | What::Lost | What::Clock) {
+            if !matches!(what, EntryKind::Value | EntryKind::Lost | EntryKind::Clock) {
                 replay.events.push(Entry {
                     value: &[],
                     ..entry
                 });
             }
             match what {
-                What::Value => {
+                EntryKind::Value => {
                     let start = value.as_ptr().addr() - bytes.as_ptr().addr();
                     (replay.values).push(((place, job), start..start + value.len()));
                     replay.is_compared.push(false);
                 }
-                What::Cut => cuts.push((dag, place, job)),
-                What::Fault => replay.faults.push(Fault::new(dag, place, job)),
-                What::Signal | What::Skip => {
+                EntryKind::Cut => cuts.push((dag, place, job)),
+                EntryKind::Fault => replay.faults.push(Fault::new(dag, place, job)),
+                EntryKind::Signal | EntryKind::Skip => {
                     replay.first_signals.entry(id).or_insert(job);
                     let of_dag = replay.signals.entry(id).or_default();
                     of_dag.push_back(entry.release_ns);
                 }
-                What::Clock => {
+                EntryKind::Clock => {
                     // The machine writes each answer by itself.
                     let told = replay.clock.entry((dag, place, job)).or_default();
                     told.times.extend(Vec::<u64>::from_bytes(value)?);
                 }
-                What::Lost if role(place) == Role::Source => {
+                EntryKind::Lost if role(place) == Role::Source => {
                     replay.lost.get_or_insert((place, job));
                 }
-                What::Restart | What::Lost => {}
+                EntryKind::Restart | EntryKind::Lost => {}
             }
         }
         replay.values.sort_unstable_by_key(|(of, _)| *of);
@@ -534,7 +534,7 @@ impl Crossing for OfMachine {
     }
 
     fn happened(&mut self, notice: &Notice) {
-        if let journal::What::Due | journal::What::Skipped = notice.event.what
+        if let journal::EventKind::Due | journal::EventKind::Skipped = notice.event.what
             && let Some((replay, signals)) = &mut self.replay
         {
             let dag = notice.event.dag;

@@ -2,7 +2,7 @@
 
 use crate::support::{every, job_numbers, named, run, ticking, work};
 use fass::{Dag, Switch, create_dag};
-use virtual_time::{VirtualTime, What};
+use virtual_time::{EventKind, VirtualTime};
 
 /// A DAG of one subtask that asks for something of another DAG in each job, every 20 ms.
 fn asking(of: &Dag, mut ask: impl FnMut(Switch<'_>, u64) + Send + 'static) -> Dag {
@@ -73,14 +73,14 @@ fn l6_a_replay_passes_over_what_was_skipped_whatever_is_asked_for() {
         assert_eq!((report.compared, report.uncompared), (4, 0));
         let skips = report.dag("sensor").statistics().skips;
         assert_eq!(skips, 0, "they are passed over");
-        let is_switch = |what| [What::Off, What::On].contains(&what);
+        let is_switch = |what| [EventKind::Off, EventKind::On].contains(&what);
         assert!(!report.events.iter().any(|event| is_switch(event.what)));
     }
 }
 
 #[test]
 fn a_release_of_a_dag_that_is_off_is_a_breach() {
-    for off in [What::Off, What::Closed] {
+    for off in [EventKind::Off, EventKind::Closed] {
         let machine = VirtualTime::new().cores(2);
         let ticks = ticking("ticks", 1);
         let asks = asking(&ticks, |mut switch, _| switch.pause());
@@ -88,9 +88,9 @@ fn a_release_of_a_dag_that_is_off_is_a_breach() {
         let mut report = run(&machine, &[ticks, asks]);
         for event in &mut report.events {
             event.what = match event.what {
-                What::Off => off,
+                EventKind::Off => off,
                 // The pause should have kept it from coming.
-                What::Skipped => What::Released,
+                EventKind::Skipped => EventKind::Released,
                 what => what,
             };
         }

@@ -6,7 +6,7 @@ use std::ops::AddAssign;
 
 use crate::support::{commit, every, job_numbers, ms, named, run, ticking};
 use fass::{Dag, Raiser, Sample, State, create_dag, finish_create_dags};
-use recording::{Channel, Entry, Recording, Role, What, Writer, to_bytes};
+use recording::{Channel, Entry, EntryKind, Recording, Role, Writer, to_bytes};
 use virtual_time::{JobShown, Passed, Report, RunError, SubtaskShown, Value, VirtualTime};
 
 /// A source that counts on.
@@ -58,7 +58,7 @@ fn altered<'e>(bytes: &'e [u8], alter: impl Fn(Entry<'e>, Role) -> Vec<Entry<'e>
 
 /// A signal at the place of an entry.
 fn signal(entry: Entry<'_>) -> Entry<'_> {
-    let (what, value) = (What::Signal, &[][..]);
+    let (what, value) = (EntryKind::Signal, &[][..]);
     Entry {
         what,
         value,
@@ -150,18 +150,18 @@ fn the_inputs_of_the_last_jobs_lead_to_the_same_faults() {
     let recording = Recording::read(&bytes).expect("whole");
     let header = recording.header();
     let mut jobs = [0; 3];
-    for entry in (recording.entries()).filter(|entry| entry.what == What::Value) {
+    for entry in (recording.entries()).filter(|entry| entry.what == EntryKind::Value) {
         let channel = &header.channels[usize::from(entry.place)];
         assert_ne!(channel.role, Role::Result);
         jobs[usize::from(channel.dag)] += usize::from(channel.role == Role::Source);
     }
     assert_eq!(jobs, [16, 16, 16]);
-    let clocks = recording.entries().filter(|it| it.what == What::Clock);
+    let clocks = recording.entries().filter(|it| it.what == EntryKind::Clock);
     assert_eq!(clocks.count(), 16, "times of the last jobs only");
 
     // What a fault cuts need not be recorded, for nothing behind it can run.
     let without_cuts = altered(&bytes, |entry, _| match entry.what {
-        What::Cut => vec![],
+        EntryKind::Cut => vec![],
         _ => vec![entry],
     });
     assert!(without_cuts.len() < bytes.len());
@@ -454,12 +454,12 @@ fn a_fault_that_follows_from_a_recorded_state_comes_again() {
     let recording = Recording::read(&bytes).expect("whole");
     let states = recording.entries().filter(|entry| {
         let channel = &recording.header().channels[usize::from(entry.place)];
-        entry.what == What::Value && (channel.role, &*channel.topic) == (Role::State, "sums")
+        entry.what == EntryKind::Value && (channel.role, &*channel.topic) == (Role::State, "sums")
     });
     // Not only every 64, for of that many there are no inputs.
     let states: Vec<u64> = states.map(|entry| entry.job).collect();
     assert_eq!(states, [4_992, 5_000]);
-    assert!(recording.entries().any(|it| it.what == What::Fault));
+    assert!(recording.entries().any(|it| it.what == EntryKind::Fault));
     for cores in [1, 4] {
         let machine = replaying(&bytes).cores(cores);
         let report = run(&machine, &[kept()]);
@@ -481,7 +481,7 @@ fn an_altered_state_is_found() {
     flipped[bytes.len() / 2] ^= 1;
     let refused = VirtualTime::new().replay(&flipped).unwrap_err().to_string();
     assert!(refused.contains("the file is altered"), "{refused}");
-    let is_state = |entry: &Entry<'_>, role| entry.what == What::Value && role == Role::State;
+    let is_state = |entry: &Entry<'_>, role| entry.what == EntryKind::Value && role == Role::State;
     let shorter = altered(&bytes, |entry, role| match is_state(&entry, role) {
         true => vec![Entry {
             value: &entry.value[1..],
@@ -537,7 +537,7 @@ fn a_late_job_of_a_long_recording_is_computed_at_once() {
     for job in 0..=LAST {
         let mut write = |place, value: &[u8]| {
             writer.write(&Entry {
-                what: What::Value,
+                what: EntryKind::Value,
                 dag: 0,
                 place,
                 job,

@@ -13,7 +13,7 @@ use fass::{
     ConstructionPolicy, Dag, FaultLimit, Occupation, OverrunPolicy, Policy, Preemption, Raiser,
     Sample, Signal, Uses, create_dag, execute_for, finish_create_dags_with,
 };
-use recording::{Entry, Recording, Role, What};
+use recording::{Entry, EntryKind, Recording, Role};
 use virtual_time::{PanicRecord, Report, VirtualTime};
 
 const CASES: u64 = 80;
@@ -187,7 +187,7 @@ fn run(machine: &VirtualTime, set: &Set, raises: &[(usize, Duration)]) -> (Repor
     // A replay looks at states in more jobs, and compares what is recorded of them.
     let is_state = |entry: &Entry<'_>| {
         let channel = recording.header().channels.get(usize::from(entry.place));
-        entry.what == What::Value && channel.is_some_and(|it| it.role == Role::State)
+        entry.what == EntryKind::Value && channel.is_some_and(|it| it.role == Role::State)
     };
     let others = recording.entries().filter(|entry| !is_state(entry));
     let said = others.map(|entry| {
@@ -261,11 +261,11 @@ fn case(seed: u64) -> [usize; 6] {
         later += usize::from(firsts[dag] > 0);
     }
     let counted = [
-        What::Clock,
-        What::Skip,
-        What::Cut,
-        What::Restart,
-        What::Signal,
+        EntryKind::Clock,
+        EntryKind::Skip,
+        EntryKind::Cut,
+        EntryKind::Restart,
+        EntryKind::Signal,
     ];
     let [clock, skip, cut, restart, signal] =
         counted.map(|what| said.iter().filter(|it| it.0 == what.name()).count());

@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
-use fass::{Clusters, Dag, Policy, Preemption, Signal, Terms, Tunable, Wire};
+use fass::{CoreDivision, Dag, Policy, Preemption, Signal, Terms, Tunable, Wire};
 use sched_dag::engine::Run;
 
 use super::ending::Ending;
@@ -589,7 +589,7 @@ impl<S: Divisible> Machine<S> {
     /// }
     /// ```
     #[must_use]
-    pub fn clusters(&self) -> Clusters {
+    pub fn clusters(&self) -> CoreDivision {
         self.system.terms().clusters
     }
 }

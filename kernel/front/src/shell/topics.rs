@@ -8,7 +8,7 @@ use core::fmt::{self, Display};
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 use sched_dag::{DagId, SubtaskId, TaskSet, Topic, nearest_of};
 
 use fass::edge::Excerpt;
@@ -211,7 +211,7 @@ impl Rate {
     }
 
     fn take(&mut self, event: &Event, dag: DagId, writer: SubtaskId) {
-        if (event.what, event.dag, event.subtask) != (What::Finish, dag, Some(writer)) {
+        if (event.what, event.dag, event.subtask) != (EventKind::Finish, dag, Some(writer)) {
             return;
         }
         let between_ns = self.first_ns.saturating_sub(event.time_ns);
@@ -272,7 +272,7 @@ mod tests {
         let mut rate = Rate::default();
         let finish = |time_ns, subtask| Event {
             time_ns,
-            what: What::Finish,
+            what: EventKind::Finish,
             core: CoreId(0),
             dag: DagId(1),
             job: 0,

@@ -22,7 +22,7 @@ use executive::run::execution;
 use front::json;
 use front::shell::{look_back, snapshot};
 use sched_dag::DagId;
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 
 use super::KernelRun;
 
@@ -205,11 +205,11 @@ impl Loads {
             return;
         }
         match event.what {
-            What::Start | What::Resume => {
+            EventKind::Start | EventKind::Resume => {
                 let to_ns = self.stopped_ns[core].take().unwrap_or(time_ns);
                 self.busy_ns[core] += to_ns.saturating_sub(time_ns);
             }
-            What::Suspend | What::Finish | What::Ended => {
+            EventKind::Suspend | EventKind::Finish | EventKind::Ended => {
                 self.stopped_ns[core] = Some(time_ns);
             }
             _ => return,
@@ -277,7 +277,7 @@ mod tests {
     use super::{PATIENCE_NS, Patience, *};
 
     /// The load of core 0 by events in the order of time.
-    fn load(events: &[(u64, What)], from_ns: u64, to_ns: u64) -> u64 {
+    fn load(events: &[(u64, EventKind)], from_ns: u64, to_ns: u64) -> u64 {
         let mut loads = Loads::new(from_ns, to_ns);
         for &(time_ns, what) in events.iter().rev() {
             loads.take(&Event {
@@ -296,14 +296,14 @@ mod tests {
     #[test]
     fn only_what_lies_in_the_time_counts() {
         let events = [
-            (10, What::Start),
-            (20, What::Finish),
-            (90, What::Start),
-            (120, What::Suspend),
-            (120, What::Ready),
-            (150, What::Resume),
-            (160, What::Ended),
-            (195, What::Start),
+            (10, EventKind::Start),
+            (20, EventKind::Finish),
+            (90, EventKind::Start),
+            (120, EventKind::Suspend),
+            (120, EventKind::Ready),
+            (150, EventKind::Resume),
+            (160, EventKind::Ended),
+            (195, EventKind::Start),
         ];
         // 90..120 from 100 on, 150..160, and 195 up to the end.
         assert_eq!(load(&events, 100, 200), 350);
@@ -314,17 +314,17 @@ mod tests {
 
     #[test]
     fn an_instance_whose_start_is_not_known_counts_from_the_oldest_event() {
-        let events = [(100, What::Ready), (150, What::Finish)];
+        let events = [(100, EventKind::Ready), (150, EventKind::Finish)];
         assert_eq!(load(&events, 100, 200), 500);
         assert_eq!(load(&[], 100, 200), 0);
-        assert_eq!(load(&[(50, What::Start)], 100, 200), 1000);
-        assert_eq!(load(&[(50, What::Start)], 100, 100), 0);
+        assert_eq!(load(&[(50, EventKind::Start)], 100, 200), 1000);
+        assert_eq!(load(&[(50, EventKind::Start)], 100, 100), 0);
     }
 
     #[test]
     fn what_happens_after_the_time_is_not_in_it() {
-        assert_eq!(load(&[(250, What::Finish)], 250, 200), 0);
-        assert_eq!(load(&[(250, What::Start)], 250, 200), 0);
+        assert_eq!(load(&[(250, EventKind::Finish)], 250, 200), 0);
+        assert_eq!(load(&[(250, EventKind::Start)], 250, 200), 0);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::replay::{stage_after, stage_before};
 use super::sweep::{Model, Stage, Sweep, Waits};
 use super::{Terms, Violation};
 use crate::ids::{CoreId, Instance};
-use crate::journal::{Event, What};
+use crate::journal::{Event, EventKind};
 use crate::policy::{OnFault, SchedulerOptions};
 use crate::task_set::TaskSet;
 
@@ -40,7 +40,7 @@ pub fn judge_dispatch(
     for cluster in task_set.clusters() {
         let is_of_it = |event: &Event| task_set.dag(event.dag).cluster() == cluster;
         let events = events.clone().filter(is_of_it);
-        let due = events.clone().filter(|event| event.what == What::Due);
+        let due = events.clone().filter(|event| event.what == EventKind::Due);
         let mut model = Model {
             task_set,
             options,
@@ -78,10 +78,13 @@ fn of_cluster(
         let is_new = event.what.is_of_machine() && known.insert(event.core);
         sweep.known_cores += usize::from(is_new);
         let ends_its_dag = model.task_set.dag(event.dag).on_fault() == OnFault::EndDag;
-        if event.what == What::Stopped || event.what == What::Ended && ends_its_dag {
+        if event.what == EventKind::Stopped || event.what == EventKind::Ended && ends_its_dag {
             sweep.stop(event.dag);
         }
-        if let Some(instance) = event.instance().filter(|_| event.what != What::Request) {
+        if let Some(instance) = event
+            .instance()
+            .filter(|_| event.what != EventKind::Request)
+        {
             sweep.enter(instance, stage_after(&event));
         }
     }
@@ -107,9 +110,9 @@ fn before(
     cores: Range<u32>,
     events: impl Iterator<Item = Event>,
 ) -> (BTreeSet<CoreId>, BTreeMap<Instance, Stage>) {
-    let mut first_of_core: BTreeMap<CoreId, What> = BTreeMap::new();
+    let mut first_of_core: BTreeMap<CoreId, EventKind> = BTreeMap::new();
     let mut first_of_instance: BTreeMap<Instance, Stage> = BTreeMap::new();
-    for event in events.filter(|event| event.what != What::Request) {
+    for event in events.filter(|event| event.what != EventKind::Request) {
         if let Some(instance) = event.instance() {
             let stage = first_of_instance.entry(instance);
             stage.or_insert_with(|| stage_before(&event));
@@ -118,7 +121,7 @@ fn before(
             first_of_core.entry(event.core).or_insert(event.what);
         }
     }
-    let is_busy = |what: &What| !matches!(what, What::Start | What::Resume);
+    let is_busy = |what: &EventKind| !matches!(what, EventKind::Start | EventKind::Resume);
     let busy = cores.map(CoreId);
     let busy = busy.filter(|core| first_of_core.get(core).is_some_and(is_busy));
     (busy.collect(), first_of_instance)
@@ -130,7 +133,7 @@ fn wrong_cores(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Vi
         if event.what.is_of_machine() && !model.cores.contains(&event.core.0) {
             return Some(Violation::OutsideItsCluster { event });
         }
-        let lost = event.what == What::Resume && model.keeps_its_core(event.instance()?);
+        let lost = event.what == EventKind::Resume && model.keeps_its_core(event.instance()?);
         lost.then_some(Violation::LostItsCore { event })
     });
     found.collect()

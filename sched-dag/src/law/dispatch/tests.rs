@@ -4,7 +4,7 @@
 use super::*;
 use crate::ids::{ClusterId, DagId, SubtaskId};
 use crate::policy::{Policy, Preemption};
-use crate::{Clusters, CommitOptions, DagSpec, Priority, SubtaskSpec, verify};
+use crate::{CommitOptions, CoreDivision, DagSpec, Priority, SubtaskSpec, verify};
 
 /// DAGs of one subtask each in these clusters, DAG 0 the most urgent; the last one's subtask
 /// cannot be preempted if `keeps`.
@@ -23,7 +23,7 @@ pub(in crate::law) fn dags(clusters: &[u32], keeps: bool) -> TaskSet {
     let specs: Vec<DagSpec> = (0..).zip(clusters).map(spec).collect();
     let options = CommitOptions::new(Policy::StaticPriority, 2);
     let options = match clusters.contains(&1) {
-        true => options.with_clusters(Clusters::Of(vec![1, 1])),
+        true => options.with_clusters(CoreDivision::Of(vec![1, 1])),
         false => options,
     };
     verify(&specs, &options).unwrap().task_set
@@ -45,7 +45,7 @@ fn events(schedule: &str) -> Vec<Event> {
     let (ready, ran) = schedule.split_once(": ").unwrap();
     let ready = numbers(ready).into_iter().enumerate();
     let mut events: Vec<Event> = ready
-        .map(|(dag, ns)| event(ns, What::Ready, dag, 0))
+        .map(|(dag, ns)| event(ns, EventKind::Ready, dag, 0))
         .collect();
     let ran: Vec<Vec<u64>> = ran.split(", ").map(numbers).collect();
     for (place, stretch) in ran.iter().enumerate() {
@@ -54,12 +54,12 @@ fn events(schedule: &str) -> Vec<Event> {
         };
         let is_own = |other: &Vec<u64>| other[0] == dag;
         let begins = match ran[..place].iter().any(is_own) {
-            true => What::Resume,
-            false => What::Start,
+            true => EventKind::Resume,
+            false => EventKind::Start,
         };
         let ends = match ran[place + 1..].iter().any(is_own) {
-            true => What::Suspend,
-            false => What::Finish,
+            true => EventKind::Suspend,
+            false => EventKind::Finish,
         };
         let dag = usize::try_from(dag).unwrap();
         events.push(event(from_ns, begins, dag, core));

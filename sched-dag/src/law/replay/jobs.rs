@@ -38,7 +38,7 @@ use alloc::vec::Vec;
 
 use super::{Life, Moment, OfDag, Replay};
 use crate::ids::{DagId, Instance, SubtaskId};
-use crate::journal::{Event, What};
+use crate::journal::{Event, EventKind};
 use crate::law::sweep::Stage;
 use crate::law::{Violation, latest};
 
@@ -85,22 +85,24 @@ impl Job {
     /// Takes note of an event; that it happens twice is a breach.
     fn note(&mut self, event: &Event, moment: Moment) -> Option<Violation> {
         let place = match event.what {
-            What::Released => &mut self.released,
-            What::Queued => &mut self.queued,
-            What::Skipped => &mut self.skipped,
-            What::Aborted => &mut self.cut,
-            What::Missed => &mut self.missed,
+            EventKind::Released => &mut self.released,
+            EventKind::Queued => &mut self.queued,
+            EventKind::Skipped => &mut self.skipped,
+            EventKind::Aborted => &mut self.cut,
+            EventKind::Missed => &mut self.missed,
             _ => &mut self.completed,
         };
         let earlier = place.replace(moment)?;
         *place = Some(earlier);
         let (event, before, before_ns) = (*event, event.what, earlier.time_ns);
         Some(match before {
-            What::Released | What::Queued | What::Skipped => Violation::ReleasedAgain {
-                event,
-                before,
-                before_ns,
-            },
+            EventKind::Released | EventKind::Queued | EventKind::Skipped => {
+                Violation::ReleasedAgain {
+                    event,
+                    before,
+                    before_ns,
+                }
+            }
             _ => Violation::EndedAgain {
                 event,
                 before,
@@ -136,7 +138,7 @@ impl Replay<'_> {
         let Event { dag, job, .. } = event;
         let moment = self.moment(&event);
         let model = self.task_set.dag(dag);
-        let is_released = event.what == What::Released;
+        let is_released = event.what == EventKind::Released;
         let of_dag = self.dag(dag);
         let due_ns = of_dag.due.filter(|due| due.0 == job).map(|due| due.1);
         let release_ns = match model.is_sporadic() {
@@ -148,7 +150,7 @@ impl Replay<'_> {
             && known.released.is_some()
         {
             let before_ns = known.released.map_or(0, |released| released.time_ns);
-            let before = What::Released;
+            let before = EventKind::Released;
             // Twice, or queued or skipped after all.
             found[0] = Some(Violation::ReleasedAgain {
                 event,
@@ -162,7 +164,7 @@ impl Replay<'_> {
         waiting.release_ns = release_ns;
         found[0] = waiting.note(&event, moment);
         if is_released && let Some(skipped) = waiting.skipped {
-            let (before, before_ns) = (What::Skipped, skipped.time_ns);
+            let (before, before_ns) = (EventKind::Skipped, skipped.time_ns);
             found[1] = Some(Violation::ReleasedAgain {
                 event,
                 before,
@@ -250,7 +252,7 @@ impl Replay<'_> {
         let moment = self.moment(event);
         let of_dag = self.dag(dag);
         // A job may miss its deadline while its release waits.
-        if event.what == What::Missed
+        if event.what == EventKind::Missed
             && let Some(waiting) = of_dag.waiting.get_mut(&job)
         {
             let again = waiting.note(event, moment);
@@ -267,9 +269,9 @@ impl Replay<'_> {
             self.found.push(again);
             return;
         }
-        let is_judged = event.what != What::Aborted && known.completed.is_some();
+        let is_judged = event.what != EventKind::Aborted && known.completed.is_some();
         let was_counted = known.released.is_some();
-        if event.what == What::Completed {
+        if event.what == EventKind::Completed {
             let wrong = self.completed_at_wrong_time(event, moment);
             self.found.extend(wrong);
             if let Some(Violation::BeforeItsEnd { awaited, .. }) = wrong {
@@ -282,7 +284,7 @@ impl Replay<'_> {
         if is_judged {
             self.found.extend(self.missed_wrongly(dag, job));
         }
-        if event.what == What::Completed {
+        if event.what == EventKind::Completed {
             self.dag(dag).forget_before(job);
         }
     }
@@ -412,7 +414,7 @@ impl Replay<'_> {
         }
         let event = Event {
             time_ns: missed.time_ns,
-            what: What::Missed,
+            what: EventKind::Missed,
             core: missed.core,
             dag,
             job,
@@ -494,7 +496,7 @@ impl Replay<'_> {
         let too_early = self.before_join(event, instance);
         let is_early = too_early.is_some();
         self.found.extend(too_early);
-        if is_early || event.what != What::Ready {
+        if is_early || event.what != EventKind::Ready {
             return;
         }
         let Some(last) = self.last_condition(instance) else {

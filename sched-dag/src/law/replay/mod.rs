@@ -35,7 +35,7 @@ use alloc::vec::Vec;
 use super::sweep::Stage;
 use super::{Terms, Violation};
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
-use crate::journal::{Event, What};
+use crate::journal::{Event, EventKind};
 use crate::policy::OnFault;
 use crate::task_set::TaskSet;
 use jobs::Job;
@@ -148,18 +148,19 @@ impl Moment {
 impl Replay<'_> {
     fn take(&mut self, event: &Event) {
         // The time of these may be before that of events that are lost.
-        if !matches!(event.what, What::Finish | What::Due) {
+        if !matches!(event.what, EventKind::Finish | EventKind::Due) {
             self.first_ns.get_or_insert(event.time_ns);
         }
         self.end_ns = self.end_ns.max(event.time_ns);
         match event.what {
-            What::Due => self.dag(event.dag).due = Some((event.job, event.time_ns)),
-            What::Stopped => self.dag(event.dag).is_stopped = true,
-            What::Off | What::Closed => self.dag(event.dag).is_off = true,
-            What::On => self.dag(event.dag).is_off = false,
-            What::Signalled | What::Dropped | What::Request | What::Entered => {}
-            What::Released | What::Queued | What::Skipped => self.release(event),
-            What::Aborted | What::Missed | What::Completed => self.job(event),
+            EventKind::Due => self.dag(event.dag).due = Some((event.job, event.time_ns)),
+            EventKind::Stopped => self.dag(event.dag).is_stopped = true,
+            EventKind::Off | EventKind::Closed => self.dag(event.dag).is_off = true,
+            EventKind::On => self.dag(event.dag).is_off = false,
+            EventKind::Signalled | EventKind::Dropped | EventKind::Request | EventKind::Entered => {
+            }
+            EventKind::Released | EventKind::Queued | EventKind::Skipped => self.release(event),
+            EventKind::Aborted | EventKind::Missed | EventKind::Completed => self.job(event),
             _ => self.instance(event),
         }
     }
@@ -239,7 +240,7 @@ impl Replay<'_> {
 struct Life {
     stage: Stage,
     /// What happened to it last, and when.
-    last: Option<(What, u64)>,
+    last: Option<(EventKind, u64)>,
     ready: Option<Moment>,
     finish: Option<Moment>,
     /// When it was cancelled, or ended by a fault.
@@ -268,17 +269,17 @@ impl Life {
         self.stage = stage_after(event);
         self.last = Some((event.what, event.time_ns));
         let place = match event.what {
-            What::Ready => Some(&mut self.ready),
-            What::Finish => Some(&mut self.finish),
-            What::Cancelled | What::Ended => Some(&mut self.dropped),
+            EventKind::Ready => Some(&mut self.ready),
+            EventKind::Finish => Some(&mut self.finish),
+            EventKind::Cancelled | EventKind::Ended => Some(&mut self.dropped),
             _ => None,
         };
         if let Some(place) = place {
             place.get_or_insert(moment);
         }
         let event = *event;
-        let was_ended = last.is_some_and(|(what, _)| what == What::Ended);
-        let is_answer = was_ended && event.what == What::Restarted;
+        let was_ended = last.is_some_and(|(what, _)| what == EventKind::Ended);
+        let is_answer = was_ended && event.what == EventKind::Restarted;
         if !is_answer && !is_allowed(stage, &event) {
             return Some(Violation::OutOfTurn { event, stage });
         }
@@ -293,12 +294,12 @@ impl Life {
 
 fn is_allowed(stage: Stage, event: &Event) -> bool {
     match (stage, event.what) {
-        (Stage::Absent, What::Ready | What::Cancelled)
-        | (Stage::Ready, What::Start | What::Cancelled)
-        | (Stage::Suspended, What::Resume)
+        (Stage::Absent, EventKind::Ready | EventKind::Cancelled)
+        | (Stage::Ready, EventKind::Start | EventKind::Cancelled)
+        | (Stage::Suspended, EventKind::Resume)
         // Whichever core finds the fault, or stops the DAG, ends the instance.
-        | (Stage::Running(_) | Stage::Suspended, What::Ended) => true,
-        (Stage::Running(core), What::Suspend | What::Finish) => core == event.core,
+        | (Stage::Running(_) | Stage::Suspended, EventKind::Ended) => true,
+        (Stage::Running(core), EventKind::Suspend | EventKind::Finish) => core == event.core,
         _ => false,
     }
 }
@@ -306,9 +307,9 @@ fn is_allowed(stage: Stage, event: &Event) -> bool {
 /// Returns what an instance is after an event.
 pub(super) const fn stage_after(event: &Event) -> Stage {
     match event.what {
-        What::Ready => Stage::Ready,
-        What::Start | What::Resume => Stage::Running(event.core),
-        What::Suspend => Stage::Suspended,
+        EventKind::Ready => Stage::Ready,
+        EventKind::Start | EventKind::Resume => Stage::Running(event.core),
+        EventKind::Suspend => Stage::Suspended,
         _ => Stage::Over,
     }
 }
@@ -316,9 +317,9 @@ pub(super) const fn stage_after(event: &Event) -> Stage {
 /// Returns what an instance must have been before its first known event.
 pub(super) const fn stage_before(event: &Event) -> Stage {
     match event.what {
-        What::Start => Stage::Ready,
-        What::Resume => Stage::Suspended,
-        What::Suspend | What::Finish | What::Ended => Stage::Running(event.core),
+        EventKind::Start => Stage::Ready,
+        EventKind::Resume => Stage::Suspended,
+        EventKind::Suspend | EventKind::Finish | EventKind::Ended => Stage::Running(event.core),
         _ => Stage::Absent,
     }
 }
@@ -334,7 +335,7 @@ impl Replay<'_> {
         let is_known = self.find_job(event);
         let ends_its_dag = self.task_set.dag(instance.dag).on_fault() == OnFault::EndDag;
         let of_dag = self.dag(instance.dag);
-        of_dag.is_stopped |= event.what == What::Ended && ends_its_dag;
+        of_dag.is_stopped |= event.what == EventKind::Ended && ends_its_dag;
         let is_stopped = of_dag.is_stopped;
         let Some(job) = of_dag.jobs.get_mut(&instance.job).filter(|_| is_known) else {
             return;
@@ -343,7 +344,7 @@ impl Replay<'_> {
             true => stage_before(event),
             false => Stage::Absent,
         };
-        if event.what == What::Restarted {
+        if event.what == EventKind::Restarted {
             job.cut.get_or_insert(moment);
         }
         let is_uncut = job.cut.is_none() && !is_stopped && !job.is_partial;
@@ -352,16 +353,17 @@ impl Replay<'_> {
         let out_of_turn = life.note(event, moment);
         self.found.extend(out_of_turn);
         let event = *event;
-        if event.what == What::Restarted {
+        if event.what == EventKind::Restarted {
             let beyond_limit = self.beyond_limit(event);
             self.found.extend(beyond_limit);
         }
-        if event.what == What::Cancelled && is_uncut {
+        if event.what == EventKind::Cancelled && is_uncut {
             self.found.push(Violation::CancelledUncut { event });
         }
         // A start is judged like a readiness where that did not come before.
-        let is_first = event.what == What::Start && ready_ns.is_none_or(|ns| event.time_ns < ns);
-        if event.what == What::Ready || is_first {
+        let is_first =
+            event.what == EventKind::Start && ready_ns.is_none_or(|ns| event.time_ns < ns);
+        if event.what == EventKind::Ready || is_first {
             self.join(&event, instance, moment);
         }
     }
@@ -382,7 +384,7 @@ impl Replay<'_> {
     }
 
     fn occupy(&mut self, event: &Event, instance: Instance) {
-        if event.what == What::Ended {
+        if event.what == EventKind::Ended {
             // Another core may have ended it.
             for core in &mut self.cores {
                 core.occupant = core.occupant.filter(|occupant| *occupant != instance);
@@ -395,7 +397,7 @@ impl Replay<'_> {
         core.step += 1;
         let event = *event;
         match event.what {
-            What::Start | What::Resume => {
+            EventKind::Start | EventKind::Resume => {
                 if let Some(occupant) = core.occupant.replace(instance) {
                     self.found.push(Violation::CoreNotFree { event, occupant });
                 }

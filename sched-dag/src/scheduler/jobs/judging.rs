@@ -15,7 +15,7 @@ use alloc::boxed::Box;
 
 use super::Jobs;
 use crate::ids::{DagId, SubtaskId};
-use crate::journal::What;
+use crate::journal::EventKind;
 use crate::order::sorted_by_key;
 use crate::scheduler::Scheduler;
 use crate::scheduler::vertices::Vertices;
@@ -213,7 +213,7 @@ impl Scheduler {
             if state.jobs.count_late(&unjudged, is_late) && state.jobs.note_miss(&unjudged) {
                 state.statistics.count_miss();
                 let deadline_ns = Some(unjudged.deadline_ns);
-                (self.log).of_job(What::Missed, dag, unjudged.number, deadline_ns);
+                (self.log).of_job(EventKind::Missed, dag, unjudged.number, deadline_ns);
             }
         }
     }

@@ -159,7 +159,7 @@ fn stated(text: &str) -> Option<(TaskSet, Settings)> {
         policy,
         preemption: Preemption::Enabled,
         cores,
-        clusters: sched_dag::Clusters::Undivided,
+        clusters: sched_dag::CoreDivision::Undivided,
     };
     // Only a shared state makes a sink precede another subtask.
     let task_set = sample.task_set()?;

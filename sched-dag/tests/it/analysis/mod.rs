@@ -16,8 +16,8 @@ mod worked;
 use common::random::Random;
 use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer, fix_orders};
 use sched_dag::{
-    ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagId, DagSpec, Order, Policy,
-    Preemption, SubtaskId, verify,
+    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Policy, Preemption,
+    SubtaskId, SubtaskOrder, verify,
 };
 
 use kinds::breach;
@@ -210,14 +210,14 @@ fn what_becomes_ready_at_once_is_charged_whatever_its_rank() {
 
 #[test]
 fn a_fixed_order_is_taken_where_it_proves_more() {
-    let on = |cores, clusters: &[u32], order: Order, wcets: &[u64]| {
+    let on = |cores, clusters: &[u32], order: SubtaskOrder, wcets: &[u64]| {
         let mut spec = spec(100, 100, wcets, &[], 0);
         spec.order = order;
         spec.cluster = (!clusters.is_empty()).then_some(ClusterId(0));
         // Under EDF, so that no priorities within the DAG help.
         let options = CommitOptions::new(Policy::Edf, cores)
             .with_construction(ConstructionPolicy::any_graph())
-            .with_clusters(Clusters::Of(clusters.to_vec()));
+            .with_clusters(CoreDivision::Of(clusters.to_vec()));
         let mut task_set = verify(&[spec], &options).unwrap().task_set;
         let settings = settings((Policy::Edf, Preemption::Enabled), cores);
         fix_orders(&mut task_set, &settings);
@@ -232,10 +232,10 @@ fn a_fixed_order_is_taken_where_it_proves_more() {
     let bound = |order, wcets: &[u64]| on(2, &[], order, wcets);
     // Three of 2 after two of 3, on two cores: 3 + 2 + 2, in whatever order they are taken.
     let wcets = [3, 3, 2, 2, 2];
-    assert_eq!(bound(Order::Free, &wcets), (8, 0));
-    assert_eq!(bound(Order::Fixed, &wcets), (7, 3));
+    assert_eq!(bound(SubtaskOrder::Free, &wcets), (8, 0));
+    assert_eq!(bound(SubtaskOrder::Fixed, &wcets), (7, 3));
     // Made for the cores of its cluster, be there more on the machine.
-    assert_eq!(on(8, &[2, 6], Order::Fixed, &wcets), (7, 3));
+    assert_eq!(on(8, &[2, 6], SubtaskOrder::Fixed, &wcets), (7, 3));
     // Here one job alone takes no longer anyway.
-    assert_eq!(bound(Order::Fixed, &[5, 5]), (5, 0));
+    assert_eq!(bound(SubtaskOrder::Fixed, &[5, 5]), (5, 0));
 }

@@ -3,8 +3,8 @@
 use common::random::Random;
 use sched_dag::analysis::{Overheads, Settings};
 use sched_dag::{
-    Activation, ClusterId, Clusters, CommitOptions, ConstructionPolicy, DagSpec, Order, Policy,
-    Preemption, TaskSet, verify,
+    Activation, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagSpec, Policy,
+    Preemption, SubtaskOrder, TaskSet, verify,
 };
 
 use super::drawn::set;
@@ -16,7 +16,7 @@ pub(crate) struct Sample {
     pub(crate) policy: Policy,
     pub(crate) preemption: Preemption,
     pub(crate) cores: u32,
-    pub(crate) clusters: Clusters,
+    pub(crate) clusters: CoreDivision,
 }
 
 impl Sample {
@@ -90,7 +90,7 @@ pub(crate) fn sample_of(kind: Kind, random: &mut Random) -> Sample {
             draw_sinks(random, spec);
         }
         if kind.is_fixed && (number == 0 || random.once_in(3)) {
-            spec.order = Order::Fixed;
+            spec.order = SubtaskOrder::Fixed;
         }
         if random.once_in(8) {
             spec.activation = Activation::Sporadic;
@@ -109,8 +109,8 @@ pub(crate) fn sample_of(kind: Kind, random: &mut Random) -> Sample {
         },
         cores,
         clusters: match kind.is_divided {
-            true => Clusters::Of(sizes),
-            false => Clusters::Undivided,
+            true => CoreDivision::Of(sizes),
+            false => CoreDivision::Undivided,
         },
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sched_dag::law::Record;
-use sched_dag::virtual_time::{End, VirtualTime};
+use sched_dag::virtual_time::{RunOutcome, VirtualTime};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, Preemption, Priority,
     SchedulerOptions, SubtaskSpec, TaskSet, verify,
@@ -78,7 +78,7 @@ pub(crate) fn observe(
     let driver = VirtualTime::new(&Arc::new(task_set.clone()), options);
     let mut driver = driver.recording();
     let end = driver.run_until(until_ns, &mut script);
-    assert!(!matches!(end, End::TimeOverflow(_)), "{end:?}");
+    assert!(!matches!(end, RunOutcome::TimeOverflow(_)), "{end:?}");
     let events = driver.events().into_iter();
     let record = Record::of_events(task_set, true, events).expect("it fits");
     let (mut dags, mut subtasks) = (Vec::new(), Vec::new());

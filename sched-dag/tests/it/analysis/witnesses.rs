@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use common::random::Random;
 use sched_dag::analysis::{Answer, DagBound, answer, witness};
-use sched_dag::{ClusterId, Clusters, Policy, Preemption, TaskSet};
+use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, TaskSet};
 
 use super::forged;
 use super::kinds::tighter;
@@ -45,7 +45,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
             1 => behind_unknown(),
             _ => sample(&mut random),
         };
-        let is_divided = sample.clusters != Clusters::Undivided;
+        let is_divided = sample.clusters != CoreDivision::Undivided;
         let Some(task_set) = sample.task_set() else {
             continue;
         };
@@ -101,7 +101,7 @@ fn a_witness_that_lacks_a_cluster_is_refused() {
     for (spec, cluster) in sample.specs.iter_mut().zip(0..) {
         spec.cluster = Some(ClusterId(cluster));
     }
-    (sample.cores, sample.clusters) = (2, Clusters::Of(vec![1, 1]));
+    (sample.cores, sample.clusters) = (2, CoreDivision::Of(vec![1, 1]));
     let text = witness(&sample.task_set().unwrap(), &sample.settings());
     let second = text.rfind("machine ").unwrap();
     let (first, second) = text.split_at(second);
@@ -179,6 +179,6 @@ fn full_core() -> Sample {
         policy: Policy::Edf,
         preemption: Preemption::Enabled,
         cores: 1,
-        clusters: Clusters::Undivided,
+        clusters: CoreDivision::Undivided,
     }
 }

@@ -15,7 +15,7 @@ use crate::support::set::{self, Set};
 use crate::support::{Script, driver, number};
 use common::random::Random;
 use releases::SAID;
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use sched_dag::law::{Terms, dispatch_violations, violations};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Instance};
@@ -115,7 +115,7 @@ fn check_walks(is_late: bool) {
         walk(set, random, is_late, &mut told)
     });
     if number("SCHED_DAG_SETS", 3_000) >= 3_000 {
-        let lacks = |what: &What| told[*what as usize] < 100;
+        let lacks = |what: &EventKind| told[*what as usize] < 100;
         assert_eq!(SAID.into_iter().find(lacks), None, "it is rare");
     }
 }

@@ -7,26 +7,26 @@
 
 use std::collections::{BTreeSet, VecDeque};
 
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use sched_dag::{
     Activation, DagId, DagPhase, DagSpec, DagStatistics, Notice, OnFault, OverrunPolicy, Scheduler,
 };
 
 /// The kinds of reports that are judged here.
-pub(crate) const SAID: [What; 13] = [
-    What::Released,
-    What::Queued,
-    What::Skipped,
-    What::Aborted,
-    What::Missed,
-    What::Completed,
-    What::Stopped,
-    What::Off,
-    What::On,
-    What::Closed,
-    What::Restarted,
-    What::Signalled,
-    What::Dropped,
+pub(crate) const SAID: [EventKind; 13] = [
+    EventKind::Released,
+    EventKind::Queued,
+    EventKind::Skipped,
+    EventKind::Aborted,
+    EventKind::Missed,
+    EventKind::Completed,
+    EventKind::Stopped,
+    EventKind::Off,
+    EventKind::On,
+    EventKind::Closed,
+    EventKind::Restarted,
+    EventKind::Signalled,
+    EventKind::Dropped,
 ];
 
 /// A job in flight.
@@ -53,7 +53,7 @@ pub(crate) struct Releases {
     /// The jobs of the faults that were survived.
     survived: Vec<u64>,
     /// What the scheduler has to answer to what has just been asked.
-    owed: Option<What>,
+    owed: Option<EventKind>,
     counted: DagStatistics,
 }
 
@@ -80,13 +80,13 @@ impl Releases {
     }
 
     /// Takes note of what is asked: the answer, if anything comes of it.
-    pub(crate) fn ask(&mut self, answer: What) {
+    pub(crate) fn ask(&mut self, answer: EventKind) {
         let is_open = self.phase < DagPhase::Closed;
         let comes = match answer {
-            What::Off => self.phase == DagPhase::Running,
-            What::On => self.phase == DagPhase::Paused,
-            What::Closed => is_open,
-            What::Signalled => true,
+            EventKind::Off => self.phase == DagPhase::Running,
+            EventKind::On => self.phase == DagPhase::Paused,
+            EventKind::Closed => is_open,
+            EventKind::Signalled => true,
             _ => self.phase < DagPhase::Ended,
         };
         self.owed = comes.then_some(answer);
@@ -105,8 +105,8 @@ impl Releases {
         };
         self.counted.faults += 1;
         self.ask(match survives && is_replaceable {
-            true => What::Restarted,
-            false => What::Stopped,
+            true => EventKind::Restarted,
+            false => EventKind::Stopped,
         });
     }
 
@@ -116,27 +116,27 @@ impl Releases {
         let job = event.job;
         let counted = &mut self.counted;
         match event.what {
-            What::Released | What::Queued | What::Skipped => {
+            EventKind::Released | EventKind::Queued | EventKind::Skipped => {
                 let is_right = self.is_right(spec, event.what, job, now_ns);
                 let is_at = at_ns == self.due_ns.get(index(job)).copied();
                 self.settle(event.what, job);
                 return is_right && is_at;
             }
-            What::Aborted => {
+            EventKind::Aborted => {
                 let is_first = self.uncut().next().is_some_and(|it| it.number == job);
                 let is_right = is_first && self.has_to_make_room(spec, now_ns);
                 self.has_made_room = true;
                 self.counted.aborts += 1;
                 return self.cut(job) && is_right;
             }
-            What::Missed => {
+            EventKind::Missed => {
                 counted.misses += 1;
                 counted.consecutive_misses += 1;
                 let most = &mut counted.most_consecutive_misses;
                 *most = counted.consecutive_misses.max(*most);
                 return self.missed.insert(job);
             }
-            What::Completed => {
+            EventKind::Completed => {
                 let Some(ended) = self.in_flight.pop_front() else {
                     return false;
                 };
@@ -146,25 +146,25 @@ impl Releases {
                 }
                 return ended.number == job;
             }
-            What::Stopped => {
+            EventKind::Stopped => {
                 self.phase = DagPhase::Ended;
                 counted.cut_short += self.in_flight.iter().filter(|it| !it.is_cut).count() as u64;
                 self.uncut().for_each(|it| it.is_cut = true);
                 self.counted.dropped += self.waiting.drain(..).len() as u64;
             }
-            What::Restarted => {
+            EventKind::Restarted => {
                 counted.restarts += 1;
                 counted.failed += 1;
                 self.survived.push(job);
                 self.counted.failed -= u64::from(!self.cut(job));
             }
-            What::Off => self.phase = DagPhase::Paused,
-            What::On => (self.phase, self.resumed_ns) = (DagPhase::Running, now_ns),
-            What::Closed => self.phase = DagPhase::Closed,
-            What::Signalled | What::Dropped => {
+            EventKind::Off => self.phase = DagPhase::Paused,
+            EventKind::On => (self.phase, self.resumed_ns) = (DagPhase::Running, now_ns),
+            EventKind::Closed => self.phase = DagPhase::Closed,
+            EventKind::Signalled | EventKind::Dropped => {
                 let due_ns = self.signal(spec, now_ns);
-                let is_kept = event.what == What::Signalled;
-                let is_owed = self.owed.take() == Some(What::Signalled);
+                let is_kept = event.what == EventKind::Signalled;
+                let is_owed = self.owed.take() == Some(EventKind::Signalled);
                 return is_owed && due_ns == at_ns && due_ns.is_some() == is_kept;
             }
             _ => return false,
@@ -214,7 +214,7 @@ impl Releases {
             && !self.has_made_room
     }
 
-    fn is_right(&self, spec: &DagSpec, what: What, job: u64, now_ns: u64) -> bool {
+    fn is_right(&self, spec: &DagSpec, what: EventKind, job: u64, now_ns: u64) -> bool {
         let Some(first) = self.first(now_ns) else {
             return false;
         };
@@ -223,15 +223,15 @@ impl Releases {
         let is_off = self.phase > DagPhase::Running
             || is_next && self.next_ns().is_some_and(|ns| ns < self.resumed_ns);
         match (what, spec.overrun) {
-            (What::Released, _) => job == first && has_room && !is_off,
-            (What::Skipped, _) if is_off => job == first,
-            (What::Skipped, OverrunPolicy::Skip) => is_next && !has_room,
-            (What::Skipped, OverrunPolicy::Abort) => {
+            (EventKind::Released, _) => job == first && has_room && !is_off,
+            (EventKind::Skipped, _) if is_off => job == first,
+            (EventKind::Skipped, OverrunPolicy::Skip) => is_next && !has_room,
+            (EventKind::Skipped, OverrunPolicy::Abort) => {
                 let is_all_cut = self.in_flight.iter().all(|it| it.is_cut);
                 job == first && is_all_cut && self.has_to_make_room(spec, now_ns)
             }
-            (What::Queued, OverrunPolicy::Queue) => is_next && !has_room && !is_off,
-            (What::Queued, OverrunPolicy::Abort) => {
+            (EventKind::Queued, OverrunPolicy::Queue) => is_next && !has_room && !is_off,
+            (EventKind::Queued, OverrunPolicy::Abort) => {
                 is_next && !has_room && !is_off && self.has_made_room
             }
             _ => false,
@@ -239,16 +239,16 @@ impl Releases {
     }
 
     /// Takes note of what has become of a job that was due.
-    fn settle(&mut self, what: What, job: u64) {
+    fn settle(&mut self, what: EventKind, job: u64) {
         match job == self.next {
             true => (self.next, self.has_made_room) = (job + 1, false),
             false => {
-                self.has_made_room |= self.phase == DagPhase::Running && what == What::Skipped;
+                self.has_made_room |= self.phase == DagPhase::Running && what == EventKind::Skipped;
                 self.waiting.pop_front();
             }
         }
         match what {
-            What::Released => {
+            EventKind::Released => {
                 let is_cut = false;
                 self.counted.released += 1;
                 self.in_flight.push_back(Job {
@@ -256,7 +256,7 @@ impl Releases {
                     is_cut,
                 });
             }
-            What::Queued => {
+            EventKind::Queued => {
                 self.counted.queued += 1;
                 self.waiting.push_back(job);
             }

@@ -10,7 +10,7 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use sched_dag::law::sweep::Stage;
 use sched_dag::law::{JobRecord, Record, Terms, Violation, dispatch_violations, violations};
 use sched_dag::lifecycle::Request;
@@ -147,11 +147,11 @@ impl<'s> Walk<'s> {
             }
             Step::Ask(request) => {
                 let (dag, answer) = match request {
-                    Request::Pause(dag) => (dag, What::Off),
-                    Request::Resume(dag) => (dag, What::On),
-                    Request::Close(dag) => (dag, What::Closed),
-                    Request::Stop(dag) => (dag, What::Stopped),
-                    Request::Signal(dag) => (dag, What::Signalled),
+                    Request::Pause(dag) => (dag, EventKind::Off),
+                    Request::Resume(dag) => (dag, EventKind::On),
+                    Request::Close(dag) => (dag, EventKind::Closed),
+                    Request::Stop(dag) => (dag, EventKind::Stopped),
+                    Request::Signal(dag) => (dag, EventKind::Signalled),
                     _ => unreachable!("it is not asked of a scheduler"),
                 };
                 releases[dag.index()].ask(answer);
@@ -227,10 +227,10 @@ impl<'s> Walk<'s> {
             let (core, instance) = (decision.core, decision.instance);
             let place = &mut self.cores[core.index()];
             let (what, is_right) = match decision.what {
-                What::Suspend => {
+                EventKind::Suspend => {
                     freed = Some(core);
                     self.preempted.push(instance);
-                    (What::Suspend, place.take() == Some(instance))
+                    (EventKind::Suspend, place.take() == Some(instance))
                 }
                 _ => {
                     let is_free = freed.take().or_else(|| self.idle.pop()) == Some(core);
@@ -238,13 +238,13 @@ impl<'s> Walk<'s> {
                     match self.preempted.iter().position(|it| *it == instance) {
                         Some(at) => {
                             self.preempted.remove(at);
-                            let is_resumed = decision.what == What::Resume;
-                            (What::Resume, is_free && is_resumed)
+                            let is_resumed = decision.what == EventKind::Resume;
+                            (EventKind::Resume, is_free && is_resumed)
                         }
                         None => {
                             let is_cut = self.releases[instance.dag.index()].is_cut(instance.job);
-                            let is_started = decision.what == What::Start;
-                            (What::Start, is_free && is_started && !is_cut)
+                            let is_started = decision.what == EventKind::Start;
+                            (EventKind::Start, is_free && is_started && !is_cut)
                         }
                     }
                 }
@@ -321,7 +321,7 @@ fn is_of_lateness(violation: &Violation) -> bool {
         | Violation::StillQueued { .. }
         | Violation::MissedLate { .. } => true,
         Violation::OutOfTurn { event, stage } => {
-            event.what == What::Finish && *stage == Stage::Suspended
+            event.what == EventKind::Finish && *stage == Stage::Suspended
         }
         _ => false,
     }

@@ -17,7 +17,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use common::random::Random;
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
     Activation, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec, FaultLimit, HandOff,
@@ -176,8 +176,8 @@ pub(crate) fn pass_on(
         && is_unwritten
     {
         let log = &mut scheduler.log;
-        log.on_core(core, What::Finish, now_ns, finished);
-        log.on_core(core, What::Ready, log.now_ns(), decision.instance);
+        log.on_core(core, EventKind::Finish, now_ns, finished);
+        log.on_core(core, EventKind::Ready, log.now_ns(), decision.instance);
     }
     done
 }
@@ -251,8 +251,8 @@ pub(crate) fn told<'a>(events: impl IntoIterator<Item = &'a Event>) -> Vec<(u64,
     let tell = |event: &Event| {
         let Event { dag, job, what, .. } = *event;
         let outcome = match what {
-            What::Aborted => Some(JobOutcome::Aborted),
-            What::Restarted => Some(JobOutcome::Failed),
+            EventKind::Aborted => Some(JobOutcome::Aborted),
+            EventKind::Restarted => Some(JobOutcome::Failed),
             _ => None,
         };
         let known = outcomes.get(&(dag, job)).copied();
@@ -261,10 +261,10 @@ pub(crate) fn told<'a>(events: impl IntoIterator<Item = &'a Event>) -> Vec<(u64,
         {
             outcomes.insert((dag, job), outcome);
         }
-        if what == What::Missed {
+        if what == EventKind::Missed {
             outcomes.entry((dag, job)).or_insert(JobOutcome::Missed);
         }
-        if what == What::Stopped {
+        if what == EventKind::Stopped {
             stopped.push(dag);
         }
         let cut = known.filter(|known| *known != JobOutcome::Missed);
@@ -272,13 +272,15 @@ pub(crate) fn told<'a>(events: impl IntoIterator<Item = &'a Event>) -> Vec<(u64,
         let outcome = cut.or(ended).or(known).unwrap_or(JobOutcome::Met);
         let subject = match event.subtask {
             Some(subtask) => format!("{}.{job}.{}", dag.0, subtask.0),
-            None if what == What::Entered => job.to_string(),
+            None if what == EventKind::Entered => job.to_string(),
             None if what.is_of_dag() => dag.0.to_string(),
             None => format!("{}.{job}", dag.0),
         };
         let rest = match what {
-            What::Start | What::Suspend | What::Resume => format!(" on {}", event.core.0),
-            What::Completed => format!(" {outcome:?}"),
+            EventKind::Start | EventKind::Suspend | EventKind::Resume => {
+                format!(" on {}", event.core.0)
+            }
+            EventKind::Completed => format!(" {outcome:?}"),
             _ => String::new(),
         };
         (event.time_ns, format!("{what} {subject}{rest}"))

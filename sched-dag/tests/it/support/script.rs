@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
-use sched_dag::virtual_time::{End, VirtualTime, Workload};
+use sched_dag::virtual_time::{RunOutcome, VirtualTime, Workload};
 use sched_dag::{DagId, Instance, Scheduler, TaskSet};
 
 use super::{Takes, ask, kind, line, told};
@@ -57,7 +57,7 @@ impl<'a, T: Takes> Script<'a, T> {
     /// Runs until nothing happens any more.
     pub(crate) fn run(mut self, driver: VirtualTime) -> Run {
         let mut driver = driver.recording();
-        assert_eq!(driver.run(&mut self), End::Finished);
+        assert_eq!(driver.run(&mut self), RunOutcome::Finished);
         Run {
             task_set: Arc::clone(driver.scheduler_of(DagId(0)).task_set()),
             events: driver.events(),

@@ -22,7 +22,9 @@ use sched_dag::analysis::{
     Overheads, Settings, Task, answer, bonifaci_dm, bonifaci_edf, fix_orders, gedf_capacity,
     grm_capacity, multi_path,
 };
-use sched_dag::{CommitOptions, ConstructionPolicy, DagSpec, Order, Policy, Preemption, verify};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskOrder, verify,
+};
 
 use super::frame::by_plan;
 use crate::dag_file::stg;
@@ -309,8 +311,8 @@ fn bound_graphs() -> Result<(usize, Vec<Means>), String> {
     let of_cores = |cores: u32| {
         let mut sums = [0.0; 3];
         for spec in &specs {
-            let free = task(spec, Order::Free, cores)?;
-            let fixed = task(spec, Order::Fixed, cores)?;
+            let free = task(spec, SubtaskOrder::Free, cores)?;
+            let fixed = task(spec, SubtaskOrder::Fixed, cores)?;
             let base = graham(&free, cores) as f64;
             let bounds = [
                 Some(long_paths(&free, cores)),
@@ -327,7 +329,7 @@ fn bound_graphs() -> Result<(usize, Vec<Means>), String> {
     Ok((specs.len(), means?))
 }
 
-fn task(spec: &DagSpec, order: Order, cores: u32) -> Result<Task, String> {
+fn task(spec: &DagSpec, order: SubtaskOrder, cores: u32) -> Result<Task, String> {
     let spec = DagSpec {
         order,
         period_ns: Some(u64::MAX / 4),

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use dag_file::time::parse_ns;
 use dag_file::{DagFile, Execution, FileDag, Length, Malformed, Set, check, is_name, parse};
 use replay::shown::{is_seen, shown};
-use sched_dag::{Clusters, CommitOptions, Policy};
+use sched_dag::{CommitOptions, CoreDivision, Policy};
 
 use crate::files;
 use crate::options::Parsed;
@@ -40,7 +40,7 @@ pub struct Import {
     /// The number of cores that it will run on.
     pub cores: u32,
     /// How they are divided.
-    pub clusters: Clusters,
+    pub clusters: CoreDivision,
     /// For how long it will run.
     pub length: Length,
 }
@@ -260,12 +260,12 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
 }
 
 /// Reads how the cores are to be divided. Where the commit is to find that, it has not yet.
-fn clusters(text: Option<&str>) -> Result<Clusters, String> {
+fn clusters(text: Option<&str>) -> Result<CoreDivision, String> {
     let Some(text) = text.filter(|text| *text != "auto") else {
-        return Ok(Clusters::Undivided);
+        return Ok(CoreDivision::Undivided);
     };
     let sizes: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
-    sizes.map(Clusters::Of).map_err(|_| {
+    sizes.map(CoreDivision::Of).map_err(|_| {
         let text = shown(text);
         format!("`--clusters {text}`: give the number of cores of each cluster, as in 2,2, or auto")
     })

@@ -19,10 +19,10 @@ use std::sync::Arc;
 
 use common::random::Random;
 use sched_dag::analysis::{Overheads, Settings, answer, fix_orders};
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, Instance, Notice, Order, Policy,
-    Preemption, Scheduler, SchedulerOptions, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, Instance, Notice, Policy,
+    Preemption, Scheduler, SchedulerOptions, SubtaskOrder, verify,
 };
 
 use crate::options::{Command, Takes as Value, options};
@@ -173,7 +173,7 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
             subtask.non_preemptive = mixed && random.once_in(2);
         }
         if random.once_in(4) {
-            spec.order = Order::Fixed;
+            spec.order = SubtaskOrder::Fixed;
         }
     }
     let options = SchedulerOptions {
@@ -237,7 +237,8 @@ impl Machine<'_> {
 
     fn run(&mut self, until_ns: u64) {
         let (costs, mut notices) = (self.costs, Vec::new());
-        self.scheduler.hear([What::Released, What::Completed]);
+        self.scheduler
+            .hear([EventKind::Released, EventKind::Completed]);
         // The scheduler's next event, and when its interrupt comes.
         let mut alarm: Option<(u64, u64)> = None;
         let mut now_ns = 0;
@@ -278,7 +279,7 @@ impl Machine<'_> {
     /// Notes a release or a completion; returns how many instances it has made ready by releases.
     fn hear(&mut self, notice: &Notice, now_ns: u64) -> u64 {
         let (dag, job) = (notice.event.dag, notice.event.job);
-        if notice.event.what == What::Released {
+        if notice.event.what == EventKind::Released {
             self.flying.insert((dag, job), notice.at_ns.unwrap_or(0));
             return self.scheduler.task_set().dag(dag).sources().len() as u64;
         }
@@ -297,13 +298,13 @@ impl Machine<'_> {
         let (core, instance) = (decision.core.index(), decision.instance);
         let overheads = self.costs.overheads;
         let takes_ns = match decision.what {
-            What::Suspend => {
+            EventKind::Suspend => {
                 if let Some((instance, finish_ns)) = self.cores[core].take() {
                     self.left_ns.insert(instance, finish_ns - now_ns);
                 }
                 return;
             }
-            What::Resume => {
+            EventKind::Resume => {
                 let left_ns = self.left_ns.remove(&instance).unwrap_or(0);
                 left_ns + self.draw(overheads.interrupt_ns)
             }

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 
 use sched_dag::law::{InstanceRecord, JobRecord, Record};
-use sched_dag::virtual_time::{End, ExecutionTimes, VirtualTime};
+use sched_dag::virtual_time::{ExecutionTimes, RunOutcome, VirtualTime};
 use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, TaskSet};
 
 pub use ::replay::{Case, parse};
@@ -61,9 +61,11 @@ pub fn check(case: &Case) -> Result<(), String> {
         times[usize::try_from(instance.job).expect("few jobs")]
     }));
     match end {
-        End::Finished => {}
-        End::TimeReached | End::Stopped => return Err("the replay stopped early".to_owned()),
-        End::TimeOverflow(instance) => return Err(format!("{instance} never finishes")),
+        RunOutcome::Finished => {}
+        RunOutcome::TimeReached | RunOutcome::Stopped => {
+            return Err("the replay stopped early".to_owned());
+        }
+        RunOutcome::TimeOverflow(instance) => return Err(format!("{instance} never finishes")),
     }
     if !run.is_finished() {
         return Err("some jobs have not ended".to_owned());

@@ -232,26 +232,26 @@ pub fn read(path: &Path) -> Result<String, String> {
         }
         last = line;
         match record {
-            wcets::Record::Margin(_) => {}
-            wcets::Record::Dag { hash, .. } if hashes.contains(&hash) => {
+            wcets::WcetRecord::Margin(_) => {}
+            wcets::WcetRecord::Dag { hash, .. } if hashes.contains(&hash) => {
                 return Err(refuse(line, "this DAG stands here twice; give it once"));
             }
-            wcets::Record::Dag { hash, .. } => {
+            wcets::WcetRecord::Dag { hash, .. } => {
                 hashes.push(hash);
                 numbers.clear();
                 has_dag = true;
             }
-            wcets::Record::Wcet { .. } if !has_dag => {
+            wcets::WcetRecord::Wcet { .. } if !has_dag => {
                 return Err(refuse(
                     line,
                     "a WCET before the first DAG; put a `dag` before it",
                 ));
             }
-            wcets::Record::Wcet { subtask, .. } if numbers.contains(&subtask) => {
+            wcets::WcetRecord::Wcet { subtask, .. } if numbers.contains(&subtask) => {
                 return Err(refuse(line, "this subtask stands here twice; give it once"));
             }
-            wcets::Record::Wcet { subtask, .. } => numbers.push(subtask),
-            wcets::Record::End => has_ended = true,
+            wcets::WcetRecord::Wcet { subtask, .. } => numbers.push(subtask),
+            wcets::WcetRecord::End => has_ended = true,
         }
     }
     match (has_ended, has_dag) {

@@ -17,7 +17,7 @@
 use std::path::{Path, PathBuf};
 
 use sched_dag::analysis::{self, Overheads, Settings};
-use sched_dag::{Clusters, Dag, DagId, DagSpec, Preemption, SchedulerOptions};
+use sched_dag::{CoreDivision, Dag, DagId, DagSpec, Preemption, SchedulerOptions};
 
 use super::observed::OfDag;
 use crate::files;
@@ -208,7 +208,7 @@ pub fn of(commit: &Committed, dag: DagId) -> Slack {
             preemption: settings.preemption,
             cores: settings.cores,
         };
-        let task_set = record::task_set(options, Clusters::Undivided, dags).ok()?;
+        let task_set = record::task_set(options, CoreDivision::Undivided, dags).ok()?;
         let answer = analysis::answer(&task_set, settings);
         answer.bounds[dag].map(|bound| bound.bound_ns)
     };

@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 
 use recording::{Chunk, Commit, CommittedDag, Events, MAGIC, Recording, Times};
 use sched_dag::analysis::{self, Overheads, Settings};
-use sched_dag::chains::Sampling;
-use sched_dag::journal::{Event, What};
+use sched_dag::chains::SampledEdge;
+use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::Terms;
 use sched_dag::{
-    Activation, ClusterId, Clusters, CommitOptions, ConstructionPolicy, CoreId, DagId, DagSpec,
+    Activation, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, CoreId, DagId, DagSpec,
     FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskId,
     SubtaskSpec, TaskSet, verify,
 };
@@ -289,7 +289,7 @@ fn in_order(run: &Run) -> Result<(), CoreId> {
     let mut latest_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
     for event in &run.events {
         // These two state another core, and another time, than those of their making.
-        if matches!(event.what, What::Request | What::Due) {
+        if matches!(event.what, EventKind::Request | EventKind::Due) {
             continue;
         }
         let latest_ns = latest_ns.entry(event.core).or_insert(0);
@@ -330,8 +330,8 @@ impl Committed {
         }
         let specs: Result<_, String> = told.dags.iter().map(spec).collect();
         let clusters = match &told.clusters[..] {
-            [] => Clusters::Undivided,
-            sizes => Clusters::Of(sizes.to_vec()),
+            [] => CoreDivision::Undivided,
+            sizes => CoreDivision::Of(sizes.to_vec()),
         };
         let mut committed = Self {
             number,
@@ -403,12 +403,12 @@ impl Committed {
 
     /// Returns what samples what, of the model's subtasks.
     #[must_use]
-    pub fn samplings(&self) -> Vec<Sampling> {
+    pub fn samplings(&self) -> Vec<SampledEdge> {
         let dags = (0..).map(DagId).zip(&self.told.dags);
         let sampling = |(dag, &(reader, writer, topic, _))| {
             let of_writer = self.told.dags.get(usize::try_from(writer).ok()?)?;
             let topic = of_writer.topics.get(usize::try_from(topic).ok()?)?;
-            Some(Sampling {
+            Some(SampledEdge {
                 writer: self.place(DagId(writer), topic.writer)?,
                 reader: self.place(dag, reader)?,
             })
@@ -432,7 +432,7 @@ impl Committed {
 /// The reasons for which a commit would refuse them.
 pub fn task_set(
     options: SchedulerOptions,
-    clusters: Clusters,
+    clusters: CoreDivision,
     dags: &[DagSpec],
 ) -> Result<TaskSet, String> {
     if dags.is_empty() {
@@ -516,7 +516,7 @@ pub struct Run {
     /// The DAGs.
     pub task_set: TaskSet,
     /// The samplings of subtasks.
-    pub samplings: Vec<Sampling>,
+    pub samplings: Vec<SampledEdge>,
     /// The bound that was proven of each DAG.
     pub bounds_ns: Vec<Option<u64>>,
     /// The events, in the order of the journal.

@@ -23,8 +23,8 @@ use std::fmt::{Display, Write as _};
 use std::io::{self, Write};
 
 use recording::{
-    Crc, Decoder, Entry, Field, Header, Malformed, Part, Recordable, Recording, Role, Scalar,
-    Schema, What, write_json,
+    Crc, Decoder, Entry, EntryKind, Field, Header, Malformed, Part, Recordable, Recording, Role,
+    Scalar, Schema, write_json,
 };
 
 use crate::json::{Object, quoted};
@@ -87,14 +87,14 @@ fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
     let number = |index: usize| u16::try_from(index).unwrap_or(u16::MAX);
     let channel = header.channels.get(usize::from(entry.place));
     match (entry.what, channel) {
-        (What::Value, Some(channel)) => {
+        (EntryKind::Value, Some(channel)) => {
             // The reader has gone through every value.
             let _ = write_message((entry.job, &channel.schema, entry.value), json);
             entry.place
         }
         (what, channel) => {
             let subtask = match what {
-                What::Lost => channel.map_or(entry.place, |channel| channel.subtask),
+                EntryKind::Lost => channel.map_or(entry.place, |channel| channel.subtask),
                 _ => entry.place,
             };
             let event = Object::new()

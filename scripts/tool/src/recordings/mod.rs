@@ -15,7 +15,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::{self, ExitCode};
 
-use recording::{Chunk, Commit, Counted, Entry, Recording, Schema, Shown, Times, What};
+use recording::{Chunk, Commit, Counted, Entry, EntryKind, Recording, Schema, Shown, Times};
 use replay::shown::{quoted, visible};
 
 use crate::dot;
@@ -248,12 +248,12 @@ fn shown(recording: &Recording<'_>) -> String {
     let header = recording.header();
     let mut values = vec![0_u64; header.channels.len()];
     let mut others = [
-        (What::Signal, 0),
-        (What::Skip, 0),
-        (What::Cut, 0),
-        (What::Restart, 0),
-        (What::Clock, 0),
-        (What::Fault, 0),
+        (EntryKind::Signal, 0),
+        (EntryKind::Skip, 0),
+        (EntryKind::Cut, 0),
+        (EntryKind::Restart, 0),
+        (EntryKind::Clock, 0),
+        (EntryKind::Fault, 0),
     ];
     let mut span_ns: Option<(u64, u64)> = None;
     for entry in recording.entries() {
@@ -261,7 +261,7 @@ fn shown(recording: &Recording<'_>) -> String {
         span_ns = Some((first.min(entry.release_ns), last.max(entry.at_ns)));
         match others.iter_mut().find(|(what, _)| *what == entry.what) {
             Some((_, count)) => *count += 1,
-            None if entry.what == What::Value => values[usize::from(entry.place)] += 1,
+            None if entry.what == EntryKind::Value => values[usize::from(entry.place)] += 1,
             None => {}
         }
     }
@@ -413,10 +413,10 @@ fn inputs_until(recording: &Recording<'_>, job: &str) -> Result<String, String> 
     {
         let channel = header.channels.get(usize::from(place));
         let _ = match (what, channel) {
-            (What::Value | What::Lost, Some(channel)) => {
+            (EntryKind::Value | EntryKind::Lost, Some(channel)) => {
                 let (role, topic) = (channel.role.name(), visible(&channel.topic));
                 let shown = match what {
-                    What::Lost => "lost".to_string(),
+                    EntryKind::Lost => "lost".to_string(),
                     _ => Shown {
                         schema: &channel.schema,
                         bytes: value,
@@ -429,7 +429,7 @@ fn inputs_until(recording: &Recording<'_>, job: &str) -> Result<String, String> 
                     "  {at_ns} ns, subtask {subtask}, {role} `{topic}`: {shown}"
                 )
             }
-            (What::Clock, _) => {
+            (EntryKind::Clock, _) => {
                 let shown = Shown {
                     schema: &times,
                     bytes: value,
@@ -439,7 +439,7 @@ fn inputs_until(recording: &Recording<'_>, job: &str) -> Result<String, String> 
                     "  {at_ns} ns, subtask {place}, told the time: {shown}"
                 )
             }
-            (What::Cut | What::Restart | What::Fault, _) => {
+            (EntryKind::Cut | EntryKind::Restart | EntryKind::Fault, _) => {
                 writeln!(text, "  {at_ns} ns, subtask {place}: {}", what.name())
             }
             _ => writeln!(text, "  {at_ns} ns: {}", what.name()),

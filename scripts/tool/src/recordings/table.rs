@@ -15,8 +15,8 @@ use std::path::Path;
 
 use dag_file::time::parse_ns;
 use recording::{
-    Channel, DagHeader, Decoder, Entry, Field, Header, Malformed, Part, Recording, Role, Scalar,
-    Schema, What, Writer, to_bytes, write_json,
+    Channel, DagHeader, Decoder, Entry, EntryKind, Field, Header, Malformed, Part, Recording, Role,
+    Scalar, Schema, Writer, to_bytes, write_json,
 };
 use replay::shown::quoted;
 
@@ -109,7 +109,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         )
         .map_err(|why| at(line, why))?;
         writer.write(&Entry {
-            what: What::Value,
+            what: EntryKind::Value,
             dag: 0,
             place: 0,
             job,
@@ -356,7 +356,7 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
             ..
         } = entry;
         cells.clear();
-        if entry.what == What::Value {
+        if entry.what == EntryKind::Value {
             let place = usize::from(place);
             cells.extend([job, release_ns, at_ns].map(|number| number.to_string()));
             let schema = &header.channels[place].schema;
@@ -371,7 +371,7 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
             continue;
         }
         let subtask = match entry.what {
-            What::Lost => header.channels[usize::from(place)].subtask,
+            EntryKind::Lost => header.channels[usize::from(place)].subtask,
             _ => place,
         };
         cells.extend([

@@ -40,8 +40,8 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
-use sched_dag::chains::{Chain, Place};
-use sched_dag::journal::{Event, What};
+use sched_dag::chains::{Chain, SubtaskRef};
+use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::sweep::Waits;
 use sched_dag::law::{self, Distribution, Violation};
 use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
@@ -370,7 +370,7 @@ fn measure(run: &Run, options: &Parsed) -> Result<Vec<Measured>, String> {
 }
 
 /// Finds the subtask that an option names.
-fn place(run: &Run, option: &str, name: &str) -> Result<Place, String> {
+fn place(run: &Run, option: &str, name: &str) -> Result<SubtaskRef, String> {
     Chain::place(&run.task_set, name).ok_or_else(|| {
         let dags = (0..).map(DagId).zip(run.task_set.dags());
         let all: Vec<String> = dags
@@ -490,7 +490,7 @@ fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
     // The next request for each core, as seen from the one at hand.
     let mut next_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
     let requests = view.events.iter().rev();
-    for event in requests.filter(|event| event.what == What::Request) {
+    for event in requests.filter(|event| event.what == EventKind::Request) {
         let overtaken_ns = next_ns.insert(event.core, event.time_ns);
         let history = event.instance().and_then(|it| view.histories.get(&it));
         let slices = history.map_or(&[][..], |history| &history.slices);
@@ -587,15 +587,15 @@ impl<'r> View<'r> {
         for event in &view.events {
             let of_job = (event.dag, event.job);
             match (event.what, event.instance()) {
-                (What::Request, _) => {}
+                (EventKind::Request, _) => {}
                 (_, Some(instance)) => {
                     let history = view.histories.entry(instance).or_default();
                     history.note(event, run.lost > 0, view.from_ns);
                 }
-                (What::Due, None) => {
+                (EventKind::Due, None) => {
                     view.due_ns.insert(of_job, event.time_ns);
                 }
-                (What::Signalled | What::Dropped, None) => {}
+                (EventKind::Signalled | EventKind::Dropped, None) => {}
                 (what, None) if what.is_of_dag() => {}
                 (_, None) => view.jobs.entry(of_job).or_default().note(event),
             }
@@ -633,7 +633,7 @@ fn complete_from_ns(run: &Run) -> u64 {
     }
     // What is lost came before it, and the time of these was read as they were written.
     let mut events = run.events.iter();
-    let first = events.find(|event| !matches!(event.what, What::Finish | What::Due));
+    let first = events.find(|event| !matches!(event.what, EventKind::Finish | EventKind::Due));
     // At that very instant something may be missing.
     first.map_or(u64::MAX, |first| first.time_ns.saturating_add(1))
 }
@@ -641,10 +641,10 @@ fn complete_from_ns(run: &Run) -> u64 {
 impl JobHistory {
     fn note(&mut self, event: &Event) {
         let place = match event.what {
-            What::Released => &mut self.released_ns,
-            What::Aborted => &mut self.aborted_ns,
-            What::Missed => &mut self.missed_ns,
-            What::Completed => &mut self.completed_ns,
+            EventKind::Released => &mut self.released_ns,
+            EventKind::Aborted => &mut self.aborted_ns,
+            EventKind::Missed => &mut self.missed_ns,
+            EventKind::Completed => &mut self.completed_ns,
             _ => return,
         };
         place.get_or_insert(event.time_ns);
@@ -660,7 +660,10 @@ impl History {
     fn note(&mut self, event: &Event, is_lossy: bool, from_ns: u64) {
         let time_ns = event.time_ns;
         let is_first = self.slices.is_empty() && self.start_ns.is_none();
-        let ran = matches!(event.what, What::Suspend | What::Finish | What::Ended);
+        let ran = matches!(
+            event.what,
+            EventKind::Suspend | EventKind::Finish | EventKind::Ended
+        );
         if is_lossy && is_first && ran {
             // It has been running since before the trace.
             self.begin(event.core, from_ns);
@@ -669,15 +672,15 @@ impl History {
             slice.to_ns.get_or_insert(time_ns);
         }
         let place = match event.what {
-            What::Ready => &mut self.ready_ns,
-            What::Start => &mut self.start_ns,
-            What::Finish => &mut self.finish_ns,
-            What::Cancelled | What::Ended => &mut self.dropped_ns,
+            EventKind::Ready => &mut self.ready_ns,
+            EventKind::Start => &mut self.start_ns,
+            EventKind::Finish => &mut self.finish_ns,
+            EventKind::Cancelled | EventKind::Ended => &mut self.dropped_ns,
             _ => &mut None,
         };
         place.get_or_insert(time_ns);
-        self.suspensions += u64::from(event.what == What::Suspend);
-        if matches!(event.what, What::Start | What::Resume) {
+        self.suspensions += u64::from(event.what == EventKind::Suspend);
+        if matches!(event.what, EventKind::Start | EventKind::Resume) {
             self.begin(event.core, time_ns);
         }
     }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use recording::{Recording, Role, What};
+use recording::{EntryKind, Recording, Role};
 use tool::system::workspace;
 
 use crate::support::{Called, call, folder};
@@ -66,7 +66,7 @@ fn a_crash_leaves_what_shows_its_job_on_the_host() {
         [Role::Source, Role::State, Role::State],
         "no results"
     );
-    let values = (recording.entries()).filter(|entry| entry.what == What::Value);
+    let values = (recording.entries()).filter(|entry| entry.what == EntryKind::Value);
     let jobs = |place| -> Vec<u64> {
         let of_place = values.clone().filter(|entry| entry.place == place);
         of_place.map(|entry| entry.job).collect()

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 
 use linux::EndSignals;
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use tool::protocol::Transcript;
 use tool::record::Record;
 use tool::system::workspace;
@@ -51,7 +51,9 @@ fn closings(folder: &Path) -> usize {
     let bytes = fs::read(folder.join("trace.rec")).expect("it is there");
     let record = Record::read(&bytes).expect("it is whole");
     let events = record.runs.iter().flat_map(|run| &run.events);
-    events.filter(|event| event.what == What::Closed).count()
+    events
+        .filter(|event| event.what == EventKind::Closed)
+        .count()
 }
 
 #[test]

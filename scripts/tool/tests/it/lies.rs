@@ -4,36 +4,51 @@
 //! instant, is never told.
 
 use common::random::Random;
-use sched_dag::journal::{Event, What};
+use sched_dag::journal::{Event, EventKind};
 use tool::record::Run;
 
 /// A lie: its name, of what and of which events it can be told, and how it changes the one at a
 /// place.
 pub(crate) type Lie = (
     &'static str,
-    What,
+    EventKind,
     fn(&Run, &Event) -> bool,
     fn(&mut Run, usize, &mut Random),
 );
 
 /// All lies.
 pub(crate) const LIES: [Lie; 16] = [
-    ("a start is missing", What::Start, any, remove),
-    ("a finish is missing", What::Finish, any, remove),
-    ("a suspension is missing", What::Suspend, any, remove),
-    ("a resumption is missing", What::Resume, any, remove),
-    ("a readiness is missing", What::Ready, starts, remove),
-    ("a release is missing", What::Released, any, remove),
-    ("a completion is missing", What::Completed, any, remove),
-    ("a start happens twice", What::Start, any, double),
-    ("a finish happens twice", What::Finish, any, double),
-    ("a miss is made up", What::Completed, is_in_time, miss),
-    ("a miss is not noticed", What::Missed, is_not_cut, remove),
-    ("a release is early", What::Released, is_after_0, early),
-    ("a start before the join", What::Start, joins, before_join),
-    ("a start comes late", What::Start, runs_on, late),
-    ("start and finish swapped", What::Start, finishes, swap),
-    ("a finish elsewhere", What::Finish, has_others, elsewhere),
+    ("a start is missing", EventKind::Start, any, remove),
+    ("a finish is missing", EventKind::Finish, any, remove),
+    ("a suspension is missing", EventKind::Suspend, any, remove),
+    ("a resumption is missing", EventKind::Resume, any, remove),
+    ("a readiness is missing", EventKind::Ready, starts, remove),
+    ("a release is missing", EventKind::Released, any, remove),
+    ("a completion is missing", EventKind::Completed, any, remove),
+    ("a start happens twice", EventKind::Start, any, double),
+    ("a finish happens twice", EventKind::Finish, any, double),
+    ("a miss is made up", EventKind::Completed, is_in_time, miss),
+    (
+        "a miss is not noticed",
+        EventKind::Missed,
+        is_not_cut,
+        remove,
+    ),
+    ("a release is early", EventKind::Released, is_after_0, early),
+    (
+        "a start before the join",
+        EventKind::Start,
+        joins,
+        before_join,
+    ),
+    ("a start comes late", EventKind::Start, runs_on, late),
+    ("start and finish swapped", EventKind::Start, finishes, swap),
+    (
+        "a finish elsewhere",
+        EventKind::Finish,
+        has_others,
+        elsewhere,
+    ),
 ];
 
 /// Tells a lie about one of the events of which it can be told, if there is one.
@@ -51,13 +66,13 @@ pub(crate) fn tell((_, what, can_be, change): Lie, run: &mut Run, random: &mut R
 }
 
 /// Returns where something else happened to the instance or the job of an event.
-fn find(run: &Run, like: &Event, what: What) -> Option<usize> {
+fn find(run: &Run, like: &Event, what: EventKind) -> Option<usize> {
     let of = |event: &Event| (event.dag, event.job, event.subtask);
     let mut events = run.events.iter();
     events.position(|event| event.what == what && of(event) == of(like))
 }
 
-fn time_ns(run: &Run, like: &Event, what: What) -> Option<u64> {
+fn time_ns(run: &Run, like: &Event, what: EventKind) -> Option<u64> {
     find(run, like, what).map(|place| run.events[place].time_ns)
 }
 
@@ -66,17 +81,17 @@ fn any(_: &Run, _: &Event) -> bool {
 }
 
 fn starts(run: &Run, event: &Event) -> bool {
-    find(run, event, What::Start).is_some()
+    find(run, event, EventKind::Start).is_some()
 }
 
 fn is_in_time(run: &Run, event: &Event) -> bool {
-    [What::Missed, What::Aborted]
+    [EventKind::Missed, EventKind::Aborted]
         .iter()
         .all(|&what| find(run, event, what).is_none())
 }
 
 fn is_not_cut(run: &Run, event: &Event) -> bool {
-    [What::Skipped, What::Aborted]
+    [EventKind::Skipped, EventKind::Aborted]
         .iter()
         .all(|&what| find(run, event, what).is_none())
 }
@@ -90,7 +105,7 @@ fn join_ns(run: &Run, event: &Event) -> Option<u64> {
     let predecessors = run.task_set.dag(event.dag).predecessors(event.subtask?);
     let finishes = predecessors.iter().map(|&predecessor| {
         let subtask = Some(predecessor);
-        time_ns(run, &Event { subtask, ..*event }, What::Finish)
+        time_ns(run, &Event { subtask, ..*event }, EventKind::Finish)
     });
     finishes.max().flatten()
 }
@@ -100,13 +115,13 @@ fn joins(run: &Run, event: &Event) -> bool {
 }
 
 fn runs_on(run: &Run, event: &Event) -> bool {
-    let next = [What::Suspend, What::Finish].map(|what| time_ns(run, event, what));
+    let next = [EventKind::Suspend, EventKind::Finish].map(|what| time_ns(run, event, what));
     let mut next = next.into_iter().flatten();
     next.all(|next_ns| next_ns > event.time_ns + 1)
 }
 
 fn finishes(run: &Run, event: &Event) -> bool {
-    time_ns(run, event, What::Finish) > Some(event.time_ns)
+    time_ns(run, event, EventKind::Finish) > Some(event.time_ns)
 }
 
 fn has_others(run: &Run, _: &Event) -> bool {
@@ -122,7 +137,7 @@ fn double(run: &mut Run, place: usize, _: &mut Random) {
 }
 
 fn miss(run: &mut Run, place: usize, _: &mut Random) {
-    let what = What::Missed;
+    let what = EventKind::Missed;
     let missed = Event {
         what,
         ..run.events[place]
@@ -146,7 +161,7 @@ fn late(run: &mut Run, place: usize, _: &mut Random) {
 }
 
 fn swap(run: &mut Run, start: usize, _: &mut Random) {
-    let finish = find(run, &run.events[start], What::Finish).expect("it finishes");
+    let finish = find(run, &run.events[start], EventKind::Finish).expect("it finishes");
     let start_ns = run.events[start].time_ns;
     run.events[start].time_ns = run.events[finish].time_ns;
     run.events[finish].time_ns = start_ns;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use recording::{Channel, DagHeader, Entry, Header, Recordable, Role, What, Writer, to_bytes};
+use recording::{Channel, DagHeader, Entry, EntryKind, Header, Recordable, Role, Writer, to_bytes};
 
 use crate::support::{assert_refused, call, folder, refusal, succeed};
 
@@ -36,8 +36,8 @@ fn recording() -> Vec<u8> {
             vec![u64::MAX; usize::try_from(job % 4).expect("small")],
         );
         let (what, bytes) = match job {
-            70 => (What::Lost, Vec::new()),
-            _ => (What::Value, to_bytes(&value)),
+            70 => (EntryKind::Lost, Vec::new()),
+            _ => (EntryKind::Value, to_bytes(&value)),
         };
         writer.write(&Entry {
             what,

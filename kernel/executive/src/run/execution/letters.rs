@@ -1,6 +1,6 @@
 //! Requests of one cluster to others: signals, pauses, modes, the end.
 //!
-//! They are [letters](sched_dag::lifecycle::Letters): the other cluster's first core is woken,
+//! They are [letters](sched_dag::lifecycle::Mailboxes): the other cluster's first core is woken,
 //! which takes them in a step of its own. That takes no lock, so nobody waits.
 
 use alloc::sync::Arc;
@@ -12,7 +12,7 @@ use sched_dag::{ClusterId, lifecycle};
 use super::cluster::{CoreSet, FIRST_SEAT, nth};
 
 /// Those of a run; all clusters have the same ones. None where cores are not divided.
-pub(super) type Letters = Option<Arc<lifecycle::Letters>>;
+pub(super) type Letters = Option<Arc<lifecycle::Mailboxes>>;
 
 /// Sends a request to the other clusters that it concerns, adds the cores that have to take it, and
 /// reports whether it does not concern the cluster itself.

@@ -27,7 +27,7 @@ use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan, Terms};
 use sched_dag::engine::{Engine, Proven, Run};
-use sched_dag::lifecycle::Requests;
+use sched_dag::lifecycle::PendingRequests;
 use sched_dag::{Dag, Journal, Scheduler, TaskSet};
 
 use crate::machine::context::Parked;
@@ -112,7 +112,7 @@ pub fn prepare(mut plan: Plan, terms: &Terms, coincidence_ns: u64) -> Result<(),
                 id,
                 Scheduler::of_cluster(Arc::clone(task_set), options, id),
                 Journal::of_cluster(task_set, id, free_bytes, most_events),
-                Requests::new(plan.bodies.len(), lifecycles.next().flatten()),
+                PendingRequests::new(plan.bodies.len(), lifecycles.next().flatten()),
                 plan.after_fault.clone(),
             ),
             loans: Loans::new(task_set.vertices()),

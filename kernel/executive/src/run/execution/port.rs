@@ -9,7 +9,7 @@ use core::sync::atomic::Ordering;
 
 use fass::{Body, LaunchError};
 use sched_dag::engine::{Body as _, Port};
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{self, Request};
 use sched_dag::{ClusterId, CoreId, Notice, Preemption, SchedulerOptions, TaskSet};
 
@@ -34,7 +34,7 @@ pub(super) struct SmpPort<'a> {
 
 impl Port<Loan> for SmpPort<'_> {
     /// The edge tells of these, where a topic is recorded.
-    const HEARS: &'static [What] = fass::edge::HEARS;
+    const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
     fn now_ns(&self) -> u64 {
         since_epoch(clock::now_ns())
@@ -74,7 +74,7 @@ impl Port<Loan> for SmpPort<'_> {
         self.cluster.may_have_letters()
     }
 
-    fn take_letters(&mut self) -> Option<&lifecycle::Letters> {
+    fn take_letters(&mut self) -> Option<&lifecycle::Mailboxes> {
         if !MAY_DIVIDE {
             return None;
         }

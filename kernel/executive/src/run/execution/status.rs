@@ -13,7 +13,7 @@ use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
 use sched_dag::engine::Cost;
-use sched_dag::journal::Subject;
+use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet};
 
@@ -32,7 +32,7 @@ const _: () = {
         subtask: SubtaskId(0),
     };
     // The heap tells by this whose memory it is.
-    assert!(Subject::of(any).ids == 1 << heap::OWNER_BIT);
+    assert!(EventSubject::of(any).ids == 1 << heap::OWNER_BIT);
 };
 
 /// Stands where the ids of an instance do, for none.
@@ -75,11 +75,11 @@ pub fn running(core: &Core) -> Option<Instance> {
         .running
         .each_ref()
         .map(|field| field.load(Ordering::Relaxed));
-    (ids != NOTHING).then(|| Subject { ids, job }.instance())
+    (ids != NOTHING).then(|| EventSubject { ids, job }.instance())
 }
 
 /// Notes which instance a core runs, for [`running`].
-pub(super) fn note_running(core: &Core, subject: Option<Subject>) {
+pub(super) fn note_running(core: &Core, subject: Option<EventSubject>) {
     let (ids, job) = subject.map_or((NOTHING, 0), |subject| (subject.ids, subject.job));
     core.note_running([ids, job]);
 }

@@ -18,7 +18,7 @@ use core::sync::atomic::Ordering;
 
 use fass::{Plan, Request};
 use sched_dag::engine::{Continuation, Engine};
-use sched_dag::journal::{Subject, What};
+use sched_dag::journal::{EventKind, EventSubject};
 use sched_dag::placement::Next;
 use sched_dag::{CoreId, DagId, Instance, Moment};
 
@@ -140,7 +140,7 @@ impl Execution {
             Next::Start(_, runner) => Work::Run(runner),
             Next::Continue(context) => {
                 self.note_resumed(core, &context, clock::now_ns());
-                note_running(core, self.current(here.index()).map(Subject::of));
+                note_running(core, self.current(here.index()).map(EventSubject::of));
                 Work::Continue(context)
             }
             // Only core 0 has a background, and only while it does other work.
@@ -179,9 +179,9 @@ impl Execution {
             let instance = self.engine.scheduler.instance_of(vertex);
             self.engine.scheduler.log.journal.write(
                 seat(core),
-                What::Suspend,
+                EventKind::Suspend,
                 time_ns,
-                Subject::of(instance),
+                EventSubject::of(instance),
             );
             // The hold, or the turn, was the instance's.
             turns::leave(core);
@@ -197,7 +197,7 @@ impl Execution {
                 contexts::begin()
             }
         };
-        note_running(core, self.current(here).map(Subject::of));
+        note_running(core, self.current(here).map(EventSubject::of));
         let last = interrupted.exchange(next);
         match suspended {
             Some(vertex) => {
@@ -221,9 +221,9 @@ impl Execution {
             let time_ns = since_epoch(clock::now_ns());
             self.engine.scheduler.log.journal.write(
                 here,
-                What::Resume,
+                EventKind::Resume,
                 time_ns,
-                Subject::of(instance),
+                EventSubject::of(instance),
             );
         }
     }

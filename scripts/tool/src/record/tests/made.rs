@@ -7,7 +7,7 @@
 //! before them is of events that are there no more.
 
 use recording::{Commit, CommittedDag, CommittedSubtask, Times, Writer};
-use sched_dag::journal::{Event, Subject};
+use sched_dag::journal::{Event, EventSubject};
 use sched_dag::{CoreId, DagId, SubtaskId};
 
 /// Returns the lines that are not empty.
@@ -104,8 +104,8 @@ pub(crate) fn record_of(text: &str, commit: &Commit, events: &str) -> Vec<u8> {
     }
     let words = lines.into_iter().map(|line| {
         let event = event(line);
-        let of_job = Subject::of_job(event.dag, event.job);
-        let subject = event.instance().map_or(of_job, Subject::of);
+        let of_job = EventSubject::of_job(event.dag, event.job);
+        let subject = event.instance().map_or(of_job, EventSubject::of);
         Event::words(event.time_ns, event.what, event.core, subject)
     });
     let words: Vec<[u64; 3]> = words.collect();

@@ -42,7 +42,7 @@ use std::fs;
 use std::process::ExitCode;
 
 use sched_dag::chains::SampledJobs;
-use sched_dag::journal::What;
+use sched_dag::journal::EventKind;
 use sched_dag::law::Violation;
 use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 
@@ -268,10 +268,10 @@ fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) {
 fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut Track) {
     for event in &view.events {
         let what = match event.what {
-            What::Request => "preempt for",
-            What::Suspend => "preempted",
-            What::Ended => "fault in",
-            What::Restarted => "goes on without",
+            EventKind::Request => "preempt for",
+            EventKind::Suspend => "preempted",
+            EventKind::Ended => "fault in",
+            EventKind::Restarted => "goes on without",
             _ => continue,
         };
         if let Some(instance) = event.instance()
@@ -315,13 +315,13 @@ fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) 
     let args = |job: u64| Object::new().number("job", job).end();
     for event in view.events.iter().filter(|event| event.dag == dag) {
         let what = match event.what {
-            What::Released => "release",
-            What::Queued => "release waits",
-            What::Skipped => "skip",
-            What::Aborted => "abort",
-            What::Missed => "MISS",
-            What::Signalled => "signal for",
-            What::Dropped => "signal dropped,",
+            EventKind::Released => "release",
+            EventKind::Queued => "release waits",
+            EventKind::Skipped => "skip",
+            EventKind::Aborted => "abort",
+            EventKind::Missed => "MISS",
+            EventKind::Signalled => "signal for",
+            EventKind::Dropped => "signal dropped,",
             _ => continue,
         };
         let name = format!("{what} #{}", event.job);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sched_dag::chains::Sampling;
+use sched_dag::chains::SampledEdge;
 use sched_dag::{DagId, SubtaskId};
 
 use super::super::tests::run_of;
@@ -198,7 +198,7 @@ fn an_arrow_leads_along_each_edge_whose_ends_ran() {
 #[test]
 fn an_arrow_leads_from_a_value_to_each_instance_that_samples_it() {
     // `b/x` samples what `a/s` writes.
-    let sampling = Sampling {
+    let sampling = SampledEdge {
         writer: (DagId(0), SubtaskId(0)),
         reader: (DagId(1), SubtaskId(0)),
     };
