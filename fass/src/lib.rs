@@ -139,7 +139,7 @@ pub use run::plan::{Body, Plan, Replacement, Runner};
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use run::wire::Framing;
-pub use sched_dag::analysis::{OverheadSource, Overheads, Reason, Test};
+pub use sched_dag::analysis::{NotProvenReason, OverheadSource, Overheads, SchedulabilityTest};
 pub use sched_dag::lifecycle::Request;
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{

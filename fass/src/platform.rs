@@ -17,7 +17,7 @@ use core::fmt;
 use core::time::Duration;
 
 use recording::Channel;
-use sched_dag::analysis::{OverheadSource, Overheads, Settings};
+use sched_dag::analysis::{AnalysisSettings, OverheadSource, Overheads};
 use sched_dag::{CoreDivision, DagId, Policy, Preemption, SchedulerOptions, TaskSet};
 
 use crate::edge::Begin;
@@ -524,13 +524,13 @@ impl Terms {
     }
 
     /// Returns what the analysis of a commit reckons with.
-    pub(crate) fn settings(&self) -> Settings {
+    pub(crate) fn settings(&self) -> AnalysisSettings {
         let SchedulerOptions {
             policy,
             preemption,
             cores,
         } = self.scheduler;
-        Settings {
+        AnalysisSettings {
             policy,
             preemption,
             cores,

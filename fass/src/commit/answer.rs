@@ -41,7 +41,9 @@ use core::fmt;
 use core::ops::Range;
 use core::time::Duration;
 
-use sched_dag::analysis::{self, OverheadSource, Reason, Settings, Test};
+use sched_dag::analysis::{
+    self, AnalysisSettings, NotProvenReason, OverheadSource, SchedulabilityTest,
+};
 use sched_dag::chains::{Chain, SampledEdge};
 use sched_dag::engine::Proven;
 use sched_dag::wcets::WcetSource;
@@ -401,10 +403,10 @@ pub struct SinkAnswer {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{Test, Verdict};
+/// use fass::{SchedulabilityTest, Verdict};
 ///
 /// let bound = Duration::from_millis(5);
-/// let verdict = Verdict::Proven { bound, test: Test::Edf };
+/// let verdict = Verdict::Proven { bound, test: SchedulabilityTest::Edf };
 /// assert_eq!(verdict.bound(), Some(bound));
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -415,7 +417,7 @@ pub enum Verdict {
         /// The most time from a job's nominal release to its completion.
         bound: Duration,
         /// The test that gave it.
-        test: Test,
+        test: SchedulabilityTest,
     },
     /// No test gives a bound.
     NotProven(Unproven),
@@ -437,10 +439,10 @@ impl Verdict {
     ///
     /// ```
     /// use core::time::Duration;
-    /// use fass::{Test, Verdict};
+    /// use fass::{SchedulabilityTest, Verdict};
     ///
     /// let bound = Duration::from_millis(5);
-    /// assert_eq!(Verdict::Proven { bound, test: Test::Edf }.unproven(), None);
+    /// assert_eq!(Verdict::Proven { bound, test: SchedulabilityTest::Edf }.unproven(), None);
     /// ```
     #[must_use]
     pub const fn unproven(&self) -> Option<&Unproven> {
@@ -459,7 +461,7 @@ pub(crate) struct Answers {
     pub(crate) first_unproven: Option<usize>,
     /// The bounds, for the platform.
     pub(crate) proven: Proven,
-    settings: Settings,
+    settings: AnalysisSettings,
 }
 
 impl Answers {
@@ -475,7 +477,7 @@ impl Answers {
                     test: bound.test,
                 },
                 (None, reason) => {
-                    let reason = reason.unwrap_or(Reason::NoBound);
+                    let reason = reason.unwrap_or(NotProvenReason::NoBound);
                     Verdict::NotProven(Unproven::new(task_set, dag, reason))
                 }
             };

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use core::fmt::{self, Display};
 use core::time::Duration;
 
-use sched_dag::analysis::{Reason, TaskError};
+use sched_dag::analysis::{NotProvenReason, TaskError};
 use sched_dag::wcets::WcetFault;
 use sched_dag::{DagId, DagLabel, SubtaskId, SubtaskLabel, TaskSet, Warning, worded};
 
@@ -165,7 +165,7 @@ fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unproven {
-    reason: Reason,
+    reason: NotProvenReason,
     /// The subtasks that the reason is about.
     subtasks: Vec<SubtaskLabel>,
     /// The other DAG that the reason is about.
@@ -176,14 +176,14 @@ impl Unproven {
     /// Returns the reason, by which a program may decide.
     ///
     /// ```
-    /// use fass::{Reason, Unproven};
+    /// use fass::{NotProvenReason, Unproven};
     ///
     /// fn is_worth_another_core(unproven: &Unproven) -> bool {
-    ///     matches!(unproven.reason(), Reason::NoBound | Reason::Overload)
+    ///     matches!(unproven.reason(), NotProvenReason::NoBound | NotProvenReason::Overload)
     /// }
     /// ```
     #[must_use]
-    pub const fn reason(&self) -> Reason {
+    pub const fn reason(&self) -> NotProvenReason {
         self.reason
     }
 
@@ -202,20 +202,21 @@ impl Unproven {
         self.reason.is_certain()
     }
 
-    pub(crate) fn new(task_set: &TaskSet, dag: DagId, reason: Reason) -> Self {
+    pub(crate) fn new(task_set: &TaskSet, dag: DagId, reason: NotProvenReason) -> Self {
         let subtasks = match reason {
-            Reason::Unknown(TaskError::MissingWcet { .. }) => {
+            NotProvenReason::Unknown(TaskError::MissingWcet { .. }) => {
                 let subtasks = (0..).map(SubtaskId).zip(task_set.dag(dag).subtasks());
                 let lacking = subtasks.filter(|(_, subtask)| subtask.wcet_ns().unwrap_or(0) == 0);
                 lacking.map(|(id, _)| id).collect()
             }
-            Reason::SubtaskBeyondPeriod { subtask } => vec![subtask],
-            Reason::PathBeyondDeadline { sink, .. } | Reason::NoSinkBound { sink } => vec![sink],
+            NotProvenReason::SubtaskBeyondPeriod { subtask } => vec![subtask],
+            NotProvenReason::PathBeyondDeadline { sink, .. }
+            | NotProvenReason::NoSinkBound { sink } => vec![sink],
             _ => Vec::new(),
         };
         let labels = subtasks.into_iter();
         let other = match reason {
-            Reason::DelayedBy { dag } => Some(dag),
+            NotProvenReason::DelayedBy { dag } => Some(dag),
             _ => None,
         };
         Self {
@@ -232,7 +233,7 @@ const MOST_NAMED: usize = 8;
 impl fmt::Display for Unproven {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.reason, &self.subtasks[..], &self.other) {
-            (Reason::Unknown(TaskError::MissingWcet { .. }), [first, others @ ..], _) => {
+            (NotProvenReason::Unknown(TaskError::MissingWcet { .. }), [first, others @ ..], _) => {
                 write!(f, "no WCET above 0 is given for {first}")?;
                 let (named, more) = others.split_at(others.len().min(MOST_NAMED - 1));
                 named.iter().try_for_each(|other| write!(f, ", {other}"))?;
@@ -241,22 +242,22 @@ impl fmt::Display for Unproven {
                 }
                 f.write_str("; give every subtask one to have the DAG analysed")
             }
-            (Reason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
+            (NotProvenReason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
                 f,
                 "{subtask} alone takes more than a period; split it or lengthen the period"
             ),
-            (Reason::PathBeyondDeadline { length_ns, .. }, [sink, ..], _) => write!(
+            (NotProvenReason::PathBeyondDeadline { length_ns, .. }, [sink, ..], _) => write!(
                 f,
                 "the longest path to {sink} alone takes {:?}, which is more than the relative \
                  deadline of that sink; shorten the path or relax the deadline",
                 Duration::from_nanos(*length_ns)
             ),
-            (Reason::NoSinkBound { .. }, [sink, ..], _) => write!(
+            (NotProvenReason::NoSinkBound { .. }, [sink, ..], _) => write!(
                 f,
                 "no test bounds the response time of {sink} by the relative deadline of that sink \
                  (it may still meet it); add cores or relax the deadline"
             ),
-            (Reason::DelayedBy { .. }, _, Some(other)) => write!(
+            (NotProvenReason::DelayedBy { .. }, _, Some(other)) => write!(
                 f,
                 "{other}, which may delay it, is not proven itself; see to that one first"
             ),

@@ -33,7 +33,7 @@ use super::multi_path::multi_path;
 use super::set::constrained;
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, sort_largest_first};
-use super::{Settings, fixed_order};
+use super::{AnalysisSettings, fixed_order};
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::policy::AssignmentReason;
 use crate::task_set::TaskSet;
@@ -45,13 +45,13 @@ pub struct NotAssigned {
     /// The DAG.
     pub dag: DagId,
     /// Why it gets none.
-    pub reason: Unassigned,
+    pub reason: AssignmentFailure,
 }
 
 texts! {
     /// Why a DAG gets no cores.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Unassigned {
+    pub enum AssignmentFailure {
         /// It states a cluster, and the clusters are not made yet.
         Stated = "it states a cluster, and the commit is to make them; leave its cluster out";
         /// Its need of cores is not known.
@@ -78,19 +78,19 @@ texts! {
 ///
 /// The first DAG that gets no cores: heavy ones in the order of the commit, then light ones,
 /// the densest first.
-pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssigned> {
+pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(), NotAssigned> {
     let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
     let overhead_ns = overhead_ns.ok_or(TaskError::VolumeOverflow);
     let mut tasks = Vec::with_capacity(task_set.dags().len());
     for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
         let refused = |reason| NotAssigned { dag, reason };
         if model.states_cluster() {
-            return Err(refused(Unassigned::Stated));
+            return Err(refused(AssignmentFailure::Stated));
         }
         let task = overhead_ns.and_then(|overhead_ns| Task::from_dag(model, overhead_ns));
-        tasks.push(task.map_err(|error| refused(Unassigned::Unknown(error)))?);
+        tasks.push(task.map_err(|error| refused(AssignmentFailure::Unknown(error)))?);
     }
-    let mut assignment = Assignment {
+    let mut assignment = AssignmentSearch {
         sizes: Vec::new(),
         of_dags: vec![(ClusterId(0), AssignmentReason::Light); tasks.len()],
     };
@@ -104,7 +104,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssi
         }
         let length_ns = task.length_ns();
         if length_ns > within_ns {
-            let reason = Unassigned::TooLong {
+            let reason = AssignmentFailure::TooLong {
                 length_ns,
                 within_ns,
             };
@@ -118,7 +118,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssi
                 || fixed().is_some_and(|(_, length_ns)| length_ns <= within_ns)
         };
         let Some(count) = (1..=left).find(is_enough) else {
-            let (dag, reason) = (DagId(to_u32(dag)), Unassigned::TooHeavy { left });
+            let (dag, reason) = (DagId(to_u32(dag)), AssignmentFailure::TooHeavy { left });
             return Err(NotAssigned { dag, reason });
         };
         let cluster = ClusterId(to_u32(assignment.sizes.len()));
@@ -136,7 +136,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &Settings) -> Result<(), NotAssi
 }
 
 /// Which DAG gets which cores.
-struct Assignment {
+struct AssignmentSearch {
     /// The cores of each cluster.
     sizes: Vec<u32>,
     /// The cluster of each DAG, and why it is that.
@@ -154,7 +154,7 @@ fn pack(
     tasks: &[Task],
     mut light: Vec<usize>,
     left: u32,
-    assignment: &mut Assignment,
+    assignment: &mut AssignmentSearch,
 ) -> Result<(), NotAssigned> {
     sort_largest_first(&mut light, |dag| density(&tasks[dag]));
     let first = assignment.sizes.len();
@@ -177,7 +177,7 @@ fn pack(
             Ratio::sum(all).is_some_and(|sum| sum.at_most(1, 1))
         };
         let Some(place) = place.filter(fits) else {
-            let (dag, reason) = (DagId(to_u32(dag)), Unassigned::NoRoom { left });
+            let (dag, reason) = (DagId(to_u32(dag)), AssignmentFailure::NoRoom { left });
             return Err(NotAssigned { dag, reason });
         };
         loads[place].push(density(&tasks[dag]));
@@ -266,7 +266,7 @@ mod tests {
         let options = CommitOptions::new(Policy::Edf, cores)
             .with_construction(ConstructionPolicy::any_graph());
         let verified = crate::verify(dags, &options).expect("the DAGs are right");
-        let settings = Settings {
+        let settings = AnalysisSettings {
             policy: Policy::Edf,
             preemption: Preemption::Enabled,
             cores,
@@ -334,18 +334,27 @@ mod tests {
         };
         let (heavy, light) = (parallel(&[6, 6, 6, 6], 10), parallel(&[8], 10));
         let both = [light.clone(), heavy];
-        assert_eq!(refused(&both, 3), (1, Unassigned::TooHeavy { left: 3 }));
-        assert_eq!(refused(&both, 4), (0, Unassigned::NoRoom { left: 0 }));
+        assert_eq!(
+            refused(&both, 3),
+            (1, AssignmentFailure::TooHeavy { left: 3 })
+        );
+        assert_eq!(
+            refused(&both, 4),
+            (0, AssignmentFailure::NoRoom { left: 0 })
+        );
         let two = [light.clone(), light];
-        assert_eq!(refused(&two, 1), (1, Unassigned::NoRoom { left: 1 }));
+        assert_eq!(refused(&two, 1), (1, AssignmentFailure::NoRoom { left: 1 }));
         // Neither cores nor a later deadline help what is longer than its period.
-        let too_long = Unassigned::TooLong {
+        let too_long = AssignmentFailure::TooLong {
             length_ns: 21,
             within_ns: 20,
         };
         assert_eq!(refused(&[parallel(&[21], 30)], 8), (0, too_long));
         let unknown = [parallel(&[0], 10)];
-        assert!(matches!(refused(&unknown, 1), (0, Unassigned::Unknown(_))));
+        assert!(matches!(
+            refused(&unknown, 1),
+            (0, AssignmentFailure::Unknown(_))
+        ));
     }
 
     #[test]

@@ -60,7 +60,7 @@ pub fn parallelism(task: &Task, cores: u32) -> u64 {
 
 /// Returns the covers if they can be found within the limit.
 fn exact(task: &Task, most: usize) -> Option<Vec<u64>> {
-    let mut flow = Flow::none(task);
+    let mut flow = ChainFlow::none(task);
     let mut covers: Vec<u64> = Vec::new();
     let mut sum = 0;
     while covers.len() < most && sum < task.volume_ns() {
@@ -97,7 +97,7 @@ pub(super) fn covering(task: &Task, most: usize, count: usize) -> Vec<Chain> {
 
 /// Returns `count` disjoint chains of the most work, whatever the size of the graph.
 pub(super) fn heaviest(task: &Task, count: usize) -> Vec<Chain> {
-    let mut flow = Flow::none(task);
+    let mut flow = ChainFlow::none(task);
     for _ in 0..count {
         flow.augment();
     }
@@ -135,7 +135,7 @@ fn is_small(task: &Task, chains: usize) -> bool {
 
 /// A flow of chains. Each subtask has an entry and an exit; it is taken between them once,
 /// for its WCET, or passed any number of times, for nothing.
-struct Flow<'a> {
+struct ChainFlow<'a> {
     task: &'a Task,
     taken: Vec<bool>,
     passed: Vec<u32>,
@@ -145,7 +145,7 @@ struct Flow<'a> {
 
 /// How the heaviest way to an entry or exit comes there.
 #[derive(Clone, Copy)]
-enum Step {
+enum PathStep {
     /// It begins at this entry.
     Begin,
     /// Along an edge, from the exit of its predecessor.
@@ -159,13 +159,13 @@ enum Step {
 }
 
 /// The heaviest ways to an entry, or to an exit, of each subtask.
-struct Ways {
+struct HeaviestPaths {
     weights: Vec<u64>,
-    steps: Vec<Step>,
+    steps: Vec<PathStep>,
 }
 
-impl Ways {
-    fn improve(&mut self, subtask: usize, weight: u64, step: Step) -> bool {
+impl HeaviestPaths {
+    fn improve(&mut self, subtask: usize, weight: u64, step: PathStep) -> bool {
         let is_heavier = weight > self.weights[subtask];
         if is_heavier {
             self.weights[subtask] = weight;
@@ -175,7 +175,7 @@ impl Ways {
     }
 }
 
-impl<'a> Flow<'a> {
+impl<'a> ChainFlow<'a> {
     fn none(task: &'a Task) -> Self {
         Self {
             task,
@@ -188,11 +188,14 @@ impl<'a> Flow<'a> {
     /// Adds a chain so that the chains take the most, and returns how much more that is.
     fn augment(&mut self) -> u64 {
         let count = self.task.subtask_count();
-        let ways = |step| Ways {
+        let ways = |step| HeaviestPaths {
             weights: vec![0; count],
             steps: vec![step; count],
         };
-        let (mut entries, mut exits) = (ways(Step::Begin), ways(Step::Through { takes: false }));
+        let (mut entries, mut exits) = (
+            ways(PathStep::Begin),
+            ways(PathStep::Through { takes: false }),
+        );
         // No way goes round, so each pair of sweeps settles a further turn of some way.
         for _ in 0..=count {
             self.sweep(&mut entries, &mut exits);
@@ -208,44 +211,44 @@ impl<'a> Flow<'a> {
         exits.weights[last]
     }
 
-    fn sweep(&self, entries: &mut Ways, exits: &mut Ways) {
+    fn sweep(&self, entries: &mut HeaviestPaths, exits: &mut HeaviestPaths) {
         for v in self.task.topological_order() {
             let here = entries.weights[v];
             if !self.taken[v] {
                 let weight = here + self.task.wcets_ns()[v];
-                exits.improve(v, weight, Step::Through { takes: true });
+                exits.improve(v, weight, PathStep::Through { takes: true });
             }
-            exits.improve(v, here, Step::Through { takes: false });
+            exits.improve(v, here, PathStep::Through { takes: false });
             for (edge, to) in self.task.edges_of(v) {
-                let step = Step::Edge { from: v, edge };
+                let step = PathStep::Edge { from: v, edge };
                 entries.improve(to, exits.weights[v], step);
             }
         }
     }
 
-    fn sweep_back(&self, entries: &mut Ways, exits: &mut Ways) -> bool {
+    fn sweep_back(&self, entries: &mut HeaviestPaths, exits: &mut HeaviestPaths) -> bool {
         let mut changed = false;
         for v in self.task.topological_order().rev() {
             for (edge, to) in self.task.edges_of(v) {
                 if self.along[edge] > 0 {
-                    let step = Step::UndoEdge { to, edge };
+                    let step = PathStep::UndoEdge { to, edge };
                     changed |= exits.improve(v, entries.weights[to], step);
                 }
             }
             if self.taken[v]
                 && let Some(weight) = exits.weights[v].checked_sub(self.task.wcets_ns()[v])
             {
-                changed |= entries.improve(v, weight, Step::Undo { takes: true });
+                changed |= entries.improve(v, weight, PathStep::Undo { takes: true });
             }
             if self.passed[v] > 0 {
-                changed |= entries.improve(v, exits.weights[v], Step::Undo { takes: false });
+                changed |= entries.improve(v, exits.weights[v], PathStep::Undo { takes: false });
             }
         }
         changed
     }
 
     /// Adds the heaviest way to the exit of `last` to the flow.
-    fn follow(&mut self, last: usize, entries: &Ways, exits: &Ways) {
+    fn follow(&mut self, last: usize, entries: &HeaviestPaths, exits: &HeaviestPaths) {
         let (mut at, mut is_exit) = (last, true);
         loop {
             let steps = if is_exit {
@@ -254,19 +257,19 @@ impl<'a> Flow<'a> {
                 &entries.steps
             };
             match steps[at] {
-                Step::Begin => return,
-                Step::Edge { from, edge } => {
+                PathStep::Begin => return,
+                PathStep::Edge { from, edge } => {
                     self.along[edge] += 1;
                     at = from;
                 }
-                Step::UndoEdge { to, edge } => {
+                PathStep::UndoEdge { to, edge } => {
                     self.along[edge] -= 1;
                     at = to;
                 }
-                Step::Through { takes: true } => self.taken[at] = true,
-                Step::Through { takes: false } => self.passed[at] += 1,
-                Step::Undo { takes: true } => self.taken[at] = false,
-                Step::Undo { takes: false } => self.passed[at] -= 1,
+                PathStep::Through { takes: true } => self.taken[at] = true,
+                PathStep::Through { takes: false } => self.passed[at] += 1,
+                PathStep::Undo { takes: true } => self.taken[at] = false,
+                PathStep::Undo { takes: false } => self.passed[at] -= 1,
             }
             is_exit = !is_exit;
         }

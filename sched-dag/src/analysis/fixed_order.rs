@@ -23,14 +23,14 @@ use core::cmp::Reverse;
 use super::judge::answer;
 use super::multi_path::multi_path;
 use super::task::Task;
-use super::{Answer, Settings};
+use super::{AnalysisResult, AnalysisSettings};
 use crate::ids::{DagId, to_u32};
 use crate::policy::SubtaskOrder;
 use crate::task_set::{Dag, TaskSet};
 
 /// Fixes the order of each DAG that allows it, where that proves more: a shorter bound of it,
 /// and of no other job or sink a longer one.
-pub fn fix_orders(task_set: &mut TaskSet, settings: &Settings) {
+pub fn fix_orders(task_set: &mut TaskSet, settings: &AnalysisSettings) {
     let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
     let Some(overhead_ns) = overhead_ns else {
         return;
@@ -72,9 +72,9 @@ pub(super) fn shorter(task: &Task, cores: u32) -> Option<(Vec<(u32, u32)>, u64)>
 
 /// Compares answers: one DAG is to have a shorter bound, and no other a longer one, nor a sink
 /// of these.
-fn is_better(dag: DagId, after: &Answer, before: &Answer) -> bool {
+fn is_better(dag: DagId, after: &AnalysisResult, before: &AnalysisResult) -> bool {
     // What is not proven is longer than all that is.
-    let bounds = |answer: &Answer| -> Vec<u64> {
+    let bounds = |answer: &AnalysisResult| -> Vec<u64> {
         let jobs = answer.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
         let (earlier, own_on) = answer.sinks_ns.split_at(dag.index());
         let sinks = earlier.iter().chain(&own_on[1..]).flatten().copied();

@@ -1,7 +1,7 @@
 //! What the other DAGs may execute while a job lasts, in the forms that the equations need.
 //!
 //! The equation with `j` chains counts interference on at most `m - j` cores. So a DAG has
-//! a [`Workload`] for each number of cores up to those that a job of it can use. The clipped
+//! a [`InterferingWorkload`] for each number of cores up to those that a job of it can use. The clipped
 //! form asks for the work in some part of the window only, all together as long as the job
 //! waits: there no core executes more than that time, and neither does a chain of the
 //! other DAG, which is on one core at a time.
@@ -11,11 +11,11 @@ use alloc::vec::Vec;
 use super::cover::parallelism_covers_and_parts;
 use super::one_core::{Blocking, largest};
 use super::task::Task;
-use super::workload::{Bursts, Piece, Workload};
+use super::workload::{InterferingWorkload, WorkloadBursts, WorkloadSegment};
 
 /// Which interference the multi-path equations count; each is a bound, the later the tighter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clip {
+pub enum InterferenceBound {
     /// All that fits into the window.
     Window,
     /// On each core no more than the time that the job waits.
@@ -26,7 +26,7 @@ pub enum Clip {
 
 /// What of a DAG's graph enters equations, its own and those of others.
 #[derive(Clone, Debug)]
-pub(super) struct Shape {
+pub(super) struct GraphSummary {
     /// The most cores that one job can use, at least 1 and at most all.
     pub(super) parallelism: u64,
     /// The most work of 1, 2, .. disjoint chains, for as many as there are cores.
@@ -38,7 +38,7 @@ pub(super) struct Shape {
     pub(super) unblocked: Blocking,
 }
 
-impl Shape {
+impl GraphSummary {
     pub(super) fn of(task: &Task, cores: u32) -> Self {
         let (parallelism, covers, chains) = parallelism_covers_and_parts(task, cores);
         Self {
@@ -52,37 +52,37 @@ impl Shape {
 }
 
 /// What may delay a DAG's work that is due at some time, for as long as it waits.
-pub(super) struct Delays {
+pub(super) struct DelaySources {
     /// The workloads of DAGs that may outrank it.
-    pub(super) others: Vec<Other>,
+    pub(super) others: Vec<InterferingDag>,
     pub(super) blocking: Blocking,
-    pub(super) bursts: Bursts,
+    pub(super) bursts: WorkloadBursts,
 }
 
 /// Returns what DAGs may execute on all cores within a window.
-pub(super) fn on_all_cores(others: &[Other], window_ns: u64) -> Piece {
+pub(super) fn on_all_cores(others: &[InterferingDag], window_ns: u64) -> WorkloadSegment {
     let pieces = others.iter();
     let pieces = pieces.map(|other| other.on_all_cores().at(window_ns));
-    pieces.fold(Piece::NONE, Piece::and)
+    pieces.fold(WorkloadSegment::NONE, WorkloadSegment::and)
 }
 
 /// A DAG that may outrank the one under analysis.
-pub(super) struct Other {
+pub(super) struct InterferingDag {
     /// All of it, on at most 1, 2, .. cores.
-    whole: Vec<Workload>,
+    whole: Vec<InterferingWorkload>,
     /// What its chains leave, likewise.
-    rest: Vec<Workload>,
-    chains: Vec<Workload>,
+    rest: Vec<InterferingWorkload>,
+    chains: Vec<InterferingWorkload>,
 }
 
-impl Other {
+impl InterferingDag {
     /// Describes the workloads of a DAG with a response-time bound, each changed by `limit`.
     pub(super) fn new(
         task: &Task,
-        shape: &Shape,
+        shape: &GraphSummary,
         response_ns: u64,
         cores: u64,
-        limit: impl Fn(Workload) -> Workload,
+        limit: impl Fn(InterferingWorkload) -> InterferingWorkload,
     ) -> Self {
         let by_cores = |volume_ns: u64| {
             let counts = 1..=shape.parallelism;
@@ -93,12 +93,26 @@ impl Other {
                 } else {
                     cores
                 };
-                limit(Workload::new(task, volume_ns, response_ns, count, all))
+                limit(InterferingWorkload::new(
+                    task,
+                    volume_ns,
+                    response_ns,
+                    count,
+                    all,
+                ))
             });
             workload.collect()
         };
         let left = task.volume_ns() - shape.chains.iter().sum::<u64>();
-        let chain = |&volume_ns| limit(Workload::new(task, volume_ns, response_ns, 1, cores));
+        let chain = |&volume_ns| {
+            limit(InterferingWorkload::new(
+                task,
+                volume_ns,
+                response_ns,
+                1,
+                cores,
+            ))
+        };
         Self {
             whole: by_cores(task.volume_ns()),
             rest: if left > 0 { by_cores(left) } else { Vec::new() },
@@ -107,7 +121,7 @@ impl Other {
     }
 
     /// Returns the workload on all cores.
-    pub(super) fn on_all_cores(&self) -> &Workload {
+    pub(super) fn on_all_cores(&self) -> &InterferingWorkload {
         &self.whole[self.whole.len() - 1]
     }
 
@@ -116,14 +130,14 @@ impl Other {
     pub(super) fn add_to(
         &self,
         times: (u64, u64),
-        clip: Clip,
+        clip: InterferenceBound,
         cores: usize,
-        plain: &mut [Piece],
-        clipped: &mut [Piece],
+        plain: &mut [WorkloadSegment],
+        clipped: &mut [WorkloadSegment],
     ) {
-        let of_chains = (clip == Clip::Chains).then(|| self.of_chains(times));
+        let of_chains = (clip == InterferenceBound::Chains).then(|| self.of_chains(times));
         let mut last = 0;
-        let mut pieces = [Piece::NONE; 2];
+        let mut pieces = [WorkloadSegment::NONE; 2];
         for (j, (plain, clipped)) in plain.iter_mut().zip(clipped).enumerate() {
             let count = (cores - j).min(self.whole.len());
             if count != last {
@@ -143,25 +157,30 @@ impl Other {
         (count, pieces.map(|piece| piece.value))
     }
 
-    fn of_chains(&self, (window_ns, waiting_ns): (u64, u64)) -> Piece {
-        self.chains.iter().fold(Piece::NONE, |sum, chain| {
-            sum.and(chain.at(window_ns).least(chain.over(waiting_ns)))
-        })
+    fn of_chains(&self, (window_ns, waiting_ns): (u64, u64)) -> WorkloadSegment {
+        self.chains
+            .iter()
+            .fold(WorkloadSegment::NONE, |sum, chain| {
+                sum.and(chain.at(window_ns).least(chain.over(waiting_ns)))
+            })
     }
 
     fn pieces(
         &self,
         (window_ns, waiting_ns): (u64, u64),
         count: usize,
-        of_chains: Option<Piece>,
-    ) -> [Piece; 2] {
+        of_chains: Option<WorkloadSegment>,
+    ) -> [WorkloadSegment; 2] {
         let whole = &self.whole[count - 1];
         let plain = whole.at(window_ns);
         let clipped = plain.least(whole.over(waiting_ns));
         let by_chains = of_chains.map(|of_chains| {
-            let rest = self.rest.get(count - 1).map_or(Piece::NONE, |rest| {
-                rest.at(window_ns).least(rest.over(waiting_ns))
-            });
+            let rest = self
+                .rest
+                .get(count - 1)
+                .map_or(WorkloadSegment::NONE, |rest| {
+                    rest.at(window_ns).least(rest.over(waiting_ns))
+                });
             clipped.least(of_chains.and(rest))
         });
         [plain, by_chains.unwrap_or(clipped)]

@@ -38,7 +38,7 @@ pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
     if cores == 0 || paths(task) > PATH_LIMIT {
         return None;
     }
-    let closure = Closure::of(task)?;
+    let closure = TransitiveClosure::of(task)?;
     let interferes = |v: usize, u: usize| {
         ranks[u] < ranks[v] && !closure.precedes(u, v) && !closure.precedes(v, u)
     };
@@ -119,12 +119,12 @@ fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
 pub const SUBTASK_LIMIT: usize = 1024;
 
 /// For each subtask the set of subtasks that it precedes, directly or not.
-struct Closure {
+struct TransitiveClosure {
     words: usize,
     rows: Vec<u64>,
 }
 
-impl Closure {
+impl TransitiveClosure {
     /// Builds the closure, or returns `None` beyond [`SUBTASK_LIMIT`].
     fn of(task: &Task) -> Option<Self> {
         let count = task.subtask_count();

@@ -68,15 +68,18 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::interference::Delays;
+use super::interference::DelaySources;
 use super::intra_task::{SUBTASK_LIMIT, intra_task};
-use super::one_core::{Due, Load, Response, demand};
-use super::pipelined::{Figures, STEP_LIMIT, Unsolved};
-use super::set::{Failure, Set, Steps, constrained};
+use super::one_core::{DagDemand, DueDemand, ResponseEquation, demand};
+use super::pipelined::{PipelineTerms, STEP_LIMIT, SolverFailure};
+use super::set::{BoundFailure, EquationSet, EvaluationBudget, constrained};
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
-use super::workload::Bursts;
-use super::{Answer, DagBound, NotProven, Reason, Settings, Test, multi_path};
+use super::workload::WorkloadBursts;
+use super::{
+    AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason, SchedulabilityTest,
+    multi_path,
+};
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
 use crate::policy::{Policy, Preemption};
@@ -87,10 +90,10 @@ use crate::task_set::{Dag, TaskSet};
 /// Clusters share no core, so each is a case of its own. A signal from one to another needs
 /// no term: a sporadic DAG counts as if signals came as fast as they may.
 #[must_use]
-pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
+pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult {
     let dags = task_set.dags();
     let unknown = dags.iter().map(|dag| vec![None; dag.sinks().len()]);
-    let mut answer = Answer {
+    let mut answer = AnalysisResult {
         bounds: vec![None; dags.len()],
         sinks_ns: unknown.collect(),
         reasons: vec![None; dags.len()],
@@ -99,7 +102,7 @@ pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
     for cluster in task_set.clusters() {
         let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
         let own: Vec<usize> = own.collect();
-        let settings = Settings {
+        let settings = AnalysisSettings {
             cores: to_u32(task_set.cores_of(cluster, settings.cores).len()),
             ..*settings
         };
@@ -129,11 +132,11 @@ pub fn answer(task_set: &TaskSet, settings: &Settings) -> Answer {
 pub(super) fn with_case(
     dags: &[Dag],
     own: &[usize],
-    settings: &Settings,
-    reasons: &mut [Option<Reason>],
-    work: impl FnOnce(&Case<'_>, &mut [Option<Reason>]),
+    settings: &AnalysisSettings,
+    reasons: &mut [Option<NotProvenReason>],
+    work: impl FnOnce(&AnalysisInput<'_>, &mut [Option<NotProvenReason>]),
 ) {
-    let relation = Relation::new(dags, own, settings.policy, settings.preemption);
+    let relation = RankRelation::new(dags, own, settings.policy, settings.preemption);
     let tasks = analysable(dags, own, &relation, settings, reasons);
     let can_be = |dag: &usize| reasons[*dag].is_none();
     let members: Vec<usize> = own.iter().copied().filter(can_be).collect();
@@ -142,12 +145,12 @@ pub(super) fn with_case(
         .filter_map(|&dag| tasks[dag].as_ref())
         .collect();
     let relation = relation.among(&members);
-    let case = Case::new(dags, own, (&members, &tasks), relation, settings);
+    let case = AnalysisInput::new(dags, own, (&members, &tasks), relation, settings);
     work(&case, reasons);
 }
 
 /// The DAGs that can be analysed, and what follows from their attributes.
-pub(super) struct Case<'a> {
+pub(super) struct AnalysisInput<'a> {
     /// All DAGs of the commit.
     all: &'a [Dag],
     /// Whether no other DAG is on these cores, one that cannot be analysed either.
@@ -155,20 +158,20 @@ pub(super) struct Case<'a> {
     /// Those of this case; elsewhere a DAG is a position in this list.
     pub(super) members: &'a [usize],
     pub(super) tasks: &'a [&'a Task],
-    pub(super) settings: &'a Settings,
-    pub(super) relation: Relation,
+    pub(super) settings: &'a AnalysisSettings,
+    pub(super) relation: RankRelation,
     /// The most urgent DAG first.
     order: Vec<usize>,
-    pub(super) set: Set<'a>,
+    pub(super) set: EquationSet<'a>,
 }
 
-impl<'a> Case<'a> {
+impl<'a> AnalysisInput<'a> {
     fn new(
         all: &'a [Dag],
         own: &[usize],
         (members, tasks): (&'a [usize], &'a [&'a Task]),
-        relation: Relation,
-        settings: &'a Settings,
+        relation: RankRelation,
+        settings: &'a AnalysisSettings,
     ) -> Self {
         let order = sorted_by_key(members.len(), |dag| match settings.policy {
             Policy::StaticPriority => u64::from(relation.ranks(dag)[0].0),
@@ -182,9 +185,9 @@ impl<'a> Case<'a> {
             settings,
             relation,
             order,
-            set: Set::new(tasks, settings.cores),
+            set: EquationSet::new(tasks, settings.cores),
         };
-        case.set.bursts = Bursts::of(own.iter().map(|&dag| &all[dag]), settings);
+        case.set.bursts = WorkloadBursts::of(own.iter().map(|&dag| &all[dag]), settings);
         case.complete();
         case
     }
@@ -199,13 +202,13 @@ impl<'a> Case<'a> {
 
     /// Answers for the jobs of the DAGs of this case, by their positions in it; names
     /// them by their positions in the commit.
-    pub(super) fn verdict(&self) -> Answer {
+    pub(super) fn verdict(&self) -> AnalysisResult {
         let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
         let solution = self.set.solve(&self.order, may_outrank);
         let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
             .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
             .collect();
-        let demand = || are_in_time(self).then_some(Test::Demand);
+        let demand = || are_in_time(self).then_some(SchedulabilityTest::Demand);
         if bounds.iter().any(Option::is_none)
             && let Some(test) = self.vouching_test().or_else(demand)
         {
@@ -216,7 +219,7 @@ impl<'a> Case<'a> {
                 });
             }
         }
-        let mut reasons: Vec<Option<Reason>> = (bounds.iter().enumerate())
+        let mut reasons: Vec<Option<NotProvenReason>> = (bounds.iter().enumerate())
             .map(|(dag, bound)| match bound {
                 Some(_) => None,
                 None => solution.failures[dag].map(|failure| self.reason(dag, failure)),
@@ -236,7 +239,7 @@ impl<'a> Case<'a> {
             let dag = self.id(dag);
             Some(NotProven { dag, reason })
         });
-        Answer {
+        AnalysisResult {
             bounds,
             sinks_ns: Vec::new(),
             reasons,
@@ -246,7 +249,7 @@ impl<'a> Case<'a> {
 
     /// Reports whether a DAG has all cores whenever it needs them.
     fn is_alone(&self, dag: usize) -> bool {
-        let blocked = self.relation.preemption != Mixture::All && !self.is_only_one;
+        let blocked = self.relation.preemption != PreemptionMix::All && !self.is_only_one;
         let mut others = 0..self.members.len();
         !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
     }
@@ -256,7 +259,7 @@ impl<'a> Case<'a> {
     fn by_priorities(&self, dag: usize) -> Option<u64> {
         let (task, cores) = (self.tasks[dag], self.settings.cores);
         let subtasks = self.dag(dag).subtasks();
-        if self.relation.preemption != Mixture::All
+        if self.relation.preemption != PreemptionMix::All
             || self.settings.policy != Policy::StaticPriority
             || subtasks.len() > SUBTASK_LIMIT
             || !self.is_alone(dag)
@@ -274,9 +277,9 @@ impl<'a> Case<'a> {
 
     /// Tells the equations what follows from the attributes.
     fn complete(&mut self) {
-        self.set.keep_cores = self.relation.preemption == Mixture::None;
+        self.set.keep_cores = self.relation.preemption == PreemptionMix::None;
         self.set.deadlines_limit = self.settings.policy == Policy::Edf
-            && self.relation.preemption != Mixture::Some
+            && self.relation.preemption != PreemptionMix::Some
             && constrained(self.tasks, self.settings.cores);
         for (dag, figures) in self.set.figures.iter_mut().enumerate() {
             figures.younger_may_win = self.relation.younger_may_win(dag);
@@ -295,28 +298,28 @@ impl<'a> Case<'a> {
     fn bound(&self, dag: usize, bound_ns: u64) -> DagBound {
         let test = if self.set.known[dag].is_some() {
             match self.settings.cores {
-                1 => Test::OneCore,
-                _ => Test::IntraTask,
+                1 => SchedulabilityTest::OneCore,
+                _ => SchedulabilityTest::IntraTask,
             }
         } else if bound_ns > self.tasks[dag].period_ns() {
-            Test::Pipelined
+            SchedulabilityTest::Pipelined
         } else if self.is_alone(dag) {
-            Test::Alone
+            SchedulabilityTest::Alone
         } else {
             match (self.relation.preemption, self.settings.policy) {
-                (Mixture::Some, _) => Test::AnyOrder,
-                (Mixture::None, _) => Test::NonPreemptive,
-                (Mixture::All, Policy::StaticPriority) => Test::FixedPriority,
-                (Mixture::All, Policy::Edf) => Test::Edf,
+                (PreemptionMix::Some, _) => SchedulabilityTest::AnyOrder,
+                (PreemptionMix::None, _) => SchedulabilityTest::NonPreemptive,
+                (PreemptionMix::All, Policy::StaticPriority) => SchedulabilityTest::FixedPriority,
+                (PreemptionMix::All, Policy::Edf) => SchedulabilityTest::Edf,
             }
         };
         DagBound { bound_ns, test }
     }
 
     /// Returns the utilisation test that accepts the whole set, if one does.
-    fn vouching_test(&self) -> Option<Test> {
+    fn vouching_test(&self) -> Option<SchedulabilityTest> {
         let (tasks, cores) = (self.tasks, self.settings.cores);
-        let applies = self.relation.preemption == Mixture::All
+        let applies = self.relation.preemption == PreemptionMix::All
             && !self.relation.ranks_sinks
             && self.set.bursts.are_none();
         if !applies || !constrained(tasks, cores) {
@@ -338,27 +341,27 @@ impl<'a> Case<'a> {
             }
         };
         match (capacity, speed_up) {
-            (Some(true), _) => Some(Test::Capacity),
-            (_, true) => Some(Test::SpeedUp),
+            (Some(true), _) => Some(SchedulabilityTest::Capacity),
+            (_, true) => Some(SchedulabilityTest::SpeedUp),
             _ => None,
         }
     }
 
-    fn reason(&self, dag: usize, failure: Failure) -> Reason {
+    fn reason(&self, dag: usize, failure: BoundFailure) -> NotProvenReason {
         let task = self.tasks[dag];
         let in_flight = self.dag(dag).in_flight();
         let room = u128::from(in_flight) * u128::from(task.period_ns());
         match failure {
-            Failure::Other(other) => Reason::DelayedBy {
+            BoundFailure::Other(other) => NotProvenReason::DelayedBy {
                 dag: self.id(other),
             },
-            Failure::Own(Unsolved::Limit) => Reason::Limit,
-            Failure::Own(Unsolved::BeyondDeadline)
+            BoundFailure::Own(SolverFailure::Limit) => NotProvenReason::Limit,
+            BoundFailure::Own(SolverFailure::BeyondDeadline)
                 if room < u128::from(task.relative_deadline_ns()) =>
             {
-                Reason::InFlightTooFew { in_flight }
+                NotProvenReason::InFlightTooFew { in_flight }
             }
-            Failure::Own(Unsolved::BeyondDeadline) => Reason::NoBound,
+            BoundFailure::Own(SolverFailure::BeyondDeadline) => NotProvenReason::NoBound,
         }
     }
 
@@ -369,12 +372,12 @@ impl<'a> Case<'a> {
 
     /// Finds the DAGs that cannot keep up at WCETs: by urgency those that could
     /// not even alone, then the first at which the cores do not suffice.
-    fn certain(&self) -> Vec<(usize, Reason)> {
+    fn certain(&self) -> Vec<(usize, NotProvenReason)> {
         let hopeless = |&dag: &usize| {
             let task = self.tasks[dag];
             let length_ns = task.length_ns();
             if length_ns > task.relative_deadline_ns() {
-                return Some((dag, Reason::LengthBeyondDeadline { length_ns }));
+                return Some((dag, NotProvenReason::LengthBeyondDeadline { length_ns }));
             }
             if !self.must_keep_up(dag) {
                 return None;
@@ -382,9 +385,10 @@ impl<'a> Case<'a> {
             let ids = (0_u32..).map(SubtaskId).zip(task.wcets_ns());
             let mut long = ids.filter(|&(_, &wcet)| wcet > task.period_ns());
             let (subtask, _) = long.next()?;
-            Some((dag, Reason::SubtaskBeyondPeriod { subtask }))
+            Some((dag, NotProvenReason::SubtaskBeyondPeriod { subtask }))
         };
-        let mut certain: Vec<(usize, Reason)> = self.order.iter().filter_map(hopeless).collect();
+        let mut certain: Vec<(usize, NotProvenReason)> =
+            self.order.iter().filter_map(hopeless).collect();
         let cores = u128::from(self.settings.cores);
         let mut used = Vec::new();
         for &dag in self.order.iter().filter(|&&dag| self.must_keep_up(dag)) {
@@ -394,7 +398,7 @@ impl<'a> Case<'a> {
             };
             if !sum.at_most(cores, 1) {
                 if certain.iter().all(|&(hopeless, _)| hopeless != dag) {
-                    certain.push((dag, Reason::Overload));
+                    certain.push((dag, NotProvenReason::Overload));
                 }
                 break;
             }
@@ -413,9 +417,9 @@ fn dag_id(dag: usize) -> DagId {
 fn analysable(
     dags: &[Dag],
     own: &[usize],
-    relation: &Relation,
-    settings: &Settings,
-    reasons: &mut [Option<Reason>],
+    relation: &RankRelation,
+    settings: &AnalysisSettings,
+    reasons: &mut [Option<NotProvenReason>],
 ) -> Vec<Option<Task>> {
     let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
     let mut tasks: Vec<Option<Task>> = dags.iter().map(|_| None).collect();
@@ -424,9 +428,9 @@ fn analysable(
             .ok_or(TaskError::VolumeOverflow)
             .and_then(|overhead_ns| Task::from_dag(&dags[dag], overhead_ns));
         reasons[dag] = match &task {
-            _ if settings.cores == 0 => Some(Reason::NoCores),
+            _ if settings.cores == 0 => Some(NotProvenReason::NoCores),
             Ok(_) => None,
-            Err(error) => Some(Reason::Unknown(*error)),
+            Err(error) => Some(NotProvenReason::Unknown(*error)),
         };
         tasks[dag] = task.ok();
     }
@@ -438,7 +442,7 @@ fn analysable(
         known.retain(|&dag| {
             let is_delayed = relation.may_delay(other, dag);
             if is_delayed {
-                reasons[dag] = Some(Reason::DelayedBy { dag: dag_id(other) });
+                reasons[dag] = Some(NotProvenReason::DelayedBy { dag: dag_id(other) });
                 unknown.push(dag);
             }
             !is_delayed
@@ -448,8 +452,8 @@ fn analysable(
 }
 
 /// Returns the first DAG at the positions `among` that cannot be analysed for a reason of its own.
-fn first_unknown(among: &[usize], reasons: &[Option<Reason>]) -> Option<NotProven> {
-    let own = |reason: &Reason| !matches!(reason, Reason::DelayedBy { .. });
+fn first_unknown(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option<NotProven> {
+    let own = |reason: &NotProvenReason| !matches!(reason, NotProvenReason::DelayedBy { .. });
     let mut unknown = among.iter().filter_map(|&dag| {
         let reason = reasons[dag].filter(own)?;
         let dag = dag_id(dag);
@@ -460,9 +464,9 @@ fn first_unknown(among: &[usize], reasons: &[Option<Reason>]) -> Option<NotProve
 
 /// The relation between the DAGs of a commit, by their positions.
 #[derive(Clone, Debug)]
-pub(super) struct Relation {
+pub(super) struct RankRelation {
     policy: Policy,
-    pub(super) preemption: Mixture,
+    pub(super) preemption: PreemptionMix,
     /// Per DAG the most and the least urgent priority, as numbers.
     priorities: Vec<(u32, u32)>,
     /// Whether subtasks of one job may have different deadlines, under EDF.
@@ -471,13 +475,13 @@ pub(super) struct Relation {
 
 /// Which subtasks can be preempted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mixture {
+pub(super) enum PreemptionMix {
     All,
     None,
     Some,
 }
 
-impl Relation {
+impl RankRelation {
     /// Makes the relation between those that are at the positions `own`.
     pub(super) fn new(dags: &[Dag], own: &[usize], policy: Policy, preemption: Preemption) -> Self {
         let has_sink_deadlines =
@@ -504,7 +508,7 @@ impl Relation {
     pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
         other != dag
             && match (self.policy, self.preemption) {
-                (Policy::Edf, _) | (_, Mixture::Some) => true,
+                (Policy::Edf, _) | (_, PreemptionMix::Some) => true,
                 (Policy::StaticPriority, _) => self.ranks(other)[0] < self.ranks(dag)[1],
             }
     }
@@ -512,7 +516,7 @@ impl Relation {
     /// Reports whether `dag` may have to wait for `other`, be it only because
     /// an instance of `other` keeps its core.
     fn may_delay(&self, other: usize, dag: usize) -> bool {
-        other != dag && (self.preemption != Mixture::All || self.may_outrank(other, dag))
+        other != dag && (self.preemption != PreemptionMix::All || self.may_outrank(other, dag))
     }
 
     /// Returns the most and the least urgent priority of a DAG among all; the smaller wins.
@@ -529,7 +533,7 @@ impl Relation {
             // It may have a subtask that leads to a more urgent sink.
             Policy::Edf => self.ranks_sinks,
         };
-        unequal || self.preemption != Mixture::All
+        unequal || self.preemption != PreemptionMix::All
     }
 }
 
@@ -538,27 +542,27 @@ fn priority_range(dag: &Dag) -> (u32, u32) {
     (numbers().min().unwrap_or(0), numbers().max().unwrap_or(0))
 }
 
-fn mixture(dags: &[Dag], own: &[usize], preemption: Preemption) -> Mixture {
+fn mixture(dags: &[Dag], own: &[usize], preemption: Preemption) -> PreemptionMix {
     let mut subtasks = own.iter().flat_map(|&dag| dags[dag].subtasks());
     let keeps = |non_preemptive: bool| non_preemptive || preemption == Preemption::Disabled;
     let Some(first) = subtasks
         .next()
         .map(|first| keeps(first.is_non_preemptive()))
     else {
-        return Mixture::All;
+        return PreemptionMix::All;
     };
     if subtasks.any(|other| keeps(other.is_non_preemptive()) != first) {
-        Mixture::Some
+        PreemptionMix::Some
     } else if first {
-        Mixture::None
+        PreemptionMix::None
     } else {
-        Mixture::All
+        PreemptionMix::All
     }
 }
 
 /// Returns the DAGs of a case as their response times on one core need them.
-pub(super) fn loads(case: &Case<'_>) -> Vec<Load> {
-    let loads = case.tasks.iter().enumerate().map(|(dag, task)| Load {
+pub(super) fn loads(case: &AnalysisInput<'_>) -> Vec<DagDemand> {
+    let loads = case.tasks.iter().enumerate().map(|(dag, task)| DagDemand {
         volume_ns: task.volume_ns(),
         period_ns: task.period_ns(),
         limit_ns: case.set.figures[dag].limit_ns(),
@@ -574,15 +578,17 @@ pub(super) fn loads(case: &Case<'_>) -> Vec<Load> {
 
 /// Bounds the response times of DAGs that something may delay, where all that may delay them
 /// keep their own.
-fn responses(case: &Case<'_>) -> Vec<Option<u64>> {
+fn responses(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
     let loads = loads(case);
     let (loads, bursts) = (&loads, &case.set.bursts);
-    let (mut steps, mut found) = (Steps::of(loads.len()), vec![None; loads.len()]);
+    let (mut steps, mut found) = (EvaluationBudget::of(loads.len()), vec![None; loads.len()]);
     for &dag in &case.order {
-        found[dag] = steps.spend(dag, |steps| Response::of(loads, bursts, dag).solve(steps));
+        found[dag] = steps.spend(dag, |steps| {
+            ResponseEquation::of(loads, bursts, dag).solve(steps)
+        });
     }
     let known = (0..loads.len()).map(|dag| {
-        let others = Response::of(loads, bursts, dag).others;
+        let others = ResponseEquation::of(loads, bursts, dag).others;
         let are_known = others.iter().all(|&other| found[other].is_some());
         found[dag].filter(|_| are_known && !case.is_alone(dag))
     });
@@ -590,7 +596,7 @@ fn responses(case: &Case<'_>) -> Vec<Option<u64>> {
 }
 
 /// Reports whether each subtask is finished by its deadline, under EDF.
-pub(super) fn are_in_time(case: &Case<'_>) -> bool {
+pub(super) fn are_in_time(case: &AnalysisInput<'_>) -> bool {
     let fit =
         |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
     let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
@@ -598,22 +604,22 @@ pub(super) fn are_in_time(case: &Case<'_>) -> bool {
 }
 
 /// Returns what is due of all DAGs.
-pub(super) fn all_dues(case: &Case<'_>) -> Vec<Due> {
+pub(super) fn all_dues(case: &AnalysisInput<'_>) -> Vec<DueDemand> {
     (0..case.tasks.len())
         .flat_map(|dag| dues(case, dag))
         .collect()
 }
 
 /// Returns what is due of a DAG, by deadlines.
-fn dues(case: &Case<'_>, dag: usize) -> Vec<Due> {
+fn dues(case: &AnalysisInput<'_>, dag: usize) -> Vec<DueDemand> {
     let (task, subtasks) = (case.tasks[dag], case.dag(dag).subtasks());
-    let mut dues: Vec<Due> = Vec::new();
+    let mut dues: Vec<DueDemand> = Vec::new();
     for (subtask, &wcet_ns) in subtasks.iter().zip(task.wcets_ns()) {
         let deadline_ns = subtask.relative_deadline_ns();
         let known = dues.iter().position(|due| due.deadline_ns == deadline_ns);
         let place = known.unwrap_or(dues.len());
         if known.is_none() {
-            dues.push(Due {
+            dues.push(DueDemand {
                 deadline_ns,
                 period_ns: task.period_ns(),
                 volume_ns: 0,
@@ -630,14 +636,14 @@ fn dues(case: &Case<'_>, dag: usize) -> Vec<Due> {
 }
 
 /// The path to a sink, and what of its own job may delay it.
-struct Reach {
+struct SinkPath {
     length_ns: u64,
     volume_ns: u64,
 }
 
 /// Fills in the bounds of the sinks of each DAG, in their order, that follow from the bounds
 /// of jobs. A DAG of which a sink is not bounded by its own deadline is not proven.
-fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Option<u64>>]) {
+fn bound(case: &AnalysisInput<'_>, verdict: &mut AnalysisResult, bounds: &mut [Vec<Option<u64>>]) {
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
     let is_met = case.relation.ranks_sinks && are_in_time(case);
@@ -656,9 +662,9 @@ fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Option<u64>>])
         let unbounded = within_deadlines(model, verdict.bounds[dag], sinks_ns);
         let reason = match (too_far(case.tasks[dag], model), unbounded) {
             (Some((sink, length_ns)), _) if !is_certain(verdict.reasons[dag]) => {
-                Reason::PathBeyondDeadline { sink, length_ns }
+                NotProvenReason::PathBeyondDeadline { sink, length_ns }
             }
-            (_, Some(sink)) => Reason::NoSinkBound { sink },
+            (_, Some(sink)) => NotProvenReason::NoSinkBound { sink },
             _ => continue,
         };
         verdict.bounds[dag] = None;
@@ -671,17 +677,17 @@ fn bound(case: &Case<'_>, verdict: &mut Answer, bounds: &mut [Vec<Option<u64>>])
     }
 }
 
-fn is_certain(reason: Option<Reason>) -> bool {
+fn is_certain(reason: Option<NotProvenReason>) -> bool {
     reason.is_some_and(|reason| reason.is_certain())
 }
 
 /// Returns the equation of each sink of a DAG and what may delay it, where the response times
 /// of jobs are known that it rests on.
 pub(super) fn equations<'a>(
-    case: &'a Case<'_>,
+    case: &'a AnalysisInput<'_>,
     dag: usize,
     responses: &'a [Option<u64>],
-) -> impl Iterator<Item = (SubtaskId, Option<(Figures, Delays)>)> {
+) -> impl Iterator<Item = (SubtaskId, Option<(PipelineTerms, DelaySources)>)> {
     let (set, model) = (&case.set, case.dag(dag));
     let (policy, preemption) = (case.settings.policy, case.relation.preemption);
     let reaches = reaches(set.tasks[dag], model, policy, preemption);
@@ -745,7 +751,7 @@ fn too_far(task: &Task, model: &Dag) -> Option<(SubtaskId, u64)> {
     sinks.find(|&(sink, length_ns)| length_ns > model.subtask(sink).relative_deadline_ns())
 }
 
-fn reaches(task: &Task, model: &Dag, policy: Policy, preemption: Mixture) -> Vec<Reach> {
+fn reaches(task: &Task, model: &Dag, policy: Policy, preemption: PreemptionMix) -> Vec<SinkPath> {
     let subtasks = model.subtasks();
     // The smaller number wins, in both.
     let urgency = |subtask: usize| match policy {
@@ -770,10 +776,10 @@ fn reaches(task: &Task, model: &Dag, policy: Policy, preemption: Mixture) -> Vec
     let reach = sinks.map(|(sink, length_ns)| {
         let least = least_urgent[sink.index()];
         let counted = match preemption {
-            Mixture::All => order.partition_point(|&subtask| urgency(subtask) <= least),
-            Mixture::None | Mixture::Some => order.len(),
+            PreemptionMix::All => order.partition_point(|&subtask| urgency(subtask) <= least),
+            PreemptionMix::None | PreemptionMix::Some => order.len(),
         };
-        Reach {
+        SinkPath {
             length_ns,
             volume_ns: sums_ns[counted],
         }

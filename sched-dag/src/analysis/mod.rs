@@ -45,7 +45,7 @@
 //! - *Integers only*: 64-bit times, 128-bit products; divisions round so that
 //!   the result stays a bound, and an overflow is an error or "not proven".
 //! - *No recursion*, and every loop has a limit; a limit reached is "not
-//!   proven" ([`Reason::Limit`]), never a guess. Time is near linear in
+//!   proven" ([`NotProvenReason::Limit`]), never a guess. Time is near linear in
 //!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and quadratic in the
 //!   number of DAGs.
 //! - *Evidence*: the property test in `tests/analysis` simulates thousands of
@@ -85,10 +85,10 @@ use crate::ids::{DagId, SubtaskId};
 use crate::policy::{Policy, Preemption};
 use crate::worded::texts;
 
-pub use assign::{Federation, NotAssigned, Unassigned, assign, federated};
+pub use assign::{AssignmentFailure, Federation, NotAssigned, assign, federated};
 pub use cover::{covers, parallelism, width};
 pub use fixed_order::fix_orders;
-pub use interference::Clip;
+pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;
 pub use multi_path::multi_path;
@@ -100,7 +100,7 @@ pub use witness::witness;
 
 /// Under what conditions the DAGs will run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
+pub struct AnalysisSettings {
     /// How ready instances are ordered.
     pub policy: Policy,
     /// Whether instances of preemptible subtasks may lose their core.
@@ -113,7 +113,7 @@ pub struct Settings {
 
 /// The response-time bounds of a set of DAGs, as far as they are proven.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Answer {
+pub struct AnalysisResult {
     /// The bound of each DAG, in the order of the commit; `None`: not proven.
     ///
     /// A bound stands for itself: DAGs that are not proven do not weaken it.
@@ -124,7 +124,7 @@ pub struct Answer {
     /// [`Dag::sinks`]: crate::Dag::sinks
     pub sinks_ns: Vec<Vec<Option<u64>>>,
     /// Why a DAG has no bound, in the order of the commit; `None`: it has one.
-    pub reasons: Vec<Option<Reason>>,
+    pub reasons: Vec<Option<NotProvenReason>>,
     /// The first DAG that is not proven, and why; `None` if all are.
     pub first_failing: Option<NotProven>,
 }
@@ -135,13 +135,13 @@ pub struct DagBound {
     /// The most time from a job's nominal release to its last finish.
     pub bound_ns: u64,
     /// The test that gave it.
-    pub test: Test,
+    pub test: SchedulabilityTest,
 }
 
 texts! {
     /// The test that gave a bound.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-    pub enum Test {
+    pub enum SchedulabilityTest {
         /// The multi-path bound: nothing else can delay this DAG.
         Alone = "multiple paths";
         /// Intra-task priorities: nothing else can delay this DAG.
@@ -173,13 +173,13 @@ pub struct NotProven {
     /// The DAG.
     pub dag: DagId,
     /// Why there is no bound.
-    pub reason: Reason,
+    pub reason: NotProvenReason,
 }
 
 texts! {
     /// Why a DAG is not proven to meet its deadlines. Lengths are those with overheads.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Reason {
+    pub enum NotProvenReason {
         /// The DAG cannot be analysed: a WCET is missing or numbers overflow.
         Unknown(error: TaskError) = "{error}";
         /// There are no cores.
@@ -225,7 +225,7 @@ texts! {
     }
 }
 
-impl Answer {
+impl AnalysisResult {
     /// Reports whether every DAG has a bound.
     #[must_use]
     pub const fn is_proven(&self) -> bool {
@@ -233,7 +233,7 @@ impl Answer {
     }
 }
 
-impl Reason {
+impl NotProvenReason {
     /// Reports whether deadlines will be missed when every instance takes its
     /// WCET, rather than merely not being proven to be met.
     #[must_use]

@@ -27,10 +27,10 @@
 use alloc::vec;
 
 use super::cover::covers;
-use super::interference::{Clip, Delays};
-use super::pipelined::Unsolved;
+use super::interference::{DelaySources, InterferenceBound};
+use super::pipelined::SolverFailure;
 use super::task::Task;
-use super::workload::Piece;
+use super::workload::WorkloadSegment;
 
 /// Bounds the response time of one job alone on `cores` cores; `None` without cores.
 #[must_use]
@@ -49,37 +49,37 @@ pub(super) fn alone(task: &Task, covers: &[u64], cores: u64) -> Option<u64> {
 }
 
 /// What of one DAG enters its equations, with `j` from 0 to one less than the covers.
-pub(super) struct Equations<'a> {
+pub(super) struct MultiPathEquations<'a> {
     pub(super) task: &'a Task,
     pub(super) covers: &'a [u64],
     pub(super) cores: usize,
-    pub(super) clip: Clip,
+    pub(super) clip: InterferenceBound,
     /// The longest response time that is of use, at most a period.
     pub(super) limit_ns: u64,
 }
 
 /// One of the inequalities: proven if `cores` times the waiting is at least `busy`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Form {
+pub(super) struct WaitInequality {
     /// The cores that count: `m - j`.
     pub(super) cores: u128,
     pub(super) is_clipped: bool,
-    pub(super) busy: Piece,
+    pub(super) busy: WorkloadSegment,
 }
 
-impl Equations<'_> {
+impl MultiPathEquations<'_> {
     /// Returns the least response time that some form proves, if it is at least `start_ns`.
     pub(super) fn solve(
         &self,
-        delays: &Delays,
+        delays: &DelaySources,
         start_ns: u64,
         steps: &mut u64,
-    ) -> Result<u64, Unsolved> {
+    ) -> Result<u64, SolverFailure> {
         let start = alone(self.task, self.covers, self.cores as u64);
         let length = self.task.length_ns();
         let mut window = start_ns.max(start.unwrap_or(0)).max(length);
         while window <= self.limit_ns {
-            *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
+            *steps = steps.checked_sub(1).ok_or(SolverFailure::Limit)?;
             let lacks = self.forms(delays, window).map(|form| {
                 let lack = form.busy.lacks(form.cores, u128::from(window - length));
                 lack.unwrap_or(0)
@@ -89,39 +89,45 @@ impl Equations<'_> {
             match least {
                 0 => return Ok(window),
                 lack => {
-                    let lack = u64::try_from(lack).map_err(|_| Unsolved::BeyondDeadline)?;
-                    window = window.checked_add(lack).ok_or(Unsolved::BeyondDeadline)?;
+                    let lack = u64::try_from(lack).map_err(|_| SolverFailure::BeyondDeadline)?;
+                    window = window
+                        .checked_add(lack)
+                        .ok_or(SolverFailure::BeyondDeadline)?;
                 }
             }
         }
-        Err(Unsolved::BeyondDeadline)
+        Err(SolverFailure::BeyondDeadline)
     }
 
     /// Returns the forms at a window of at least the length.
-    pub(super) fn forms(&self, delays: &Delays, window_ns: u64) -> impl Iterator<Item = Form> {
-        let Delays {
+    pub(super) fn forms(
+        &self,
+        delays: &DelaySources,
+        window_ns: u64,
+    ) -> impl Iterator<Item = WaitInequality> {
+        let DelaySources {
             others,
             blocking,
             bursts,
         } = delays;
         let times = (window_ns, window_ns - self.task.length_ns());
-        let mut plain = vec![Piece::NONE; self.covers.len()];
+        let mut plain = vec![WorkloadSegment::NONE; self.covers.len()];
         let mut clipped = plain.clone();
         for other in others {
             other.add_to(times, self.clip, self.cores, &mut plain, &mut clipped);
         }
-        let has_clipped = !others.is_empty() && self.clip != Clip::Window;
+        let has_clipped = !others.is_empty() && self.clip != InterferenceBound::Window;
         let sums = plain.into_iter().zip(clipped).enumerate();
         sums.flat_map(move |(j, (plain, clipped))| {
             let left = u128::from(self.task.volume_ns() - self.covers[j]);
-            let form = |is_clipped: bool, own: u128, sum: Piece| {
+            let form = |is_clipped: bool, own: u128, sum: WorkloadSegment| {
                 let blocked = blocking.during(self.cores, j, is_clipped);
                 let sum = sum.and(bursts.on(self.cores - j, window_ns));
                 let value = sum.value.saturating_add(own).saturating_add(blocked);
-                Form {
+                WaitInequality {
                     cores: (self.cores - j) as u128,
                     is_clipped,
-                    busy: Piece { value, ..sum },
+                    busy: WorkloadSegment { value, ..sum },
                 }
             };
             let clipped = has_clipped.then(|| form(true, left.max(1), clipped));

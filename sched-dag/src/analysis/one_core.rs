@@ -69,14 +69,14 @@
 use alloc::vec::Vec;
 
 use super::task::Task;
-use super::workload::Bursts;
+use super::workload::WorkloadBursts;
 use crate::order::sorted;
 
 /// The most evaluations of sums under EDF, for all DAGs.
 const STEP_LIMIT: u64 = 4096;
 
 /// A DAG under static priorities.
-pub(super) struct Load {
+pub(super) struct DagDemand {
     pub(super) volume_ns: u64,
     pub(super) period_ns: u64,
     /// The longest response time that is of use.
@@ -87,7 +87,7 @@ pub(super) struct Load {
     pub(super) keeps_ns: u64,
 }
 
-impl Load {
+impl DagDemand {
     /// Returns what jobs execute that are released within a window, or at its begin.
     fn released(&self, window: u128) -> u128 {
         let jobs = window.max(1).div_ceil(self.period_ns.into());
@@ -100,17 +100,17 @@ impl Load {
 }
 
 /// The equations of a DAG's response time.
-pub(super) struct Response<'a> {
-    loads: &'a [Load],
-    bursts: &'a Bursts,
-    own: &'a Load,
+pub(super) struct ResponseEquation<'a> {
+    loads: &'a [DagDemand],
+    bursts: &'a WorkloadBursts,
+    own: &'a DagDemand,
     /// The DAGs that may delay it, directly or through others.
     pub(super) others: Vec<usize>,
     pub(super) blocking: u128,
 }
 
-impl<'a> Response<'a> {
-    pub(super) fn of(loads: &'a [Load], bursts: &'a Bursts, dag: usize) -> Self {
+impl<'a> ResponseEquation<'a> {
+    pub(super) fn of(loads: &'a [DagDemand], bursts: &'a WorkloadBursts, dag: usize) -> Self {
         let own = &loads[dag];
         let mut least = own.priorities[1];
         loop {
@@ -194,7 +194,7 @@ impl<'a> Response<'a> {
 }
 
 /// The part of each job of a DAG that is due at the same time, under EDF.
-pub(super) struct Due {
+pub(super) struct DueDemand {
     pub(super) deadline_ns: u64,
     pub(super) period_ns: u64,
     pub(super) volume_ns: u64,
@@ -205,13 +205,13 @@ pub(super) struct Due {
 /// Looks for a time in which more is due than the core can execute. If there is none, returns the
 /// longest stretch in which it is busy, and the times that show it; `None` also if that takes too
 /// many steps.
-pub(super) fn demand(all: &[Due], bursts: &Bursts) -> Option<(u128, Vec<u128>)> {
+pub(super) fn demand(all: &[DueDemand], bursts: &WorkloadBursts) -> Option<(u128, Vec<u128>)> {
     let mut steps = STEP_LIMIT;
     let blocking = |after: u128| {
         let later = all.iter().filter(|due| u128::from(due.deadline_ns) > after);
         u128::from(later.map(|due| due.keeps_ns).max().unwrap_or(0))
     };
-    let sum = |jobs: &dyn Fn(&Due) -> u128| {
+    let sum = |jobs: &dyn Fn(&DueDemand) -> u128| {
         let volumes = all
             .iter()
             .map(|due| jobs(due).saturating_mul(due.volume_ns.into()));

@@ -17,7 +17,7 @@
 //! follows from the chain: it goes back over `j` releases only if its part over
 //! `j - 1` of them can last until the next release, `X_(j-1) > j T`.
 //!
-//! The terms: `W_i`, the [`Workload`](super::workload::Workload) of each DAG that may
+//! The terms: `W_i`, the [`InterferingWorkload`](super::workload::InterferingWorkload) of each DAG that may
 //! outrank this one; `own`, what still older jobs may run in the window,
 //! `sum over l >= 1, l T < R of min(volume, p (R - l T))`, twice that if
 //! younger jobs may win over older ones; `blocking`, lower-ranked work that
@@ -38,13 +38,13 @@
 //! The least solution is found exactly, from below. Both sides are piecewise
 //! linear, so instead of creeping up by the difference, which may be one
 //! nanosecond a step, each step solves the present linear piece or jumps to
-//! its end; see [`Piece`].
+//! its end; see [`WorkloadSegment`].
 
 use alloc::vec::Vec;
 
-use super::interference::{Delays, Shape, on_all_cores};
+use super::interference::{DelaySources, GraphSummary, on_all_cores};
 use super::task::Task;
-use super::workload::Piece;
+use super::workload::WorkloadSegment;
 
 /// The most evaluations of equations' right-hand sides that the DAGs of one analysis share; a
 /// DAG that needs more is "not proven".
@@ -59,7 +59,7 @@ const OVERLAP_LIMIT: u64 = 1024;
 
 /// What of a task enters its equation.
 #[derive(Clone, Debug)]
-pub(super) struct Figures {
+pub(super) struct PipelineTerms {
     period: u128,
     deadline: u128,
     volume: u128,
@@ -78,16 +78,16 @@ pub(super) struct Figures {
 
 /// Why an equation has no usable solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Unsolved {
+pub(super) enum SolverFailure {
     /// The least solution, if any, exceeds the relative deadline.
     BeyondDeadline,
     /// A limit on steps, on overlapping jobs or on the numbers' size was hit.
     Limit,
 }
 
-impl Figures {
+impl PipelineTerms {
     /// Takes the figures of a task on `cores >= 1` cores: preemptive, older jobs first.
-    pub(super) fn of(task: &Task, cores: usize, shape: &Shape) -> Self {
+    pub(super) fn of(task: &Task, cores: usize, shape: &GraphSummary) -> Self {
         Self {
             period: task.period_ns().into(),
             deadline: task.relative_deadline_ns().into(),
@@ -135,10 +135,10 @@ impl Figures {
     /// must not exceed the least solution (0 always is right).
     pub(super) fn solve(
         &self,
-        delays: &Delays,
+        delays: &DelaySources,
         start_ns: u64,
         steps: &mut u64,
-    ) -> Result<u64, Unsolved> {
+    ) -> Result<u64, SolverFailure> {
         let mut response = u128::from(start_ns);
         let mut windows: Vec<u128> = Vec::new();
         loop {
@@ -147,7 +147,7 @@ impl Figures {
             let responses = back.map(|(window, back)| window.saturating_sub(back * self.period));
             let largest = responses.max().unwrap_or(0).max(response);
             if largest == response {
-                return u64::try_from(response).map_err(|_| Unsolved::BeyondDeadline);
+                return u64::try_from(response).map_err(|_| SolverFailure::BeyondDeadline);
             }
             response = largest;
         }
@@ -157,9 +157,9 @@ impl Figures {
     /// jobs before the chain's first can run.
     pub(super) fn windows(
         &self,
-        delays: &Delays,
+        delays: &DelaySources,
         response_ns: u64,
-    ) -> Result<(Vec<u128>, u128), Unsolved> {
+    ) -> Result<(Vec<u128>, u128), SolverFailure> {
         let (mut windows, mut steps) = (Vec::new(), STEP_LIMIT);
         let response = u128::from(response_ns);
         self.extend(&mut windows, response, delays, &mut steps)?;
@@ -172,12 +172,12 @@ impl Figures {
         &self,
         windows: &mut Vec<u128>,
         response: u128,
-        delays: &Delays,
+        delays: &DelaySources,
         steps: &mut u64,
-    ) -> Result<(), Unsolved> {
+    ) -> Result<(), SolverFailure> {
         let own = self.other_jobs(self.whole.unwrap_or(response))?;
         for back in 0..=OVERLAP_LIMIT {
-            let index = usize::try_from(back).map_err(|_| Unsolved::Limit)?;
+            let index = usize::try_from(back).map_err(|_| SolverFailure::Limit)?;
             if index == windows.len() {
                 windows.push(0);
             }
@@ -186,12 +186,12 @@ impl Figures {
                 return Ok(());
             }
         }
-        Err(Unsolved::Limit)
+        Err(SolverFailure::Limit)
     }
 
     /// Returns what jobs before the chain's first (and after the job itself,
     /// if they may win) can run while the chain lasts.
-    fn other_jobs(&self, response: u128) -> Result<u128, Unsolved> {
+    fn other_jobs(&self, response: u128) -> Result<u128, SolverFailure> {
         let mut sum = 0;
         let mut left = response;
         for _ in 0..OVERLAP_LIMIT {
@@ -206,7 +206,7 @@ impl Figures {
                 }
             }
         }
-        Err(Unsolved::Limit)
+        Err(SolverFailure::Limit)
     }
 
     /// Returns the least `X_j`, starting from a value not above it.
@@ -214,24 +214,24 @@ impl Figures {
         &self,
         back: u64,
         own: u128,
-        delays: &Delays,
+        delays: &DelaySources,
         start: u128,
         steps: &mut u64,
-    ) -> Result<u128, Unsolved> {
+    ) -> Result<u128, SolverFailure> {
         let back = u128::from(back);
         let limit = self.deadline + back * self.period;
         let cores = self.cores as u128;
         let mut window = start.max(self.chain(back));
         while window <= limit {
-            *steps = steps.checked_sub(1).ok_or(Unsolved::Limit)?;
-            let length = u64::try_from(window).map_err(|_| Unsolved::Limit)?;
+            *steps = steps.checked_sub(1).ok_or(SolverFailure::Limit)?;
+            let length = u64::try_from(window).map_err(|_| SolverFailure::Limit)?;
             let busy = self.busy(back, own, delays, length);
             match busy.lacks(cores, window - self.chain(back)) {
                 None => return Ok(window),
-                Some(lack) => window = window.checked_add(lack).ok_or(Unsolved::Limit)?,
+                Some(lack) => window = window.checked_add(lack).ok_or(SolverFailure::Limit)?,
             }
         }
-        Err(Unsolved::BeyondDeadline)
+        Err(SolverFailure::BeyondDeadline)
     }
 
     /// Returns `P_j`.
@@ -240,27 +240,33 @@ impl Figures {
     }
 
     /// Returns what the cores execute at most while a chain over `back` releases waits.
-    pub(super) fn busy(&self, back: u128, own: u128, delays: &Delays, window_ns: u64) -> Piece {
+    pub(super) fn busy(
+        &self,
+        back: u128,
+        own: u128,
+        delays: &DelaySources,
+        window_ns: u64,
+    ) -> WorkloadSegment {
         let constant = (back * self.volume + self.last_volume - self.chain(back))
             .saturating_add(own)
             .saturating_add(delays.blocking.along_a_chain(self.cores, back));
         let sum = on_all_cores(&delays.others, window_ns);
         let sum = sum.and(delays.bursts.on(self.cores, window_ns));
         let value = sum.value.saturating_add(constant);
-        Piece { value, ..sum }
+        WorkloadSegment { value, ..sum }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::analysis::{Clip, Task, multi_path_fp};
+    use crate::analysis::{InterferenceBound, Task, multi_path_fp};
 
     #[test]
     fn e8_two_pipelines() {
         let chain = Task::new(10, 30, vec![4, 5, 3], &[(0, 1), (1, 2)]).unwrap();
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
         let other = Task::new(25, 50, vec![1, 3, 3, 1], &diamond).unwrap();
-        let bounds = multi_path_fp(&[&chain, &other], 3, Clip::Window);
+        let bounds = multi_path_fp(&[&chain, &other], 3, InterferenceBound::Window);
         assert_eq!(bounds, Some(vec![13, 14]));
     }
 }

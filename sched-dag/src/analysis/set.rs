@@ -21,65 +21,68 @@
 
 use alloc::vec::Vec;
 
-use super::interference::{Clip, Delays, Other, Shape};
-use super::multi_path::{Equations, alone};
-use super::pipelined::{Figures, OWN_STEPS, STEP_LIMIT, Unsolved};
+use super::interference::{DelaySources, GraphSummary, InterferenceBound, InterferingDag};
+use super::multi_path::{MultiPathEquations, alone};
+use super::pipelined::{OWN_STEPS, PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::task::Task;
-use super::workload::{Bursts, Workload};
+use super::workload::{InterferingWorkload, WorkloadBursts};
 
 /// DAGs with what enters their equations.
-pub(super) struct Set<'a> {
+pub(super) struct EquationSet<'a> {
     pub(super) tasks: &'a [&'a Task],
     pub(super) cores: u32,
-    pub(super) shapes: Vec<Shape>,
-    pub(super) figures: Vec<Figures>,
+    pub(super) shapes: Vec<GraphSummary>,
+    pub(super) figures: Vec<PipelineTerms>,
     /// Whether only jobs with deadlines no later count (EDF with `D <= T`).
     pub(super) deadlines_limit: bool,
     /// Whether each subtask keeps its core, so that lower-ranked ones may block.
     pub(super) keep_cores: bool,
     /// Which interference counts.
-    pub(super) clip: Clip,
-    pub(super) bursts: Bursts,
+    pub(super) clip: InterferenceBound,
+    pub(super) bursts: WorkloadBursts,
     /// Bounds that are known already, by DAG.
     pub(super) known: Vec<Option<u64>>,
 }
 
 /// What is known about each DAG of a set.
 #[derive(Debug)]
-pub(super) struct Solution {
+pub(super) struct DagSolution {
     /// The response-time bound by DAG, `None` if not proven.
     pub(super) responses: Vec<Option<u64>>,
     /// The DAG that failed first, on its own account.
-    pub(super) first_failing: Option<(usize, Unsolved)>,
+    pub(super) first_failing: Option<(usize, SolverFailure)>,
     /// Why a DAG has no response time, by DAG.
-    pub(super) failures: Vec<Option<Failure>>,
+    pub(super) failures: Vec<Option<BoundFailure>>,
 }
 
 /// Why a DAG has no response-time bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Failure {
+pub(super) enum BoundFailure {
     /// Its own equation has no usable solution.
-    Own(Unsolved),
+    Own(SolverFailure),
     /// This DAG may outrank it and has no bound itself.
     Other(usize),
 }
 
-impl<'a> Set<'a> {
+impl<'a> EquationSet<'a> {
     /// Describes DAGs that are preemptive and whose older jobs win.
     pub(super) fn new(tasks: &'a [&'a Task], cores: u32) -> Self {
-        let shapes: Vec<Shape> = tasks.iter().map(|task| Shape::of(task, cores)).collect();
+        let shapes: Vec<GraphSummary> = tasks
+            .iter()
+            .map(|task| GraphSummary::of(task, cores))
+            .collect();
         let figures = tasks.iter().zip(&shapes);
         Self {
             tasks,
             cores,
             figures: figures
-                .map(|(task, shape)| Figures::of(task, cores as usize, shape))
+                .map(|(task, shape)| PipelineTerms::of(task, cores as usize, shape))
                 .collect(),
             shapes,
             deadlines_limit: false,
             keep_cores: false,
-            clip: Clip::Chains,
-            bursts: Bursts::default(),
+            clip: InterferenceBound::Chains,
+            bursts: WorkloadBursts::default(),
             known: alloc::vec![None; tasks.len()],
         }
     }
@@ -90,13 +93,13 @@ impl<'a> Set<'a> {
         &self,
         order: &[usize],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Solution {
-        let mut solution = Solution {
+    ) -> DagSolution {
+        let mut solution = DagSolution {
             responses: (0..self.tasks.len()).map(|dag| self.start(dag)).collect(),
             first_failing: None,
             failures: alloc::vec![None; self.tasks.len()],
         };
-        let mut steps = Steps::of(self.tasks.len());
+        let mut steps = EvaluationBudget::of(self.tasks.len());
         let mut is_done = false;
         while !is_done {
             is_done = true;
@@ -109,7 +112,7 @@ impl<'a> Set<'a> {
                 is_done &= solution.responses[dag] == before;
             }
         }
-        if let Some((_, Unsolved::Limit)) = solution.first_failing
+        if let Some((_, SolverFailure::Limit)) = solution.first_failing
             && let Some(coarse) = self.down_from_deadlines(&may_outrank)
         {
             solution.responses = coarse.into_iter().map(Some).collect();
@@ -124,16 +127,16 @@ impl<'a> Set<'a> {
     fn visit(
         &self,
         dag: usize,
-        delays: Result<Delays, usize>,
-        solution: &mut Solution,
-        steps: &mut Steps,
+        delays: Result<DelaySources, usize>,
+        solution: &mut DagSolution,
+        steps: &mut EvaluationBudget,
     ) {
         let start_ns = solution.responses[dag].unwrap_or(0);
         let after = match delays {
-            Err(other) => Err(Failure::Other(other)),
+            Err(other) => Err(BoundFailure::Other(other)),
             Ok(delays) => (self.respond(dag, &delays, start_ns, steps)).map_err(|why| {
                 solution.first_failing.get_or_insert((dag, why));
-                Failure::Own(why)
+                BoundFailure::Own(why)
             }),
         };
         solution.failures[dag] = after.err();
@@ -144,14 +147,14 @@ impl<'a> Set<'a> {
     fn respond(
         &self,
         dag: usize,
-        delays: &Delays,
+        delays: &DelaySources,
         start_ns: u64,
-        steps: &mut Steps,
-    ) -> Result<u64, Unsolved> {
+        steps: &mut EvaluationBudget,
+    ) -> Result<u64, SolverFailure> {
         let (equations, figures) = (self.equations(dag), &self.figures[dag]);
         steps.spend(dag, |steps| {
             match equations.solve(delays, start_ns, steps) {
-                Err(Unsolved::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
+                Err(SolverFailure::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
                     figures.solve(delays, start_ns, steps)
                 }
                 solved => solved,
@@ -160,9 +163,9 @@ impl<'a> Set<'a> {
     }
 
     /// Returns the equations of a DAG's jobs one at a time.
-    pub(super) fn equations(&self, dag: usize) -> Equations<'_> {
+    pub(super) fn equations(&self, dag: usize) -> MultiPathEquations<'_> {
         let figures = &self.figures[dag];
-        Equations {
+        MultiPathEquations {
             task: self.tasks[dag],
             covers: &self.shapes[dag].covers,
             cores: self.cores as usize,
@@ -185,7 +188,7 @@ impl<'a> Set<'a> {
         &self,
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Option<Vec<u64>> {
-        let mut steps = Steps::of(self.tasks.len());
+        let mut steps = EvaluationBudget::of(self.tasks.len());
         let mut bounds: Vec<u64> = (self.known.iter().zip(self.tasks))
             .map(|(known, task)| known.unwrap_or(task.relative_deadline_ns()))
             .collect();
@@ -215,7 +218,7 @@ impl<'a> Set<'a> {
         dag: usize,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<Delays, usize> {
+    ) -> Result<DelaySources, usize> {
         let deadline_ns = self.tasks[dag].relative_deadline_ns();
         self.delays(dag, deadline_ns, responses, may_outrank)
     }
@@ -231,7 +234,7 @@ impl<'a> Set<'a> {
         deadline_ns: u64,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<Delays, usize> {
+    ) -> Result<DelaySources, usize> {
         let limit_ns = self.deadlines_limit.then_some(deadline_ns);
         let (mut others, mut blocking_ns) = (Vec::new(), Vec::new());
         for other in (0..self.tasks.len()).filter(|&other| other != dag) {
@@ -245,7 +248,7 @@ impl<'a> Set<'a> {
             }
         }
         let blocking = (self.shapes[dag].unblocked).by(&blocking_ns, self.cores);
-        Ok(Delays {
+        Ok(DelaySources {
             others,
             blocking,
             bursts: self.bursts.clone(),
@@ -253,25 +256,30 @@ impl<'a> Set<'a> {
     }
 
     /// Describes what a DAG with a response-time bound may execute next to another one.
-    pub(super) fn other(&self, other: usize, response_ns: u64, limit_ns: Option<u64>) -> Other {
+    pub(super) fn other(
+        &self,
+        other: usize,
+        response_ns: u64,
+        limit_ns: Option<u64>,
+    ) -> InterferingDag {
         let (task, shape) = (self.tasks[other], &self.shapes[other]);
-        let limit = |workload: Workload| match limit_ns {
+        let limit = |workload: InterferingWorkload| match limit_ns {
             Some(limit_ns) => workload.under_edf(task.least_deadline_ns(), limit_ns),
             None => workload,
         };
-        Other::new(task, shape, response_ns, self.cores.into(), limit)
+        InterferingDag::new(task, shape, response_ns, self.cores.into(), limit)
     }
 }
 
 /// How often equations may be evaluated yet. A DAG takes the shared steps first and then its
 /// own, so that one which comes near its solution slowly takes no other's bound away.
-pub(super) struct Steps {
+pub(super) struct EvaluationBudget {
     shared: u64,
     /// By DAG.
     own: Vec<u64>,
 }
 
-impl Steps {
+impl EvaluationBudget {
     pub(super) fn of(dags: usize) -> Self {
         Self {
             shared: STEP_LIMIT,
@@ -300,8 +308,8 @@ pub(super) fn constrained(tasks: &[&Task], cores: u32) -> bool {
 /// priority to the lowest; also of jobs that overlap. `None` if there is no core, or a DAG has no
 /// bound within its deadline.
 #[must_use]
-pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: Clip) -> Option<Vec<u64>> {
-    let mut set = (cores > 0).then(|| Set::new(tasks, cores))?;
+pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Option<Vec<u64>> {
+    let mut set = (cores > 0).then(|| EquationSet::new(tasks, cores))?;
     set.clip = clip;
     let order: Vec<usize> = (0..tasks.len()).collect();
     let solution = set.solve(&order, |other, dag| other < dag);
@@ -312,8 +320,8 @@ pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: Clip) -> Option<Vec<u64>
 /// deadlines, so it accepts a little less than [`answer()`](super::answer()). `None` if a DAG has
 /// `D > T`, or no bound within its deadline.
 #[must_use]
-pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: Clip) -> Option<Vec<u64>> {
-    let mut set = constrained(tasks, cores).then(|| Set::new(tasks, cores))?;
+pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Option<Vec<u64>> {
+    let mut set = constrained(tasks, cores).then(|| EquationSet::new(tasks, cores))?;
     set.clip = clip;
     set.deadlines_limit = true;
     set.down_from_deadlines(|_, _| true)
@@ -321,14 +329,18 @@ pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: Clip) -> Option<Vec<u64
 
 #[cfg(test)]
 mod tests {
-    use super::{Clip, multi_path_fp};
+    use super::{InterferenceBound, multi_path_fp};
     use crate::analysis::Task;
 
     #[test]
     fn nothing_beside_the_chains_is_not_nothing_to_wait_for() {
         let high = Task::new(100, 100, vec![3, 3], &[]).unwrap();
         let low = Task::new(100, 100, vec![5], &[]).unwrap();
-        for clip in [Clip::Window, Clip::Waiting, Clip::Chains] {
+        for clip in [
+            InterferenceBound::Window,
+            InterferenceBound::Waiting,
+            InterferenceBound::Chains,
+        ] {
             assert_eq!(multi_path_fp(&[&high, &low], 2, clip), Some(vec![3, 8]));
         }
     }
@@ -339,6 +351,12 @@ mod tests {
         let long = Task::new(100, 100, vec![9, 2], &[]).unwrap();
         let low = Task::new(100, 100, vec![4, 4], &[(0, 1)]).unwrap();
         let bounds = |clip| multi_path_fp(&[&long, &low], 2, clip).unwrap()[1];
-        assert_eq!((bounds(Clip::Window), bounds(Clip::Chains)), (14, 11));
+        assert_eq!(
+            (
+                bounds(InterferenceBound::Window),
+                bounds(InterferenceBound::Chains)
+            ),
+            (14, 11)
+        );
     }
 }

@@ -51,13 +51,13 @@ use alloc::vec::Vec;
 use core::fmt::{self, Write};
 
 use super::cover::{Chain, covering, heaviest, peel};
-use super::interference::{Delays, Other};
+use super::interference::{DelaySources, InterferingDag};
 use super::intra_task::each_path;
-use super::judge::{self, Case, with_case};
-use super::one_core::{Response, demand};
-use super::pipelined::{Figures, STEP_LIMIT};
-use super::workload::Bursts;
-use super::{DagBound, Settings, Test};
+use super::judge::{self, AnalysisInput, with_case};
+use super::one_core::{ResponseEquation, demand};
+use super::pipelined::{PipelineTerms, STEP_LIMIT};
+use super::workload::WorkloadBursts;
+use super::{AnalysisSettings, DagBound, SchedulabilityTest};
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::to_u32;
 use crate::policy::{Policy, Preemption};
@@ -66,19 +66,19 @@ use crate::task_set::{Dag, TaskSet};
 /// Writes a witness for the bounds that [`answer()`](super::answer()) gives; where the cores
 /// are divided, one for each cluster, with its DAGs counted from 0.
 #[must_use]
-pub fn witness(task_set: &TaskSet, settings: &Settings) -> String {
+pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
     let parts = task_set.clusters().map(|cluster| {
         let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
         let place = task_set.is_divided().then_some(cluster);
         let place = place.map(|cluster| (cluster.0, task_set.clusters().count()));
-        let settings = Settings { cores, ..*settings };
+        let settings = AnalysisSettings { cores, ..*settings };
         whole(&task_set.part(cluster), place, &settings)
     });
     parts.collect()
 }
 
-fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> String {
-    let mut text = Text(String::new());
+fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &AnalysisSettings) -> String {
+    let mut text = WitnessText(String::new());
     text.statement(dags, place, settings);
     text.hash("hash");
     let all: Vec<usize> = (0..dags.len()).collect();
@@ -90,7 +90,7 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> Stri
         }
         let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
         let responses: Vec<Option<u64>> = responses.collect();
-        let by_demand = |bound: &DagBound| bound.test == Test::Demand;
+        let by_demand = |bound: &DagBound| bound.test == SchedulabilityTest::Demand;
         let is_asked = case.relation.ranks_sinks && judge::are_in_time(case);
         if (is_asked || bounds.iter().flatten().any(by_demand))
             && let Some((busy, times)) = demand(&judge::all_dues(case), &case.set.bursts)
@@ -119,9 +119,9 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) -> Stri
     text.0
 }
 
-struct Text(String);
+struct WitnessText(String);
 
-impl Text {
+impl WitnessText {
     fn hash(&mut self, word: &str) {
         let hash = fnv_1a(EMPTY, self.0.as_bytes());
         self.line(format_args!("{word} {hash}"));
@@ -140,7 +140,12 @@ impl Text {
         self.0.push('\n');
     }
 
-    fn statement(&mut self, dags: &[Dag], place: Option<(u32, usize)>, settings: &Settings) {
+    fn statement(
+        &mut self,
+        dags: &[Dag],
+        place: Option<(u32, usize)>,
+        settings: &AnalysisSettings,
+    ) {
         let policy = match settings.policy {
             Policy::StaticPriority => "static",
             Policy::Edf => "edf",
@@ -148,7 +153,7 @@ impl Text {
         let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
         let (cores, overhead_ns) = (settings.cores, overhead_ns.unwrap_or(u64::MAX));
         self.line(format_args!("machine {cores} {policy} {overhead_ns}"));
-        let bursts = Bursts::of(dags.iter(), settings);
+        let bursts = WorkloadBursts::of(dags.iter(), settings);
         if !bursts.are_none() {
             let ready_ns = settings.overheads.ready_ns;
             self.line(format_args!("bursts {ready_ns} {}", bursts.late_ns));
@@ -188,7 +193,7 @@ impl Text {
         }
     }
 
-    fn graph(&mut self, case: &Case<'_>, dag: usize) {
+    fn graph(&mut self, case: &AnalysisInput<'_>, dag: usize) {
         let (task, shape) = (case.tasks[dag], &case.set.shapes[dag]);
         let (length, volume) = (task.length_ns(), task.volume_ns());
         self.line(format_args!(
@@ -214,19 +219,19 @@ impl Text {
 
     fn bound(
         &mut self,
-        case: &Case<'_>,
+        case: &AnalysisInput<'_>,
         responses: &[Option<u64>],
         dag: usize,
         DagBound { bound_ns, test }: DagBound,
     ) {
         let (id, task) = (case.members[dag], case.tasks[dag]);
         match test {
-            Test::Capacity | Test::SpeedUp => {
+            SchedulabilityTest::Capacity | SchedulabilityTest::SpeedUp => {
                 self.line(format_args!("bound {id} {bound_ns} utilisation"));
             }
-            Test::Demand => self.line(format_args!("bound {id} {bound_ns} demand")),
-            Test::OneCore => self.response(case, dag, bound_ns),
-            Test::IntraTask => self.priorities(case, dag, bound_ns),
+            SchedulabilityTest::Demand => self.line(format_args!("bound {id} {bound_ns} demand")),
+            SchedulabilityTest::OneCore => self.response(case, dag, bound_ns),
+            SchedulabilityTest::IntraTask => self.priorities(case, dag, bound_ns),
             _ => {
                 let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
                 let Ok(delays) = case.set.delays_of_job(dag, responses, may_outrank) else {
@@ -245,7 +250,13 @@ impl Text {
     }
 
     /// Writes the bounds of sinks that are below their job's.
-    fn sinks(&mut self, case: &Case<'_>, responses: &[Option<u64>], dag: usize, whole_ns: u64) {
+    fn sinks(
+        &mut self,
+        case: &AnalysisInput<'_>,
+        responses: &[Option<u64>],
+        dag: usize,
+        whole_ns: u64,
+    ) {
         for (sink, equation) in judge::equations(case, dag, responses) {
             if let Some((figures, delays)) = equation
                 && let Ok(bound_ns) = figures.solve(&delays, 0, &mut { STEP_LIMIT })
@@ -260,11 +271,11 @@ impl Text {
 
     fn paths(
         &mut self,
-        case: &Case<'_>,
+        case: &AnalysisInput<'_>,
         dag: usize,
         bound_ns: u64,
-        delays: &Delays,
-        listed: &[Listed<'_>],
+        delays: &DelaySources,
+        listed: &[OutrankingDag<'_>],
     ) {
         let (id, task) = (case.members[dag], case.tasks[dag]);
         let equations = case.set.equations(dag);
@@ -303,10 +314,10 @@ impl Text {
     fn overlap(
         &mut self,
         begin: fmt::Arguments<'_>,
-        figures: &Figures,
+        figures: &PipelineTerms,
         bound_ns: u64,
-        delays: &Delays,
-        listed: &[Listed<'_>],
+        delays: &DelaySources,
+        listed: &[OutrankingDag<'_>],
     ) {
         let Ok((windows, own)) = figures.windows(delays, bound_ns) else {
             return;
@@ -324,9 +335,9 @@ impl Text {
         }
     }
 
-    fn response(&mut self, case: &Case<'_>, dag: usize, bound_ns: u64) {
+    fn response(&mut self, case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) {
         let (id, loads) = (case.members[dag], judge::loads(case));
-        let response = Response::of(&loads, &case.set.bursts, dag);
+        let response = ResponseEquation::of(&loads, &case.set.bursts, dag);
         let blocked = response.blocking;
         self.line(format_args!("bound {id} {bound_ns} response {blocked}"));
         let windows = response.windows(&mut { u64::MAX }).unwrap_or_default();
@@ -336,7 +347,7 @@ impl Text {
         }
     }
 
-    fn priorities(&mut self, case: &Case<'_>, dag: usize, bound_ns: u64) {
+    fn priorities(&mut self, case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) {
         let id = case.members[dag];
         self.line(format_args!(
             "bound {id} {bound_ns} priorities {}",
@@ -350,25 +361,27 @@ impl Text {
 }
 
 /// A DAG that may outrank another, with its number in the commit.
-struct Listed<'a> {
+struct OutrankingDag<'a> {
     id: usize,
     response_ns: u64,
-    workloads: &'a Other,
+    workloads: &'a InterferingDag,
 }
 
 /// Names the DAGs that may outrank one, in the order of their workloads.
 fn listed<'a>(
-    case: &Case<'_>,
+    case: &AnalysisInput<'_>,
     dag: usize,
     responses: &[Option<u64>],
-    delays: &'a Delays,
-) -> Vec<Listed<'a>> {
+    delays: &'a DelaySources,
+) -> Vec<OutrankingDag<'a>> {
     let ids = (0..responses.len()).filter(|&other| case.relation.may_outrank(other, dag));
-    let listed = ids.zip(&delays.others).map(|(other, workloads)| Listed {
-        id: case.members[other],
-        response_ns: responses[other].unwrap_or(u64::MAX),
-        workloads,
-    });
+    let listed = ids
+        .zip(&delays.others)
+        .map(|(other, workloads)| OutrankingDag {
+            id: case.members[other],
+            response_ns: responses[other].unwrap_or(u64::MAX),
+            workloads,
+        });
     listed.collect()
 }
 

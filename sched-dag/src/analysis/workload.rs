@@ -53,14 +53,14 @@
 
 use alloc::vec::Vec;
 
-use super::Settings;
+use super::AnalysisSettings;
 use super::task::Task;
 use crate::ids::SubtaskId;
 use crate::task_set::Dag;
 
 /// A DAG, or a part of one, that may execute next to the DAG under analysis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Workload {
+pub(super) struct InterferingWorkload {
     /// The most that one job executes.
     volume: u128,
     /// The period of a lane.
@@ -78,7 +78,7 @@ pub(super) struct Workload {
 
 /// A workload at one window length, and how it goes on from there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
+pub(super) struct WorkloadSegment {
     /// The workload.
     pub(super) value: u128,
     /// By how much it grows at least for each further nanosecond of window...
@@ -87,7 +87,7 @@ pub(super) struct Piece {
     pub(super) span: Option<u128>,
 }
 
-impl Workload {
+impl InterferingWorkload {
     /// Describes a part of `volume_ns` of a task whose jobs are complete within
     /// `response_ns`, with at most `parallelism` cores a job and `cores < 2^32` cores for
     /// all jobs.
@@ -131,11 +131,11 @@ impl Workload {
     ///
     /// Nothing overflows: times are below 2^64 and parallelism below 2^32, so
     /// every area is below 2^98; the one larger product saturates.
-    pub(super) fn at(&self, window_ns: u64) -> Piece {
+    pub(super) fn at(&self, window_ns: u64) -> WorkloadSegment {
         let body = self.lane(u128::from(window_ns)).times(self.lanes);
         let piece = body.least(self.over(window_ns));
         match self.ceiling {
-            Some(ceiling) if piece.value >= ceiling => Piece {
+            Some(ceiling) if piece.value >= ceiling => WorkloadSegment {
                 value: ceiling,
                 slope: 0,
                 span: None,
@@ -143,15 +143,15 @@ impl Workload {
             Some(ceiling) if piece.slope > 0 => {
                 let room = (ceiling - piece.value) / piece.slope;
                 let span = Some(piece.span.map_or(room, |span| span.min(room)));
-                Piece { span, ..piece }.or_one_flat_step()
+                WorkloadSegment { span, ..piece }.or_one_flat_step()
             }
             _ => piece,
         }
     }
 
     /// Returns what all cores that the jobs use could execute in a time.
-    pub(super) fn over(&self, time_ns: u64) -> Piece {
-        Piece {
+    pub(super) fn over(&self, time_ns: u64) -> WorkloadSegment {
+        WorkloadSegment {
             value: self.cap * u128::from(time_ns),
             slope: self.cap,
             span: None,
@@ -159,26 +159,26 @@ impl Workload {
     }
 
     /// Returns the closed form for one lane, without the cap.
-    fn lane(&self, window: u128) -> Piece {
+    fn lane(&self, window: u128) -> WorkloadSegment {
         let area = self.parallelism * (window + self.response);
         // A job's volume fits into its response time.
         self.packed(area - self.volume)
     }
 
     /// Returns what of an area is executed that has one job a period, packed to its beginning.
-    fn packed(&self, area: u128) -> Piece {
+    fn packed(&self, area: u128) -> WorkloadSegment {
         let pitch = self.parallelism * self.period;
         let (jobs, rest) = (area / pitch, area % pitch);
         let whole = jobs.saturating_mul(self.volume);
         if rest < self.volume {
-            let piece = Piece {
+            let piece = WorkloadSegment {
                 value: whole.saturating_add(rest),
                 slope: self.parallelism,
                 span: Some((self.volume - rest) / self.parallelism),
             };
             piece.or_one_flat_step()
         } else {
-            Piece {
+            WorkloadSegment {
                 value: whole.saturating_add(self.volume),
                 slope: 0,
                 span: Some((pitch - rest).div_ceil(self.parallelism)),
@@ -187,7 +187,7 @@ impl Workload {
     }
 }
 
-impl Piece {
+impl WorkloadSegment {
     /// Nothing, for all windows.
     pub(super) const NONE: Self = Self {
         value: 0,
@@ -275,16 +275,16 @@ const STEP_LIMIT: u32 = 1024;
 
 /// The bursts of the DAGs that share cores.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Bursts {
+pub(super) struct WorkloadBursts {
     /// How late a release is at most.
     pub(super) late_ns: u64,
     /// `T`, `carry` and `burst`.
     repeated: Vec<[u128; 3]>,
 }
 
-impl Bursts {
+impl WorkloadBursts {
     /// Returns those of DAGs, be they analysable or not.
-    pub(super) fn of<'a>(dags: impl Iterator<Item = &'a Dag>, settings: &Settings) -> Self {
+    pub(super) fn of<'a>(dags: impl Iterator<Item = &'a Dag>, settings: &AnalysisSettings) -> Self {
         let mut bursts = Self::default();
         if settings.overheads.ready_ns == 0 {
             return bursts;
@@ -325,11 +325,11 @@ impl Bursts {
     }
 
     /// Returns what so many cores lose in a window.
-    pub(super) fn on(&self, cores: usize, window_ns: u64) -> Piece {
+    pub(super) fn on(&self, cores: usize, window_ns: u64) -> WorkloadSegment {
         let time = u128::from(window_ns) + u128::from(self.late_ns);
         let spans = self.repeated.iter();
         let spans = spans.map(|[period, carry, _]| period - (time + carry) % period);
-        Piece {
+        WorkloadSegment {
             value: self.during(window_ns.into()).saturating_mul(cores as u128),
             slope: 0,
             span: spans.min(),
@@ -352,34 +352,36 @@ impl Bursts {
 
 #[cfg(test)]
 mod tests {
-    use super::Workload;
+    use super::InterferingWorkload;
     use crate::analysis::Task;
 
     #[test]
     fn e2_e3_and_e13_workloads() {
         let diamond = [(0, 1), (0, 2), (1, 3), (2, 3)];
         let one = Task::new(10, 10, vec![1, 2, 2, 1], &diamond).unwrap();
-        let at = |workload: Workload, windows: [u64; 3]| windows.map(|l| workload.at(l).value);
+        let at = |workload: InterferingWorkload, windows: [u64; 3]| {
+            windows.map(|l| workload.at(l).value)
+        };
         assert_eq!(
-            at(Workload::new(&one, 6, 5, 2, 2), [8, 11, 14]),
+            at(InterferingWorkload::new(&one, 6, 5, 2, 2), [8, 11, 14]),
             [6, 12, 12]
         );
 
         let chain = Task::new(10, 10, vec![2, 3], &[(0, 1)]).unwrap();
         assert_eq!(
-            at(Workload::new(&chain, 5, 6, 2, 2), [4, 9, 14]),
+            at(InterferingWorkload::new(&chain, 5, 6, 2, 2), [4, 9, 14]),
             [5, 10, 10]
         );
         assert_eq!(
-            at(Workload::new(&chain, 5, 6, 1, 2), [4, 9, 14]),
+            at(InterferingWorkload::new(&chain, 5, 6, 1, 2), [4, 9, 14]),
             [4, 5, 10]
         );
 
         let forks = [(0, 1), (0, 2), (0, 3), (1, 4), (2, 4), (3, 4)];
         let two = Task::new(20, 20, vec![1, 3, 3, 3, 1], &forks).unwrap();
-        let in_two = Workload::new(&one, 6, 9, 2, 2).under_edf(10, 20);
+        let in_two = InterferingWorkload::new(&one, 6, 9, 2, 2).under_edf(10, 20);
         assert_eq!(in_two.at(1000).value, 12);
-        let in_one = Workload::new(&two, 11, 14, 2, 2).under_edf(20, 10);
+        let in_one = InterferingWorkload::new(&two, 11, 14, 2, 2).under_edf(20, 10);
         assert_eq!(in_one.at(1000).value, 8);
     }
 
@@ -388,7 +390,7 @@ mod tests {
         for (response, own) in [(5, 9), (9, 9), (7, 4), (6, 6)] {
             let task = Task::new(9, 9, vec![2, 3, 5], &[(0, 1)]).unwrap();
             for parallelism in 1..4 {
-                let workload = Workload::new(&task, 10, response, parallelism, 3);
+                let workload = InterferingWorkload::new(&task, 10, response, parallelism, 3);
                 let volume = 10.min(parallelism * response);
                 for other in 0..60 {
                     let jobs = if other < own {
@@ -409,7 +411,7 @@ mod tests {
         for parallelism in 1..4 {
             for response in 10..22 {
                 let task = Task::new(9, 9, vec![2, 3, 5], &[(0, 1)]).unwrap();
-                let plain = Workload::new(&task, 10, response, parallelism, 3);
+                let plain = InterferingWorkload::new(&task, 10, response, parallelism, 3);
                 for workload in [plain, plain.under_edf(13, 30)] {
                     let values: Vec<u128> = (0..80).map(|l| workload.at(l).value).collect();
                     assert!(values.is_sorted(), "{values:?}");

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use common::random::Random;
-use sched_dag::analysis::{self, Answer, Overheads, Reason, Settings};
+use sched_dag::analysis::{self, AnalysisResult, AnalysisSettings, NotProvenReason, Overheads};
 use sched_dag::journal::Event;
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
@@ -110,8 +110,8 @@ const EDF: SchedulerOptions = SchedulerOptions {
 };
 
 /// Analyses DAGs in two clusters of one core.
-fn answer(specs: &[DagSpec]) -> (Answer, String) {
-    let settings = Settings {
+fn answer(specs: &[DagSpec]) -> (AnalysisResult, String) {
+    let settings = AnalysisSettings {
         policy: EDF.policy,
         preemption: EDF.preemption,
         cores: EDF.cores,
@@ -130,17 +130,27 @@ fn each_cluster_is_analysed_on_its_own_cores() {
     assert_eq!(one_each.sinks_ns, [[Some(6)], [Some(6)]]);
     // Both on one core: that is too much for it, and the other cluster's core is no help.
     let (one_for_both, _) = answer(&[three()[1].clone(), three()[1].clone()]);
-    assert!(one_for_both.reasons.contains(&Some(Reason::Overload)));
+    assert!(
+        one_for_both
+            .reasons
+            .contains(&Some(NotProvenReason::Overload))
+    );
 }
 
 #[test]
 fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
     let (answer, witness) = answer(&three());
     assert_eq!(answer.bounds[0].unwrap().bound_ns, 6);
-    assert_eq!(answer.reasons[1], Some(Reason::DelayedBy { dag: DagId(2) }));
+    assert_eq!(
+        answer.reasons[1],
+        Some(NotProvenReason::DelayedBy { dag: DagId(2) })
+    );
     let unknown = answer.first_failing.unwrap();
     assert_eq!(unknown.dag, DagId(2));
-    assert!(matches!(unknown.reason, Reason::Unknown(_)), "{unknown:?}");
+    assert!(
+        matches!(unknown.reason, NotProvenReason::Unknown(_)),
+        "{unknown:?}"
+    );
     let begins = |line: &&str| line.starts_with("machine 1 ");
     assert_eq!(witness.lines().filter(begins).count(), 2, "one for each");
 }

@@ -6,7 +6,7 @@
 
 use std::fs;
 
-use sched_dag::analysis::{Settings, answer};
+use sched_dag::analysis::{AnalysisSettings, answer};
 use sched_dag::{DagSpec, Policy, Preemption, Priority, SubtaskSpec, TaskSet};
 
 use super::random::Sample;
@@ -122,7 +122,7 @@ fn unsound(text: &str, lines: &[String]) -> Option<String> {
 }
 
 /// Returns the DAGs that a witness states, and on what they run; if verification takes them.
-fn stated(text: &str) -> Option<(TaskSet, Settings)> {
+fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     let mut dags: Vec<DagSpec> = Vec::new();
     let (mut machine, mut ready_ns) = ((0, Policy::Edf, 0), 0);
     for line in text.lines().take_while(|line| !line.starts_with("hash ")) {

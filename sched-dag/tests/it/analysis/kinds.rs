@@ -13,7 +13,7 @@
 use std::collections::BTreeMap;
 
 use common::random::Random;
-use sched_dag::analysis::{Answer, Settings, answer, fix_orders};
+use sched_dag::analysis::{AnalysisResult, AnalysisSettings, answer, fix_orders};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Instance, TaskSet};
 
@@ -93,8 +93,8 @@ fn accepted_sets_keep_their_bounds() {
 /// times and one with shortened ones.
 pub(crate) fn breach(
     task_set: &TaskSet,
-    settings: &Settings,
-    answer: &Answer,
+    settings: &AnalysisSettings,
+    answer: &AnalysisResult,
     random: &mut Random,
 ) -> Option<String> {
     let longest = task_set.dags().iter().map(|dag| dag.period_ns()).max();
@@ -143,7 +143,7 @@ pub(crate) fn breach(
 }
 
 /// Counts the sinks with a smaller bound than their job.
-pub(crate) fn tighter(answer: &Answer) -> u64 {
+pub(crate) fn tighter(answer: &AnalysisResult) -> u64 {
     let pairs = answer.bounds.iter().zip(&answer.sinks_ns);
     let counts = pairs.map(|(whole, sinks_ns)| {
         let whole_ns = whole.map(|whole| whole.bound_ns);
@@ -153,7 +153,7 @@ pub(crate) fn tighter(answer: &Answer) -> u64 {
 }
 
 /// Reports whether bounds are shorter than others; `None`: one is longer.
-fn is_no_longer(fixed: &Answer, free: &Answer) -> Option<bool> {
+fn is_no_longer(fixed: &AnalysisResult, free: &AnalysisResult) -> Option<bool> {
     // None is longer than all.
     let [fixed, free] = [fixed, free].map(|answer| {
         let bounds = answer

@@ -14,7 +14,9 @@ mod witnesses;
 mod worked;
 
 use common::random::Random;
-use sched_dag::analysis::{Overheads, Reason, Settings, TaskError, Test, answer, fix_orders};
+use sched_dag::analysis::{
+    AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, TaskError, answer, fix_orders,
+};
 use sched_dag::{
     ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Policy, Preemption,
     SubtaskId, SubtaskOrder, verify,
@@ -27,8 +29,8 @@ use simulate::{commit, responses, spec};
 const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
 const DIAMOND: [(usize, usize); 4] = [(0, 1), (0, 2), (1, 3), (2, 3)];
 
-fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> Settings {
-    Settings {
+fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> AnalysisSettings {
+    AnalysisSettings {
         policy,
         preemption,
         cores,
@@ -53,7 +55,7 @@ fn no_bound_rests_on_a_wcet_of_zero() {
         };
         let answer = answer(&task_set, &sample.settings());
         let subtask = SubtaskId(u32::try_from(subtask).unwrap());
-        let missing = Reason::Unknown(TaskError::MissingWcet { subtask });
+        let missing = NotProvenReason::Unknown(TaskError::MissingWcet { subtask });
         assert_eq!(answer.reasons[dag], Some(missing), "seed {seed}");
         let breach = breach(&task_set, &sample.settings(), &answer, &mut random);
         assert_eq!(breach, None, "seed {seed}");
@@ -76,7 +78,10 @@ fn e4_blocking_is_observed_beyond_the_published_bound() {
     });
     assert_eq!(observed[0], 11);
     let bound = answer(&task_set, &settings(kind, 2)).bounds[0].unwrap();
-    assert_eq!((bound.bound_ns, bound.test), (15, Test::NonPreemptive));
+    assert_eq!(
+        (bound.bound_ns, bound.test),
+        (15, SchedulabilityTest::NonPreemptive)
+    );
 }
 
 #[test]
@@ -111,7 +116,10 @@ fn delays_that_are_handed_on_count() {
     let (observed, full) = with(10);
     assert!(observed > 18 + 10, "{observed}");
     let failing = full.first_failing.unwrap();
-    assert_eq!((failing.dag.0, failing.reason), (1, Reason::NoBound));
+    assert_eq!(
+        (failing.dag.0, failing.reason),
+        (1, NotProvenReason::NoBound)
+    );
     assert!(with(9).1.is_proven());
 }
 
@@ -126,12 +134,15 @@ fn each_dag_without_a_bound_has_its_reason_and_the_surest_one_is_the_first() {
     let mut narrow = spec(10, 40, &[8, 8], &[(0, 1)], 1);
     narrow.in_flight = Some(1);
 
-    let (no_bound, overload) = (Some(Reason::NoBound), Some(Reason::Overload));
-    let behind = |dag| Some(Reason::DelayedBy { dag: DagId(dag) });
-    let too_few = Some(Reason::InFlightTooFew { in_flight: 1 });
-    let too_long = Some(Reason::LengthBeyondDeadline { length_ns: 12 });
+    let (no_bound, overload) = (
+        Some(NotProvenReason::NoBound),
+        Some(NotProvenReason::Overload),
+    );
+    let behind = |dag| Some(NotProvenReason::DelayedBy { dag: DagId(dag) });
+    let too_few = Some(NotProvenReason::InFlightTooFew { in_flight: 1 });
+    let too_long = Some(NotProvenReason::LengthBeyondDeadline { length_ns: 12 });
     let subtask = SubtaskId(0);
-    let missing = Some(Reason::Unknown(TaskError::MissingWcet { subtask }));
+    let missing = Some(NotProvenReason::Unknown(TaskError::MissingWcet { subtask }));
     let around_unknown = [one(0), unknown, one(2)];
     let held_up = [behind(1), missing, behind(1)];
     let no_preemption = (Policy::StaticPriority, Preemption::Disabled);
@@ -140,7 +151,7 @@ fn each_dag_without_a_bound_has_its_reason_and_the_surest_one_is_the_first() {
     let holds = |kind: (Policy, Preemption),
                  cores,
                  specs: &[DagSpec],
-                 expected: &[Option<Reason>],
+                 expected: &[Option<NotProvenReason>],
                  first: Option<usize>| {
         let task_set = commit(specs, kind.0, cores);
         let answer = answer(&task_set, &settings(kind, cores));

@@ -1,7 +1,7 @@
 //! The tests of one core are exact: in virtual time their worst case comes.
 
 use common::random::Random;
-use sched_dag::analysis::{Answer, Test, answer};
+use sched_dag::analysis::{AnalysisResult, SchedulabilityTest, answer};
 use sched_dag::{DagSpec, Policy, Preemption, TaskSet};
 
 use super::simulate::{commit, responses, spec};
@@ -9,7 +9,7 @@ use super::{FP, settings};
 
 /// Draws DAGs of one subtask that are all released at once, and again after 120, and that are no
 /// overload in the long run; answers, and observes the longest responses.
-fn one_set(random: &mut Random, policy: Policy) -> (TaskSet, Answer, Vec<u64>) {
+fn one_set(random: &mut Random, policy: Policy) -> (TaskSet, AnalysisResult, Vec<u64>) {
     const PERIODS: [u64; 10] = [4, 5, 6, 8, 10, 12, 20, 30, 60, 120];
     let count = random.within(2..=5);
     let (mut most, mut left) = (random.within(2..=8), 120);
@@ -49,7 +49,12 @@ fn static_priorities_on_one_core_have_their_exact_response_times() {
         let periods = task_set.dags().iter().map(|dag| dag.period_ns());
         overlapping += u64::from(periods.zip(bounds).any(|(period, bound)| bound > period));
         let tests = answer.bounds.iter().flatten().map(|bound| bound.test);
-        below += u64::from(tests.filter(|&test| test == Test::OneCore).count() > 0);
+        below += u64::from(
+            tests
+                .filter(|&test| test == SchedulabilityTest::OneCore)
+                .count()
+                > 0,
+        );
         sets += 1;
         if sets == 1_000 {
             break;

@@ -1,7 +1,7 @@
 //! Random task sets from a seed.
 
 use common::random::Random;
-use sched_dag::analysis::{Overheads, Settings};
+use sched_dag::analysis::{AnalysisSettings, Overheads};
 use sched_dag::{
     Activation, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagSpec, Policy,
     Preemption, SubtaskOrder, TaskSet, verify,
@@ -20,8 +20,8 @@ pub(crate) struct Sample {
 }
 
 impl Sample {
-    pub(crate) fn settings(&self) -> Settings {
-        Settings {
+    pub(crate) fn settings(&self) -> AnalysisSettings {
+        AnalysisSettings {
             policy: self.policy,
             preemption: self.preemption,
             cores: self.cores,

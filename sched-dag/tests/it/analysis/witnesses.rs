@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use common::random::Random;
-use sched_dag::analysis::{Answer, DagBound, answer, witness};
+use sched_dag::analysis::{AnalysisResult, DagBound, answer, witness};
 use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, TaskSet};
 
 use super::forged;
@@ -120,7 +120,7 @@ fn a_witness_that_lacks_a_cluster_is_refused() {
 }
 
 /// Returns how the lines begin that the checker is to say.
-fn lines(task_set: &TaskSet, answer: &Answer) -> Vec<String> {
+fn lines(task_set: &TaskSet, answer: &AnalysisResult) -> Vec<String> {
     let mut lines = Vec::new();
     for cluster in task_set.clusters() {
         let place = match task_set.is_divided() {

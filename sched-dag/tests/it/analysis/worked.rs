@@ -1,8 +1,8 @@
 //! Worked examples: values from the papers, and schedules that show them.
 
 use sched_dag::analysis::{
-    Clip, Reason, Task, answer, covers, intra_task, multi_path, multi_path_edf, multi_path_fp,
-    width,
+    InterferenceBound, NotProvenReason, Task, answer, covers, intra_task, multi_path,
+    multi_path_edf, multi_path_fp, width,
 };
 use sched_dag::{DagSpec, Instance, Policy, Preemption, Priority};
 
@@ -48,12 +48,16 @@ fn e2_e3_and_e13_two_dags() {
     let one = Task::new(10, 10, vec![1, 2, 2, 1], &DIAMOND).unwrap();
     let two = Task::new(20, 20, vec![1, 3, 3, 3, 1], &forks).unwrap();
     let tasks = [&one, &two];
-    for clip in [Clip::Window, Clip::Waiting, Clip::Chains] {
+    for clip in [
+        InterferenceBound::Window,
+        InterferenceBound::Waiting,
+        InterferenceBound::Chains,
+    ] {
         assert_eq!(multi_path_fp(&tasks, 2, clip), Some(vec![4, 14]));
     }
     // The commit, which comes from below, has bounds under EDF, too. Alone, the first DAG has two
     // paths that cover it: 4, where Graham's bound is 5.
-    assert_eq!(multi_path_edf(&tasks, 2, Clip::Chains), None);
+    assert_eq!(multi_path_edf(&tasks, 2, InterferenceBound::Chains), None);
     let specs = [
         spec(10, 10, &[1, 2, 2, 1], &DIAMOND, 0),
         spec(20, 20, &[1, 3, 3, 3, 1], &forks, 1),
@@ -137,7 +141,7 @@ fn a_dag_near_its_bound_slowly_leaves_a_more_urgent_one_its_own() {
     let task_set = commit(&[urgent, slow], FP.0, 2);
     let answer = answer(&task_set, &settings(FP, 2));
     assert_eq!(answer.bounds[0].map(|bound| bound.bound_ns), Some(40_000));
-    assert_eq!(answer.reasons, [None, Some(Reason::Limit)]);
+    assert_eq!(answer.reasons, [None, Some(NotProvenReason::Limit)]);
 }
 
 /// Returns the bounds of jobs and of their sinks.

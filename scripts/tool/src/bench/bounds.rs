@@ -19,8 +19,8 @@ use std::process::ExitCode;
 
 use common::random::Random;
 use sched_dag::analysis::{
-    Overheads, Settings, Task, answer, bonifaci_dm, bonifaci_edf, fix_orders, gedf_capacity,
-    grm_capacity, multi_path,
+    AnalysisSettings, Overheads, Task, answer, bonifaci_dm, bonifaci_edf, fix_orders,
+    gedf_capacity, grm_capacity, multi_path,
 };
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskOrder, verify,
@@ -81,9 +81,9 @@ fn measure(cores: &[u32], count: u64) -> Result<bool, String> {
 }
 
 /// Returns what any graphs are committed and analysed with.
-fn terms(policy: Policy, cores: u32) -> (CommitOptions, Settings) {
+fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
     let options = CommitOptions::new(policy, cores);
-    let settings = Settings {
+    let settings = AnalysisSettings {
         policy,
         preemption: Preemption::Enabled,
         cores,

@@ -31,8 +31,8 @@
 //! the multi-path ones have replaced are in `older_bounds`.
 
 use sched_dag::analysis::{
-    Clip, Federation, Task, bonifaci_edf, covers, federated, gedf_capacity, multi_path,
-    multi_path_edf, multi_path_fp, width,
+    Federation, InterferenceBound, Task, bonifaci_edf, covers, federated, gedf_capacity,
+    multi_path, multi_path_edf, multi_path_fp, width,
 };
 
 use replay::lines::{Line, Lines, Malformed, cases, quoted};
@@ -246,7 +246,7 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
     let accepted = |yes: bool| u8::from(yes).to_string();
     let bounds = |bounds: Option<Vec<u64>>| bounds.map(|bounds| list(&bounds));
     let is_constrained = |task: &&Task| task.relative_deadline_ns() <= task.period_ns();
-    let by_priority = |clip: Clip| {
+    let by_priority = |clip: InterferenceBound| {
         let bounds = multi_path_fp(&by_deadline, cores, clip);
         bounds.filter(|_| tasks.iter().all(is_constrained))
     };
@@ -260,10 +260,10 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
         "gfp_dm_width" => bounds(older::melani_fp(&by_deadline, cores, older::Width::Used)),
         "np_safe_gfp_dm" => bounds(older::np_safe_fp(&by_deadline, cores)),
         "melani_gedf" => bounds(older::melani_edf(tasks, cores, older::Width::Ignored)),
-        "mp_gfp_dm" => bounds(by_priority(Clip::Window)),
-        "mp_gfp_dm_clip" => bounds(by_priority(Clip::Waiting)),
-        "mp_gedf" => bounds(multi_path_edf(tasks, cores, Clip::Window)),
-        "mp_gedf_clip" => bounds(multi_path_edf(tasks, cores, Clip::Waiting)),
+        "mp_gfp_dm" => bounds(by_priority(InterferenceBound::Window)),
+        "mp_gfp_dm_clip" => bounds(by_priority(InterferenceBound::Waiting)),
+        "mp_gedf" => bounds(multi_path_edf(tasks, cores, InterferenceBound::Window)),
+        "mp_gedf_clip" => bounds(multi_path_edf(tasks, cores, InterferenceBound::Waiting)),
         "gedf_capacity" => gedf_capacity(tasks, cores).map(accepted),
         "bonifaci_gedf" => Some(accepted(bonifaci_edf(tasks, cores))),
         "federated" => federated(tasks, cores).map(|federation| words_of(&federation)),

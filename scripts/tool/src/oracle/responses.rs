@@ -18,7 +18,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use common::random::Random;
-use sched_dag::analysis::{Overheads, Settings, answer, fix_orders};
+use sched_dag::analysis::{AnalysisSettings, Overheads, answer, fix_orders};
 use sched_dag::journal::EventKind;
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, Instance, Notice, Policy,
@@ -98,7 +98,7 @@ impl Seen {
             return Vec::new();
         };
         let mut task_set = verified.task_set;
-        let settings = Settings {
+        let settings = AnalysisSettings {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,

@@ -16,7 +16,7 @@
 
 use std::path::{Path, PathBuf};
 
-use sched_dag::analysis::{self, Overheads, Settings};
+use sched_dag::analysis::{self, AnalysisSettings, Overheads};
 use sched_dag::{CoreDivision, Dag, DagId, DagSpec, Preemption, SchedulerOptions};
 
 use super::observed::OfDag;
@@ -202,7 +202,7 @@ pub struct Slack {
 /// Takes the bound of a DAG of a commit apart.
 #[must_use]
 pub fn of(commit: &Committed, dag: DagId) -> Slack {
-    let bound = |dags: &[DagSpec], settings: &Settings, dag: usize| -> Option<u64> {
+    let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
         let options = SchedulerOptions {
             policy: settings.policy,
             preemption: settings.preemption,

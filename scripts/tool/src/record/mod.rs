@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use recording::{Chunk, Commit, CommittedDag, Events, MAGIC, Recording, Times};
-use sched_dag::analysis::{self, Overheads, Settings};
+use sched_dag::analysis::{self, AnalysisSettings, Overheads};
 use sched_dag::chains::SampledEdge;
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::Terms;
@@ -362,9 +362,9 @@ impl Committed {
 
     /// Returns what the analysis takes for granted besides the DAGs.
     #[must_use]
-    pub fn settings(&self) -> Settings {
+    pub fn settings(&self) -> AnalysisSettings {
         let options = self.options();
-        Settings {
+        AnalysisSettings {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,

@@ -12,7 +12,7 @@ use cases::{CASES, PERIOD};
 use fass::finish_create_dags;
 use harness::fault_page::{self, documented_faults, is_said_by, table};
 use harness::markdown::page;
-use sched_dag::analysis::{Reason, TaskError};
+use sched_dag::analysis::{NotProvenReason, TaskError};
 use sched_dag::{
     CommitOptions, DagId, DagLabel, DagSpec, Fault, Policy, SubtaskId, SubtaskSpec, TopicPort,
     verify,
@@ -247,25 +247,29 @@ fn every_reason_against_a_proof_is_listed() {
 
     // Each leads to the next one: a new reason does not compile here until it is among them.
     let subtask = SubtaskId(0);
-    let next = |reason: &Reason| {
+    let next = |reason: &NotProvenReason| {
         Some(match reason {
-            Reason::LengthBeyondDeadline { length_ns } => Reason::PathBeyondDeadline {
-                sink: subtask,
-                length_ns: *length_ns,
-            },
-            Reason::PathBeyondDeadline { sink, .. } => Reason::NoSinkBound { sink: *sink },
-            Reason::NoSinkBound { .. } => Reason::SubtaskBeyondPeriod { subtask },
-            Reason::SubtaskBeyondPeriod { .. } => Reason::Overload,
-            Reason::Overload => Reason::DelayedBy { dag: DagId(1) },
-            Reason::DelayedBy { .. } => Reason::NoBound,
-            Reason::NoBound => Reason::InFlightTooFew { in_flight: 2 },
-            Reason::InFlightTooFew { .. } => Reason::Limit,
-            Reason::Limit => Reason::NoCores,
-            Reason::NoCores => Reason::Unknown(TaskError::VolumeOverflow),
-            Reason::Unknown(_) => return None,
+            NotProvenReason::LengthBeyondDeadline { length_ns } => {
+                NotProvenReason::PathBeyondDeadline {
+                    sink: subtask,
+                    length_ns: *length_ns,
+                }
+            }
+            NotProvenReason::PathBeyondDeadline { sink, .. } => {
+                NotProvenReason::NoSinkBound { sink: *sink }
+            }
+            NotProvenReason::NoSinkBound { .. } => NotProvenReason::SubtaskBeyondPeriod { subtask },
+            NotProvenReason::SubtaskBeyondPeriod { .. } => NotProvenReason::Overload,
+            NotProvenReason::Overload => NotProvenReason::DelayedBy { dag: DagId(1) },
+            NotProvenReason::DelayedBy { .. } => NotProvenReason::NoBound,
+            NotProvenReason::NoBound => NotProvenReason::InFlightTooFew { in_flight: 2 },
+            NotProvenReason::InFlightTooFew { .. } => NotProvenReason::Limit,
+            NotProvenReason::Limit => NotProvenReason::NoCores,
+            NotProvenReason::NoCores => NotProvenReason::Unknown(TaskError::VolumeOverflow),
+            NotProvenReason::Unknown(_) => return None,
         })
     };
-    let first = Reason::LengthBeyondDeadline { length_ns: 5 };
+    let first = NotProvenReason::LengthBeyondDeadline { length_ns: 5 };
     let reasons = std::iter::successors(Some(first), next);
     texts.extend(reasons.map(|reason| reason.to_string()));
     assert_eq!(texts.len(), documented.len());
