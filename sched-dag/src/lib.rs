@@ -131,7 +131,8 @@ pub use policy::{
     SchedulerOptions, SubtaskOrder,
 };
 pub use scheduler::{
-    DagPhase, DagStatistics, Decision, HandOff, Log, Moment, Notice, Scheduler, Snapshot,
+    DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,
+    Scheduler,
 };
 pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};

@@ -2,7 +2,7 @@
 //!
 //! Time jumps from event to event. What the cores do comes from a
 //! [`Workload`], which is asked once for each instance, at its start, how long
-//! it executes; it may run the function of the instance's [body](Body) to find out.
+//! it executes; it may run the function of the instance's [body](SubtaskBody) to find out.
 //!
 //! An instance that executes for no time finishes at the instant of its start,
 //! after the dispatch that started it; another dispatch at the same instant
@@ -50,18 +50,18 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 
-use crate::engine::{Body, Continuation, Cost, Engine, Port, Run};
+use crate::engine::{Engine, FaultCost, NextAction, PlatformPort, Run, SubtaskBody};
 use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind, EventSubject};
 use crate::kept::Journal;
 use crate::lifecycle::{Lifecycle, LifecycleChange, PendingRequests, Request};
-use crate::placement::Next;
+use crate::placement::NextWork;
 use crate::policy::SchedulerOptions;
-use crate::scheduler::{Moment, Notice, Scheduler};
+use crate::scheduler::{DriverNotice, Moment, Scheduler};
 use crate::task_set::TaskSet;
 
 /// A scheduler in virtual time with its bodies, or those of all clusters.
-pub struct VirtualTime<B: Body = Instance> {
+pub struct VirtualTime<B: SubtaskBody = Instance> {
     clusters: Box<[ClusterRun<B>]>,
     now_ns: u64,
     /// What fails at the present instant.
@@ -106,7 +106,7 @@ fn instances(task_set: &TaskSet) -> impl Iterator<Item = Instance> {
     })
 }
 
-impl<B: Body> VirtualTime<B> {
+impl<B: SubtaskBody> VirtualTime<B> {
     /// Makes one for a body of each subtask. By DAG, `after_fault` is the one that gets a signal
     /// when a fault ends it.
     pub fn of_bodies(
@@ -350,7 +350,7 @@ impl<B: Body> VirtualTime<B> {
     }
 }
 
-impl<B: Body> fmt::Debug for VirtualTime<B> {
+impl<B: SubtaskBody> fmt::Debug for VirtualTime<B> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("VirtualTime");
         shown.field("now_ns", &self.now_ns).finish_non_exhaustive()
@@ -379,12 +379,12 @@ pub trait Workload<B = Instance> {
     }
 
     /// An instance has ended, what it publishes is published; or a fault ended it that costs this.
-    fn ended(&mut self, instance: Instance, fault: Option<Cost>) {
+    fn ended(&mut self, instance: Instance, fault: Option<FaultCost>) {
         let _ = (instance, fault);
     }
 
     /// A job is released, skipped or completed, or a DAG stopped.
-    fn hear(&mut self, notice: &Notice) {
+    fn hear(&mut self, notice: &DriverNotice) {
         let _ = notice;
     }
 
@@ -425,14 +425,14 @@ pub struct ExecutionTimes<F>(
     pub F,
 );
 
-impl<B: Body, F: FnMut(Instance) -> u64> Workload<B> for ExecutionTimes<F> {
+impl<B: SubtaskBody, F: FnMut(Instance) -> u64> Workload<B> for ExecutionTimes<F> {
     fn execute(&mut self, body: &mut B, _now_ns: u64) -> Option<u64> {
         Some((self.0)(body.subject().instance()))
     }
 }
 
 /// Stands for a body without a function, which can always be replaced.
-impl Body for Instance {
+impl SubtaskBody for Instance {
     type Alternate = ();
 
     fn set_job(&mut self, job: u64) {
@@ -459,7 +459,7 @@ impl Body for Instance {
 }
 
 /// What runs by itself.
-struct ClusterRun<B: Body> {
+struct ClusterRun<B: SubtaskBody> {
     /// Parked is a body, behind the time that its instance has left.
     engine: Engine<B, (u64, B)>,
     /// By core, the body of its instance, and when that finishes if nothing intervenes.
@@ -474,7 +474,7 @@ struct VirtualInstant<'a, W> {
     begun_ns: Result<u64, RunOutcome>,
 }
 
-impl<B: Body, W: Workload<B>> Port<B> for VirtualInstant<'_, W> {
+impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
     const HEARS: &'static [EventKind] = &[
         EventKind::Released,
         EventKind::Skipped,
@@ -502,12 +502,12 @@ impl<B: Body, W: Workload<B>> Port<B> for VirtualInstant<'_, W> {
         is_asked
     }
 
-    fn hear(&mut self, notice: &Notice) {
+    fn hear(&mut self, notice: &DriverNotice) {
         self.workload.hear(notice);
     }
 }
 
-impl<B: Body> ClusterRun<B> {
+impl<B: SubtaskBody> ClusterRun<B> {
     fn new(scheduler: Scheduler, cluster: ClusterId, after_fault: Vec<Option<DagId>>) -> Self {
         type Any<'a> = VirtualInstant<'a, ExecutionTimes<fn(Instance) -> u64>>;
         let cores = scheduler.options().cores;
@@ -556,9 +556,9 @@ impl<B: Body> ClusterRun<B> {
         let done = engine.complete((core, vertex), body, now_ns, is_alone, now);
         now.workload.ended(instance, None);
         match done {
-            Continuation::Run(body) => self.run(core, body, now_ns, now.begun_ns)?,
-            Continuation::Look { .. } => self.go_on(core, now)?,
-            Continuation::Step(ended) => {
+            NextAction::Run(body) => self.run(core, body, now_ns, now.begun_ns)?,
+            NextAction::Look { .. } => self.go_on(core, now)?,
+            NextAction::Step(ended) => {
                 if let Some(instance) = ended {
                     engine.tell((now_ns, core), now, |moment| moment.complete(instance));
                 }
@@ -605,9 +605,9 @@ impl<B: Body> ClusterRun<B> {
     ) -> Result<(), RunOutcome> {
         let (engine, now_ns) = (&mut self.engine, now.now_ns);
         match engine.next(core, now) {
-            Next::Nothing => Ok(()),
-            Next::Start(_, body) => self.run(core, body, now_ns, now.begun_ns),
-            Next::Continue((left_ns, body)) => {
+            NextWork::Nothing => Ok(()),
+            NextWork::Start(_, body) => self.run(core, body, now_ns, now.begun_ns),
+            NextWork::Continue((left_ns, body)) => {
                 let vertex = engine.task_set.vertex(body.subject().instance());
                 engine.note(EventKind::Resume, core, vertex, now_ns);
                 self.run(core, body, now_ns, Ok(left_ns))

@@ -14,7 +14,7 @@ use std::time::Duration;
 use fass::edge::{Drain, Edge, Kept, Outgoing, Sink};
 use fass::{Clock, LaunchError, Plan, Recorded, Terms};
 use sched_dag::engine::Run;
-use sched_dag::{Instance, Notice};
+use sched_dag::{DriverNotice, Instance};
 
 use crate::sys;
 
@@ -131,7 +131,7 @@ pub(crate) fn record(value: &Recorded<'_>) {
 }
 
 /// Takes what became of a job or an instance. The cluster's lock is held.
-pub(crate) fn happened(notice: &Notice) {
+pub(crate) fn happened(notice: &DriverNotice) {
     if IS_ON.load(Ordering::Relaxed) {
         get().happened(notice);
     }

@@ -11,7 +11,7 @@ use std::time::Duration;
 use fass::edge::{Begin, Kept};
 use fass::log::Line;
 use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms};
-use sched_dag::engine::{self, Proven};
+use sched_dag::engine::{self, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, PendingRequests, Request};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
 
@@ -212,7 +212,7 @@ pub(crate) struct Threads {
 /// A plan that was committed.
 pub(crate) struct Launched {
     pub(crate) control: Control,
-    pub(crate) proven: Proven,
+    pub(crate) proven: ProvenBounds,
     pub(crate) threads: Threads,
 }
 
@@ -297,10 +297,10 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
             }
         }
     }
-    let run = run.with_counts(engine::Counts {
+    let run = run.with_counts(engine::RunCounts {
         epoch_ns,
         allocations,
-        ..engine::Counts::default()
+        ..engine::RunCounts::default()
     });
     edge::end_run(&run);
     Run {

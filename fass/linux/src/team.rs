@@ -25,7 +25,7 @@ use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use fass::Runner;
-use sched_dag::engine::{Continuation, Port as _};
+use sched_dag::engine::{NextAction, PlatformPort as _};
 use sched_dag::{ClusterId, CoreId, Vertex};
 
 use crate::level::{Levels, Role};
@@ -259,13 +259,13 @@ impl Team {
                 let (engine, mut port) = state_now.parts(workers);
                 let ended = (core, vertex);
                 match engine.complete(ended, runner, end_ns, is_alone, &mut port) {
-                    Continuation::Run(runner) => {
+                    NextAction::Run(runner) => {
                         self.hand_offs.fetch_add(1, Ordering::Relaxed);
                         self.announce(&state);
                         return Some(runner);
                     }
-                    Continuation::Look { .. } => {}
-                    Continuation::Step(ended) => {
+                    NextAction::Look { .. } => {}
+                    NextAction::Step(ended) => {
                         let now_ns = port.now_ns();
                         engine.step((now_ns, core), &mut port, |moment| {
                             ended.into_iter().for_each(|ended| moment.complete(ended));

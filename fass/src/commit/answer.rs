@@ -45,7 +45,7 @@ use sched_dag::analysis::{
     self, AnalysisSettings, NotProvenReason, OverheadSource, SchedulabilityTest,
 };
 use sched_dag::chains::{Chain, SampledEdge};
-use sched_dag::engine::Proven;
+use sched_dag::engine::ProvenBounds;
 use sched_dag::wcets::WcetSource;
 use sched_dag::{
     AssignmentReason, ClusterId, DagId, DagKey, DagLabel, Subtask, SubtaskLabel, TaskSet, Warning,
@@ -460,7 +460,7 @@ pub(crate) struct Answers {
     /// The position of the first DAG that fails.
     pub(crate) first_unproven: Option<usize>,
     /// The bounds, for the platform.
-    pub(crate) proven: Proven,
+    pub(crate) proven: ProvenBounds,
     settings: AnalysisSettings,
 }
 
@@ -501,7 +501,7 @@ impl Answers {
         let bounds_ns = (answer.bounds.iter()).map(|bound| Some(bound.as_ref()?.bound_ns));
         Self {
             of_dags,
-            proven: Proven {
+            proven: ProvenBounds {
                 bounds_ns: bounds_ns.collect(),
                 sink_bounds_ns: answer.sinks_ns,
             },

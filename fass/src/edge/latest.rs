@@ -17,7 +17,7 @@ use core::mem;
 use core::ops::Range;
 
 use recording::{Channel, EntryKind, Header, Role};
-use sched_dag::{DagId, Instance, Notice, journal};
+use sched_dag::{DagId, DriverNotice, Instance, journal};
 
 use super::replay::narrow;
 use super::tape::{Releases, SIGNALS, place_of};
@@ -88,7 +88,7 @@ impl Crossing for Latest {
         }
     }
 
-    fn happened(&mut self, notice: &Notice) {
+    fn happened(&mut self, notice: &DriverNotice) {
         let (dag, job) = (notice.event.dag.index(), notice.event.job);
         // A skipped job counts, or those after it would be others in a replay.
         if let journal::EventKind::Due | journal::EventKind::Skipped = notice.event.what

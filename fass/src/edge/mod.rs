@@ -28,7 +28,7 @@ use core::fmt;
 
 use recording::{Channel, DagHeader, Header, Schema, Stream};
 use sched_dag::journal::EventKind;
-use sched_dag::{DagId, Instance, Notice, TaskSet};
+use sched_dag::{DagId, DriverNotice, Instance, TaskSet};
 
 use crate::run::line::Recorded;
 use crate::run::plan::Plan;
@@ -107,7 +107,7 @@ pub trait Crossing: Send {
     fn record(&mut self, value: &Recorded<'_>, at_ns: u64);
 
     /// Takes what has become of a job, or of an instance: an event of those of [`HEARS`].
-    fn happened(&mut self, notice: &Notice);
+    fn happened(&mut self, notice: &DriverNotice);
 
     /// Takes note that an instance has failed, and what it had sampled: `at_ns` on the time of
     /// the run, `clock_ns` on that of [`crate::now_ns`].
@@ -487,7 +487,7 @@ impl Edge {
     }
 
     /// Takes what became of a job or an instance, if it is of interest.
-    pub fn happened(&mut self, notice: &Notice) {
+    pub fn happened(&mut self, notice: &DriverNotice) {
         if self.is_on
             && let Some(crossing) = &mut self.crossing
         {

@@ -16,7 +16,7 @@ use core::mem;
 use core::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use recording::{Channel, Encoder, Entry, EntryKind, Header, Recordable};
-use sched_dag::{DagId, Instance, Notice, SubtaskId, TaskSet};
+use sched_dag::{DagId, DriverNotice, Instance, SubtaskId, TaskSet};
 
 use super::replay::narrow;
 use super::{Crossing, Drain, Drained, Record, name, open, recorded};
@@ -125,7 +125,7 @@ impl Crossing for Tape {
         take(&self.given, &self.lost, value, at_ns);
     }
 
-    fn happened(&mut self, notice: &Notice) {
+    fn happened(&mut self, notice: &DriverNotice) {
         let event = notice.event;
         if let Some(what) = recorded(event.what) {
             let subtask = event.subtask.unwrap_or(SubtaskId(0));

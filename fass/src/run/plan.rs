@@ -7,7 +7,7 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use sched_dag::engine::{Alternate, Proven};
+use sched_dag::engine::{Alternate, ProvenBounds};
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
@@ -42,7 +42,7 @@ pub struct Plan {
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
     pub bodies: Vec<Vec<Body>>,
     /// The response times that the commit has proven ([`Commit::answers`](crate::Commit::answers)).
-    pub proven: Proven,
+    pub proven: ProvenBounds,
     /// By DAG, the one that gets a signal when a fault ends it
     /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
     /// scheduler.
@@ -155,7 +155,7 @@ impl<F: FnMut(u64) -> bool + Send> Subtask for Looked<F> {
 ///
 /// ```
 /// use fass::Body;
-/// use sched_dag::engine::{Alternate, Proven};
+/// use sched_dag::engine::{Alternate, ProvenBounds};
 ///
 /// fn is_survived(body: &Body) -> bool {
 ///     body.replacement().is_some_and(|next: fass::Replacement| next.is_there())
@@ -428,7 +428,7 @@ impl Runner {
     }
 }
 
-impl engine::Body for Runner {
+impl engine::SubtaskBody for Runner {
     type Alternate = Replacement;
 
     #[inline]

@@ -29,11 +29,13 @@ use fass::edge::{Begin, Replay};
 use fass::log::{Level, Line, set_level};
 use fass::{LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms, Wire};
 use recording::Channel;
-use sched_dag::engine::{Alternate, Cost};
+use sched_dag::engine::{Alternate, FaultCost};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::Request;
 use sched_dag::virtual_time::{RunOutcome, VirtualTime as Driver, Workload};
-use sched_dag::{Dag, DagId, DagLabel, Instance, Notice, SchedulerOptions, SubtaskLabel, TaskSet};
+use sched_dag::{
+    Dag, DagId, DagLabel, DriverNotice, Instance, SchedulerOptions, SubtaskLabel, TaskSet,
+};
 
 use crate::edge::Edge;
 use crate::job::JobShown;
@@ -602,12 +604,12 @@ impl Workload<Runner> for Calls {
             && panics.any(|panic| panic.instance == instance)
     }
 
-    fn ended(&mut self, instance: Instance, fault: Option<Cost>) {
-        self.degraded[instance.dag.index()] |= fault == Some(Cost::Degraded);
+    fn ended(&mut self, instance: Instance, fault: Option<FaultCost>) {
+        self.degraded[instance.dag.index()] |= fault == Some(FaultCost::Degraded);
         self.machine.collect();
     }
 
-    fn hear(&mut self, notice: &Notice) {
+    fn hear(&mut self, notice: &DriverNotice) {
         let event = &notice.event;
         let ended = match event.what {
             EventKind::Released => None,

@@ -8,7 +8,7 @@ use core::iter;
 use fass::edge::{Drained, Outcome, Sink};
 use fass::log::Line;
 use fass::{Wire, WireCounts};
-use sched_dag::{Dag, DagId, Snapshot, TaskSet};
+use sched_dag::{Dag, DagId, DagSnapshot, TaskSet};
 
 use crate::text::json;
 
@@ -16,7 +16,7 @@ pub use crate::text::Ns;
 pub use sched_dag::law::Distribution;
 
 /// Prints the line of a DAG for people, of which `print` makes the rest, and its machine line.
-pub fn show_dag(snapshot: &Snapshot, dag: DagId, model: &Dag, print: fn(&Snapshot, &Dag)) {
+pub fn show_dag(snapshot: &DagSnapshot, dag: DagId, model: &Dag, print: fn(&DagSnapshot, &Dag)) {
     crate::print!("  dag {} ", dag.0);
     print(snapshot, model);
     let of = snapshot.statistics;
@@ -38,7 +38,7 @@ pub fn show_dag(snapshot: &Snapshot, dag: DagId, model: &Dag, print: fn(&Snapsho
 }
 
 /// Prints the counts of a DAG's jobs.
-pub fn print_counts(snapshot: &Snapshot, model: &Dag) {
+pub fn print_counts(snapshot: &DagSnapshot, model: &Dag) {
     let of = snapshot.statistics;
     crate::println!(
         "`{}`: {}; {} jobs released, {} completed, {} in flight, {} waiting; {} deadlines \

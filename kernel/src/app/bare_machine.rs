@@ -22,7 +22,7 @@ use front::app::ending::Ending;
 use front::app::machine::System;
 use front::json;
 use front::report::Memory;
-use sched_dag::engine::{Counts, Run};
+use sched_dag::engine::{Run, RunCounts};
 
 /// The machine, lent to the app's function for the time of the run.
 pub type Machine = front::app::machine::Machine<BareMachine>;
@@ -90,7 +90,7 @@ impl System for BareMachine {
         }
         record::end_recording(outgoing, !self.is_shut_down());
         let run = execution::end().ok_or_else(nothing)?;
-        let run = run.with_counts(Counts {
+        let run = run.with_counts(RunCounts {
             epoch_ns,
             allocations,
             lock_acquisitions: locks,

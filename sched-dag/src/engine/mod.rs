@@ -2,17 +2,17 @@
 //! of them, in the steps that every platform takes.
 //!
 //! A platform holds the engine under one lock, or alone. It says when it is, starts a body on a
-//! core, and reaches other clusters, by its [`Port`]; what runs the instances of a subtask is a
-//! [`Body`]. An event is one call: [`complete`](Engine::complete), [`fail`](Engine::fail), or
+//! core, and reaches other clusters, by its [`PlatformPort`]; what runs the instances of a subtask is a
+//! [`SubtaskBody`]. An event is one call: [`complete`](Engine::complete), [`fail`](Engine::fail), or
 //! [`step`](Engine::step) for all else. Then the platform brings the cores that the step
-//! [concerns](Port::retarget) to what they should run: [`next`](Engine::next) gives a core its next
+//! [concerns](PlatformPort::retarget) to what they should run: [`next`](Engine::next) gives a core its next
 //! instance, [`suspend`](Engine::suspend) takes one away.
 //!
 //! # What is guaranteed
 //!
 //! - What a fault costs, what requests come to and who runs next is decided here, for all
 //!   platforms alike.
-//! - The journal is in the order in which things were decided. A [start](Port::start) is written
+//! - The journal is in the order in which things were decided. A [start](PlatformPort::start) is written
 //!   before the function begins.
 //! - After [`Engine::new`] nothing is allocated here, and no step is unbounded but by the releases
 //!   and deadlines that have passed since the last one.
@@ -28,16 +28,16 @@ use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex};
 use crate::journal::{EventKind, EventSubject};
 use crate::kept::Journal;
 use crate::lifecycle::{Mailboxes, PendingRequests, Request};
-use crate::placement::{Next, Placement};
-use crate::scheduler::{Decision, HandOff, Moment, Notice, Scheduler};
+use crate::placement::{NextWork, Placement};
+use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler};
 use crate::task_set::{Dag, TaskSet};
 
-pub use crate::engine::run::{Counts, Proven, Run};
+pub use crate::engine::run::{ProvenBounds, Run, RunCounts};
 
 /// A cluster's scheduler, its bodies, and what is asked of it. `P` is what a platform keeps of an
 /// instance that is suspended.
 #[derive(Debug)]
-pub struct Engine<B: Body, P> {
+pub struct Engine<B: SubtaskBody, P> {
     /// The scheduler, with its journal.
     pub scheduler: Scheduler,
     /// Which core has which body.
@@ -55,15 +55,15 @@ pub struct Engine<B: Body, P> {
     /// By DAG, the one that gets a signal when a fault ends it.
     after_fault: Vec<Option<DagId>>,
     /// Room to look at notices in.
-    notices: Vec<Notice>,
+    notices: Vec<DriverNotice>,
     /// Cancelled instances whose bodies run older ones, and so cannot discard yet. While there are
     /// any, [`Request::Step`] keeps completions from taking the short way.
     undiscarded: Vec<(Vertex, u64)>,
 }
 
-impl<B: Body, P> Engine<B, P> {
+impl<B: SubtaskBody, P> Engine<B, P> {
     /// Makes one without bodies, and takes all memory that it will need.
-    pub fn new<C: Port<B>>(
+    pub fn new<C: PlatformPort<B>>(
         cluster: ClusterId,
         mut scheduler: Scheduler,
         journal: Journal,
@@ -108,7 +108,7 @@ impl<B: Body, P> Engine<B, P> {
     pub fn step(
         &mut self,
         instant: (u64, CoreId),
-        port: &mut impl Port<B>,
+        port: &mut impl PlatformPort<B>,
         happened: impl FnOnce(&mut Moment<'_>),
     ) {
         self.tell(instant, port, happened);
@@ -123,7 +123,7 @@ impl<B: Body, P> Engine<B, P> {
     pub fn tell(
         &mut self,
         (now_ns, here): (u64, CoreId),
-        port: &mut impl Port<B>,
+        port: &mut impl PlatformPort<B>,
         happened: impl FnOnce(&mut Moment<'_>),
     ) {
         self.scheduler.log.here = here;
@@ -138,7 +138,7 @@ impl<B: Body, P> Engine<B, P> {
     /// Serves what is asked for. Apart, as in most steps nothing is.
     #[cold]
     #[inline(never)]
-    fn serve(&mut self, now_ns: u64, port: &mut impl Port<B>) {
+    fn serve(&mut self, now_ns: u64, port: &mut impl PlatformPort<B>) {
         self.requests.give_away(|request| port.forward(request));
         let mut moment = self.scheduler.at(now_ns);
         if let Some(letters) = port.take_letters() {
@@ -150,7 +150,7 @@ impl<B: Body, P> Engine<B, P> {
 
     /// Ends the instant: what is due is released, and the cores are given what they should run.
     #[inline]
-    pub fn decide(&mut self, now_ns: u64, port: &mut impl Port<B>) {
+    pub fn decide(&mut self, now_ns: u64, port: &mut impl PlatformPort<B>) {
         while !self.scheduler.at(now_ns).release_some() {
             self.act(port);
         }
@@ -169,21 +169,21 @@ impl<B: Body, P> Engine<B, P> {
     /// Takes note that a core has finished an instance. Where `is_alone`, that may be all of the
     /// instant, and the core may go on without a step.
     #[inline]
-    pub fn complete<C: Port<B>>(
+    pub fn complete<C: PlatformPort<B>>(
         &mut self,
         (core, vertex): (CoreId, Vertex),
         mut body: B,
         finish_ns: u64,
         is_alone: bool,
         port: &mut C,
-    ) -> Continuation<B> {
+    ) -> NextAction<B> {
         if body.has_effects() {
             body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         }
         if !is_alone || !self.requests.are_none() {
             let instance = self.scheduler.instance_of(vertex);
             self.placement.finish(core.index(), vertex, body);
-            return Continuation::Step(Some(instance));
+            return NextAction::Step(Some(instance));
         }
         let (done, is_unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
         if let HandOff::To(next, decision) = done {
@@ -196,7 +196,7 @@ impl<B: Body, P> Engine<B, P> {
             }
             let Some(mut body) = exchanged else {
                 // It is suspended, so it has been ready before.
-                return Continuation::Look {
+                return NextAction::Look {
                     is_rescheduled: false,
                 };
             };
@@ -211,15 +211,15 @@ impl<B: Body, P> Engine<B, P> {
             } else {
                 log.journal.write_all(core, [start]);
             }
-            return Continuation::Run(body);
+            return NextAction::Run(body);
         }
         self.placement.finish(core.index(), vertex, body);
         self.act(port);
         if let HandOff::Open = done {
-            return Continuation::Step(None);
+            return NextAction::Step(None);
         }
         let is_rescheduled = self.scheduler.log.take_job_event();
-        Continuation::Look { is_rescheduled }
+        NextAction::Look { is_rescheduled }
     }
 
     /// Takes note that an instance has finished that no core has any more; it ran last on `core`.
@@ -229,7 +229,7 @@ impl<B: Body, P> Engine<B, P> {
         (core, vertex): (CoreId, Vertex),
         body: B,
         (finish_ns, now_ns): (u64, u64),
-        port: &mut impl Port<B>,
+        port: &mut impl PlatformPort<B>,
     ) {
         let body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         self.placement.finish_parked(vertex, body);
@@ -239,14 +239,14 @@ impl<B: Body, P> Engine<B, P> {
 
     /// Returns what a fault of the vertex' instance costs if it comes now.
     #[must_use]
-    pub fn cost_of_fault(&self, vertex: Vertex) -> Cost {
+    pub fn cost_of_fault(&self, vertex: Vertex) -> FaultCost {
         let instance = self.scheduler.instance_of(vertex);
         let alternate = self.alternates[vertex.index()].as_ref();
         let is_survived = self.scheduler.survives(instance.dag, instance.job);
         match alternate.filter(|next| is_survived && next.is_there()) {
-            None => Cost::Dag,
-            Some(next) if next.is_fallback() => Cost::Degraded,
-            Some(_) => Cost::Job,
+            None => FaultCost::Dag,
+            Some(next) if next.is_fallback() => FaultCost::Degraded,
+            Some(_) => FaultCost::Job,
         }
     }
 
@@ -258,8 +258,8 @@ impl<B: Body, P> Engine<B, P> {
         instant: (u64, CoreId),
         vertex: Vertex,
         body: Option<B>,
-        port: &mut impl Port<B>,
-    ) -> Cost {
+        port: &mut impl PlatformPort<B>,
+    ) -> FaultCost {
         let cost = self.tell_fault(instant, vertex, body, port);
         self.decide(instant.0, port);
         cost
@@ -271,14 +271,14 @@ impl<B: Body, P> Engine<B, P> {
         instant: (u64, CoreId),
         vertex: Vertex,
         body: Option<B>,
-        port: &mut impl Port<B>,
-    ) -> Cost {
+        port: &mut impl PlatformPort<B>,
+    ) -> FaultCost {
         let instance = self.scheduler.instance_of(vertex);
         let cost = match &body {
             Some(_) => self.cost_of_fault(vertex),
-            None => Cost::Dag,
+            None => FaultCost::Dag,
         };
-        if cost != Cost::Dag {
+        if cost != FaultCost::Dag {
             self.tell(instant, port, |moment| moment.fail_replaceable(instance));
             if let Some(mut body) = body {
                 body.replace();
@@ -304,9 +304,9 @@ impl<B: Body, P> Engine<B, P> {
     /// Finds what a core without an instance does next. What it is to start has started; that it
     /// resumes an instance is [written down](Self::note) by whoever knows when.
     #[inline]
-    pub fn next(&mut self, core: CoreId, port: &mut impl Port<B>) -> Next<B, P> {
+    pub fn next(&mut self, core: CoreId, port: &mut impl PlatformPort<B>) -> NextWork<B, P> {
         let mut next = self.placement.next(core.index());
-        if let Next::Start(vertex, body) = &mut next {
+        if let NextWork::Start(vertex, body) = &mut next {
             let instance = self.scheduler.instance_of(*vertex);
             body.set_job(instance.job);
             let subject = body.subject();
@@ -332,7 +332,7 @@ impl<B: Body, P> Engine<B, P> {
     }
 
     #[inline]
-    fn act(&mut self, port: &mut impl Port<B>) {
+    fn act(&mut self, port: &mut impl PlatformPort<B>) {
         if self.scheduler.log.has_notices() {
             self.act_on_notices(port);
         }
@@ -340,7 +340,7 @@ impl<B: Body, P> Engine<B, P> {
 
     #[cold]
     #[inline(never)]
-    fn act_on_notices(&mut self, port: &mut impl Port<B>) {
+    fn act_on_notices(&mut self, port: &mut impl PlatformPort<B>) {
         self.scheduler.log.exchange_notices(&mut self.notices);
         for notice in &self.notices {
             port.hear(notice);
@@ -373,7 +373,7 @@ impl<B: Body, P> Engine<B, P> {
     }
 
     #[inline]
-    fn set_targets<C: Port<B>>(&mut self, port: &mut C) {
+    fn set_targets<C: PlatformPort<B>>(&mut self, port: &mut C) {
         let mut preempted = None;
         let (decisions, log) = self.scheduler.decided();
         for decision in decisions {
@@ -395,7 +395,7 @@ impl<B: Body, P> Engine<B, P> {
 
 /// The code of one subtask, as the engine handles it. There is one for each subtask, which has one
 /// started instance at a time (R2).
-pub trait Body {
+pub trait SubtaskBody {
     /// A function that would take over after a fault.
     type Alternate: Alternate;
 
@@ -423,8 +423,8 @@ pub trait Body {
 }
 
 /// A way to a body, such as a box, is one.
-impl<D: DerefMut<Target: Body>> Body for D {
-    type Alternate = <D::Target as Body>::Alternate;
+impl<D: DerefMut<Target: SubtaskBody>> SubtaskBody for D {
+    type Alternate = <D::Target as SubtaskBody>::Alternate;
 
     #[inline]
     fn set_job(&mut self, job: u64) {
@@ -483,7 +483,7 @@ impl Alternate for () {
 ///
 /// All else a step returns: whoever takes it holds the lock around the engine, and wakes and
 /// suspends cores by the platform's own means, mostly after the lock.
-pub trait Port<B> {
+pub trait PlatformPort<B> {
     /// The kinds of events that the platform acts on itself.
     const HEARS: &'static [EventKind] = &[];
 
@@ -524,7 +524,7 @@ pub trait Port<B> {
     }
 
     /// An event of a kind that it [hears](Self::HEARS) of was written down.
-    fn hear(&mut self, notice: &Notice) {
+    fn hear(&mut self, notice: &DriverNotice) {
         let _ = notice;
     }
 }
@@ -532,7 +532,7 @@ pub trait Port<B> {
 /// What a core does after a completion.
 #[derive(Debug, PartialEq, Eq)]
 #[must_use]
-pub enum Continuation<B> {
+pub enum NextAction<B> {
     /// It runs this at once, and nothing else changes.
     Run(B),
     /// It may have a target; nothing changes for other cores.
@@ -547,7 +547,7 @@ pub enum Continuation<B> {
 
 /// The cost of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cost {
+pub enum FaultCost {
     /// The DAG is ended.
     Dag,
     /// The job is lost, and the subtask goes on with a function that was made anew.
@@ -556,7 +556,7 @@ pub enum Cost {
     Degraded,
 }
 
-impl Cost {
+impl FaultCost {
     /// Returns its word in machine lines.
     #[must_use]
     pub const fn word(self) -> &'static str {

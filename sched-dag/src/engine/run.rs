@@ -4,14 +4,14 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::cell::OnceCell;
 
-use super::{Body, Engine};
+use super::{Engine, SubtaskBody};
 use crate::chains::{Chain, ChainLatencies};
 use crate::ids::{DagId, SubtaskId};
 use crate::kept::{FINEST, Journal};
 use crate::key::{DagKey, SubtaskKey};
 use crate::law::{self, Record, Tally, Terms, Violation};
 use crate::policy::SchedulerOptions;
-use crate::scheduler::{DagStatistics, Scheduler, Snapshot};
+use crate::scheduler::{DagSnapshot, DagStatistics, Scheduler};
 use crate::task_set::TaskSet;
 
 /// A run that has ended: its model, its times and its counts.
@@ -35,19 +35,19 @@ use crate::task_set::TaskSet;
 pub struct Run {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
-    proven: Proven,
-    dags: Vec<OfDag>,
+    proven: ProvenBounds,
+    dags: Vec<DagCounts>,
     journal: Journal,
     record: OnceCell<Record>,
     times: OnceCell<Option<Tally>>,
-    counts: Counts,
+    counts: RunCounts,
 }
 
 /// The response times that a commit has proven.
 ///
 /// See [`Run`].
 #[derive(Clone, Debug, Default)]
-pub struct Proven {
+pub struct ProvenBounds {
     /// By DAG.
     pub bounds_ns: Vec<Option<u64>>,
     /// By DAG, of its sinks, in the order of [`Dag::sinks`](crate::Dag::sinks).
@@ -58,7 +58,7 @@ pub struct Proven {
 ///
 /// See [`Run`].
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Counts {
+pub struct RunCounts {
     /// The instant from which releases count, on the clock that functions read.
     pub epoch_ns: u64,
     /// How often anything allocated memory between the start of the run and its last completion.
@@ -68,13 +68,13 @@ pub struct Counts {
 }
 
 #[derive(Clone, Debug)]
-struct OfDag {
-    snapshot: Snapshot,
+struct DagCounts {
+    snapshot: DagSnapshot,
     /// By sink.
     misses: Vec<u64>,
 }
 
-impl OfDag {
+impl DagCounts {
     fn new(scheduler: &Scheduler, dag: DagId) -> Self {
         let sinks = scheduler.task_set().dag(dag).sinks().iter();
         Self {
@@ -89,14 +89,22 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn of<B: Body, P>(engine: &mut Engine<B, P>, proven: Proven, cores: u32) -> Self {
+    pub fn of<B: SubtaskBody, P>(
+        engine: &mut Engine<B, P>,
+        proven: ProvenBounds,
+        cores: u32,
+    ) -> Self {
         let journal = core::mem::replace(&mut engine.scheduler.log.journal, Journal::none());
         let run = Self::so_far(engine, journal, cores);
         Self { proven, ..run }
     }
 
     /// Makes one of an engine that may go on, and of a copy of its journal.
-    pub(crate) fn so_far<B: Body, P>(engine: &Engine<B, P>, journal: Journal, cores: u32) -> Self {
+    pub(crate) fn so_far<B: SubtaskBody, P>(
+        engine: &Engine<B, P>,
+        journal: Journal,
+        cores: u32,
+    ) -> Self {
         let ids = (0..).map(DagId).take(engine.task_set.dags().len());
         Self {
             task_set: Arc::clone(&engine.task_set),
@@ -104,29 +112,31 @@ impl Run {
                 cores,
                 ..engine.scheduler.options()
             },
-            proven: Proven::default(),
-            dags: ids.map(|dag| OfDag::new(&engine.scheduler, dag)).collect(),
+            proven: ProvenBounds::default(),
+            dags: ids
+                .map(|dag| DagCounts::new(&engine.scheduler, dag))
+                .collect(),
             journal,
             record: OnceCell::new(),
             times: OnceCell::new(),
-            counts: Counts::default(),
+            counts: RunCounts::default(),
         }
     }
 
     /// Takes over what the engine of another cluster has of the same run.
     ///
     /// See [`Run`].
-    pub fn absorb<B: Body, P>(&mut self, other: &mut Engine<B, P>) {
+    pub fn absorb<B: SubtaskBody, P>(&mut self, other: &mut Engine<B, P>) {
         let journal = core::mem::replace(&mut other.scheduler.log.journal, Journal::none());
         self.add(other, journal);
     }
 
     /// Does so with an engine that may go on, and with a copy of its journal.
-    pub(crate) fn add<B: Body, P>(&mut self, other: &Engine<B, P>, journal: Journal) {
+    pub(crate) fn add<B: SubtaskBody, P>(&mut self, other: &Engine<B, P>, journal: Journal) {
         let (task_set, cluster) = (&self.task_set, other.cluster);
         let ids = (0..).map(DagId).zip(&mut self.dags);
         for (dag, of_dag) in ids.filter(|(dag, _)| task_set.dag(*dag).cluster() == cluster) {
-            *of_dag = OfDag::new(&other.scheduler, dag);
+            *of_dag = DagCounts::new(&other.scheduler, dag);
         }
         let first_core = task_set.cores_of(cluster, self.options.cores).start;
         self.journal.absorb(journal, cluster, first_core);
@@ -136,7 +146,7 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn with_counts(self, counts: Counts) -> Self {
+    pub fn with_counts(self, counts: RunCounts) -> Self {
         Self { counts, ..self }
     }
 
@@ -249,7 +259,7 @@ impl Run {
     /// See [`Run`].
     #[must_use]
     #[track_caller]
-    pub fn snapshot(&self, dag: impl DagKey) -> &Snapshot {
+    pub fn snapshot(&self, dag: impl DagKey) -> &DagSnapshot {
         &self.dags[self.task_set.find(dag).index()].snapshot
     }
 

@@ -21,7 +21,7 @@ use crate::ids::{CoreId, Vertex};
 
 /// Where a subtask's body is.
 #[derive(Debug)]
-enum Place<Body, Parked> {
+enum BodyState<Body, Parked> {
     /// In the table: no instance of the subtask has started.
     Resting(Body),
     /// With the core whose current instance it is.
@@ -34,7 +34,7 @@ enum Place<Body, Parked> {
 
 /// What a core without a current instance does next.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Next<Body, Parked> {
+pub enum NextWork<Body, Parked> {
     /// Nothing is there for it to do.
     Nothing,
     /// It starts an instance of this subtask.
@@ -46,8 +46,8 @@ pub enum Next<Body, Parked> {
 /// The places of all subtasks, and what each core has and should have.
 #[derive(Debug)]
 pub struct Placement<Body, Parked> {
-    places: Box<[Place<Body, Parked>]>,
-    seats: Box<[Seat]>,
+    places: Box<[BodyState<Body, Parked>]>,
+    seats: Box<[CoreSlot]>,
 }
 
 /// What one core has, and what it should have: [`NOTHING`], or a vertex.
@@ -55,7 +55,7 @@ pub struct Placement<Body, Parked> {
 /// Not options, which would be two words each: a seat changes twice with each
 /// instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Seat {
+struct CoreSlot {
     current: Vertex,
     target: Vertex,
 }
@@ -63,7 +63,7 @@ struct Seat {
 /// Stands where there is no vertex; no task set has that many subtasks.
 const NOTHING: Vertex = Vertex(u32::MAX);
 
-const EMPTY_SEAT: Seat = Seat {
+const EMPTY_SEAT: CoreSlot = CoreSlot {
     current: NOTHING,
     target: NOTHING,
 };
@@ -78,7 +78,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     #[must_use]
     pub fn empty(vertices: usize, cores: usize) -> Self {
         Self {
-            places: (0..vertices).map(|_| Place::Lost).collect(),
+            places: (0..vertices).map(|_| BodyState::Lost).collect(),
             seats: alloc::vec![EMPTY_SEAT; cores].into_boxed_slice(),
         }
     }
@@ -99,8 +99,8 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Puts the body of an instance that has run to rest.
     #[inline]
     fn put(&mut self, vertex: Vertex, body: Body) {
-        let running = core::mem::replace(self.place(vertex), Place::Resting(body));
-        debug_assert!(matches!(running, Place::Running));
+        let running = core::mem::replace(self.place(vertex), BodyState::Resting(body));
+        debug_assert!(matches!(running, BodyState::Running));
         // It holds nothing, which the compiler need not find out each time.
         core::mem::forget(running);
     }
@@ -109,7 +109,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// vertex. Its body stays on the stack of a context that is never resumed.
     pub fn lose(&mut self, core: usize) -> Option<Vertex> {
         let vertex = self.detach(core)?;
-        *self.place(vertex) = Place::Lost;
+        *self.place(vertex) = BodyState::Lost;
         self.forget_target(core, vertex);
         Some(vertex)
     }
@@ -117,14 +117,14 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Puts a body to rest where there is none: in the place of one that was
     /// [lost](Self::lose), or at first.
     pub fn replace(&mut self, vertex: Vertex, body: Body) {
-        *self.place(vertex) = Place::Resting(body);
+        *self.place(vertex) = BodyState::Resting(body);
     }
 
     /// Takes the body of a subtask out, if no instance of it has started.
     pub fn take(&mut self, vertex: Vertex) -> Option<Body> {
         let place = self.place(vertex);
-        match core::mem::replace(place, Place::Lost) {
-            Place::Resting(body) => Some(body),
+        match core::mem::replace(place, BodyState::Lost) {
+            BodyState::Resting(body) => Some(body),
             other => {
                 *place = other;
                 None
@@ -135,13 +135,13 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Takes note that an instance has finished that no core has: on a driver where a
     /// parked one may still be executed.
     pub fn finish_parked(&mut self, vertex: Vertex, body: Body) {
-        *self.place(vertex) = Place::Resting(body);
+        *self.place(vertex) = BodyState::Resting(body);
         self.forget_target(0, vertex);
     }
 
     /// The scheduler knows that the instance has ended: nobody is to run it.
     fn forget_target(&mut self, core: usize, vertex: Vertex) {
-        let wants_it = |seat: &Seat| seat.target == vertex;
+        let wants_it = |seat: &CoreSlot| seat.target == vertex;
         // Nearly always the core that ran it; another one if it was about to move.
         let seat = match wants_it(&self.seats[core]) {
             true => Some(&mut self.seats[core]),
@@ -154,13 +154,13 @@ impl<Body, Parked> Placement<Body, Parked> {
 
     /// Reports whether core `core` has an instance that it should give up.
     pub fn must_suspend(&self, core: usize) -> bool {
-        let Seat { current, target } = self.seats[core];
+        let CoreSlot { current, target } = self.seats[core];
         current != NOTHING && current != target
     }
 
     /// Reports whether core `core` has nothing and should have something.
     pub fn is_wanted(&self, core: usize) -> bool {
-        let Seat { current, target } = self.seats[core];
+        let CoreSlot { current, target } = self.seats[core];
         current == NOTHING && target != NOTHING
     }
 
@@ -173,7 +173,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Notes that `context` holds a detached instance. Returns the core
     /// that has been waiting for it, if there is one.
     pub fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
-        *self.place(vertex) = Place::Suspended(context);
+        *self.place(vertex) = BodyState::Suspended(context);
         let mut seats = (0..).map(CoreId).zip(&self.seats);
         seats.find_map(|(core, seat)| (seat.target == vertex).then_some(core))
     }
@@ -183,8 +183,8 @@ impl<Body, Parked> Placement<Body, Parked> {
     pub fn take_suspended(&mut self, core: usize) -> Option<Parked> {
         let vertex = some(self.seats[core].target)?;
         let place = self.place(vertex);
-        match core::mem::replace(place, Place::Running) {
-            Place::Suspended(context) => {
+        match core::mem::replace(place, BodyState::Running) {
+            BodyState::Suspended(context) => {
                 self.seats[core].current = vertex;
                 Some(context)
             }
@@ -196,19 +196,19 @@ impl<Body, Parked> Placement<Body, Parked> {
     }
 
     /// Gives core `core`, which has no current instance, what it should have.
-    pub fn next(&mut self, core: usize) -> Next<Body, Parked> {
+    pub fn next(&mut self, core: usize) -> NextWork<Body, Parked> {
         let Some(vertex) = some(self.seats[core].target) else {
-            return Next::Nothing;
+            return NextWork::Nothing;
         };
         let place = self.place(vertex);
-        let next = match core::mem::replace(place, Place::Running) {
-            Place::Resting(body) => Next::Start(vertex, body),
-            Place::Suspended(context) => Next::Continue(context),
+        let next = match core::mem::replace(place, BodyState::Running) {
+            BodyState::Resting(body) => NextWork::Start(vertex, body),
+            BodyState::Suspended(context) => NextWork::Continue(context),
             // The core that still has it will say when it no longer has.
-            Place::Running => return Next::Nothing,
-            Place::Lost => {
-                *place = Place::Lost;
-                return Next::Nothing;
+            BodyState::Running => return NextWork::Nothing,
+            BodyState::Lost => {
+                *place = BodyState::Lost;
+                return NextWork::Nothing;
             }
         };
         self.seats[core].current = vertex;
@@ -220,9 +220,9 @@ impl<Body, Parked> Placement<Body, Parked> {
     #[inline]
     pub fn start(&mut self, core: CoreId, vertex: Vertex) -> Option<Body> {
         let place = self.place(vertex);
-        match core::mem::replace(place, Place::Running) {
-            Place::Resting(body) => {
-                self.seats[core.index()] = Seat {
+        match core::mem::replace(place, BodyState::Running) {
+            BodyState::Resting(body) => {
+                self.seats[core.index()] = CoreSlot {
                     current: vertex,
                     target: vertex,
                 };
@@ -249,7 +249,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         self.put(finished, body);
         let started = self.start(core, next);
         if started.is_none() {
-            self.seats[core.index()] = Seat {
+            self.seats[core.index()] = CoreSlot {
                 current: NOTHING,
                 target: next,
             };
@@ -265,12 +265,12 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Returns the body of a subtask of which no instance has started.
     pub fn resting(&mut self, vertex: Vertex) -> Option<&mut Body> {
         match self.place(vertex) {
-            Place::Resting(body) => Some(body),
+            BodyState::Resting(body) => Some(body),
             _ => None,
         }
     }
 
-    fn place(&mut self, vertex: Vertex) -> &mut Place<Body, Parked> {
+    fn place(&mut self, vertex: Vertex) -> &mut BodyState<Body, Parked> {
         &mut self.places[vertex.index()]
     }
 }

@@ -42,7 +42,7 @@
 //! Idle cores form a stack: the core that has become idle last is taken first.
 //! The kernel asks for a dispatch on the core that has just completed, so the
 //! next instance in line starts there without an interrupt to another core. A driver
-//! that knows of a core that is awake says so ([`Cores::prefer`]).
+//! that knows of a core that is awake says so ([`CoreTable::prefer`]).
 //!
 //! The core to be preempted first is looked for among all cores when there is
 //! need. That is rare: when no core is idle and something has become ready that
@@ -54,8 +54,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::instances::line_up;
-use super::key::Key;
-use super::vertices::{Phase, Vertices};
+use super::key::DispatchKey;
+use super::vertices::{InstancePhase, VertexTable};
 use super::{OWED, Scheduler};
 use crate::ids::{CoreId, Instance, Vertex};
 use crate::journal::EventKind;
@@ -106,14 +106,14 @@ impl Scheduler {
 
     /// Gives a core an instance that is ready.
     #[inline]
-    pub(super) fn give(&mut self, core: CoreId, key: Key) -> Decision {
+    pub(super) fn give(&mut self, core: CoreId, key: DispatchKey) -> Decision {
         let vertex = self.vertices.get_mut(key.vertex());
         let instance = vertex.present_instance();
         let what = match vertex.phase {
-            Phase::Preempted => EventKind::Resume,
+            InstancePhase::Preempted => EventKind::Resume,
             _ => EventKind::Start,
         };
-        vertex.phase = Phase::Running(core);
+        vertex.phase = InstancePhase::Running(core);
         self.cores.run(core, key, vertex.is_preemptible);
         Decision {
             what,
@@ -124,9 +124,9 @@ impl Scheduler {
 
     /// Puts the instance that runs on a core back in line.
     #[inline]
-    fn preempt(&mut self, core: CoreId, running: Key) {
+    fn preempt(&mut self, core: CoreId, running: DispatchKey) {
         let vertex = self.vertices.get_mut(running.vertex());
-        vertex.phase = Phase::Preempted;
+        vertex.phase = InstancePhase::Preempted;
         let instance = vertex.present_instance();
         self.decisions.push(Decision {
             what: EventKind::Suspend,
@@ -180,7 +180,7 @@ impl Scheduler {
         self.log.now_ns = self.log.now_ns.max(now_ns);
         let ending = self.vertices.get(vertex.0);
         // Otherwise a dispatch is owed from before, or the instance was to move.
-        if self.fresh != 0 || ending.phase != Phase::Running(core) {
+        if self.fresh != 0 || ending.phase != InstancePhase::Running(core) {
             let instance = self.instance_of(vertex);
             self.write_finish(core, vertex, now_ns);
             self.finish(instance);
@@ -241,7 +241,7 @@ impl Scheduler {
         let key = (self.ready).key(number, next, || {
             self.dags[next.dag.index()].jobs.job(next.progress)
         });
-        next.phase = Phase::Running(core);
+        next.phase = InstancePhase::Running(core);
         self.cores.run(core, key, next.is_preemptible);
         let decision = Decision {
             what: EventKind::Start,
@@ -254,7 +254,7 @@ impl Scheduler {
     /// Puts all successors of a vertex in line that its end has made ready.
     #[inline]
     fn line_up_successors(&mut self, vertex: u32) {
-        for place in Vertices::successors(self.vertices.get(vertex)) {
+        for place in VertexTable::successors(self.vertices.get(vertex)) {
             if let Some((number, next)) = self.vertices.ready_successor(place) {
                 let job = self.dags[next.dag.index()].jobs.job(next.progress);
                 line_up(number, next, job, &mut self.ready, &mut self.log);
@@ -275,24 +275,24 @@ impl Scheduler {
 
 /// The cores and their instances.
 #[derive(Clone, Debug, Hash)]
-pub(super) struct Cores {
-    occupations: Box<[Occupation]>,
+pub(super) struct CoreTable {
+    occupations: Box<[CoreOccupancy]>,
     idle: Vec<CoreId>,
 }
 
 #[derive(Clone, Copy, Debug, Hash)]
-struct Occupation {
+struct CoreOccupancy {
     /// The key of what runs, if anything does.
-    key: Key,
+    key: DispatchKey,
     may_be_preempted: bool,
 }
 
-const IDLE: Occupation = Occupation {
-    key: Key::NONE,
+const IDLE: CoreOccupancy = CoreOccupancy {
+    key: DispatchKey::NONE,
     may_be_preempted: false,
 };
 
-impl Cores {
+impl CoreTable {
     #[inline]
     pub(super) fn new(cores: u32) -> Self {
         Self {
@@ -309,7 +309,7 @@ impl Cores {
     }
 
     #[inline]
-    pub(super) fn running(&self, core: CoreId) -> Option<Key> {
+    pub(super) fn running(&self, core: CoreId) -> Option<DispatchKey> {
         let key = self.occupations[core.index()].key;
         (!key.is_none()).then_some(key)
     }
@@ -335,8 +335,8 @@ impl Cores {
 
     /// Gives a core, which is not among the idle ones, an instance.
     #[inline]
-    pub(super) fn run(&mut self, core: CoreId, key: Key, may_be_preempted: bool) {
-        self.occupations[core.index()] = Occupation {
+    pub(super) fn run(&mut self, core: CoreId, key: DispatchKey, may_be_preempted: bool) {
+        self.occupations[core.index()] = CoreOccupancy {
             key,
             may_be_preempted,
         };
@@ -351,7 +351,7 @@ impl Cores {
 
     /// Returns the largest key among the instances that may be preempted.
     #[inline]
-    fn largest_preemptible(&self) -> Option<(CoreId, Key)> {
+    fn largest_preemptible(&self) -> Option<(CoreId, DispatchKey)> {
         let mut largest = None;
         for (core, occupation) in (0..).map(CoreId).zip(&self.occupations) {
             let is_larger = largest.is_none_or(|(_, key)| key < occupation.key);

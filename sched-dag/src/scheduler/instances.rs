@@ -7,8 +7,8 @@
 
 use super::jobs::Job;
 use super::ready_queue::ReadyQueue;
-use super::vertices::{Phase, Vertex, Vertices};
-use super::{DagPhase, Log, OWED, Scheduler, earliest_ns};
+use super::vertices::{InstancePhase, Vertex, VertexTable};
+use super::{DagPhase, EventLog, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
 
@@ -35,11 +35,11 @@ impl Scheduler {
             && vertex.progress < jobs.next
             && jobs.job(vertex.progress).number == instance.job;
         match vertex.phase {
-            Phase::Running(core) if in_flight => {
+            InstancePhase::Running(core) if in_flight => {
                 self.cores.free(core);
                 self.fresh |= OWED;
             }
-            Phase::Preempted if in_flight => {
+            InstancePhase::Preempted if in_flight => {
                 let key = (self.ready).key(number, vertex, || jobs.job(vertex.progress));
                 self.ready.remove(key);
             }
@@ -83,11 +83,11 @@ impl Scheduler {
             let vertex = self.vertices.get_mut(number);
             vertex.only_passes_on = false;
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
-            if vertex.phase == Phase::Ready && is_meant {
+            if vertex.phase == InstancePhase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
                 self.ready.remove(self.ready.key(number, vertex, || job));
                 self.log.of(EventKind::Cancelled, vertex.instance(job));
-                vertex.phase = Phase::Absent;
+                vertex.phase = InstancePhase::Absent;
                 self.ending.push(number);
             }
         }
@@ -139,7 +139,7 @@ impl Scheduler {
         let overlaps = sequence + 1 < jobs.next;
         let job = jobs.job_mut(sequence);
         let is_cut = job.cut.is_some();
-        let successors = Vertices::successors(&ended);
+        let successors = VertexTable::successors(&ended);
         job.unfinished -= u32::from(successors.is_empty());
         let is_last = job.unfinished == 0;
         for place in successors {
@@ -231,9 +231,9 @@ pub(super) fn line_up(
     vertex: &mut Vertex,
     job: &Job,
     ready: &mut ReadyQueue,
-    log: &mut Log,
+    log: &mut EventLog,
 ) {
-    vertex.phase = Phase::Ready;
+    vertex.phase = InstancePhase::Ready;
     vertex.job = job.number;
     ready.insert(ready.key(number, vertex, || job));
     log.of(EventKind::Ready, vertex.instance(job));

@@ -7,7 +7,7 @@
 //! R5 orders by (priority or absolute deadline, DAG, job, subtask). All of that
 //! is one number here, so that one comparison does it. Its low 32 bits are the
 //! vertex, which counts subtasks DAG by DAG; what is above depends on the
-//! [`Order`]:
+//! [`KeyOrder`]:
 //!
 //! | order | 127..96 | 95..64 | 63..32 |
 //! |---|---|---|---|
@@ -27,7 +27,7 @@ use super::vertices::Vertex;
 
 /// What keys are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Order {
+pub(super) enum KeyOrder {
     /// Each subtask has a rank of its own.
     Rank,
     /// Subtasks of one DAG may have the same rank; then the older job is first.
@@ -40,9 +40,9 @@ pub(super) enum Order {
 
 /// An instance's place in the order of dispatch; the smaller key goes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct Key(u128);
+pub(super) struct DispatchKey(u128);
 
-impl Key {
+impl DispatchKey {
     /// Stands where there is no key; it is larger than any.
     pub(super) const NONE: Self = Self(u128::MAX);
 
@@ -130,12 +130,13 @@ mod tests {
     #[test]
     fn keys_compare_part_by_part() {
         let parts = [(0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0), (u64::MAX, 7, 3)];
-        let keys = parts.map(|(first, second, vertex)| Key::of_parts(first, second, vertex));
+        let keys =
+            parts.map(|(first, second, vertex)| DispatchKey::of_parts(first, second, vertex));
         assert!(keys.is_sorted_by(|one, other| one < other));
         assert_eq!(keys[4].vertex(), 3);
         assert_eq!(keys[4].slot(), 7);
-        assert_eq!(Key::of_job(keys[4].before_the_vertex(), 3), keys[4]);
-        assert!(keys[4] < Key::NONE);
+        assert_eq!(DispatchKey::of_job(keys[4].before_the_vertex(), 3), keys[4]);
+        assert!(keys[4] < DispatchKey::NONE);
         assert_eq!(halves(0x1_0000_0002), [1, 2]);
     }
 }

@@ -12,7 +12,7 @@ use crate::kept::Journal;
 
 /// An event that a driver acts on, with a time that the journal has no room for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Notice {
+pub struct DriverNotice {
     /// The event.
     pub event: Event,
     /// When the job was to be released, or its deadline was, in nanoseconds.
@@ -21,7 +21,7 @@ pub struct Notice {
 
 /// The journal with what the next events of it have in common.
 #[derive(Clone, Debug)]
-pub struct Log {
+pub struct EventLog {
     /// The instant.
     pub(super) now_ns: u64,
     /// The core that makes the scheduler's step.
@@ -34,12 +34,12 @@ pub struct Log {
     heard: u32,
     /// How many notices one event may come to; there is room for twice as many.
     most_at_once: usize,
-    notices: Vec<Notice>,
+    notices: Vec<DriverNotice>,
     /// What has happened so far.
     pub journal: Journal,
 }
 
-impl Log {
+impl EventLog {
     /// Begins without room for events.
     #[inline]
     pub(super) const fn new() -> Self {
@@ -90,7 +90,7 @@ impl Log {
 
     /// Takes the notices out, in exchange for a list whose room is used next.
     #[inline]
-    pub fn exchange_notices(&mut self, room: &mut Vec<Notice>) {
+    pub fn exchange_notices(&mut self, room: &mut Vec<DriverNotice>) {
         room.clear();
         core::mem::swap(&mut self.notices, room);
     }
@@ -162,7 +162,7 @@ impl Log {
     fn keep(&mut self, what: EventKind, subject: EventSubject, at_ns: Option<u64>) {
         let words = Event::words(self.now_ns, what, self.here, subject);
         let event = Event::unpack(words);
-        (self.notices).extend(event.map(|event| Notice { event, at_ns }));
+        (self.notices).extend(event.map(|event| DriverNotice { event, at_ns }));
     }
 }
 

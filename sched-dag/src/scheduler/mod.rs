@@ -56,17 +56,17 @@ use core::hash::{Hash, Hasher};
 use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
 use crate::journal::EventKind;
 use crate::policy::SchedulerOptions;
-use crate::scheduler::dispatch::Cores;
-use crate::scheduler::jobs::Jobs;
-use crate::scheduler::phase::Survived;
+use crate::scheduler::dispatch::CoreTable;
+use crate::scheduler::jobs::JobTable;
+use crate::scheduler::phase::SurvivedFaults;
 use crate::scheduler::ready_queue::{IndexedHeap, ReadyQueue};
-use crate::scheduler::vertices::Vertices;
+use crate::scheduler::vertices::VertexTable;
 use crate::task_set::{Dag, TaskSet};
 
 pub use crate::scheduler::dispatch::{Decision, HandOff};
-pub use crate::scheduler::log::{Log, Notice};
+pub use crate::scheduler::log::{DriverNotice, EventLog};
 pub use crate::scheduler::moment::Moment;
-pub use crate::scheduler::phase::{DagPhase, Snapshot};
+pub use crate::scheduler::phase::{DagPhase, DagSnapshot};
 
 /// The state of all jobs in flight.
 ///
@@ -78,13 +78,13 @@ pub struct Scheduler {
     task_set: Arc<TaskSet>,
     options: SchedulerOptions,
     dags: Box<[DagState]>,
-    vertices: Vertices,
+    vertices: VertexTable,
     /// The ready instances that do not run.
     ready: ReadyQueue,
     /// How many instances have become ready since the last dispatch, and [`OWED`] if
     /// a core has become idle since then that the next instance in line may need.
     fresh: u32,
-    cores: Cores,
+    cores: CoreTable,
     /// When something happens to each DAG without a completion.
     timers: IndexedHeap<u64>,
     /// The least of these times, at hand for each completion; `u64::MAX` also if there
@@ -95,7 +95,7 @@ pub struct Scheduler {
     ending: Vec<u32>,
     decisions: Vec<Decision>,
     /// What is written down of each instant.
-    pub log: Log,
+    pub log: EventLog,
 }
 
 /// Stands next to a count of instances: a dispatch is owed.
@@ -104,9 +104,9 @@ const OWED: u32 = 1 << 31;
 /// The state of one DAG.
 #[derive(Clone, Debug, Hash)]
 struct DagState {
-    jobs: Jobs,
+    jobs: JobTable,
     statistics: DagStatistics,
-    survived: Survived,
+    survived: SurvivedFaults,
     /// When the latest pause has ended; what was due before is skipped.
     resumed_ns: u64,
 }
@@ -149,14 +149,14 @@ impl Scheduler {
             .map(|dag| {
                 let first_slot = to_u32(slots);
                 slots += dag.slots();
-                let mut jobs = Jobs::new(dag, first_slot);
+                let mut jobs = JobTable::new(dag, first_slot);
                 if cluster != dag.cluster() {
                     jobs.end_all();
                 }
                 DagState {
                     jobs,
                     statistics: DagStatistics::default(),
-                    survived: Survived::new(dag.on_fault()),
+                    survived: SurvivedFaults::new(dag.on_fault()),
                     resumed_ns: 0,
                 }
             })
@@ -167,15 +167,15 @@ impl Scheduler {
                 timers.set(index, event_ns);
             }
         }
-        let mut vertices = Vertices::new(&task_set, options.preemption);
+        let mut vertices = VertexTable::new(&task_set, options.preemption);
         Self {
             options,
-            log: Log::new(),
+            log: EventLog::new(),
             dags: states,
             ready: ReadyQueue::new(&task_set, options.policy, &mut vertices),
             fresh: 0,
             vertices,
-            cores: Cores::new(options.cores),
+            cores: CoreTable::new(options.cores),
             quiet_until_ns: earliest_ns(&timers),
             timers,
             ending: Vec::with_capacity(longest.unwrap_or(0)),
@@ -193,7 +193,7 @@ impl Scheduler {
         Moment::new(self, now_ns)
     }
 
-    /// Has events of these kinds kept as [notices](Log::has_notices), and returns how many there is
+    /// Has events of these kinds kept as [notices](EventLog::has_notices), and returns how many there is
     /// room for.
     pub fn hear(&mut self, kinds: impl IntoIterator<Item = EventKind>) -> usize {
         // At one instant a DAG's end may skip and cancel all that it has, and a change of mode
@@ -212,7 +212,7 @@ impl Scheduler {
 
     /// Returns what the latest dispatch has decided, and where to write down what comes of it.
     #[inline]
-    pub fn decided(&mut self) -> (&[Decision], &mut Log) {
+    pub fn decided(&mut self) -> (&[Decision], &mut EventLog) {
         (&self.decisions, &mut self.log)
     }
 

@@ -146,7 +146,7 @@ impl<'s> Moment<'s> {
         &self.scheduler.decisions
     }
 
-    /// Releases what is due as long as there is room for [notices](super::Log::has_notices), and reports whether
+    /// Releases what is due as long as there is room for [notices](super::EventLog::has_notices), and reports whether
     /// that is all. A driver that is late finds any number of releases due.
     #[inline]
     pub fn release_some(mut self) -> bool {

@@ -129,7 +129,7 @@ pub enum DagPhase {
 
 /// A DAG at one instant.
 #[derive(Clone, Copy, Debug)]
-pub struct Snapshot {
+pub struct DagSnapshot {
     /// Its phase.
     pub phase: DagPhase,
     /// Whether it has a limit of jobs, and nothing of it is left to be done.
@@ -142,7 +142,7 @@ pub struct Snapshot {
     pub waiting: u64,
 }
 
-impl Snapshot {
+impl DagSnapshot {
     /// Returns the word for its state that people and programs read.
     #[must_use]
     pub const fn word(&self) -> &'static str {
@@ -179,8 +179,8 @@ impl Scheduler {
     ///
     /// If there is no such DAG.
     #[must_use]
-    pub fn snapshot(&self, dag: DagId) -> Snapshot {
-        Snapshot {
+    pub fn snapshot(&self, dag: DagId) -> DagSnapshot {
+        DagSnapshot {
             phase: self.phase(dag),
             is_over: self.is_over(dag) && self.task_set.dag(dag).jobs().is_some(),
             statistics: *self.statistics(dag),
@@ -288,7 +288,7 @@ impl Scheduler {
 
 /// The latest survived faults of a DAG.
 #[derive(Clone, Debug, Hash)]
-pub(super) struct Survived {
+pub(super) struct SurvivedFaults {
     window: u64,
     /// How many there may still be.
     left: u32,
@@ -299,7 +299,7 @@ pub(super) struct Survived {
     count: usize,
 }
 
-impl Survived {
+impl SurvivedFaults {
     pub(super) fn new(on_fault: OnFault) -> Self {
         let (window, left, most) = match on_fault {
             OnFault::EndDag => (0, 0, 0),

@@ -39,8 +39,8 @@ use alloc::vec::Vec;
 
 use super::bits::BitSet;
 use super::jobs::Job;
-use super::key::{Key, Order};
-use super::vertices::{Vertex, Vertices};
+use super::key::{DispatchKey, KeyOrder};
+use super::vertices::{Vertex, VertexTable};
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::{sorted, sorted_by_key};
 use crate::policy::Policy;
@@ -50,19 +50,19 @@ use crate::task_set::{Dag, TaskSet};
 #[derive(Clone, Debug, Hash)]
 pub(super) struct ReadyQueue {
     /// The smallest key, or none.
-    front: Key,
+    front: DispatchKey,
     /// How many are in the rest.
     others: u32,
-    order: Order,
+    order: KeyOrder,
     /// Under `SinkDeadline` the relative deadline of each rank, else nothing.
     deadlines_ns: Box<[u64]>,
-    rest: Rest,
+    rest: QueueStorage,
 }
 
 /// `repr(u8)`, so that testing for the first variant takes one comparison.
 #[derive(Clone, Debug, Hash)]
 #[repr(u8)]
-enum Rest {
+enum QueueStorage {
     /// For keys that are ranks up to 63.
     Word {
         ranks: u64,
@@ -75,45 +75,45 @@ enum Rest {
     Ranked {
         ranks: BitSet,
         /// The key of each rank.
-        keys: Box<[Key]>,
+        keys: Box<[DispatchKey]>,
     },
     /// For keys that begin with a deadline.
     ByDeadline(ByDeadline),
     /// For any keys, by vertex.
-    Keyed(IndexedHeap<Key>),
+    Keyed(IndexedHeap<DispatchKey>),
 }
 
 impl ReadyQueue {
     /// Makes the queue for a set and a policy; gives vertices their ranks.
     #[inline]
-    pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut Vertices) -> Self {
-        let in_any_order = |count| Rest::Keyed(IndexedHeap::new(count));
+    pub(super) fn new(task_set: &TaskSet, policy: Policy, vertices: &mut VertexTable) -> Self {
+        let in_any_order = |count| QueueStorage::Keyed(IndexedHeap::new(count));
         if policy == Policy::Edf {
             if task_set
                 .dags()
                 .iter()
                 .all(|dag| deadlines_ns(dag).len() == 1)
             {
-                let rest = Rest::ByDeadline(ByDeadline::new(task_set));
-                return Self::of(Order::Deadline, rest);
+                let rest = QueueStorage::ByDeadline(ByDeadline::new(task_set));
+                return Self::of(KeyOrder::Deadline, rest);
             }
             return Self {
                 deadlines_ns: rank_by_deadline(task_set, vertices).into(),
-                ..Self::of(Order::SinkDeadline, in_any_order(vertices.len()))
+                ..Self::of(KeyOrder::SinkDeadline, in_any_order(vertices.len()))
             };
         }
         if task_set.dags().iter().all(has_ranks) {
-            let order = rank(vertices, Order::Rank);
-            return Self::of(Order::Rank, ranked(&order));
+            let order = rank(vertices, KeyOrder::Rank);
+            return Self::of(KeyOrder::Rank, ranked(&order));
         }
-        rank(vertices, Order::Job);
-        Self::of(Order::Job, in_any_order(vertices.len()))
+        rank(vertices, KeyOrder::Job);
+        Self::of(KeyOrder::Job, in_any_order(vertices.len()))
     }
 
     #[inline]
-    fn of(order: Order, rest: Rest) -> Self {
+    fn of(order: KeyOrder, rest: QueueStorage) -> Self {
         Self {
-            front: Key::NONE,
+            front: DispatchKey::NONE,
             others: 0,
             order,
             deadlines_ns: Box::default(),
@@ -128,27 +128,27 @@ impl ReadyQueue {
         number: u32,
         vertex: &Vertex,
         job: impl FnOnce() -> &'j Job,
-    ) -> Key {
+    ) -> DispatchKey {
         // The usual one is told apart by one comparison, and the next one by another.
-        if self.order == Order::Rank {
-            return Key::of_rank(vertex.rank, number);
+        if self.order == KeyOrder::Rank {
+            return DispatchKey::of_rank(vertex.rank, number);
         }
         let job = job();
-        if self.order == Order::Deadline {
-            return Key::of_parts(job.deadline_ns, job.slot, number);
+        if self.order == KeyOrder::Deadline {
+            return DispatchKey::of_parts(job.deadline_ns, job.slot, number);
         }
         self.rare_key(number, vertex, job)
     }
 
     /// Apart, so that no other key pays for it.
     #[inline(never)]
-    fn rare_key(&self, number: u32, vertex: &Vertex, job: &Job) -> Key {
+    fn rare_key(&self, number: u32, vertex: &Vertex, job: &Job) -> DispatchKey {
         match self.order {
-            Order::SinkDeadline => {
+            KeyOrder::SinkDeadline => {
                 let deadline_ns = self.deadlines_ns[vertex.rank as usize];
-                Key::by_sink(deadline_ns, number, vertex, job)
+                DispatchKey::by_sink(deadline_ns, number, vertex, job)
             }
-            _ => Key::by_job(number, vertex),
+            _ => DispatchKey::by_job(number, vertex),
         }
     }
 
@@ -160,7 +160,7 @@ impl ReadyQueue {
 
     /// Returns the smallest key.
     #[inline]
-    pub(super) fn peek(&self) -> Option<Key> {
+    pub(super) fn peek(&self) -> Option<DispatchKey> {
         if !self.front.is_none() {
             return Some(self.front);
         }
@@ -172,7 +172,7 @@ impl ReadyQueue {
 
     /// Puts an instance in line.
     #[inline]
-    pub(super) fn insert(&mut self, key: Key) {
+    pub(super) fn insert(&mut self, key: DispatchKey) {
         if self.is_empty() {
             self.front = key;
         } else {
@@ -182,7 +182,7 @@ impl ReadyQueue {
 
     /// Compares with the front only: comparing with the rest costs as much as inserting.
     #[inline]
-    fn insert_among_others(&mut self, key: Key) {
+    fn insert_among_others(&mut self, key: DispatchKey) {
         let precedes_front = !self.front.is_none() && key < self.front;
         let behind = match precedes_front {
             true => core::mem::replace(&mut self.front, key),
@@ -194,9 +194,9 @@ impl ReadyQueue {
 
     /// Takes the instance with the smallest key out.
     #[inline]
-    pub(super) fn pop(&mut self) -> Option<Key> {
+    pub(super) fn pop(&mut self) -> Option<DispatchKey> {
         if !self.front.is_none() {
-            return Some(core::mem::replace(&mut self.front, Key::NONE));
+            return Some(core::mem::replace(&mut self.front, DispatchKey::NONE));
         }
         if self.others == 0 {
             return None;
@@ -207,9 +207,9 @@ impl ReadyQueue {
 
     /// Takes an instance out, which waits.
     #[inline]
-    pub(super) fn remove(&mut self, key: Key) {
+    pub(super) fn remove(&mut self, key: DispatchKey) {
         if self.front == key {
-            self.front = Key::NONE;
+            self.front = DispatchKey::NONE;
             return;
         }
         self.others -= 1;
@@ -217,14 +217,14 @@ impl ReadyQueue {
     }
 }
 
-impl Rest {
+impl QueueStorage {
     #[inline]
-    fn peek(&self) -> Option<Key> {
+    fn peek(&self) -> Option<DispatchKey> {
         match self {
             Self::Word { ranks, vertices } => {
                 let rank = ranks.trailing_zeros();
                 let vertex = vertices.get(rank as usize)?;
-                Some(Key::of_rank(rank, *vertex))
+                Some(DispatchKey::of_rank(rank, *vertex))
             }
             Self::Ranked { ranks, keys } => ranks.first().map(|rank| keys[rank]),
             Self::ByDeadline(jobs) => jobs.peek(),
@@ -233,7 +233,7 @@ impl Rest {
     }
 
     #[inline]
-    fn insert(&mut self, key: Key) {
+    fn insert(&mut self, key: DispatchKey) {
         match self {
             Self::Word { ranks, .. } => *ranks |= 1 << key.rank(),
             _ => self.insert_beyond_a_word(key),
@@ -243,7 +243,7 @@ impl Rest {
     // `cold`: a call, which leaves the caller its registers, but compiled as the caller is.
     #[cold]
     #[inline]
-    fn insert_beyond_a_word(&mut self, key: Key) {
+    fn insert_beyond_a_word(&mut self, key: DispatchKey) {
         match self {
             Self::Word { .. } => {}
             Self::Ranked { ranks, .. } => ranks.insert(key.rank()),
@@ -253,7 +253,7 @@ impl Rest {
     }
 
     #[inline]
-    fn remove(&mut self, key: Key) {
+    fn remove(&mut self, key: DispatchKey) {
         match self {
             Self::Word { ranks, .. } => *ranks &= !(1 << key.rank()),
             Self::Ranked { ranks, .. } => ranks.remove(key.rank()),
@@ -264,12 +264,12 @@ impl Rest {
 
     /// Takes the instance with the smallest key out, of which there is one.
     #[inline]
-    fn pop(&mut self) -> Key {
+    fn pop(&mut self) -> DispatchKey {
         match self {
             Self::Word { ranks, vertices } => {
                 let rank = ranks.trailing_zeros();
                 *ranks &= ranks.wrapping_sub(1);
-                Key::of_rank(rank, vertices[rank as usize])
+                DispatchKey::of_rank(rank, vertices[rank as usize])
             }
             _ => self.pop_beyond_a_word(),
         }
@@ -277,7 +277,7 @@ impl Rest {
 
     #[cold]
     #[inline]
-    fn pop_beyond_a_word(&mut self) -> Key {
+    fn pop_beyond_a_word(&mut self) -> DispatchKey {
         let first = match self {
             Self::Word { .. } => None,
             Self::Ranked { ranks, keys } => ranks.pop().map(|rank| keys[rank]),
@@ -290,17 +290,17 @@ impl Rest {
 
 /// Makes the rest for vertices in the order of their ranks.
 #[inline]
-fn ranked(order: &[u32]) -> Rest {
+fn ranked(order: &[u32]) -> QueueStorage {
     let keys = (0u32..).zip(order);
     match order.len() {
-        0..=64 => Rest::Word {
+        0..=64 => QueueStorage::Word {
             ranks: 0,
             vertices: order.into(),
         },
-        count => Rest::Ranked {
+        count => QueueStorage::Ranked {
             ranks: BitSet::new(count),
             keys: keys
-                .map(|(rank, &vertex)| Key::of_rank(rank, vertex))
+                .map(|(rank, &vertex)| DispatchKey::of_rank(rank, vertex))
                 .collect(),
         },
     }
@@ -317,7 +317,7 @@ fn has_ranks(dag: &Dag) -> bool {
 /// Replaces each vertex's priority by its place in the order of (priority, DAG,
 /// subtask), or of (priority, DAG) if the job comes next; returns the vertices in
 /// that order.
-fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
+fn rank(vertices: &mut VertexTable, kind: KeyOrder) -> Vec<u32> {
     // Vertices count DAG by DAG, within a DAG by subtask, and the sort is stable.
     let urgency = |vertex| vertices.get(to_u32(vertex)).rank;
     let order = sorted_by_key(vertices.len(), urgency);
@@ -327,7 +327,7 @@ fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
     for &number in &order {
         let vertex = vertices.get_mut(number);
         let group = (vertex.rank, vertex.dag);
-        if last.is_some_and(|last| kind == Order::Rank || last != group) {
+        if last.is_some_and(|last| kind == KeyOrder::Rank || last != group) {
             rank += 1;
         }
         last = Some(group);
@@ -338,7 +338,7 @@ fn rank(vertices: &mut Vertices, kind: Order) -> Vec<u32> {
 
 /// Replaces each vertex's priority by its place in the order of (DAG, relative deadline,
 /// the longest first), and returns the relative deadline of each place.
-fn rank_by_deadline(task_set: &TaskSet, vertices: &mut Vertices) -> Vec<u64> {
+fn rank_by_deadline(task_set: &TaskSet, vertices: &mut VertexTable) -> Vec<u64> {
     let mut of_ranks = Vec::new();
     for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
         let first = task_set.first_vertex(id);
@@ -507,12 +507,12 @@ struct ByDeadline {
     /// What comes before the vertex in the keys of the jobs that have ready instances, by slot.
     jobs: IndexedHeap<u128>,
     /// By slot.
-    lines: Box<[Line]>,
+    lines: Box<[JobQueue]>,
 }
 
 /// The ready instances of one job in flight.
 #[derive(Clone, Debug, Hash)]
-struct Line {
+struct JobQueue {
     /// The first vertex of its DAG.
     first: u32,
     /// The ready ones, counted from there.
@@ -524,7 +524,7 @@ impl ByDeadline {
     pub(super) fn new(task_set: &TaskSet) -> Self {
         let mut lines = Vec::new();
         for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
-            lines.extend((0..dag.slots()).map(|_| Line {
+            lines.extend((0..dag.slots()).map(|_| JobQueue {
                 first: task_set.first_vertex(id),
                 subtasks: BitSet::new(dag.subtasks().len()),
             }));
@@ -536,7 +536,7 @@ impl ByDeadline {
     }
 
     #[inline]
-    pub(super) fn insert(&mut self, key: Key) {
+    pub(super) fn insert(&mut self, key: DispatchKey) {
         let slot = key.slot();
         let line = &mut self.lines[slot];
         if line.subtasks.is_empty() {
@@ -547,27 +547,27 @@ impl ByDeadline {
 
     /// Returns the smallest key.
     #[inline]
-    pub(super) fn peek(&self) -> Option<Key> {
+    pub(super) fn peek(&self) -> Option<DispatchKey> {
         let (job, slot) = self.jobs.peek()?;
         let line = &self.lines[slot];
         let vertex = line.first + to_u32(line.subtasks.first()?);
-        Some(Key::of_job(job, vertex))
+        Some(DispatchKey::of_job(job, vertex))
     }
 
     /// Takes the instance with the smallest key out.
     #[inline]
-    pub(super) fn pop(&mut self) -> Option<Key> {
+    pub(super) fn pop(&mut self) -> Option<DispatchKey> {
         let (job, slot) = self.jobs.peek()?;
         let line = &mut self.lines[slot];
         let vertex = line.first + to_u32(line.subtasks.pop()?);
         if line.subtasks.is_empty() {
             self.jobs.remove(slot);
         }
-        Some(Key::of_job(job, vertex))
+        Some(DispatchKey::of_job(job, vertex))
     }
 
     #[inline]
-    pub(super) fn remove(&mut self, key: Key) {
+    pub(super) fn remove(&mut self, key: DispatchKey) {
         let slot = key.slot();
         let line = &mut self.lines[slot];
         line.subtasks.remove((key.vertex() - line.first) as usize);
@@ -581,15 +581,15 @@ impl ByDeadline {
 mod tests {
     use super::*;
 
-    fn key(number: u32) -> Key {
-        Key::of_parts(u64::from(number) << 32, 0, number)
+    fn key(number: u32) -> DispatchKey {
+        DispatchKey::of_parts(u64::from(number) << 32, 0, number)
     }
 
     /// One of each kind that needs no task set, with room for so many.
     fn queues() -> [(ReadyQueue, u32); 4] {
-        let ranked = |count| (ReadyQueue::of(Order::Rank, ranked(&order(count))), count);
-        let keyed = Rest::Keyed(IndexedHeap::new(100));
-        let keyed = (ReadyQueue::of(Order::Job, keyed), 100);
+        let ranked = |count| (ReadyQueue::of(KeyOrder::Rank, ranked(&order(count))), count);
+        let keyed = QueueStorage::Keyed(IndexedHeap::new(100));
+        let keyed = (ReadyQueue::of(KeyOrder::Job, keyed), 100);
         [ranked(63), ranked(64), ranked(100), keyed]
     }
 

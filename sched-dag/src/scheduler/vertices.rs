@@ -31,7 +31,7 @@ use crate::task_set::TaskSet;
 
 /// What the next instance of a subtask does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Phase {
+pub(super) enum InstancePhase {
     /// It is not ready.
     Absent,
     /// It is ready and has not started.
@@ -46,7 +46,7 @@ pub(super) enum Phase {
 #[derive(Clone, Copy, Debug, Hash)]
 #[repr(align(64))]
 pub(super) struct Vertex {
-    pub(super) phase: Phase,
+    pub(super) phase: InstancePhase,
     /// The sequence number of the job that it has to do next, or is doing.
     pub(super) progress: u64,
     /// The number of the job that it is doing.
@@ -74,7 +74,7 @@ pub(super) struct Vertex {
 
 /// All subtasks.
 #[derive(Clone, Debug, Hash)]
-pub(super) struct Vertices {
+pub(super) struct VertexTable {
     vertices: Box<[Vertex]>,
     /// The successors of all vertices, those of one together.
     successors: Box<[u32]>,
@@ -82,7 +82,7 @@ pub(super) struct Vertices {
     counters: Box<[u32]>,
 }
 
-impl Vertices {
+impl VertexTable {
     #[inline]
     pub(super) fn new(task_set: &TaskSet, preemption: Preemption) -> Self {
         let mut all = Self {
@@ -99,7 +99,7 @@ impl Vertices {
                 let from = to_u32(successors.len());
                 successors.extend(dag.successors(subtask).iter().map(|next| first + next.0));
                 vertices.push(Vertex {
-                    phase: Phase::Absent,
+                    phase: InstancePhase::Absent,
                     progress: 0,
                     job: 0,
                     rank: attributes.priority().0,
@@ -158,7 +158,7 @@ impl Vertices {
     pub(super) fn end(&mut self, vertex: u32) -> Vertex {
         let own = &mut self.vertices[vertex as usize];
         let ended = *own;
-        own.phase = Phase::Absent;
+        own.phase = InstancePhase::Absent;
         own.progress += 1;
         *own.counter(&mut self.counters, ended.progress) = ended.initial;
         ended
@@ -170,7 +170,7 @@ impl Vertices {
     pub(super) fn pass_on(&mut self, vertex: u32) -> (u32, u32) {
         let own = &mut self.vertices[vertex as usize];
         let (job, [mut place, end]) = (own.job, own.successors);
-        own.phase = Phase::Absent;
+        own.phase = InstancePhase::Absent;
         own.progress += 1;
         own.counter = own.initial;
         let (mut count, mut last) = (0, vertex);

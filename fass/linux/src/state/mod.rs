@@ -24,11 +24,13 @@
 use std::sync::Arc;
 
 use fass::Runner;
-use sched_dag::engine::{Cost, Engine, Port};
+use sched_dag::engine::{Engine, FaultCost, PlatformPort};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Mailboxes, PendingRequests, Request};
-use sched_dag::placement::Next;
-use sched_dag::{ClusterId, CoreId, DagId, Instance, Journal, Moment, Notice, Scheduler, Vertex};
+use sched_dag::placement::NextWork;
+use sched_dag::{
+    ClusterId, CoreId, DagId, DriverNotice, Instance, Journal, Moment, Scheduler, Vertex,
+};
 
 use crate::level::{Levels, Role};
 use crate::office::Office;
@@ -57,7 +59,7 @@ pub struct Fault {
     /// nothing can take over: the cost is the DAG.
     pub is_overrun: bool,
     /// The cost.
-    pub cost: Cost,
+    pub cost: FaultCost,
 }
 
 /// The scheduler of a cluster, its bodies, and which worker runs what.
@@ -133,11 +135,11 @@ pub(crate) struct ThreadPort<'s> {
     opened: &'s mut u64,
 }
 
-impl Port<Box<Runner>> for ThreadPort<'_> {
+impl PlatformPort<Box<Runner>> for ThreadPort<'_> {
     /// The edge tells of these, where a topic is recorded.
     const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
-    fn hear(&mut self, notice: &Notice) {
+    fn hear(&mut self, notice: &DriverNotice) {
         edge::happened(notice);
     }
 
@@ -387,8 +389,8 @@ impl State {
         };
         let (engine, mut port) = self.parts(workers);
         match engine.next(core, &mut port) {
-            Next::Start(_, runner) => Some(runner),
-            Next::Continue(parked) => {
+            NextWork::Start(_, runner) => Some(runner),
+            NextWork::Continue(parked) => {
                 self.seats[me] = None;
                 self.spare.push(me);
                 self.seat(parked, core, workers);
@@ -402,7 +404,7 @@ impl State {
                 }
                 None
             }
-            Next::Nothing => None,
+            NextWork::Nothing => None,
         }
     }
 }

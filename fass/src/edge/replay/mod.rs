@@ -26,7 +26,7 @@ use core::{fmt, mem};
 
 pub use fit::job_of;
 use recording::{Channel, Entry, EntryKind, Header, Malformed, Recordable, Recording, Role, Shown};
-use sched_dag::{DagId, Instance, Notice, SubtaskId, TaskSet, journal};
+use sched_dag::{DagId, DriverNotice, Instance, SubtaskId, TaskSet, journal};
 
 use super::{Crossing, Drain, Drained, Host, Record, name, open};
 use crate::run::line::{LineOf, Recorded};
@@ -533,7 +533,7 @@ impl Crossing for OfMachine {
         }
     }
 
-    fn happened(&mut self, notice: &Notice) {
+    fn happened(&mut self, notice: &DriverNotice) {
         if let journal::EventKind::Due | journal::EventKind::Skipped = notice.event.what
             && let Some((replay, signals)) = &mut self.replay
         {

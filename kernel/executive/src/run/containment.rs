@@ -19,7 +19,7 @@ use core::panic::PanicInfo;
 use core::time::Duration;
 
 use sched_dag::Instance;
-use sched_dag::engine::Cost;
+use sched_dag::engine::FaultCost;
 
 use super::{contexts, execution};
 use crate::machine::fault::Exception;
@@ -177,7 +177,7 @@ fn report(instance: Instance, fault: &Fault<'_>) {
     let (dag, subtask) = names.unwrap_or_default();
     let dag = Excerpt::<NAME_BYTES>::of(dag);
     let subtask = Excerpt::<NAME_BYTES>::of(subtask);
-    let cost = known.as_ref().map_or(Cost::Dag, |(cost, _)| *cost);
+    let cost = known.as_ref().map_or(FaultCost::Dag, |(cost, _)| *cost);
     let consequence = cost.consequence();
     front::println!(
         "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; \

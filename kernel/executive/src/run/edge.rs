@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::edge::{Edge, Record, Wish};
 use fass::{LaunchError, Plan, Recorded};
-use sched_dag::{Instance, Notice};
+use sched_dag::{DriverNotice, Instance};
 
 use crate::machine::debug_port;
 use crate::machine::spinlock::{SpinLock, SpinLockGuard};
@@ -60,7 +60,7 @@ pub fn record(value: &Recorded<'_>, at_ns: u64) {
 
 /// Takes what became of a job or an instance, if it is of interest. The scheduler's lock is
 /// held.
-pub fn happened(notice: &Notice) {
+pub fn happened(notice: &DriverNotice) {
     if IS_ON.load(Ordering::Relaxed) {
         EDGE.lock_uninterrupted().happened(notice);
     }

@@ -22,7 +22,7 @@ use fass::SetOnce;
 use fass::edge::Seen;
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
-use sched_dag::{Dag, DagId, Scheduler, Snapshot, TaskSet};
+use sched_dag::{Dag, DagId, DagSnapshot, Scheduler, TaskSet};
 
 use crate::options::whole_number;
 use crate::text::json;
@@ -82,7 +82,7 @@ pub trait LiveRun {
 }
 
 /// Returns how a DAG does, if a run goes on.
-pub fn snapshot<R: LiveRun>(task_set: &TaskSet, dag: DagId) -> Option<Snapshot> {
+pub fn snapshot<R: LiveRun>(task_set: &TaskSet, dag: DagId) -> Option<DagSnapshot> {
     let cluster = task_set.dag(dag).cluster().index();
     R::with_scheduler(cluster, |scheduler| scheduler.snapshot(dag))
 }
@@ -167,7 +167,7 @@ struct Listing {
     next: DagId,
     /// The first one that is not to be listed.
     end: DagId,
-    print: fn(&Snapshot, &Dag),
+    print: fn(&DagSnapshot, &Dag),
 }
 
 impl<R: LiveRun> Session<R> {
@@ -309,7 +309,7 @@ fn record<R: LiveRun>(on: bool, task_set: &TaskSet, refuse: Refuse<'_>) {
 fn list(
     task_set: &TaskSet,
     name: &str,
-    print: fn(&Snapshot, &Dag),
+    print: fn(&DagSnapshot, &Dag),
     refuse: Refuse<'_>,
 ) -> Option<Listing> {
     let all = u32::try_from(task_set.dags().len()).unwrap_or(u32::MAX);
@@ -323,7 +323,7 @@ fn list(
     Some(Listing { next, end, print })
 }
 
-fn describe(snapshot: &Snapshot, dag: &Dag) {
+fn describe(snapshot: &DagSnapshot, dag: &Dag) {
     println!(
         "`{}`: {}; {} subtasks, {}T = {} us, D = {} us",
         dag.name(),

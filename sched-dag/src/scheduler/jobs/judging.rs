@@ -13,19 +13,19 @@
 
 use alloc::boxed::Box;
 
-use super::Jobs;
+use super::JobTable;
 use crate::ids::{DagId, SubtaskId};
 use crate::journal::EventKind;
 use crate::order::sorted_by_key;
 use crate::scheduler::Scheduler;
-use crate::scheduler::vertices::Vertices;
+use crate::scheduler::vertices::VertexTable;
 use crate::task_set::Dag;
 
 /// One relative deadline of a DAG, and how far its jobs are judged by it.
 #[derive(Clone, Debug, Hash)]
 pub(in crate::scheduler) struct Deadline {
     relative_ns: u64,
-    sinks: Box<[Sink]>,
+    sinks: Box<[SinkLateness]>,
     /// The sequence number of the first job in flight that is not judged, if that is
     /// not older than all in flight.
     judged: u64,
@@ -35,14 +35,14 @@ pub(in crate::scheduler) struct Deadline {
 
 /// A sink, and how many jobs it was late in.
 #[derive(Clone, Debug, Hash)]
-struct Sink {
+struct SinkLateness {
     subtask: SubtaskId,
     misses: u64,
 }
 
 /// A job that is to be judged next.
 #[derive(Clone, Copy, Debug)]
-struct Unjudged {
+struct UnjudgedJob {
     number: u64,
     /// Its sequence number; `None` if it waits.
     sequence: Option<u64>,
@@ -62,7 +62,7 @@ impl Deadline {
         let deadline = |same: &[usize]| Self {
             relative_ns: relative_ns(same[0]),
             sinks: (same.iter())
-                .map(|&sink| Sink {
+                .map(|&sink| SinkLateness {
                     subtask: sinks[sink],
                     misses: 0,
                 })
@@ -89,7 +89,7 @@ impl Deadline {
     }
 }
 
-impl Jobs {
+impl JobTable {
     /// Returns the first deadline of the job that is released at a time.
     #[inline]
     pub(in crate::scheduler) fn first_deadline_ns(&self, release_ns: u64) -> u64 {
@@ -110,19 +110,19 @@ impl Jobs {
 
     /// Returns the job that is to be judged first.
     #[inline(never)]
-    fn first_unjudged(&self, dag: &Dag) -> Option<Unjudged> {
+    fn first_unjudged(&self, dag: &Dag) -> Option<UnjudgedJob> {
         let of_deadlines = self.deadlines.iter().enumerate();
         let unjudged = of_deadlines.filter_map(|(at, deadline)| self.unjudged(dag, at, deadline));
         unjudged.min_by_key(|unjudged| unjudged.deadline_ns)
     }
 
     #[inline(always)]
-    fn unjudged(&self, dag: &Dag, at: usize, deadline: &Deadline) -> Option<Unjudged> {
+    fn unjudged(&self, dag: &Dag, at: usize, deadline: &Deadline) -> Option<UnjudgedJob> {
         let first = deadline.judged.max(self.oldest);
         let mut uncut = (first..self.next).filter(|&sequence| self.job(sequence).cut.is_none());
         if let Some(sequence) = uncut.next() {
             let job = self.job(sequence);
-            return Some(Unjudged {
+            return Some(UnjudgedJob {
                 number: job.number,
                 sequence: Some(sequence),
                 deadline: at,
@@ -130,7 +130,7 @@ impl Jobs {
             });
         }
         let number = self.first_waiting.max(deadline.judged_waiting);
-        (number < self.announced).then(|| Unjudged {
+        (number < self.announced).then(|| UnjudgedJob {
             number,
             sequence: None,
             deadline: at,
@@ -139,7 +139,7 @@ impl Jobs {
     }
 
     /// Counts the sinks that are late, and reports whether any is.
-    fn count_late(&mut self, unjudged: &Unjudged, is_late: impl Fn(SubtaskId) -> bool) -> bool {
+    fn count_late(&mut self, unjudged: &UnjudgedJob, is_late: impl Fn(SubtaskId) -> bool) -> bool {
         let deadline = &mut self.deadlines[unjudged.deadline];
         match unjudged.sequence {
             Some(sequence) => deadline.judged = sequence + 1,
@@ -156,7 +156,7 @@ impl Jobs {
 
     /// Notes that a job has missed a deadline, and reports whether it is its first one.
     #[inline]
-    fn note_miss(&mut self, unjudged: &Unjudged) -> bool {
+    fn note_miss(&mut self, unjudged: &UnjudgedJob) -> bool {
         match unjudged.sequence {
             Some(sequence) => !core::mem::replace(&mut self.job_mut(sequence).missed, true),
             // Nothing of it has finished: it misses one deadline after the other.
@@ -232,7 +232,7 @@ impl Scheduler {
 
 /// Reports whether a sink had not finished its part of a job in flight before this instant.
 #[inline]
-fn is_unfinished(vertices: &Vertices, sink: u32, sequence: u64, ended: Option<u32>) -> bool {
+fn is_unfinished(vertices: &VertexTable, sink: u32, sequence: u64, ended: Option<u32>) -> bool {
     let has_just_ended = u64::from(ended == Some(sink));
     vertices.get(sink).progress - has_just_ended <= sequence
 }

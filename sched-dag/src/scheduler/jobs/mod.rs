@@ -31,7 +31,7 @@ use judging::Deadline;
 
 /// The jobs of one DAG.
 #[derive(Clone, Debug, Hash)]
-pub(super) struct Jobs {
+pub(super) struct JobTable {
     /// The jobs in flight, by slot of their sequence number.
     in_flight: Box<[Job]>,
     /// The most jobs in flight, J.
@@ -80,7 +80,7 @@ pub(super) struct Job {
     pub(super) cut: Option<JobOutcome>,
 }
 
-impl Jobs {
+impl JobTable {
     /// Makes the jobs of a DAG whose slots are counted from `first_slot`.
     #[inline]
     pub(super) fn new(dag: &Dag, first_slot: u32) -> Self {

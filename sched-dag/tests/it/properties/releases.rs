@@ -9,7 +9,8 @@ use std::collections::{BTreeSet, VecDeque};
 
 use sched_dag::journal::EventKind;
 use sched_dag::{
-    Activation, DagId, DagPhase, DagSpec, DagStatistics, Notice, OnFault, OverrunPolicy, Scheduler,
+    Activation, DagId, DagPhase, DagSpec, DagStatistics, DriverNotice, OnFault, OverrunPolicy,
+    Scheduler,
 };
 
 /// The kinds of reports that are judged here.
@@ -111,8 +112,8 @@ impl Releases {
     }
 
     /// Reports whether the rules allow what the scheduler tells.
-    pub(crate) fn takes(&mut self, spec: &DagSpec, notice: &Notice, now_ns: u64) -> bool {
-        let Notice { event, at_ns } = *notice;
+    pub(crate) fn takes(&mut self, spec: &DagSpec, notice: &DriverNotice, now_ns: u64) -> bool {
+        let DriverNotice { event, at_ns } = *notice;
         let job = event.job;
         let counted = &mut self.counted;
         match event.what {

@@ -21,7 +21,7 @@ use common::random::Random;
 use sched_dag::analysis::{AnalysisSettings, Overheads, answer, fix_orders};
 use sched_dag::journal::EventKind;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, Instance, Notice, Policy,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, DriverNotice, Instance, Policy,
     Preemption, Scheduler, SchedulerOptions, SubtaskOrder, verify,
 };
 
@@ -277,7 +277,7 @@ impl Machine<'_> {
     }
 
     /// Notes a release or a completion; returns how many instances it has made ready by releases.
-    fn hear(&mut self, notice: &Notice, now_ns: u64) -> u64 {
+    fn hear(&mut self, notice: &DriverNotice, now_ns: u64) -> u64 {
         let (dag, job) = (notice.event.dag, notice.event.job);
         if notice.event.what == EventKind::Released {
             self.flying.insert((dag, job), notice.at_ns.unwrap_or(0));

@@ -26,7 +26,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use fass::{LaunchError, Plan, Terms};
-use sched_dag::engine::{Engine, Proven, Run};
+use sched_dag::engine::{Engine, ProvenBounds, Run};
 use sched_dag::lifecycle::PendingRequests;
 use sched_dag::{Dag, Journal, Scheduler, TaskSet};
 
@@ -77,7 +77,7 @@ struct Execution {
     may_hand_off: bool,
     signals: Signals,
     /// In the first cluster.
-    proven: Proven,
+    proven: ProvenBounds,
 }
 
 /// Time 0 of the run, on the clock.
@@ -123,7 +123,7 @@ pub fn prepare(mut plan: Plan, terms: &Terms, coincidence_ns: u64) -> Result<(),
             budget_factor: terms.budget_factor,
             may_hand_off: coincidence_ns == 0,
             signals: Signals::new(&plan, &letters),
-            proven: Proven::default(),
+            proven: ProvenBounds::default(),
         })
         .collect();
     executions[0].proven = plan.proven;

@@ -8,10 +8,10 @@ use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering;
 
 use fass::{Body, LaunchError};
-use sched_dag::engine::{Body as _, Port};
+use sched_dag::engine::{PlatformPort, SubtaskBody as _};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{self, Request};
-use sched_dag::{ClusterId, CoreId, Notice, Preemption, SchedulerOptions, TaskSet};
+use sched_dag::{ClusterId, CoreId, DriverNotice, Preemption, SchedulerOptions, TaskSet};
 
 use super::EPOCH_NS;
 use super::cluster::{self, Cluster, CoreSet, FIRST_SEAT, MAY_DIVIDE};
@@ -32,7 +32,7 @@ pub(super) struct SmpPort<'a> {
     pub(super) woken: &'a mut CoreSet,
 }
 
-impl Port<Loan> for SmpPort<'_> {
+impl PlatformPort<Loan> for SmpPort<'_> {
     /// The edge tells of these, where a topic is recorded.
     const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
@@ -89,7 +89,7 @@ impl Port<Loan> for SmpPort<'_> {
         }
     }
 
-    fn hear(&mut self, notice: &Notice) {
+    fn hear(&mut self, notice: &DriverNotice) {
         edge::happened(notice);
     }
 }

@@ -12,7 +12,7 @@
 use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
-use sched_dag::engine::Cost;
+use sched_dag::engine::FaultCost;
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet};
@@ -97,7 +97,7 @@ pub fn budget_ns(instance: Instance) -> u64 {
 /// Returns what a fault of an instance that runs here costs if it comes now, and the model, if a
 /// run goes on. Of two faults of a DAG at one moment, either may take what is left to be survived;
 /// the journal tells.
-pub fn cost_of_fault(instance: Instance) -> Option<(Cost, Arc<TaskSet>)> {
+pub fn cost_of_fault(instance: Instance) -> Option<(FaultCost, Arc<TaskSet>)> {
     let place = cluster::of(this_core::get()).execution.lock();
     place.as_ref().map(|execution| {
         let task_set = execution.task_set();

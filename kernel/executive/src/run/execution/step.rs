@@ -17,9 +17,9 @@
 use core::sync::atomic::Ordering;
 
 use fass::{Plan, Request};
-use sched_dag::engine::{Continuation, Engine};
+use sched_dag::engine::{Engine, NextAction};
 use sched_dag::journal::{EventKind, EventSubject};
-use sched_dag::placement::Next;
+use sched_dag::placement::NextWork;
 use sched_dag::{CoreId, DagId, Instance, Moment};
 
 use super::cluster::{self, Cluster, CoreSet, FIRST_SEAT, MAY_DIVIDE};
@@ -137,14 +137,14 @@ impl Execution {
         let mut none = CoreSet::default();
         let (engine, mut port) = self.parts(&mut none);
         match engine.next(here, &mut port) {
-            Next::Start(_, runner) => Work::Run(runner),
-            Next::Continue(context) => {
+            NextWork::Start(_, runner) => Work::Run(runner),
+            NextWork::Continue(context) => {
                 self.note_resumed(core, &context, clock::now_ns());
                 note_running(core, self.current(here.index()).map(EventSubject::of));
                 Work::Continue(context)
             }
             // Only core 0 has a background, and only while it does other work.
-            Next::Nothing => {
+            NextWork::Nothing => {
                 note_running(core, None);
                 let background = self.background.take_if(|_| core.index == 0);
                 background.map_or(Work::Rest, Work::Continue)
@@ -266,14 +266,14 @@ pub fn complete(finished: Loan, finish_ns: u64) -> Work {
     let mut woken = CoreSet::default();
     let (engine, mut port) = execution.parts(&mut woken);
     match engine.complete((here, vertex), finished, run_ns, is_alone, &mut port) {
-        Continuation::Run(successor) => return Work::Run(successor),
-        Continuation::Look {
+        NextAction::Run(successor) => return Work::Run(successor),
+        NextAction::Look {
             is_rescheduled: false,
         } => {}
-        Continuation::Look {
+        NextAction::Look {
             is_rescheduled: true,
         } => execution.announce(&mut woken),
-        Continuation::Step(ended) => execution.step(finish_ns, &mut woken, |moment| {
+        NextAction::Step(ended) => execution.step(finish_ns, &mut woken, |moment| {
             ended.into_iter().for_each(|ended| moment.complete(ended));
         }),
     }
