@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use sched_dag::law::Record;
+use sched_dag::law::RunRecord;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 
 /// The latencies of one run, in nanoseconds.
@@ -25,7 +25,7 @@ pub struct Latencies {
 impl Latencies {
     /// Measures a run of the system.
     #[must_use]
-    pub fn of(task_set: &TaskSet, record: &Record, acted_on: &[AtomicU64]) -> Self {
+    pub fn of(task_set: &TaskSet, record: &RunRecord, acted_on: &[AtomicU64]) -> Self {
         let [lidar, behaviour] = ["lidar", "behaviour"].map(|dag| task_set.find(dag));
         let finish_ns = |dag, job, name| {
             let subtask = find(task_set, dag, name)?;

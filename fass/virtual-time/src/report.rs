@@ -7,7 +7,7 @@ use fass::edge::Outcome;
 use fass::log::Line;
 use sched_dag::engine::Run;
 use sched_dag::journal::{Event, EventKind};
-use sched_dag::law::{self, Terms, Violation};
+use sched_dag::law::{self, JudgeOptions, Violation};
 use sched_dag::{DagId, DagKey, DagStatistics, Instance, SubtaskKey};
 
 use crate::edge::Divergence;
@@ -161,7 +161,7 @@ impl Report {
         events.sort_by_key(|event| event.time_ns);
         let events = events.iter().copied();
         // With any tolerance it is not judged how late a timer is.
-        let (task_set, terms) = (self.task_set(), Terms::whole(self.is_late.into()));
+        let (task_set, terms) = (self.task_set(), JudgeOptions::whole(self.is_late.into()));
         let mut found = law::violations(task_set, terms, events.clone());
         let of_dispatch = law::dispatch_violations(task_set, &self.options(), terms, events);
         found.extend(of_dispatch);

@@ -18,7 +18,7 @@ use fass::{
     ConstructionPolicy, Dag, Occupation, OverheadSource, Overheads, Platform, SubtaskAttributes,
     Untyped, create_dag, execute_for, finish_create_dags_with,
 };
-use sched_dag::law::Costs;
+use sched_dag::law::MeasuredCosts;
 
 use executive::machine::clock;
 use executive::run::platform::KERNEL;
@@ -72,7 +72,7 @@ pub(super) fn charge(margin_percent: u32) -> Result<(), Ending> {
 }
 
 /// Runs them, and returns what they have shown.
-fn run() -> Result<Costs, Ending> {
+fn run() -> Result<MeasuredCosts, Ending> {
     KERNEL.set_calibration(true);
     let committed = finish_create_dags_with(&dags(), ConstructionPolicy::any_graph());
     KERNEL.set_calibration(false);

@@ -17,7 +17,7 @@
 //! contention. Measure WCETs with these in them. `docs/proving.md` has the argument for
 //! the charges, and the step of it that is not proven.
 
-use crate::law::Costs;
+use crate::law::MeasuredCosts;
 use crate::policy::Preemption;
 
 /// Measured costs, each a worst case; all 0 by default.
@@ -66,7 +66,7 @@ impl Overheads {
     /// Work of the platform that interrupts a running instance, a timer's or another core's, is
     /// within that call's time, as it is observed.
     #[must_use]
-    pub const fn measured(costs: &Costs, margin_percent: u32, at_once: u64) -> Self {
+    pub const fn measured(costs: &MeasuredCosts, margin_percent: u32, at_once: u64) -> Self {
         let percent = 100 + margin_percent as u64;
         let owed_ns = costs.owed_ns.saturating_mul(percent).div_ceil(100);
         let late_ns = costs.late_ns.saturating_mul(percent).div_ceil(100);
@@ -95,7 +95,7 @@ impl Overheads {
 
 #[cfg(test)]
 mod tests {
-    use super::{Costs, Overheads, Preemption};
+    use super::{MeasuredCosts, Overheads, Preemption};
 
     #[test]
     fn only_preemption_costs_an_interrupt() {
@@ -116,10 +116,10 @@ mod tests {
 
     #[test]
     fn what_was_measured_is_charged_with_its_margin() {
-        let costs = Costs {
+        let costs = MeasuredCosts {
             owed_ns: 7,
             late_ns: 2,
-            ..Costs::default()
+            ..MeasuredCosts::default()
         };
         let charged = |margin, at_once| {
             let of = Overheads::measured(&costs, margin, at_once);

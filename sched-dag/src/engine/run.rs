@@ -9,7 +9,7 @@ use crate::chains::{Chain, ChainLatencies};
 use crate::ids::{DagId, SubtaskId};
 use crate::kept::{FINEST, Journal};
 use crate::key::{DagKey, SubtaskKey};
-use crate::law::{self, Record, Tally, Terms, Violation};
+use crate::law::{self, JudgeOptions, RunRecord, RunTally, Violation};
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{DagSnapshot, DagStatistics, Scheduler};
 use crate::task_set::TaskSet;
@@ -38,8 +38,8 @@ pub struct Run {
     proven: ProvenBounds,
     dags: Vec<DagCounts>,
     journal: Journal,
-    record: OnceCell<Record>,
-    times: OnceCell<Option<Tally>>,
+    record: OnceCell<RunRecord>,
+    times: OnceCell<Option<RunTally>>,
     counts: RunCounts,
 }
 
@@ -169,10 +169,10 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn record(&self) -> &Record {
+    pub fn record(&self) -> &RunRecord {
         self.record.get_or_init(|| {
             let (is_whole, events) = (self.journal.is_whole(), self.journal.events());
-            let record = Record::of_events(&self.task_set, is_whole, events);
+            let record = RunRecord::of_events(&self.task_set, is_whole, events);
             record.expect("the times of a journal's events fit into memory")
         })
     }
@@ -207,7 +207,7 @@ impl Run {
     /// }
     /// ```
     #[must_use]
-    pub fn times(&self) -> Option<&Tally> {
+    pub fn times(&self) -> Option<&RunTally> {
         let tally = || self.journal.statistics(&self.task_set, FINEST);
         self.times.get_or_init(tally).as_ref()
     }
@@ -216,7 +216,7 @@ impl Run {
     ///
     /// See [`Run`].
     #[must_use]
-    pub fn coarse_times(&self) -> Option<Tally> {
+    pub fn coarse_times(&self) -> Option<RunTally> {
         self.journal.statistics(&self.task_set, 0)
     }
 
@@ -341,10 +341,10 @@ impl Run {
         terms.is_whole.then(judge)
     }
 
-    const fn terms(&self, tolerance_ns: u64) -> Terms {
-        Terms {
+    const fn terms(&self, tolerance_ns: u64) -> JudgeOptions {
+        JudgeOptions {
             is_whole: self.journal.is_whole(),
-            ..Terms::whole(tolerance_ns)
+            ..JudgeOptions::whole(tolerance_ns)
         }
     }
 

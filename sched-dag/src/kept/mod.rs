@@ -16,7 +16,7 @@
 //! or a quarter of what is free, if that is less, or no job is the last: the times that
 //! are computed from it after the run take up to half as much again. When it is
 //! full, the oldest event makes way for each new one. Before it goes, it is counted in
-//! the [`Tally`], so statistics remain those of the whole run.
+//! the [`RunTally`], so statistics remain those of the whole run.
 //!
 //! Times are nanoseconds since the run's epoch.
 
@@ -25,7 +25,7 @@ use alloc::vec::Vec;
 
 use crate::ids::{ClusterId, CoreId};
 use crate::journal::{Event, EventKind, EventSubject};
-use crate::law::{Costs, Tally};
+use crate::law::{MeasuredCosts, RunTally};
 use crate::task_set::{Dag, TaskSet};
 
 /// Where a run has no last job, as many events as make sense: 6 MiB.
@@ -46,7 +46,7 @@ pub struct Journal {
     /// How many events are not there any more, or never were.
     lost: u64,
     /// What is known of the lost ones, if there can be any.
-    tally: Option<Tally>,
+    tally: Option<RunTally>,
     /// Whether each lost event is counted in the tally.
     is_complete: bool,
     /// Whether there is room for all, as much as there is memory.
@@ -263,10 +263,10 @@ impl Journal {
     /// kept; `None` if events were neither kept nor counted.
     #[must_use]
     #[inline(never)]
-    pub fn statistics(&self, task_set: &Arc<TaskSet>, bits: u32) -> Option<Tally> {
+    pub fn statistics(&self, task_set: &Arc<TaskSet>, bits: u32) -> Option<RunTally> {
         let mut tally = match &self.tally {
             Some(tally) => tally.clone(),
-            None => Tally::new(task_set, bits),
+            None => RunTally::new(task_set, bits),
         };
         self.events().for_each(|event| tally.take(&event));
         self.is_complete.then_some(tally)
@@ -275,8 +275,8 @@ impl Journal {
     /// Measures what the platform's own work has cost, core by core; `None` if events are lost.
     #[must_use]
     #[inline(never)]
-    pub fn costs(&self, task_set: &TaskSet) -> Option<Costs> {
-        let measure = || Costs::of_cores(task_set, self.events());
+    pub fn costs(&self, task_set: &TaskSet) -> Option<MeasuredCosts> {
+        let measure = || MeasuredCosts::of_cores(task_set, self.events());
         self.is_whole().then(measure)
     }
 
@@ -331,10 +331,10 @@ fn events_of<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> Option<usize> {
 }
 
 /// Makes the finest tally that takes at most `most_bytes`, or else the coarsest.
-fn tally(task_set: &Arc<TaskSet>, most_bytes: usize) -> Tally {
+fn tally(task_set: &Arc<TaskSet>, most_bytes: usize) -> RunTally {
     let mut finest = (0..=FINEST).rev();
-    let bits = finest.find(|&bits| Tally::size_of(task_set, bits) <= most_bytes);
-    Tally::new(task_set, bits.unwrap_or(0))
+    let bits = finest.find(|&bits| RunTally::size_of(task_set, bits) <= most_bytes);
+    RunTally::new(task_set, bits.unwrap_or(0))
 }
 
 #[cfg(test)]

@@ -52,7 +52,11 @@ fn whole(task_set: &Arc<TaskSet>, free_bytes: usize) -> Journal {
 }
 
 fn violations(journal: &Journal, task_set: &TaskSet) -> Vec<law::Violation> {
-    law::violations(task_set, law::Terms::whole(u64::MAX), journal.events())
+    law::violations(
+        task_set,
+        law::JudgeOptions::whole(u64::MAX),
+        journal.events(),
+    )
 }
 
 fn small() -> Journal {

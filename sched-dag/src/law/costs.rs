@@ -18,7 +18,7 @@ use crate::task_set::TaskSet;
 
 /// What was measured, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Costs {
+pub struct MeasuredCosts {
     /// How many instances were dispatched.
     pub dispatches: u64,
     /// The longest time for which one was owed a core.
@@ -29,7 +29,7 @@ pub struct Costs {
     pub late_ns: u64,
 }
 
-impl Costs {
+impl MeasuredCosts {
     /// Measures the events of a whole run without faults, which are in their order, core by core:
     /// an instance is owed a core from when it waits and the core on which it goes on has
     /// finished another one. ([`judge_dispatch`](super::judge_dispatch) asks the rule itself,
@@ -91,7 +91,7 @@ impl Costs {
 }
 
 /// Says it in words.
-impl fmt::Display for Costs {
+impl fmt::Display for MeasuredCosts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             dispatches,
@@ -143,8 +143,8 @@ mod tests {
             (127, Resume, 1, 0), // owed for 7, after 11 in which another one ran
             (140, Finish, 1, 0),
         ]);
-        let costs = Costs::of_cores(&task_set, events.iter().copied());
-        let expected = Costs {
+        let costs = MeasuredCosts::of_cores(&task_set, events.iter().copied());
+        let expected = MeasuredCosts {
             dispatches: 2,
             owed_ns: 11,
             releases: 2,
@@ -157,12 +157,12 @@ mod tests {
             preemption: Preemption::Enabled,
             cores: 1,
         };
-        let terms = law::Terms::whole(u64::MAX);
+        let terms = law::JudgeOptions::whole(u64::MAX);
         let dispatch = law::judge_dispatch(&task_set, &options, terms, events.iter().copied());
         assert_eq!(dispatch.waits.longest_owed_ns, 11);
         // The last one counts from the finish before.
         let without = events[5..].iter().copied();
-        assert_eq!(Costs::of_cores(&task_set, without).owed_ns, 7);
+        assert_eq!(MeasuredCosts::of_cores(&task_set, without).owed_ns, 7);
     }
 
     #[test]
@@ -175,7 +175,7 @@ mod tests {
             (150, Released, 0, 1),
         ];
         let late_ns = |happened: &[_]| {
-            Costs::of_releases(&task_set, events(happened).iter().copied()).late_ns
+            MeasuredCosts::of_releases(&task_set, events(happened).iter().copied()).late_ns
         };
         assert_eq!(late_ns(&happened), 0);
         assert_eq!(late_ns(&[happened[0], happened[2]]), 50);

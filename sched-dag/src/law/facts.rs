@@ -4,13 +4,13 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::Record;
+use super::RunRecord;
 use crate::ids::{DagId, Instance};
 use crate::journal::{Event, EventKind};
 use crate::policy::JobOutcome;
 use crate::task_set::TaskSet;
 
-impl Record {
+impl RunRecord {
     /// Computes the times from a journal's events, in their order.
     ///
     /// If the oldest events are lost (`is_whole` is false), it has the jobs that were

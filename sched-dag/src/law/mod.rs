@@ -6,13 +6,13 @@
 //! - [`violations`]: every breach of the model's rules R1 to R4, and of what every
 //!   machine must keep: one life of each instance, one instance on each core;
 //! - [`dispatch_violations`]: every breach of R5; [`sweep`] is its core;
-//! - [`Costs`]: what the platform's own work has taken;
-//! - [`Record::of_events`]: the times of every job and instance, of the latest whole
+//! - [`MeasuredCosts`]: what the platform's own work has taken;
+//! - [`RunRecord::of_events`]: the times of every job and instance, of the latest whole
 //!   jobs if the oldest events are lost;
-//! - [`Tally`]: statistics of a run of any length, in a fixed amount of memory, each of
+//! - [`RunTally`]: statistics of a run of any length, in a fixed amount of memory, each of
 //!   which is read as a [`Distribution`].
 //!
-//! How strictly a journal is judged is said by [`Terms`]. Times are in nanoseconds from
+//! How strictly a journal is judged is said by [`JudgeOptions`]. Times are in nanoseconds from
 //! the run's epoch.
 //!
 //! These are the only checks of the rules after a run: in virtual time, on threads, in
@@ -34,11 +34,11 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-pub use costs::Costs;
-pub use dispatch::{Dispatch, dispatch_violations, judge_dispatch};
+pub use costs::MeasuredCosts;
+pub use dispatch::{DispatchReport, dispatch_violations, judge_dispatch};
 pub use distribution::{Distribution, Histogram};
-pub use replay::{Verdict, judge, violations};
-pub use tally::{OfDag, OfSubtask, Tally};
+pub use replay::{ReplayVerdict, judge, violations};
+pub use tally::{DagTally, RunTally, SubtaskTally};
 pub use violation::{Rule, Violation};
 
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
@@ -86,7 +86,7 @@ pub struct JobRecord {
 
 /// What is known of a journal besides its events, and how strictly it is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Terms {
+pub struct JudgeOptions {
     /// Whether no event is missing. Else the oldest ones are, and of what they may have
     /// been about, nothing is concluded from an event that is not there.
     pub is_whole: bool,
@@ -101,7 +101,7 @@ pub struct Terms {
     pub tolerance_ns: u64,
 }
 
-impl Terms {
+impl JudgeOptions {
     /// Those of a whole run in virtual time.
     pub const EXACT: Self = Self::whole(0);
 
@@ -118,7 +118,7 @@ impl Terms {
 
 /// The times of all jobs of all DAGs.
 #[derive(Clone, Debug)]
-pub struct Record {
+pub struct RunRecord {
     dags: Vec<DagRecord>,
 }
 
@@ -132,7 +132,7 @@ struct DagRecord {
     instances: Vec<InstanceRecord>,
 }
 
-impl Record {
+impl RunRecord {
     /// Makes an empty record with room for the jobs of each DAG whose numbers are in
     /// `jobs(dag)`.
     ///

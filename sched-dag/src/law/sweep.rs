@@ -31,7 +31,7 @@ use crate::task_set::TaskSet;
 pub(super) type Key = (u64, Instance);
 
 /// The model and the options of a run, and the cores of the cluster in hand.
-pub(super) struct Model<'a> {
+pub(super) struct DispatchModel<'a> {
     pub(super) task_set: &'a TaskSet,
     pub(super) options: &'a SchedulerOptions,
     pub(super) cores: Range<u32>,
@@ -39,7 +39,7 @@ pub(super) struct Model<'a> {
     pub(super) due_ns: BTreeMap<(DagId, u64), u64>,
 }
 
-impl Model<'_> {
+impl DispatchModel<'_> {
     /// Returns an instance's place in the order of dispatch. Static priority: (priority, DAG,
     /// job, subtask). EDF: the deadline instead, that of the most urgent sink that the subtask
     /// reaches.
@@ -67,7 +67,7 @@ impl Model<'_> {
 
 /// What an instance is, for the dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub enum DispatchState {
     /// It is not ready yet, as far as is known.
     Absent,
     /// It waits for a core and has not started.
@@ -82,7 +82,7 @@ pub enum Stage {
 
 /// What runs while another instance should.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Blame {
+pub enum DispatchFault {
     /// An instance, on this core.
     Runs(Instance, CoreId),
     /// A core is idle; the first one, unless it is not known which.
@@ -91,7 +91,7 @@ pub enum Blame {
 
 /// A breach of R5.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wrong {
+pub enum DispatchBreach {
     /// The instance was owed a core for too long.
     Waits {
         /// The instance.
@@ -101,7 +101,7 @@ pub enum Wrong {
         /// For how long.
         length_ns: u64,
         /// What was the case meanwhile.
-        blame: Blame,
+        blame: DispatchFault,
     },
     /// An instance started and keeps its core, although another one went first.
     OutOfTurn {
@@ -120,7 +120,7 @@ pub enum Wrong {
 
 /// What R5 tells about a run besides breaches.
 #[derive(Clone, Debug, Default)]
-pub struct Waits {
+pub struct WaitCounts {
     /// The longest time for which an instance was owed a core.
     pub longest_owed_ns: u64,
     /// From readiness to start, where a core was idle for the instance and no
@@ -129,16 +129,16 @@ pub struct Waits {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Owed {
+struct OwedDispatch {
     since_ns: u64,
     /// Whether it has just become ready and found an idle core for it.
     finds_idle_core: bool,
-    blame: Option<Blame>,
+    blame: Option<DispatchFault>,
 }
 
 /// The state of the dispatch at an instant.
-pub(super) struct Sweep<'m> {
-    model: &'m Model<'m>,
+pub(super) struct DispatchSweep<'m> {
+    model: &'m DispatchModel<'m>,
     bound_ns: u64,
     now_ns: u64,
     /// How many cores there are of which it is known what they do.
@@ -149,23 +149,23 @@ pub(super) struct Sweep<'m> {
     waiting: BTreeMap<Key, (u64, u64)>,
     running: BTreeMap<Key, CoreId>,
     stopped: BTreeSet<DagId>,
-    owed: BTreeMap<Key, Owed>,
+    owed: BTreeMap<Key, OwedDispatch>,
     /// Became ready, or started, at this instant.
     fresh: Vec<Key>,
     started: Vec<(Key, CoreId, u64)>,
     /// What has not started yet.
     unstarted: BTreeSet<Key>,
-    wrong: Vec<Wrong>,
-    waits: &'m mut Waits,
+    wrong: Vec<DispatchBreach>,
+    waits: &'m mut WaitCounts,
 }
 
-impl<'m> Sweep<'m> {
+impl<'m> DispatchSweep<'m> {
     /// Begins at an instant; what is found of waits is added to the ones given.
     pub(super) fn new(
-        model: &'m Model<'m>,
+        model: &'m DispatchModel<'m>,
         bound_ns: u64,
         now_ns: u64,
-        waits: &'m mut Waits,
+        waits: &'m mut WaitCounts,
     ) -> Self {
         Self {
             model,
@@ -194,7 +194,7 @@ impl<'m> Sweep<'m> {
     }
 
     /// Judges the rest, up to the run's end.
-    pub(super) fn end(mut self, end_ns: u64) -> Vec<Wrong> {
+    pub(super) fn end(mut self, end_ns: u64) -> Vec<DispatchBreach> {
         self.settle(end_ns);
         self.now_ns = end_ns;
         for (key, owed) in core::mem::take(&mut self.owed) {
@@ -210,7 +210,7 @@ impl<'m> Sweep<'m> {
     }
 
     /// An instance enters a stage.
-    pub(super) fn enter(&mut self, instance: Instance, stage: Stage) {
+    pub(super) fn enter(&mut self, instance: Instance, stage: DispatchState) {
         let key = self.model.key(instance);
         self.events += 1;
         let since = (self.now_ns, self.events);
@@ -219,22 +219,22 @@ impl<'m> Sweep<'m> {
         let is_owed_nothing = self.stopped.contains(&key.1.dag);
         let is_first = self.unstarted.remove(&key);
         match stage {
-            Stage::Ready | Stage::Suspended if is_owed_nothing => {}
-            Stage::Ready => {
+            DispatchState::Ready | DispatchState::Suspended if is_owed_nothing => {}
+            DispatchState::Ready => {
                 self.waiting.insert(key, since);
                 self.unstarted.insert(key);
                 self.fresh.push(key);
             }
-            Stage::Suspended => {
+            DispatchState::Suspended => {
                 self.waiting.insert(key, since);
             }
-            Stage::Running(core) => {
+            DispatchState::Running(core) => {
                 self.running.insert(key, core);
                 if is_first {
                     self.started.push((key, core, self.events));
                 }
             }
-            Stage::Absent | Stage::Over => {}
+            DispatchState::Absent | DispatchState::Over => {}
         }
     }
 
@@ -259,7 +259,7 @@ impl<'m> Sweep<'m> {
             let exceeds = since_ns.saturating_add(self.bound_ns) < until_ns;
             let blame = (exceeds && !has_blame).then(|| self.blame(rank < idle));
             let finds_idle_core = rank < idle && self.fresh.contains(key);
-            let owed = self.owed.entry(*key).or_insert(Owed {
+            let owed = self.owed.entry(*key).or_insert(OwedDispatch {
                 since_ns,
                 finds_idle_core,
                 blame: None,
@@ -299,22 +299,22 @@ impl<'m> Sweep<'m> {
     }
 
     /// Says what runs instead of an instance that is owed a core.
-    fn blame(&self, is_idle: bool) -> Blame {
+    fn blame(&self, is_idle: bool) -> DispatchFault {
         let mut running = self.running.iter().rev();
         let movable = running.find(|(key, _)| !self.model.keeps_its_core(key.1));
         match movable {
-            Some((key, core)) if !is_idle => Blame::Runs(key.1, *core),
+            Some((key, core)) if !is_idle => DispatchFault::Runs(key.1, *core),
             _ => {
                 let is_busy = |core: &CoreId| self.running.values().any(|busy| busy == core);
                 let cores = self.model.cores.start..;
                 let mut cores = cores.take(self.known_cores).map(CoreId);
-                Blame::Idle(cores.find(|core| !is_busy(core)))
+                DispatchFault::Idle(cores.find(|core| !is_busy(core)))
             }
         }
     }
 
     /// Takes note that an instance is owed nothing any more.
-    fn close(&mut self, key: Key, owed: &Owed) {
+    fn close(&mut self, key: Key, owed: &OwedDispatch) {
         let length_ns = self.now_ns.saturating_sub(owed.since_ns);
         self.waits.longest_owed_ns = self.waits.longest_owed_ns.max(length_ns);
         let mut started = self.started.iter();
@@ -322,17 +322,21 @@ impl<'m> Sweep<'m> {
             self.waits.ready_to_start_ns.push(length_ns);
         }
         if length_ns > self.bound_ns {
-            self.wrong.push(Wrong::Waits {
+            self.wrong.push(DispatchBreach::Waits {
                 waiting: key.1,
                 since_ns: owed.since_ns,
                 length_ns,
-                blame: owed.blame.unwrap_or(Blame::Idle(None)),
+                blame: owed.blame.unwrap_or(DispatchFault::Idle(None)),
             });
         }
     }
 
     /// Judges the start of an instance that keeps its core from now on.
-    fn out_of_turn(&self, (key, core, start): (Key, CoreId, u64), idle: usize) -> Option<Wrong> {
+    fn out_of_turn(
+        &self,
+        (key, core, start): (Key, CoreId, u64),
+        idle: usize,
+    ) -> Option<DispatchBreach> {
         if !self.model.keeps_its_core(key.1) {
             return None;
         }
@@ -342,7 +346,7 @@ impl<'m> Sweep<'m> {
             longest_ns > self.bound_ns || self.bound_ns == 0 && *event < start
         });
         let (first, (since_ns, _)) = before.nth(idle)?;
-        Some(Wrong::OutOfTurn {
+        Some(DispatchBreach::OutOfTurn {
             started: key.1,
             core,
             at_ns: self.now_ns,

@@ -1,6 +1,6 @@
 //! Statistics of a run of any length, in memory that is taken before it begins.
 //!
-//! A [`Tally`] takes the events of a journal in their order, each once, and forgets
+//! A [`RunTally`] takes the events of a journal in their order, each once, and forgets
 //! each job with its end. What it keeps is a [`Histogram`] of each time that is asked
 //! about, and the times of the jobs in flight.
 //!
@@ -25,15 +25,15 @@ use crate::task_set::{Dag, TaskSet};
 
 /// The statistics, and the jobs in flight.
 #[derive(Clone, Debug)]
-pub struct Tally {
+pub struct RunTally {
     task_set: Arc<TaskSet>,
-    dags: Box<[OfDag]>,
-    subtasks: Box<[OfSubtask]>,
+    dags: Box<[DagTally]>,
+    subtasks: Box<[SubtaskTally]>,
 }
 
 /// What is asked about a DAG.
 #[derive(Clone, Debug)]
-pub struct OfDag {
+pub struct DagTally {
     /// From the nominal release of a complete job to its last finish.
     pub response_time: Histogram,
     /// From the nominal release of a job to its release.
@@ -43,14 +43,14 @@ pub struct OfDag {
     /// The nominal release of the sporadic job that is being released.
     due_ns: u64,
     /// The jobs in flight, each at the first free place from its number's on.
-    open: Box<[Job]>,
+    open: Box<[JobInFlight]>,
     /// The instances of these jobs.
-    instances: Box<[Times]>,
+    instances: Box<[InstanceTimes]>,
 }
 
 /// What is asked about a subtask.
 #[derive(Clone, Debug)]
-pub struct OfSubtask {
+pub struct SubtaskTally {
     /// From the last predecessor's finish to the start.
     pub join_latency: Histogram,
     /// From the start to the finish, without the time of suspensions.
@@ -62,7 +62,7 @@ pub struct OfSubtask {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Job {
+struct JobInFlight {
     /// Its number and 1 more; 0: the place is free.
     number: u64,
     release_ns: u64,
@@ -71,7 +71,7 @@ struct Job {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Times {
+struct InstanceTimes {
     /// When it started or was resumed.
     since_ns: u64,
     executed_ns: u64,
@@ -79,20 +79,23 @@ struct Times {
     join_ns: u64,
 }
 
-impl Tally {
+impl RunTally {
     /// Makes an empty one whose histograms have `2^bits` buckets a doubling.
     #[must_use]
     pub fn new(task_set: &Arc<TaskSet>, bits: u32) -> Self {
-        let of_dag = |dag: &Dag| OfDag {
+        let of_dag = |dag: &Dag| DagTally {
             response_time: Histogram::new(bits),
             release_jitter: Histogram::new(bits),
             longest: (0, 0),
             due_ns: 0,
-            open: vec![Job::default(); dag.in_flight() as usize].into(),
-            instances: vec![Times::default(); dag.in_flight() as usize * dag.subtasks().len()]
-                .into(),
+            open: vec![JobInFlight::default(); dag.in_flight() as usize].into(),
+            instances: vec![
+                InstanceTimes::default();
+                dag.in_flight() as usize * dag.subtasks().len()
+            ]
+            .into(),
         };
-        let of_subtask = |is_sink: bool| OfSubtask {
+        let of_subtask = |is_sink: bool| SubtaskTally {
             join_latency: Histogram::new(bits),
             execution_time: Histogram::new(bits),
             beyond_wcet: 0,
@@ -113,8 +116,8 @@ impl Tally {
     #[must_use]
     pub fn size_of(task_set: &TaskSet, bits: u32) -> usize {
         let in_flight = |dag: &Dag| {
-            let job = size_of::<Job>() + dag.subtasks().len() * size_of::<Times>();
-            size_of::<OfDag>() + (dag.in_flight() as usize).saturating_mul(job)
+            let job = size_of::<JobInFlight>() + dag.subtasks().len() * size_of::<InstanceTimes>();
+            size_of::<DagTally>() + (dag.in_flight() as usize).saturating_mul(job)
         };
         let places: usize = task_set.dags().iter().map(in_flight).sum();
         let sinks = task_set.dags().iter().map(|dag| judged_sinks(dag).len());
@@ -128,7 +131,7 @@ impl Tally {
     ///
     /// If there is no such DAG.
     #[must_use]
-    pub fn dag(&self, dag: DagId) -> &OfDag {
+    pub fn dag(&self, dag: DagId) -> &DagTally {
         &self.dags[dag.index()]
     }
 
@@ -138,7 +141,7 @@ impl Tally {
     ///
     /// If there is no such subtask.
     #[must_use]
-    pub fn subtask(&self, vertex: Vertex) -> &OfSubtask {
+    pub fn subtask(&self, vertex: Vertex) -> &SubtaskTally {
         &self.subtasks[vertex.index()]
     }
 
@@ -160,7 +163,7 @@ impl Tally {
     /// Forgets the jobs in flight, because events of them are missing.
     pub fn skip(&mut self) {
         for dag in &mut self.dags {
-            dag.open.fill(Job::default());
+            dag.open.fill(JobInFlight::default());
         }
     }
 
@@ -203,7 +206,7 @@ impl Tally {
     }
 }
 
-impl OfDag {
+impl DagTally {
     /// Returns the longest response time of a complete job, and the job's number.
     #[must_use]
     pub const fn longest(&self) -> (u64, u64) {
@@ -226,12 +229,12 @@ impl OfDag {
         // There is a free place, for no more are in flight.
         let free = order.find(|&place| self.open[place].number == 0);
         let place = free.unwrap_or(first);
-        self.open[place] = Job {
+        self.open[place] = JobInFlight {
             number: event.job + 1,
             release_ns,
-            ..Job::default()
+            ..JobInFlight::default()
         };
-        self.instances[place * subtasks..][..subtasks].fill(Times::default());
+        self.instances[place * subtasks..][..subtasks].fill(InstanceTimes::default());
         let jitter_ns = event.time_ns.saturating_sub(release_ns);
         self.release_jitter.add(jitter_ns);
     }
@@ -246,7 +249,7 @@ impl OfDag {
                     self.response_time.add(response_ns);
                     self.longest = self.longest.max((response_ns, job.number - 1));
                 }
-                *job = Job::default();
+                *job = JobInFlight::default();
             }
             _ => {}
         }
@@ -258,7 +261,7 @@ impl OfDag {
         model: &Dag,
         instance: Instance,
         event: &Event,
-        statistics: &mut OfSubtask,
+        statistics: &mut SubtaskTally,
     ) {
         let subtasks = model.subtasks().len();
         let instances = &mut self.instances[place * subtasks..][..subtasks];

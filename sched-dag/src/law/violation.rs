@@ -9,10 +9,10 @@
 
 use core::fmt::{self, Display};
 
+use DetectionTime::{At, By};
 use Rule::{AndJoin, CompletionBoundary, Dispatch, JobCompletion, OneCore, OneLife, Release};
-use Shown::{At, By};
 
-use super::sweep::{Blame, Stage, Wrong};
+use super::sweep::{DispatchBreach, DispatchFault, DispatchState};
 use crate::ids::{CoreId, DagId, Instance, named};
 use crate::journal::{Event, EventKind};
 use crate::task_set::{Subtask, TaskSet};
@@ -44,7 +44,7 @@ texts! {
 
 /// When a violation shows.
 #[derive(Clone, Copy)]
-enum Shown<'v> {
+enum DetectionTime<'v> {
     /// At a time, in nanoseconds from the run's epoch.
     At(u64),
     /// By an event, with which its text begins.
@@ -57,7 +57,7 @@ worded! {
     /// Its text has the names of DAGs and subtasks if it is printed
     /// [`with_names`](Self::with_names).
     #[derive(Copy)]
-    pub enum Violation[names: Names<'_>] -> (Rule, Shown<'_>) {
+    pub enum Violation[names: NamedSubject<'_>] -> (Rule, DetectionTime<'_>) {
         /// R1: something of a job happened before its nominal release.
         BeforeRelease { event: Event, release_ns: u64 } = "before_release", (Release, By(event)),
             " before its release time {release_ns} ns";
@@ -170,7 +170,7 @@ worded! {
             names.job(*dag, *job);
         /// R5: an instance waited although a core was idle, or ran an instance that it outranks
         /// and could have replaced.
-        PassedOver(wrong: Wrong) = "passed_over", (Dispatch, At(shown_ns(wrong))),
+        PassedOver(wrong: DispatchBreach) = "passed_over", (Dispatch, At(shown_ns(wrong))),
             "{}", names.passed_over(wrong);
         /// R5: an instance was on a core that is not its cluster's.
         OutsideItsCluster { event: Event } = "outside_its_cluster", (Dispatch, By(event)),
@@ -179,7 +179,7 @@ worded! {
         LostItsCore { event: Event } = "lost_its_core", (Dispatch, By(event)),
             " although it keeps its core until it finishes";
         /// One life: what happened to an instance does not follow from what it was.
-        OutOfTurn { event: Event, stage: Stage } = "out_of_turn", (OneLife, By(event)),
+        OutOfTurn { event: Event, stage: DispatchState } = "out_of_turn", (OneLife, By(event)),
             " although it {}", does(*stage);
         /// One life: something happened to an instance before the event that comes first.
         Backwards { event: Event, before: EventKind, before_ns: u64 } =
@@ -218,10 +218,10 @@ impl Violation {
     /// Returns its text with the names of the model that was run, instead of numbers.
     #[must_use]
     pub fn with_names(self, task_set: &TaskSet) -> impl fmt::Display {
-        fmt::from_fn(move |f| self.tell(Names(Some(task_set)), f))
+        fmt::from_fn(move |f| self.tell(NamedSubject(Some(task_set)), f))
     }
 
-    fn tell(&self, names: Names<'_>, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn tell(&self, names: NamedSubject<'_>, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (rule, shown) = self.columns();
         write!(f, "at {} ns, {rule}: ", self.time_ns())?;
         if let By(event) = shown {
@@ -233,15 +233,15 @@ impl Violation {
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.tell(Names(None), f)
+        self.tell(NamedSubject(None), f)
     }
 }
 
 /// Writes a job or an instance with the names that it has, for people.
 #[derive(Clone, Copy)]
-pub(super) struct Names<'a>(pub(super) Option<&'a TaskSet>);
+pub(super) struct NamedSubject<'a>(pub(super) Option<&'a TaskSet>);
 
-impl Names<'_> {
+impl NamedSubject<'_> {
     pub(super) fn job(self, dag: DagId, job: u64) -> impl Display {
         let name = self.0.map_or("", |task_set| task_set.dag(dag).name());
         let dag = named("dag", dag.0, name);
@@ -290,9 +290,9 @@ impl Names<'_> {
         })
     }
 
-    pub(super) fn passed_over(self, wrong: &Wrong) -> impl Display {
+    pub(super) fn passed_over(self, wrong: &DispatchBreach) -> impl Display {
         fmt::from_fn(move |f| match *wrong {
-            Wrong::Waits {
+            DispatchBreach::Waits {
                 waiting,
                 length_ns,
                 blame,
@@ -301,14 +301,14 @@ impl Names<'_> {
                 let waiting = self.instance(waiting);
                 write!(f, "{waiting} should run and waits {length_ns} ns while ")?;
                 match blame {
-                    Blame::Runs(running, core) => {
+                    DispatchFault::Runs(running, core) => {
                         write!(f, "core {} runs {}", core.0, self.instance(running))
                     }
-                    Blame::Idle(Some(core)) => write!(f, "core {} is idle", core.0),
-                    Blame::Idle(None) => f.write_str("a core is idle"),
+                    DispatchFault::Idle(Some(core)) => write!(f, "core {} is idle", core.0),
+                    DispatchFault::Idle(None) => f.write_str("a core is idle"),
                 }
             }
-            Wrong::OutOfTurn {
+            DispatchBreach::OutOfTurn {
                 started,
                 core,
                 first,
@@ -327,10 +327,10 @@ impl Names<'_> {
 }
 
 /// Returns when a breach of R5 shows.
-const fn shown_ns(wrong: &Wrong) -> u64 {
+const fn shown_ns(wrong: &DispatchBreach) -> u64 {
     match *wrong {
-        Wrong::Waits { since_ns, .. } => since_ns,
-        Wrong::OutOfTurn { at_ns, .. } => at_ns,
+        DispatchBreach::Waits { since_ns, .. } => since_ns,
+        DispatchBreach::OutOfTurn { at_ns, .. } => at_ns,
     }
 }
 
@@ -357,12 +357,12 @@ pub(super) fn over(over_ns: Option<u64>) -> impl Display {
 }
 
 /// Returns what an instance at a stage does.
-pub(super) fn does(stage: Stage) -> impl Display {
+pub(super) fn does(stage: DispatchState) -> impl Display {
     fmt::from_fn(move |f| match stage {
-        Stage::Absent => f.write_str("never was ready"),
-        Stage::Ready => f.write_str("is ready and has not started"),
-        Stage::Running(core) => write!(f, "runs on core {}", core.0),
-        Stage::Suspended => f.write_str("is suspended"),
-        Stage::Over => f.write_str("is over already"),
+        DispatchState::Absent => f.write_str("never was ready"),
+        DispatchState::Ready => f.write_str("is ready and has not started"),
+        DispatchState::Running(core) => write!(f, "runs on core {}", core.0),
+        DispatchState::Suspended => f.write_str("is suspended"),
+        DispatchState::Over => f.write_str("is over already"),
     })
 }

@@ -7,8 +7,8 @@
 use common::random::Random;
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::{
-    Histogram, InstanceRecord, JobRecord, Record, Tally, Terms, Violation, dispatch_violations,
-    violations,
+    Histogram, InstanceRecord, JobRecord, JudgeOptions, RunRecord, RunTally, Violation,
+    dispatch_violations, violations,
 };
 use sched_dag::{DagId, Instance, JobOutcome, SubtaskId};
 
@@ -30,13 +30,13 @@ fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
 }
 
 /// What the rules say of a run in virtual time that has gone on to its end.
-const COMPLETE: Terms = Terms {
+const COMPLETE: JudgeOptions = JudgeOptions {
     is_complete: true,
-    ..Terms::EXACT
+    ..JudgeOptions::EXACT
 };
 
 /// Returns every breach of every rule.
-fn judged(run: &Run, set: &Set, terms: Terms, events: &[Event]) -> Vec<Violation> {
+fn judged(run: &Run, set: &Set, terms: JudgeOptions, events: &[Event]) -> Vec<Violation> {
     let events = events.iter().copied();
     let mut found = violations(&run.task_set, terms, events.clone());
     let of_dispatch = dispatch_violations(&run.task_set, &set.options, terms, events);
@@ -44,9 +44,9 @@ fn judged(run: &Run, set: &Set, terms: Terms, events: &[Event]) -> Vec<Violation
     found
 }
 
-fn record(run: &Run, is_whole: bool, from: usize) -> Record {
+fn record(run: &Run, is_whole: bool, from: usize) -> RunRecord {
     let events = run.events[from..].iter().copied();
-    Record::of_events(&run.task_set, is_whole, events).expect("it fits")
+    RunRecord::of_events(&run.task_set, is_whole, events).expect("it fits")
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn the_latest_events_have_the_latest_jobs_whole() {
         // At the very instant of the first event something may be missing.
         let after = |event: &Event| event.time_ns > run.events[from].time_ns;
         let rest: Vec<Event> = run.events.iter().copied().filter(after).collect();
-        let terms = Terms {
+        let terms = JudgeOptions {
             is_whole: false,
             ..COMPLETE
         };
@@ -141,7 +141,7 @@ fn a_whole_journal_keeps_all_rules_and_its_record_has_the_statistics() {
     for_each_run(|seed, _, set, run| {
         assert_eq!(judged(run, set, COMPLETE, &run.events), [], "seed {seed}");
         let record = record(run, true, 0);
-        let mut tally = Tally::new(&run.task_set, 5);
+        let mut tally = RunTally::new(&run.task_set, 5);
         run.events.iter().for_each(|event| tally.take(event));
         let same = |counted: &Histogram, times: Vec<u64>| {
             let counted = counted.distribution();
@@ -195,7 +195,7 @@ fn the_law_accepts_what_is_survived_and_nothing_else() {
         .run(driver(std::slice::from_ref(&right), PREEMPTIVE));
     let breaches = |spec, events: &[Event]| {
         let events = events.iter().copied();
-        violations(&commit(&[spec], PREEMPTIVE), Terms::EXACT, events)
+        violations(&commit(&[spec], PREEMPTIVE), JudgeOptions::EXACT, events)
     };
     assert_eq!(breaches(right.clone(), &run.events), []);
     let record = record(&run, true, 0);
@@ -224,7 +224,7 @@ fn the_law_accepts_what_is_survived_and_nothing_else() {
 fn the_law_finds_releases_that_are_too_close_and_those_of_no_signal() {
     let spec = support::dag(10, 10, 2, &[0], &[]).sporadic();
     let task_set = commit(&[spec], PREEMPTIVE);
-    let found = |text| violations(&task_set, Terms::whole(u64::MAX), events(text));
+    let found = |text| violations(&task_set, JudgeOptions::whole(u64::MAX), events(text));
     let expected = Violation::TooSoon {
         dag: DagId(0),
         job: 1,

@@ -8,7 +8,7 @@ use core::sync::atomic::Ordering::Relaxed;
 
 use fass::{Commit, CommitError, OverrunPolicy};
 use sched_dag::engine::Run;
-use sched_dag::law::Record;
+use sched_dag::law::RunRecord;
 use sched_dag::{DagId, DagStatistics, JobOutcome, TaskSet};
 
 use crate::dag::Use;
@@ -52,7 +52,7 @@ impl Scenario {
     pub fn judge_accounts<'a>(
         &self,
         task_set: &TaskSet,
-        record: &Record,
+        record: &RunRecord,
         statistics: impl Fn(DagId) -> &'a DagStatistics,
     ) -> Vec<String> {
         let pauses = |name| {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fass::{Preemption, SubtaskAttributes, create_dag, finish_create_dags};
-use sched_dag::law::{self, Terms};
+use sched_dag::law::{self, JudgeOptions};
 use sched_dag::lifecycle::Request;
 use sched_dag::{CoreId, DagId};
 
@@ -135,8 +135,8 @@ impl Stage {
         let journal = &state.engine.scheduler.log.journal;
         assert!(journal.is_whole());
         let (task_set, options) = (&state.engine.task_set, state.engine.scheduler.options());
-        let mut found = law::violations(task_set, Terms::whole(u64::MAX), journal.events());
-        let terms = Terms::whole(1_000_000_000);
+        let mut found = law::violations(task_set, JudgeOptions::whole(u64::MAX), journal.events());
+        let terms = JudgeOptions::whole(1_000_000_000);
         found.extend(law::dispatch_violations(
             task_set,
             &options,

@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::replay::{stage_after, stage_before};
-use super::sweep::{Model, Stage, Sweep, Waits};
-use super::{Terms, Violation};
+use super::sweep::{DispatchModel, DispatchState, DispatchSweep, WaitCounts};
+use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, EventKind};
 use crate::policy::{OnFault, SchedulerOptions};
@@ -14,11 +14,11 @@ use crate::task_set::TaskSet;
 
 /// What a journal shows of R5.
 #[derive(Clone, Debug, Default)]
-pub struct Dispatch {
+pub struct DispatchReport {
     /// Every breach.
     pub violations: Vec<Violation>,
     /// How long instances waited.
-    pub waits: Waits,
+    pub waits: WaitCounts,
 }
 
 /// Holds a journal against R5: no instance is owed a core for longer than the terms
@@ -31,17 +31,17 @@ pub struct Dispatch {
 pub fn judge_dispatch(
     task_set: &TaskSet,
     options: &SchedulerOptions,
-    terms: Terms,
+    terms: JudgeOptions,
     events: impl Iterator<Item = Event> + Clone,
-) -> Dispatch {
+) -> DispatchReport {
     let first_ns = events.clone().next().map_or(0, |event| event.time_ns);
     let end_ns = events.clone().map(|event| event.time_ns).max().unwrap_or(0);
-    let mut all = Dispatch::default();
+    let mut all = DispatchReport::default();
     for cluster in task_set.clusters() {
         let is_of_it = |event: &Event| task_set.dag(event.dag).cluster() == cluster;
         let events = events.clone().filter(is_of_it);
         let due = events.clone().filter(|event| event.what == EventKind::Due);
-        let mut model = Model {
+        let mut model = DispatchModel {
             task_set,
             options,
             cores: task_set.cores_of(cluster, options.cores),
@@ -57,18 +57,18 @@ pub fn judge_dispatch(
 
 /// Judges the events of one cluster's DAGs, in a journal that begins and ends then.
 fn of_cluster(
-    model: &Model<'_>,
-    terms: Terms,
+    model: &DispatchModel<'_>,
+    terms: JudgeOptions,
     (first_ns, end_ns): (u64, u64),
     events: impl Iterator<Item = Event> + Clone,
-    Dispatch { violations, waits }: &mut Dispatch,
+    DispatchReport { violations, waits }: &mut DispatchReport,
 ) {
     let cores = model.cores.clone();
     let (mut known, before) = match terms.is_whole {
         true => (cores.map(CoreId).collect(), BTreeMap::new()),
         false => before(cores, events.clone()),
     };
-    let mut sweep = Sweep::new(model, terms.tolerance_ns, first_ns, waits);
+    let mut sweep = DispatchSweep::new(model, terms.tolerance_ns, first_ns, waits);
     sweep.known_cores = known.len();
     for (instance, stage) in before {
         sweep.enter(instance, stage);
@@ -98,7 +98,7 @@ fn of_cluster(
 pub fn dispatch_violations(
     task_set: &TaskSet,
     options: &SchedulerOptions,
-    terms: Terms,
+    terms: JudgeOptions,
     events: impl Iterator<Item = Event> + Clone,
 ) -> Vec<Violation> {
     judge_dispatch(task_set, options, terms, events).violations
@@ -109,9 +109,9 @@ pub fn dispatch_violations(
 fn before(
     cores: Range<u32>,
     events: impl Iterator<Item = Event>,
-) -> (BTreeSet<CoreId>, BTreeMap<Instance, Stage>) {
+) -> (BTreeSet<CoreId>, BTreeMap<Instance, DispatchState>) {
     let mut first_of_core: BTreeMap<CoreId, EventKind> = BTreeMap::new();
-    let mut first_of_instance: BTreeMap<Instance, Stage> = BTreeMap::new();
+    let mut first_of_instance: BTreeMap<Instance, DispatchState> = BTreeMap::new();
     for event in events.filter(|event| event.what != EventKind::Request) {
         if let Some(instance) = event.instance() {
             let stage = first_of_instance.entry(instance);
@@ -128,7 +128,7 @@ fn before(
 }
 
 /// Returns what was on a core of another cluster, or lost a core that it keeps.
-fn wrong_cores(model: &Model<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
+fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
     let found = events.filter_map(|event| {
         if event.what.is_of_machine() && !model.cores.contains(&event.core.0) {
             return Some(Violation::OutsideItsCluster { event });

@@ -80,7 +80,7 @@ fn must(task_set: &TaskSet, cores: u32, schedule: &str, expected: &[&str]) {
             cores,
         };
         let events = events(schedule).into_iter();
-        let found = dispatch_violations(task_set, &options, Terms::EXACT, events);
+        let found = dispatch_violations(task_set, &options, JudgeOptions::EXACT, events);
         let found: Vec<_> = found.iter().map(ToString::to_string).collect();
         assert_eq!(found, expected, "{policy:?}");
     }
@@ -131,7 +131,7 @@ fn r5_lets_a_started_instance_keep_its_core() {
 #[test]
 fn finds_a_core_or_an_instance_in_two_places() {
     let overlap = events("0 2: 0@0 0-4, 1@0 2-6");
-    let found = crate::law::violations(&dags(&[0, 0], false), Terms::EXACT, overlap);
+    let found = crate::law::violations(&dags(&[0, 0], false), JudgeOptions::EXACT, overlap);
     let found: Vec<_> = found.iter().map(ToString::to_string).collect();
     let not_free = "at 2 ns, one core: core 0 runs subtask 0 of dag 1 job 0 while it still runs \
                     subtask 0 of dag 0 job 0";

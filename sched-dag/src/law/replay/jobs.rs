@@ -36,31 +36,31 @@
 
 use alloc::vec::Vec;
 
-use super::{Life, Moment, OfDag, Replay};
+use super::{DagReplay, InstanceLife, JournalReplay, StepTime};
 use crate::ids::{DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind};
-use crate::law::sweep::Stage;
+use crate::law::sweep::DispatchState;
 use crate::law::{Violation, latest};
 
 /// What is known of a job.
 #[derive(Default)]
-pub(super) struct Job {
+pub(super) struct JobState {
     /// The nominal release; `None` for a sporadic job until it is released.
     pub(super) release_ns: Option<u64>,
     /// Whether its release may be among the events that are lost.
     pub(super) is_partial: bool,
-    pub(super) released: Option<Moment>,
-    queued: Option<Moment>,
-    skipped: Option<Moment>,
+    pub(super) released: Option<StepTime>,
+    queued: Option<StepTime>,
+    skipped: Option<StepTime>,
     /// When it was aborted, or a fault has cut it.
-    pub(super) cut: Option<Moment>,
-    pub(super) missed: Option<Moment>,
-    pub(super) completed: Option<Moment>,
+    pub(super) cut: Option<StepTime>,
+    pub(super) missed: Option<StepTime>,
+    pub(super) completed: Option<StepTime>,
     /// By subtask, as far as there is one.
-    lives: Vec<Option<Life>>,
+    lives: Vec<Option<InstanceLife>>,
 }
 
-impl Job {
+impl JobState {
     pub(super) fn partial(release_ns: Option<u64>) -> Self {
         Self {
             release_ns,
@@ -70,20 +70,24 @@ impl Job {
     }
 
     /// Returns what is known of an instance.
-    pub(super) fn life(&self, subtask: SubtaskId) -> Option<&Life> {
+    pub(super) fn life(&self, subtask: SubtaskId) -> Option<&InstanceLife> {
         self.lives.get(subtask.index())?.as_ref()
     }
 
     /// Returns what is known of an instance, whose life begins at a stage if nothing is.
-    pub(super) fn life_from(&mut self, subtask: SubtaskId, first: Stage) -> &mut Life {
+    pub(super) fn life_from(
+        &mut self,
+        subtask: SubtaskId,
+        first: DispatchState,
+    ) -> &mut InstanceLife {
         if self.lives.len() <= subtask.index() {
             self.lives.resize_with(subtask.index() + 1, || None);
         }
-        self.lives[subtask.index()].get_or_insert_with(|| Life::new(first))
+        self.lives[subtask.index()].get_or_insert_with(|| InstanceLife::new(first))
     }
 
     /// Takes note of an event; that it happens twice is a breach.
-    fn note(&mut self, event: &Event, moment: Moment) -> Option<Violation> {
+    fn note(&mut self, event: &Event, moment: StepTime) -> Option<Violation> {
         let place = match event.what {
             EventKind::Released => &mut self.released,
             EventKind::Queued => &mut self.queued,
@@ -112,7 +116,7 @@ impl Job {
     }
 }
 
-impl OfDag {
+impl DagReplay {
     /// Forgets the jobs before a complete one that are over.
     fn forget_before(&mut self, job: u64) {
         while let Some(first) = self.jobs.first_entry()
@@ -131,7 +135,7 @@ impl OfDag {
     }
 }
 
-impl Replay<'_> {
+impl JournalReplay<'_> {
     /// Takes what happens to a job that is due.
     pub(super) fn release(&mut self, event: &Event) {
         let event = *event;
@@ -294,18 +298,18 @@ impl Replay<'_> {
     }
 
     /// R4: complete with the last instance, in its step.
-    fn completed_at_wrong_time(&self, event: &Event, completed: Moment) -> Option<Violation> {
+    fn completed_at_wrong_time(&self, event: &Event, completed: StepTime) -> Option<Violation> {
         let event = *event;
         let Event { dag, job, .. } = event;
         let of_dag = &self.dags[dag.index()];
         let known = of_dag.jobs.get(&job)?;
         let mut last = completed;
         let mut last_ns = 0;
-        let is_same_step = |moment: Moment| moment.is_same_step(completed);
+        let is_same_step = |moment: StepTime| moment.is_same_step(completed);
         let mut has_cause = known.cut.is_some_and(is_same_step);
         for subtask in (0..self.subtasks(dag)).map(SubtaskId) {
             let life = known.life(subtask);
-            match life.and_then(Life::over) {
+            match life.and_then(InstanceLife::over) {
                 Some(over) if over.time_ns <= completed.time_ns => {
                     if over.time_ns >= last_ns {
                         (last, last_ns) = (over, over.time_ns);
@@ -363,23 +367,23 @@ impl Replay<'_> {
 }
 
 /// The absolute deadline of a sink, and its finish.
-struct Due {
+struct SinkDeadline {
     deadline_ns: u64,
     finish_ns: Option<u64>,
 }
 
-impl Due {
+impl SinkDeadline {
     fn is_met(&self) -> bool {
         (self.finish_ns).is_some_and(|finish_ns| finish_ns <= self.deadline_ns)
     }
 }
 
-impl Replay<'_> {
+impl JournalReplay<'_> {
     /// Returns what is due of a job; `None` if it is not known since when.
-    fn dues(&self, dag: DagId, known: &Job) -> Option<Vec<Due>> {
+    fn dues(&self, dag: DagId, known: &JobState) -> Option<Vec<SinkDeadline>> {
         let release_ns = known.release_ns?;
         let model = self.task_set.dag(dag);
-        let due = |sink: &SubtaskId| Due {
+        let due = |sink: &SubtaskId| SinkDeadline {
             deadline_ns: release_ns.saturating_add(model.subtask(*sink).relative_deadline_ns()),
             finish_ns: (known.life(*sink))
                 .and_then(|life| life.finish)
@@ -420,7 +424,7 @@ impl Replay<'_> {
             job,
             subtask: None,
         };
-        let may_be_meant = |due: &&Due| {
+        let may_be_meant = |due: &&SinkDeadline| {
             let finish_ns = due.finish_ns.filter(|_| due.is_met());
             finish_ns.is_none_or(|finish_ns| self.is_tolerable(finish_ns, missed.time_ns))
         };
@@ -448,7 +452,7 @@ impl Replay<'_> {
 
     /// Reports whether what followed from one of the deadlines may be among the events
     /// that are lost: the job's miss, or an abort before.
-    fn may_be_lost(&self, dues: &[Due]) -> bool {
+    fn may_be_lost(&self, dues: &[SinkDeadline]) -> bool {
         let earliest_ns = dues.iter().map(|due| due.deadline_ns).min();
         !self.terms.is_whole && earliest_ns < self.first_ns
     }
@@ -479,18 +483,18 @@ impl Replay<'_> {
 }
 
 /// A condition of an instance.
-struct Condition {
+struct InstanceCondition {
     /// The instance that must be over; `None`: the release.
     awaited: Option<Instance>,
     /// When it held; `None`: it is not known to have held.
-    held: Option<Moment>,
+    held: Option<StepTime>,
     /// Whether it may have held without leaving an event.
     may_be_lost: bool,
 }
 
-impl Replay<'_> {
+impl JournalReplay<'_> {
     /// Judges that an instance becomes ready, or starts without having been.
-    pub(super) fn join(&mut self, event: &Event, instance: Instance, moment: Moment) {
+    pub(super) fn join(&mut self, event: &Event, instance: Instance, moment: StepTime) {
         let too_early = self.before_release(event, instance);
         self.found.extend(too_early);
         let too_early = self.before_join(event, instance);
@@ -506,7 +510,7 @@ impl Replay<'_> {
             return;
         };
         let mut conditions = self.conditions(instance);
-        let is_same_step = |held: Moment| held.is_same_step(moment);
+        let is_same_step = |held: StepTime| held.is_same_step(moment);
         let has_cause = conditions.any(|condition| condition.held.is_some_and(is_same_step));
         drop(conditions);
         let (event, since_ns) = (*event, held.time_ns);
@@ -525,7 +529,7 @@ impl Replay<'_> {
         }
     }
 
-    fn conditions(&self, instance: Instance) -> impl Iterator<Item = Condition> {
+    fn conditions(&self, instance: Instance) -> impl Iterator<Item = InstanceCondition> {
         let Instance { dag, job, subtask } = instance;
         let predecessors = self.task_set.dag(dag).predecessors(subtask);
         let of_dag = &self.dags[dag.index()];
@@ -533,7 +537,7 @@ impl Replay<'_> {
         let is_partial = known.is_none_or(|known| known.is_partial);
         let of_predecessors = predecessors.iter().map(move |&subtask| {
             let life = known.and_then(|known| known.life(subtask));
-            Condition {
+            InstanceCondition {
                 awaited: Some(Instance { dag, job, subtask }),
                 held: life.and_then(|life| life.finish),
                 may_be_lost: life.is_none() && is_partial,
@@ -542,13 +546,13 @@ impl Replay<'_> {
         let precursor = of_dag.jobs.range(..job).next_back();
         let of_precursor = precursor.map(|(&job, known)| {
             let life = known.life(subtask);
-            Condition {
+            InstanceCondition {
                 awaited: Some(Instance { dag, job, subtask }),
-                held: life.and_then(super::Life::over),
+                held: life.and_then(super::InstanceLife::over),
                 may_be_lost: life.is_none() && (known.is_partial || of_dag.is_stopped),
             }
         });
-        let of_release = predecessors.is_empty().then(|| Condition {
+        let of_release = predecessors.is_empty().then(|| InstanceCondition {
             awaited: None,
             held: known.and_then(|known| known.released),
             may_be_lost: true,
@@ -557,9 +561,9 @@ impl Replay<'_> {
     }
 
     /// Returns the condition that held last, if all are known to have held.
-    fn last_condition(&self, instance: Instance) -> Option<Condition> {
-        let mut last: Option<Condition> = None;
-        let rank = |condition: &Condition| {
+    fn last_condition(&self, instance: Instance) -> Option<InstanceCondition> {
+        let mut last: Option<InstanceCondition> = None;
+        let rank = |condition: &InstanceCondition| {
             let time_ns = condition.held.map(|held| held.time_ns);
             (time_ns, condition.awaited.is_some())
         };

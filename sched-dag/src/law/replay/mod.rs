@@ -32,17 +32,17 @@ mod jobs;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use super::sweep::Stage;
-use super::{Terms, Violation};
+use super::sweep::DispatchState;
+use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind};
 use crate::policy::OnFault;
 use crate::task_set::TaskSet;
-use jobs::Job;
+use jobs::JobState;
 
 /// What a journal shows of R1 to R4, of lives and of cores.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Verdict {
+pub struct ReplayVerdict {
     /// Every breach, in the order in which they were found.
     pub violations: Vec<Violation>,
     /// The longest time from a finish that an instance waited for last to its
@@ -56,11 +56,19 @@ pub struct Verdict {
 /// Which instance should have run is judged by
 /// [`dispatch_violations`](super::dispatch_violations).
 #[must_use]
-pub fn judge(task_set: &TaskSet, terms: Terms, events: impl IntoIterator<Item = Event>) -> Verdict {
-    let mut replay = Replay {
+pub fn judge(
+    task_set: &TaskSet,
+    terms: JudgeOptions,
+    events: impl IntoIterator<Item = Event>,
+) -> ReplayVerdict {
+    let mut replay = JournalReplay {
         task_set,
         terms,
-        dags: task_set.dags().iter().map(|_| OfDag::default()).collect(),
+        dags: task_set
+            .dags()
+            .iter()
+            .map(|_| DagReplay::default())
+            .collect(),
         cores: Vec::new(),
         first_ns: None,
         end_ns: 0,
@@ -71,7 +79,7 @@ pub fn judge(task_set: &TaskSet, terms: Terms, events: impl IntoIterator<Item = 
         replay.take(&event);
     }
     replay.end();
-    Verdict {
+    ReplayVerdict {
         violations: replay.found,
         finish_to_ready_max_ns: replay.finish_to_ready_max_ns,
     }
@@ -81,17 +89,17 @@ pub fn judge(task_set: &TaskSet, terms: Terms, events: impl IntoIterator<Item = 
 #[must_use]
 pub fn violations(
     task_set: &TaskSet,
-    terms: Terms,
+    terms: JudgeOptions,
     events: impl IntoIterator<Item = Event>,
 ) -> Vec<Violation> {
     judge(task_set, terms, events).violations
 }
 
-struct Replay<'a> {
+struct JournalReplay<'a> {
     task_set: &'a TaskSet,
-    terms: Terms,
-    dags: Vec<OfDag>,
-    cores: Vec<OfCore>,
+    terms: JudgeOptions,
+    dags: Vec<DagReplay>,
+    cores: Vec<CoreReplay>,
     /// The time at which the first event was written.
     first_ns: Option<u64>,
     /// The latest time so far.
@@ -101,11 +109,11 @@ struct Replay<'a> {
 }
 
 #[derive(Default)]
-struct OfDag {
+struct DagReplay {
     /// The jobs that are released, or partial, and not forgotten.
-    jobs: BTreeMap<u64, Job>,
+    jobs: BTreeMap<u64, JobState>,
     /// The jobs that are due and not released.
-    waiting: BTreeMap<u64, Job>,
+    waiting: BTreeMap<u64, JobState>,
     /// How many jobs were released and are not complete.
     in_flight: u32,
     /// All jobs before this one are forgotten or not complete.
@@ -124,7 +132,7 @@ struct OfDag {
 }
 
 #[derive(Clone, Default)]
-struct OfCore {
+struct CoreReplay {
     /// Counts its machine events.
     step: u64,
     /// What it runs.
@@ -133,19 +141,19 @@ struct OfCore {
 
 /// When and in which step of the scheduler something happened.
 #[derive(Clone, Copy)]
-struct Moment {
+struct StepTime {
     time_ns: u64,
     core: CoreId,
     step: u64,
 }
 
-impl Moment {
+impl StepTime {
     fn is_same_step(self, other: Self) -> bool {
         (self.core, self.step) == (other.core, other.step)
     }
 }
 
-impl Replay<'_> {
+impl JournalReplay<'_> {
     fn take(&mut self, event: &Event) {
         // The time of these may be before that of events that are lost.
         if !matches!(event.what, EventKind::Finish | EventKind::Due) {
@@ -165,19 +173,19 @@ impl Replay<'_> {
         }
     }
 
-    fn dag(&mut self, dag: DagId) -> &mut OfDag {
+    fn dag(&mut self, dag: DagId) -> &mut DagReplay {
         &mut self.dags[dag.index()]
     }
 
-    fn core(&mut self, core: CoreId) -> &mut OfCore {
+    fn core(&mut self, core: CoreId) -> &mut CoreReplay {
         if self.cores.len() <= core.index() {
-            self.cores.resize(core.index() + 1, OfCore::default());
+            self.cores.resize(core.index() + 1, CoreReplay::default());
         }
         &mut self.cores[core.index()]
     }
 
-    fn moment(&mut self, event: &Event) -> Moment {
-        Moment {
+    fn moment(&mut self, event: &Event) -> StepTime {
+        StepTime {
             time_ns: event.time_ns,
             core: event.core,
             step: self.core(event.core).step,
@@ -209,7 +217,7 @@ impl Replay<'_> {
         let is_over = job < of_dag.forgotten;
         let is_partial = may_be_lost && !is_over && !of_dag.waiting.contains_key(&job);
         // In both cases nothing is concluded from what is not there of it.
-        of_dag.jobs.insert(job, Job::partial(release_ns));
+        of_dag.jobs.insert(job, JobState::partial(release_ns));
         if !is_partial {
             let event = *event;
             self.found.push(match is_over {
@@ -237,18 +245,18 @@ impl Replay<'_> {
 }
 
 /// What is known of an instance.
-struct Life {
-    stage: Stage,
+struct InstanceLife {
+    stage: DispatchState,
     /// What happened to it last, and when.
     last: Option<(EventKind, u64)>,
-    ready: Option<Moment>,
-    finish: Option<Moment>,
+    ready: Option<StepTime>,
+    finish: Option<StepTime>,
     /// When it was cancelled, or ended by a fault.
-    dropped: Option<Moment>,
+    dropped: Option<StepTime>,
 }
 
-impl Life {
-    const fn new(stage: Stage) -> Self {
+impl InstanceLife {
+    const fn new(stage: DispatchState) -> Self {
         Self {
             stage,
             last: None,
@@ -259,12 +267,12 @@ impl Life {
     }
 
     /// Returns when the instance was over: finished, cancelled or ended.
-    fn over(&self) -> Option<Moment> {
+    fn over(&self) -> Option<StepTime> {
         self.finish.or(self.dropped)
     }
 
     /// Takes note of an event, whether it is allowed or not, and says what is wrong.
-    fn note(&mut self, event: &Event, moment: Moment) -> Option<Violation> {
+    fn note(&mut self, event: &Event, moment: StepTime) -> Option<Violation> {
         let (stage, last) = (self.stage, self.last);
         self.stage = stage_after(event);
         self.last = Some((event.what, event.time_ns));
@@ -292,39 +300,41 @@ impl Life {
     }
 }
 
-fn is_allowed(stage: Stage, event: &Event) -> bool {
+fn is_allowed(stage: DispatchState, event: &Event) -> bool {
     match (stage, event.what) {
-        (Stage::Absent, EventKind::Ready | EventKind::Cancelled)
-        | (Stage::Ready, EventKind::Start | EventKind::Cancelled)
-        | (Stage::Suspended, EventKind::Resume)
+        (DispatchState::Absent, EventKind::Ready | EventKind::Cancelled)
+        | (DispatchState::Ready, EventKind::Start | EventKind::Cancelled)
+        | (DispatchState::Suspended, EventKind::Resume)
         // Whichever core finds the fault, or stops the DAG, ends the instance.
-        | (Stage::Running(_) | Stage::Suspended, EventKind::Ended) => true,
-        (Stage::Running(core), EventKind::Suspend | EventKind::Finish) => core == event.core,
+        | (DispatchState::Running(_) | DispatchState::Suspended, EventKind::Ended) => true,
+        (DispatchState::Running(core), EventKind::Suspend | EventKind::Finish) => core == event.core,
         _ => false,
     }
 }
 
 /// Returns what an instance is after an event.
-pub(super) const fn stage_after(event: &Event) -> Stage {
+pub(super) const fn stage_after(event: &Event) -> DispatchState {
     match event.what {
-        EventKind::Ready => Stage::Ready,
-        EventKind::Start | EventKind::Resume => Stage::Running(event.core),
-        EventKind::Suspend => Stage::Suspended,
-        _ => Stage::Over,
+        EventKind::Ready => DispatchState::Ready,
+        EventKind::Start | EventKind::Resume => DispatchState::Running(event.core),
+        EventKind::Suspend => DispatchState::Suspended,
+        _ => DispatchState::Over,
     }
 }
 
 /// Returns what an instance must have been before its first known event.
-pub(super) const fn stage_before(event: &Event) -> Stage {
+pub(super) const fn stage_before(event: &Event) -> DispatchState {
     match event.what {
-        EventKind::Start => Stage::Ready,
-        EventKind::Resume => Stage::Suspended,
-        EventKind::Suspend | EventKind::Finish | EventKind::Ended => Stage::Running(event.core),
-        _ => Stage::Absent,
+        EventKind::Start => DispatchState::Ready,
+        EventKind::Resume => DispatchState::Suspended,
+        EventKind::Suspend | EventKind::Finish | EventKind::Ended => {
+            DispatchState::Running(event.core)
+        }
+        _ => DispatchState::Absent,
     }
 }
 
-impl Replay<'_> {
+impl JournalReplay<'_> {
     /// Takes what happens to an instance.
     fn instance(&mut self, event: &Event) {
         let Some(instance) = event.instance() else {
@@ -342,7 +352,7 @@ impl Replay<'_> {
         };
         let first = match job.is_partial {
             true => stage_before(event),
-            false => Stage::Absent,
+            false => DispatchState::Absent,
         };
         if event.what == EventKind::Restarted {
             job.cut.get_or_insert(moment);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sched_dag::law::Record;
+use sched_dag::law::RunRecord;
 use sched_dag::virtual_time::{RunOutcome, VirtualTime};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, Preemption, Priority,
@@ -80,7 +80,7 @@ pub(crate) fn observe(
     let end = driver.run_until(until_ns, &mut script);
     assert!(!matches!(end, RunOutcome::TimeOverflow(_)), "{end:?}");
     let events = driver.events().into_iter();
-    let record = Record::of_events(task_set, true, events).expect("it fits");
+    let record = RunRecord::of_events(task_set, true, events).expect("it fits");
     let (mut dags, mut subtasks) = (Vec::new(), Vec::new());
     for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
         let (mut largest, mut of_subtasks) = (0, vec![0; dag.subtasks().len()]);

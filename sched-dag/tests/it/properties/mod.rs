@@ -16,7 +16,7 @@ use crate::support::{Script, driver, number};
 use common::random::Random;
 use releases::SAID;
 use sched_dag::journal::EventKind;
-use sched_dag::law::{Terms, dispatch_violations, violations};
+use sched_dag::law::{JudgeOptions, dispatch_violations, violations};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Instance};
 use walk::{Step, Walk};
@@ -155,8 +155,9 @@ fn virtual_time_keeps_the_rules_where_instances_fail() {
             .asking(signals)
             .run(driver(&set.specs(), set.options));
         let events = || run.events.iter().copied();
-        let found = violations(&run.task_set, Terms::EXACT, events());
-        let of_dispatch = dispatch_violations(&run.task_set, &set.options, Terms::EXACT, events());
+        let found = violations(&run.task_set, JudgeOptions::EXACT, events());
+        let of_dispatch =
+            dispatch_violations(&run.task_set, &set.options, JudgeOptions::EXACT, events());
         match found.first().or(of_dispatch.first()) {
             None => Ok(()),
             Some(first) => Err(first.to_string()),

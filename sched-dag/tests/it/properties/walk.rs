@@ -11,8 +11,10 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use sched_dag::journal::EventKind;
-use sched_dag::law::sweep::Stage;
-use sched_dag::law::{JobRecord, Record, Terms, Violation, dispatch_violations, violations};
+use sched_dag::law::sweep::DispatchState;
+use sched_dag::law::{
+    JobRecord, JudgeOptions, RunRecord, Violation, dispatch_violations, violations,
+};
 use sched_dag::lifecycle::Request;
 use sched_dag::{CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler};
 
@@ -259,9 +261,9 @@ impl<'s> Walk<'s> {
 
     /// Returns what the law finds in all that has happened.
     pub(crate) fn judged(&self, is_complete: bool) -> Result<(), String> {
-        let terms = Terms {
+        let terms = JudgeOptions {
             is_complete,
-            ..Terms::EXACT
+            ..JudgeOptions::EXACT
         };
         let task_set = self.scheduler.task_set();
         let events = || self.scheduler.log.journal.events();
@@ -285,7 +287,7 @@ impl<'s> Walk<'s> {
     fn counted_misses(&self) -> Result<(), String> {
         let task_set = self.scheduler.task_set();
         let events = self.scheduler.log.journal.events();
-        let record = Record::of_events(task_set, true, events).expect("it is short");
+        let record = RunRecord::of_events(task_set, true, events).expect("it is short");
         for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
             let statistics = self.scheduler.statistics(dag);
             if statistics.skips + statistics.dropped > 0 {
@@ -321,7 +323,7 @@ fn is_of_lateness(violation: &Violation) -> bool {
         | Violation::StillQueued { .. }
         | Violation::MissedLate { .. } => true,
         Violation::OutOfTurn { event, stage } => {
-            event.what == EventKind::Finish && *stage == Stage::Suspended
+            event.what == EventKind::Finish && *stage == DispatchState::Suspended
         }
         _ => false,
     }

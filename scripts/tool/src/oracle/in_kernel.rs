@@ -35,7 +35,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use replay::{Case, Epoch, Scale, build};
-use sched_dag::law::Record;
+use sched_dag::law::RunRecord;
 
 use super::schedules::{self, Deviation, compare};
 use super::{equal, read};
@@ -386,7 +386,7 @@ fn compare_run(
         ));
     }
     let events = run.events.iter().copied();
-    let record = Record::of_events(&run.task_set, true, events).ok_or("too many jobs")?;
+    let record = RunRecord::of_events(&run.task_set, true, events).ok_or("too many jobs")?;
     let (unit_ns, tolerance_ns) = (settings.scale().unit_ns, settings.tolerance_ns());
     let deviation = compare(case, &run.task_set, &record, unit_ns, tolerance_ns)?;
     for what in ["violations", "allocations"] {

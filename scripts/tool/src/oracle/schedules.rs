@@ -10,7 +10,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-use sched_dag::law::{InstanceRecord, JobRecord, Record};
+use sched_dag::law::{InstanceRecord, JobRecord, RunRecord};
 use sched_dag::virtual_time::{ExecutionTimes, RunOutcome, VirtualTime};
 use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, TaskSet};
 
@@ -71,7 +71,7 @@ pub fn check(case: &Case) -> Result<(), String> {
         return Err("some jobs have not ended".to_owned());
     }
     let events = run.events().into_iter();
-    let record = Record::of_events(&case.task_set, true, events).ok_or("too many jobs")?;
+    let record = RunRecord::of_events(&case.task_set, true, events).ok_or("too many jobs")?;
     compare(case, &case.task_set, &record, 1, 0).map(drop)
 }
 
@@ -84,7 +84,7 @@ pub fn check(case: &Case) -> Result<(), String> {
 pub fn compare(
     case: &Case,
     task_set: &TaskSet,
-    record: &Record,
+    record: &RunRecord,
     unit_ns: u64,
     tolerance_ns: u64,
 ) -> Result<Deviation, String> {

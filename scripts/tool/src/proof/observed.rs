@@ -16,7 +16,7 @@ use std::path::Path;
 
 use recording::Counted;
 use sched_dag::analysis::Overheads;
-use sched_dag::law::{Costs, Distribution};
+use sched_dag::law::{Distribution, MeasuredCosts};
 use sched_dag::wcets::{self, records};
 
 use crate::files;
@@ -117,7 +117,7 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
 
 /// What was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Measured(pub Costs);
+pub struct Measured(pub MeasuredCosts);
 
 /// Measures the runs of a guest.
 ///
@@ -125,7 +125,7 @@ pub struct Measured(pub Costs);
 ///
 /// In words: the log has no trace, or a damaged one.
 pub fn measure(runs: &[Run]) -> Result<Measured, String> {
-    let costs = runs.iter().map(of_run).reduce(|one, other| Costs {
+    let costs = runs.iter().map(of_run).reduce(|one, other| MeasuredCosts {
         dispatches: one.dispatches + other.dispatches,
         owed_ns: one.owed_ns.max(other.owed_ns),
         releases: one.releases + other.releases,
@@ -136,12 +136,12 @@ pub fn measure(runs: &[Run]) -> Result<Measured, String> {
         .ok_or_else(|| "the guest has run nothing".into())
 }
 
-fn of_run(run: &Run) -> Costs {
+fn of_run(run: &Run) -> MeasuredCosts {
     let figures = trace::check(run, u64::MAX).figures;
-    Costs {
+    MeasuredCosts {
         dispatches: figures.instances as u64,
         owed_ns: figures.longest_inversion_ns,
-        ..Costs::of_releases(&run.task_set, run.events.iter().copied())
+        ..MeasuredCosts::of_releases(&run.task_set, run.events.iter().copied())
     }
 }
 

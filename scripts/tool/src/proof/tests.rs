@@ -5,7 +5,7 @@ use std::path::Path;
 
 use recording::{Commit, Counted, DagTimes, SubtaskTimes, Times, Writer};
 use sched_dag::DagId;
-use sched_dag::law::Costs;
+use sched_dag::law::MeasuredCosts;
 
 use super::observed::OfDag;
 use super::report::{Row, complaint, rows, summary, table};
@@ -194,7 +194,7 @@ fn the_longest_waits_of_a_run_are_what_is_charged() {
         120 finish c0 0.1.0\n 120 completed c0 0.1";
     let record = record_of("", &commit("edf 1\nx T=100 D=100 O=0: a/0/50"), events);
     let measured = observed::measure(&Record::read(&record).unwrap().runs).unwrap();
-    let expected = Costs {
+    let expected = MeasuredCosts {
         dispatches: 2,
         owed_ns: 7,
         releases: 2,

@@ -12,7 +12,7 @@ use recording::{Chunk, Commit, CommittedDag, Events, MAGIC, Recording, Times};
 use sched_dag::analysis::{self, AnalysisSettings, Overheads};
 use sched_dag::chains::SampledEdge;
 use sched_dag::journal::{Event, EventKind};
-use sched_dag::law::Terms;
+use sched_dag::law::JudgeOptions;
 use sched_dag::{
     Activation, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, CoreId, DagId, DagSpec,
     FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskId,
@@ -530,8 +530,8 @@ pub struct Run {
 impl Run {
     /// Returns on which terms it is judged, by a bound in nanoseconds.
     #[must_use]
-    pub const fn terms(&self, bound_ns: u64) -> Terms {
-        Terms {
+    pub const fn terms(&self, bound_ns: u64) -> JudgeOptions {
+        JudgeOptions {
             is_whole: self.lost == 0,
             is_complete: self.complete,
             tolerance_ns: bound_ns,

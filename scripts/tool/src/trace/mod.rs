@@ -42,7 +42,7 @@ use std::process::ExitCode;
 
 use sched_dag::chains::{Chain, SubtaskRef};
 use sched_dag::journal::{Event, EventKind};
-use sched_dag::law::sweep::Waits;
+use sched_dag::law::sweep::WaitCounts;
 use sched_dag::law::{self, Distribution, Violation};
 use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
 
@@ -467,7 +467,7 @@ pub struct Figures {
 }
 
 /// Computes the figures of a run.
-fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: Waits) -> Figures {
+fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: WaitCounts) -> Figures {
     let first_ns = view.events.first().map_or(0, |event| event.time_ns);
     let span_ns = view.end_ns.saturating_sub(first_ns);
     let histories = view.histories.values();
