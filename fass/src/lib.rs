@@ -143,6 +143,6 @@ pub use sched_dag::analysis::{NotProvenReason, OverheadSource, Overheads, Schedu
 pub use sched_dag::lifecycle::Request;
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{
-    AssignmentReason, ClusterId, ConstructionPolicy, CoreDivision, Count, FaultLimit,
+    AssignmentReason, ClusterId, ConstructionPolicy, CoreDivision, CountLimit, FaultLimit,
     OverrunPolicy, Policy, Preemption, SubtaskOrder, Warning,
 };

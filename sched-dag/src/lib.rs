@@ -138,6 +138,7 @@ pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSp
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{
-    CommitOptions, ConstructionPolicy, Count, DagLabel, Direction, Fault, MAX_ARITY, MOST_FAULTS,
-    Rejected, SubtaskLabel, Time, Verified, Warning, verify, write_faults,
+    CommitOptions, ConstructionPolicy, CountLimit, DagFault, DagLabel, MAX_ARITY, MOST_FAULTS,
+    OverflowingTime, RejectedDags, SubtaskLabel, TopicSide, VerifiedDags, Warning, verify,
+    write_faults,
 };

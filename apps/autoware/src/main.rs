@@ -9,7 +9,7 @@ use alloc::format;
 use core::time::Duration;
 
 use autoware::{Latencies, SUBTASKS, Workload};
-use fass::{Commit, ConstructionPolicy, Count, Occupation, finish_create_dags_with};
+use fass::{Commit, ConstructionPolicy, CountLimit, Occupation, finish_create_dags_with};
 use kernel::report::{Distribution, Ns};
 use kernel::{Ending, Machine, Run, json, println};
 
@@ -21,8 +21,8 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     system.record();
     // Two lidars, and several results that other DAGs sample.
     let construction = ConstructionPolicy {
-        sources: Count::Several,
-        sinks: Count::Several,
+        sources: CountLimit::Several,
+        sinks: CountLimit::Several,
         ..ConstructionPolicy::paper()
     };
     println!(

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use autoware::{Latencies, SUBTASKS, Workload};
-use fass::{ConstructionPolicy, Count, Occupation, Policy, finish_create_dags_with};
+use fass::{ConstructionPolicy, CountLimit, Occupation, Policy, finish_create_dags_with};
 use virtual_time::VirtualTime;
 
 fn workload(jobs: u64, least_percent: u64) -> Workload {
@@ -18,8 +18,8 @@ fn workload(jobs: u64, least_percent: u64) -> Workload {
 
 fn construction() -> ConstructionPolicy {
     ConstructionPolicy {
-        sources: Count::Several,
-        sinks: Count::Several,
+        sources: CountLimit::Several,
+        sinks: CountLimit::Several,
         ..ConstructionPolicy::paper()
     }
 }

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use replay::lines::Malformed;
 use replay::of_file;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagSpec, Fault, MOST_FAULTS, SubtaskId, SubtaskLabel,
+    CommitOptions, ConstructionPolicy, DagFault, DagSpec, MOST_FAULTS, SubtaskId, SubtaskLabel,
     sorted_by_key, verify,
 };
 
@@ -55,42 +55,44 @@ pub fn check(set: &Set, machine: &CommitOptions, length: Length) -> Result<(), V
 }
 
 /// Returns the line that a fault is about; 1 if it is about no line in particular.
-fn line_of(set: &Set, fault: &Fault) -> usize {
+fn line_of(set: &Set, fault: &DagFault) -> usize {
     let line = match fault {
-        Fault::Cycle { dag, hops } => set.dags.get(dag.id.index()).map(|dag| {
+        DagFault::Cycle { dag, hops } => set.dags.get(dag.id.index()).map(|dag| {
             let ends = (hops.last(), hops.first());
             edge_line(dag, ends).unwrap_or(dag.line)
         }),
-        Fault::SelfEdge { dag, subtask, .. } => set.dags.get(dag.id.index()).map(|dag| {
+        DagFault::SelfEdge { dag, subtask, .. } => set.dags.get(dag.id.index()).map(|dag| {
             let ends = (Some(subtask), Some(subtask));
             edge_line(dag, ends).unwrap_or(dag.line)
         }),
-        Fault::WcetExceedsDeadline { dag, subtask, .. }
-        | Fault::ZeroSinkDeadline { dag, sink: subtask }
-        | Fault::SinkDeadlineBeyondDag {
+        DagFault::WcetExceedsDeadline { dag, subtask, .. }
+        | DagFault::ZeroSinkDeadline { dag, sink: subtask }
+        | DagFault::SinkDeadlineBeyondDag {
             dag, sink: subtask, ..
         }
-        | Fault::DeadlineOfNoSink { dag, subtask, .. } => set
+        | DagFault::DeadlineOfNoSink { dag, subtask, .. } => set
             .dags
             .get(dag.id.index())
             .map(|dag| subtask_line(dag, subtask.id).unwrap_or(dag.line)),
-        Fault::PrioritiesPartlyGiven { dag, without } => set.dags.get(dag.id.index()).map(|dag| {
-            let first = without.first();
-            let line = first.and_then(|subtask| subtask_line(dag, subtask.id));
-            line.unwrap_or(dag.line)
-        }),
-        Fault::TooManyInstances { dag, .. }
-        | Fault::NoSubtasks { dag }
-        | Fault::NoSource { dag }
-        | Fault::NoSink { dag }
-        | Fault::TooManySubtasks { dag, .. }
-        | Fault::ZeroPeriod { dag }
-        | Fault::ZeroDeadline { dag }
-        | Fault::ZeroInFlight { dag }
-        | Fault::TimeOverflow { dag, .. }
-        | Fault::NoCluster { dag, .. }
-        | Fault::UnknownCluster { dag, .. }
-        | Fault::PrioritiesExhausted { dag } => set.dags.get(dag.id.index()).map(|dag| dag.line),
+        DagFault::PrioritiesPartlyGiven { dag, without } => {
+            set.dags.get(dag.id.index()).map(|dag| {
+                let first = without.first();
+                let line = first.and_then(|subtask| subtask_line(dag, subtask.id));
+                line.unwrap_or(dag.line)
+            })
+        }
+        DagFault::TooManyInstances { dag, .. }
+        | DagFault::NoSubtasks { dag }
+        | DagFault::NoSource { dag }
+        | DagFault::NoSink { dag }
+        | DagFault::TooManySubtasks { dag, .. }
+        | DagFault::ZeroPeriod { dag }
+        | DagFault::ZeroDeadline { dag }
+        | DagFault::ZeroInFlight { dag }
+        | DagFault::TimeOverflow { dag, .. }
+        | DagFault::NoCluster { dag, .. }
+        | DagFault::UnknownCluster { dag, .. }
+        | DagFault::PrioritiesExhausted { dag } => set.dags.get(dag.id.index()).map(|dag| dag.line),
         _ => None,
     };
     line.unwrap_or(1)

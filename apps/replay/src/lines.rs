@@ -17,7 +17,7 @@ use core::fmt;
 use core::num::IntErrorKind;
 use core::str::FromStr;
 
-use sched_dag::{Fault, Rejected, sorted_by_key};
+use sched_dag::{DagFault, RejectedDags, sorted_by_key};
 
 use crate::shown::is_seen;
 pub use crate::shown::quoted;
@@ -314,21 +314,22 @@ pub fn repeated<T: Ord>(items: impl IntoIterator<Item = T>) -> Option<(usize, us
 }
 
 /// Returns the faults that a person can mend, and what to say of each.
-pub fn of_file(rejected: &Rejected) -> impl Iterator<Item = (&Fault, String)> {
+pub fn of_file(rejected: &RejectedDags) -> impl Iterator<Item = (&DagFault, String)> {
     let faults = rejected.faults();
-    let is_cycle = |fault: &Fault| matches!(fault, Fault::Cycle { .. } | Fault::SelfEdge { .. });
+    let is_cycle =
+        |fault: &DagFault| matches!(fault, DagFault::Cycle { .. } | DagFault::SelfEdge { .. });
     let has_cycle = faults.iter().any(is_cycle);
     // A graph that is one cycle has no ends either; the cycle says all.
-    let follows = move |fault: &&Fault| {
-        has_cycle && matches!(fault, Fault::NoSource { .. } | Fault::NoSink { .. })
+    let follows = move |fault: &&DagFault| {
+        has_cycle && matches!(fault, DagFault::NoSource { .. } | DagFault::NoSink { .. })
     };
     let news = faults.iter().filter(move |fault| !follows(fault));
     news.map(|fault| (fault, reason(fault)))
 }
 
-fn reason(fault: &Fault) -> String {
+fn reason(fault: &DagFault) -> String {
     match fault {
-        Fault::TooManyInstances {
+        DagFault::TooManyInstances {
             dag,
             in_flight,
             instances,

@@ -23,8 +23,8 @@ use alloc::vec::Vec;
 
 use sched_dag::analysis::{self, NotAssigned};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, Count, DagId, DagLabel, Policy, TaskSet, Verified, Warning,
-    sorted_by_key, wcets,
+    CommitOptions, ConstructionPolicy, CountLimit, DagId, DagLabel, Policy, TaskSet, VerifiedDags,
+    Warning, sorted_by_key, wcets,
 };
 
 use crate::api::dag::Dag;
@@ -116,7 +116,7 @@ pub fn finish_create_dags_with(
     construction: ConstructionPolicy,
 ) -> Result<Commit, CommitError> {
     let construction = ConstructionPolicy {
-        writers: Count::One,
+        writers: CountLimit::One,
         ..construction
     };
     let drafts: Vec<_> = dags.iter().map(|dag| Rc::clone(&dag.draft)).collect();
@@ -137,7 +137,7 @@ pub fn finish_create_dags_with(
     let terms = platform.terms();
     let options = with(terms.scheduler.policy, terms.scheduler.cores);
     let options = options.with_clusters(terms.clusters.clone());
-    let Verified {
+    let VerifiedDags {
         mut task_set,
         mut warnings,
     } = verify(&drafts, options, terms.wcets.as_deref())?;
@@ -201,7 +201,7 @@ fn verify(
     drafts: &Drafts,
     options: CommitOptions,
     observed: Option<&str>,
-) -> Result<Verified, CommitError> {
+) -> Result<VerifiedDags, CommitError> {
     let mut faults = Vec::new();
     let open: Vec<_> = drafts.iter().map(|draft| draft.borrow()).collect();
     let mut specs = Vec::with_capacity(drafts.len());
@@ -243,7 +243,7 @@ fn verify(
     }
     match sched_dag::verify(&specs, &options) {
         Ok(verified) if faults.is_empty() => Ok(verified),
-        Ok(Verified { warnings, .. }) => Err(CommitError { faults, warnings }),
+        Ok(VerifiedDags { warnings, .. }) => Err(CommitError { faults, warnings }),
         Err(rejected) => {
             let (mut news, warnings) = rejected.into_parts();
             news.retain(|fault| !is_consequence(fault, &faults));
@@ -255,10 +255,10 @@ fn verify(
 
 /// Reports whether a fault of the model only repeats one of ours: a period or a
 /// deadline is missing because it was too long to be noted.
-fn is_consequence(fault: &sched_dag::Fault, ours: &[Fault]) -> bool {
+fn is_consequence(fault: &sched_dag::DagFault, ours: &[Fault]) -> bool {
     let (label, missing) = match fault {
-        sched_dag::Fault::MissingPeriod { dag } => (dag, "period"),
-        sched_dag::Fault::MissingDeadline { dag } => (dag, "relative deadline"),
+        sched_dag::DagFault::MissingPeriod { dag } => (dag, "period"),
+        sched_dag::DagFault::MissingDeadline { dag } => (dag, "relative deadline"),
         _ => return false,
     };
     ours.iter().any(|fault| {

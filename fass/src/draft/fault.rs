@@ -1,7 +1,7 @@
 //! Reasons why a commit is refused, in words.
 //!
 //! Every fault states a fact, names the offender, and says what to do. The
-//! faults of the graph itself are [`sched_dag::Fault`]s; the ones here can only
+//! faults of the graph itself are [`sched_dag::DagFault`]s; the ones here can only
 //! be seen from this side: the shape of functions, durations, the platform.
 
 use alloc::string::String;
@@ -122,7 +122,7 @@ worded! {
         NotProven { dag: DagLabel, unproven: Unproven } = "not_proven",
             "{dag} demands a proof that it meets its deadlines, and there is none: {unproven}";
         /// The graph or its attributes are at fault.
-        Model(fault: sched_dag::Fault) = of fault.code(), "{fault}";
+        Model(fault: sched_dag::DagFault) = of fault.code(), "{fault}";
         /// The platform did not take the verified plan.
         NotLaunched(error: LaunchError) = "not_launched",
             "the platform did not take the plan: {error}";

@@ -5,14 +5,14 @@ use core::time::Duration;
 use std::slice;
 
 use crate::support::{PERIOD, named, panic_message};
-use fass::{ConstructionPolicy, Count, Dag, create_dag, finish_create_dags_with};
+use fass::{ConstructionPolicy, CountLimit, Dag, create_dag, finish_create_dags_with};
 
 /// Commits DAGs that are refused for these reasons: the beginnings of all lines.
 #[track_caller]
 fn assert_refused(dags: &[Dag], expected: &[&str]) {
     crate::support::install();
     let construction = ConstructionPolicy {
-        writers: Count::Several,
+        writers: CountLimit::Several,
         ..ConstructionPolicy::paper()
     };
     let error = finish_create_dags_with(dags, construction).expect_err("the commit is refused");

@@ -7,27 +7,27 @@
 
 use alloc::vec::Vec;
 
-use super::fault::{Direction, Fault, Time, Warning};
+use super::fault::{DagFault, OverflowingTime, TopicSide, Warning};
 use super::label::SubtaskLabel;
 use super::names::Interner;
 use super::topics::is_shared;
-use super::{CommitOptions, Findings, MAX_ARITY, Page};
+use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
 use crate::spec::{DagSpec, STACK_BYTES};
 
 /// Checks the attributes of the whole commit.
-pub(super) fn check(options: &CommitOptions, findings: &mut Findings<'_>) {
+pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     let count = findings.specs.len();
     if count == 0 {
-        findings.fault(Fault::NoDags);
+        findings.fault(DagFault::NoDags);
     }
     if options.cores == 0 {
-        findings.fault(Fault::NoCores);
+        findings.fault(DagFault::NoCores);
     }
     if u32::try_from(count).is_err() {
-        findings.fault(Fault::TooManyDags { count });
+        findings.fault(DagFault::TooManyDags { count });
     }
     check_instances(options, findings);
     for dag in 0..count {
@@ -68,7 +68,7 @@ pub(super) fn in_flight(spec: &DagSpec) -> u64 {
     enough.min(spec.jobs.unwrap_or(u64::MAX))
 }
 
-fn check_instances(options: &CommitOptions, findings: &mut Findings<'_>) {
+fn check_instances(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     let of = |spec: &DagSpec| u128::from(in_flight(spec)) * spec.subtasks.len() as u128;
     let specs = findings.specs;
     let instances: u128 = specs.iter().map(|spec| of(spec)).sum();
@@ -76,7 +76,7 @@ fn check_instances(options: &CommitOptions, findings: &mut Findings<'_>) {
         return;
     }
     if let Some(most) = (0..specs.len()).max_by_key(|&dag| of(specs[dag])) {
-        findings.of(most).fault(|dag| Fault::TooManyInstances {
+        findings.of(most).fault(|dag| DagFault::TooManyInstances {
             dag,
             in_flight: in_flight(specs[most]),
             instances,
@@ -86,57 +86,57 @@ fn check_instances(options: &CommitOptions, findings: &mut Findings<'_>) {
 }
 
 #[inline(never)]
-fn check_counts(page: &mut Page<'_, '_>) {
+fn check_counts(page: &mut DagFindings<'_, '_>) {
     let spec = page.spec;
     let count = spec.subtasks.len();
     if count == 0 {
-        page.fault(|dag| Fault::NoSubtasks { dag });
+        page.fault(|dag| DagFault::NoSubtasks { dag });
     }
     if u32::try_from(count).is_err() {
-        page.fault(|dag| Fault::TooManySubtasks { dag, count });
+        page.fault(|dag| DagFault::TooManySubtasks { dag, count });
     }
     if spec.jobs == Some(0) {
-        page.fault(|dag| Fault::ZeroJobs { dag });
+        page.fault(|dag| DagFault::ZeroJobs { dag });
     }
     if spec.in_flight == Some(0) {
-        page.fault(|dag| Fault::ZeroInFlight { dag });
+        page.fault(|dag| DagFault::ZeroInFlight { dag });
     }
     if let OnFault::DropJob(limit) = spec.on_fault {
         if limit.faults == 0 || limit.in_all == 0 {
-            page.fault(|dag| Fault::ZeroFaults { dag });
+            page.fault(|dag| DagFault::ZeroFaults { dag });
         }
         if limit.window == 0 {
-            page.fault(|dag| Fault::ZeroWindow { dag });
+            page.fault(|dag| DagFault::ZeroWindow { dag });
         }
     }
 }
 
 #[inline(never)]
-fn check_times(page: &mut Page<'_, '_>) {
+fn check_times(page: &mut DagFindings<'_, '_>) {
     let spec = page.spec;
     // An app that registers subtasks states both with them.
     let has_subtasks = !spec.subtasks.is_empty();
     match spec.period_ns {
-        None if has_subtasks => page.fault(|dag| Fault::MissingPeriod { dag }),
-        Some(0) => page.fault(|dag| Fault::ZeroPeriod { dag }),
+        None if has_subtasks => page.fault(|dag| DagFault::MissingPeriod { dag }),
+        Some(0) => page.fault(|dag| DagFault::ZeroPeriod { dag }),
         _ => {}
     }
     match spec.relative_deadline_ns {
-        None if has_subtasks => page.fault(|dag| Fault::MissingDeadline { dag }),
-        Some(0) => page.fault(|dag| Fault::ZeroDeadline { dag }),
+        None if has_subtasks => page.fault(|dag| DagFault::MissingDeadline { dag }),
+        Some(0) => page.fault(|dag| DagFault::ZeroDeadline { dag }),
         _ => {}
     }
     let is_beyond = |jobs: u64| deadline_of(spec, jobs.saturating_sub(1)).is_none();
     let deadline = match spec.jobs {
-        _ if is_beyond(1) => Some(Time::FirstDeadline),
-        Some(jobs) if is_beyond(jobs) => Some(Time::LastDeadline),
+        _ if is_beyond(1) => Some(OverflowingTime::FirstDeadline),
+        Some(jobs) if is_beyond(jobs) => Some(OverflowingTime::LastDeadline),
         _ => None,
     };
     let mut wcets_ns = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
     let volume = wcets_ns.try_fold(0_u64, u64::checked_add);
-    let volume = volume.is_none().then_some(Time::Volume);
+    let volume = volume.is_none().then_some(OverflowingTime::Volume);
     for time in deadline.into_iter().chain(volume) {
-        page.fault(|dag| Fault::TimeOverflow { dag, time });
+        page.fault(|dag| DagFault::TimeOverflow { dag, time });
     }
 }
 
@@ -150,7 +150,7 @@ fn deadline_of(spec: &DagSpec, job: u64) -> Option<u64> {
 }
 
 #[inline(never)]
-fn check_subtasks(page: &mut Page<'_, '_>) {
+fn check_subtasks(page: &mut DagFindings<'_, '_>) {
     let spec = page.spec;
     for (index, stated) in spec.subtasks.iter().enumerate() {
         let subtask = || SubtaskLabel::new(spec, index);
@@ -162,7 +162,7 @@ fn check_subtasks(page: &mut Page<'_, '_>) {
                 subtask: subtask(),
             }),
             (Some(wcet_ns), Some(relative_deadline_ns)) if wcet_ns > relative_deadline_ns => {
-                page.fault(|dag| Fault::WcetExceedsDeadline {
+                page.fault(|dag| DagFault::WcetExceedsDeadline {
                     dag,
                     subtask: subtask(),
                     wcet_ns,
@@ -174,18 +174,18 @@ fn check_subtasks(page: &mut Page<'_, '_>) {
         if let Some(bytes) = stated.stack_bytes
             && !STACK_BYTES.contains(&bytes)
         {
-            page.fault(|dag| Fault::StackOutOfRange {
+            page.fault(|dag| DagFault::StackOutOfRange {
                 dag,
                 subtask: subtask(),
                 bytes,
             });
         }
         for (direction, arity) in [
-            (Direction::Input, stated.inputs.len()),
-            (Direction::Output, stated.outputs.len()),
+            (TopicSide::Input, stated.inputs.len()),
+            (TopicSide::Output, stated.outputs.len()),
         ] {
             if arity > MAX_ARITY {
-                page.fault(|dag| Fault::ArityTooLarge {
+                page.fault(|dag| DagFault::ArityTooLarge {
                     dag,
                     subtask: subtask(),
                     direction,
@@ -198,7 +198,7 @@ fn check_subtasks(page: &mut Page<'_, '_>) {
 
 /// Checks what a subtask states of its own deadline. That it is a sink's is checked with
 /// the graph.
-fn check_sink_deadline(page: &mut Page<'_, '_>, index: usize) {
+fn check_sink_deadline(page: &mut DagFindings<'_, '_>, index: usize) {
     let spec = page.spec;
     let Some(relative_deadline_ns) = spec.subtasks[index].relative_deadline_ns else {
         return;
@@ -206,11 +206,11 @@ fn check_sink_deadline(page: &mut Page<'_, '_>, index: usize) {
     let sink = page.subtask(index);
     let of_dag_ns = spec.relative_deadline_ns;
     if relative_deadline_ns == 0 && of_dag_ns != Some(0) {
-        page.fault(|dag| Fault::ZeroSinkDeadline { dag, sink });
+        page.fault(|dag| DagFault::ZeroSinkDeadline { dag, sink });
     } else if let Some(of_dag_ns @ 1..) = of_dag_ns
         && relative_deadline_ns > of_dag_ns
     {
-        page.fault(|dag| Fault::SinkDeadlineBeyondDag {
+        page.fault(|dag| DagFault::SinkDeadlineBeyondDag {
             dag,
             sink,
             relative_deadline_ns,
@@ -219,16 +219,16 @@ fn check_sink_deadline(page: &mut Page<'_, '_>, index: usize) {
     }
 }
 
-fn check_priorities_given(page: &mut Page<'_, '_>) {
+fn check_priorities_given(page: &mut DagFindings<'_, '_>) {
     let subtasks = &page.spec.subtasks;
     let without = (0..subtasks.len()).filter(|&index| subtasks[index].priority.is_none());
     let without: Vec<_> = without.map(|index| page.subtask(index)).collect();
     if !without.is_empty() && without.len() < subtasks.len() {
-        page.fault(|dag| Fault::PrioritiesPartlyGiven { dag, without });
+        page.fault(|dag| DagFault::PrioritiesPartlyGiven { dag, without });
     }
 }
 
-fn warn_of_equal_priorities(findings: &mut Findings<'_>) {
+fn warn_of_equal_priorities(findings: &mut VerifyFindings<'_>) {
     let mut given: Vec<(u32, usize, usize)> = Vec::new();
     for (dag, spec) in findings.specs.iter().enumerate() {
         for (index, subtask) in spec.subtasks.iter().enumerate() {
@@ -253,24 +253,24 @@ fn warn_of_equal_priorities(findings: &mut Findings<'_>) {
 
 /// Checks the clusters' cores, and the one that each DAG is in.
 #[inline(never)]
-fn check_clusters(options: &CommitOptions, findings: &mut Findings<'_>) {
+fn check_clusters(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     let sizes = options.clusters.sizes();
     for (cluster, &size) in (0..).map(ClusterId).zip(sizes) {
         if size == 0 {
-            findings.fault(Fault::ClusterWithoutCores { cluster });
+            findings.fault(DagFault::ClusterWithoutCores { cluster });
         }
     }
     let wanted: u64 = sizes.iter().copied().map(u64::from).sum();
     let (cores, clusters) = (options.cores, sizes.len());
     if wanted > cores.into() {
-        findings.fault(Fault::ClustersBeyondCores { wanted, cores });
+        findings.fault(DagFault::ClustersBeyondCores { wanted, cores });
     }
     for dag in 0..findings.specs.len() {
         let mut page = findings.of(dag);
         match page.spec.cluster {
-            None if clusters > 0 => page.fault(|dag| Fault::NoCluster { dag, clusters }),
+            None if clusters > 0 => page.fault(|dag| DagFault::NoCluster { dag, clusters }),
             Some(cluster) if cluster.index() >= clusters.max(1) => {
-                page.fault(|dag| Fault::UnknownCluster {
+                page.fault(|dag| DagFault::UnknownCluster {
                     dag,
                     cluster,
                     clusters,
@@ -282,7 +282,7 @@ fn check_clusters(options: &CommitOptions, findings: &mut Findings<'_>) {
 }
 
 /// Checks the names of DAGs and subtasks.
-fn check_names(findings: &mut Findings<'_>) {
+fn check_names(findings: &mut VerifyFindings<'_>) {
     let specs = findings.specs;
     for (first, second) in duplicates(specs.iter().map(|spec| spec.name.as_str())) {
         let (first, second) = (findings.label(first), findings.label(second));
@@ -292,7 +292,7 @@ fn check_names(findings: &mut Findings<'_>) {
     for (dag, spec) in specs.iter().enumerate() {
         let names = spec.subtasks.iter().map(|subtask| subtask.name.as_str());
         for (first, second) in duplicates(names) {
-            findings.of(dag).fault(|dag| Fault::DuplicateSubtask {
+            findings.of(dag).fault(|dag| DagFault::DuplicateSubtask {
                 dag,
                 first: SubtaskLabel::new(spec, first),
                 second: SubtaskLabel::new(spec, second),

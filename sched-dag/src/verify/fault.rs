@@ -22,7 +22,7 @@ worded! {
     ///
     /// In every variant `dag` is the DAG and `subtask` the subtask at fault;
     /// `meant` is the topic that was probably meant.
-    pub enum Fault {
+    pub enum DagFault {
         /// There is no DAG to schedule.
         NoDags = "no_dags",
             "the commit has no dag; create one and register its subtasks";
@@ -129,13 +129,13 @@ worded! {
              the others", dags.len(), list(dags);
         /// One topic twice among the inputs or twice among the outputs of a subtask.
         DuplicateTopic {
-            dag: DagLabel, subtask: SubtaskLabel, topic: String, direction: Direction
+            dag: DagLabel, subtask: SubtaskLabel, topic: String, direction: TopicSide
         } = "duplicate_topic",
             "{subtask} of {dag} {} topic `{topic}` twice; drop one of the {}",
             direction.verb(), direction.noun();
         /// More inputs or more outputs than [`MAX_ARITY`].
         ArityTooLarge {
-            dag: DagLabel, subtask: SubtaskLabel, direction: Direction, arity: usize
+            dag: DagLabel, subtask: SubtaskLabel, direction: TopicSide, arity: usize
         } = "arity_too_large",
             "{subtask} of {dag} has {arity} {}, more than {MAX_ARITY}; bundle some into one \
              message", direction.noun();
@@ -189,7 +189,7 @@ worded! {
         ZeroWindow { dag: DagLabel } = "zero_window",
             "{dag} survives faults within a window of 0 jobs; give the window at least 1";
         /// A time that 64 bits of nanoseconds do not hold.
-        TimeOverflow { dag: DagLabel, time: Time } = "time_overflow",
+        TimeOverflow { dag: DagLabel, time: OverflowingTime } = "time_overflow",
             "{} of {dag} exceeds {} ns, the last time there is; {}",
             time.noun(), u64::MAX, time.remedy();
         /// Under static priority: some subtasks of a DAG have a priority, these not.
@@ -281,7 +281,7 @@ worded! {
 
 /// Which side of a subtask a topic stands on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Direction {
+pub enum TopicSide {
     /// The subtask reads the topic.
     Input,
     /// The subtask writes the topic.
@@ -290,7 +290,7 @@ pub enum Direction {
 
 /// A time of a DAG that may overflow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Time {
+pub enum OverflowingTime {
     /// The absolute deadline of job 0.
     FirstDeadline,
     /// The absolute deadline of the last job.
@@ -299,7 +299,7 @@ pub enum Time {
     Volume,
 }
 
-impl Direction {
+impl TopicSide {
     const fn verb(self) -> &'static str {
         match self {
             Self::Input => "reads",
@@ -315,7 +315,7 @@ impl Direction {
     }
 }
 
-impl Time {
+impl OverflowingTime {
     const fn noun(self) -> &'static str {
         match self {
             Self::FirstDeadline => "the deadline of the first job",

@@ -29,7 +29,7 @@ use crate::policy::{CoreDivision, Policy};
 use crate::spec::DagSpec;
 use crate::task_set::TaskSet;
 
-pub use fault::{Direction, Fault, Time, Warning};
+pub use fault::{DagFault, OverflowingTime, TopicSide, Warning};
 pub use label::{DagLabel, SubtaskLabel};
 
 /// The most inputs and the most outputs that a subtask may have.
@@ -37,7 +37,7 @@ pub const MAX_ARITY: usize = 16;
 
 /// DAGs that can be scheduled.
 #[derive(Clone, Debug)]
-pub struct Verified {
+pub struct VerifiedDags {
     /// The model for the scheduler.
     pub task_set: TaskSet,
     /// What the apps' authors may not have meant.
@@ -46,8 +46,8 @@ pub struct Verified {
 
 /// DAGs that cannot be scheduled, with every reason.
 #[derive(Clone, Debug)]
-pub struct Rejected {
-    faults: Vec<Fault>,
+pub struct RejectedDags {
+    faults: Vec<DagFault>,
     warnings: Vec<Warning>,
 }
 
@@ -59,13 +59,13 @@ pub struct Rejected {
 pub fn verify<S: Borrow<DagSpec>>(
     specs: &[S],
     options: &CommitOptions,
-) -> Result<Verified, Rejected> {
+) -> Result<VerifiedDags, RejectedDags> {
     let specs: Vec<&DagSpec> = specs.iter().map(Borrow::borrow).collect();
     verify_all(&specs, options)
 }
 
-fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<Verified, Rejected> {
-    let (mut findings, policy) = (Findings::new(specs), options.construction);
+fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<VerifiedDags, RejectedDags> {
+    let (mut findings, policy) = (VerifyFindings::new(specs), options.construction);
     attributes::check(options, &mut findings);
     topics::check_states(&mut findings);
     let topologies = topics::check(options, &mut findings);
@@ -80,15 +80,15 @@ fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<Verified, R
     let (mut faults, warnings) = findings.into_parts();
     names::suggest(specs, &mut faults);
     match task_set {
-        Some(task_set) => Ok(Verified { task_set, warnings }),
-        None => Err(Rejected { faults, warnings }),
+        Some(task_set) => Ok(VerifiedDags { task_set, warnings }),
+        None => Err(RejectedDags { faults, warnings }),
     }
 }
 
-impl Rejected {
+impl RejectedDags {
     /// Returns the faults in the order of the DAGs, never empty.
     #[must_use]
-    pub fn faults(&self) -> &[Fault] {
+    pub fn faults(&self) -> &[DagFault] {
         &self.faults
     }
 
@@ -100,13 +100,13 @@ impl Rejected {
 
     /// Returns faults and warnings to keep.
     #[must_use]
-    pub fn into_parts(self) -> (Vec<Fault>, Vec<Warning>) {
+    pub fn into_parts(self) -> (Vec<DagFault>, Vec<Warning>) {
         (self.faults, self.warnings)
     }
 }
 
 /// Writes as [`write_faults`] does.
-impl fmt::Display for Rejected {
+impl fmt::Display for RejectedDags {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write_faults(&self.faults, f)
     }
@@ -134,24 +134,24 @@ pub fn write_faults(faults: &[impl fmt::Display], f: &mut fmt::Formatter<'_>) ->
     }
 }
 
-impl core::error::Error for Rejected {}
+impl core::error::Error for RejectedDags {}
 
 /// The DAGs, and what has been found so far.
-struct Findings<'s> {
+struct VerifyFindings<'s> {
     specs: &'s [&'s DagSpec],
     /// Each fault with the position of its DAG.
-    faults: Vec<(usize, Fault)>,
+    faults: Vec<(usize, DagFault)>,
     warnings: Vec<Warning>,
 }
 
 /// The page of one DAG.
-struct Page<'f, 's> {
+struct DagFindings<'f, 's> {
     dag: usize,
     spec: &'s DagSpec,
-    findings: &'f mut Findings<'s>,
+    findings: &'f mut VerifyFindings<'s>,
 }
 
-impl<'s> Findings<'s> {
+impl<'s> VerifyFindings<'s> {
     const fn new(specs: &'s [&'s DagSpec]) -> Self {
         Self {
             specs,
@@ -161,10 +161,10 @@ impl<'s> Findings<'s> {
     }
 
     /// Opens the page of a DAG.
-    fn of(&mut self, dag: usize) -> Page<'_, 's> {
+    fn of(&mut self, dag: usize) -> DagFindings<'_, 's> {
         let spec = self.specs[dag];
         let findings = self;
-        Page {
+        DagFindings {
             dag,
             spec,
             findings,
@@ -176,7 +176,7 @@ impl<'s> Findings<'s> {
     }
 
     /// Notes a fault of the whole commit, which counts as DAG 0's.
-    fn fault(&mut self, fault: Fault) {
+    fn fault(&mut self, fault: DagFault) {
         self.faults.push((0, fault));
     }
 
@@ -186,16 +186,16 @@ impl<'s> Findings<'s> {
 
     /// Returns the faults in the order of the DAGs and, within a DAG, in the
     /// order of the checks.
-    fn into_parts(self) -> (Vec<Fault>, Vec<Warning>) {
+    fn into_parts(self) -> (Vec<DagFault>, Vec<Warning>) {
         let order = sorted_by_key(self.faults.len(), |fault| self.faults[fault].0);
         let faults = self.faults.into_iter().map(|(_, fault)| Some(fault));
-        let mut faults: Vec<Option<Fault>> = faults.collect();
+        let mut faults: Vec<Option<DagFault>> = faults.collect();
         let faults = order.into_iter().filter_map(|fault| faults[fault].take());
         (faults.collect(), self.warnings)
     }
 }
 
-impl Page<'_, '_> {
+impl DagFindings<'_, '_> {
     fn label(&self) -> DagLabel {
         self.findings.label(self.dag)
     }
@@ -205,7 +205,7 @@ impl Page<'_, '_> {
     }
 
     /// Notes a fault, which names the DAG.
-    fn fault(&mut self, fault: impl FnOnce(DagLabel) -> Fault) {
+    fn fault(&mut self, fault: impl FnOnce(DagLabel) -> DagFault) {
         let fault = fault(self.label());
         self.findings.faults.push((self.dag, fault));
     }
@@ -243,19 +243,19 @@ pub struct CommitOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub struct ConstructionPolicy {
     /// How many subtasks may have no predecessor.
-    pub sources: Count,
+    pub sources: CountLimit,
     /// How many subtasks may have no successor.
-    pub sinks: Count,
-    /// How many subtasks may write one topic. With [`Count::Several`] a reader
+    pub sinks: CountLimit,
+    /// How many subtasks may write one topic. With [`CountLimit::Several`] a reader
     /// waits for all of them.
-    pub writers: Count,
+    pub writers: CountLimit,
     /// How many parts without an edge between them a DAG may fall into.
-    pub parts: Count,
+    pub parts: CountLimit,
 }
 
 /// How many of something a DAG may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum Count {
+pub enum CountLimit {
     /// Exactly one.
     #[default]
     One,
@@ -302,16 +302,16 @@ impl ConstructionPolicy {
     /// Returns the paper's policy, which is the default.
     #[must_use]
     pub const fn paper() -> Self {
-        Self::all(Count::One)
+        Self::all(CountLimit::One)
     }
 
     /// Returns the policy that accepts every acyclic graph.
     #[must_use]
     pub const fn any_graph() -> Self {
-        Self::all(Count::Several)
+        Self::all(CountLimit::Several)
     }
 
-    const fn all(count: Count) -> Self {
+    const fn all(count: CountLimit) -> Self {
         Self {
             sources: count,
             sinks: count,

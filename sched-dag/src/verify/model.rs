@@ -3,9 +3,9 @@
 use alloc::vec::Vec;
 
 use super::attributes::in_flight;
-use super::fault::Fault;
-use super::shape::Shape;
-use super::{CommitOptions, Findings};
+use super::fault::DagFault;
+use super::shape::PrecedenceGraph;
+use super::{CommitOptions, VerifyFindings};
 use crate::graph::Graph;
 use crate::ids::SubtaskId;
 use crate::order::sort_by_key;
@@ -23,8 +23,8 @@ use crate::wcets::{WcetSource, graph_hash};
 /// If the specs have a fault that an earlier check finds.
 pub(super) fn build(
     options: &CommitOptions,
-    shapes: Vec<Shape>,
-    findings: &mut Findings<'_>,
+    shapes: Vec<PrecedenceGraph>,
+    findings: &mut VerifyFindings<'_>,
 ) -> Option<TaskSet> {
     let bases = priority_bases(findings);
     if findings.has_faults() {
@@ -38,7 +38,7 @@ pub(super) fn build(
 /// Returns for each DAG without priorities the number of its first one:
 /// deadline monotonic, after all that are given.
 #[inline(never)]
-fn priority_bases(findings: &mut Findings<'_>) -> Vec<u32> {
+fn priority_bases(findings: &mut VerifyFindings<'_>) -> Vec<u32> {
     let specs = findings.specs;
     let given = specs
         .iter()
@@ -59,7 +59,7 @@ fn priority_bases(findings: &mut Findings<'_>) -> Vec<u32> {
         let after = next + specs[dag].subtasks.len() as u64;
         match u32::try_from(next) {
             Ok(base) if after <= u64::from(u32::MAX) + 1 => bases[dag] = base,
-            _ => (findings.of(dag)).fault(|dag| Fault::PrioritiesExhausted { dag }),
+            _ => (findings.of(dag)).fault(|dag| DagFault::PrioritiesExhausted { dag }),
         }
         next = after;
     }
@@ -73,8 +73,8 @@ fn has_priorities(spec: &DagSpec) -> bool {
 }
 
 #[inline(never)]
-fn build_dag(spec: &DagSpec, shape: Shape, priority_base: u32) -> Dag {
-    let Shape {
+fn build_dag(spec: &DagSpec, shape: PrecedenceGraph, priority_base: u32) -> Dag {
+    let PrecedenceGraph {
         mut graph,
         state_precedences,
     } = shape;

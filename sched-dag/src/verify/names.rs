@@ -17,7 +17,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::MOST_FAULTS;
-use super::fault::Fault;
+use super::fault::DagFault;
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::SubtaskId;
 use crate::nearest::nearest;
@@ -73,28 +73,28 @@ impl<'a> Interner<'a> {
 
 /// Adds to the first faults which topic was probably meant.
 #[inline(never)]
-pub(super) fn suggest(specs: &[&DagSpec], faults: &mut [Fault]) {
+pub(super) fn suggest(specs: &[&DagSpec], faults: &mut [DagFault]) {
     for index in 0..faults.len().min(MOST_FAULTS) {
         let found = match &faults[index] {
-            Fault::UnwrittenTopic {
+            DagFault::UnwrittenTopic {
                 dag, topic, reader, ..
             } => {
                 let spec = &specs[dag.id.index()];
                 let own = own_topics(spec, reader.id);
                 nearest(topic, &written(spec, &own))
             }
-            Fault::LatestUnwritten { dag, topic, .. } => {
+            DagFault::LatestUnwritten { dag, topic, .. } => {
                 nearest(topic, &written(specs[dag.id.index()], &[]))
             }
-            Fault::UnreadTopic {
+            DagFault::UnreadTopic {
                 dag, topic, writer, ..
             } => {
                 let own = own_topics(specs[dag.id.index()], writer.id);
                 let unwritten = faults.iter().filter_map(|fault| match fault {
-                    Fault::UnwrittenTopic {
+                    DagFault::UnwrittenTopic {
                         dag: other, topic, ..
                     }
-                    | Fault::LatestUnwritten {
+                    | DagFault::LatestUnwritten {
                         dag: other, topic, ..
                     } if other.id == dag.id => Some(topic.as_str()),
                     _ => None,
@@ -105,9 +105,9 @@ pub(super) fn suggest(specs: &[&DagSpec], faults: &mut [Fault]) {
             _ => None,
         };
         let found = found.map(Into::into);
-        if let Fault::UnwrittenTopic { meant, .. }
-        | Fault::LatestUnwritten { meant, .. }
-        | Fault::UnreadTopic { meant, .. } = &mut faults[index]
+        if let DagFault::UnwrittenTopic { meant, .. }
+        | DagFault::LatestUnwritten { meant, .. }
+        | DagFault::UnreadTopic { meant, .. } = &mut faults[index]
         {
             *meant = found;
         }

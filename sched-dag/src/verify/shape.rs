@@ -18,17 +18,17 @@ use alloc::collections::VecDeque;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::fault::{Fault, Warning};
+use super::fault::{DagFault, Warning};
 use super::label::SubtaskLabel;
-use super::topics::Topology;
-use super::{ConstructionPolicy, Count, Findings, Page, topics};
+use super::topics::TopicGraph;
+use super::{ConstructionPolicy, CountLimit, DagFindings, VerifyFindings, topics};
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sorted, sorted_by_key};
 use crate::task_set::StatePrecedence;
 
 /// The graph of a DAG, with the edges that follow from shared states.
-pub(super) struct Shape {
+pub(super) struct PrecedenceGraph {
     pub(super) graph: Graph,
     pub(super) state_precedences: Vec<StatePrecedence>,
 }
@@ -37,10 +37,10 @@ pub(super) struct Shape {
 #[inline(never)]
 pub(super) fn check(
     dag: usize,
-    mut topology: Topology<'_>,
+    mut topology: TopicGraph<'_>,
     policy: ConstructionPolicy,
-    findings: &mut Findings<'_>,
-) -> Shape {
+    findings: &mut VerifyFindings<'_>,
+) -> PrecedenceGraph {
     let page = &mut findings.of(dag);
     let spec = page.spec;
     add_plain_edges(&mut topology.edges, page);
@@ -52,7 +52,7 @@ pub(super) fn check(
     if !graph.is_acyclic() {
         for cycle in shortest_cycles(&graph) {
             let hops = labels(page, &cycle);
-            page.fault(|dag| Fault::Cycle { dag, hops });
+            page.fault(|dag| DagFault::Cycle { dag, hops });
         }
     }
     // Last, so that all other checks judge the graph that the author stated.
@@ -66,27 +66,27 @@ pub(super) fn check(
         topology.edges.extend(added);
         graph = Graph::new(graph.len(), &topology.edges);
     }
-    Shape {
+    PrecedenceGraph {
         graph,
         state_precedences,
     }
 }
 
 /// Adds the edges that are given without a topic.
-fn add_plain_edges(edges: &mut Vec<(u32, u32)>, page: &mut Page<'_, '_>) {
+fn add_plain_edges(edges: &mut Vec<(u32, u32)>, page: &mut DagFindings<'_, '_>) {
     let subtasks = page.spec.subtasks.len();
     edges.reserve(page.spec.edges.len());
     for &edge in &page.spec.edges {
         let (from, to) = edge;
         if from >= subtasks || to >= subtasks {
-            page.fault(|dag| Fault::EdgeOutOfRange {
+            page.fault(|dag| DagFault::EdgeOutOfRange {
                 dag,
                 edge,
                 subtasks,
             });
         } else if from == to {
             let (subtask, topic) = (page.subtask(from), None);
-            page.fault(|dag| Fault::SelfEdge {
+            page.fault(|dag| DagFault::SelfEdge {
                 dag,
                 subtask,
                 topic,
@@ -97,14 +97,14 @@ fn add_plain_edges(edges: &mut Vec<(u32, u32)>, page: &mut Page<'_, '_>) {
     }
 }
 
-fn check_connection(graph: &Graph, policy: ConstructionPolicy, page: &mut Page<'_, '_>) {
-    if policy.parts == Count::Several {
+fn check_connection(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFindings<'_, '_>) {
+    if policy.parts == CountLimit::Several {
         return;
     }
     let (part_of, parts) = graph.parts();
     if let Some(other) = part_of.iter().position(|&part| part != 0) {
         let (one, other) = (page.subtask(0), page.subtask(other));
-        page.fault(|dag| Fault::NotConnected {
+        page.fault(|dag| DagFault::NotConnected {
             dag,
             parts,
             one,
@@ -115,15 +115,15 @@ fn check_connection(graph: &Graph, policy: ConstructionPolicy, page: &mut Page<'
 
 /// A subtask that only reads topics without writer has no predecessor, but
 /// its author did not mean a source: that fault is reported by itself.
-fn check_sources(graph: &Graph, policy: ConstructionPolicy, page: &mut Page<'_, '_>) {
+fn check_sources(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFindings<'_, '_>) {
     let subtasks = &page.spec.subtasks;
     let is_source = |subtask: &SubtaskId| subtasks[subtask.index()].inputs.is_empty();
     let sources = graph.sources.iter().copied().filter(is_source);
     let sources = labels(page, &sources.collect::<Vec<_>>());
     if sources.is_empty() && !subtasks.is_empty() {
-        page.fault(|dag| Fault::NoSource { dag });
-    } else if sources.len() > 1 && policy.sources == Count::One {
-        page.fault(|dag| Fault::SeveralSources { dag, sources });
+        page.fault(|dag| DagFault::NoSource { dag });
+    } else if sources.len() > 1 && policy.sources == CountLimit::One {
+        page.fault(|dag| DagFault::SeveralSources { dag, sources });
     }
 }
 
@@ -136,7 +136,7 @@ fn check_sinks(
     graph: &Graph,
     policy: ConstructionPolicy,
     unread: &[(usize, &str)],
-    page: &mut Page<'_, '_>,
+    page: &mut DagFindings<'_, '_>,
 ) {
     let ends = &*graph.sinks;
     let mut writes_unread = alloc::vec![false; graph.len()];
@@ -145,17 +145,17 @@ fn check_sinks(
     }
     let silent = ends.iter().filter(|end| !writes_unread[end.index()]);
     let silent: Vec<SubtaskId> = silent.copied().collect();
-    let wants_one = policy.sinks == Count::One;
+    let wants_one = policy.sinks == CountLimit::One;
     let sinks = match wants_one && !silent.is_empty() {
         true => &silent,
         false => ends,
     };
 
     if sinks.is_empty() && graph.len() > 0 {
-        page.fault(|dag| Fault::NoSink { dag });
+        page.fault(|dag| DagFault::NoSink { dag });
     } else if sinks.len() > 1 && wants_one {
         let sinks = labels(page, sinks);
-        page.fault(|dag| Fault::SeveralSinks { dag, sinks });
+        page.fault(|dag| DagFault::SeveralSinks { dag, sinks });
     }
 
     let accepted = !wants_one || (silent.is_empty() && ends.len() == 1);
@@ -169,7 +169,7 @@ fn check_sinks(
                 topic,
             });
         } else {
-            page.fault(|dag| Fault::UnreadTopic {
+            page.fault(|dag| DagFault::UnreadTopic {
                 dag,
                 topic,
                 writer,
@@ -180,7 +180,7 @@ fn check_sinks(
 }
 
 /// Of subtasks only sinks have deadlines of their own.
-fn check_deadlines(graph: &Graph, page: &mut Page<'_, '_>) {
+fn check_deadlines(graph: &Graph, page: &mut DagFindings<'_, '_>) {
     let stated = &page.spec.subtasks;
     for subtask in graph.subtasks() {
         if stated[subtask.index()].relative_deadline_ns.is_some()
@@ -188,7 +188,7 @@ fn check_deadlines(graph: &Graph, page: &mut Page<'_, '_>) {
         {
             let (subtask, successor) = (subtask.index(), successor.index());
             let (subtask, successor) = (page.subtask(subtask), page.subtask(successor));
-            page.fault(|dag| Fault::DeadlineOfNoSink {
+            page.fault(|dag| DagFault::DeadlineOfNoSink {
                 dag,
                 subtask,
                 successor,
@@ -197,7 +197,7 @@ fn check_deadlines(graph: &Graph, page: &mut Page<'_, '_>) {
     }
 }
 
-fn labels(page: &Page<'_, '_>, subtasks: &[SubtaskId]) -> Vec<SubtaskLabel> {
+fn labels(page: &DagFindings<'_, '_>, subtasks: &[SubtaskId]) -> Vec<SubtaskLabel> {
     let labels = subtasks.iter().map(|subtask| page.subtask(subtask.index()));
     labels.collect()
 }
@@ -217,7 +217,7 @@ fn shortest_cycles(graph: &Graph) -> Vec<Vec<SubtaskId>> {
             knot_of[subtask.index()] = to_u32(number);
         }
     }
-    let mut search = Search {
+    let mut search = CycleSearch {
         graph,
         knot_of: &knot_of,
         found_by: vec![NONE; graph.len()],
@@ -293,7 +293,7 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
         .collect()
 }
 
-struct Search<'a> {
+struct CycleSearch<'a> {
     graph: &'a Graph,
     knot_of: &'a [u32],
     /// The root of the last search that found a subtask.
@@ -304,7 +304,7 @@ struct Search<'a> {
     budget: usize,
 }
 
-impl Search<'_> {
+impl CycleSearch<'_> {
     fn shortest_in(&mut self, knot: &[SubtaskId]) -> Option<Vec<SubtaskId>> {
         let mut best: Option<Vec<SubtaskId>> = None;
         for &root in knot {

@@ -36,10 +36,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::cmp::Reverse;
 
-use super::fault::{Direction, Fault};
+use super::fault::{DagFault, TopicSide};
 use super::label::SubtaskLabel;
 use super::names::Interner;
-use super::{CommitOptions, Count, Findings, Page};
+use super::{CommitOptions, CountLimit, DagFindings, VerifyFindings};
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
@@ -48,7 +48,7 @@ use crate::task_set::StatePrecedence;
 
 /// What the topics of one DAG say about its graph.
 #[derive(Clone, Default)]
-pub(super) struct Topology<'a> {
+pub(super) struct TopicGraph<'a> {
     /// Edges `(predecessor, successor)`, perhaps repeated, never to oneself.
     pub(super) edges: Vec<(u32, u32)>,
     /// Topics that are written and not read, with their writer.
@@ -57,30 +57,30 @@ pub(super) struct Topology<'a> {
 
 /// One end of a topic.
 #[derive(Clone, Copy)]
-struct End<'a> {
+struct TopicEnd<'a> {
     /// The topic's number.
     topic: usize,
     dag: usize,
     subtask: usize,
-    direction: Direction,
+    direction: TopicSide,
     port: &'a TopicPort,
 }
 
 /// The ends of one topic in one DAG, at most one of each kind a subtask.
 #[derive(Default)]
-struct Sides<'a> {
-    writers: Vec<End<'a>>,
-    readers: Vec<End<'a>>,
+struct TopicEnds<'a> {
+    writers: Vec<TopicEnd<'a>>,
+    readers: Vec<TopicEnd<'a>>,
 }
 
-impl<'a> Sides<'a> {
-    fn fill(&mut self, ends: &[End<'a>]) {
+impl<'a> TopicEnds<'a> {
+    fn fill(&mut self, ends: &[TopicEnd<'a>]) {
         self.writers.clear();
         self.readers.clear();
         for end in ends {
             let side = match end.direction {
-                Direction::Output => &mut self.writers,
-                Direction::Input => &mut self.readers,
+                TopicSide::Output => &mut self.writers,
+                TopicSide::Input => &mut self.readers,
             };
             if side.last().is_none_or(|last| last.subtask != end.subtask) {
                 side.push(*end);
@@ -90,11 +90,14 @@ impl<'a> Sides<'a> {
 }
 
 /// Checks all topics and their latest values and returns what they say, one entry a DAG.
-pub(super) fn check<'a>(options: &CommitOptions, findings: &mut Findings<'a>) -> Vec<Topology<'a>> {
-    let mut topologies = vec![Topology::default(); findings.specs.len()];
+pub(super) fn check<'a>(
+    options: &CommitOptions,
+    findings: &mut VerifyFindings<'a>,
+) -> Vec<TopicGraph<'a>> {
+    let mut topologies = vec![TopicGraph::default(); findings.specs.len()];
     // Filled anew for each topic, so that many topics do not mean as many
     // allocations.
-    let mut sides = Sides::default();
+    let mut sides = TopicEnds::default();
     for ends in ends_by_topic(findings.specs).chunk_by(|one, other| one.topic == other.topic) {
         let first = ends[0];
         let of_dags = || ends.chunk_by(|one, other| one.dag == other.dag);
@@ -102,7 +105,7 @@ pub(super) fn check<'a>(options: &CommitOptions, findings: &mut Findings<'a>) ->
         if is_shared {
             let dags = of_dags().map(|ends| findings.label(ends[0].dag)).collect();
             let topic = first.port.topic.clone();
-            let shared = |_| Fault::TopicInSeveralDags { topic, dags };
+            let shared = |_| DagFault::TopicInSeveralDags { topic, dags };
             findings.of(first.dag).fault(shared);
         }
         for ends in of_dags() {
@@ -126,18 +129,18 @@ pub(super) fn check<'a>(options: &CommitOptions, findings: &mut Findings<'a>) ->
 
 /// Returns all ends, those of a topic next to each other and in the order of DAGs and subtasks.
 #[inline(never)]
-fn ends_by_topic<'a>(specs: &[&'a DagSpec]) -> Vec<End<'a>> {
+fn ends_by_topic<'a>(specs: &[&'a DagSpec]) -> Vec<TopicEnd<'a>> {
     let subtasks = specs.iter().flat_map(|spec| &spec.subtasks);
     let count = subtasks.map(|subtask| subtask.inputs.len() + subtask.outputs.len());
     let mut topics = Interner::new(count.sum());
     let mut ends = Vec::new();
     for (dag, spec) in specs.iter().enumerate() {
         for (subtask, of) in spec.subtasks.iter().enumerate() {
-            let inputs = of.inputs.iter().map(|port| (Direction::Input, port));
-            let outputs = of.outputs.iter().map(|port| (Direction::Output, port));
+            let inputs = of.inputs.iter().map(|port| (TopicSide::Input, port));
+            let outputs = of.outputs.iter().map(|port| (TopicSide::Output, port));
             for (direction, port) in inputs.chain(outputs) {
                 let topic = topics.intern(&port.topic);
-                ends.push(End {
+                ends.push(TopicEnd {
                     topic,
                     dag,
                     subtask,
@@ -155,19 +158,19 @@ fn ends_by_topic<'a>(specs: &[&'a DagSpec]) -> Vec<End<'a>> {
 #[inline(never)]
 fn check_topic<'a>(
     options: &CommitOptions,
-    Sides { writers, readers }: &Sides<'a>,
+    TopicEnds { writers, readers }: &TopicEnds<'a>,
     is_shared: bool,
-    topology: &mut Topology<'a>,
-    page: &mut Page<'_, '_>,
+    topology: &mut TopicGraph<'a>,
+    page: &mut DagFindings<'_, '_>,
 ) {
-    let Some(End { port, .. }) = writers.first().or(readers.first()).copied() else {
+    let Some(TopicEnd { port, .. }) = writers.first().or(readers.first()).copied() else {
         return;
     };
     let (spec, topic) = (page.spec, || port.topic.clone());
-    let label = |end: &End<'_>| SubtaskLabel::new(spec, end.subtask);
+    let label = |end: &TopicEnd<'_>| SubtaskLabel::new(spec, end.subtask);
 
-    if writers.len() > 1 && options.construction.writers == Count::One {
-        page.fault(|dag| Fault::SeveralWriters {
+    if writers.len() > 1 && options.construction.writers == CountLimit::One {
+        page.fault(|dag| DagFault::SeveralWriters {
             dag,
             topic: topic(),
             writers: writers.iter().map(label).collect(),
@@ -177,7 +180,7 @@ fn check_topic<'a>(
         (Some(writer), None) if !is_shared => topology.unread.push((writer.subtask, &port.topic)),
         (None, Some(_)) if !is_shared => {
             for reader in readers {
-                page.fault(|dag| Fault::UnwrittenTopic {
+                page.fault(|dag| DagFault::UnwrittenTopic {
                     dag,
                     topic: topic(),
                     reader: label(reader),
@@ -193,7 +196,7 @@ fn check_topic<'a>(
     }
     let mut ends = writers.iter().chain(readers);
     if readers.len() > 1 && ends.any(|end| !end.port.can_fan_out) {
-        page.fault(|dag| Fault::SeveralReaders {
+        page.fault(|dag| DagFault::SeveralReaders {
             dag,
             topic: topic(),
             type_name: port.type_name,
@@ -204,12 +207,12 @@ fn check_topic<'a>(
 
 /// Reports a topic that stands twice among the inputs, or among the outputs,
 /// of a subtask: in `ends` such ends are neighbours.
-fn report_duplicates(ends: &[End<'_>], page: &mut Page<'_, '_>) {
-    let kind = |end: &End<'_>| (end.subtask, end.direction);
+fn report_duplicates(ends: &[TopicEnd<'_>], page: &mut DagFindings<'_, '_>) {
+    let kind = |end: &TopicEnd<'_>| (end.subtask, end.direction);
     for same in ends.chunk_by(|one, other| kind(one) == kind(other)) {
         if let [first, _, ..] = same {
             let subtask = page.subtask(first.subtask);
-            page.fault(|dag| Fault::DuplicateTopic {
+            page.fault(|dag| DagFault::DuplicateTopic {
                 dag,
                 subtask,
                 topic: first.port.topic.clone(),
@@ -221,13 +224,17 @@ fn report_duplicates(ends: &[End<'_>], page: &mut Page<'_, '_>) {
 
 /// Compares every reader with the first writer, and every further writer with
 /// the first reader: linear, and no wrong end stays unnamed.
-fn report_mismatches(writers: &[End<'_>], readers: &[End<'_>], page: &mut Page<'_, '_>) {
+fn report_mismatches(
+    writers: &[TopicEnd<'_>],
+    readers: &[TopicEnd<'_>],
+    page: &mut DagFindings<'_, '_>,
+) {
     let spec = page.spec;
     let with_first_writer = readers.iter().map(|reader| (&writers[0], reader));
     let with_first_reader = writers.iter().skip(1).map(|writer| (writer, &readers[0]));
     for (writer, reader) in with_first_writer.chain(with_first_reader) {
         if writer.port.type_id != reader.port.type_id {
-            page.fault(|dag| Fault::TypeMismatch {
+            page.fault(|dag| DagFault::TypeMismatch {
                 dag,
                 topic: writer.port.topic.clone(),
                 writer: SubtaskLabel::new(spec, writer.subtask),
@@ -241,19 +248,19 @@ fn report_mismatches(writers: &[End<'_>], readers: &[End<'_>], page: &mut Page<'
 
 fn add_edges(
     options: &CommitOptions,
-    writers: &[End<'_>],
-    readers: &[End<'_>],
-    topology: &mut Topology<'_>,
-    page: &mut Page<'_, '_>,
+    writers: &[TopicEnd<'_>],
+    readers: &[TopicEnd<'_>],
+    topology: &mut TopicGraph<'_>,
+    page: &mut DagFindings<'_, '_>,
 ) {
     for (position, writer) in writers.iter().enumerate() {
         // Under one writer a topic the further ones are a fault already: one
         // edge each keeps them connected without a product of two counts.
-        let all = position == 0 || options.construction.writers != Count::One;
+        let all = position == 0 || options.construction.writers != CountLimit::One;
         for reader in if all { readers } else { &readers[..1] } {
             if writer.subtask == reader.subtask {
                 let subtask = page.subtask(writer.subtask);
-                page.fault(|dag| Fault::SelfEdge {
+                page.fault(|dag| DagFault::SelfEdge {
                     dag,
                     subtask,
                     topic: Some(writer.port.topic.clone()),
@@ -267,24 +274,24 @@ fn add_edges(
 }
 
 #[inline(never)]
-fn check_latest(latest: &LatestSpec, page: &mut Page<'_, '_>) {
+fn check_latest(latest: &LatestSpec, page: &mut DagFindings<'_, '_>) {
     let subtasks = page.spec.subtasks.iter();
     let topic = latest.port.topic.clone();
     if latest.samplers == 0 {
         let topic = topic.clone();
-        page.fault(|dag| Fault::LatestUnread { dag, topic });
+        page.fault(|dag| DagFault::LatestUnread { dag, topic });
     }
     let is_here = |other: &&TopicPort| other.topic == latest.port.topic;
     let mut writers = (subtasks.clone().enumerate())
         .filter_map(|(index, subtask)| Some((index, subtask.outputs.iter().find(is_here)?)));
     let Some((writer, written)) = writers.next() else {
         let meant = None;
-        page.fault(|dag| Fault::LatestUnwritten { dag, topic, meant });
+        page.fault(|dag| DagFault::LatestUnwritten { dag, topic, meant });
         return;
     };
     if written.type_id != latest.port.type_id {
         let writer = page.subtask(writer);
-        page.fault(|dag| Fault::LatestTypeMismatch {
+        page.fault(|dag| DagFault::LatestTypeMismatch {
             dag,
             topic,
             writer,
@@ -296,7 +303,7 @@ fn check_latest(latest: &LatestSpec, page: &mut Page<'_, '_>) {
     let inputs = subtasks.flat_map(|subtask| subtask.inputs.iter().filter(is_here));
     let readers = inputs.count() + latest.samplers;
     if readers > 1 && !written.can_fan_out {
-        page.fault(|dag| Fault::LatestOfMoved {
+        page.fault(|dag| DagFault::LatestOfMoved {
             dag,
             topic,
             type_name: written.type_name,
@@ -312,14 +319,14 @@ pub(super) fn is_shared(state: &StateSpec) -> bool {
 }
 
 /// Checks the states of all DAGs.
-pub(super) fn check_states(findings: &mut Findings<'_>) {
+pub(super) fn check_states(findings: &mut VerifyFindings<'_>) {
     for dag in 0..findings.specs.len() {
         let page = &mut findings.of(dag);
         for (position, state) in page.spec.states.iter().enumerate() {
             let is_repeated = |other: &StateSpec| other.name == state.name;
             if page.spec.states[..position].iter().any(is_repeated) {
                 let state = state.name.clone();
-                page.fault(|dag| Fault::DuplicateState { dag, state });
+                page.fault(|dag| DagFault::DuplicateState { dag, state });
             }
             check_users(state, page);
         }
@@ -327,19 +334,19 @@ pub(super) fn check_states(findings: &mut Findings<'_>) {
 }
 
 #[inline(never)]
-fn check_users(stated: &StateSpec, page: &mut Page<'_, '_>) {
+fn check_users(stated: &StateSpec, page: &mut DagFindings<'_, '_>) {
     let spec = page.spec;
     let label = |user: usize| SubtaskLabel::new(spec, user);
     let state = || stated.name.clone();
     let mut users: Vec<usize> = stated.users.iter().map(|user| user.subtask).collect();
     sort_by_key(&mut users, |user| user);
     match stated.users.first() {
-        None => page.fault(|dag| Fault::UnusedState {
+        None => page.fault(|dag| DagFault::UnusedState {
             dag,
             state: state(),
         }),
         Some(first) if stated.users.iter().all(|user| !user.updates) => {
-            page.fault(|dag| Fault::StateNeverUpdated {
+            page.fault(|dag| DagFault::StateNeverUpdated {
                 dag,
                 state: state(),
                 reader: label(first.subtask),
@@ -349,7 +356,7 @@ fn check_users(stated: &StateSpec, page: &mut Page<'_, '_>) {
     }
     for same in users.chunk_by(|one, other| one == other) {
         if let [subtask, _, ..] = *same {
-            page.fault(|dag| Fault::StateUsedTwice {
+            page.fault(|dag| DagFault::StateUsedTwice {
                 dag,
                 state: state(),
                 subtask: label(subtask),
@@ -360,7 +367,7 @@ fn check_users(stated: &StateSpec, page: &mut Page<'_, '_>) {
     if let Some(in_flight @ 2..) = spec.in_flight
         && is_shared(stated)
     {
-        page.fault(|dag| Fault::StateOverJobs {
+        page.fault(|dag| DagFault::StateOverJobs {
             dag,
             state: state(),
             in_flight,

@@ -4,8 +4,8 @@
 use std::any::{TypeId, type_name};
 
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, Count, DagSpec, Fault, LatestSpec, Policy, Priority,
-    Rejected, SubtaskId, SubtaskSpec, TopicPort, verify,
+    CommitOptions, ConstructionPolicy, CountLimit, DagFault, DagSpec, LatestSpec, Policy, Priority,
+    RejectedDags, SubtaskId, SubtaskSpec, TopicPort, verify,
 };
 
 const DRIVE: &str = "drive: > camera > image; image > fuse > obstacle; obstacle > brake >";
@@ -63,7 +63,7 @@ fn options() -> CommitOptions {
     CommitOptions::new(Policy::StaticPriority, 2)
 }
 
-struct Refused(Rejected);
+struct Refused(RejectedDags);
 
 #[track_caller]
 fn refused(specs: &[DagSpec]) -> Refused {
@@ -216,7 +216,7 @@ fn a_policy_or_another_scheduler_may_accept_it() {
     let writers = [dag(&DRIVE.replace("> image;", "> image obstacle;"))];
     refused(&writers).must_say("several_writers `obstacle`...: subtask `camera`, subtask `fuse`;");
     let several = ConstructionPolicy {
-        writers: Count::Several,
+        writers: CountLimit::Several,
         ..ConstructionPolicy::paper()
     };
     let verified = verify(&writers, &options().with_construction(several)).expect("allowed");
@@ -264,7 +264,7 @@ fn of_many_misspelt_topics_those_that_are_told_get_a_suggestion() {
     let pair = |number: u32| format!("; start >> topic-{number:03}; topci-{number:03} >>");
     let pairs: String = (0..25).map(pair).collect();
     let Refused(rejected) = refused(&[dag(&format!("many: > from > start{pairs}"))]);
-    let is_asked = |fault: &Fault| fault.to_string().contains("did you mean `topic-0");
+    let is_asked = |fault: &DagFault| fault.to_string().contains("did you mean `topic-0");
     let asked: Vec<bool> = rejected.faults().iter().map(is_asked).collect();
     assert_eq!(asked[..20], [true; 20]);
     assert!(!asked[20..].contains(&true));

@@ -1,6 +1,6 @@
 //! Large commits and runs: no recursion, no quadratic loop.
 
-use sched_dag::{CommitOptions, DagSpec, Fault, Policy, SubtaskSpec, verify};
+use sched_dag::{CommitOptions, DagFault, DagSpec, Policy, SubtaskSpec, verify};
 
 use crate::support::{PREEMPTIVE, Spec, cores, dag, run};
 
@@ -36,7 +36,7 @@ fn a_huge_cycle_or_knot_is_refused_in_bounded_time() {
         let options = CommitOptions::new(Policy::Edf, 1);
         let rejected = verify(&[large(&edges)], &options).expect_err("a cycle");
         let cycles = rejected.faults().iter().filter_map(|fault| match fault {
-            Fault::Cycle { hops, .. } => Some(hops.len()),
+            DagFault::Cycle { hops, .. } => Some(hops.len()),
             _ => None,
         });
         let cycles: Vec<usize> = cycles.collect();

@@ -1,6 +1,6 @@
 //! Priorities from the graph.
 
-use sched_dag::{CommitOptions, DagSpec, Fault, Policy, verify};
+use sched_dag::{CommitOptions, DagFault, DagSpec, Policy, verify};
 
 use crate::support::{Spec, dag};
 
@@ -19,7 +19,7 @@ fn priorities(specs: &[DagSpec]) -> Result<Vec<Vec<u32>>, Vec<&'static str>> {
     let options = CommitOptions::new(Policy::StaticPriority, 2);
     let verified = verify(specs, &options);
     let verified =
-        verified.map_err(|it| it.faults().iter().map(Fault::code).collect::<Vec<_>>())?;
+        verified.map_err(|it| it.faults().iter().map(DagFault::code).collect::<Vec<_>>())?;
     let dags = verified.task_set.dags().iter();
     let of_dag = dags.map(|dag| dag.subtasks().iter().map(|it| it.priority().0).collect());
     Ok(of_dag.collect())

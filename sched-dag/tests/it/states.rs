@@ -2,7 +2,7 @@
 
 use common::random::Random;
 use sched_dag::{
-    CommitOptions, DagId, DagSpec, Fault, LatestSpec, Policy, StateSpec, StateUser, SubtaskId,
+    CommitOptions, DagFault, DagId, DagSpec, LatestSpec, Policy, StateSpec, StateUser, SubtaskId,
     SubtaskSpec, TopicPort, verify,
 };
 
@@ -116,7 +116,7 @@ fn sharing_a_state_does_not_connect() {
     let spec = with_states(&[], 2, vec![state("pose", &[(0, true), (1, true)])]);
     let options = CommitOptions::new(Policy::StaticPriority, 1);
     let rejected = verify(&[spec], &options).expect_err("two parts");
-    let codes: Vec<&str> = rejected.faults().iter().map(Fault::code).collect();
+    let codes: Vec<&str> = rejected.faults().iter().map(DagFault::code).collect();
     assert_eq!(codes, ["not_connected", "several_sources", "several_sinks"]);
 }
 

@@ -14,7 +14,7 @@ use harness::fault_page::{self, documented_faults, is_said_by, table};
 use harness::markdown::page;
 use sched_dag::analysis::{NotProvenReason, TaskError};
 use sched_dag::{
-    CommitOptions, DagId, DagLabel, DagSpec, Fault, Policy, SubtaskId, SubtaskSpec, TopicPort,
+    CommitOptions, DagFault, DagId, DagLabel, DagSpec, Policy, SubtaskId, SubtaskSpec, TopicPort,
     verify,
 };
 use tool::golden::Golden;
@@ -75,19 +75,19 @@ fn refused(_machine: virtual_time::VirtualTime, dag: fass::Dag) -> fass::CommitE
     fass::finish_create_dags_with(&[dag], any_graph).expect_err("there is a fault")
 }
 
-fn no_cores() -> Vec<Fault> {
+fn no_cores() -> Vec<DagFault> {
     let options = CommitOptions::new(Policy::Edf, 0);
     faults(&[lidar()], &options)
 }
 
-fn edge_out_of_range() -> Vec<Fault> {
+fn edge_out_of_range() -> Vec<DagFault> {
     let mut dag = lidar();
     dag.subtasks.push(SubtaskSpec::default());
     dag.edges.push((0, 1));
     faults(&[dag], &CommitOptions::new(Policy::Edf, 1))
 }
 
-fn arity_too_large() -> Vec<Fault> {
+fn arity_too_large() -> Vec<DagFault> {
     let topic = |number: u32| TopicPort {
         topic: format!("points {number}"),
         type_id: TypeId::of::<u32>(),
@@ -103,15 +103,15 @@ fn arity_too_large() -> Vec<Fault> {
     faults(&[dag], &CommitOptions::new(Policy::Edf, 1))
 }
 
-fn too_many_dags() -> Vec<Fault> {
+fn too_many_dags() -> Vec<DagFault> {
     // 2^32 of them take 1 TiB: only the value is made.
-    vec![Fault::TooManyDags { count: 1 << 32 }]
+    vec![DagFault::TooManyDags { count: 1 << 32 }]
 }
 
-fn too_many_subtasks() -> Vec<Fault> {
+fn too_many_subtasks() -> Vec<DagFault> {
     // 2^32 of them take 1 TiB: only the value is made.
     let dag = label();
-    vec![Fault::TooManySubtasks {
+    vec![DagFault::TooManySubtasks {
         dag,
         count: 1 << 32,
     }]
@@ -131,7 +131,7 @@ fn label() -> DagLabel {
     }
 }
 
-fn faults(dags: &[DagSpec], options: &CommitOptions) -> Vec<Fault> {
+fn faults(dags: &[DagSpec], options: &CommitOptions) -> Vec<DagFault> {
     let rejected = verify(dags, options).expect_err("there is a fault");
     rejected.faults().to_vec()
 }
@@ -180,7 +180,7 @@ fn every_fault_is_found_and_said_as_documented() {
 #[test]
 fn every_kind_of_fault_has_an_entry() {
     let documented: BTreeSet<String> = documented_faults().into_keys().collect();
-    let tables = [sched_dag::Fault::CODES, fass::Fault::CODES];
+    let tables = [sched_dag::DagFault::CODES, fass::Fault::CODES];
     let mut codes: BTreeSet<String> = tables.concat().into_iter().map(String::from).collect();
     // Others are named where they are found.
     let others = sources(&["fass/src/draft/checks.rs"]);
