@@ -108,25 +108,25 @@ mod platform;
 mod run;
 
 pub use api::dag::{Dag, create_dag};
-pub use api::latest::{Latest, Sample, Sampling};
+pub use api::latest::{Latest, LatestUse, Sample};
 pub use api::lifecycle::{
-    Entering, Entrance, Mode, Modes, Shutdown, ShuttingDown, Switch, Switching, shutting_down,
+    Mode, ModeSwitch, ModeUse, Modes, Shutdown, ShutdownUse, Switch, SwitchUse, shutting_down,
 };
-pub use api::parameter::{Parameter, ParameterValue, Reading, Tunable, Unsettable};
-pub use api::signal::{Raiser, Raising, Signal};
-pub use api::state::{Read, State, StateValue, Update};
-pub use api::subtask::{Subtask, Untyped};
-pub use api::uses::{ResettableUses, Uses, Using};
-pub use api::wire::{Packet, Received, Receiving, Sender, Sending, Wire, WireCounts, WireOptions};
-pub use commit::answer::{Answer, Commit, EndToEnd, Placement, SinkAnswer, Verdict};
+pub use api::parameter::{Parameter, ParameterError, ParameterUse, ParameterValue, Tunable};
+pub use api::signal::{Raiser, Signal, SignalUse};
+pub use api::state::{State, StateRead, StateUpdate, StateValue};
+pub use api::subtask::{Subtask, UntypedSubtask};
+pub use api::uses::{ResettableUses, SubtaskBuilder, Uses};
+pub use api::wire::{Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions};
+pub use commit::answer::{ClusterPlacement, Commit, DagAnswer, EndToEnd, SinkAnswer, Verdict};
 pub use commit::{assign_clusters, finish_create_dags, finish_create_dags_with};
 pub use draft::SubtaskAttributes;
-pub use draft::fault::{CommitError, Fault, Unproven};
+pub use draft::fault::{CommitError, Fault, UnprovenDag};
 pub use edge::latest::LatestJobs;
 #[doc(hidden)]
 pub use platform::say;
 pub use platform::{
-    AlreadyInstalled, Clock, LaunchError, Occupation, Platform, Terms, execute_for, install,
+    AlreadyInstalled, Clock, LaunchError, Occupation, Platform, RunConfig, execute_for, install,
     now_ns, set_clock,
 };
 pub use recording::Channel;

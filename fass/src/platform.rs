@@ -34,13 +34,13 @@ use crate::run::plan::Plan;
 ///
 /// ```standalone_crate
 /// use core::time::Duration;
-/// use fass::{LaunchError, Occupation, Plan, Platform, Terms};
+/// use fass::{LaunchError, Occupation, Plan, Platform, RunConfig};
 ///
 /// struct OneJob;
 ///
 /// impl Platform for OneJob {
-///     fn terms(&self) -> Terms {
-///         Terms::of_cores(1)
+///     fn terms(&self) -> RunConfig {
+///         RunConfig::of_cores(1)
 ///     }
 ///     fn now_ns(&self) -> u64 {
 ///         0
@@ -61,7 +61,7 @@ use crate::run::plan::Plan;
 /// ```
 pub trait Platform: Sync {
     /// Returns on what terms DAGs run: a commit verifies and answers by these.
-    fn terms(&self) -> Terms;
+    fn terms(&self) -> RunConfig;
 
     /// Divides the cores for these DAGs, by [`assign_clusters`](crate::assign_clusters), if the
     /// terms leave that to the commit; a platform whose terms never do does not define this. (So
@@ -428,15 +428,15 @@ pub fn say(level: Level, text: &'static str, fields: &[Field]) {
 /// The terms on which a platform runs the DAGs of the commits to come.
 ///
 /// ```
-/// use fass::{CoreDivision, Policy, Terms};
+/// use fass::{CoreDivision, Policy, RunConfig};
 ///
-/// let mut terms = Terms::of_cores(3);
+/// let mut terms = RunConfig::of_cores(3);
 /// terms.scheduler.policy = Policy::Edf;
 /// terms.divide(&[1, 2]);
 /// assert_eq!(terms.clusters, CoreDivision::Of(vec![1, 2]));
 /// ```
 #[derive(Clone, Debug)]
-pub struct Terms {
+pub struct RunConfig {
     /// The scheduling policy, which decides what attributes are needed; whether a started
     /// instance may lose its core; and the number of processors that run subtasks, at least 1.
     pub scheduler: SchedulerOptions,
@@ -474,11 +474,11 @@ pub struct Terms {
     pub most_events: u64,
 }
 
-impl Terms {
+impl RunConfig {
     /// Makes terms of so many cores: they are not divided, static priorities and preemption rule,
     /// nothing is charged, and there are no budgets but stated ones.
     ///
-    /// See [`Terms`].
+    /// See [`RunConfig`].
     #[must_use]
     pub const fn of_cores(cores: u32) -> Self {
         Self {
@@ -505,7 +505,7 @@ impl Terms {
     /// Divides the cores into clusters of so many each, from core 0 on; no number: they are not
     /// divided. Each cluster schedules its own DAGs.
     ///
-    /// See [`Terms`].
+    /// See [`RunConfig`].
     pub fn divide(&mut self, sizes: &[u32]) {
         self.assigns = false;
         self.clusters = match sizes {
@@ -516,9 +516,9 @@ impl Terms {
 
     /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
     /// others share clusters of one core each. All subtasks need WCETs. See
-    /// [`Placement`](crate::Placement).
+    /// [`ClusterPlacement`](crate::ClusterPlacement).
     ///
-    /// See [`Terms`].
+    /// See [`RunConfig`].
     pub fn divide_by_commit(&mut self) {
         (self.clusters, self.assigns) = (CoreDivision::Undivided, true);
     }
@@ -539,7 +539,7 @@ impl Terms {
     }
 }
 
-impl Default for Terms {
+impl Default for RunConfig {
     fn default() -> Self {
         Self::of_cores(1)
     }

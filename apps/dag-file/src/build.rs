@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use common::random::nth;
-use fass::{Dag, Occupation, SubtaskAttributes, Untyped, create_dag};
+use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
 use sched_dag::DagSpec;
 
 use crate::execution::{Execution, Times};
@@ -80,7 +80,7 @@ fn build_dag(
         dag.cluster(cluster.0);
     }
     let subtasks = spec.subtasks.iter().zip(&described.subtasks).zip(seeds);
-    let subtasks: Vec<Untyped> = subtasks
+    let subtasks: Vec<UntypedSubtask> = subtasks
         .map(|((subtask, more), seed)| {
             let mut attributes =
                 SubtaskAttributes::named(&subtask.name).wcet(time(subtask.wcet_ns));

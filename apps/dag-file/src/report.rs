@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use dag_file::Set;
-use fass::{Answer, SinkAnswer, Verdict};
+use fass::{DagAnswer, SinkAnswer, Verdict};
 use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
 use sched_dag::law::Violation;
@@ -38,7 +38,7 @@ struct SinkReport {
 
 impl Report {
     /// Takes the figures from a run; prints each violation.
-    pub(crate) fn new(set: &Set, answers: &[Answer], run: &Run) -> Self {
+    pub(crate) fn new(set: &Set, answers: &[DagAnswer], run: &Run) -> Self {
         let dags = set.dags.iter().zip(answers);
         let dags = dags.map(|(dag, answer)| DagReport {
             name: dag.spec.name.clone(),
@@ -217,7 +217,7 @@ fn responses(dag: DagId, run: &Run) -> Distribution {
 }
 
 /// Returns the figures of a DAG's sinks, if there are several.
-fn sinks(answer: &Answer, run: &Run) -> Vec<SinkReport> {
+fn sinks(answer: &DagAnswer, run: &Run) -> Vec<SinkReport> {
     let dag = answer.dag.id;
     if answer.sinks.len() < 2 {
         return Vec::new();

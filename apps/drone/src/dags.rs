@@ -4,7 +4,9 @@ use alloc::vec;
 use core::time::Duration;
 
 use common::random::Random;
-use fass::{Dag, Entrance, FaultLimit, Latest, Mode, Modes, Occupation, OverrunPolicy, Parameter};
+use fass::{
+    Dag, FaultLimit, Latest, Mode, ModeSwitch, Modes, Occupation, OverrunPolicy, Parameter,
+};
 use fass::{Raiser, Sample, Signal, SubtaskAttributes, create_dag, execute_for};
 use maths::{acos, sqrt};
 
@@ -258,7 +260,7 @@ impl Workload {
         let flight = flight.clone();
         let mut ahead = WAYPOINTS.into_iter().cycle();
         let mut goal = START;
-        let decide = move |(is_low, mut landing): (Seen<'_, bool>, Entrance<'_>)| {
+        let decide = move |(is_low, mut landing): (Seen<'_, bool>, ModeSwitch<'_>)| {
             self.spend("decide");
             let lands = is_low.is_some_and(|is_low| *is_low.value);
             flight.decided(lands);
@@ -295,7 +297,7 @@ impl Workload {
 
     fn register_safety(self, dag: &Dag, landing: &Mode, flight: &Flight) -> Signal {
         let flight = flight.clone();
-        let alarm = move |mut landing: Entrance<'_>| {
+        let alarm = move |mut landing: ModeSwitch<'_>| {
             self.spend("alarm");
             flight.decided(true);
             landing.at_once();

@@ -16,7 +16,7 @@ use core::num::NonZeroUsize;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{Dag, Occupation, SubtaskAttributes, Untyped, create_dag};
+use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
 use fork_join::{ExecutionTimes, PERIOD};
 use join_latency::{Joined, Samples, Span};
 use kernel::{Ending, Event, Lock, Machine};
@@ -59,7 +59,7 @@ fn workers(cores: u32, shared: &Arc<Cores>) -> Dag {
     let own = Arc::clone(shared);
     let begin = move |_| own.begin();
     let source = dag.register_untyped_subtask(begin, SubtaskAttributes::named("begin"));
-    let workers: Vec<Untyped> = (0..cores)
+    let workers: Vec<UntypedSubtask> = (0..cores)
         .map(|_| {
             let own = Arc::clone(shared);
             let worker = move |_| {

@@ -12,7 +12,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use fass::edge::{Drain, Edge, Kept, Outgoing, Sink};
-use fass::{Clock, LaunchError, Plan, Recorded, Terms};
+use fass::{Clock, LaunchError, Plan, Recorded, RunConfig};
 use sched_dag::engine::Run;
 use sched_dag::{DriverNotice, Instance};
 
@@ -101,7 +101,7 @@ pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
 }
 
 /// Takes what is committed.
-pub(crate) fn commit(plan: &Plan, terms: &Terms) {
+pub(crate) fn commit(plan: &Plan, terms: &RunConfig) {
     if let Some(file) = &mut *unpoisoned(&FILE) {
         file.commit(plan, &terms.scheduler, terms.overheads);
     }

@@ -15,7 +15,7 @@ use std::time::Duration;
 use std::{fmt, fs};
 
 use fass::edge::{Drained, Kept, Outcome, Wish};
-use fass::{Platform as _, Preemption, Signal, Terms, Wire};
+use fass::{Platform as _, Preemption, RunConfig, Signal, Wire};
 
 use crate::control::{self, Control};
 use crate::edge::{self, FILE, File, IS_LIVE, LEFT, unpoisoned};
@@ -187,7 +187,7 @@ impl Linux {
             "this program has a `Linux` already; drop it first"
         );
         *threads = Some(Threads {
-            terms: Terms::of_cores(cores),
+            terms: RunConfig::of_cores(cores),
             processors: processors.into(),
             levels,
             polls: mechanism == Mechanism::Poll,
@@ -200,13 +200,13 @@ impl Linux {
 
     /// Returns the terms of the commits to come.
     #[must_use]
-    pub fn terms(&self) -> Terms {
+    pub fn terms(&self) -> RunConfig {
         HOST.terms()
     }
 
     /// Changes these. Without SCHED_FIFO or `sched_ext` a started instance never loses its core,
     /// whatever they say.
-    pub fn change(&self, change: impl FnOnce(&mut Terms)) {
+    pub fn change(&self, change: impl FnOnce(&mut RunConfig)) {
         if let Some(Threads { terms, levels, .. }) = HOST.threads().as_mut() {
             change(terms);
             if levels.is_none() {
@@ -235,7 +235,7 @@ impl Linux {
     /// assert!(run.journal().events().all(|event| event.core.0 == event.dag.0));
     /// ```
     #[must_use = "the machine itself is returned"]
-    pub fn with(self, change: impl FnOnce(&mut Terms)) -> Self {
+    pub fn with(self, change: impl FnOnce(&mut RunConfig)) -> Self {
         self.change(change);
         self
     }

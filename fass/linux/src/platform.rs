@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use fass::edge::{Begin, Kept};
 use fass::log::Line;
-use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms};
+use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, RunConfig, Runner};
 use sched_dag::engine::{self, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, PendingRequests, Request};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
@@ -53,12 +53,12 @@ impl Host {
 }
 
 impl Platform for Host {
-    fn terms(&self) -> Terms {
+    fn terms(&self) -> RunConfig {
         let threads = self.threads();
         // Without a machine, those of none.
         threads
             .as_ref()
-            .map_or(Terms::of_cores(1), |of| of.terms.clone())
+            .map_or(RunConfig::of_cores(1), |of| of.terms.clone())
     }
 
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
@@ -198,7 +198,7 @@ const LEAD_NS: u64 = 1_000_000;
 #[derive(Clone, Debug)]
 pub(crate) struct Threads {
     /// The terms of the commits to come.
-    pub(crate) terms: Terms,
+    pub(crate) terms: RunConfig,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
     /// Whether idle threads watch instead of sleeping.

@@ -16,7 +16,7 @@ use core::time::Duration;
 
 use sched_dag::{ClusterId, DagId, DagKey, OverrunPolicy, SubtaskOrder, TaskSet};
 
-use crate::draft::Draft;
+use crate::draft::DagDraft;
 use crate::draft::SubtaskAttributes;
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
@@ -56,7 +56,7 @@ pub fn create_dag() -> Dag {
 /// would silently not run is a mistake in the program.
 #[derive(Clone, Debug)]
 pub struct Dag {
-    pub(crate) draft: Rc<RefCell<Draft>>,
+    pub(crate) draft: Rc<RefCell<DagDraft>>,
 }
 
 impl Dag {
@@ -338,7 +338,7 @@ impl Dag {
 
     /// Borrows the draft for a change.
     #[track_caller]
-    pub(crate) fn open(&self) -> RefMut<'_, Draft> {
+    pub(crate) fn open(&self) -> RefMut<'_, DagDraft> {
         let draft = self.draft.borrow_mut();
         assert!(
             !draft.is_committed,

@@ -79,7 +79,7 @@ pub struct Latest<T> {
 ///
 /// See [`Latest`].
 #[derive(Debug)]
-pub struct Sampling<T>(Latest<T>);
+pub struct LatestUse<T>(Latest<T>);
 
 /// A value as a subtask finds it at its start: that of the latest complete instance
 /// of its writer. `None` in its place: none has been complete yet.
@@ -127,9 +127,9 @@ impl<T: Message + Sync> Latest<T> {
     ///
     /// See [`Latest`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
-    pub fn sample(&self) -> Sampling<T> {
+    pub fn sample(&self) -> LatestUse<T> {
         let shared = Rc::clone(&self.shared);
-        Sampling(Latest { shared })
+        LatestUse(Latest { shared })
     }
 }
 
@@ -152,9 +152,9 @@ impl Dag {
     }
 }
 
-impl<T> sealed::Sealed for Sampling<T> {}
+impl<T> sealed::Sealed for LatestUse<T> {}
 
-impl<T: Message + Sync> Uses for Sampling<T> {
+impl<T: Message + Sync> Uses for LatestUse<T> {
     type Borrowed<'a> = Option<Sample<'a, T>>;
     type Held = Sampler<T>;
     type Guard<'a> = Looked<'a, T>;

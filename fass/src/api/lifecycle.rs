@@ -20,7 +20,7 @@ use sched_dag::{DagId, ModeId};
 
 use super::dag::Dag;
 use super::uses::{Uses, implement_asking, sealed};
-use crate::draft::Draft;
+use crate::draft::DagDraft;
 use crate::draft::checks::{self, ModeDraft, dags_of_modes};
 use crate::run::effect::{AT_ONCE, GO, Of, STOP, Target, WHEN_IDLE, Wish};
 
@@ -29,7 +29,7 @@ use crate::run::effect::{AT_ONCE, GO, Of, STOP, Target, WHEN_IDLE, Wish};
 ///
 /// See [`Switch`].
 #[derive(Debug)]
-pub struct Switching {
+pub struct SwitchUse {
     target: Arc<Target>,
 }
 
@@ -101,7 +101,7 @@ impl Switch<'_> {
 ///
 /// See [`Shutdown`].
 #[derive(Debug)]
-pub struct ShuttingDown(());
+pub struct ShutdownUse(());
 
 /// What a function ends the run with, in order: nothing more is released, and what is in flight
 /// comes to its end.
@@ -157,8 +157,8 @@ impl Shutdown<'_> {
 ///
 /// See [`Shutdown`].
 #[must_use = "a use has no effect until a subtask is registered with it"]
-pub const fn shutting_down() -> ShuttingDown {
-    ShuttingDown(())
+pub const fn shutting_down() -> ShutdownUse {
+    ShutdownUse(())
 }
 
 impl Dag {
@@ -167,9 +167,9 @@ impl Dag {
     /// The commit must have this DAG, too. See [`Switch`].
     #[track_caller]
     #[must_use = "a use has no effect until a subtask is registered with it"]
-    pub fn switching(&self) -> Switching {
+    pub fn switching(&self) -> SwitchUse {
         let draft = self.open();
-        Switching {
+        SwitchUse {
             target: Arc::clone(&draft.target),
         }
     }
@@ -200,7 +200,7 @@ impl Dag {
 
 /// Makes what serves the requests of DAGs. Only what is stated here names it, so an app that
 /// states nothing of that kind has no code for it.
-fn lifecycle(dags: &[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle> {
+fn lifecycle(dags: &[Rc<RefCell<DagDraft>>]) -> Box<dyn Lifecycle> {
     let drafts = || (0..).map(DagId).zip(dags);
     let paused = drafts().filter(|(_, draft)| draft.borrow().starts_paused);
     let paused: Vec<DagId> = paused.map(|(dag, _)| dag).collect();
@@ -210,18 +210,18 @@ fn lifecycle(dags: &[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle> {
     Box::new(changes.with_modes(dags_of_modes(dags)))
 }
 
-implement_asking!(Switching, Switch, |switching, draft, subtask| {
+implement_asking!(SwitchUse, Switch, |switching, draft, subtask| {
     (draft.switches).push((subtask, Arc::clone(&switching.target)));
     ask(draft, subtask, Of::Dag(switching.target))
 });
 
-implement_asking!(ShuttingDown, Shutdown, |_, draft, subtask| {
+implement_asking!(ShutdownUse, Shutdown, |_, draft, subtask| {
     draft.may_shut_down = true;
     ask(draft, subtask, Of::Run)
 });
 
 /// Notes that completions of a subtask may ask for a change of what is on.
-fn ask(draft: &mut Draft, subtask: usize, of: Of) -> Wish {
+fn ask(draft: &mut DagDraft, subtask: usize, of: Of) -> Wish {
     draft.lifecycle = Some(lifecycle);
     draft.ask(subtask, of)
 }
@@ -238,7 +238,7 @@ fn ask(draft: &mut Draft, subtask: usize, of: Of) -> Wish {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{Entrance, Modes, SubtaskAttributes, create_dag, finish_create_dags};
+/// use fass::{ModeSwitch, Modes, SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::VirtualTime;
 ///
 /// let machine = VirtualTime::new();
@@ -257,7 +257,7 @@ fn ask(draft: &mut Draft, subtask: usize, of: Of) -> Wish {
 /// let battery = create_dag(); // in no mode, so it runs in both
 /// battery.name("battery").jobs(3).relative_deadline(ms(25));
 /// let mut charge = 3;
-/// let watch = move |mut landing: Entrance<'_>| {
+/// let watch = move |mut landing: ModeSwitch<'_>| {
 ///     charge -= 1;
 ///     if charge == 1 {
 ///         landing.when_idle(); // asked for when this instance is complete
@@ -289,22 +289,22 @@ pub struct Mode {
     number: ModeId,
 }
 
-/// The use of a mode by a subtask that may enter it: the function gets an [`Entrance`]. Made by
+/// The use of a mode by a subtask that may enter it: the function gets an [`ModeSwitch`]. Made by
 /// [`Mode::entering`].
 ///
 /// See [`Modes`].
 #[derive(Debug)]
-pub struct Entering(Mode);
+pub struct ModeUse(Mode);
 
 /// What a function enters a mode with.
 ///
 /// See [`Modes`].
 #[derive(Debug)]
-pub struct Entrance<'a> {
+pub struct ModeSwitch<'a> {
     wish: &'a AtomicU8,
 }
 
-impl Entrance<'_> {
+impl ModeSwitch<'_> {
     /// Enters the mode when this instance is complete. Jobs of the old mode that are in flight
     /// go on next to those of the new.
     ///
@@ -367,12 +367,12 @@ impl Mode {
     ///
     /// See [`Modes`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
-    pub fn entering(&self) -> Entering {
-        Entering(self.clone())
+    pub fn entering(&self) -> ModeUse {
+        ModeUse(self.clone())
     }
 }
 
-implement_asking!(Entering, Entrance, |entering, draft, subtask| {
+implement_asking!(ModeUse, ModeSwitch, |entering, draft, subtask| {
     draft.modes.push(entering.0.modes);
     draft.check_modes = Some(checks::check_modes);
     ask(draft, subtask, Of::Mode(entering.0.number))

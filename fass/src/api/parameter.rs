@@ -62,9 +62,9 @@ use super::uses::{Uses, sealed};
 /// machine.run();
 /// assert_eq!(gain.value(), 1.5);
 /// ```
-pub struct Parameter<T>(Arc<Shared<T>>);
+pub struct Parameter<T>(Arc<ParameterCell<T>>);
 
-struct Shared<T> {
+struct ParameterCell<T> {
     name: String,
     /// The value, as bits.
     bits: AtomicU64,
@@ -76,22 +76,22 @@ struct Shared<T> {
 ///
 /// See [`Parameter`].
 #[derive(Debug)]
-pub struct Reading<T>(Parameter<T>);
+pub struct ParameterUse<T>(Parameter<T>);
 
 /// A value that is not within a parameter's range, or is no number of its type. It says so in one
 /// line, with the type and the range.
 ///
 /// See [`Parameter`].
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Unsettable(String);
+pub struct ParameterError(String);
 
-impl fmt::Display for Unsettable {
+impl fmt::Display for ParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
     }
 }
 
-impl core::error::Error for Unsettable {}
+impl core::error::Error for ParameterError {}
 
 /// A type that a parameter can have: `bool`, `i64`, `u64`, `f64` and the shorter ones `i32`, `u32`,
 /// `f32`.
@@ -236,7 +236,7 @@ impl<T: ParameterValue> Parameter<T> {
             "parameter `{name}` begins with {initial}, which is not from {least} to {most}; \
              change one of them"
         );
-        Self(Arc::new(Shared {
+        Self(Arc::new(ParameterCell {
             name: name.into(),
             bits: AtomicU64::new(initial.to_bits()),
             initial,
@@ -259,20 +259,23 @@ impl<T: ParameterValue> Parameter<T> {
     /// If it is not within the range; then nothing has changed.
     ///
     /// See [`Parameter`].
-    pub fn set(&self, value: T) -> Result<(), Unsettable> {
+    pub fn set(&self, value: T) -> Result<(), ParameterError> {
         if self.store(value) {
             return Ok(());
         }
         let this: &dyn Tunable = self;
-        Err(Unsettable(format!("{}", this.refusal(&format!("{value}")))))
+        Err(ParameterError(format!(
+            "{}",
+            this.refusal(&format!("{value}"))
+        )))
     }
 
     /// Returns the use of a source that reads it.
     ///
     /// See [`Parameter`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
-    pub fn reading(&self) -> Reading<T> {
-        Reading(self.clone())
+    pub fn reading(&self) -> ParameterUse<T> {
+        ParameterUse(self.clone())
     }
 
     fn store(&self, value: T) -> bool {
@@ -322,9 +325,9 @@ impl<T> Clone for Parameter<T> {
 
 shown_as!(Parameter<T>, |of| of.0.name);
 
-impl<T> sealed::Sealed for Reading<T> {}
+impl<T> sealed::Sealed for ParameterUse<T> {}
 
-impl<T: ParameterValue> Uses for Reading<T> {
+impl<T: ParameterValue> Uses for ParameterUse<T> {
     type Borrowed<'a> = T;
     type Held = Parameter<T>;
     type Guard<'a> = (T, PhantomData<&'a ()>);

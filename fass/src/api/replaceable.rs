@@ -13,7 +13,7 @@ use sched_dag::{FaultLimit, OnFault};
 
 use super::dag::Dag;
 use super::subtask::Subtask;
-use super::uses::{ResettableUses, Uses, Using};
+use super::uses::{ResettableUses, SubtaskBuilder, Uses};
 use crate::run::replaceable::Reset;
 use crate::run::replaceable::{Alternatives, Anew, Two, defer};
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -129,7 +129,7 @@ impl Dag {
 }
 
 // The bound is each method's own, so that the compiler says our sentence where it is not met.
-impl<'d, U: Uses + 'static> Using<'d, U> {
+impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
     /// Works like [`Dag::restarting`]. The states that the subtask uses are reset, too, to
     /// what is given by [`State::reset_to`](crate::State::reset_to).
     ///

@@ -21,7 +21,7 @@ use sched_dag::DagId;
 
 use super::dag::Dag;
 use super::uses::{Uses, implement_asking, sealed};
-use crate::draft::Draft;
+use crate::draft::DagDraft;
 use crate::platform;
 use crate::run::effect::Target;
 use crate::run::effect::{GO, Of, Wish};
@@ -75,7 +75,7 @@ pub struct Signal {
 ///
 /// See [`Signal`].
 #[derive(Debug)]
-pub struct Raising(Signal);
+pub struct SignalUse(Signal);
 
 /// What a function raises a signal with. See [`Signal`].
 #[derive(Debug)]
@@ -99,8 +99,8 @@ impl Signal {
     ///
     /// See [`Signal`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
-    pub fn raising(&self) -> Raising {
-        Raising(self.clone())
+    pub fn raising(&self) -> SignalUse {
+        SignalUse(self.clone())
     }
 
     /// Raises the signal now, from outside all subtasks. Once the DAG's run is over
@@ -215,7 +215,7 @@ impl Dag {
     }
 }
 
-implement_asking!(Raising, Raiser, |raising, draft, subtask| {
+implement_asking!(SignalUse, Raiser, |raising, draft, subtask| {
     let target = raising.0.target;
     draft.raises.push((subtask, Arc::clone(&target)));
     draft.ask(subtask, Of::Signal(target))

@@ -104,22 +104,22 @@ pub struct State<T> {
 ///
 /// See [`State`].
 #[derive(Debug)]
-pub struct Update<T>(State<T>);
+pub struct StateUpdate<T>(State<T>);
 
 /// The use of a [`State`] that only reads it: the function gets a `&T`. Made by
 /// [`State::read`].
 ///
 /// See [`State`].
 #[derive(Debug)]
-pub struct Read<T>(State<T>);
+pub struct StateRead<T>(State<T>);
 
 impl<T: StateValue> State<T> {
     /// Returns the use of a subtask that may change the state.
     ///
     /// See [`State`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
-    pub fn update(&self) -> Update<T> {
-        Update(self.clone())
+    pub fn update(&self) -> StateUpdate<T> {
+        StateUpdate(self.clone())
     }
 
     /// Returns the use of a subtask that only reads the state. Readers between two
@@ -127,8 +127,8 @@ impl<T: StateValue> State<T> {
     ///
     /// See [`State`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
-    pub fn read(&self) -> Read<T> {
-        Read(self.clone())
+    pub fn read(&self) -> StateRead<T> {
+        StateRead(self.clone())
     }
 
     /// States what the state is reset to after a fault of a subtask that uses it, where the
@@ -311,8 +311,8 @@ macro_rules! implement_use {
     };
 }
 
-implement_use!(Update: &'a mut T, true, change -> Changing);
-implement_use!(Read: &'a T, false, look -> Looking);
+implement_use!(StateUpdate: &'a mut T, true, change -> Changing);
+implement_use!(StateRead: &'a T, false, look -> Looking);
 
 fn refuse() -> ! {
     panic!(

@@ -31,7 +31,7 @@ use core::time::Duration;
 use sched_dag::SubtaskLabel;
 
 use super::dag::Dag;
-use crate::draft::{Draft, Ends, SubtaskAttributes};
+use crate::draft::{DagDraft, NamedTopics, SubtaskAttributes};
 use crate::run::message::MessageType;
 use crate::run::subtask::{MakeBody, defer};
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -39,7 +39,7 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 /// A subtask whose function is known, to be registered by [`register`](Self::register).
 ///
 /// Made by [`Dag::subtask`], [`Dag::source`], [`Dag::restarting`] and [`Dag::falling_back`], and
-/// those of [`Using`](crate::Using).
+/// those of [`SubtaskBuilder`](crate::SubtaskBuilder).
 ///
 /// ```
 /// use core::time::Duration;
@@ -169,7 +169,7 @@ impl<'d> Subtask<'d> {
             draft.replaceable.push(subtask);
         }
         let [inputs, outputs] = self.types.map(|types| types());
-        let ends = Ends {
+        let ends = NamedTopics {
             inputs: (self.reads, &inputs),
             outputs: (self.writes, &outputs),
         };
@@ -191,10 +191,10 @@ impl fmt::Debug for Subtask<'_> {
 /// [`Dag::register_untyped_subtask`](crate::Dag::register_untyped_subtask).
 ///
 /// ```
-/// use fass::{SubtaskAttributes, Untyped, create_dag};
+/// use fass::{SubtaskAttributes, UntypedSubtask, create_dag};
 ///
 /// let dag = create_dag();
-/// let subtasks: Vec<Untyped> = (0..40)
+/// let subtasks: Vec<UntypedSubtask> = (0..40)
 ///     .map(|_| dag.register_untyped_subtask(|_job| (), SubtaskAttributes::default()))
 ///     .collect();
 /// for earlier in &subtasks[..39] {
@@ -202,13 +202,13 @@ impl fmt::Debug for Subtask<'_> {
 /// }
 /// ```
 #[derive(Clone)]
-pub struct Untyped {
-    pub(crate) draft: Rc<RefCell<Draft>>,
+pub struct UntypedSubtask {
+    pub(crate) draft: Rc<RefCell<DagDraft>>,
     /// The subtask's position in its DAG.
     pub(crate) subtask: usize,
 }
 
-shown_as!(Untyped, |of| of.subtask);
+shown_as!(UntypedSubtask, |of| of.subtask);
 
 impl Dag {
     /// Registers a subtask without types, for a graph that is known only at run
@@ -245,11 +245,11 @@ impl Dag {
     /// assert_eq!(machine.run().jobs.len(), 3);
     /// ```
     #[track_caller]
-    pub fn register_untyped_subtask<F>(&self, f: F, attributes: SubtaskAttributes) -> Untyped
+    pub fn register_untyped_subtask<F>(&self, f: F, attributes: SubtaskAttributes) -> UntypedSubtask
     where
         F: FnMut(u64) + Send + 'static,
     {
-        Untyped {
+        UntypedSubtask {
             subtask: self.open().register_untyped(f, attributes),
             draft: Rc::clone(&self.draft),
         }
@@ -265,7 +265,7 @@ impl Dag {
     /// Also if one of the two is a subtask of another DAG: there are no edges
     /// between DAGs.
     #[track_caller]
-    pub fn precede(&self, earlier: &Untyped, later: &Untyped) -> &Self {
+    pub fn precede(&self, earlier: &UntypedSubtask, later: &UntypedSubtask) -> &Self {
         for end in [earlier, later] {
             assert!(
                 Rc::ptr_eq(&end.draft, &self.draft),
@@ -296,7 +296,7 @@ impl Dag {
     ///
     /// Also if it is a subtask of another DAG.
     #[track_caller]
-    pub fn sink_deadline(&self, sink: &Untyped, relative_deadline: Duration) -> &Self {
+    pub fn sink_deadline(&self, sink: &UntypedSubtask, relative_deadline: Duration) -> &Self {
         assert!(
             Rc::ptr_eq(&sink.draft, &self.draft),
             "{sink:?} is a subtask of another DAG; call its own DAG's `sink_deadline`"

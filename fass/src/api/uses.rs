@@ -15,7 +15,7 @@
 //! | [`Latest::sample`](crate::Latest::sample) | `Option<Sample<T>>` | bounded staleness |
 //! | [`Signal::raising`](crate::Signal::raising) | `Raiser` | sporadic release |
 //! | [`Dag::switching`] | `Switch` | pauses (P1 to P5) |
-//! | [`Mode::entering`](crate::Mode::entering) | `Entrance` | modes (M1 to M7) |
+//! | [`Mode::entering`](crate::Mode::entering) | `ModeSwitch` | modes (M1 to M7) |
 //! | [`shutting_down`](crate::shutting_down) | `Shutdown` | the end (C1 to C5) |
 //! | [`Wire::receiving`](crate::Wire::receiving) | `Received<T>` | input |
 //! | [`Wire::sending`](crate::Wire::sending) | `Sender` | output |
@@ -24,14 +24,14 @@
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
 //!
-//! The methods of [`Using`] are those of [`Dag`]. Each wraps the function in one that begins the
+//! The methods of [`SubtaskBuilder`] are those of [`Dag`]. Each wraps the function in one that begins the
 //! uses, lends them to the function for one call, and ends them.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::dag::Dag;
-use super::subtask::{Subtask, Untyped};
+use super::subtask::{Subtask, UntypedSubtask};
 use crate::draft::SubtaskAttributes;
 use crate::run::replaceable::Reset;
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -93,7 +93,7 @@ pub trait Uses: sealed::Sealed {
 /// reset, or a tuple of such.
 ///
 /// Apps do not call its methods; they meet the trait in
-/// [`Using::restarting`](crate::Using::restarting).
+/// [`SubtaskBuilder::restarting`](crate::SubtaskBuilder::restarting).
 ///
 /// ```
 /// use fass::{ResettableUses, create_dag};
@@ -128,7 +128,7 @@ macro_rules! implement_asking {
             type Guard<'a> = &'a AtomicU8;
 
             fn hold(self, dag: &Dag, subtask: usize) -> Wish {
-                let hold: fn(Self, &mut Draft, usize) -> Wish = $hold;
+                let hold: fn(Self, &mut DagDraft, usize) -> Wish = $hold;
                 hold(self, &mut dag.draft.borrow_mut(), subtask)
             }
 
@@ -209,7 +209,7 @@ implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guar
 /// See [`State`](crate::State).
 #[derive(Debug)]
 #[must_use = "register a subtask with it"]
-pub struct Using<'d, U> {
+pub struct SubtaskBuilder<'d, U> {
     dag: &'d Dag,
     uses: U,
 }
@@ -224,16 +224,16 @@ impl Dag {
     ///
     /// Also if a state is another DAG's.
     #[track_caller]
-    pub fn using<U: Uses>(&self, uses: U) -> Using<'_, U> {
+    pub fn using<U: Uses>(&self, uses: U) -> SubtaskBuilder<'_, U> {
         assert!(
             uses.is_of(self),
             "a state of another DAG is used; share it between DAGs as a latest value"
         );
-        Using { dag: self, uses }
+        SubtaskBuilder { dag: self, uses }
     }
 }
 
-impl<'d, U: Uses> Using<'d, U> {
+impl<'d, U: Uses> SubtaskBuilder<'d, U> {
     /// Works like [`Dag::source`].
     ///
     /// See [`Subtask`].
@@ -272,7 +272,11 @@ impl<'d, U: Uses> Using<'d, U> {
     ///     .register_untyped_subtask(append, SubtaskAttributes::named("append"));
     /// ```
     #[track_caller]
-    pub fn register_untyped_subtask<F>(self, mut f: F, attributes: SubtaskAttributes) -> Untyped
+    pub fn register_untyped_subtask<F>(
+        self,
+        mut f: F,
+        attributes: SubtaskAttributes,
+    ) -> UntypedSubtask
     where
         F: for<'a> FnMut(U::Borrowed<'a>, u64) + Send + 'static,
     {

@@ -84,10 +84,10 @@ use crate::run::wire::{Departure, Framing, Incoming, Outgoing};
 /// ```
 #[derive(Clone)]
 pub struct Wire {
-    shared: Arc<Shared>,
+    shared: Arc<WireState>,
 }
 
-struct Shared {
+struct WireState {
     name: String,
     incoming: Incoming,
     outgoing: Arc<Outgoing>,
@@ -166,7 +166,7 @@ impl Wire {
     #[must_use]
     pub fn with(name: &str, options: WireOptions) -> Self {
         Self {
-            shared: Arc::new(Shared {
+            shared: Arc::new(WireState {
                 name: name.into(),
                 incoming: Incoming::new(options.framing, options.longest_bytes, options.room_bytes),
                 outgoing: Arc::new(Outgoing::new(options.room_bytes)),
@@ -188,9 +188,9 @@ impl Wire {
     /// If another subtask receives on the wire.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
-    pub fn receiving<T>(&self, decode: fn(&[u8]) -> Option<T>) -> Receiving<T> {
+    pub fn receiving<T>(&self, decode: fn(&[u8]) -> Option<T>) -> ReceiveUse<T> {
         self.claim(&self.shared.is_received, "receives");
-        Receiving {
+        ReceiveUse {
             wire: self.clone(),
             decode,
         }
@@ -205,9 +205,9 @@ impl Wire {
     /// If another subtask sends on the wire.
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
-    pub fn sending(&self) -> Sending {
+    pub fn sending(&self) -> SendUse {
         self.claim(&self.shared.is_sent_on, "sends");
-        Sending(self.clone())
+        SendUse(self.clone())
     }
 
     #[track_caller]
@@ -232,7 +232,7 @@ impl Wire {
     /// See [`Wire`].
     #[must_use]
     pub fn counts(&self) -> WireCounts {
-        let Shared {
+        let WireState {
             incoming, outgoing, ..
         } = &*self.shared;
         WireCounts {
@@ -292,7 +292,7 @@ shown_as!(Wire, |of| of.name());
 /// The use of a wire by the subtask that receives. Made by [`Wire::receiving`].
 ///
 /// See [`Wire`].
-pub struct Receiving<T> {
+pub struct ReceiveUse<T> {
     wire: Wire,
     decode: fn(&[u8]) -> Option<T>,
 }
@@ -301,14 +301,14 @@ pub struct Receiving<T> {
 ///
 /// See [`Wire`].
 #[derive(Debug)]
-pub struct Sending(Wire);
+pub struct SendUse(Wire);
 
 /// The packets that an instance is given, the oldest first. Those that it does not take stay
 /// for the next one.
 ///
 /// See [`Wire`].
 pub struct Received<'a, T> {
-    held: &'a mut Receiver<T>,
+    held: &'a mut PacketReceiver<T>,
     mark: usize,
 }
 
@@ -333,7 +333,7 @@ impl<T> Iterator for Received<'_, T> {
     type Item = Packet<T>;
 
     fn next(&mut self) -> Option<Packet<T>> {
-        let Receiver { wire, decode, room } = &mut *self.held;
+        let PacketReceiver { wire, decode, room } = &mut *self.held;
         let incoming = &wire.shared.incoming;
         // Each turn takes a packet, and there are no more than up to the mark.
         loop {
@@ -366,19 +366,19 @@ impl fmt::Write for Sender<'_> {
 ///
 /// See [`Wire`].
 #[doc(hidden)]
-pub struct Receiver<T> {
+pub struct PacketReceiver<T> {
     wire: Wire,
     decode: fn(&[u8]) -> Option<T>,
     /// Room for the longest packet.
     room: Box<[u8]>,
 }
 
-impl<T> sealed::Sealed for Receiving<T> {}
+impl<T> sealed::Sealed for ReceiveUse<T> {}
 
-impl<T: 'static> Uses for Receiving<T> {
+impl<T: 'static> Uses for ReceiveUse<T> {
     type Borrowed<'a> = Received<'a, T>;
-    type Held = Receiver<T>;
-    type Guard<'a> = &'a mut Receiver<T>;
+    type Held = PacketReceiver<T>;
+    type Guard<'a> = &'a mut PacketReceiver<T>;
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let takes = format!("receives on wire `{}`", self.wire.name());
@@ -387,7 +387,7 @@ impl<T: 'static> Uses for Receiving<T> {
         let shared = Arc::clone(&self.wire.shared);
         let tell = move |signal| _ = shared.signal.set(signal);
         draft.receives.push(Box::new(tell));
-        Receiver {
+        PacketReceiver {
             room: self.wire.shared.incoming.buffer(),
             wire: self.wire,
             decode: self.decode,
@@ -406,9 +406,9 @@ impl<T: 'static> Uses for Receiving<T> {
     }
 }
 
-impl sealed::Sealed for Sending {}
+impl sealed::Sealed for SendUse {}
 
-impl Uses for Sending {
+impl Uses for SendUse {
     type Borrowed<'a> = Sender<'a>;
     type Held = Wire;
     type Guard<'a> = &'a Wire;

@@ -52,8 +52,8 @@ use sched_dag::{
 };
 
 use crate::draft::checks::{Drafts, writer_of};
-use crate::draft::fault::{Count, Unproven};
-use crate::platform::Terms;
+use crate::draft::fault::{CountedNoun, UnprovenDag};
+use crate::platform::RunConfig;
 use crate::run::latest::Staleness;
 
 /// An accepted commit.
@@ -79,7 +79,7 @@ use crate::run::latest::Staleness;
 #[non_exhaustive]
 pub struct Commit {
     pub(super) warnings: Vec<Warning>,
-    pub(super) answers: Answers,
+    pub(super) answers: CommitAnswers,
     pub(super) staleness: Arc<Vec<Staleness>>,
     pub(super) task_set: Arc<TaskSet>,
 }
@@ -109,7 +109,7 @@ impl Commit {
     ///
     /// Bounds hold for the platform's policy, preemption and cores, with its
     /// measured overheads added to the WCETs
-    /// ([`Terms::overheads`](crate::Terms::overheads)), and as long as no
+    /// ([`RunConfig::overheads`](crate::RunConfig::overheads)), and as long as no
     /// instance executes for longer than its WCET. A DAG that is *not proven*
     /// may meet its deadlines all the same.
     ///
@@ -127,7 +127,7 @@ impl Commit {
     /// }
     /// ```
     #[must_use]
-    pub fn answers(&self) -> &[Answer] {
+    pub fn answers(&self) -> &[DagAnswer] {
         &self.answers.of_dags
     }
 
@@ -140,7 +140,7 @@ impl Commit {
     /// See [`answers`](Self::answers).
     #[must_use]
     #[track_caller]
-    pub fn answer(&self, dag: impl DagKey) -> &Answer {
+    pub fn answer(&self, dag: impl DagKey) -> &DagAnswer {
         &self.answers.of_dags[self.task_set.find(dag).index()]
     }
 
@@ -189,7 +189,7 @@ impl Commit {
     /// assert_eq!(commit.first_unproven().unwrap().dag.name, "vision");
     /// ```
     #[must_use]
-    pub fn first_unproven(&self) -> Option<&Answer> {
+    pub fn first_unproven(&self) -> Option<&DagAnswer> {
         self.answers.of_dags.get(self.answers.first_unproven?)
     }
 }
@@ -335,11 +335,11 @@ impl Commit {
 /// );
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Answer {
+pub struct DagAnswer {
     /// The DAG.
     pub dag: DagLabel,
     /// Where it runs; `None` if the cores are not divided.
-    pub cluster: Option<Placement>,
+    pub cluster: Option<ClusterPlacement>,
     /// What is known.
     pub verdict: Verdict,
     /// What is known of each sink, in the order of registration.
@@ -353,13 +353,13 @@ pub struct Answer {
 /// The cluster of a DAG.
 ///
 /// ```
-/// use fass::{ClusterId, Placement};
+/// use fass::{ClusterId, ClusterPlacement};
 ///
-/// let placement = Placement { cluster: ClusterId(1), cores: 1..3, why: None };
+/// let placement = ClusterPlacement { cluster: ClusterId(1), cores: 1..3, why: None };
 /// assert_eq!(placement.to_string(), "in cluster 1, on 2 cores from core 1 on");
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Placement {
+pub struct ClusterPlacement {
     /// Which it is.
     pub cluster: ClusterId,
     /// The numbers of its cores.
@@ -420,7 +420,7 @@ pub enum Verdict {
         test: SchedulabilityTest,
     },
     /// No test gives a bound.
-    NotProven(Unproven),
+    NotProven(UnprovenDag),
 }
 
 impl Verdict {
@@ -445,7 +445,7 @@ impl Verdict {
     /// assert_eq!(Verdict::Proven { bound, test: SchedulabilityTest::Edf }.unproven(), None);
     /// ```
     #[must_use]
-    pub const fn unproven(&self) -> Option<&Unproven> {
+    pub const fn unproven(&self) -> Option<&UnprovenDag> {
         match self {
             Self::Proven { .. } => None,
             Self::NotProven(unproven) => Some(unproven),
@@ -455,8 +455,8 @@ impl Verdict {
 
 /// The answers of one commit.
 #[derive(Clone, Debug)]
-pub(crate) struct Answers {
-    pub(crate) of_dags: Vec<Answer>,
+pub(crate) struct CommitAnswers {
+    pub(crate) of_dags: Vec<DagAnswer>,
     /// The position of the first DAG that fails.
     pub(crate) first_unproven: Option<usize>,
     /// The bounds, for the platform.
@@ -464,9 +464,9 @@ pub(crate) struct Answers {
     settings: AnalysisSettings,
 }
 
-impl Answers {
+impl CommitAnswers {
     /// Analyses what a platform will run on these terms.
-    pub(crate) fn new(task_set: &TaskSet, terms: &Terms) -> Self {
+    pub(crate) fn new(task_set: &TaskSet, terms: &RunConfig) -> Self {
         let settings = terms.settings();
         let answer = analysis::answer(task_set, &settings);
         let found = answer.bounds.iter().zip(&answer.reasons);
@@ -478,12 +478,12 @@ impl Answers {
                 },
                 (None, reason) => {
                     let reason = reason.unwrap_or(NotProvenReason::NoBound);
-                    Verdict::NotProven(Unproven::new(task_set, dag, reason))
+                    Verdict::NotProven(UnprovenDag::new(task_set, dag, reason))
                 }
             };
             let cluster = task_set.dag(dag).cluster();
-            Answer {
-                cluster: task_set.is_divided().then(|| Placement {
+            DagAnswer {
+                cluster: task_set.is_divided().then(|| ClusterPlacement {
                     cluster,
                     cores: task_set.cores_of(cluster, settings.cores),
                     why: task_set.dag(dag).why_there(),
@@ -536,7 +536,7 @@ fn sinks(task_set: &TaskSet, dag: DagId, bounds_ns: &[Option<u64>]) -> Vec<SinkA
     answers.collect()
 }
 
-impl fmt::Display for Answer {
+impl fmt::Display for DagAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let dag = &self.dag;
         match &self.verdict {
@@ -575,14 +575,14 @@ impl fmt::Display for Answer {
     }
 }
 
-impl fmt::Display for Placement {
+impl fmt::Display for ClusterPlacement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             cluster,
             cores,
             why,
         } = self;
-        let (count, first) = (Count(cores.len(), "core"), cores.start);
+        let (count, first) = (CountedNoun(cores.len(), "core"), cores.start);
         let cluster = cluster.0;
         write!(f, "in cluster {cluster}, on {count} from core {first} on")?;
         why.map_or(Ok(()), |why| write!(f, ": {why}"))
@@ -590,7 +590,11 @@ impl fmt::Display for Placement {
 }
 
 /// Returns the staleness of each sample of all DAGs.
-pub(super) fn staleness(drafts: &Drafts, task_set: &TaskSet, answers: &[Answer]) -> Vec<Staleness> {
+pub(super) fn staleness(
+    drafts: &Drafts,
+    task_set: &TaskSet,
+    answers: &[DagAnswer],
+) -> Vec<Staleness> {
     let mut found = Vec::new();
     for (draft, reader) in drafts.iter().zip(answers) {
         let draft = draft.borrow();
@@ -612,7 +616,7 @@ pub(super) fn staleness(drafts: &Drafts, task_set: &TaskSet, answers: &[Answer])
 }
 
 /// Returns how old a value of a DAG can be, by the answer about that.
-fn bound(writer: &sched_dag::Dag, answer: &Answer) -> Option<Duration> {
+fn bound(writer: &sched_dag::Dag, answer: &DagAnswer) -> Option<Duration> {
     let response = answer.verdict.bound().filter(|_| !writer.is_sporadic())?;
     Duration::from_nanos(writer.period_ns()).checked_add(response)
 }

@@ -32,7 +32,7 @@ use crate::draft::checks::{self, Drafts};
 use crate::draft::fault::{CommitError, Fault};
 use crate::platform;
 use crate::platform::{LaunchError, Platform};
-use answer::{Answers, Commit, staleness};
+use answer::{Commit, CommitAnswers, staleness};
 use tie::tie;
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
@@ -96,7 +96,7 @@ pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{ConstructionPolicy, Count, SubtaskAttributes, create_dag, finish_create_dags_with};
+/// use fass::{ConstructionPolicy, CountLimit, SubtaskAttributes, create_dag, finish_create_dags_with};
 ///
 /// # let machine = virtual_time::VirtualTime::new();
 /// let dag = create_dag();
@@ -106,7 +106,7 @@ pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
 /// dag.precede(&subtasks[0], &subtasks[2]).precede(&subtasks[1], &subtasks[2]);
 ///
 /// let construction = ConstructionPolicy {
-///     sources: Count::Several,
+///     sources: CountLimit::Several,
 ///     ..ConstructionPolicy::paper()
 /// };
 /// finish_create_dags_with(&[dag], construction).unwrap();
@@ -147,7 +147,7 @@ pub fn finish_create_dags_with(
         return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
     analysis::fix_orders(&mut task_set, &terms.settings());
-    let answers = Answers::new(&task_set, &terms);
+    let answers = CommitAnswers::new(&task_set, &terms);
     let certain = answers.certain_misses();
     warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
     let faults = lacking_proofs(&drafts, &answers);
@@ -174,7 +174,7 @@ pub fn finish_create_dags_with(
 }
 
 /// Returns a fault for each DAG that demands a proof and has none.
-fn lacking_proofs(drafts: &Drafts, answers: &Answers) -> Vec<Fault> {
+fn lacking_proofs(drafts: &Drafts, answers: &CommitAnswers) -> Vec<Fault> {
     let demanding =
         (drafts.iter().zip(&answers.of_dags)).filter(|(draft, _)| draft.borrow().demands_proof);
     let lacking = demanding.filter_map(|(_, answer)| {

@@ -12,8 +12,8 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use sched_dag::{Activation, DagId, OnFault, SubtaskSpec, TaskSet};
 
-use super::answer::Answers;
-use crate::draft::Draft;
+use super::answer::CommitAnswers;
+use crate::draft::DagDraft;
 use crate::draft::checks::{Drafts, writer_of};
 use crate::run::latest::Staleness;
 use crate::run::plan::{Body, Plan};
@@ -28,7 +28,7 @@ static PLANS: AtomicU64 = AtomicU64::new(0);
 pub(crate) fn tie(
     drafts: &Drafts,
     task_set: Arc<TaskSet>,
-    answers: &Answers,
+    answers: &CommitAnswers,
     staleness: Arc<Vec<Staleness>>,
 ) -> Plan {
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
@@ -105,7 +105,7 @@ pub(crate) fn tie(
         bodies
     })
     .collect();
-    let handler = |draft: &Rc<RefCell<Draft>>| Some(draft.borrow().on_fault.as_ref()?.get()?.1);
+    let handler = |draft: &Rc<RefCell<DagDraft>>| Some(draft.borrow().on_fault.as_ref()?.get()?.1);
     Plan {
         task_set,
         number,
@@ -119,7 +119,11 @@ pub(crate) fn tie(
 }
 
 /// Returns what a DAG's subtasks sample of recorded topics.
-fn samples(drafts: &Drafts, draft: &Draft, recorded: &[Vec<Rc<dyn AnyRecorded>>]) -> Vec<Sampled> {
+fn samples(
+    drafts: &Drafts,
+    draft: &DagDraft,
+    recorded: &[Vec<Rc<dyn AnyRecorded>>],
+) -> Vec<Sampled> {
     let samples = draft
         .samples
         .iter()

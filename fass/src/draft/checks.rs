@@ -16,20 +16,25 @@ use core::ptr;
 
 use sched_dag::{DagId, DagLabel, OnFault, SubtaskSpec};
 
-use super::Draft;
+use super::DagDraft;
 use super::fault::Fault;
 use crate::run::effect::Target;
 use crate::run::latest::AnyLatest;
 
 /// Adds what is wrong with a DAG of these.
-pub(crate) fn check_dag(drafts: &Drafts, draft: &Draft, label: &DagLabel, faults: &mut Vec<Fault>) {
+pub(crate) fn check_dag(
+    drafts: &Drafts,
+    draft: &DagDraft,
+    label: &DagLabel,
+    faults: &mut Vec<Fault>,
+) {
     check_others(drafts, draft, label, faults);
     check_replaceable(draft, label, faults);
     check_inputs(draft, label, faults);
 }
 
 /// Adds each use of something of a DAG that is not in the commit.
-fn check_others(drafts: &Drafts, draft: &Draft, label: &DagLabel, faults: &mut Vec<Fault>) {
+fn check_others(drafts: &Drafts, draft: &DagDraft, label: &DagLabel, faults: &mut Vec<Fault>) {
     for (subtask, latest, _) in &draft.samples {
         if writer_of(drafts, latest).is_none() {
             faults.push(Fault::LatestNotCommitted {
@@ -60,7 +65,7 @@ fn check_others(drafts: &Drafts, draft: &Draft, label: &DagLabel, faults: &mut V
 }
 
 /// Adds what is wrong with the functions for after faults.
-fn check_replaceable(draft: &Draft, label: &DagLabel, faults: &mut Vec<Fault>) {
+fn check_replaceable(draft: &DagDraft, label: &DagLabel, faults: &mut Vec<Fault>) {
     let dag = label.clone();
     let drops_jobs = draft.spec.on_fault != OnFault::EndDag;
     match draft.replaceable.first() {
@@ -86,7 +91,7 @@ fn check_replaceable(draft: &Draft, label: &DagLabel, faults: &mut Vec<Fault>) {
 }
 
 /// Adds what is wrong with the inputs from outside.
-fn check_inputs(draft: &Draft, dag: &DagLabel, faults: &mut Vec<Fault>) {
+fn check_inputs(draft: &DagDraft, dag: &DagLabel, faults: &mut Vec<Fault>) {
     let mut add = |code, text| faults.push(Fault::Worded { code, text });
     for (number, (subtask, takes)) in draft.outside.iter().enumerate() {
         let label = draft.label(*subtask);
@@ -110,7 +115,7 @@ fn check_inputs(draft: &Draft, dag: &DagLabel, faults: &mut Vec<Fault>) {
 }
 
 /// Reports whether nothing precedes a subtask.
-fn is_source(draft: &Draft, subtask: usize) -> bool {
+fn is_source(draft: &DagDraft, subtask: usize) -> bool {
     let has_inputs = |spec: &SubtaskSpec| !spec.inputs.is_empty();
     let follows = |&(_, to): &(usize, usize)| to == subtask;
     let spec = &draft.spec;
@@ -120,7 +125,7 @@ fn is_source(draft: &Draft, subtask: usize) -> bool {
 /// Adds what is wrong with the modes of a commit, and with what it records.
 #[inline(never)]
 pub(crate) fn check_all(drafts: &Drafts, faults: &mut Vec<Fault>) {
-    let checks: [fn(&Draft) -> Option<Check>; 2] = [|of| of.check_modes, |of| of.check_recorded];
+    let checks: [fn(&DagDraft) -> Option<Check>; 2] = [|of| of.check_modes, |of| of.check_recorded];
     for pick in checks {
         if let Some(check) = drafts.iter().find_map(|draft| pick(&draft.borrow())) {
             check(drafts, faults);
@@ -133,14 +138,14 @@ pub(crate) struct ModeDraft {
     pub(crate) name: String,
     /// With the names that they had when the mode was made. A draft keeps its modes, so these do
     /// not keep it.
-    pub(crate) dags: Vec<(Weak<RefCell<Draft>>, String)>,
+    pub(crate) dags: Vec<(Weak<RefCell<DagDraft>>, String)>,
 }
 
 /// The modes of one handle.
 pub(crate) type Modes = Rc<RefCell<Vec<ModeDraft>>>;
 
 /// All drafts of a commit.
-pub(crate) type Drafts = [Rc<RefCell<Draft>>];
+pub(crate) type Drafts = [Rc<RefCell<DagDraft>>];
 
 /// Adds all that is wrong with the modes of a commit, or with what it records.
 pub(crate) type Check = fn(&Drafts, &mut Vec<Fault>);
@@ -227,14 +232,14 @@ fn of_commit(drafts: &Drafts) -> Vec<Modes> {
 }
 
 /// Returns the place of a DAG in the commit.
-fn place(drafts: &Drafts, dag: &Weak<RefCell<Draft>>) -> Option<usize> {
+fn place(drafts: &Drafts, dag: &Weak<RefCell<DagDraft>>) -> Option<usize> {
     let is_it = |draft: &Rc<_>| core::ptr::eq(Rc::as_ptr(draft), dag.as_ptr());
     drafts.iter().position(is_it)
 }
 
 /// Returns the DAG that is meant.
 fn dag_of(drafts: &Drafts, target: &Arc<Target>) -> Option<DagId> {
-    let is_it = |other: &Rc<RefCell<Draft>>| Arc::ptr_eq(&other.borrow().target, target);
+    let is_it = |other: &Rc<RefCell<DagDraft>>| Arc::ptr_eq(&other.borrow().target, target);
     (0..).map(DagId).nth(drafts.iter().position(is_it)?)
 }
 
@@ -295,7 +300,7 @@ pub(crate) fn check_recorded(drafts: &Drafts, faults: &mut Vec<Fault>) {
     }
 }
 
-fn records(draft: &Draft, topic: &str) -> bool {
+fn records(draft: &DagDraft, topic: &str) -> bool {
     let mut recorded = draft.recorded.iter();
     recorded.any(|recorded| recorded.topic() == topic)
 }

@@ -60,13 +60,13 @@ worded! {
         InputArity { dag: DagLabel, subtask: SubtaskLabel, expected: usize, given: usize } =
             "input_arity",
             "{subtask} of {dag} takes {} but lists {}; list one topic for each element of its \
-             argument tuple", Count(*expected, "input"), Count(*given, "input topic");
+             argument tuple", CountedNoun(*expected, "input"), CountedNoun(*given, "input topic");
         /// A function returns another number of outputs, `expected`, than its list names
         /// topics, `given`.
         OutputArity { dag: DagLabel, subtask: SubtaskLabel, expected: usize, given: usize } =
             "output_arity",
             "{subtask} of {dag} returns {} but lists {}; list one topic for each element of its \
-             result tuple", Count(*expected, "output"), Count(*given, "output topic");
+             result tuple", CountedNoun(*expected, "output"), CountedNoun(*given, "output topic");
         /// A duration, of a DAG or of one of its subtasks, does not fit into 64 bits of
         /// nanoseconds (584 years); `what` says what it is for.
         DurationTooLong { dag: DagLabel, subtask: Option<SubtaskLabel>, what: &'static str } =
@@ -119,7 +119,7 @@ worded! {
         NotAssigned(error: LaunchError) = "not_assigned", "{error}";
         /// The DAG demands a proof that it meets its deadlines, and there is none, for that
         /// reason. Found only where nothing else is wrong.
-        NotProven { dag: DagLabel, unproven: Unproven } = "not_proven",
+        NotProven { dag: DagLabel, unproven: UnprovenDag } = "not_proven",
             "{dag} demands a proof that it meets its deadlines, and there is none: {unproven}";
         /// The graph or its attributes are at fault.
         Model(fault: sched_dag::DagFault) = of fault.code(), "{fault}";
@@ -164,7 +164,7 @@ fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
 /// );
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Unproven {
+pub struct UnprovenDag {
     reason: NotProvenReason,
     /// The subtasks that the reason is about.
     subtasks: Vec<SubtaskLabel>,
@@ -172,13 +172,13 @@ pub struct Unproven {
     other: Option<DagLabel>,
 }
 
-impl Unproven {
+impl UnprovenDag {
     /// Returns the reason, by which a program may decide.
     ///
     /// ```
-    /// use fass::{NotProvenReason, Unproven};
+    /// use fass::{NotProvenReason, UnprovenDag};
     ///
-    /// fn is_worth_another_core(unproven: &Unproven) -> bool {
+    /// fn is_worth_another_core(unproven: &UnprovenDag) -> bool {
     ///     matches!(unproven.reason(), NotProvenReason::NoBound | NotProvenReason::Overload)
     /// }
     /// ```
@@ -191,10 +191,10 @@ impl Unproven {
     /// WCET, rather than merely not being proven to be met.
     ///
     /// ```
-    /// use fass::{Answer, Unproven};
+    /// use fass::{DagAnswer, UnprovenDag};
     ///
-    /// fn is_hopeless(answer: &Answer) -> bool {
-    ///     answer.verdict.unproven().is_some_and(Unproven::is_certain)
+    /// fn is_hopeless(answer: &DagAnswer) -> bool {
+    ///     answer.verdict.unproven().is_some_and(UnprovenDag::is_certain)
     /// }
     /// ```
     #[must_use]
@@ -230,7 +230,7 @@ impl Unproven {
 /// So many subtasks without WCET are named, and the rest counted.
 const MOST_NAMED: usize = 8;
 
-impl fmt::Display for Unproven {
+impl fmt::Display for UnprovenDag {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.reason, &self.subtasks[..], &self.other) {
             (NotProvenReason::Unknown(TaskError::MissingWcet { .. }), [first, others @ ..], _) => {
@@ -328,9 +328,9 @@ impl fmt::Display for CommitError {
 impl core::error::Error for CommitError {}
 
 /// A number of things, in the singular or the plural.
-pub(crate) struct Count(pub(crate) usize, pub(crate) &'static str);
+pub(crate) struct CountedNoun(pub(crate) usize, pub(crate) &'static str);
 
-impl fmt::Display for Count {
+impl fmt::Display for CountedNoun {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(number, thing) = self;
         let plural = if *number == 1 { "" } else { "s" };

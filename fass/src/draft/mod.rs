@@ -4,7 +4,7 @@
 //! [`DagSpec`]: durations that do not fit, topic lists that do not fit the
 //! function. The commit reports those together with all other faults. So that
 //! one mistake is not reported as several, a subtask whose list does not fit
-//! keeps its topics in the spec, but with the type [`Unknown`], which the commit
+//! keeps its topics in the spec, but with the type [`UnstatedType`], which the commit
 //! takes to be whatever the topic's other end says.
 
 pub(crate) mod checks;
@@ -35,7 +35,7 @@ use crate::run::subtask::{MakeBody, defer_untyped};
 use fault::Fault;
 
 /// Makes of all drafts of a commit what serves their requests.
-type MakeLifecycle = fn(&[Rc<RefCell<Draft>>]) -> Box<dyn Lifecycle>;
+type MakeLifecycle = fn(&[Rc<RefCell<DagDraft>>]) -> Box<dyn Lifecycle>;
 
 /// Provides so many values of a state for after faults.
 pub(crate) type Reset = Box<dyn FnOnce(u32)>;
@@ -46,7 +46,7 @@ pub(crate) type Flaw = Box<dyn Fn(DagLabel) -> Fault>;
 
 /// A DAG as registered so far.
 #[derive(Default)]
-pub(crate) struct Draft {
+pub(crate) struct DagDraft {
     pub(crate) spec: DagSpec,
     /// One for each of `spec.subtasks`.
     pub(crate) make_bodies: Vec<MakeBody>,
@@ -101,16 +101,16 @@ pub(crate) struct Draft {
 }
 
 /// The topics that a subtask names, and the types of its function.
-pub(crate) struct Ends<'a> {
+pub(crate) struct NamedTopics<'a> {
     pub(crate) inputs: (&'a [&'a str], &'a [MessageType]),
     pub(crate) outputs: (&'a [&'a str], &'a [MessageType]),
 }
 
 /// The type of a topic's end that no function states.
 #[derive(Clone)]
-struct Unknown;
+struct UnstatedType;
 
-impl Draft {
+impl DagDraft {
     /// Takes what was registered, for the commit, and leaves what handles may still ask for.
     pub(crate) fn close(&mut self) -> Self {
         let committed = Self {
@@ -130,7 +130,7 @@ impl Draft {
     pub(crate) fn register(
         &mut self,
         body: MakeBody,
-        ends: Ends<'_>,
+        ends: NamedTopics<'_>,
         attributes: SubtaskAttributes,
     ) -> SubtaskLabel {
         let (inputs, input_types) = ends.inputs;
@@ -285,7 +285,7 @@ impl Draft {
         }
     }
 
-    /// Returns the spec with every [`Unknown`] end replaced by its other end's
+    /// Returns the spec with every [`UnstatedType`] end replaced by its other end's
     /// type, where that is known.
     pub(crate) fn spec_with_known_types(&self) -> Cow<'_, DagSpec> {
         let mut spec = Cow::Borrowed(&self.spec);
@@ -296,7 +296,7 @@ impl Draft {
             });
             spec.to_mut().latest = latest.collect();
         }
-        let unknown = MessageType::of::<Unknown>().id();
+        let unknown = MessageType::of::<UnstatedType>().id();
         let ports = (self.spec.subtasks.iter())
             .flat_map(|subtask| subtask.inputs.iter().chain(&subtask.outputs));
         if ports.clone().all(|port| port.type_id != unknown) {
@@ -354,13 +354,13 @@ fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
     (topics.iter().enumerate())
         .map(|(index, topic)| {
             let known = types.get(index).filter(|_| fits).copied();
-            let message = known.unwrap_or_else(MessageType::of::<Unknown>);
+            let message = known.unwrap_or_else(MessageType::of::<UnstatedType>);
             message.port(topic)
         })
         .collect()
 }
 
-impl fmt::Debug for Draft {
+impl fmt::Debug for DagDraft {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Draft")
             .field("spec", &self.spec)

@@ -97,7 +97,7 @@ const CASES: &[Case] = &[
     (
         "fn main() { let dag = create_dag(); let pose = dag.latest::<u32>(\"pose\"); dag.using(pose.sample()).restarting(|| |_: Option<fass::Sample<'_, u32>>, (_,): (u32,)| ()); }",
         &[
-            "a subtask that uses `Sampling<u32>` cannot be replaced after a fault",
+            "a subtask that uses `LatestUse<u32>` cannot be replaced after a fault",
             "let another subtask sample the latest value or raise the signal, and send along an edge",
         ],
     ),

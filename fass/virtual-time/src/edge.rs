@@ -9,7 +9,7 @@
 use std::cell::RefCell;
 
 use fass::edge::{self, Replay};
-use fass::{LatestJobs, Plan, Recorded, Terms};
+use fass::{LatestJobs, Plan, Recorded, RunConfig};
 use recording::{Channel, Entry, EntryKind, Header, Malformed};
 use sched_dag::engine::Run;
 use sched_dag::journal::{self, Event};
@@ -180,7 +180,7 @@ impl Edge {
     }
 
     /// Takes what is committed.
-    pub(crate) fn commit(&self, plan: &Plan, terms: &Terms) {
+    pub(crate) fn commit(&self, plan: &Plan, terms: &RunConfig) {
         let mut record = edge::Kept::new(Vec::new());
         record.commit(plan, &terms.scheduler, terms.overheads);
         self.committed.replace(Some(record));

@@ -151,7 +151,7 @@ impl VirtualTime {
     }
 
     /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
-    /// others share clusters of one core each. All subtasks need WCETs. See [`fass::Placement`].
+    /// others share clusters of one core each. All subtasks need WCETs. See [`fass::ClusterPlacement`].
     #[must_use = "the machine itself is returned"]
     pub fn assign_clusters(self) -> Self {
         self.set(|settings| settings.terms.divide_by_commit())

@@ -27,7 +27,7 @@ use std::time::Duration;
 
 use fass::edge::{Begin, Replay};
 use fass::log::{Level, Line, set_level};
-use fass::{LaunchError, Occupation, Plan, Platform, Recorded, Runner, Terms, Wire};
+use fass::{LaunchError, Occupation, Plan, Platform, Recorded, RunConfig, Runner, Wire};
 use recording::Channel;
 use sched_dag::engine::{Alternate, FaultCost};
 use sched_dag::journal::EventKind;
@@ -248,7 +248,7 @@ impl VirtualTime {
 struct HostPlatform;
 
 impl Platform for HostPlatform {
-    fn terms(&self) -> Terms {
+    fn terms(&self) -> RunConfig {
         let terms = |machine: Rc<Machine>| machine.settings.borrow().terms.clone();
         // Without a machine, those that one has at first.
         current().map(terms).unwrap_or_default()

@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use common::random::{nth, scale};
-use fass::Terms;
+use fass::RunConfig;
 use sched_dag::{Dag, Instance, Subtask, TaskSet};
 
 use crate::{VirtualTime, nanoseconds};
@@ -15,7 +15,7 @@ use crate::{VirtualTime, nanoseconds};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Settings {
     /// The terms of the commits to come.
-    pub(crate) terms: Terms,
+    pub(crate) terms: RunConfig,
     /// How long calls take that do not say.
     pub(crate) silent: Silent,
     /// How late interrupts are.

@@ -13,7 +13,7 @@ use std::thread;
 use std::time::Duration;
 
 use fass::edge::Seen;
-use fass::{Signal, Terms, Wire};
+use fass::{RunConfig, Signal, Wire};
 use front::app::ending::Ending;
 use front::app::machine::{Divisible, System};
 use front::json;
@@ -81,11 +81,11 @@ impl System for LinuxSystem {
         self.has_console
     }
 
-    fn terms(&self) -> Terms {
+    fn terms(&self) -> RunConfig {
         self.linux.terms()
     }
 
-    fn change(&self, change: impl FnOnce(&mut Terms)) {
+    fn change(&self, change: impl FnOnce(&mut RunConfig)) {
         self.linux.change(change);
     }
 

@@ -6,7 +6,7 @@ use core::fmt;
 use core::panic::Location;
 use core::time::Duration;
 
-use fass::{Platform, Signal, Terms, Wire};
+use fass::{Platform, RunConfig, Signal, Wire};
 
 use super::calibration;
 use crate::options::{Options, UsageError};
@@ -52,11 +52,11 @@ impl System for BareMachine {
         self.wishes.console.is_some()
     }
 
-    fn terms(&self) -> Terms {
+    fn terms(&self) -> RunConfig {
         KERNEL.terms()
     }
 
-    fn change(&self, change: impl FnOnce(&mut Terms)) {
+    fn change(&self, change: impl FnOnce(&mut RunConfig)) {
         KERNEL.change(change);
     }
 

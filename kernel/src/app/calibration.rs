@@ -16,7 +16,7 @@ use core::time::Duration;
 
 use fass::{
     ConstructionPolicy, Dag, Occupation, OverheadSource, Overheads, Platform, SubtaskAttributes,
-    Untyped, create_dag, execute_for, finish_create_dags_with,
+    UntypedSubtask, create_dag, execute_for, finish_create_dags_with,
 };
 use sched_dag::law::MeasuredCosts;
 
@@ -122,11 +122,11 @@ fn dag(offset: Duration, deadline: Duration) -> Dag {
     dag
 }
 
-fn urgent(dag: &Dag) -> Untyped {
+fn urgent(dag: &Dag) -> UntypedSubtask {
     subtask(dag, 0, Duration::ZERO)
 }
 
-fn subtask(dag: &Dag, priority: u32, time: Duration) -> Untyped {
+fn subtask(dag: &Dag, priority: u32, time: Duration) -> UntypedSubtask {
     let attributes = SubtaskAttributes::default()
         .priority(priority)
         .budget(BUDGET);

@@ -9,7 +9,7 @@ use std::rc::Rc;
 use std::sync::OnceLock;
 
 use fass::{Body, ConstructionPolicy, Dag, LaunchError, Occupation, Plan, Platform, Policy};
-use fass::{Preemption, SubtaskAttributes, Terms};
+use fass::{Preemption, RunConfig, SubtaskAttributes};
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 
@@ -21,8 +21,8 @@ thread_local! {
 struct Keeper;
 
 impl Platform for Keeper {
-    fn terms(&self) -> Terms {
-        let mut terms = Terms::of_cores(1);
+    fn terms(&self) -> RunConfig {
+        let mut terms = RunConfig::of_cores(1);
         terms.scheduler.policy = Policy::Edf;
         terms.scheduler.preemption = Preemption::Disabled;
         terms

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use crate::support::{every, ms, named, taking, ticking, work};
 use fass::{
-    Answer, Commit, ConstructionPolicy, Dag, Fault, OverheadSource, Overheads, Policy, Preemption,
-    create_dag, finish_create_dags, finish_create_dags_with,
+    Commit, ConstructionPolicy, Dag, DagAnswer, Fault, OverheadSource, Overheads, Policy,
+    Preemption, create_dag, finish_create_dags, finish_create_dags_with,
 };
 use virtual_time::{Report, VirtualTime};
 
@@ -169,7 +169,7 @@ fn overheads_are_added_to_every_wcet() {
         // They are no part of the run in virtual time.
         let mut jobs = report.dag("two").jobs();
         assert!(jobs.all(|job| job.response_time_ns() == Some(5_000_000)));
-        let mut answer: Answer = commit.answer("two").clone();
+        let mut answer: DagAnswer = commit.answer("two").clone();
         assert_eq!(answer.overheads, OverheadSource::Stated);
         answer.overheads = OverheadSource::Measured {
             dispatches: 500,
@@ -225,7 +225,7 @@ fn the_commit_divides_the_cores_and_says_why() {
     dags.iter().for_each(|dag| _ = dag.jobs(5));
     let commit = finish_create_dags_with(&dags, ConstructionPolicy::any_graph());
     let commit = commit.expect("nothing is wrong");
-    let place = |answer: &Answer| answer.cluster.as_ref().map(ToString::to_string);
+    let place = |answer: &DagAnswer| answer.cluster.as_ref().map(ToString::to_string);
     let places: Vec<String> = commit.answers().iter().filter_map(place).collect();
     assert_eq!(
         places,

@@ -5,7 +5,7 @@ use core::time::Duration;
 
 use fass::edge::{Begin, Kept};
 use fass::log::Line;
-use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, Recorded, Terms};
+use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, Recorded, RunConfig};
 use sched_dag::DagId;
 
 use super::{edge, execution, occupation, record, stacks};
@@ -15,7 +15,7 @@ use crate::machine::{clock, interrupt_flag, this_core};
 /// The one kernel, as `fass` sees it.
 pub struct Kernel {
     /// The terms of the commits to come; the cores are those that have come up.
-    terms: SpinLock<Terms>,
+    terms: SpinLock<RunConfig>,
     /// How long a decision waits for further events of the same instant.
     coincidence_ns: AtomicU64,
     /// Whether a commit is the kernel's own, to measure overheads with.
@@ -24,14 +24,14 @@ pub struct Kernel {
 
 /// The platform that apps on this machine are built for.
 pub static KERNEL: Kernel = Kernel {
-    terms: SpinLock::new(Terms::of_cores(1)),
+    terms: SpinLock::new(RunConfig::of_cores(1)),
     coincidence_ns: AtomicU64::new(0),
     calibrates: AtomicBool::new(false),
 };
 
 impl Kernel {
     /// Changes the terms of the commits to come.
-    pub fn change(&self, change: impl FnOnce(&mut Terms)) {
+    pub fn change(&self, change: impl FnOnce(&mut RunConfig)) {
         change(&mut self.terms.lock());
     }
 
@@ -57,7 +57,7 @@ static TOLD: Clock = || {
 };
 
 impl Platform for Kernel {
-    fn terms(&self) -> Terms {
+    fn terms(&self) -> RunConfig {
         let mut terms = self.terms.lock().clone();
         terms.scheduler.cores = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
         if self.calibrates.load(Ordering::Relaxed) {

@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
-use fass::{CoreDivision, Dag, Policy, Preemption, Signal, Terms, Tunable, Wire};
+use fass::{CoreDivision, Dag, Policy, Preemption, RunConfig, Signal, Tunable, Wire};
 use sched_dag::engine::Run;
 
 use super::ending::Ending;
@@ -40,10 +40,10 @@ pub trait System: Sized {
     }
 
     /// Returns the terms of the commits to come.
-    fn terms(&self) -> Terms;
+    fn terms(&self) -> RunConfig;
 
     /// Changes these, as far as the system allows it.
-    fn change(&self, change: impl FnOnce(&mut Terms));
+    fn change(&self, change: impl FnOnce(&mut RunConfig));
 
     /// Makes events that are less than `window` apart count as one instant.
     fn set_coincidence(&self, window: Duration);
@@ -552,7 +552,7 @@ impl<S: Divisible> Machine<S> {
     /// ```
     pub fn offer_clusters(&self) -> Result<(), UsageError> {
         if self.options.text("clusters") == Some("auto") {
-            self.system.change(Terms::divide_by_commit);
+            self.system.change(RunConfig::divide_by_commit);
             return Ok(());
         }
         let sizes = self

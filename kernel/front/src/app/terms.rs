@@ -6,7 +6,7 @@ use alloc::format;
 use fass::edge::job_of;
 use fass::log::Level::{Debug, Error, Info, Warn};
 use fass::log::{Level, set_level};
-use fass::{Overheads, Policy, Preemption, Terms};
+use fass::{Overheads, Policy, Preemption, RunConfig};
 
 use crate::options::{Options, UsageError};
 
@@ -42,7 +42,7 @@ impl Chosen {
     }
 
     /// Puts what commits are told where a platform keeps it.
-    pub const fn apply(&self, terms: &mut Terms) {
+    pub const fn apply(&self, terms: &mut RunConfig) {
         terms.scheduler.policy = self.policy;
         terms.scheduler.preemption = self.preemption;
         terms.budget_factor = self.budget_factor;

@@ -25,7 +25,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use fass::{LaunchError, Plan, Terms};
+use fass::{LaunchError, Plan, RunConfig};
 use sched_dag::engine::{Engine, ProvenBounds, Run};
 use sched_dag::lifecycle::PendingRequests;
 use sched_dag::{Dag, Journal, Scheduler, TaskSet};
@@ -85,7 +85,7 @@ static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// Prepares a plan to be run; a dispatch waits for so long for further events of the same
 /// instant. Takes all memory that the run will need.
-pub fn prepare(mut plan: Plan, terms: &Terms, coincidence_ns: u64) -> Result<(), LaunchError> {
+pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result<(), LaunchError> {
     let options = terms.scheduler;
     if cluster::nth(0).execution.lock().is_some() {
         return Err(LaunchError::new(
