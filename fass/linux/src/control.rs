@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier, PoisonError, RwLock};
 use std::{io, thread};
 
-use fass::edge::Seen;
+use fass::edge::WatchedValue;
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, DagKey, Scheduler, TaskSet};
 
@@ -161,7 +161,7 @@ impl Control {
     }
 
     /// Takes the latest value that is to be seen, if there is a new one.
-    pub fn take_seen(&self, into: &mut [u8]) -> Option<Seen> {
+    pub fn take_seen(&self, into: &mut [u8]) -> Option<WatchedValue> {
         edge::get().take_seen(into)
     }
 

@@ -11,7 +11,7 @@ use std::sync::{Arc, Barrier, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use fass::edge::{Drain, Edge, Kept, Outgoing, Sink};
+use fass::edge::{BootRecord, Drain, Edge, Outgoing, Sink};
 use fass::{Clock, LaunchError, Plan, Recorded, RunConfig};
 use sched_dag::engine::Run;
 use sched_dag::{DriverNotice, Instance};
@@ -33,7 +33,7 @@ static IS_ON: AtomicBool = AtomicBool::new(false);
 static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
 /// The record, if one is kept.
-pub(crate) static FILE: Mutex<Option<Kept<File>>> = Mutex::new(None);
+pub(crate) static FILE: Mutex<Option<BootRecord<File>>> = Mutex::new(None);
 
 /// Whether it is written during a run, too, so that it is there if the program dies.
 pub(crate) static IS_LIVE: AtomicBool = AtomicBool::new(false);
@@ -92,7 +92,7 @@ static TOLD: Clock = || {
 pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     let mut edge = get();
     let mut file = unpoisoned(&FILE);
-    let launched = edge.launch(plan, file.as_mut().map(Kept::file));
+    let launched = edge.launch(plan, file.as_mut().map(BootRecord::file));
     if launched.map_err(LaunchError::new)? {
         fass::set_clock(&TOLD);
     }
@@ -146,7 +146,7 @@ pub(crate) struct Sending {
 /// Begins to send, if there is anything. `take_events` adds the events that there are.
 pub(crate) fn begin_run(
     epoch_ns: u64,
-    take_events: impl Fn(&mut Kept<File>) + Send + 'static,
+    take_events: impl Fn(&mut BootRecord<File>) + Send + 'static,
 ) -> Option<Sending> {
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
     let mut outgoing = get().begin_run(epoch_ns);
@@ -162,8 +162,9 @@ pub(crate) fn begin_run(
         begun.wait();
         for look in 0_u64.. {
             let was_over = seen.load(Ordering::Acquire);
-            let step =
-                |drain: &mut Box<dyn Drain>| drain.step(unpoisoned(&FILE).as_mut().map(Kept::file));
+            let step = |drain: &mut Box<dyn Drain>| {
+                drain.step(unpoisoned(&FILE).as_mut().map(BootRecord::file))
+            };
             while outgoing.as_mut().is_some_and(step) {}
             if let Some(file) = &mut *unpoisoned(&FILE) {
                 if is_live && (was_over || look % EVENTS == 0) {

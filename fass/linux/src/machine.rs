@@ -14,7 +14,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use std::{fmt, fs};
 
-use fass::edge::{Drained, Kept, Outcome, Wish};
+use fass::edge::{BootRecord, EdgeMode, RecordingState, ReplayOutcome};
 use fass::{Platform as _, Preemption, RunConfig, Signal, Wire};
 
 use crate::control::{self, Control};
@@ -383,7 +383,7 @@ impl Linux {
     fn record_as(&self, app: &'static str, is_needed: bool, to: impl Write + Send + 'static) {
         self.keep_events(to);
         IS_LIVE.store(true, Ordering::Relaxed);
-        let wish = Wish::Record {
+        let wish = EdgeMode::Record {
             app,
             bytes: ROOM_BYTES,
             is_needed,
@@ -395,7 +395,7 @@ impl Linux {
     ///
     /// See [`record`](Self::record).
     pub fn keep_events(&self, to: impl Write + Send + 'static) {
-        *unpoisoned(&FILE) = Some(Kept::new(File {
+        *unpoisoned(&FILE) = Some(BootRecord::new(File {
             writer: Box::new(to),
             failure: None,
         }));
@@ -404,7 +404,7 @@ impl Linux {
     /// Has the run to come replay a recording, which may begin with this job of a DAG, or before.
     pub fn replay(&self, recording: &'static [u8], from: Option<(&'static str, u64)>) {
         let bytes = recording;
-        edge::get().set_wish(Box::leak(Box::new(Wish::Replay { bytes, from })));
+        edge::get().set_wish(Box::leak(Box::new(EdgeMode::Replay { bytes, from })));
     }
 
     /// Lets people look at what crosses, by [`watch`](fass::edge::Edge::watch).
@@ -416,10 +416,10 @@ impl Linux {
     /// complete the recording is. `is_over`: the run has not been ended before its time.
     ///
     /// See [`record`](Self::record).
-    pub fn end_recording(&self, is_over: bool) -> (Option<Outcome>, Option<Drained>) {
+    pub fn end_recording(&self, is_over: bool) -> (Option<ReplayOutcome>, Option<RecordingState>) {
         let outcome = edge::get().end_run(is_over);
         let left = unpoisoned(&LEFT).take();
-        let end = |file: &mut Kept<File>| file.end_recording(left);
+        let end = |file: &mut BootRecord<File>| file.end_recording(left);
         (outcome, unpoisoned(&FILE).as_mut().and_then(end))
     }
 

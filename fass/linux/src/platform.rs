@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use fass::edge::{Begin, Kept};
+use fass::edge::{Begin, BootRecord};
 use fass::log::Line;
 use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, RunConfig, Runner};
 use sched_dag::engine::{self, ProvenBounds};
@@ -312,7 +312,7 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
 
 /// Copies events into the record, with the level of who releases jobs, so that nobody who waits for
 /// the lock waits for those that compute.
-fn events(control: Control) -> impl Fn(&mut Kept<File>) {
+fn events(control: Control) -> impl Fn(&mut BootRecord<File>) {
     move |record| {
         control.raise();
         while record.take_events(|cluster, take| {

@@ -6,7 +6,7 @@ use recording::Recordable;
 
 use super::dag::Dag;
 use crate::draft::checks::check_recorded;
-use crate::edge::{self, Begin, Host};
+use crate::edge::{self, Begin, ReplayHost};
 use crate::platform::{expect_installed, record};
 use crate::run::line::Edge;
 use crate::run::message::Message;
@@ -22,7 +22,7 @@ static EDGE: Edge = Edge {
 };
 
 const BEGIN: Begin = |wish, shows| {
-    let host = Host {
+    let host = ReplayHost {
         raise: |plan, dag| expect_installed().raise(plan, dag),
         now_ns: || expect_installed().now_ns(),
     };

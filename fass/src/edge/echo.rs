@@ -13,14 +13,14 @@ use core::fmt;
 
 use recording::{Channel, Schema, Shown};
 
-use super::{Echoing, Seen};
+use super::{Echoing, WatchedValue};
 use crate::run::line::Recorded;
 
 /// The longest value that is shown, in bytes.
 const ROOM: usize = 512;
 
 /// Keeps the latest value of a topic.
-pub(super) struct Echo {
+pub(super) struct TopicEcho {
     /// By channel: the topic and its type; none of what is sampled.
     topics: Vec<Option<(String, Arc<Schema>)>>,
     /// Whether the topics are those of a plan that is launched.
@@ -32,7 +32,7 @@ pub(super) struct Echo {
     left_out: u64,
 }
 
-impl Echo {
+impl TopicEcho {
     pub(super) fn new() -> Self {
         Self {
             topics: Vec::new(),
@@ -45,7 +45,7 @@ impl Echo {
     }
 }
 
-impl Echoing for Echo {
+impl Echoing for TopicEcho {
     fn open(&mut self, channels: &[Channel]) {
         if core::mem::take(&mut self.is_launched) {
             self.topics.clear();
@@ -87,7 +87,7 @@ impl Echoing for Echo {
         self.watched.is_some()
     }
 
-    fn take(&mut self, into: &mut [u8]) -> Option<Seen> {
+    fn take(&mut self, into: &mut [u8]) -> Option<WatchedValue> {
         let watched = usize::from(self.watched?);
         let (_, schema) = self.topics.get(watched)?.as_ref()?;
         let (job, length) = self.kept.take()?;
@@ -96,7 +96,7 @@ impl Echoing for Echo {
                 .copy_from_slice(self.room.get(..length)?);
             Some(length)
         });
-        Some(Seen {
+        Some(WatchedValue {
             job,
             length,
             left_out: core::mem::take(&mut self.left_out),
@@ -112,7 +112,7 @@ mod tests {
     use alloc::string::ToString;
     use recording::{Recordable, Role};
 
-    fn open(echo: &mut Echo, topics: &[(&str, Role)]) {
+    fn open(echo: &mut TopicEcho, topics: &[(&str, Role)]) {
         let channels = topics.iter().map(|(topic, role)| Channel {
             dag: 0,
             subtask: 0,
@@ -123,7 +123,7 @@ mod tests {
         echo.open(&channels.collect::<Vec<_>>());
     }
 
-    fn record(echo: &mut Echo, channel: u16, job: u64, bytes: &[u8]) {
+    fn record(echo: &mut TopicEcho, channel: u16, job: u64, bytes: &[u8]) {
         let value = Recorded {
             channel,
             job,
@@ -134,7 +134,7 @@ mod tests {
     }
 
     /// The job, the value as text, and how many were left out.
-    fn take(echo: &mut Echo) -> Option<(u64, String, u64)> {
+    fn take(echo: &mut TopicEcho) -> Option<(u64, String, u64)> {
         let mut buffer = [0; ROOM];
         let seen = echo.take(&mut buffer)?;
         let text = seen.shown(&buffer).to_string();
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn the_latest_value_is_seen_and_others_are_counted() {
-        let mut echo = Echo::new();
+        let mut echo = TopicEcho::new();
         let speed = ("speed", Role::Source);
         let topics = [("pose", Role::Sample), speed, ("pose", Role::Result)];
         open(&mut echo, &topics);

@@ -19,7 +19,7 @@ use sched_dag::{
     SubtaskId, TaskSet, Vertex,
 };
 
-use super::{Drained, Outgoing, Record};
+use super::{Outgoing, Record, RecordingState};
 use crate::run::plan::Plan;
 
 /// How many events are copied at once.
@@ -31,23 +31,23 @@ const MOST_CLUSTERS: usize = 64;
 /// The record of a boot, and what takes its bytes.
 ///
 /// ```
-/// use fass::edge::Kept;
+/// use fass::edge::BootRecord;
 ///
-/// let kept = Kept::new(Vec::new());
+/// let kept = BootRecord::new(Vec::new());
 /// assert!(recording::Recording::read(&kept.end()).is_ok());
 /// ```
 #[derive(Clone, Debug)]
-pub struct Kept<S> {
+pub struct BootRecord<S> {
     stream: Stream<S>,
     is_cut: bool,
     /// By cluster, how many events of this run were looked at.
     taken: Vec<u64>,
 }
 
-impl<S: Sink + Send + 'static> Kept<S> {
+impl<S: Sink + Send + 'static> BootRecord<S> {
     /// Begins a record.
     ///
-    /// See [`Kept`].
+    /// See [`BootRecord`].
     pub fn new(to: S) -> Self {
         Self {
             stream: Stream::begin(to),
@@ -114,7 +114,7 @@ impl<S: Sink + Send + 'static> Kept<S> {
     }
 
     /// Adds the rest of what is recorded. Returns how complete it is, if it is recorded.
-    pub fn end_recording(&mut self, mut outgoing: Outgoing) -> Option<Drained> {
+    pub fn end_recording(&mut self, mut outgoing: Outgoing) -> Option<RecordingState> {
         let drain = outgoing.as_mut()?;
         while drain.step(Some(&mut self.stream)) {}
         let drained = drain.end(&mut self.stream)?;
@@ -124,7 +124,7 @@ impl<S: Sink + Send + 'static> Kept<S> {
 
     /// Ends the record, and returns what has taken it.
     ///
-    /// See [`Kept`].
+    /// See [`BootRecord`].
     pub fn end(self) -> S {
         match self.is_cut {
             true => self.stream.cut(),

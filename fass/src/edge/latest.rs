@@ -20,32 +20,32 @@ use recording::{Channel, EntryKind, Header, Role};
 use sched_dag::{DagId, DriverNotice, Instance, journal};
 
 use super::replay::narrow;
-use super::tape::{Releases, SIGNALS, place_of};
-use super::{Crossing, Drain, Drained, Record, name, open};
+use super::tape::{ReleaseTimes, SIGNALS, place_of};
+use super::{Crossing, Drain, Record, RecordingState, name, open};
 use crate::run::line::{LineOf, Recorded, room_for};
 use crate::run::plan::Plan;
 
 /// Keeps the last jobs.
-pub(super) struct Latest {
+pub(super) struct RecentJobs {
     app: &'static str,
     jobs: u32,
     /// What the next plan says of itself.
     header: Header,
     /// From the launch on, if there is memory.
-    kept: Option<Kept>,
+    kept: Option<PlanHistory>,
 }
 
 /// What is kept of a plan.
-struct Kept {
+struct PlanHistory {
     header: Header,
     latest: LatestJobs,
-    releases: Releases,
+    releases: ReleaseTimes,
     lines: Vec<LineOf>,
     /// The first instance of each DAG that has failed, and when.
     faults: Vec<(Instance, u64)>,
 }
 
-impl Latest {
+impl RecentJobs {
     pub(super) fn new(app: &'static str, jobs: u32) -> Self {
         Self {
             app,
@@ -57,7 +57,7 @@ impl Latest {
     }
 }
 
-impl Crossing for Latest {
+impl Crossing for RecentJobs {
     fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool {
         open(&mut self.header, dag, graph, channels);
         false
@@ -69,10 +69,10 @@ impl Crossing for Latest {
         plan.keep_states_of(self.jobs);
         // Without memory the app runs as if nothing was kept, for nobody has asked for it.
         let latest = LatestJobs::new(&header.channels, self.jobs);
-        self.kept = latest.map(|latest| Kept {
+        self.kept = latest.map(|latest| PlanHistory {
             header,
             latest,
-            releases: Releases::new(&plan.task_set),
+            releases: ReleaseTimes::new(&plan.task_set),
             lines: mem::take(&mut plan.lines),
             faults: Vec::with_capacity(plan.task_set.dags().len()),
         });
@@ -123,11 +123,11 @@ impl Crossing for Latest {
 }
 
 /// Makes the file.
-struct OfLatest(Kept);
+struct OfLatest(PlanHistory);
 
 impl Drain for OfLatest {
     fn begin(&mut self, to: &mut Record) {
-        let Kept {
+        let PlanHistory {
             header,
             latest,
             releases,
@@ -164,8 +164,8 @@ impl Drain for OfLatest {
         false
     }
 
-    fn end(&mut self, to: &mut Record) -> Option<Drained> {
-        Some(Drained::of(to, true))
+    fn end(&mut self, to: &mut Record) -> Option<RecordingState> {
+        Some(RecordingState::of(to, true))
     }
 }
 
@@ -199,7 +199,7 @@ impl Drain for OfLatest {
 pub struct LatestJobs {
     jobs: u32,
     /// One for each channel; empty for one that is no input.
-    places: Vec<Places>,
+    places: Vec<ChannelHistory>,
     /// For each DAG, the jobs before the next one.
     ends: Vec<u64>,
     /// For each DAG, the last job of interest.
@@ -208,7 +208,7 @@ pub struct LatestJobs {
 
 /// The places of a channel.
 #[derive(Clone, Debug)]
-struct Places {
+struct ChannelHistory {
     dag: usize,
     /// The room of a value.
     room: usize,
@@ -231,7 +231,7 @@ impl LatestJobs {
                 Role::Result => 0,
             };
             let room = room_for(channel.schema.least_bytes());
-            places.push(Places {
+            places.push(ChannelHistory {
                 dag: channel.dag.into(),
                 room,
                 bytes: filled(0, room.checked_mul(count)?)?,

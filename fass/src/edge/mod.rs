@@ -34,15 +34,15 @@ use crate::run::line::Recorded;
 use crate::run::plan::Plan;
 
 pub use excerpt::Excerpt;
-pub use kept::Kept;
+pub use kept::BootRecord;
 pub use recording::Sink;
-pub use replay::{Divergence, Outcome, Replay, job_of};
+pub use replay::{Divergence, Replay, ReplayOutcome, job_of};
 
 /// What a platform is to do with what crosses.
 ///
 /// See [`Crossing`].
 #[derive(Clone, Copy, Debug)]
-pub enum Wish {
+pub enum EdgeMode {
     /// Record it.
     Record {
         /// What is recorded, by its name.
@@ -70,24 +70,25 @@ pub enum Wish {
 
 /// What a replay needs of the platform.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Host {
+pub(crate) struct ReplayHost {
     /// Takes a signal from outside.
     pub(crate) raise: fn(u64, DagId),
     pub(crate) now_ns: fn() -> u64,
 }
 
 /// Begins to do what is wished, and, if people can look, what they see.
-pub type Begin = fn(Option<Wish>, bool) -> (Option<Box<dyn Crossing>>, Option<Box<dyn Echoing>>);
+pub type Begin =
+    fn(Option<EdgeMode>, bool) -> (Option<Box<dyn Crossing>>, Option<Box<dyn Echoing>>);
 
 /// What a platform asks for in order to record or to replay; times are of the run. What does
 /// not concern a replay, or a tape, does nothing there.
 ///
 /// ```
-/// use fass::edge::{Begin, Crossing, Wish};
+/// use fass::edge::{Begin, Crossing, EdgeMode};
 ///
 /// /// What a platform does in `open_channels`, once.
 /// fn crossing(begin: Begin, file: &'static [u8]) -> Option<Box<dyn Crossing>> {
-///     begin(Some(Wish::Replay { bytes: file, from: None }), false).0
+///     begin(Some(EdgeMode::Replay { bytes: file, from: None }), false).0
 /// }
 /// ```
 pub trait Crossing: Send {
@@ -132,7 +133,7 @@ pub trait Crossing: Send {
     fn drain(&mut self) -> Option<Box<dyn Drain>>;
 
     /// Returns what a replay has found; if the run is over, also a value that it has not computed.
-    fn outcome(&self, is_over: bool) -> Option<Outcome> {
+    fn outcome(&self, is_over: bool) -> Option<ReplayOutcome> {
         let _ = is_over;
         None
     }
@@ -156,14 +157,14 @@ pub trait Echoing: Send {
     fn watch(&mut self, topic: Option<&str>) -> bool;
 
     /// Takes the latest value out, if there is one since the last call. Allocates nothing.
-    fn take(&mut self, into: &mut [u8]) -> Option<Seen>;
+    fn take(&mut self, into: &mut [u8]) -> Option<WatchedValue>;
 }
 
 /// A value of a topic that is watched.
 ///
 /// See [`Echoing`].
 #[derive(Clone, Debug)]
-pub struct Seen {
+pub struct WatchedValue {
     /// The job that it is of.
     pub job: u64,
     /// How many values came since the one that was taken before, and were not.
@@ -175,7 +176,7 @@ pub struct Seen {
     write: fn(&Schema, &[u8], &mut fmt::Formatter<'_>) -> fmt::Result,
 }
 
-impl Seen {
+impl WatchedValue {
     /// Returns the value in the buffer that it was taken into, as text. Nothing is allocated.
     ///
     /// See [`Echoing`].
@@ -209,14 +210,14 @@ pub trait Drain: Send {
     fn step(&mut self, to: Option<&mut Record>) -> bool;
 
     /// Sends what is lost, when the run is over and nothing is left; `None`: there is no file.
-    fn end(&mut self, to: &mut Record) -> Option<Drained>;
+    fn end(&mut self, to: &mut Record) -> Option<RecordingState>;
 }
 
 /// How complete a recording is.
 ///
 /// See [`Drain`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Drained {
+pub struct RecordingState {
     /// The entries.
     pub entries: u64,
     /// Those of values for which there was no room.
@@ -225,7 +226,7 @@ pub struct Drained {
     pub is_cut: bool,
 }
 
-impl Drained {
+impl RecordingState {
     fn of(file: &Record, is_cut: bool) -> Self {
         Self {
             entries: file.entries(),
@@ -236,17 +237,17 @@ impl Drained {
 }
 
 /// Begins to do what is wished.
-pub(crate) fn begin(wish: Wish, host: Host) -> Box<dyn Crossing> {
+pub(crate) fn begin(wish: EdgeMode, host: ReplayHost) -> Box<dyn Crossing> {
     match wish {
-        Wish::Record { app, bytes, .. } => Box::new(tape::Tape::new(app, bytes)),
-        Wish::Replay { bytes, from } => Box::new(replay::OfMachine::new(bytes, from, host)),
-        Wish::Latest { app, jobs } => Box::new(latest::Latest::new(app, jobs)),
+        EdgeMode::Record { app, bytes, .. } => Box::new(tape::RunRecorder::new(app, bytes)),
+        EdgeMode::Replay { bytes, from } => Box::new(replay::OfMachine::new(bytes, from, host)),
+        EdgeMode::Latest { app, jobs } => Box::new(latest::RecentJobs::new(app, jobs)),
     }
 }
 
 /// Begins to show values.
 pub(crate) fn begin_echo() -> Box<dyn Echoing> {
-    Box::new(echo::Echo::new())
+    Box::new(echo::TopicEcho::new())
 }
 
 /// Adds the recorded topics of a DAG to a header.
@@ -294,17 +295,17 @@ pub type Outgoing = Option<Box<dyn Drain>>;
 /// What crosses the edge of a platform's runs.
 ///
 /// ```
-/// use fass::edge::{Edge, Wish};
+/// use fass::edge::{Edge, EdgeMode};
 ///
 /// let mut edge = Edge::new();
 /// assert!(!edge.is_wished());
-/// edge.set_wish(&Wish::Latest { app: "pump", jobs: 4 });
+/// edge.set_wish(&EdgeMode::Latest { app: "pump", jobs: 4 });
 /// assert!(edge.is_wished() && !edge.has_results());
 /// ```
 #[derive(Default)]
 pub struct Edge {
     /// What the command line says.
-    wish: Option<&'static Wish>,
+    wish: Option<&'static EdgeMode>,
     /// Whether people can look at what crosses.
     shows: bool,
     crossing: Option<Box<dyn Crossing>>,
@@ -339,7 +340,7 @@ impl Edge {
     }
 
     /// Takes what the command line says, once.
-    pub fn set_wish(&mut self, wish: &'static Wish) {
+    pub fn set_wish(&mut self, wish: &'static EdgeMode) {
         self.wish = Some(wish);
     }
 
@@ -357,13 +358,13 @@ impl Edge {
     /// Reports whether there are results among what crosses.
     #[must_use]
     pub const fn has_results(&self) -> bool {
-        self.shows || !matches!(self.wish, Some(Wish::Latest { .. }))
+        self.shows || !matches!(self.wish, Some(EdgeMode::Latest { .. }))
     }
 
     /// Reports whether a replay is wished.
     #[must_use]
     pub const fn is_replay(&self) -> bool {
-        matches!(self.wish, Some(Wish::Replay { .. }))
+        matches!(self.wish, Some(EdgeMode::Replay { .. }))
     }
 
     /// Reports whether a plan has been launched with a wish, so that events are of interest.
@@ -399,9 +400,9 @@ impl Edge {
         }
         let (word, is_asked_for, is_needed) = match self.wish {
             None => return Ok(false),
-            Some(Wish::Record { is_needed, .. }) => ("record", true, *is_needed),
-            Some(Wish::Replay { .. }) => ("replay", true, true),
-            Some(Wish::Latest { .. }) => ("latest", false, false),
+            Some(EdgeMode::Record { is_needed, .. }) => ("record", true, *is_needed),
+            Some(EdgeMode::Replay { .. }) => ("replay", true, true),
+            Some(EdgeMode::Latest { .. }) => ("latest", false, false),
         };
         let launched = match &mut self.crossing {
             None if !is_needed => return Ok(false),
@@ -450,7 +451,7 @@ impl Edge {
 
     /// Ends a run. Returns what a replay has found; if the run `is_over`, also a value that it has
     /// not computed.
-    pub fn end_run(&mut self, is_over: bool) -> Option<Outcome> {
+    pub fn end_run(&mut self, is_over: bool) -> Option<ReplayOutcome> {
         if !self.is_replay() {
             return None;
         }
@@ -502,7 +503,7 @@ impl Edge {
     }
 
     /// Takes that value out, if there is one.
-    pub fn take_seen(&mut self, into: &mut [u8]) -> Option<Seen> {
+    pub fn take_seen(&mut self, into: &mut [u8]) -> Option<WatchedValue> {
         self.echo.as_mut()?.take(into)
     }
 

@@ -19,13 +19,13 @@ use recording::{Channel, Encoder, Entry, EntryKind, Header, Recordable};
 use sched_dag::{DagId, DriverNotice, Instance, SubtaskId, TaskSet};
 
 use super::replay::narrow;
-use super::{Crossing, Drain, Drained, Record, name, open, recorded};
+use super::{Crossing, Drain, Record, RecordingState, name, open, recorded};
 use crate::run::cell::outbox::{Outbox, OutboxReader, Published, outbox, words_of};
 use crate::run::line::{LineOf, Recorded};
 use crate::run::plan::Plan;
 
 /// Records a run.
-pub(super) struct Tape {
+pub(super) struct RunRecorder {
     app: &'static str,
     bytes: usize,
     header: Header,
@@ -34,10 +34,10 @@ pub(super) struct Tape {
     lines: Vec<LineOf>,
     /// By channel: where a value is put that is given, for somebody in front of the tape looks.
     given: Vec<Option<Outbox>>,
-    lost: Lost,
+    lost: LossCounts,
 }
 
-impl Tape {
+impl RunRecorder {
     pub(super) fn new(app: &'static str, bytes: usize) -> Self {
         Self {
             app,
@@ -47,7 +47,7 @@ impl Tape {
             drain: None,
             lines: Vec::new(),
             given: Vec::new(),
-            lost: Lost {
+            lost: LossCounts {
                 values: Arc::default(),
                 rest_ns: Arc::new(AtomicU64::new(u64::MAX)),
             },
@@ -71,7 +71,7 @@ impl Tape {
             records,
             lost: self.lost.clone(),
             header: self.header.clone(),
-            releases: Releases::new(&plan.task_set),
+            releases: ReleaseTimes::new(&plan.task_set),
             epoch_ns: 0,
         }));
         Some(())
@@ -93,7 +93,7 @@ impl Tape {
 }
 
 /// Takes a value that is not where the drain reads it: it is given, and is put there, or is lost.
-fn take(given: &[Option<Outbox>], lost: &Lost, value: &Recorded<'_>, at_ns: u64) {
+fn take(given: &[Option<Outbox>], lost: &LossCounts, value: &Recorded<'_>, at_ns: u64) {
     let outbox = given
         .get(usize::from(value.channel))
         .and_then(Option::as_ref);
@@ -104,7 +104,7 @@ fn take(given: &[Option<Outbox>], lost: &Lost, value: &Recorded<'_>, at_ns: u64)
     }
 }
 
-impl Crossing for Tape {
+impl Crossing for RunRecorder {
     fn open(&mut self, dag: DagId, graph: u64, channels: &[Channel]) -> bool {
         open(&mut self.header, dag, graph, channels);
         true
@@ -179,15 +179,15 @@ struct OfTape {
     events: OutboxReader,
     /// By channel.
     records: Vec<OutboxReader>,
-    lost: Lost,
+    lost: LossCounts,
     header: Header,
-    releases: Releases,
+    releases: ReleaseTimes,
     /// When the run's time begins, on the clock, on which values were complete.
     epoch_ns: u64,
 }
 
 /// When jobs are due.
-pub(super) struct Releases {
+pub(super) struct ReleaseTimes {
     pub(super) task_set: Arc<TaskSet>,
     /// By DAG, if it is sporadic, the signals in flight: job and release, a place for each.
     signals: Vec<Vec<(u64, u64)>>,
@@ -196,7 +196,7 @@ pub(super) struct Releases {
 /// How many signals of a DAG are remembered.
 pub(super) const SIGNALS: u32 = 64;
 
-impl Releases {
+impl ReleaseTimes {
     pub(super) fn new(task_set: &Arc<TaskSet>) -> Self {
         let signals = task_set.dags().iter().map(|dag| match dag.is_sporadic() {
             true => (0..SIGNALS).map(|_| (u64::MAX, 0)).collect(),
@@ -355,14 +355,14 @@ impl Drain for OfTape {
         true
     }
 
-    fn end(&mut self, to: &mut Record) -> Option<Drained> {
+    fn end(&mut self, to: &mut Record) -> Option<RecordingState> {
         let is_cut = self.has_ended(u64::MAX);
         if !is_cut {
             (0..)
                 .take(self.records.len())
                 .for_each(|channel| self.tell_lost(channel, None, to));
         }
-        Some(Drained::of(to, is_cut))
+        Some(RecordingState::of(to, is_cut))
     }
 }
 
@@ -428,14 +428,14 @@ impl LostJobs {
 
 /// What is lost.
 #[derive(Clone)]
-struct Lost {
+struct LossCounts {
     /// By channel.
     values: Arc<[LostJobs]>,
     /// When something happened that had no room; `u64::MAX`: there was nothing.
     rest_ns: Arc<AtomicU64>,
 }
 
-impl Lost {
+impl LossCounts {
     /// Notes a value. It happens at completions, under the scheduler's lock.
     #[cold]
     fn note(&self, value: &Recorded<'_>, at_ns: u64) {

@@ -32,7 +32,7 @@ pub(crate) struct Edge {
     latest: RefCell<Option<LatestJobs>>,
     replay: RefCell<Option<Replay>>,
     /// The begin of the record: what was committed.
-    committed: RefCell<Option<edge::Kept<Vec<u8>>>>,
+    committed: RefCell<Option<edge::BootRecord<Vec<u8>>>>,
 }
 
 /// An entry of the recording to be, without its value, and the value.
@@ -181,7 +181,7 @@ impl Edge {
 
     /// Takes what is committed.
     pub(crate) fn commit(&self, plan: &Plan, terms: &RunConfig) {
-        let mut record = edge::Kept::new(Vec::new());
+        let mut record = edge::BootRecord::new(Vec::new());
         record.commit(plan, &terms.scheduler, terms.overheads);
         self.committed.replace(Some(record));
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Deref;
 
-use fass::edge::Outcome;
+use fass::edge::ReplayOutcome;
 use fass::log::Line;
 use sched_dag::engine::Run;
 use sched_dag::journal::{Event, EventKind};
@@ -87,7 +87,7 @@ impl Report {
         end_ns: u64,
         executed_ns: &BTreeMap<Instance, u64>,
         logs: &[Line],
-        outcome: Outcome,
+        outcome: ReplayOutcome,
     ) -> Self {
         let events: Vec<Event> = run.journal().events().collect();
         let of = |what| events.iter().filter(move |event| event.what == what);

@@ -5,7 +5,7 @@ use alloc::sync::Arc;
 use core::fmt::{self, Write};
 use core::iter;
 
-use fass::edge::{Drained, Outcome, Sink};
+use fass::edge::{RecordingState, ReplayOutcome, Sink};
 use fass::log::Line;
 use fass::{Wire, WireCounts};
 use sched_dag::{Dag, DagId, DagSnapshot, TaskSet};
@@ -100,7 +100,7 @@ impl Memory {
 }
 
 /// Tells how complete a recording is.
-pub fn recorded(drained: &Drained) {
+pub fn recorded(drained: &RecordingState) {
     let is_complete = !drained.is_cut && drained.lost == 0;
     json::emit("recorded", |line| {
         line.number("entries", drained.entries)
@@ -110,7 +110,7 @@ pub fn recorded(drained: &Drained) {
 }
 
 /// Tells what a replay has found.
-pub fn replayed(outcome: &Outcome) {
+pub fn replayed(outcome: &ReplayOutcome) {
     let (compared, uncompared) = (outcome.compared, outcome.uncompared);
     crate::println!(
         "replay: {compared} values were compared, {uncompared} recorded ones were not computed"

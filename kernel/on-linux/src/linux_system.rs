@@ -12,7 +12,7 @@ use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use fass::edge::Seen;
+use fass::edge::WatchedValue;
 use fass::{RunConfig, Signal, Wire};
 use front::app::ending::Ending;
 use front::app::machine::{Divisible, System};
@@ -286,7 +286,7 @@ impl LiveRun for LinuxRun {
         Control::get().is_some_and(|live| live.see(topic))
     }
 
-    fn take_seen(into: &mut [u8]) -> Option<Seen> {
+    fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
         Control::get()?.take_seen(into)
     }
 }

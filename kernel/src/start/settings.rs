@@ -40,7 +40,7 @@ use core::ops::RangeInclusive;
 use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
 use executive::run::{edge, record, stacks, worker};
-use fass::edge::Wish;
+use fass::edge::EdgeMode;
 use front::app::terms::{self, Chosen};
 use front::options::{Options, UsageError, whole_number};
 
@@ -78,23 +78,23 @@ pub(crate) fn set_wish(
             let shorter = || UsageError::new("`replay`: the module is shorter than that");
             let (recording, rest) = terms::split(module, replay_bytes).ok_or_else(shorter)?;
             module = rest;
-            Wish::Replay {
+            EdgeMode::Replay {
                 bytes: recording,
                 from: terms::from(options)?,
             }
         }
-        (0, 1.., _) => Wish::Record {
+        (0, 1.., _) => EdgeMode::Record {
             app,
             bytes: usize::try_from(kib * 1024).unwrap_or(0),
             is_needed: record_kib > 0,
         },
-        (0, 0, 1..) => Wish::Latest {
+        (0, 0, 1..) => EdgeMode::Latest {
             app,
             jobs: u32::try_from(jobs).unwrap_or(0),
         },
         (0, 0, 0) => return Ok(module),
     };
-    if matches!(wish, Wish::Record { .. }) {
+    if matches!(wish, EdgeMode::Record { .. }) {
         record::begin(true);
     }
     edge::set_wish(wish);

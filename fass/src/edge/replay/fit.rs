@@ -13,7 +13,7 @@ use alloc::{format, vec};
 use recording::{Channel, EntryKind, Header, Role};
 use sched_dag::{DagId, SubtaskId, TaskSet};
 
-use super::{Passed, Replay, guard, is_compared};
+use super::{Replay, SkippedInstances, guard, is_compared};
 use crate::run::plan::Plan;
 
 impl Replay {
@@ -138,7 +138,7 @@ impl Replay {
         jobs.dedup();
         dags.dedup();
         let cuts = self.passed.cuts.clone();
-        self.passed = Arc::new(Passed { dags, jobs, cuts });
+        self.passed = Arc::new(SkippedInstances { dags, jobs, cuts });
     }
 
     /// Makes sure that no recorded source would be called, and that none of its values is lost.

@@ -28,7 +28,7 @@ pub use fit::job_of;
 use recording::{Channel, Entry, EntryKind, Header, Malformed, Recordable, Recording, Role, Shown};
 use sched_dag::{DagId, DriverNotice, Instance, SubtaskId, TaskSet, journal};
 
-use super::{Crossing, Drain, Drained, Host, Record, name, open};
+use super::{Crossing, Drain, Record, RecordingState, ReplayHost, name, open};
 use crate::run::line::{LineOf, Recorded};
 use crate::run::plan::{Body, Plan};
 
@@ -41,9 +41,9 @@ pub struct Replay {
     values: Vec<((u16, u64), Range<usize>)>,
     /// Whether it says nothing of what came after its last entry.
     is_cut: bool,
-    passed: Arc<Passed>,
+    passed: Arc<SkippedInstances>,
     /// What instances were answered that asked for the time.
-    clock: BTreeMap<(u16, u16, u64), Told>,
+    clock: BTreeMap<(u16, u16, u64), ToldTimes>,
     /// The releases, if the DAG is sporadic; those of skipped jobs, too, so that the jobs after
     /// them keep their numbers.
     signals: BTreeMap<DagId, VecDeque<u64>>,
@@ -52,14 +52,14 @@ pub struct Replay {
     /// What has no value.
     events: Vec<Entry<'static>>,
     /// The instances that have failed in the recorded run, and in this one not yet.
-    faults: Vec<Fault>,
+    faults: Vec<RecordedFault>,
     /// The first value of a source that is lost: its channel and job.
     lost: Option<(u16, u64)>,
     /// The job that shall be computed, if the person names one.
     from: Option<(String, u64)>,
     /// For each DAG of the plan the job that it begins with.
     begins: Vec<u64>,
-    /// See [`Outcome`].
+    /// See [`ReplayOutcome`].
     lacking: Option<(String, u64)>,
     /// What the plan says of itself.
     own: Header,
@@ -78,14 +78,14 @@ pub struct Replay {
 
 /// The times that an instance was told, and how many of them it has been told again.
 #[derive(Debug, Default)]
-struct Told {
+struct ToldTimes {
     times: Vec<u64>,
     taken: usize,
 }
 
 /// What a replay has found.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Outcome {
+pub struct ReplayOutcome {
     /// How many values were compared.
     pub compared: u64,
     /// How many recorded ones the replay has not computed.
@@ -100,7 +100,7 @@ pub struct Outcome {
 /// The first value of a replay that is not the recorded one, or, if all that were computed are,
 /// the first recorded one that was not computed, or else a recorded fault that has not come again.
 ///
-/// See [`Outcome`].
+/// See [`ReplayOutcome`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Divergence {
     /// The name of the DAG.
@@ -194,7 +194,7 @@ impl Replay {
                     replay.is_compared.push(false);
                 }
                 EntryKind::Cut => cuts.push((dag, place, job)),
-                EntryKind::Fault => replay.faults.push(Fault::new(dag, place, job)),
+                EntryKind::Fault => replay.faults.push(RecordedFault::new(dag, place, job)),
                 EntryKind::Signal | EntryKind::Skip => {
                     replay.first_signals.entry(id).or_insert(job);
                     let of_dag = replay.signals.entry(id).or_default();
@@ -213,9 +213,9 @@ impl Replay {
         }
         replay.values.sort_unstable_by_key(|(of, _)| *of);
         cuts.sort_unstable();
-        let passed = Passed {
+        let passed = SkippedInstances {
             cuts,
-            ..Passed::default()
+            ..SkippedInstances::default()
         };
         Ok(Self {
             passed: Arc::new(passed),
@@ -299,14 +299,14 @@ impl Replay {
 
     /// Returns what was found so far; if the run is over, also a value that it has not computed.
     #[must_use]
-    pub fn outcome(&self, is_over: bool) -> Outcome {
+    pub fn outcome(&self, is_over: bool) -> ReplayOutcome {
         let differs = self.divergence.as_ref().map(|(channel, job, place)| {
             let channel = &self.own.channels[usize::from(*channel)];
             self.describe(channel, *job, place, Some(&self.computed))
         });
         let missing = || is_over.then(|| self.missing()).flatten();
         let unmet = || is_over.then(|| self.unmet_fault(None)).flatten();
-        Outcome {
+        ReplayOutcome {
             compared: self.compared,
             uncompared: self.to_compare - self.compared,
             divergence: differs.or_else(missing).or_else(unmet),
@@ -368,7 +368,7 @@ const fn is_compared(role: Role) -> bool {
 
 /// The instances whose functions are not called.
 #[derive(Clone, Debug, Default)]
-struct Passed {
+struct SkippedInstances {
     /// The DAGs whose inputs are recorded, in order.
     dags: Vec<u16>,
     /// The jobs of these that have some, in order.
@@ -377,7 +377,7 @@ struct Passed {
     cuts: Vec<(u16, u16, u64)>,
 }
 
-impl Passed {
+impl SkippedInstances {
     /// Reports whether the inputs of a DAG are recorded.
     fn is_of(&self, dag: u16) -> bool {
         self.dags.binary_search(&dag).is_ok()
@@ -412,7 +412,7 @@ pub(super) fn narrow(instance: Instance) -> Option<(u16, u16)> {
 }
 
 /// Makes all bodies of a plan pass over these.
-fn guard(plan: &mut Plan, passed: &Arc<Passed>) {
+fn guard(plan: &mut Plan, passed: &Arc<SkippedInstances>) {
     for (dag, bodies) in (0..).map(DagId).zip(&mut plan.bodies) {
         let of_subtasks = (0..).map(SubtaskId).zip(mem::take(bodies));
         let guarded = of_subtasks.map(|(subtask, body): (_, Body)| {
@@ -425,13 +425,13 @@ fn guard(plan: &mut Plan, passed: &Arc<Passed>) {
 
 /// A fault of the recorded run.
 #[derive(Debug)]
-struct Fault {
+struct RecordedFault {
     instance: Instance,
     /// The name of the subtask, once it is known.
     subtask: String,
 }
 
-impl Fault {
+impl RecordedFault {
     fn new(dag: u16, subtask: u16, job: u64) -> Self {
         let (dag, subtask) = (DagId(dag.into()), SubtaskId(subtask.into()));
         Self {
@@ -444,7 +444,7 @@ impl Fault {
 impl Replay {
     /// Finds the names of those that have failed. The DAGs are those of the recording.
     fn name_faults(&mut self, task_set: &TaskSet) {
-        for Fault { instance, subtask } in &mut self.faults {
+        for RecordedFault { instance, subtask } in &mut self.faults {
             let subtasks = task_set.dag(instance.dag).subtasks();
             let failed = subtasks.get(instance.subtask.index());
             *subtask = failed.map_or("", |failed| failed.name()).into();
@@ -460,12 +460,12 @@ impl Replay {
     /// recording is of a whole run, only those count whose function is called.
     #[must_use]
     pub fn unmet_fault(&self, of: Option<(DagId, u64)>) -> Option<Divergence> {
-        let is_unmet = |Fault { instance, .. }: &&Fault| {
+        let is_unmet = |RecordedFault { instance, .. }: &&RecordedFault| {
             let is_of = of.is_none_or(|of| of == (instance.dag, instance.job));
             let is_only_a_part = self.begins[instance.dag.index()] > 0;
             is_of && self.is_of(instance.dag) && (is_only_a_part || !self.passes_over(*instance))
         };
-        let Fault { instance, subtask } = self.faults.iter().find(is_unmet)?;
+        let RecordedFault { instance, subtask } = self.faults.iter().find(is_unmet)?;
         Some(Divergence {
             dag: self.own.dags[instance.dag.index()].name.clone(),
             topic: subtask.clone(),
@@ -481,18 +481,18 @@ impl Replay {
 pub(in crate::edge) struct OfMachine {
     bytes: &'static [u8],
     from: Option<(&'static str, u64)>,
-    host: Host,
+    host: ReplayHost,
     own: Header,
     lines: Vec<LineOf>,
     /// From the launch on.
-    replay: Option<(Replay, Signals)>,
+    replay: Option<(Replay, SignalTimes)>,
 }
 
 impl OfMachine {
     pub(in crate::edge) fn new(
         bytes: &'static [u8],
         from: Option<(&'static str, u64)>,
-        host: Host,
+        host: ReplayHost,
     ) -> Self {
         Self {
             bytes,
@@ -522,7 +522,7 @@ impl Crossing for OfMachine {
         replay.prepare(plan)?;
         replay.guard(plan);
         self.lines = mem::take(&mut plan.lines);
-        let signals = Signals::take_over(plan, &mut replay);
+        let signals = SignalTimes::take_over(plan, &mut replay);
         self.replay = Some((replay, signals));
         Ok(())
     }
@@ -568,7 +568,7 @@ impl Crossing for OfMachine {
         self.replay.as_ref()?.1.raiser(self.host)
     }
 
-    fn outcome(&self, is_over: bool) -> Option<Outcome> {
+    fn outcome(&self, is_over: bool) -> Option<ReplayOutcome> {
         (self.replay.as_ref()).map(|(replay, _)| replay.outcome(is_over))
     }
 }
@@ -581,9 +581,9 @@ const NONE: u64 = u64::MAX;
 
 /// The next signal of each sporadic DAG.
 #[derive(Clone, Debug)]
-struct Signals(Arc<[(DagId, AtomicU64)]>);
+struct SignalTimes(Arc<[(DagId, AtomicU64)]>);
 
-impl Signals {
+impl SignalTimes {
     /// Takes the place of all signals of a plan.
     fn take_over(plan: &mut Plan, replay: &mut Replay) -> Self {
         plan.number = REPLAYED;
@@ -617,8 +617,8 @@ impl Signals {
     }
 
     /// Returns what raises them, if there are any.
-    fn raiser(&self, host: Host) -> Option<Box<dyn Drain>> {
-        let raiser = Raiser {
+    fn raiser(&self, host: ReplayHost) -> Option<Box<dyn Drain>> {
+        let raiser = SignalReplayer {
             signals: self.clone(),
             host,
             epoch_ns: 0,
@@ -628,13 +628,13 @@ impl Signals {
 }
 
 /// Raises the signals of a replay.
-struct Raiser {
-    signals: Signals,
-    host: Host,
+struct SignalReplayer {
+    signals: SignalTimes,
+    host: ReplayHost,
     epoch_ns: u64,
 }
 
-impl Drain for Raiser {
+impl Drain for SignalReplayer {
     fn begin(&mut self, _to: &mut Record) {}
 
     fn begin_run(&mut self, epoch_ns: u64) {
@@ -650,7 +650,7 @@ impl Drain for Raiser {
         false
     }
 
-    fn end(&mut self, _to: &mut Record) -> Option<Drained> {
+    fn end(&mut self, _to: &mut Record) -> Option<RecordingState> {
         None
     }
 }
@@ -663,7 +663,7 @@ mod tests {
 
     #[test]
     fn a_signal_is_due_once_and_the_next_one_after_its_release() {
-        let signals = Signals(Arc::new([(DagId(1), 10.into()), (DagId(4), 30.into())]));
+        let signals = SignalTimes(Arc::new([(DagId(1), 10.into()), (DagId(4), 30.into())]));
         let due = |now_ns| signals.due(now_ns).collect::<Vec<_>>();
         assert_eq!(due(9), []);
         assert_eq!(due(10), [DagId(1)]);

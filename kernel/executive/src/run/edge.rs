@@ -9,7 +9,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::edge::{Edge, Record, Wish};
+use fass::edge::{Edge, EdgeMode, Record};
 use fass::{LaunchError, Plan, Recorded};
 use sched_dag::{DriverNotice, Instance};
 
@@ -27,9 +27,9 @@ pub fn get() -> SpinLockGuard<'static, Edge> {
 }
 
 /// Takes what the command line says.
-pub fn set_wish(wish: Wish) {
+pub fn set_wish(wish: EdgeMode) {
     // Nobody has asked for the latest jobs, so they do not fill a console.
-    if !matches!(wish, Wish::Latest { .. }) || debug_port::is_there() {
+    if !matches!(wish, EdgeMode::Latest { .. }) || debug_port::is_there() {
         EDGE.lock().set_wish(Box::leak(Box::new(wish)));
     }
 }

@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::edge::{Begin, Kept};
+use fass::edge::{Begin, BootRecord};
 use fass::log::Line;
 use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, Recorded, RunConfig};
 use sched_dag::DagId;
@@ -126,7 +126,8 @@ impl Platform for Kernel {
         let coincidence_ns = self.coincidence_ns.load(Ordering::Relaxed);
         if !self.calibrates.load(Ordering::Relaxed) {
             let launched = record::with(|mut record| {
-                let launched = edge::launch(&mut plan, record.as_deref_mut().map(Kept::file))?;
+                let launched =
+                    edge::launch(&mut plan, record.as_deref_mut().map(BootRecord::file))?;
                 if let Some(record) = record {
                     record.commit(&plan, &terms.scheduler, terms.overheads);
                 }

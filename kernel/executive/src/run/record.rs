@@ -6,7 +6,7 @@
 use alloc::boxed::Box;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::edge::{Drain, Kept, Outgoing, Sink};
+use fass::edge::{BootRecord, Drain, Outgoing, Sink};
 use sched_dag::engine::Run;
 
 use super::{edge, execution};
@@ -15,7 +15,7 @@ use crate::machine::spinlock::SpinLock;
 use crate::text::console;
 use front::report::{self, Lines};
 
-type File = Kept<To>;
+type File = BootRecord<To>;
 
 static RECORD: SpinLock<Option<File>> = SpinLock::new(None);
 
@@ -40,7 +40,7 @@ impl Sink for To {
 /// Begins to keep a record.
 pub fn begin(is_live: bool) {
     IS_LIVE.store(is_live, Ordering::Relaxed);
-    *RECORD.lock() = Some(Kept::new(match debug_port::is_there() {
+    *RECORD.lock() = Some(BootRecord::new(match debug_port::is_there() {
         true => To::Port,
         false => To::Console(Box::new(Lines::new())),
     }));
@@ -60,7 +60,10 @@ pub(super) fn with<T>(work: impl FnOnce(Option<&mut File>) -> T) -> T {
 pub fn step(outgoing: &mut Outgoing) -> bool {
     let has_port = debug_port::is_there();
     with(|mut record| {
-        let to = record.as_deref_mut().filter(|_| has_port).map(Kept::file);
+        let to = record
+            .as_deref_mut()
+            .filter(|_| has_port)
+            .map(BootRecord::file);
         let is_sent = (outgoing.as_mut()).is_some_and(|drain| drain.step(to));
         let has_room = IS_LIVE.load(Ordering::Relaxed) && (has_port || !console::has_pending());
         is_sent | record.is_some_and(|record| has_room && take_events(record))
@@ -113,7 +116,7 @@ pub fn end_run(run: &Run) {
 /// Ends the record.
 pub fn end() {
     let record = RECORD.lock().take();
-    if let Some(To::Console(mut lines)) = record.map(Kept::end) {
+    if let Some(To::Console(mut lines)) = record.map(BootRecord::end) {
         lines.flush();
     }
 }

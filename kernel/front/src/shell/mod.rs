@@ -19,7 +19,7 @@ use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::SetOnce;
-use fass::edge::Seen;
+use fass::edge::WatchedValue;
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, DagSnapshot, Scheduler, TaskSet};
@@ -78,7 +78,7 @@ pub trait LiveRun {
     fn watch(topic: Option<&str>) -> bool;
 
     /// Takes the latest value that is to be seen, if there is a new one.
-    fn take_seen(into: &mut [u8]) -> Option<Seen>;
+    fn take_seen(into: &mut [u8]) -> Option<WatchedValue>;
 }
 
 /// Returns how a DAG does, if a run goes on.

@@ -65,7 +65,7 @@ impl LiveRun for NoRun {
         true
     }
 
-    fn take_seen(_: &mut [u8]) -> Option<Seen> {
+    fn take_seen(_: &mut [u8]) -> Option<WatchedValue> {
         None
     }
 }

@@ -39,7 +39,7 @@ use executive::machine::{clock, serial};
 use executive::run::{edge, execution, heartbeat};
 use executive::text::console;
 use fass::SetOnce;
-use fass::edge::Seen;
+use fass::edge::WatchedValue;
 use front::report::tell_log;
 use front::shell::{self, END, LiveRun, Session, shut_down};
 use sched_dag::lifecycle::Request;
@@ -288,7 +288,7 @@ impl LiveRun for KernelRun {
         edge::get().watch(topic)
     }
 
-    fn take_seen(into: &mut [u8]) -> Option<Seen> {
+    fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
         edge::get().take_seen(into)
     }
 }
