@@ -89,7 +89,7 @@
 //! # How it is built
 //!
 //! Top to bottom: [`Dag`] takes registrations; the commit verifies them with
-//! `sched-dag` and makes of each function a [`Body`], one future that is polled
+//! `sched-dag` and makes of each function a [`SubtaskCode`], one future that is polled
 //! once for each instance; the [`Platform`] gets the [`Plan`] and runs bodies
 //! when its scheduler says so. Values travel in rings that have a slot for each
 //! job that may be in flight. The crate names no kernel and needs only `alloc`;
@@ -132,10 +132,10 @@ pub use platform::{
 pub use recording::Channel;
 pub use run::cell::SetOnce;
 pub use run::latest::Staleness;
-pub use run::line::Recorded;
+pub use run::line::RecordedValue;
 pub use run::log;
 pub use run::message::{Message, MessageType, Unique};
-pub use run::plan::{Body, Plan, Replacement, Runner};
+pub use run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
 pub use run::wire::Framing;

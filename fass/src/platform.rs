@@ -21,9 +21,9 @@ use sched_dag::analysis::{AnalysisSettings, OverheadSource, Overheads};
 use sched_dag::{CoreDivision, DagId, Policy, Preemption, SchedulerOptions, TaskSet};
 
 use crate::edge::Begin;
-use crate::run::cell::{Current, SetOnce};
-use crate::run::line::Recorded;
-use crate::run::log::{Field, Level, Line};
+use crate::run::cell::{CurrentIndex, SetOnce};
+use crate::run::line::RecordedValue;
+use crate::run::log::{Field, Level, LogLine};
 use crate::run::plan::Plan;
 
 /// A machine that schedules committed DAGs.
@@ -120,7 +120,7 @@ pub trait Platform: Sync {
     /// Takes a value of a recorded topic, at the completion of its writer, or what a subtask had
     /// sampled of one, at the end of that instance; without a
     /// definition it is forgotten. Must not wait.
-    fn record(&self, value: &Recorded<'_>) {
+    fn record(&self, value: &RecordedValue<'_>) {
         let _ = value;
     }
 
@@ -136,9 +136,9 @@ pub trait Platform: Sync {
     }
 
     /// Takes a line of the [log](mod@crate::log) from the function that runs here. Adds which
-    /// instance that is, if it is one, and the time of the run, and [keeps](Line::keep) it for
+    /// instance that is, if it is one, and the time of the run, and [keeps](LogLine::keep) it for
     /// what shows it later; without a definition it is forgotten. Must not wait.
-    fn log(&self, line: Line) {
+    fn log(&self, line: LogLine) {
         let _ = line;
     }
 
@@ -311,7 +311,7 @@ pub(crate) fn expect_installed() -> &'static dyn Platform {
 
 /// Gives a value to the platform. It looks for the platform itself: a function that is called for
 /// that is, in a crate compiled for size, as long again.
-pub(crate) fn record(value: &Recorded<'_>) {
+pub(crate) fn record(value: &RecordedValue<'_>) {
     match PLATFORM.get() {
         Some(platform) => platform.record(value),
         None => missing(),
@@ -324,7 +324,7 @@ fn missing() -> ! {
 }
 
 /// What tells the time: the platform, unless it has named something else.
-static CLOCK: Current<Clock> = Current::new(&(ASK_THE_PLATFORM as Clock));
+static CLOCK: CurrentIndex<Clock> = CurrentIndex::new(&(ASK_THE_PLATFORM as Clock));
 
 /// Tells the time, as [`now_ns`] does.
 pub type Clock = fn() -> u64;
@@ -421,7 +421,7 @@ macro_rules! log {
 #[inline(never)]
 pub fn say(level: Level, text: &'static str, fields: &[Field]) {
     if let Some(platform) = installed() {
-        platform.log(Line::new(level, text, fields));
+        platform.log(LogLine::new(level, text, fields));
     }
 }
 

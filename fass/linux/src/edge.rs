@@ -12,7 +12,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use fass::edge::{BootRecord, Drain, Edge, Outgoing, Sink};
-use fass::{Clock, LaunchError, Plan, Recorded, RunConfig};
+use fass::{Clock, LaunchError, Plan, RecordedValue, RunConfig};
 use sched_dag::engine::Run;
 use sched_dag::{DriverNotice, Instance};
 
@@ -126,7 +126,7 @@ pub(crate) fn failed(instance: Instance) {
 }
 
 /// Takes a value that is not read where it was written. The cluster's lock is held.
-pub(crate) fn record(value: &Recorded<'_>) {
+pub(crate) fn record(value: &RecordedValue<'_>) {
     get().record(value, of_run(value.completed_ns));
 }
 

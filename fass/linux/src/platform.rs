@@ -9,8 +9,10 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use fass::edge::{Begin, BootRecord};
-use fass::log::Line;
-use fass::{Channel, LaunchError, Occupation, Plan, Platform, Recorded, RunConfig, Runner};
+use fass::log::LogLine;
+use fass::{
+    Channel, LaunchError, Occupation, Plan, Platform, RecordedValue, RunConfig, SubtaskRunner,
+};
 use sched_dag::engine::{self, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, PendingRequests, Request};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
@@ -105,7 +107,7 @@ impl Platform for Host {
         edge::get().open(dag, graph, channels, begin)
     }
 
-    fn record(&self, value: &Recorded<'_>) {
+    fn record(&self, value: &RecordedValue<'_>) {
         edge::record(value);
     }
 
@@ -117,7 +119,7 @@ impl Platform for Host {
         edge::get().lend(channel, job, take);
     }
 
-    fn log(&self, mut line: Line) {
+    fn log(&self, mut line: LogLine) {
         (line.instance, line.at_ns) = edge::here();
         line.keep();
     }
@@ -159,8 +161,8 @@ impl Platform for Host {
 fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> Arc<[Arc<Team>]> {
     let (task_set, options) = (&plan.task_set, threads.terms.scheduler);
     let dags = task_set.dags().len();
-    let mut runners: Vec<Vec<Runner>> = task_set.clusters().map(|_| Vec::new()).collect();
-    for runner in Runner::all(task_set, plan.bodies) {
+    let mut runners: Vec<Vec<SubtaskRunner>> = task_set.clusters().map(|_| Vec::new()).collect();
+    for runner in SubtaskRunner::all(task_set, plan.bodies) {
         let cluster = task_set.dag(runner.instance.dag).cluster();
         runners[cluster.index()].push(runner);
     }

@@ -24,7 +24,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use fass::Runner;
+use fass::SubtaskRunner;
 use sched_dag::engine::{NextAction, PlatformPort as _};
 use sched_dag::{ClusterId, CoreId, Vertex};
 
@@ -200,7 +200,7 @@ impl Team {
 
     /// Calls the function; the error is a panic's message.
     #[inline]
-    fn execute(&self, runner: &mut Runner) -> Result<(), String> {
+    fn execute(&self, runner: &mut SubtaskRunner) -> Result<(), String> {
         edge::note_running(Some(runner.instance));
         let body = AssertUnwindSafe(|| runner.run());
         let outcome = catch_unwind(body).map_err(|panic| message(&*panic));
@@ -213,9 +213,9 @@ impl Team {
     pub(crate) fn complete(
         &self,
         me: Number,
-        runner: Box<Runner>,
+        runner: Box<SubtaskRunner>,
         outcome: Result<(), String>,
-    ) -> Result<Option<Box<Runner>>, Abandoned> {
+    ) -> Result<Option<Box<SubtaskRunner>>, Abandoned> {
         let finish_ns = sys::now_ns();
         let workers = &self.workers;
         let is_raised = workers[me].report(self.levels);
@@ -245,10 +245,10 @@ impl Team {
         &self,
         me: Number,
         mut state: MutexGuard<'_, State>,
-        mut runner: Box<Runner>,
+        mut runner: Box<SubtaskRunner>,
         outcome: Result<(), String>,
         finish_ns: u64,
-    ) -> Option<Box<Runner>> {
+    ) -> Option<Box<SubtaskRunner>> {
         let (workers, vertex) = (&self.workers, runner.vertex);
         let state_now = &mut *state;
         let seat = state_now.seats[me];
@@ -293,7 +293,7 @@ impl Team {
     }
 
     /// Ends a worker's step: finds what it does next, and calls others.
-    fn go_on(&self, me: Number, mut state: MutexGuard<'_, State>) -> Option<Box<Runner>> {
+    fn go_on(&self, me: Number, mut state: MutexGuard<'_, State>) -> Option<Box<SubtaskRunner>> {
         let mut next = state.find_work(me, &self.workers);
         if next.is_none() && self.skips_idle && state.skip_to_next_event() {
             let core = state.seats[me];

@@ -29,7 +29,7 @@ use alloc::rc::Rc;
 
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
-use crate::run::latest::{Looked, Sampler, SharedLatest};
+use crate::run::latest::{SampledSlot, Sampler, SharedLatest};
 use crate::run::message::Message;
 
 /// The latest value of a topic, for subtasks of any DAG. Made by [`Dag::latest`].
@@ -157,7 +157,7 @@ impl<T> sealed::Sealed for LatestUse<T> {}
 impl<T: Message + Sync> Uses for LatestUse<T> {
     type Borrowed<'a> = Option<Sample<'a, T>>;
     type Held = Sampler<T>;
-    type Guard<'a> = Looked<'a, T>;
+    type Guard<'a> = SampledSlot<'a, T>;
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
         let (sampler, number) = self.0.shared.sampler();

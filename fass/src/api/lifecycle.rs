@@ -22,7 +22,7 @@ use super::dag::Dag;
 use super::uses::{Uses, implement_asking, sealed};
 use crate::draft::DagDraft;
 use crate::draft::checks::{self, ModeDraft, dags_of_modes};
-use crate::run::effect::{AT_ONCE, GO, Of, STOP, Target, WHEN_IDLE, Wish};
+use crate::run::effect::{AT_ONCE, GO, RequestKind, RequestTarget, STOP, WHEN_IDLE, Wish};
 
 /// The use of a DAG by a subtask that may pause and resume it: the function gets a [`Switch`].
 /// Made by [`Dag::switching`].
@@ -30,7 +30,7 @@ use crate::run::effect::{AT_ONCE, GO, Of, STOP, Target, WHEN_IDLE, Wish};
 /// See [`Switch`].
 #[derive(Debug)]
 pub struct SwitchUse {
-    target: Arc<Target>,
+    target: Arc<RequestTarget>,
 }
 
 /// What a function pauses and resumes a DAG with.
@@ -212,16 +212,16 @@ fn lifecycle(dags: &[Rc<RefCell<DagDraft>>]) -> Box<dyn Lifecycle> {
 
 implement_asking!(SwitchUse, Switch, |switching, draft, subtask| {
     (draft.switches).push((subtask, Arc::clone(&switching.target)));
-    ask(draft, subtask, Of::Dag(switching.target))
+    ask(draft, subtask, RequestKind::Dag(switching.target))
 });
 
 implement_asking!(ShutdownUse, Shutdown, |_, draft, subtask| {
     draft.may_shut_down = true;
-    ask(draft, subtask, Of::Run)
+    ask(draft, subtask, RequestKind::Run)
 });
 
 /// Notes that completions of a subtask may ask for a change of what is on.
-fn ask(draft: &mut DagDraft, subtask: usize, of: Of) -> Wish {
+fn ask(draft: &mut DagDraft, subtask: usize, of: RequestKind) -> Wish {
     draft.lifecycle = Some(lifecycle);
     draft.ask(subtask, of)
 }
@@ -375,7 +375,7 @@ impl Mode {
 implement_asking!(ModeUse, ModeSwitch, |entering, draft, subtask| {
     draft.modes.push(entering.0.modes);
     draft.check_modes = Some(checks::check_modes);
-    ask(draft, subtask, Of::Mode(entering.0.number))
+    ask(draft, subtask, RequestKind::Mode(entering.0.number))
 });
 
 impl fmt::Debug for Modes {

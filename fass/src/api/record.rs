@@ -8,11 +8,11 @@ use super::dag::Dag;
 use crate::draft::checks::check_recorded;
 use crate::edge::{self, Begin, ReplayHost};
 use crate::platform::{expect_installed, record};
-use crate::run::line::Edge;
+use crate::run::line::TopicEdge;
 use crate::run::message::Message;
 use crate::run::record::RecordedTopic;
 
-static EDGE: Edge = Edge {
+static EDGE: TopicEdge = TopicEdge {
     crosses: || expect_installed().crosses(),
     has_results: || expect_installed().results_cross(),
     open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels, BEGIN),

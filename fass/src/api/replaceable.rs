@@ -15,7 +15,7 @@ use super::dag::Dag;
 use super::subtask::Subtask;
 use super::uses::{ResettableUses, SubtaskBuilder, Uses};
 use crate::run::replaceable::Reset;
-use crate::run::replaceable::{Alternatives, Anew, Two, defer};
+use crate::run::replaceable::{Alternatives, FallbackPair, RemadeFunction, defer};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 impl Dag {
@@ -85,7 +85,7 @@ impl Dag {
     {
         Subtask::of(
             self,
-            Box::new(Anew {
+            Box::new(RemadeFunction {
                 make,
                 present: None,
                 call: |f: &mut F, args| f(args),
@@ -119,7 +119,7 @@ impl Dag {
     {
         Subtask::of(
             self,
-            Box::new(Two {
+            Box::new(FallbackPair {
                 first: Some(first),
                 second,
             }),
@@ -148,7 +148,7 @@ impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
         let call = move |f: &mut F, args| f(U::borrow(&mut U::enter(&mut held)), args);
         Subtask::of(
             dag,
-            Box::new(Anew {
+            Box::new(RemadeFunction {
                 make,
                 present: None,
                 call,
@@ -188,7 +188,7 @@ impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
         let states = U::states(&held);
         let second = wrap::<U, _, _, _>(U::another(&held), second);
         let first = Some(wrap::<U, _, _, _>(held, first));
-        Subtask::of(dag, Box::new(Two { first, second }), states)
+        Subtask::of(dag, Box::new(FallbackPair { first, second }), states)
     }
 }
 

@@ -23,8 +23,8 @@ use super::dag::Dag;
 use super::uses::{Uses, implement_asking, sealed};
 use crate::draft::DagDraft;
 use crate::platform;
-use crate::run::effect::Target;
-use crate::run::effect::{GO, Of, Wish};
+use crate::run::effect::RequestTarget;
+use crate::run::effect::{GO, RequestKind, Wish};
 
 /// What releases a sporadic DAG. Clones are handles of the same signal.
 ///
@@ -67,7 +67,7 @@ use crate::run::effect::{GO, Of, Wish};
 /// ```
 #[derive(Clone)]
 pub struct Signal {
-    target: Arc<Target>,
+    target: Arc<RequestTarget>,
 }
 
 /// The use of a [`Signal`] by a subtask that may raise it: the function gets a
@@ -218,7 +218,7 @@ impl Dag {
 implement_asking!(SignalUse, Raiser, |raising, draft, subtask| {
     let target = raising.0.target;
     draft.raises.push((subtask, Arc::clone(&target)));
-    draft.ask(subtask, Of::Signal(target))
+    draft.ask(subtask, RequestKind::Signal(target))
 });
 
 shown_as!(Signal, |of| of.target());

@@ -37,9 +37,9 @@ use sched_dag::{StateSpec, StateUser};
 
 use super::dag::Dag;
 use super::uses::{ResettableUses, Uses, sealed};
-use crate::run::cell::{Changing, Looking};
+use crate::run::cell::{ReadClaim, WriteClaim};
 use crate::run::line::KeptState;
-use crate::run::replaceable::{Reset, Resettable};
+use crate::run::replaceable::{Reset, ResettableState};
 
 /// What can be a state: any type that several cores may use in turn.
 ///
@@ -96,7 +96,7 @@ pub struct State<T> {
     dag: Dag,
     /// The position among the DAG's states.
     position: usize,
-    value: Arc<Resettable<T>>,
+    value: Arc<ResettableState<T>>,
 }
 
 /// The use of a [`State`] that may change it: the function gets a `&mut T`. Made
@@ -215,7 +215,7 @@ impl<T: StateValue> State<T> {
     where
         T: Recordable,
     {
-        let value = Arc::<Resettable<T>>::clone(&self.value);
+        let value = Arc::<ResettableState<T>>::clone(&self.value);
         let mut draft = self.dag.open();
         draft.states.retain(|(state, _)| *state != self.position);
         let kept = Arc::new(KeptState::new(value, jobs));
@@ -225,7 +225,7 @@ impl<T: StateValue> State<T> {
     }
 
     /// Notes a use, and returns the value that the subtask will claim.
-    fn note(&self, dag: &Dag, subtask: usize, updates: bool) -> Arc<Resettable<T>> {
+    fn note(&self, dag: &Dag, subtask: usize, updates: bool) -> Arc<ResettableState<T>> {
         let user = StateUser { subtask, updates };
         dag.draft.borrow_mut().spec.states[self.position]
             .users
@@ -266,7 +266,7 @@ impl Dag {
         State {
             dag: self.clone(),
             position,
-            value: Arc::new(Resettable::new(initial)),
+            value: Arc::new(ResettableState::new(initial)),
         }
     }
 }
@@ -279,7 +279,7 @@ macro_rules! implement_use {
 
         impl<T: StateValue> Uses for $Use<T> {
             type Borrowed<'a> = $Borrowed;
-            type Held = Arc<Resettable<T>>;
+            type Held = Arc<ResettableState<T>>;
             type Guard<'a> = $Guard<'a, T>;
 
             fn is_of(&self, dag: &Dag) -> bool {
@@ -305,14 +305,14 @@ macro_rules! implement_use {
             }
 
             fn states(held: &Self::Held) -> Vec<Arc<dyn Reset>> {
-                vec![Arc::<Resettable<T>>::clone(held)]
+                vec![Arc::<ResettableState<T>>::clone(held)]
             }
         }
     };
 }
 
-implement_use!(StateUpdate: &'a mut T, true, change -> Changing);
-implement_use!(StateRead: &'a T, false, look -> Looking);
+implement_use!(StateUpdate: &'a mut T, true, change -> WriteClaim);
+implement_use!(StateRead: &'a T, false, look -> ReadClaim);
 
 fn refuse() -> ! {
     panic!(

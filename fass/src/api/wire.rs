@@ -37,8 +37,8 @@ use sched_dag::DagId;
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
 use crate::run::cell::SetOnce;
-use crate::run::effect::Target;
-use crate::run::wire::{Departure, Framing, Incoming, Outgoing};
+use crate::run::effect::RequestTarget;
+use crate::run::wire::{Framing, SendCompletion, WireInput, WireOutput};
 
 /// A way for bytes in and out of a run. Clones are handles of the same wire.
 ///
@@ -89,12 +89,12 @@ pub struct Wire {
 
 struct WireState {
     name: String,
-    incoming: Incoming,
-    outgoing: Arc<Outgoing>,
+    incoming: WireInput,
+    outgoing: Arc<WireOutput>,
     is_received: AtomicBool,
     is_sent_on: AtomicBool,
     /// What its packets raise, if a sporadic DAG begins with them.
-    signal: SetOnce<Arc<Target>>,
+    signal: SetOnce<Arc<RequestTarget>>,
 }
 
 /// What an app says about a wire.
@@ -168,8 +168,12 @@ impl Wire {
         Self {
             shared: Arc::new(WireState {
                 name: name.into(),
-                incoming: Incoming::new(options.framing, options.longest_bytes, options.room_bytes),
-                outgoing: Arc::new(Outgoing::new(options.room_bytes)),
+                incoming: WireInput::new(
+                    options.framing,
+                    options.longest_bytes,
+                    options.room_bytes,
+                ),
+                outgoing: Arc::new(WireOutput::new(options.room_bytes)),
                 is_received: AtomicBool::new(false),
                 is_sent_on: AtomicBool::new(false),
                 signal: SetOnce::new(),
@@ -414,7 +418,7 @@ impl Uses for SendUse {
     type Guard<'a> = &'a Wire;
 
     fn hold(self, dag: &Dag, subtask: usize) -> Self::Held {
-        let effect = Departure(Arc::clone(&self.0.shared.outgoing));
+        let effect = SendCompletion(Arc::clone(&self.0.shared.outgoing));
         let mut draft = dag.draft.borrow_mut();
         draft.effects.push((subtask, Box::new(effect)));
         self.0

@@ -16,10 +16,10 @@ use super::answer::CommitAnswers;
 use crate::draft::DagDraft;
 use crate::draft::checks::{Drafts, writer_of};
 use crate::run::latest::Staleness;
-use crate::run::plan::{Body, Plan};
-use crate::run::record::{AnyRecorded, OfDag, Sampled};
+use crate::run::plan::{Plan, SubtaskCode};
+use crate::run::record::{AnyRecorded, OfDag, SampledValue};
 use crate::run::subtask::MakeBody;
-use crate::run::topic::Wiring;
+use crate::run::topic::DagWiring;
 
 /// The plans made so far.
 static PLANS: AtomicU64 = AtomicU64::new(0);
@@ -38,7 +38,7 @@ pub(crate) fn tie(
     let samples = drafts
         .iter()
         .map(|draft| samples(drafts, &draft.borrow(), &recorded));
-    let samples: Vec<Vec<Sampled>> = samples.collect();
+    let samples: Vec<Vec<SampledValue>> = samples.collect();
     // What serves the requests of the DAGs, if there can be any.
     let lifecycle = drafts.iter().find_map(|draft| draft.borrow().lifecycle);
     let lifecycle = lifecycle.map(|make| make(drafts));
@@ -76,13 +76,13 @@ pub(crate) fn tie(
             .resets
             .into_iter()
             .for_each(|provide| provide.1(faults));
-        let mut wiring = Wiring::new(&spec, &latest, slots);
-        let make = |(subtask, make_body): (usize, MakeBody)| -> Body {
+        let mut wiring = DagWiring::new(&spec, &latest, slots);
+        let make = |(subtask, make_body): (usize, MakeBody)| -> SubtaskCode {
             let any = of_dag.first();
             any.and_then(|any| any.source(of_dag, &spec, &mut wiring, subtask))
                 .unwrap_or_else(|| make_body(&mut wiring, subtask))
         };
-        let mut bodies: Vec<Body> = draft
+        let mut bodies: Vec<SubtaskCode> = draft
             .make_bodies
             .into_iter()
             .enumerate()
@@ -123,14 +123,14 @@ fn samples(
     drafts: &Drafts,
     draft: &DagDraft,
     recorded: &[Vec<Rc<dyn AnyRecorded>>],
-) -> Vec<Sampled> {
+) -> Vec<SampledValue> {
     let samples = draft
         .samples
         .iter()
         .filter_map(|(subtask, latest, sampler)| {
             let writer = writer_of(drafts, latest)?;
             let mut topics = recorded[writer].iter();
-            Some(Sampled {
+            Some(SampledValue {
                 subtask: *subtask,
                 latest: Rc::clone(latest),
                 sampler: *sampler,

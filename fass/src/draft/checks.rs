@@ -18,7 +18,7 @@ use sched_dag::{DagId, DagLabel, OnFault, SubtaskSpec};
 
 use super::DagDraft;
 use super::fault::Fault;
-use crate::run::effect::Target;
+use crate::run::effect::RequestTarget;
 use crate::run::latest::AnyLatest;
 
 /// Adds what is wrong with a DAG of these.
@@ -238,7 +238,7 @@ fn place(drafts: &Drafts, dag: &Weak<RefCell<DagDraft>>) -> Option<usize> {
 }
 
 /// Returns the DAG that is meant.
-fn dag_of(drafts: &Drafts, target: &Arc<Target>) -> Option<DagId> {
+fn dag_of(drafts: &Drafts, target: &Arc<RequestTarget>) -> Option<DagId> {
     let is_it = |other: &Rc<RefCell<DagDraft>>| Arc::ptr_eq(&other.borrow().target, target);
     (0..).map(DagId).nth(drafts.iter().position(is_it)?)
 }

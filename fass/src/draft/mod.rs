@@ -26,7 +26,7 @@ use sched_dag::{
     TopicPort,
 };
 
-use crate::run::effect::{Asked, Effect, Of, Target, Wish};
+use crate::run::effect::{Effect, InstanceRequests, RequestKind, RequestTarget, Wish};
 use crate::run::latest::AnyLatest;
 use crate::run::line::KeptState;
 use crate::run::message::MessageType;
@@ -71,9 +71,9 @@ pub(crate) struct DagDraft {
     /// The inputs of subtasks from outside: "reads parameter `gain`".
     pub(crate) outside: Vec<(usize, String)>,
     /// The signals that subtasks may raise, of whatever DAG.
-    pub(crate) raises: Vec<(usize, Arc<Target>)>,
+    pub(crate) raises: Vec<(usize, Arc<RequestTarget>)>,
     /// The DAGs that subtasks may pause.
-    pub(crate) switches: Vec<(usize, Arc<Target>)>,
+    pub(crate) switches: Vec<(usize, Arc<RequestTarget>)>,
     /// Whether it is paused at the beginning.
     pub(crate) starts_paused: bool,
     /// Whether a subtask may end the run.
@@ -87,7 +87,7 @@ pub(crate) struct DagDraft {
     /// What makes that which serves requests, if it states something of that kind.
     pub(crate) lifecycle: Option<MakeLifecycle>,
     /// What is to be told of the DAG's signal if it is sporadic: wires that its source receives on.
-    pub(crate) receives: Vec<Box<dyn FnOnce(Arc<Target>)>>,
+    pub(crate) receives: Vec<Box<dyn FnOnce(Arc<RequestTarget>)>>,
     /// What completions of subtasks do beyond the DAG, latest values apart.
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// The subtasks whose functions can be replaced.
@@ -95,9 +95,9 @@ pub(crate) struct DagDraft {
     /// The states that are made anew after faults, and by what.
     pub(crate) resets: Vec<(usize, Reset)>,
     /// Which DAG it is, for others that send it signals, or pause it.
-    pub(crate) target: Arc<Target>,
+    pub(crate) target: Arc<RequestTarget>,
     /// The signal that is raised when a fault ends the DAG.
-    pub(crate) on_fault: Option<Arc<Target>>,
+    pub(crate) on_fault: Option<Arc<RequestTarget>>,
 }
 
 /// The topics that a subtask names, and the types of its function.
@@ -267,9 +267,9 @@ impl DagDraft {
     }
 
     /// Notes that completions of a subtask may ask for something.
-    pub(crate) fn ask(&mut self, subtask: usize, of: Of) -> Wish {
+    pub(crate) fn ask(&mut self, subtask: usize, of: RequestKind) -> Wish {
         let wish = Wish::default();
-        let asked = Asked {
+        let asked = InstanceRequests {
             wish: Arc::clone(&wish),
             of,
         };

@@ -14,7 +14,7 @@ use core::fmt;
 use recording::{Channel, Schema, Shown};
 
 use super::{Echoing, WatchedValue};
-use crate::run::line::Recorded;
+use crate::run::line::RecordedValue;
 
 /// The longest value that is shown, in bytes.
 const ROOM: usize = 512;
@@ -64,7 +64,7 @@ impl Echoing for TopicEcho {
         self.is_launched = true;
     }
 
-    fn record(&mut self, value: &Recorded<'_>) {
+    fn record(&mut self, value: &RecordedValue<'_>) {
         if self.watched == Some(value.channel) {
             self.left_out += u64::from(self.kept.is_some());
             let length = value.bytes.and_then(|bytes| {
@@ -124,7 +124,7 @@ mod tests {
     }
 
     fn record(echo: &mut TopicEcho, channel: u16, job: u64, bytes: &[u8]) {
-        let value = Recorded {
+        let value = RecordedValue {
             channel,
             job,
             completed_ns: 0,

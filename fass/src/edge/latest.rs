@@ -22,7 +22,7 @@ use sched_dag::{DagId, DriverNotice, Instance, journal};
 use super::replay::narrow;
 use super::tape::{ReleaseTimes, SIGNALS, place_of};
 use super::{Crossing, Drain, Record, RecordingState, name, open};
-use crate::run::line::{LineOf, Recorded, room_for};
+use crate::run::line::{LineOf, RecordedValue, room_for};
 use crate::run::plan::Plan;
 
 /// Keeps the last jobs.
@@ -79,9 +79,9 @@ impl Crossing for RecentJobs {
         Ok(())
     }
 
-    fn record(&mut self, value: &Recorded<'_>, at_ns: u64) {
+    fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64) {
         if let Some(kept) = &mut self.kept {
-            kept.latest.take(&Recorded {
+            kept.latest.take(&RecordedValue {
                 completed_ns: at_ns,
                 ..*value
             });
@@ -173,7 +173,7 @@ impl Drain for OfLatest {
 /// nothing but when it is made.
 ///
 /// ```
-/// use fass::{LatestJobs, Recorded};
+/// use fass::{LatestJobs, RecordedValue};
 /// use recording::{Channel, Recordable, Role};
 ///
 /// let (dag, subtask, role, topic) = (0, 0, Role::Source, "turns".into());
@@ -184,7 +184,7 @@ impl Drain for OfLatest {
 ///     if job == 5 {
 ///         latest.hold(0, 4); // it has failed
 ///     }
-///     latest.take(&Recorded {
+///     latest.take(&RecordedValue {
 ///         channel: 0,
 ///         job: job.into(),
 ///         completed_ns: 0,
@@ -251,7 +251,7 @@ impl LatestJobs {
     /// Takes a value, if it is an input.
     ///
     /// See [`LatestJobs`].
-    pub fn take(&mut self, value: &Recorded<'_>) {
+    pub fn take(&mut self, value: &RecordedValue<'_>) {
         let Some(places) = self.places.get_mut(usize::from(value.channel)) else {
             return;
         };
@@ -310,14 +310,14 @@ impl LatestJobs {
     /// Returns what is kept, channel by channel, and of each job by job.
     ///
     /// See [`LatestJobs`].
-    pub fn values(&self) -> impl Iterator<Item = Recorded<'_>> {
+    pub fn values(&self) -> impl Iterator<Item = RecordedValue<'_>> {
         (0_u16..).zip(&self.places).flat_map(|(channel, places)| {
             self.jobs(places.dag).filter_map(move |job| {
                 let place = place_of(job, places.values.len())?;
                 let (_, completed_ns, length) =
                     places.values[place].filter(|(of, ..)| *of == job)?;
                 let room = &places.bytes[place * places.room..][..places.room];
-                Some(Recorded {
+                Some(RecordedValue {
                     channel,
                     job,
                     completed_ns,

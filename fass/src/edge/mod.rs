@@ -30,7 +30,7 @@ use recording::{Channel, DagHeader, Header, Schema, Stream};
 use sched_dag::journal::EventKind;
 use sched_dag::{DagId, DriverNotice, Instance, TaskSet};
 
-use crate::run::line::Recorded;
+use crate::run::line::RecordedValue;
 use crate::run::plan::Plan;
 
 pub use excerpt::Excerpt;
@@ -105,7 +105,7 @@ pub trait Crossing: Send {
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String>;
 
     /// Takes a value, at the completion of its writer: `at_ns` on the time of the run.
-    fn record(&mut self, value: &Recorded<'_>, at_ns: u64);
+    fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64);
 
     /// Takes what has become of a job, or of an instance: an event of those of [`HEARS`].
     fn happened(&mut self, notice: &DriverNotice);
@@ -150,7 +150,7 @@ pub trait Echoing: Send {
     fn launch(&mut self);
 
     /// Takes a value, at the completion of its writer.
-    fn record(&mut self, value: &Recorded<'_>);
+    fn record(&mut self, value: &RecordedValue<'_>);
 
     /// Keeps the latest value of this topic from now on, or nothing. Reports whether the topic is
     /// recorded.
@@ -478,7 +478,7 @@ impl Edge {
 
     /// Takes a value that is not read where it was written, and when that was in the time of the
     /// run.
-    pub fn record(&mut self, value: &Recorded<'_>, at_ns: u64) {
+    pub fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64) {
         if let Some(echo) = &mut self.echo {
             echo.record(value);
         }

@@ -20,8 +20,8 @@ use sched_dag::{DagId, DriverNotice, Instance, SubtaskId, TaskSet};
 
 use super::replay::narrow;
 use super::{Crossing, Drain, Record, RecordingState, name, open, recorded};
-use crate::run::cell::outbox::{Outbox, OutboxReader, Published, outbox, words_of};
-use crate::run::line::{LineOf, Recorded};
+use crate::run::cell::outbox::{Outbox, OutboxReader, PublishedRecord, outbox, words_of};
+use crate::run::line::{LineOf, RecordedValue};
 use crate::run::plan::Plan;
 
 /// Records a run.
@@ -93,7 +93,7 @@ impl RunRecorder {
 }
 
 /// Takes a value that is not where the drain reads it: it is given, and is put there, or is lost.
-fn take(given: &[Option<Outbox>], lost: &LossCounts, value: &Recorded<'_>, at_ns: u64) {
+fn take(given: &[Option<Outbox>], lost: &LossCounts, value: &RecordedValue<'_>, at_ns: u64) {
     let outbox = given
         .get(usize::from(value.channel))
         .and_then(Option::as_ref);
@@ -121,7 +121,7 @@ impl Crossing for RunRecorder {
         })
     }
 
-    fn record(&mut self, value: &Recorded<'_>, at_ns: u64) {
+    fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64) {
         take(&self.given, &self.lost, value, at_ns);
     }
 
@@ -295,7 +295,7 @@ impl OfTape {
         self.tell_lost(channel, Some((job, at_ns)), to);
         let of = [self.header.channels[number].dag, channel];
         let records = &mut self.records[number];
-        if let Some(Published { bytes, .. }) = records.next() {
+        if let Some(PublishedRecord { bytes, .. }) = records.next() {
             to.write(&self.releases.entry(EntryKind::Value, of, job, at_ns, bytes));
         }
         records.forget();
@@ -303,7 +303,7 @@ impl OfTape {
 
     /// Writes the next event.
     fn write_event(&mut self, to: &mut Record) {
-        let Some(Published { job, at_ns, bytes }) = self.events.next() else {
+        let Some(PublishedRecord { job, at_ns, bytes }) = self.events.next() else {
             return;
         };
         let event = Event::from_bytes(bytes);
@@ -438,7 +438,7 @@ struct LossCounts {
 impl LossCounts {
     /// Notes a value. It happens at completions, under the scheduler's lock.
     #[cold]
-    fn note(&self, value: &Recorded<'_>, at_ns: u64) {
+    fn note(&self, value: &RecordedValue<'_>, at_ns: u64) {
         let jobs = self.values.get(usize::from(value.channel));
         if jobs.is_some_and(|jobs| !jobs.note(value.job)) {
             self.end(at_ns);

@@ -4,7 +4,7 @@
 //! scheduler, and only after the completion. Latest values, signals and requests to the
 //! run as a whole have readers that do not wait for it. So the function only *prepares*
 //! them, and the platform publishes them when it reports the completion
-//! ([`Body::complete`](crate::Body::complete)): the completion boundary (R3) holds
+//! ([`SubtaskCode::complete`](crate::SubtaskCode::complete)): the completion boundary (R3) holds
 //! for them as it does for edges, also in virtual time, where a function has run
 //! long before its instance is complete.
 
@@ -16,9 +16,9 @@ use sched_dag::lifecycle::{ModeEntry, Request};
 use sched_dag::{DagId, ModeId};
 
 /// An effect without its signals.
-pub(crate) struct Muted(pub(crate) Box<dyn Effect>);
+pub(crate) struct MutedEffect(pub(crate) Box<dyn Effect>);
 
-impl Effect for Muted {
+impl Effect for MutedEffect {
     fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
         self.0.happen(completed_ns, &mut |request| match request {
             Request::Signal(_) => {}
@@ -50,13 +50,13 @@ impl Effect for Box<dyn FnMut() + Send> {
 
 /// Which DAG is meant, by a signal that releases it or a switch: known from the commit on.
 #[derive(Debug, Default)]
-pub(crate) struct Target {
+pub(crate) struct RequestTarget {
     /// The plan's number, 0 before the commit.
     plan: AtomicU64,
     dag: AtomicU32,
 }
 
-impl Target {
+impl RequestTarget {
     /// Returns the plan's number and the DAG, once there are any.
     pub(crate) fn get(&self) -> Option<(u64, DagId)> {
         let plan = self.plan.load(Ordering::Acquire);
@@ -90,20 +90,20 @@ pub(crate) const WHEN_IDLE: u8 = 2;
 pub(crate) type Wish = Arc<AtomicU8>;
 
 /// What a wish is about.
-pub(crate) enum Of {
+pub(crate) enum RequestKind {
     Run,
-    Signal(Arc<Target>),
-    Dag(Arc<Target>),
+    Signal(Arc<RequestTarget>),
+    Dag(Arc<RequestTarget>),
     Mode(ModeId),
 }
 
 /// What an instance may ask for.
-pub(crate) struct Asked {
+pub(crate) struct InstanceRequests {
     pub(crate) wish: Wish,
-    pub(crate) of: Of,
+    pub(crate) of: RequestKind,
 }
 
-impl Effect for Asked {
+impl Effect for InstanceRequests {
     fn happen(&mut self, _completed_ns: u64, ask: &mut dyn FnMut(Request)) {
         let wish = self.wish.load(Ordering::Relaxed);
         if wish == NOTHING {
@@ -111,12 +111,12 @@ impl Effect for Asked {
         }
         self.wish.store(NOTHING, Ordering::Relaxed);
         ask(match &self.of {
-            Of::Run => Request::ShutDown,
-            Of::Signal(target) => Request::Signal(target.dag()),
-            Of::Dag(target) if wish == STOP => Request::Pause(target.dag()),
-            Of::Dag(target) => Request::Resume(target.dag()),
-            Of::Mode(mode) if wish == AT_ONCE => Request::Enter(*mode, ModeEntry::AtOnce),
-            Of::Mode(mode) => Request::Enter(*mode, ModeEntry::WhenIdle),
+            RequestKind::Run => Request::ShutDown,
+            RequestKind::Signal(target) => Request::Signal(target.dag()),
+            RequestKind::Dag(target) if wish == STOP => Request::Pause(target.dag()),
+            RequestKind::Dag(target) => Request::Resume(target.dag()),
+            RequestKind::Mode(mode) if wish == AT_ONCE => Request::Enter(*mode, ModeEntry::AtOnce),
+            RequestKind::Mode(mode) => Request::Enter(*mode, ModeEntry::WhenIdle),
         });
     }
 }

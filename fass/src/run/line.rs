@@ -21,17 +21,17 @@ use crate::run::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
 const NO_CHANNEL: u16 = u16::MAX;
 
 /// What those share who write a channel's values, publish them, or replay them.
-pub(crate) struct Line {
+pub(crate) struct ChannelState {
     number: AtomicU16,
-    pub(super) edge: &'static Edge,
+    pub(super) edge: &'static TopicEdge,
     /// Whether the platform reads the values; else it is given each.
     is_read: AtomicBool,
     /// Where the values are written, if anybody wants them.
     outbox: SetOnce<Outbox>,
 }
 
-impl Line {
-    pub(super) const fn new(edge: &'static Edge) -> Self {
+impl ChannelState {
+    pub(super) const fn new(edge: &'static TopicEdge) -> Self {
         Self {
             number: AtomicU16::new(NO_CHANNEL),
             edge,
@@ -66,8 +66,8 @@ impl Line {
     /// Returns what the writer's completion does.
     pub(super) fn effect(self: &Arc<Self>) -> Box<dyn Effect> {
         match self.is_read.load(Ordering::Relaxed) {
-            true => Box::new(Publishing(Arc::clone(self))),
-            false => Box::new(Giving(Arc::clone(self))),
+            true => Box::new(ReaderPublish(Arc::clone(self))),
+            false => Box::new(PlatformGive(Arc::clone(self))),
         }
     }
 
@@ -114,10 +114,10 @@ impl Line {
 
     /// Gives what is there to the platform: the value, or that it had no room.
     #[inline(never)]
-    pub(crate) fn show(&self, completed_ns: u64, take: impl FnOnce(&Recorded<'_>)) {
+    pub(crate) fn show(&self, completed_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
         if let Some(outbox) = self.outbox.get() {
             outbox.show(|job, bytes| {
-                take(&Recorded {
+                take(&RecordedValue {
                     channel: self.number(),
                     job,
                     completed_ns,
@@ -133,7 +133,7 @@ impl Line {
     }
 
     /// Publishes the value, or gives it to that, as what has no room to be published.
-    pub(crate) fn end(&self, at_ns: u64, take: impl FnOnce(&Recorded<'_>)) {
+    pub(crate) fn end(&self, at_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
         let is_read = self.is_read.load(Ordering::Relaxed);
         if !is_read || !(self.outbox.get()).is_some_and(|outbox| outbox.publish(at_ns)) {
             self.show(at_ns, take);
@@ -142,9 +142,9 @@ impl Line {
 }
 
 /// Lets the reader have a value.
-struct Publishing(Arc<Line>);
+struct ReaderPublish(Arc<ChannelState>);
 
-impl Effect for Publishing {
+impl Effect for ReaderPublish {
     // Compiled with the app: this crate's own code is compiled for size.
     #[inline]
     fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
@@ -153,9 +153,9 @@ impl Effect for Publishing {
 }
 
 /// Gives a value to the platform.
-struct Giving(Arc<Line>);
+struct PlatformGive(Arc<ChannelState>);
 
-impl Effect for Giving {
+impl Effect for PlatformGive {
     fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         self.0.show(completed_ns, self.0.edge.record);
     }
@@ -163,9 +163,9 @@ impl Effect for Giving {
 
 /// Publishes or gives what an instance has found, also if it has failed: without that nobody
 /// could compute its fault again.
-pub(super) struct Found(pub(super) Arc<Line>);
+pub(super) struct InstanceOutputs(pub(super) Arc<ChannelState>);
 
-impl Effect for Found {
+impl Effect for InstanceOutputs {
     fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         self.0.give(completed_ns);
     }
@@ -180,7 +180,7 @@ pub(crate) trait AnyState: Send + Sync {
     fn schema(&self) -> Schema;
 
     /// Writes down what it is now, unless somebody changes it.
-    fn stage(&self, line: &Line, job: u64);
+    fn stage(&self, line: &ChannelState, job: u64);
 
     /// Makes it what was written down; `false`: it cannot be.
     fn restore(&self, bytes: &[u8]) -> bool;
@@ -202,7 +202,7 @@ impl KeptState {
     }
 
     /// Writes it down, if that is due in the job.
-    pub(super) fn keep(&self, line: &Line, job: u64) {
+    pub(super) fn keep(&self, line: &ChannelState, job: u64) {
         if job.is_multiple_of(self.every.load(Ordering::Relaxed).into()) {
             self.state.stage(line, job);
         }
@@ -219,7 +219,7 @@ pub(crate) struct LineOf {
     pub(crate) dag: DagId,
     pub(crate) subtask: usize,
     pub(crate) role: Role,
-    pub(crate) line: Arc<Line>,
+    pub(crate) line: Arc<ChannelState>,
     /// The state whose values they are, if they are of one.
     pub(crate) state: Option<Arc<KeptState>>,
 }
@@ -244,7 +244,7 @@ const ROOM: usize = 4096;
 /// A value that a recorded topic gives to the platform, when its writer's instance is complete.
 ///
 /// ```
-/// fn show(value: &fass::Recorded<'_>) {
+/// fn show(value: &fass::RecordedValue<'_>) {
 ///     match value.bytes {
 ///         Some(bytes) => println!("channel {}, job {}: {bytes:?}", value.channel, value.job),
 ///         None => println!("channel {}, job {} is lost", value.channel, value.job),
@@ -252,7 +252,7 @@ const ROOM: usize = 4096;
 /// }
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Recorded<'v> {
+pub struct RecordedValue<'v> {
     /// The number of the channel ([`Platform::open_channels`](crate::Platform::open_channels)).
     pub channel: u16,
     /// The job.
@@ -265,7 +265,7 @@ pub struct Recorded<'v> {
 
 /// The way from a topic to the platform, and back. What a commit does about recorded topics is
 /// reached through them only, so that an image without any has no code for it.
-pub(crate) struct Edge {
+pub(crate) struct TopicEdge {
     /// Reports whether anything is recorded or replayed.
     pub(crate) crosses: fn() -> bool,
     /// Reports whether that is so of what other subtasks than sources write, too.
@@ -274,7 +274,7 @@ pub(crate) struct Edge {
     /// taker will read the values; else they are given to it.
     pub(crate) open: fn(DagId, u64, &[Channel]) -> bool,
     /// Takes a value.
-    pub(crate) record: fn(&Recorded<'_>),
+    pub(crate) record: fn(&RecordedValue<'_>),
     /// Reports whether there is a replay.
     pub(crate) replays: fn() -> bool,
     /// Lends a value, if there is one.

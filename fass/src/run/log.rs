@@ -2,7 +2,7 @@
 //!
 //! [`log!`](crate::log!) copies a *line* into a ring of fixed size, and goes on. Nothing is
 //! allocated, nobody is waited for, and no text is made: that is left to the platform, which
-//! [takes](Line::take) lines when it has nothing else to do. Where the ring is full, the new line
+//! [takes](LogLine::take) lines when it has nothing else to do. Where the ring is full, the new line
 //! is left out and counted.
 //!
 //! # What is guaranteed
@@ -24,7 +24,7 @@ use core::sync::atomic::{AtomicU8, AtomicU32, AtomicUsize, Ordering};
 use recording::Part;
 use sched_dag::{Instance, TaskSet};
 
-use super::cell::Shared;
+use super::cell::SharedCell;
 
 /// The most fields of a line. See [`log!`](crate::log!).
 pub const FIELDS: usize = 4;
@@ -60,15 +60,15 @@ pub enum Level {
 static LEVEL: AtomicU8 = AtomicU8::new(Level::Info as u8);
 
 /// The lines that wait.
-static RING: [Shared<Place>; PLACES] = [const { Shared::new(Place::Empty) }; PLACES];
+static RING: [SharedCell<LogSlot>; PLACES] = [const { SharedCell::new(LogSlot::Empty) }; PLACES];
 
 /// A place for a line. Its representation has zeros where it is empty, which those of an `Option` are
 /// not: so an image does not hold the ring.
 #[repr(u8)]
 #[expect(clippy::large_enum_variant, reason = "nothing is allocated")]
-enum Place {
+enum LogSlot {
     Empty,
-    Full(Line),
+    Full(LogLine),
 }
 
 /// How many these are, so that a look at an empty ring is short.
@@ -121,12 +121,12 @@ pub type Field = (&'static str, Part<'static>);
 /// A line that was said.
 ///
 /// ```standalone_crate
-/// use fass::log::Line;
+/// use fass::log::LogLine;
 ///
-/// assert!(Line::take().is_none(), "nothing was said");
+/// assert!(LogLine::take().is_none(), "nothing was said");
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Line {
+pub struct LogLine {
     /// How much it matters.
     pub level: Level,
     /// Its text, without the fields.
@@ -142,7 +142,7 @@ pub struct Line {
     pub left_out: u32,
 }
 
-impl Line {
+impl LogLine {
     pub(crate) fn new(level: Level, text: &'static str, fields: &[Field]) -> Self {
         Self {
             level,
@@ -157,10 +157,11 @@ impl Line {
 
     /// Has it wait until it is taken, for platforms ([`Platform::log`](crate::Platform::log)).
     ///
-    /// See [`Line`].
+    /// See [`LogLine`].
     pub fn keep(self) {
-        let fill =
-            |place: &mut Place| matches!(place, Place::Empty).then(|| *place = Place::Full(self));
+        let fill = |place: &mut LogSlot| {
+            matches!(place, LogSlot::Empty).then(|| *place = LogSlot::Full(self))
+        };
         let kept = find(&FILLED, fill);
         let count = kept.map_or(&LEFT_OUT, |()| &WAITING);
         count.fetch_add(1, Ordering::Relaxed);
@@ -168,15 +169,17 @@ impl Line {
 
     /// Takes the oldest line that waits, to show it.
     ///
-    /// Platforms do so, and programs that have one without such a service. See [`Line`].
+    /// Platforms do so, and programs that have one without such a service. See [`LogLine`].
     #[must_use]
     pub fn take() -> Option<Self> {
         if WAITING.load(Ordering::Relaxed) == 0 {
             return None;
         }
-        let line = find(&EMPTIED, |place| match mem::replace(place, Place::Empty) {
-            Place::Empty => None,
-            Place::Full(line) => Some(line),
+        let line = find(&EMPTIED, |place| {
+            match mem::replace(place, LogSlot::Empty) {
+                LogSlot::Empty => None,
+                LogSlot::Full(line) => Some(line),
+            }
         })?;
         WAITING.fetch_sub(1, Ordering::Relaxed);
         let left_out = LEFT_OUT.swap(0, Ordering::Relaxed);
@@ -185,7 +188,7 @@ impl Line {
 
     /// Returns the keys and the values of its fields; these are JSON.
     ///
-    /// See [`Line`].
+    /// See [`LogLine`].
     pub fn fields(&self) -> impl Iterator<Item = (&'static str, impl Display)> {
         let fields = self.fields.iter().flatten();
         fields.map(|(key, value)| (*key, fmt::from_fn(|f| (self.write)(value, f))))
@@ -194,7 +197,7 @@ impl Line {
     /// Returns the names of its DAG and its subtask, and the instance, if it is of one of these
     /// DAGs.
     ///
-    /// See [`Line`].
+    /// See [`LogLine`].
     #[must_use]
     pub fn names<'t>(&self, task_set: Option<&'t TaskSet>) -> Option<(&'t str, &'t str, Instance)> {
         let instance = self.instance?;
@@ -221,7 +224,7 @@ impl Line {
 
 /// Goes round the places from `next` on, and moves it behind the first one that `fits`. Nobody waits:
 /// a place that somebody else uses is passed over.
-fn find<T>(next: &AtomicUsize, fits: impl Fn(&mut Place) -> Option<T>) -> Option<T> {
+fn find<T>(next: &AtomicUsize, fits: impl Fn(&mut LogSlot) -> Option<T>) -> Option<T> {
     let first = next.load(Ordering::Relaxed);
     (first..first + PLACES).find_map(|number| {
         let found = fits(&mut *RING[number % PLACES].change()?)?;
@@ -240,12 +243,12 @@ mod tests {
 
     /// Has a line kept that can be told from others: by its time.
     fn keep(at_ns: u64) {
-        let line = Line::new(Level::Warn, "camera late", &[]);
-        Line { at_ns, ..line }.keep();
+        let line = LogLine::new(Level::Warn, "camera late", &[]);
+        LogLine { at_ns, ..line }.keep();
     }
 
     fn taken() -> impl Iterator<Item = (u64, u32)> {
-        iter::from_fn(Line::take).map(|line| (line.at_ns, line.left_out))
+        iter::from_fn(LogLine::take).map(|line| (line.at_ns, line.left_out))
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What a commit hands to the platform: the verified model and the bodies.
 //!
 //! The platform's scheduler decides *which* instance runs *where* and *when*;
-//! it then calls [`Body::run`] there. A body never decides anything.
+//! it then calls [`SubtaskCode::run`] there. A body never decides anything.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -12,7 +12,7 @@ use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
 
-use super::effect::{Effect, Muted};
+use super::effect::{Effect, MutedEffect};
 use super::latest::Staleness;
 use super::line::LineOf;
 
@@ -24,10 +24,10 @@ use super::line::LineOf;
 /// finds a subtask's body at its ids:
 ///
 /// ```
-/// use fass::{Body, Plan};
+/// use fass::{SubtaskCode, Plan};
 /// use sched_dag::Instance;
 ///
-/// fn body_of(plan: &mut Plan, instance: Instance) -> &mut Body {
+/// fn body_of(plan: &mut Plan, instance: Instance) -> &mut SubtaskCode {
 ///     &mut plan.bodies[instance.dag.index()][instance.subtask.index()]
 /// }
 /// ```
@@ -40,7 +40,7 @@ pub struct Plan {
     /// ([`Platform::raise`](crate::Platform::raise)).
     pub number: u64,
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
-    pub bodies: Vec<Vec<Body>>,
+    pub bodies: Vec<Vec<SubtaskCode>>,
     /// The response times that the commit has proven ([`Commit::answers`](crate::Commit::answers)).
     pub proven: ProvenBounds,
     /// By DAG, the one that gets a signal when a fault ends it
@@ -76,18 +76,18 @@ impl Plan {
 /// # Examples
 ///
 /// ```
-/// use fass::Body;
+/// use fass::SubtaskCode;
 ///
 /// /// A platform that runs one instance after another.
-/// fn run_in_turn(bodies: &mut [Body], job: u64) {
+/// fn run_in_turn(bodies: &mut [SubtaskCode], job: u64) {
 ///     for body in bodies {
 ///         body.run(job);
 ///     }
 /// }
 /// # fn is_send<T: Send>() {}
-/// # is_send::<Body>();
+/// # is_send::<SubtaskCode>();
 /// ```
-pub struct Body {
+pub struct SubtaskCode {
     subtask: Box<dyn Subtask>,
     /// The job that it runs, or has panicked in; [`NO_JOB`] else.
     job: u64,
@@ -107,7 +107,7 @@ pub(crate) trait Subtask: Send {
     fn discard(&mut self, job: u64);
 
     /// Returns what would go on where a fault ends the function.
-    fn replacement(&self) -> Option<Replacement> {
+    fn replacement(&self) -> Option<ReplacementCode> {
         None
     }
 
@@ -120,12 +120,12 @@ pub(crate) trait Subtask: Send {
 }
 
 /// A subtask whose jobs are looked at before their turns.
-struct Looked<F> {
+struct JobPreview<F> {
     subtask: Box<dyn Subtask>,
     look: F,
 }
 
-impl<F: FnMut(u64) -> bool + Send> Subtask for Looked<F> {
+impl<F: FnMut(u64) -> bool + Send> Subtask for JobPreview<F> {
     fn take_turn(&mut self, job: u64) {
         match (self.look)(job) {
             true => self.subtask.take_turn(job),
@@ -137,7 +137,7 @@ impl<F: FnMut(u64) -> bool + Send> Subtask for Looked<F> {
         self.subtask.discard(job);
     }
 
-    fn replacement(&self) -> Option<Replacement> {
+    fn replacement(&self) -> Option<ReplacementCode> {
         self.subtask.replacement()
     }
 
@@ -154,18 +154,18 @@ impl<F: FnMut(u64) -> bool + Send> Subtask for Looked<F> {
 /// also while the body runs.
 ///
 /// ```
-/// use fass::Body;
+/// use fass::SubtaskCode;
 /// use sched_dag::engine::{Alternate, ProvenBounds};
 ///
-/// fn is_survived(body: &Body) -> bool {
-///     body.replacement().is_some_and(|next: fass::Replacement| next.is_there())
+/// fn is_survived(body: &SubtaskCode) -> bool {
+///     body.replacement().is_some_and(|next: fass::ReplacementCode| next.is_there())
 /// }
 /// ```
 #[derive(Clone)]
-pub struct Replacement(pub(crate) Arc<dyn Alternate + Send + Sync>);
+pub struct ReplacementCode(pub(crate) Arc<dyn Alternate + Send + Sync>);
 
 /// One is there while it may be made, and no values are just being handed over.
-impl Alternate for Replacement {
+impl Alternate for ReplacementCode {
     fn is_there(&self) -> bool {
         self.0.is_there()
     }
@@ -175,7 +175,7 @@ impl Alternate for Replacement {
     }
 }
 
-impl Body {
+impl SubtaskCode {
     pub(crate) fn new(subtask: Box<dyn Subtask>) -> Self {
         Self {
             subtask,
@@ -207,7 +207,7 @@ impl Body {
     ///   were not [discarded](Self::discard).
     ///
     /// ```
-    /// fn start(body: &mut fass::Body, instance: sched_dag::Instance) {
+    /// fn start(body: &mut fass::SubtaskCode, instance: sched_dag::Instance) {
     ///     body.run(instance.job); // then report the completion
     /// }
     /// ```
@@ -231,7 +231,7 @@ impl Body {
     /// run code of the app; a body that has no such effects returns at once.
     ///
     /// ```
-    /// fn completed(body: &mut fass::Body, now_ns: u64) {
+    /// fn completed(body: &mut fass::SubtaskCode, now_ns: u64) {
     ///     body.complete(now_ns, &mut |request| println!("{request:?}"));
     /// }
     /// ```
@@ -256,7 +256,7 @@ impl Body {
     /// failed; else nobody could compute its fault again.
     ///
     /// ```
-    /// fn failed(body: &mut fass::Body) {
+    /// fn failed(body: &mut fass::SubtaskCode) {
     ///     body.failed(fass::now_ns());
     /// }
     /// ```
@@ -269,7 +269,7 @@ impl Body {
     /// Has each job looked at before its turn: it is given up where `look` returns false.
     pub(crate) fn before(mut self, look: impl FnMut(u64) -> bool + Send + 'static) -> Self {
         let subtask = self.subtask;
-        self.subtask = Box::new(Looked { subtask, look });
+        self.subtask = Box::new(JobPreview { subtask, look });
         self
     }
 
@@ -277,7 +277,7 @@ impl Body {
     /// effect it must be short: it keeps the platform from deciding anything meanwhile.
     ///
     /// ```
-    /// fn counted(body: &mut fass::Body, count: &'static std::sync::atomic::AtomicU64) {
+    /// fn counted(body: &mut fass::SubtaskCode, count: &'static std::sync::atomic::AtomicU64) {
     ///     use std::sync::atomic::Ordering::Relaxed;
     ///     body.on_completion(Box::new(|| drop(count.fetch_add(1, Relaxed))));
     /// }
@@ -289,14 +289,16 @@ impl Body {
     /// Keeps its signals from going anywhere.
     pub(crate) fn mute(&mut self) {
         let effects = core::mem::take(&mut self.effects).into_iter();
-        self.effects = effects.map(|effect| Box::new(Muted(effect)) as _).collect();
+        self.effects = effects
+            .map(|effect| Box::new(MutedEffect(effect)) as _)
+            .collect();
     }
 
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a
     /// platform to which a clock is dear need not read it for the others.
     ///
     /// ```
-    /// fn completed(body: &mut fass::Body, ask: &mut dyn FnMut(fass::Request)) {
+    /// fn completed(body: &mut fass::SubtaskCode, ask: &mut dyn FnMut(fass::Request)) {
     ///     if body.has_effects() {
     ///         body.complete(fass::now_ns(), ask);
     ///     }
@@ -319,7 +321,7 @@ impl Body {
     /// the bodies.
     ///
     /// ```
-    /// fn cancelled(body: &mut fass::Body, instance: sched_dag::Instance) {
+    /// fn cancelled(body: &mut fass::SubtaskCode, instance: sched_dag::Instance) {
     ///     body.discard(instance.job);
     /// }
     /// ```
@@ -329,9 +331,9 @@ impl Body {
 
     /// Returns what would replace the function after a fault; `None`: its faults end the DAG.
     ///
-    /// See [`Replacement`].
+    /// See [`ReplacementCode`].
     #[must_use]
-    pub fn replacement(&self) -> Option<Replacement> {
+    pub fn replacement(&self) -> Option<ReplacementCode> {
         self.subtask.replacement()
     }
 
@@ -340,10 +342,10 @@ impl Body {
     /// [`run`](Self::run) makes the other function, if it has to be made.
     ///
     /// To be called once for a fault, before anything else of the DAG starts that was not started
-    /// then, and if the [`Replacement`] is there. Takes a bounded time and runs no code of the app.
+    /// then, and if the [`ReplacementCode`] is there. Takes a bounded time and runs no code of the app.
     ///
     /// ```
-    /// fn survived(body: &mut fass::Body) {
+    /// fn survived(body: &mut fass::SubtaskCode) {
     ///     body.replace(); // and run the next job
     /// }
     /// ```
@@ -356,8 +358,8 @@ impl Body {
     /// unwinding: all but what the app's function owns.
     ///
     /// ```
-    /// fn ended(lost: Vec<fass::Body>) {
-    ///     lost.into_iter().for_each(fass::Body::forget);
+    /// fn ended(lost: Vec<fass::SubtaskCode>) {
+    ///     lost.into_iter().for_each(fass::SubtaskCode::forget);
     /// }
     /// ```
     pub fn forget(self) {
@@ -365,7 +367,7 @@ impl Body {
     }
 }
 
-impl core::fmt::Debug for Body {
+impl core::fmt::Debug for SubtaskCode {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Body")
             .field("effects", &self.effects.len())
@@ -374,22 +376,22 @@ impl core::fmt::Debug for Body {
 }
 
 /// What runs the instances of one subtask, one after another (R2): the
-/// [body](engine::Body) in a platform's `Engine`.
+/// [body](engine::SubtaskBody) in a platform's `Engine`.
 ///
 /// ```
-/// use fass::{Plan, Runner};
+/// use fass::{Plan, SubtaskRunner};
 ///
 /// /// A platform that runs the first job of all DAGs.
 /// fn run_once(plan: Plan) {
-///     for mut runner in Runner::all(&plan.task_set, plan.bodies) {
+///     for mut runner in SubtaskRunner::all(&plan.task_set, plan.bodies) {
 ///         runner.run();
 ///     }
 /// }
 /// ```
 #[derive(Debug)]
-pub struct Runner {
+pub struct SubtaskRunner {
     /// Its function, with its ends of the topics.
-    pub body: Body,
+    pub body: SubtaskCode,
     /// The subtask.
     pub vertex: Vertex,
     /// The instance that it runs, or ran last.
@@ -398,11 +400,11 @@ pub struct Runner {
     ids: u64,
 }
 
-impl Runner {
+impl SubtaskRunner {
     /// Makes one of each body of a plan, in the order of the vertices.
     ///
-    /// See [`Runner`].
-    pub fn all(task_set: &TaskSet, bodies: Vec<Vec<Body>>) -> impl Iterator<Item = Self> {
+    /// See [`SubtaskRunner`].
+    pub fn all(task_set: &TaskSet, bodies: Vec<Vec<SubtaskCode>>) -> impl Iterator<Item = Self> {
         let of_dags = (0..).map(DagId).zip(bodies);
         of_dags.flat_map(move |(dag, of_dag)| {
             let of_subtasks = (0..).map(SubtaskId).zip(of_dag);
@@ -419,17 +421,17 @@ impl Runner {
         })
     }
 
-    /// Calls the function for the instance. It panics where [`Body::run`] does.
+    /// Calls the function for the instance. It panics where [`SubtaskCode::run`] does.
     ///
-    /// See [`Runner`].
+    /// See [`SubtaskRunner`].
     #[inline]
     pub fn run(&mut self) {
         self.body.run(self.instance.job);
     }
 }
 
-impl engine::SubtaskBody for Runner {
-    type Alternate = Replacement;
+impl engine::SubtaskBody for SubtaskRunner {
+    type Alternate = ReplacementCode;
 
     #[inline]
     fn set_job(&mut self, job: u64) {
@@ -456,7 +458,7 @@ impl engine::SubtaskBody for Runner {
         self.body.complete(finish_ns, ask);
     }
 
-    fn alternate(&self) -> Option<Replacement> {
+    fn alternate(&self) -> Option<ReplacementCode> {
         self.body.replacement()
     }
 

@@ -22,25 +22,25 @@ use sched_dag::wcets::graph_hash;
 use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
 
 use super::effect::Effect;
-use super::latest::{AnyLatest, Entry, Probe, SharedLatest, Slot};
-use super::line::{Edge, Found, KeptState, Line, LineOf};
+use super::latest::{AnyLatest, LatestEntry, Probe, SharedLatest, Slot};
+use super::line::{ChannelState, InstanceOutputs, KeptState, LineOf, TopicEdge};
 use super::message::{Message, MessageType};
-use super::plan::{Body, Subtask};
-use super::topic::{Ports, Publisher, Relay, Wiring, Wrap};
+use super::plan::{Subtask, SubtaskCode};
+use super::topic::{DagWiring, Ports, Publisher, Relay, Wrap};
 
 /// A recorded topic while DAGs are built.
 pub(crate) struct RecordedTopic<T> {
     topic: String,
-    line: Arc<Line>,
+    line: Arc<ChannelState>,
     of: PhantomData<fn() -> T>,
 }
 
 /// A recorded topic of whatever type.
 pub(crate) trait AnyRecorded: AnyLatest {
-    fn edge(&self) -> &'static Edge;
+    fn edge(&self) -> &'static TopicEdge;
 
     /// Returns the type of its values, and their way.
-    fn line(&self) -> (Schema, Arc<Line>);
+    fn line(&self) -> (Schema, Arc<ChannelState>);
 
     /// Returns what sends recorded values, in the place of the writer's next output port.
     fn replayed(&self, ports: &mut Ports<'_>) -> Replayed;
@@ -51,7 +51,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
         &self,
         latest: &dyn Any,
         sampler: usize,
-    ) -> Option<(Arc<dyn Probe>, Schema, Arc<Line>)>;
+    ) -> Option<(Arc<dyn Probe>, Schema, Arc<ChannelState>)>;
 
     /// Numbers all recorded topics of a DAG, what its subtasks sample of such topics, and its
     /// recorded states, tells the platform, and adds their lines to those before. Returns what is
@@ -63,23 +63,24 @@ pub(crate) trait AnyRecorded: AnyLatest {
         }
         let first = lines.len();
         let mut channels = Vec::new();
-        let mut open = |subtask, role, topic: &str, (schema, line): (Schema, Arc<Line>), state| {
-            line.set_number(narrow(lines.len()));
-            lines.push(LineOf {
-                dag,
-                subtask,
-                role,
-                line,
-                state,
-            });
-            channels.push(Channel {
-                dag: narrow(dag.index()),
-                subtask: narrow(subtask),
-                role,
-                topic: topic.into(),
-                schema,
-            });
-        };
+        let mut open =
+            |subtask, role, topic: &str, (schema, line): (Schema, Arc<ChannelState>), state| {
+                line.set_number(narrow(lines.len()));
+                lines.push(LineOf {
+                    dag,
+                    subtask,
+                    role,
+                    line,
+                    state,
+                });
+                channels.push(Channel {
+                    dag: narrow(dag.index()),
+                    subtask: narrow(subtask),
+                    role,
+                    topic: topic.into(),
+                    schema,
+                });
+            };
         let has_results = (self.edge().has_results)();
         for topic in of.recorded {
             let (subtask, role) = writer(&**topic, spec);
@@ -106,7 +107,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
             // The users take turns in that order.
             let mut subtasks = of.order.iter().map(|subtask| subtask.index());
             if let Some(subtask) = subtasks.find(changes) {
-                let line = Arc::new(Line::new(self.edge()));
+                let line = Arc::new(ChannelState::new(self.edge()));
                 let way = (of_state.state.schema(), Arc::clone(&line));
                 open(
                     subtask,
@@ -130,8 +131,9 @@ pub(crate) trait AnyRecorded: AnyLatest {
     }
 
     /// Puts these around the bodies of subtasks.
-    fn attach(&self, around: Vec<(usize, Around)>, bodies: &mut Vec<Body>) {
-        let mut all: Vec<Option<Body>> = core::mem::take(bodies).into_iter().map(Some).collect();
+    fn attach(&self, around: Vec<(usize, Around)>, bodies: &mut Vec<SubtaskCode>) {
+        let mut all: Vec<Option<SubtaskCode>> =
+            core::mem::take(bodies).into_iter().map(Some).collect();
         for (subtask, around) in around {
             all[subtask] = all[subtask].take().map(around);
         }
@@ -143,9 +145,9 @@ pub(crate) trait AnyRecorded: AnyLatest {
         &self,
         all: &[Rc<dyn AnyRecorded>],
         spec: &DagSpec,
-        wiring: &mut Wiring,
+        wiring: &mut DagWiring,
         subtask: usize,
-    ) -> Option<Body> {
+    ) -> Option<SubtaskCode> {
         let source = &spec.subtasks[subtask];
         let find = |topic: &str| all.iter().find(|recorded| recorded.topic() == topic);
         let is_recorded = source
@@ -159,7 +161,9 @@ pub(crate) trait AnyRecorded: AnyLatest {
         // The commit has made sure that all of them are recorded.
         let outputs = source.outputs.iter().filter_map(|port| find(&port.topic));
         let outputs = outputs.map(|recorded| recorded.replayed(&mut ports));
-        Some(Body::new(Box::new(ReplayedSource(outputs.collect()))))
+        Some(SubtaskCode::new(Box::new(ReplayedSource(
+            outputs.collect(),
+        ))))
     }
 }
 
@@ -170,13 +174,13 @@ pub(crate) struct OfDag<'d> {
     /// The subtasks, each behind those that it waits for.
     pub(crate) order: &'d [SubtaskId],
     pub(crate) recorded: &'d [Rc<dyn AnyRecorded>],
-    pub(crate) samples: &'d [Sampled],
+    pub(crate) samples: &'d [SampledValue],
     /// Its recorded states, by their positions.
     pub(crate) states: &'d [(usize, Arc<KeptState>)],
 }
 
 /// A latest value of a recorded topic, as a subtask samples it.
-pub(crate) struct Sampled {
+pub(crate) struct SampledValue {
     pub(crate) subtask: usize,
     pub(crate) latest: Rc<dyn AnyLatest>,
     /// The number that the subtask has at the latest value.
@@ -207,10 +211,10 @@ fn writer(topic: &dyn AnyRecorded, spec: &DagSpec) -> (usize, Role) {
 type Replayed = Box<dyn FnMut(u64) + Send>;
 
 impl<T: Recordable> RecordedTopic<T> {
-    pub(crate) fn new(topic: &str, edge: &'static Edge) -> Self {
+    pub(crate) fn new(topic: &str, edge: &'static TopicEdge) -> Self {
         Self {
             topic: topic.into(),
-            line: Arc::new(Line::new(edge)),
+            line: Arc::new(ChannelState::new(edge)),
             of: PhantomData,
         }
     }
@@ -232,7 +236,7 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
 
     fn stages(&self) -> Box<dyn Any> {
         let line = Arc::clone(&self.line);
-        let tap = |to| Publisher::by_way_of(Tap { line, to });
+        let tap = |to| Publisher::by_way_of(TopicTap { line, to });
         let wrap: Wrap<T> = (self.line.is_open()).then(|| Box::new(tap) as _);
         Box::new(wrap)
     }
@@ -244,11 +248,11 @@ impl<T: Message + Recordable> AnyLatest for RecordedTopic<T> {
 }
 
 impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
-    fn edge(&self) -> &'static Edge {
+    fn edge(&self) -> &'static TopicEdge {
         self.line.edge
     }
 
-    fn line(&self) -> (Schema, Arc<Line>) {
+    fn line(&self) -> (Schema, Arc<ChannelState>) {
         (T::schema(), Arc::clone(&self.line))
     }
 
@@ -270,9 +274,9 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
         &self,
         latest: &dyn Any,
         sampler: usize,
-    ) -> Option<(Arc<dyn Probe>, Schema, Arc<Line>)> {
+    ) -> Option<(Arc<dyn Probe>, Schema, Arc<ChannelState>)> {
         let shared = latest.downcast_ref::<SharedLatest<T>>()?;
-        let line = Arc::new(Line::new(self.line.edge));
+        let line = Arc::new(ChannelState::new(self.line.edge));
         let probe: Arc<dyn Probe> = Arc::new(SampleProbe::<T> {
             line: Arc::clone(&line),
             job: AtomicU64::new(0),
@@ -284,12 +288,12 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
 }
 
 /// The tap of a topic: looks at each value on its way.
-struct Tap<T> {
-    line: Arc<Line>,
+struct TopicTap<T> {
+    line: Arc<ChannelState>,
     to: Publisher<T>,
 }
 
-impl<T: Message + Recordable> Relay<T> for Tap<T> {
+impl<T: Message + Recordable> Relay<T> for TopicTap<T> {
     fn send(&mut self, job: u64, value: T) {
         self.line.stage::<T>(job, |out| value.encode(out));
         self.to.send(job, value);
@@ -315,7 +319,7 @@ type Sample<T> = Option<(u64, u64, T)>;
 
 /// The probe of a subtask that samples values of this type.
 struct SampleProbe<T> {
-    line: Arc<Line>,
+    line: Arc<ChannelState>,
     /// The job whose instance runs.
     job: AtomicU64,
     of: PhantomData<fn() -> T>,
@@ -336,7 +340,7 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
         let Some((found, mut slot)) = found.zip(slot.and_then(Slot::change)) else {
             return false;
         };
-        *slot = found.map(|(job, completed_ns, value)| Entry {
+        *slot = found.map(|(job, completed_ns, value)| LatestEntry {
             value,
             job,
             completed_ns,
@@ -362,11 +366,11 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
 }
 
 /// Puts something around a body.
-type Around = Box<dyn FnOnce(Body) -> Body>;
+type Around = Box<dyn FnOnce(SubtaskCode) -> SubtaskCode>;
 
 /// Has a subtask look for something before each turn, and the line give away what it has found.
-fn looking(line: Arc<Line>, look: impl Fn(u64) + Send + 'static) -> Around {
-    let found: Box<dyn Effect> = Box::new(Found(line));
+fn looking(line: Arc<ChannelState>, look: impl Fn(u64) + Send + 'static) -> Around {
+    let found: Box<dyn Effect> = Box::new(InstanceOutputs(line));
     let look = move |job| {
         look(job);
         true

@@ -31,9 +31,9 @@ use core::task::{Context, Poll, Waker};
 use recording::{Recordable, Schema};
 use sched_dag::engine::Alternate;
 
-use super::cell::{Changing, SetOnce, Shared};
-use super::line::{AnyState, Line};
-use super::plan::{Body, Replacement, Subtask};
+use super::cell::{SetOnce, SharedCell, WriteClaim};
+use super::line::{AnyState, ChannelState};
+use super::plan::{ReplacementCode, Subtask, SubtaskCode};
 use super::subtask::MakeBody;
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
@@ -56,13 +56,13 @@ pub(crate) trait Alternatives<Args, Ret>: Send {
 }
 
 /// Functions that `make` makes, which are called by way of `call`.
-pub(crate) struct Anew<M, F, C> {
+pub(crate) struct RemadeFunction<M, F, C> {
     pub(crate) make: M,
     pub(crate) present: Option<F>,
     pub(crate) call: C,
 }
 
-impl<Args, Ret, M, F, C> Alternatives<Args, Ret> for Anew<M, F, C>
+impl<Args, Ret, M, F, C> Alternatives<Args, Ret> for RemadeFunction<M, F, C>
 where
     M: FnMut() -> F + Send,
     F: Send,
@@ -91,12 +91,12 @@ where
 }
 
 /// A function, and the one to fall back on.
-pub(crate) struct Two<F, G> {
+pub(crate) struct FallbackPair<F, G> {
     pub(crate) first: Option<F>,
     pub(crate) second: G,
 }
 
-impl<Args, Ret, F, G> Alternatives<Args, Ret> for Two<F, G>
+impl<Args, Ret, F, G> Alternatives<Args, Ret> for FallbackPair<F, G>
 where
     F: FnMut(Args) -> Ret + Send,
     G: FnMut(Args) -> Ret + Send,
@@ -131,13 +131,13 @@ pub(crate) fn defer<Args: VecToSubs, Ret: VecToPubs>(
     Box::new(move |wiring, subtask| {
         alternatives.prepare();
         let restarts = alternatives.restarts();
-        let both = Shared::new((
+        let both = SharedCell::new((
             <Args as VecToSubs>::gen_subs(wiring.ports(subtask)),
             <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask)),
         ));
         let next = AtomicU8::new(if restarts { ANEW } else { FALLBACK });
-        let ends = Arc::new(Ends { both, next });
-        Body::new(Box::new(Replaceable {
+        let ends = Arc::new(ReplaceableEnds { both, next });
+        SubtaskCode::new(Box::new(ReplaceableBody {
             alternatives,
             states,
             ends,
@@ -145,17 +145,17 @@ pub(crate) fn defer<Args: VecToSubs, Ret: VecToPubs>(
     })
 }
 
-struct Replaceable<Args: VecToSubs, Ret: VecToPubs> {
+struct ReplaceableBody<Args: VecToSubs, Ret: VecToPubs> {
     alternatives: Box<dyn Alternatives<Args, Ret>>,
     /// The states that they use.
     states: Vec<Arc<dyn Reset>>,
-    ends: Arc<Ends<(Args::Subs, Ret::Pubs)>>,
+    ends: Arc<ReplaceableEnds<(Args::Subs, Ret::Pubs)>>,
 }
 
 /// The ends of the topics, and which function is next: all that others may look at while the
 /// present one runs.
-struct Ends<T> {
-    both: Shared<T>,
+struct ReplaceableEnds<T> {
+    both: SharedCell<T>,
     next: AtomicU8,
 }
 
@@ -166,7 +166,7 @@ const ANEW: u8 = 1;
 /// The next one is that to fall back on.
 const FALLBACK: u8 = 2;
 
-impl<T: Send + Sync> Alternate for Ends<T> {
+impl<T: Send + Sync> Alternate for ReplaceableEnds<T> {
     fn is_there(&self) -> bool {
         self.next.load(Ordering::Relaxed) != NONE && self.both.change().is_some()
     }
@@ -176,13 +176,13 @@ impl<T: Send + Sync> Alternate for Ends<T> {
     }
 }
 
-impl<T> Ends<T> {
-    fn claim(&self) -> Changing<'_, T> {
+impl<T> ReplaceableEnds<T> {
+    fn claim(&self) -> WriteClaim<'_, T> {
         self.both.change().unwrap_or_else(|| refuse())
     }
 }
 
-impl<Args: VecToSubs, Ret: VecToPubs> Subtask for Replaceable<Args, Ret> {
+impl<Args: VecToSubs, Ret: VecToPubs> Subtask for ReplaceableBody<Args, Ret> {
     fn take_turn(&mut self, job: u64) {
         let context = &mut Context::from_waker(Waker::noop());
         let mut ends = self.ends.claim();
@@ -209,9 +209,9 @@ impl<Args: VecToSubs, Ret: VecToPubs> Subtask for Replaceable<Args, Ret> {
         }
     }
 
-    fn replacement(&self) -> Option<Replacement> {
-        let ends: Arc<Ends<_>> = Arc::clone(&self.ends);
-        Some(Replacement(ends))
+    fn replacement(&self) -> Option<ReplacementCode> {
+        let ends: Arc<ReplaceableEnds<_>> = Arc::clone(&self.ends);
+        Some(ReplacementCode(ends))
     }
 
     fn replace(&mut self) {
@@ -236,10 +236,10 @@ fn refuse() -> ! {
 
 /// The values of a state, one after the other.
 #[doc(hidden)]
-pub struct Resettable<T> {
-    first: Shared<T>,
+pub struct ResettableState<T> {
+    first: SharedCell<T>,
     /// The values after faults; none where no fault is survived.
-    others: SetOnce<Box<[Shared<T>]>>,
+    others: SetOnce<Box<[SharedCell<T>]>>,
     resets: AtomicUsize,
 }
 
@@ -250,10 +250,10 @@ pub trait Reset: Send + Sync {
     fn reset(&self);
 }
 
-impl<T> Resettable<T> {
+impl<T> ResettableState<T> {
     pub(crate) const fn new(first: T) -> Self {
         Self {
-            first: Shared::new(first),
+            first: SharedCell::new(first),
             others: SetOnce::new(),
             resets: AtomicUsize::new(0),
         }
@@ -261,12 +261,12 @@ impl<T> Resettable<T> {
 
     /// Provides the values after faults, once.
     pub(crate) fn provide(&self, values: impl Iterator<Item = T>) {
-        self.others.set(values.map(Shared::new).collect());
+        self.others.set(values.map(SharedCell::new).collect());
     }
 
     /// Returns the present value. There is one for each fault that is survived.
     #[inline]
-    pub(crate) fn present(&self) -> &Shared<T> {
+    pub(crate) fn present(&self) -> &SharedCell<T> {
         match self.resets.load(Ordering::Acquire) {
             0 => &self.first,
             resets => self.after(resets),
@@ -274,24 +274,24 @@ impl<T> Resettable<T> {
     }
 
     #[cold]
-    fn after(&self, resets: usize) -> &Shared<T> {
+    fn after(&self, resets: usize) -> &SharedCell<T> {
         let value = self.others.get().and_then(|others| others.get(resets - 1));
         value.unwrap_or(&self.first)
     }
 }
 
-impl<T: Send + Sync> Reset for Resettable<T> {
+impl<T: Send + Sync> Reset for ResettableState<T> {
     fn reset(&self) {
         self.resets.fetch_add(1, Ordering::Release);
     }
 }
 
-impl<T: Recordable + Send + Sync> AnyState for Resettable<T> {
+impl<T: Recordable + Send + Sync> AnyState for ResettableState<T> {
     fn schema(&self) -> Schema {
         T::schema()
     }
 
-    fn stage(&self, line: &Line, job: u64) {
+    fn stage(&self, line: &ChannelState, job: u64) {
         if let Some(value) = self.present().look() {
             line.stage::<T>(job, |out| value.encode(out));
         }

@@ -19,13 +19,13 @@ use core::convert::Infallible;
 use core::pin::{Pin, pin};
 use core::task::{Context, Poll, Waker, ready};
 
-use super::plan::{Body, Subtask};
-use super::topic::{Publisher, Subscriber, Token, Wiring};
+use super::plan::{Subtask, SubtaskCode};
+use super::topic::{DagWiring, Publisher, Subscriber, Token};
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
 /// What the commit calls to make a registered subtask's body: with the DAG's
 /// wiring and the subtask's number.
-pub(crate) type MakeBody = Box<dyn FnOnce(&mut Wiring, usize) -> Body>;
+pub(crate) type MakeBody = Box<dyn FnOnce(&mut DagWiring, usize) -> SubtaskCode>;
 
 /// Defers [`create_subtask`] until the commit knows the wiring.
 pub(crate) fn defer<F, Args, Ret>(f: F) -> MakeBody
@@ -34,21 +34,21 @@ where
     Args: VecToSubs,
     Ret: VecToPubs,
 {
-    Box::new(move |wiring, subtask| Body::new(Box::new(create_subtask(f, wiring, subtask))))
+    Box::new(move |wiring, subtask| SubtaskCode::new(Box::new(create_subtask(f, wiring, subtask))))
 }
 
 /// Makes the future of one subtask. Its ends of the topics exist on return.
 fn create_subtask<F, Args, Ret>(
     f: F,
-    wiring: &mut Wiring,
+    wiring: &mut DagWiring,
     subtask: usize,
-) -> Turns<F, Args::Subs, Ret::Pubs>
+) -> PollLoop<F, Args::Subs, Ret::Pubs>
 where
     F: FnMut(Args) -> Ret + Send + 'static,
     Args: VecToSubs,
     Ret: VecToPubs,
 {
-    Turns {
+    PollLoop {
         f,
         subs: <Args as VecToSubs>::gen_subs(wiring.ports(subtask)),
         pubs: <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask)),
@@ -58,16 +58,16 @@ where
 /// The figure's loop, one turn a poll: what it would keep from one poll to the next
 /// is only where it waits, and it waits in one place. Written so, a turn does not
 /// begin with finding out where it was, nor end with a look at the closed gate.
-struct Turns<F, Subs, Pubs> {
+struct PollLoop<F, Subs, Pubs> {
     f: F,
     subs: Subs,
     pubs: Pubs,
 }
 
 /// Nothing in it is pinned: a turn's futures do not outlive the turn.
-impl<F, Subs, Pubs> Unpin for Turns<F, Subs, Pubs> {}
+impl<F, Subs, Pubs> Unpin for PollLoop<F, Subs, Pubs> {}
 
-impl<F, Subs: MulRecv, Pubs: MulSend> Future for Turns<F, Subs, Pubs>
+impl<F, Subs: MulRecv, Pubs: MulSend> Future for PollLoop<F, Subs, Pubs>
 where
     F: FnMut(Subs::Items) -> Pubs::Items,
 {
@@ -85,7 +85,7 @@ where
     }
 }
 
-impl<F, Subs: MulRecv, Pubs: MulSend> Subtask for Turns<F, Subs, Pubs>
+impl<F, Subs: MulRecv, Pubs: MulSend> Subtask for PollLoop<F, Subs, Pubs>
 where
     F: FnMut(Subs::Items) -> Pubs::Items,
     Self: Send,
@@ -112,17 +112,17 @@ where
 pub(crate) fn defer_untyped<F: FnMut(u64) + Send + 'static>(f: F) -> MakeBody {
     Box::new(move |wiring, subtask| {
         let (before, after) = wiring.tokens(subtask);
-        Body::new(Box::new(Untyped { f, before, after }))
+        SubtaskCode::new(Box::new(UntypedLoop { f, before, after }))
     })
 }
 
-struct Untyped<F> {
+struct UntypedLoop<F> {
     f: F,
     before: Vec<Subscriber<Token>>,
     after: Publisher<Token>,
 }
 
-impl<F: FnMut(u64) + Send> Subtask for Untyped<F> {
+impl<F: FnMut(u64) + Send> Subtask for UntypedLoop<F> {
     fn take_turn(&mut self, job: u64) {
         self.before.iter_mut().for_each(|edge| {
             edge.recv(job);

@@ -3,13 +3,13 @@
 //! A [`Publisher`] is the writing end of a topic and owns the writer of every
 //! edge that leaves it, one a reading port, and one of every subtask that samples
 //! the topic's latest value; if it is recorded, a *tap* looks at each value before; a [`Subscriber`] is one reading
-//! port. At commit [`Wiring`] hands out the ends: whichever end of an edge is
+//! port. At commit [`DagWiring`] hands out the ends: whichever end of an edge is
 //! asked for first makes the ring and leaves the other end for the one
 //! that asks second. All rings exist before the first release, so no job can be missed
 //! because a reader was not there yet.
 //!
 //! The verification has already compared the types of both ends; the downcast
-//! in [`Wiring`] relies on it.
+//! in [`DagWiring`] relies on it.
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -59,9 +59,9 @@ impl<T> Subscriber<T> {
 /// fn same<T>(_: fn(T), _: fn(T)) {}
 /// same::<<(i32,) as VecToPubs>::Pubs>(|_| (), |_: Publishers<(Publisher<i32>,)>| ());
 /// ```
-pub struct Publisher<T>(End<T>);
+pub struct Publisher<T>(PublisherKind<T>);
 
-enum End<T> {
+enum PublisherKind<T> {
     /// To the one reading port, where nobody else reads the topic.
     One(Writer<T>),
     /// To any number of readers, or by way of somebody who looks at the values.
@@ -77,7 +77,7 @@ pub(super) trait Relay<T>: Send + Sync {
 pub(super) type Wrap<T> = Option<Box<dyn FnOnce(Publisher<T>) -> Publisher<T>>>;
 
 /// Any number of readers.
-struct Several<T> {
+struct FanOut<T> {
     /// One a reading port.
     writers: Box<[Writer<T>]>,
     /// One a subtask that samples the topic's latest value.
@@ -90,14 +90,14 @@ impl<T: Message> Publisher<T> {
             && writers.len() == 1
             && let Some(writer) = writers.pop()
         {
-            return Self(End::One(writer));
+            return Self(PublisherKind::One(writer));
         }
         let writers = writers.into();
-        Self::by_way_of(Several { writers, stages })
+        Self::by_way_of(FanOut { writers, stages })
     }
 
     pub(super) fn by_way_of(relay: impl Relay<T> + 'static) -> Self {
-        Self(End::Other(Box::new(relay)))
+        Self(PublisherKind::Other(Box::new(relay)))
     }
 
     /// Hands the value of `job` to every reader: clones for all but the last,
@@ -112,13 +112,13 @@ impl<T: Message> Publisher<T> {
     #[inline]
     pub(crate) fn send(&mut self, job: u64, value: T) {
         match &mut self.0 {
-            End::One(writer) => put(writer, job, value),
-            End::Other(relay) => relay.send(job, value),
+            PublisherKind::One(writer) => put(writer, job, value),
+            PublisherKind::Other(relay) => relay.send(job, value),
         }
     }
 }
 
-impl<T: Message> Relay<T> for Several<T> {
+impl<T: Message> Relay<T> for FanOut<T> {
     fn send(&mut self, job: u64, value: T) {
         // The commit refuses several readers of a type that gives `None`.
         let stage = |stage: &mut Box<dyn Stage<T>>| {
@@ -170,7 +170,7 @@ fn no_free_slot(job: u64) -> ! {
 pub(crate) struct Token;
 
 /// The edges of one DAG while the commit ties them.
-pub(crate) struct Wiring {
+pub(crate) struct DagWiring {
     /// The number of slots of every ring.
     in_flight: usize,
     /// For each edge the end that was made but not yet asked for.
@@ -190,7 +190,7 @@ pub(crate) struct Wiring {
     stages: Vec<(String, Box<dyn Any>)>,
 }
 
-impl Wiring {
+impl DagWiring {
     /// Numbers the edges of a verified DAG: one a reading port, then those
     /// between untyped subtasks.
     pub(crate) fn new(spec: &DagSpec, latest: &[Rc<dyn AnyLatest>], in_flight: usize) -> Self {
@@ -302,7 +302,7 @@ impl Wiring {
 /// }
 /// ```
 pub struct Ports<'w> {
-    wiring: &'w mut Wiring,
+    wiring: &'w mut DagWiring,
     subtask: usize,
     next: usize,
 }

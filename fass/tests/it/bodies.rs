@@ -12,7 +12,7 @@ use std::thread;
 
 use crate::support::{PERIOD, Shared, commit, inside, named, panic_message, run_job};
 use common::random::Random;
-use fass::{Body, Dag, Plan, Unique, create_dag};
+use fass::{Dag, Plan, SubtaskCode, Unique, create_dag};
 
 #[test]
 fn a_platform_that_keeps_no_order_is_told() {
@@ -228,7 +228,7 @@ fn diamond(alive: &Arc<AtomicI64>, running: &Arc<[AtomicU64; 4]>, joined: &Arc<A
 }
 
 /// A body, and the job that is its next one.
-type Place = Mutex<(Body, u64)>;
+type Place = Mutex<(SubtaskCode, u64)>;
 
 /// Runs the bodies in turn, each with its next job: that is an order which a platform
 /// may choose, even with as many threads as jobs may be in flight. But now and then it

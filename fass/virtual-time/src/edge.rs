@@ -9,7 +9,7 @@
 use std::cell::RefCell;
 
 use fass::edge::{self, Replay};
-use fass::{LatestJobs, Plan, Recorded, RunConfig};
+use fass::{LatestJobs, Plan, RecordedValue, RunConfig};
 use recording::{Channel, Entry, EntryKind, Header, Malformed};
 use sched_dag::engine::Run;
 use sched_dag::journal::{self, Event};
@@ -65,8 +65,8 @@ fn entry(what: EntryKind, [dag, place]: [u16; 2], job: u64, at_ns: u64) -> Entry
 }
 
 impl Kept {
-    fn new(header: &Header, value: &Recorded<'_>) -> Self {
-        let Recorded { channel, job, .. } = *value;
+    fn new(header: &Header, value: &RecordedValue<'_>) -> Self {
+        let RecordedValue { channel, job, .. } = *value;
         let what = value.bytes.map_or(EntryKind::Lost, |_| EntryKind::Value);
         let of = [header.channels[usize::from(channel)].dag, channel];
         Self {
@@ -227,7 +227,7 @@ impl Edge {
     }
 
     /// Takes a value of this run, and compares it with the recorded one.
-    pub(crate) fn record(&self, value: &Recorded<'_>) {
+    pub(crate) fn record(&self, value: &RecordedValue<'_>) {
         self.of_replay(|replay| replay.compare(value));
         match self.latest.borrow_mut().as_mut() {
             Some(latest) => latest.take(value),

@@ -26,8 +26,10 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use fass::edge::{Begin, Replay};
-use fass::log::{Level, Line, set_level};
-use fass::{LaunchError, Occupation, Plan, Platform, Recorded, RunConfig, Runner, Wire};
+use fass::log::{Level, LogLine, set_level};
+use fass::{
+    LaunchError, Occupation, Plan, Platform, RecordedValue, RunConfig, SubtaskRunner, Wire,
+};
 use recording::Channel;
 use sched_dag::engine::{Alternate, FaultCost};
 use sched_dag::journal::EventKind;
@@ -60,7 +62,7 @@ pub(crate) struct Machine {
     /// The instance of the running function.
     pub(crate) running: Cell<Option<Instance>>,
     /// The lines of the log so far.
-    pub(crate) logs: RefCell<Vec<Line>>,
+    pub(crate) logs: RefCell<Vec<LogLine>>,
     /// What is to come, by time and in the order in which it was made.
     arrivals: RefCell<BTreeMap<(u64, u64), Arrival>>,
     /// How much of that there has been.
@@ -299,7 +301,7 @@ impl Platform for HostPlatform {
         false
     }
 
-    fn record(&self, value: &Recorded<'_>) {
+    fn record(&self, value: &RecordedValue<'_>) {
         expect_current().edge.record(value);
     }
 
@@ -311,7 +313,7 @@ impl Platform for HostPlatform {
         expect_current().edge.lend(channel, job, take);
     }
 
-    fn log(&self, mut line: Line) {
+    fn log(&self, mut line: LogLine) {
         if let Some(machine) = current() {
             line.instance = machine.running.get();
             line.at_ns = machine.now_ns.get();
@@ -361,7 +363,7 @@ fn expect_current() -> Rc<Machine> {
 /// A plan that runs, or can go on running.
 #[derive(Debug)]
 pub(crate) struct Session {
-    driver: Driver<Runner>,
+    driver: Driver<SubtaskRunner>,
     calls: Calls,
     /// Whether a function may end the run.
     may_shut_down: bool,
@@ -379,7 +381,7 @@ impl Session {
         for (dag, _) in dags(&task_set).filter(|(_, model)| model.is_sporadic()) {
             machine.follow_signal(dag, 0);
         }
-        let bodies = Runner::all(&task_set, plan.bodies);
+        let bodies = SubtaskRunner::all(&task_set, plan.bodies);
         let driver = Driver::of_bodies(&task_set, options, bodies, &plan.after_fault);
         Self {
             may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
@@ -527,7 +529,7 @@ impl Calls {
     }
 
     /// Calls a function, or fails in its place. The error is the message of its panic.
-    fn call(&self, runner: &mut Runner, fails: bool) -> Result<(), String> {
+    fn call(&self, runner: &mut SubtaskRunner, fails: bool) -> Result<(), String> {
         // Unwind safety: a body that panicked is never run again, and the
         // machine's cells hold plain numbers.
         let result = catch_unwind(AssertUnwindSafe(|| {
@@ -545,8 +547,8 @@ impl Calls {
     }
 }
 
-impl Workload<Runner> for Calls {
-    fn execute(&mut self, runner: &mut Runner, now_ns: u64) -> Option<u64> {
+impl Workload<SubtaskRunner> for Calls {
+    fn execute(&mut self, runner: &mut SubtaskRunner, now_ns: u64) -> Option<u64> {
         let (machine, instance) = (Rc::clone(&self.machine), runner.instance);
         let passes_over = |replay: &mut Replay| replay.passes_over(instance);
         if machine.edge.of_replay(passes_over) {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Deref;
 
 use fass::edge::ReplayOutcome;
-use fass::log::Line;
+use fass::log::LogLine;
 use sched_dag::engine::Run;
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::{self, JudgeOptions, Violation};
@@ -86,7 +86,7 @@ impl Report {
         run: Run,
         end_ns: u64,
         executed_ns: &BTreeMap<Instance, u64>,
-        logs: &[Line],
+        logs: &[LogLine],
         outcome: ReplayOutcome,
     ) -> Self {
         let events: Vec<Event> = run.journal().events().collect();
@@ -101,7 +101,7 @@ impl Report {
             })
         });
         let jobs = of(EventKind::Released).filter_map(|event| JobRecord::new(&run, event));
-        let shown = |line: &Line| line.shown(Some(run.task_set())).to_string();
+        let shown = |line: &LogLine| line.shown(Some(run.task_set())).to_string();
         Self {
             instances: instances.collect(),
             jobs: jobs.collect(),

@@ -6,7 +6,7 @@ use core::fmt::{self, Write};
 use core::iter;
 
 use fass::edge::{RecordingState, ReplayOutcome, Sink};
-use fass::log::Line;
+use fass::log::LogLine;
 use fass::{Wire, WireCounts};
 use sched_dag::{Dag, DagId, DagSnapshot, TaskSet};
 
@@ -239,7 +239,7 @@ const AT_ONCE: usize = 64;
 
 /// Shows the lines that wait, with the names of the run that they are of. Nothing is allocated.
 pub fn tell_log(task_set: impl Fn() -> Option<Arc<TaskSet>>) {
-    for line in iter::from_fn(Line::take).take(AT_ONCE) {
+    for line in iter::from_fn(LogLine::take).take(AT_ONCE) {
         let task_set = task_set();
         let task_set = task_set.as_deref();
         crate::println!("{}", line.shown(task_set));

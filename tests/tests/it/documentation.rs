@@ -33,13 +33,13 @@ const FILES: [&str; 8] = [
 /// which does not pass it on.
 const INTERNAL: [&str; 17] = [
     "MessageType",
-    "Shared",
-    "Changing",
-    "Looking",
+    "SharedCell",
+    "WriteClaim",
+    "ReadClaim",
     "Sampler",
-    "Looked",
+    "SampledSlot",
     "Sealed",
-    "Resettable",
+    "ResettableState",
     "Reset",
     "report",
     "write_line",

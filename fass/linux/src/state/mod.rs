@@ -23,7 +23,7 @@
 
 use std::sync::Arc;
 
-use fass::Runner;
+use fass::SubtaskRunner;
 use sched_dag::engine::{Engine, FaultCost, PlatformPort};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Mailboxes, PendingRequests, Request};
@@ -40,7 +40,7 @@ use crate::{edge, sys};
 /// An instance that has finished, and is not reported yet.
 pub(crate) struct Left {
     pub(crate) worker: Number,
-    pub(crate) runner: Box<Runner>,
+    pub(crate) runner: Box<SubtaskRunner>,
     /// When its function returned, on the clock.
     pub(crate) finish_ns: u64,
 }
@@ -65,7 +65,7 @@ pub struct Fault {
 /// The scheduler of a cluster, its bodies, and which worker runs what.
 pub(crate) struct State {
     pub(crate) office: Arc<Office>,
-    pub(crate) engine: Engine<Box<Runner>, Number>,
+    pub(crate) engine: Engine<Box<SubtaskRunner>, Number>,
     /// By core, the worker that runs what the core should.
     pub(crate) active: Box<[Number]>,
     /// By worker, the core of which it is the active one.
@@ -135,7 +135,7 @@ pub(crate) struct ThreadPort<'s> {
     opened: &'s mut u64,
 }
 
-impl PlatformPort<Box<Runner>> for ThreadPort<'_> {
+impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     /// The edge tells of these, where a topic is recorded.
     const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
@@ -152,7 +152,7 @@ impl PlatformPort<Box<Runner>> for ThreadPort<'_> {
     }
 
     #[inline]
-    fn start(&mut self, core: CoreId, _: &mut Box<Runner>) -> u64 {
+    fn start(&mut self, core: CoreId, _: &mut Box<SubtaskRunner>) -> u64 {
         self.workers[self.active[core.index()]].run();
         self.now_ns()
     }
@@ -178,7 +178,7 @@ impl State {
     pub(crate) fn new(
         (cluster, office): (ClusterId, &Arc<Office>),
         scheduler: Scheduler,
-        runners: Vec<Runner>,
+        runners: Vec<SubtaskRunner>,
         (requests, after_fault): (PendingRequests, Vec<Option<DagId>>),
         journal: Journal,
         processors: Box<[u32]>,
@@ -254,7 +254,7 @@ impl State {
     pub(crate) fn parts<'s>(
         &'s mut self,
         workers: &'s [Worker],
-    ) -> (&'s mut Engine<Box<Runner>, Number>, ThreadPort<'s>) {
+    ) -> (&'s mut Engine<Box<SubtaskRunner>, Number>, ThreadPort<'s>) {
         let port = ThreadPort {
             office: &self.office,
             cluster: self.engine.cluster,
@@ -280,7 +280,7 @@ impl State {
         &mut self,
         workers: &[Worker],
         (core, vertex): (CoreId, Vertex),
-        runner: Option<Box<Runner>>,
+        runner: Option<Box<SubtaskRunner>>,
         (cause, is_overrun): (String, bool),
     ) {
         let instance = self.engine.scheduler.instance_of(vertex);
@@ -382,7 +382,11 @@ impl State {
     }
 
     /// Finds what a worker without an instance does next: run this, or nothing.
-    pub(crate) fn find_work(&mut self, me: Number, workers: &[Worker]) -> Option<Box<Runner>> {
+    pub(crate) fn find_work(
+        &mut self,
+        me: Number,
+        workers: &[Worker],
+    ) -> Option<Box<SubtaskRunner>> {
         let Some(core) = self.seats[me] else {
             self.spare.push(me);
             return None;
@@ -462,7 +466,7 @@ impl State {
     pub(crate) fn end_parked(
         &mut self,
         worker: Number,
-        runner: Box<Runner>,
+        runner: Box<SubtaskRunner>,
         finish_ns: u64,
         workers: &[Worker],
     ) {

@@ -13,7 +13,7 @@ use crate::platform::HOST;
 use crate::state::Number;
 use crate::team::Team;
 use crate::{Linux, Mechanism, sys};
-use fass::Runner;
+use fass::SubtaskRunner;
 
 /// `low` is read, then thought about; `urgent` preempts that; `first` precedes both.
 const DAGS: [&str; 3] = ["low", "urgent", "first"];
@@ -22,7 +22,7 @@ const DAGS: [&str; 3] = ["low", "urgent", "first"];
 struct Stage {
     team: Arc<Team>,
     /// What runs, by its DAG's name, with the worker that runs it.
-    running: BTreeMap<&'static str, (Number, Box<Runner>)>,
+    running: BTreeMap<&'static str, (Number, Box<SubtaskRunner>)>,
     /// By DAG, the worker that began with its job.
     began: BTreeMap<&'static str, Number>,
 }
@@ -121,7 +121,7 @@ impl Stage {
         }
     }
 
-    fn go_on(&mut self, worker: Number, next: Option<Box<Runner>>) {
+    fn go_on(&mut self, worker: Number, next: Option<Box<SubtaskRunner>>) {
         if let Some(runner) = next {
             let name = DAGS[runner.instance.dag.index()];
             self.running.insert(name, (worker, runner));

@@ -29,8 +29,8 @@ use recording::{Channel, Entry, EntryKind, Header, Malformed, Recordable, Record
 use sched_dag::{DagId, DriverNotice, Instance, SubtaskId, TaskSet, journal};
 
 use super::{Crossing, Drain, Record, RecordingState, ReplayHost, name, open};
-use crate::run::line::{LineOf, Recorded};
-use crate::run::plan::{Body, Plan};
+use crate::run::line::{LineOf, RecordedValue};
+use crate::run::plan::{Plan, SubtaskCode};
 
 /// A recording that takes the place of what enters.
 #[derive(Debug, Default)]
@@ -278,7 +278,7 @@ impl Replay {
     }
 
     /// Compares a value of the run with the recorded one.
-    pub fn compare(&mut self, value: &Recorded<'_>) {
+    pub fn compare(&mut self, value: &RecordedValue<'_>) {
         if !is_compared(self.own.channels[usize::from(value.channel)].role) {
             // It is where the value is from.
             return;
@@ -415,7 +415,7 @@ pub(super) fn narrow(instance: Instance) -> Option<(u16, u16)> {
 fn guard(plan: &mut Plan, passed: &Arc<SkippedInstances>) {
     for (dag, bodies) in (0..).map(DagId).zip(&mut plan.bodies) {
         let of_subtasks = (0..).map(SubtaskId).zip(mem::take(bodies));
-        let guarded = of_subtasks.map(|(subtask, body): (_, Body)| {
+        let guarded = of_subtasks.map(|(subtask, body): (_, SubtaskCode)| {
             let passed = Arc::clone(passed);
             body.before(move |job| !passed.has(Instance { dag, job, subtask }))
         });
@@ -527,7 +527,7 @@ impl Crossing for OfMachine {
         Ok(())
     }
 
-    fn record(&mut self, value: &Recorded<'_>, _at_ns: u64) {
+    fn record(&mut self, value: &RecordedValue<'_>, _at_ns: u64) {
         if let Some((replay, _)) = &mut self.replay {
             replay.compare(value);
         }

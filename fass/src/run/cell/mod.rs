@@ -44,7 +44,7 @@
 //!
 //! # The shared value
 //!
-//! A [`Shared`] value is changed by one user or looked at by several, never both. A
+//! A [`SharedCell`] value is changed by one user or looked at by several, never both. A
 //! user *claims* it for that time. Nobody ever waits: the schedule is such that
 //! every claim succeeds, and one that does not is refused.
 //!
@@ -246,7 +246,7 @@ impl<T> Drop for Slot<T> {
 const CHANGING: u32 = u32::MAX;
 
 /// A value that one may change or several look at.
-pub(crate) struct Shared<T> {
+pub(crate) struct SharedCell<T> {
     claims: AtomicU32,
     value: UnsafeCell<ManuallyDrop<T>>,
 }
@@ -254,15 +254,15 @@ pub(crate) struct Shared<T> {
 // SAFETY: by the claim invariant threads have either one `&mut T` or several `&T`
 // between them. `T: Send` because the value is changed, and moved out of and into
 // its place, by one thread after another; `T: Sync` because several look at it.
-unsafe impl<T: Send + Sync> Sync for Shared<T> {}
+unsafe impl<T: Send + Sync> Sync for SharedCell<T> {}
 
 /// The claim of a user that may change the value.
-pub struct Changing<'a, T>(&'a Shared<T>);
+pub struct WriteClaim<'a, T>(&'a SharedCell<T>);
 
 /// The claim of a user that looks at the value.
-pub struct Looking<'a, T>(&'a Shared<T>);
+pub struct ReadClaim<'a, T>(&'a SharedCell<T>);
 
-impl<T> Shared<T> {
+impl<T> SharedCell<T> {
     pub(crate) const fn new(value: T) -> Self {
         Self {
             claims: AtomicU32::new(0),
@@ -271,24 +271,24 @@ impl<T> Shared<T> {
     }
 
     /// Claims the value for a change, unless somebody else has a claim.
-    pub(crate) fn change(&self) -> Option<Changing<'_, T>> {
+    pub(crate) fn change(&self) -> Option<WriteClaim<'_, T>> {
         let claim = self
             .claims
             .compare_exchange(0, CHANGING, Ordering::Acquire, Ordering::Relaxed);
-        claim.ok().map(|_| Changing(self))
+        claim.ok().map(|_| WriteClaim(self))
     }
 
     /// Claims the value for a look, unless somebody may change it.
-    pub(crate) fn look(&self) -> Option<Looking<'_, T>> {
+    pub(crate) fn look(&self) -> Option<ReadClaim<'_, T>> {
         let one_more = |claims| (claims < CHANGING - 1).then(|| claims + 1);
         let claim = self
             .claims
             .fetch_update(Ordering::Acquire, Ordering::Relaxed, one_more);
-        claim.ok().map(|_| Looking(self))
+        claim.ok().map(|_| ReadClaim(self))
     }
 }
 
-impl<T> Drop for Shared<T> {
+impl<T> Drop for SharedCell<T> {
     fn drop(&mut self) {
         // One that a fault has left half changed stays as it is.
         if *self.claims.get_mut() != CHANGING {
@@ -298,7 +298,7 @@ impl<T> Drop for Shared<T> {
     }
 }
 
-impl<T> Deref for Changing<'_, T> {
+impl<T> Deref for WriteClaim<'_, T> {
     type Target = T;
 
     fn deref(&self) -> &T {
@@ -308,7 +308,7 @@ impl<T> Deref for Changing<'_, T> {
     }
 }
 
-impl<T> DerefMut for Changing<'_, T> {
+impl<T> DerefMut for WriteClaim<'_, T> {
     fn deref_mut(&mut self) -> &mut T {
         // SAFETY: by the claim invariant this claim is the only one, and `&mut self`
         // keeps it from giving out another reference meanwhile.
@@ -316,7 +316,7 @@ impl<T> DerefMut for Changing<'_, T> {
     }
 }
 
-impl<T> Deref for Looking<'_, T> {
+impl<T> Deref for ReadClaim<'_, T> {
     type Target = T;
 
     fn deref(&self) -> &T {
@@ -326,13 +326,13 @@ impl<T> Deref for Looking<'_, T> {
     }
 }
 
-impl<T> Drop for Changing<'_, T> {
+impl<T> Drop for WriteClaim<'_, T> {
     fn drop(&mut self) {
         self.0.claims.store(0, Ordering::Release);
     }
 }
 
-impl<T> Drop for Looking<'_, T> {
+impl<T> Drop for ReadClaim<'_, T> {
     fn drop(&mut self) {
         self.0.claims.fetch_sub(1, Ordering::Release);
     }
@@ -412,9 +412,9 @@ impl<T> Drop for SetOnce<T> {
 /// Which of several values is current. Reading it is a load.
 ///
 /// > **Current invariant.** The pointer always comes from a `&'static T`.
-pub(crate) struct Current<T: 'static>(AtomicPtr<T>);
+pub(crate) struct CurrentIndex<T: 'static>(AtomicPtr<T>);
 
-impl<T: Sync> Current<T> {
+impl<T: Sync> CurrentIndex<T> {
     pub(crate) const fn new(first: &'static T) -> Self {
         Self(AtomicPtr::new(ptr::from_ref(first).cast_mut()))
     }

@@ -34,7 +34,7 @@ const CLAIMED: usize = 1;
 /// What was to be staged has no room.
 const LOST: usize = 2;
 
-struct Records {
+struct RecordRing {
     words: Box<[AtomicU64]>,
     /// One of these, or else where the staged record ends, which is a place behind its head.
     state: AtomicUsize,
@@ -47,13 +47,13 @@ struct Records {
 }
 
 /// The writing end.
-pub(crate) struct Outbox(Arc<Records>);
+pub(crate) struct Outbox(Arc<RecordRing>);
 
 /// The reading end. There is one, and it cannot be cloned.
-pub(crate) struct OutboxReader(Arc<Records>);
+pub(crate) struct OutboxReader(Arc<RecordRing>);
 
 /// A record that is published.
-pub(crate) struct Published<'b> {
+pub(crate) struct PublishedRecord<'b> {
     pub(crate) job: u64,
     pub(crate) at_ns: u64,
     pub(crate) bytes: &'b [u8],
@@ -69,7 +69,7 @@ pub(crate) fn outbox(count: usize) -> Option<(Outbox, OutboxReader)> {
     let mut words = Vec::new();
     words.try_reserve_exact(count).ok()?;
     words.resize_with(count, || AtomicU64::new(0));
-    let records = Arc::new(Records {
+    let records = Arc::new(RecordRing {
         words: words.into(),
         state: AtomicUsize::new(FREE),
         written: AtomicUsize::new(0),
@@ -168,7 +168,7 @@ impl Outbox {
         }
         if state == LOST {
             look(records.lost.load(Ordering::Relaxed), None);
-        } else if let Some(Published { job, bytes, .. }) =
+        } else if let Some(PublishedRecord { job, bytes, .. }) =
             records.record(records.written.load(Ordering::Relaxed))
         {
             look(job, Some(bytes));
@@ -177,7 +177,7 @@ impl Outbox {
     }
 }
 
-impl Records {
+impl RecordRing {
     /// Makes a claim if that is the state, which is not `CLAIMED`.
     #[inline(always)]
     fn claim(&self, from: usize) -> bool {
@@ -209,7 +209,7 @@ impl Records {
 
     /// Returns the record at a place. The caller has the claim, or is the reader and has seen
     /// that it is published.
-    fn record(&self, place: usize) -> Option<Published<'_>> {
+    fn record(&self, place: usize) -> Option<PublishedRecord<'_>> {
         let [job, at, length, rest @ ..] = self.words.get(place..)? else {
             return None;
         };
@@ -218,7 +218,7 @@ impl Records {
         // SAFETY: by the record invariant nobody changes these words as long as the caller holds
         // them, which both callers do while they look.
         let bytes = unsafe { slice::from_raw_parts(words.as_ptr().cast::<u8>(), length) };
-        Some(Published {
+        Some(PublishedRecord {
             job: job.load(Ordering::Relaxed),
             at_ns: at.load(Ordering::Relaxed),
             bytes,
@@ -228,7 +228,7 @@ impl Records {
 
 impl OutboxReader {
     /// Returns the next record, if one is published.
-    pub(crate) fn next(&mut self) -> Option<Published<'_>> {
+    pub(crate) fn next(&mut self) -> Option<PublishedRecord<'_>> {
         let records = &*self.0;
         let written = records.written.load(Ordering::Acquire);
         let mut place = records.read.load(Ordering::Relaxed);
@@ -280,7 +280,7 @@ mod tests {
     }
 
     fn take(reader: &mut OutboxReader) -> Option<u64> {
-        let Published { job, at_ns, bytes } = reader.next()?;
+        let PublishedRecord { job, at_ns, bytes } = reader.next()?;
         assert_eq!((at_ns, bytes), (job + 1, &*bytes_of(job)));
         reader.forget();
         Some(job)

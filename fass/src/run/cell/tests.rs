@@ -1,7 +1,7 @@
 //! Tests of the cells, on real threads. They also serve under Miri, where the
 //! counts shrink so that a run ends.
 
-use super::{SetOnce, Shared, ring};
+use super::{SetOnce, SharedCell, ring};
 use common::random::Random;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -17,16 +17,16 @@ const JOBS: u64 = if cfg!(miri) { 100 } else { 200_000 };
 const LONGEST: Duration = Duration::from_secs(1);
 
 /// A value that counts how many of its kind are alive.
-struct Counted(Arc<AtomicUsize>, u64);
+struct CountedValue(Arc<AtomicUsize>, u64);
 
-impl Counted {
+impl CountedValue {
     fn new(alive: &Arc<AtomicUsize>, number: u64) -> Self {
         alive.fetch_add(1, Ordering::Relaxed);
         Self(Arc::clone(alive), number)
     }
 }
 
-impl Drop for Counted {
+impl Drop for CountedValue {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
@@ -47,7 +47,7 @@ fn a_ring_is_a_small_map_from_jobs_to_values() {
             let before = alive.load(Ordering::Relaxed);
             match random.index(4) {
                 0 | 1 if !held.contains(&job) => {
-                    let put = writer.put(job, Counted::new(&alive, job));
+                    let put = writer.put(job, CountedValue::new(&alive, job));
                     assert_eq!(put.is_ok(), held.len() < room, "seed {seed}");
                     if put.is_ok() {
                         held.insert(job);
@@ -97,7 +97,7 @@ fn two_threads_hand_over_or_give_up_every_job() {
             move || {
                 for job in 0.. {
                     // Several words, so that a torn hand-over would show.
-                    let mut message = ([job; 5], Counted::new(&alive, job));
+                    let mut message = ([job; 5], CountedValue::new(&alive, job));
                     while let Err(back) = writer.put(job, message) {
                         if is_over.load(Ordering::Relaxed) {
                             return;
@@ -157,7 +157,7 @@ fn set_once_has_one_winner_and_all_see_it() {
 
 #[test]
 fn a_claim_for_a_change_excludes_all_others() {
-    let shared = Shared::new(1);
+    let shared = SharedCell::new(1);
     {
         let mut change = shared.change().expect("free");
         *change += 1;
@@ -174,7 +174,7 @@ fn a_claim_for_a_change_excludes_all_others() {
 
 #[test]
 fn threads_never_change_a_shared_value_at_the_same_time() {
-    let shared = Arc::new(Shared::new([0_u64; 4]));
+    let shared = Arc::new(SharedCell::new([0_u64; 4]));
     let threads: Vec<_> = (0..3)
         .map(|_| {
             let shared = Arc::clone(&shared);

@@ -18,7 +18,7 @@ use core::time::Duration;
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagLabel, SubtaskLabel, TopicPort};
 
-use super::cell::{Looking, SetOnce, Shared};
+use super::cell::{ReadClaim, SetOnce, SharedCell};
 use super::effect::Effect;
 use super::message::{Message, MessageType};
 
@@ -26,7 +26,7 @@ use super::message::{Message, MessageType};
 pub(crate) struct SharedLatest<T> {
     pub(crate) topic: String,
     /// One for each sampling subtask.
-    triples: RefCell<Vec<Arc<Triple<T>>>>,
+    triples: RefCell<Vec<Arc<TripleBuffer<T>>>>,
 }
 
 impl<T> SharedLatest<T> {
@@ -39,7 +39,7 @@ impl<T> SharedLatest<T> {
 
     /// Adds a sampling subtask and returns its reading end, and its number.
     pub(crate) fn sampler(&self) -> (Sampler<T>, usize) {
-        let triple = Arc::new(Triple::new());
+        let triple = Arc::new(TripleBuffer::new());
         let mut triples = self.triples.borrow_mut();
         triples.push(Arc::clone(&triple));
         (Sampler { triple, front: 2 }, triples.len() - 1)
@@ -120,10 +120,10 @@ pub(crate) trait Probe: Send + Sync {
 }
 
 /// A slot of a sampling subtask.
-pub(crate) type Slot<T> = Shared<Option<Entry<T>>>;
+pub(crate) type Slot<T> = SharedCell<Option<LatestEntry<T>>>;
 
 /// The slots of one sampling subtask.
-struct Triple<T> {
+struct TripleBuffer<T> {
     slots: [Slot<T>; 3],
     /// The slot in the middle, with [`FRESH`] if the reader has not had it.
     middle: AtomicU8,
@@ -136,7 +136,7 @@ struct Triple<T> {
 }
 
 /// A value, the job that it is of, and when its writer was complete.
-pub(crate) struct Entry<T> {
+pub(crate) struct LatestEntry<T> {
     pub(crate) value: T,
     pub(crate) job: u64,
     pub(crate) completed_ns: u64,
@@ -145,10 +145,10 @@ pub(crate) struct Entry<T> {
 const FRESH: u8 = 0b100;
 const SLOT: u8 = 0b011;
 
-impl<T> Triple<T> {
+impl<T> TripleBuffer<T> {
     fn new() -> Self {
         Self {
-            slots: [const { Shared::new(None) }; 3],
+            slots: [const { SharedCell::new(None) }; 3],
             back: AtomicU8::new(0),
             middle: AtomicU8::new(1),
             staged: AtomicBool::new(false),
@@ -157,7 +157,7 @@ impl<T> Triple<T> {
     }
 
     /// Changes the writer's slot.
-    fn write(&self, change: impl FnOnce(&mut Option<Entry<T>>)) {
+    fn write(&self, change: impl FnOnce(&mut Option<LatestEntry<T>>)) {
         let back = usize::from(self.back.load(Ordering::Relaxed));
         let Some(mut slot) = self.slots[back].change() else {
             panic!("a topic has two writers at one time: the platform runs a subtask twice");
@@ -166,10 +166,10 @@ impl<T> Triple<T> {
     }
 }
 
-impl<T: Send + Sync> Stage<T> for Arc<Triple<T>> {
+impl<T: Send + Sync> Stage<T> for Arc<TripleBuffer<T>> {
     fn stage(&mut self, job: u64, value: T) {
         self.write(|slot| {
-            *slot = Some(Entry {
+            *slot = Some(LatestEntry {
                 value,
                 job,
                 completed_ns: 0,
@@ -179,7 +179,7 @@ impl<T: Send + Sync> Stage<T> for Arc<Triple<T>> {
     }
 }
 
-impl<T: Send + Sync> Effect for Arc<Triple<T>> {
+impl<T: Send + Sync> Effect for Arc<TripleBuffer<T>> {
     fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         if !self.staged.load(Ordering::Relaxed) {
             return;
@@ -199,17 +199,17 @@ impl<T: Send + Sync> Effect for Arc<Triple<T>> {
 /// The reading end, kept by the sampling subtask.
 #[doc(hidden)]
 pub struct Sampler<T> {
-    triple: Arc<Triple<T>>,
+    triple: Arc<TripleBuffer<T>>,
     front: u8,
 }
 
 /// The reader's slot for the time of an instance.
 #[doc(hidden)]
-pub struct Looked<'a, T>(Looking<'a, Option<Entry<T>>>);
+pub struct SampledSlot<'a, T>(ReadClaim<'a, Option<LatestEntry<T>>>);
 
 impl<T: 'static> Sampler<T> {
     /// Takes the slot of the latest complete instance, for the time of the guard.
-    pub(crate) fn look(&mut self) -> Looked<'_, T> {
+    pub(crate) fn look(&mut self) -> SampledSlot<'_, T> {
         let Self { triple, front } = self;
         let probe = triple.probe.get();
         let slot = &triple.slots[usize::from(*front)];
@@ -223,15 +223,15 @@ impl<T: 'static> Sampler<T> {
             probe.look_at(slot);
         }
         match slot.look() {
-            Some(slot) => Looked(slot),
+            Some(slot) => SampledSlot(slot),
             None => unreachable!("the writer has another slot"),
         }
     }
 }
 
-impl<T> Looked<'_, T> {
+impl<T> SampledSlot<'_, T> {
     /// Returns what is in the slot; nothing before the writer's first completion.
-    pub(crate) fn entry(&self) -> Option<&Entry<T>> {
+    pub(crate) fn entry(&self) -> Option<&LatestEntry<T>> {
         self.0.as_ref()
     }
 }

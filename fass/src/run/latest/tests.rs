@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use super::{Sampler, Stage, Triple};
+use super::{Sampler, Stage, TripleBuffer};
 use crate::run::effect::Effect;
 
 const JOBS: u64 = if cfg!(miri) { 100 } else { 300_000 };
@@ -18,7 +18,7 @@ fn sample(sampler: &mut Sampler<[u64; 8]>) -> Option<(u64, u64)> {
 
 #[test]
 fn what_is_staged_shows_only_when_it_happens() {
-    let mut triple = Arc::new(Triple::new());
+    let mut triple = Arc::new(TripleBuffer::new());
     let mut sampler = Sampler {
         triple: Arc::clone(&triple),
         front: 2,
@@ -44,7 +44,7 @@ fn what_is_staged_shows_only_when_it_happens() {
     assert_eq!(held, Some((1, [1; 8])), "while the writer goes on");
     drop(guard);
     assert_eq!(sample(&mut sampler), Some((9, 90)));
-    let (alive, mut triple) = (Arc::new(()), Arc::new(Triple::new()));
+    let (alive, mut triple) = (Arc::new(()), Arc::new(TripleBuffer::new()));
     for job in 0..5 {
         triple.stage(job, Arc::clone(&alive));
         triple.happen(job, &mut |_| ());
@@ -55,7 +55,7 @@ fn what_is_staged_shows_only_when_it_happens() {
 
 #[test]
 fn samples_are_whole_and_never_go_back() {
-    let triple = Arc::new(Triple::new());
+    let triple = Arc::new(TripleBuffer::new());
     let mut sampler = Sampler {
         triple: Arc::clone(&triple),
         front: 2,

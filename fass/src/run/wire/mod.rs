@@ -28,7 +28,7 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering}
 
 use sched_dag::lifecycle::Request;
 
-use super::cell::Shared;
+use super::cell::SharedCell;
 use super::effect::Effect;
 
 #[cfg(test)]
@@ -36,9 +36,9 @@ mod tests;
 
 /// Counts one side's events; several of them are looked at by another.
 #[derive(Default)]
-pub(crate) struct Counter(AtomicU64);
+pub(crate) struct EventCounter(AtomicU64);
 
-impl Counter {
+impl EventCounter {
     fn add(&self, count: usize) {
         // One side counts, so a load and a store suffice.
         let before = self.0.load(Ordering::Relaxed);
@@ -76,26 +76,26 @@ pub enum Framing {
 const HEADER_BYTES: usize = 4 + 8;
 
 /// The way in of a wire.
-pub(crate) struct Incoming {
+pub(crate) struct WireInput {
     framing: Framing,
     longest: usize,
-    ring: Ring,
-    open: Shared<Open>,
+    ring: ByteRing,
+    open: SharedCell<OpenPacket>,
     /// Packets that came, and their bytes.
-    pub(crate) packets: Counter,
-    pub(crate) bytes: Counter,
+    pub(crate) packets: EventCounter,
+    pub(crate) bytes: EventCounter,
     /// Packets for which there was no room, and their bytes.
-    pub(crate) lost: Counter,
-    pub(crate) lost_bytes: Counter,
+    pub(crate) lost: EventCounter,
+    pub(crate) lost_bytes: EventCounter,
     /// Packets longer than they may be.
-    pub(crate) too_long: Counter,
+    pub(crate) too_long: EventCounter,
     /// Packets that the decoder refused. The receiver counts them.
-    pub(crate) refused: Counter,
+    pub(crate) refused: EventCounter,
 }
 
 /// The packet that is arriving.
 #[derive(Default)]
-struct Open {
+struct OpenPacket {
     /// How many bytes of it have come.
     seen: usize,
     /// Whether some of them found no room.
@@ -105,7 +105,7 @@ struct Open {
     announced: usize,
 }
 
-impl Incoming {
+impl WireInput {
     /// Makes one with room for the longest packet at least.
     pub(crate) fn new(framing: Framing, longest: usize, room_bytes: usize) -> Self {
         let longest = match framing {
@@ -115,14 +115,14 @@ impl Incoming {
         Self {
             framing,
             longest,
-            ring: Ring::new(room_bytes.max(HEADER_BYTES + longest)),
-            open: Shared::new(Open::default()),
-            packets: Counter::default(),
-            bytes: Counter::default(),
-            lost: Counter::default(),
-            lost_bytes: Counter::default(),
-            too_long: Counter::default(),
-            refused: Counter::default(),
+            ring: ByteRing::new(room_bytes.max(HEADER_BYTES + longest)),
+            open: SharedCell::new(OpenPacket::default()),
+            packets: EventCounter::default(),
+            bytes: EventCounter::default(),
+            lost: EventCounter::default(),
+            lost_bytes: EventCounter::default(),
+            too_long: EventCounter::default(),
+            refused: EventCounter::default(),
         }
     }
 
@@ -152,7 +152,7 @@ impl Incoming {
 
     /// Divides bytes into those that belong to the packet and those after it, at least one in
     /// all. Reports whether the packet ends between them.
-    fn divide<'b>(&self, open: &mut Open, bytes: &'b [u8]) -> (&'b [u8], &'b [u8], bool) {
+    fn divide<'b>(&self, open: &mut OpenPacket, bytes: &'b [u8]) -> (&'b [u8], &'b [u8], bool) {
         let end = match self.framing {
             Framing::Chunks => return (bytes, &[], true),
             Framing::LengthFirst if open.prefix < 2 => {
@@ -178,7 +178,7 @@ impl Incoming {
     }
 
     /// Puts bytes of the packet into the ring, if it can still be shown.
-    fn put(&self, open: &mut Open, part: &[u8]) {
+    fn put(&self, open: &mut OpenPacket, part: &[u8]) {
         let seen = open.seen.saturating_add(part.len());
         if seen <= self.longest && !part.is_empty() {
             open.is_lost |= !self.ring.put(HEADER_BYTES + open.seen, part);
@@ -187,8 +187,8 @@ impl Incoming {
     }
 
     /// Ends the packet, and shows it. Reports whether there is one.
-    fn close(&self, open: &mut Open, now_ns: u64) -> bool {
-        let Open {
+    fn close(&self, open: &mut OpenPacket, now_ns: u64) -> bool {
+        let OpenPacket {
             mut seen, is_lost, ..
         } = core::mem::take(open);
         if seen > self.longest {
@@ -244,26 +244,26 @@ impl Incoming {
 }
 
 /// The way out of a wire.
-pub(crate) struct Outgoing {
-    ring: Ring,
+pub(crate) struct WireOutput {
+    ring: ByteRing,
     /// How many bytes the instance has sent that is not complete yet, and whether one of them
     /// found no room.
     staged: AtomicUsize,
     is_lost: AtomicBool,
     /// Bytes that were shown.
-    pub(crate) sent: Counter,
+    pub(crate) sent: EventCounter,
     /// Bytes for which there was no room.
-    pub(crate) lost: Counter,
+    pub(crate) lost: EventCounter,
 }
 
-impl Outgoing {
+impl WireOutput {
     pub(crate) fn new(room_bytes: usize) -> Self {
         Self {
-            ring: Ring::new(room_bytes),
+            ring: ByteRing::new(room_bytes),
             staged: AtomicUsize::new(0),
             is_lost: AtomicBool::new(false),
-            sent: Counter::default(),
-            lost: Counter::default(),
+            sent: EventCounter::default(),
+            lost: EventCounter::default(),
         }
     }
 
@@ -301,9 +301,9 @@ impl Outgoing {
 }
 
 /// What the sender's completion does.
-pub(crate) struct Departure(pub(crate) Arc<Outgoing>);
+pub(crate) struct SendCompletion(pub(crate) Arc<WireOutput>);
 
-impl Effect for Departure {
+impl Effect for SendCompletion {
     fn happen(&mut self, _completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         let outgoing = &*self.0;
         let staged = outgoing.staged.load(Ordering::Relaxed);
@@ -317,7 +317,7 @@ impl Effect for Departure {
     }
 }
 
-struct Ring {
+struct ByteRing {
     /// A power of two.
     bytes: Box<[AtomicU8]>,
     /// How many bytes have ever been shown, and how many of them taken.
@@ -325,7 +325,7 @@ struct Ring {
     read: AtomicUsize,
 }
 
-impl Ring {
+impl ByteRing {
     /// Makes a ring with room for so many bytes at least.
     fn new(room_bytes: usize) -> Self {
         let room = room_bytes.max(16).next_power_of_two();

@@ -3,10 +3,10 @@
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-use super::{Framing, Incoming};
+use super::{Framing, WireInput};
 
 /// Takes all packets that are there, as text.
-fn packets(incoming: &Incoming) -> Vec<String> {
+fn packets(incoming: &WireInput) -> Vec<String> {
     let (mark, mut buffer) = (incoming.mark(), incoming.buffer());
     let mut packets = Vec::new();
     while let Some((bytes, _)) = incoming.take(mark, &mut buffer) {
@@ -17,7 +17,7 @@ fn packets(incoming: &Incoming) -> Vec<String> {
 
 /// Lets bytes arrive one by one, and takes the packets after each.
 fn framed(framing: Framing, bytes: &[u8]) -> Vec<String> {
-    let incoming = Incoming::new(framing, 5, 64);
+    let incoming = WireInput::new(framing, 5, 64);
     let mut all = Vec::new();
     for byte in bytes {
         let is_whole = incoming.arrive(&[*byte], 7);
@@ -26,7 +26,7 @@ fn framed(framing: Framing, bytes: &[u8]) -> Vec<String> {
         all.extend(new);
     }
     if framing != Framing::Chunks {
-        let at_once = Incoming::new(framing, 5, 256);
+        let at_once = WireInput::new(framing, 5, 256);
         at_once.arrive(bytes, 7);
         assert_eq!(packets(&at_once), all, "the same, at once");
     }
@@ -49,7 +49,7 @@ fn each_framing_finds_the_packets_and_too_long_ones_are_none() {
 
 #[test]
 fn what_comes_after_the_mark_waits() {
-    let incoming = Incoming::new(Framing::Lines, 20, 64);
+    let incoming = WireInput::new(Framing::Lines, 20, 64);
     incoming.arrive(b"one\ntwo\n", 7);
     let (mark, mut buffer) = (incoming.mark(), incoming.buffer());
     incoming.arrive(b"three\n", 8);
@@ -62,7 +62,7 @@ fn what_comes_after_the_mark_waits() {
 #[test]
 fn packets_pass_from_one_thread_to_another_whole_and_in_order() {
     const PACKETS: u64 = 20_000;
-    let incoming = Incoming::new(Framing::Lines, 64, 256);
+    let incoming = WireInput::new(Framing::Lines, 64, 256);
     let length = |number: u64| 1 + usize::try_from(number % 40).unwrap();
     std::thread::scope(|scope| {
         scope.spawn(|| {

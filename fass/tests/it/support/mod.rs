@@ -8,7 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::sync::OnceLock;
 
-use fass::{Body, ConstructionPolicy, Dag, LaunchError, Occupation, Plan, Platform, Policy};
+use fass::{ConstructionPolicy, Dag, LaunchError, Occupation, Plan, Platform, Policy, SubtaskCode};
 use fass::{Preemption, RunConfig, SubtaskAttributes};
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
@@ -86,7 +86,7 @@ pub(crate) fn run_job(plan: &mut Plan, job: u64) {
 
 /// A body that can be run from within another one's function.
 #[derive(Clone)]
-pub(crate) struct Shared(Rc<RefCell<Body>>);
+pub(crate) struct Shared(Rc<RefCell<SubtaskCode>>);
 
 impl Shared {
     /// Returns the bodies of a plan, those of one DAG after those of the other.

@@ -10,7 +10,7 @@ use alloc::string::String;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::edge::{Edge, EdgeMode, Record};
-use fass::{LaunchError, Plan, Recorded};
+use fass::{LaunchError, Plan, RecordedValue};
 use sched_dag::{DriverNotice, Instance};
 
 use crate::machine::debug_port;
@@ -54,7 +54,7 @@ pub fn failed(instance: Instance, at_ns: u64, clock_ns: u64) {
 
 /// Takes a value that is not read where it was written, and when that was in the time of the run.
 /// The scheduler's lock is held.
-pub fn record(value: &Recorded<'_>, at_ns: u64) {
+pub fn record(value: &RecordedValue<'_>, at_ns: u64) {
     EDGE.lock_uninterrupted().record(value, at_ns);
 }
 

@@ -4,8 +4,8 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::edge::{Begin, BootRecord};
-use fass::log::Line;
-use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, Recorded, RunConfig};
+use fass::log::LogLine;
+use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, RecordedValue, RunConfig};
 use sched_dag::DagId;
 
 use super::{edge, execution, occupation, record, stacks};
@@ -99,7 +99,7 @@ impl Platform for Kernel {
         edge::get().open(dag, graph, channels, begin)
     }
 
-    fn record(&self, value: &Recorded<'_>) {
+    fn record(&self, value: &RecordedValue<'_>) {
         edge::record(value, execution::since_epoch(value.completed_ns));
     }
 
@@ -111,7 +111,7 @@ impl Platform for Kernel {
         edge::get().lend(channel, job, take);
     }
 
-    fn log(&self, mut line: Line) {
+    fn log(&self, mut line: LogLine) {
         let were_enabled = interrupt_flag::disable();
         line.instance = execution::running(this_core::get());
         if were_enabled {

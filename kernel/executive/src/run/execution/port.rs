@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering;
 
-use fass::{Body, LaunchError};
+use fass::{LaunchError, SubtaskCode};
 use sched_dag::engine::{PlatformPort, SubtaskBody as _};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{self, Request};
@@ -99,7 +99,7 @@ impl PlatformPort<Loan> for SmpPort<'_> {
 /// There is one for each subtask, as a subtask has one started instance at a time
 /// (R2). Between its place and the core that runs it moves a [`Loan`].
 pub struct Runner {
-    pub(super) inner: fass::Runner,
+    pub(super) inner: fass::SubtaskRunner,
     cluster: &'static Cluster,
     /// The time that an instance may execute for, `u64::MAX` if there is no limit.
     pub(super) budget_ns: u64,
@@ -117,17 +117,17 @@ impl Runner {
 }
 
 impl Deref for Runner {
-    type Target = fass::Runner;
+    type Target = fass::SubtaskRunner;
 
     #[inline]
-    fn deref(&self) -> &fass::Runner {
+    fn deref(&self) -> &fass::SubtaskRunner {
         &self.inner
     }
 }
 
 impl DerefMut for Runner {
     #[inline]
-    fn deref_mut(&mut self) -> &mut fass::Runner {
+    fn deref_mut(&mut self) -> &mut fass::SubtaskRunner {
         &mut self.inner
     }
 }
@@ -135,10 +135,10 @@ impl DerefMut for Runner {
 /// Makes a runner for each body, by vertex.
 pub(super) fn runners(
     task_set: &TaskSet,
-    bodies: Vec<Vec<Body>>,
+    bodies: Vec<Vec<SubtaskCode>>,
     budget_factor: u64,
 ) -> impl Iterator<Item = Runner> {
-    fass::Runner::all(task_set, bodies).map(move |inner| {
+    fass::SubtaskRunner::all(task_set, bodies).map(move |inner| {
         let dag = task_set.dag(inner.instance.dag);
         let subtask = dag.subtask(inner.instance.subtask);
         Runner {

@@ -1,7 +1,7 @@
 //! The instructions of one hop: from one subtask's call to its successor's.
 //!
 //! A chain of 64 empty bodies is booted with every instruction logged. The log is cut at
-//! the calls of subtasks' functions, which are where `Body::run` of `fass` polls a future.
+//! the calls of subtasks' functions, which are where `SubtaskCode::run` of `fass` polls a future.
 //! A *hop* is what lies between two of them; told is the one whose length occurs most
 //! often. Each of its instructions belongs to a file of ours: that of the innermost of the functions
 //! that it was inlined from.
