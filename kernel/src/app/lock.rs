@@ -38,7 +38,7 @@
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use executive::machine::section::{Guarded, Refusal};
+use executive::machine::section::{ContextLock, LockRefusal};
 use executive::machine::timer::{self, Alarm};
 use executive::machine::{clock, interrupt_flag, this_core, turns};
 use executive::text::console;
@@ -58,7 +58,7 @@ use executive::text::console;
 /// }
 /// ```
 #[derive(Debug)]
-pub struct Lock<T>(Guarded<T>);
+pub struct Lock<T>(ContextLock<T>);
 
 impl<T> Lock<T> {
     /// Makes a lock that is free.
@@ -66,7 +66,7 @@ impl<T> Lock<T> {
     /// See [`Lock`].
     #[must_use]
     pub const fn new(data: T) -> Self {
-        Self(Guarded::new(data))
+        Self(ContextLock::new(data))
     }
 
     /// Waits until nobody uses the data and lends it to `section`.
@@ -81,12 +81,12 @@ impl<T> Lock<T> {
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
         match self.0.with(section) {
             Ok(result) => result,
-            Err(Refusal::HeldByCaller) => {
+            Err(LockRefusal::HeldByCaller) => {
                 panic!(
                     "a lock is taken by its holder, which would wait for ever; end the section first"
                 )
             }
-            Err(Refusal::HolderEnded) => {
+            Err(LockRefusal::HolderEnded) => {
                 panic!("a fault has ended a section of this lock; its data may be half changed")
             }
         }

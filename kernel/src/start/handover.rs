@@ -12,10 +12,10 @@ use core::ops::Range;
 use boot::acpi::{self, MAX_IO_APICS, Platform};
 use boot::physical::LowMemory;
 use boot::{BootInfo, Framebuffer, List, MAX_PROCESSORS, MAX_REGIONS, Module};
-use executive::machine::calibration::{self, KnownClock, Rate};
+use executive::machine::calibration::{self, KnownClock, TscRate};
 use executive::machine::paging::MapError;
-use executive::machine::power::{self, End};
-use executive::machine::this_core::{self, Core, Stacks};
+use executive::machine::power::{self, PowerAction};
+use executive::machine::this_core::{self, Core, CoreStacks};
 use executive::machine::{
     agreement, avx, clock, cpu, interrupt, interrupt_flag, legacy, local_apic, processors, screen,
     serial,
@@ -64,8 +64,8 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
         show_text(info, &screen);
     }
     match info.value("end") {
-        Some("off") => power::set_end(End::Off),
-        Some("reset") => power::set_end(End::Reset),
+        Some("off") => power::set_end(PowerAction::Off),
+        Some("reset") => power::set_end(PowerAction::Reset),
         _ => {}
     }
     if let Some(feature) = cpu::missing_feature() {
@@ -199,7 +199,7 @@ struct Start {
     name: &'static str,
     app: App,
     platform: Platform,
-    layout: memory::Layout,
+    layout: memory::MemoryLayout,
     /// Whether it is the probe that runs, and no app.
     probes: bool,
 }
@@ -239,7 +239,7 @@ extern "C" fn start_cores(start: &Start) -> ! {
 }
 
 /// Measures time by a clock of known rate, which the machine must have.
-fn measure_time(info: &BootInfo, platform: &Platform) -> Rate {
+fn measure_time(info: &BootInfo, platform: &Platform) -> TscRate {
     // SAFETY: the tables name these registers, and `devices` had them mapped.
     let clocks = unsafe { KnownClock::all(platform) };
     let is_counted = info.value("mode") == Some("deterministic");
@@ -254,7 +254,7 @@ fn measure_time(info: &BootInfo, platform: &Platform) -> Rate {
 }
 
 /// Starts the other cores, all of which have to come up.
-fn start_others(info: &BootInfo, layout: &memory::Layout, cores: usize) {
+fn start_others(info: &BootInfo, layout: &memory::MemoryLayout, cores: usize) {
     let page = memory::trampoline_page(info.memory.as_slice(), info.modules.as_slice());
     let page = page.expect("no page below 640 KiB is free for processors to start at");
     // SAFETY: 1. The table identity-maps the image, and all stacks are mapped
@@ -308,7 +308,7 @@ fn selected(info: &BootInfo, platform: &Platform) -> Vec<u32> {
 }
 
 /// Returns what each core needs, the boot processor's first.
-fn with_stacks(ids: Vec<u32>) -> impl Iterator<Item = (u32, Stacks)> {
+fn with_stacks(ids: Vec<u32>) -> impl Iterator<Item = (u32, CoreStacks)> {
     ids.into_iter().zip(0..).map(|(id, index)| {
         let stacks = stacks(index == 0);
         (
@@ -318,9 +318,9 @@ fn with_stacks(ids: Vec<u32>) -> impl Iterator<Item = (u32, Stacks)> {
     })
 }
 
-fn stacks(is_boot_processor: bool) -> Result<Stacks, MapError> {
+fn stacks(is_boot_processor: bool) -> Result<CoreStacks, MapError> {
     let small = || memory::new_stack(HANDLER_STACK, 0);
-    Ok(Stacks {
+    Ok(CoreStacks {
         first_context: contexts::create_first(is_boot_processor)?,
         handler: small()?,
         exceptions: [small()?, small()?, small()?, small()?],
@@ -373,7 +373,7 @@ fn end(result: Result<(), Ending>) -> ! {
 }
 
 /// Says what machine this is, and of what an app has to beware.
-pub(super) fn announce(info: &BootInfo, app: &str, memory_bytes: u64, rate: &Rate) {
+pub(super) fn announce(info: &BootInfo, app: &str, memory_bytes: u64, rate: &TscRate) {
     let all = this_core::all();
     let cores = all.len();
     let ids: Vec<u32> = all.iter().map(Core::apic_id).collect();

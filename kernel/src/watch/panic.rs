@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::report;
 use executive::machine::context::Registers;
-use executive::machine::fault::Exception;
+use executive::machine::fault::CpuException;
 use executive::machine::interrupt::Interrupted;
 use executive::machine::{cpu, interrupt_flag, non_maskable, power, this_core};
 use executive::run::{containment, execution};
@@ -41,7 +41,7 @@ pub(crate) fn panic(info: &PanicInfo<'_>) -> ! {
 }
 
 /// Ends the subtask that caused an exception, or else the run.
-pub(crate) fn exception(exception: &Exception<'_>, interrupted: &mut Interrupted) {
+pub(crate) fn exception(exception: &CpuException<'_>, interrupted: &mut Interrupted) {
     if !containment::end_faulty(exception, interrupted) {
         let registers = exception.registers;
         let place = fmt::from_fn(|f| write!(f, "{:#x}", registers.rip));

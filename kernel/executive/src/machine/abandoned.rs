@@ -5,7 +5,7 @@
 //!
 //! **Frames invariant**: what lies on a context's stack is reached from that context alone.
 //! Functions, messages and states are `'static`, so they hold no reference to a frame, and the
-//! kernel lends nothing of one to others but its [`Section`](super::context::Section)s, which
+//! kernel lends nothing of one to others but its [`CriticalSection`](super::context::CriticalSection)s, which
 //! end when the context is recovered.
 
 use super::context::Parked;
@@ -14,9 +14,9 @@ use super::{paint, section};
 /// A context that a handler has left for good.
 #[derive(Debug)]
 #[must_use = "its stack is lost unless it is recovered"]
-pub struct Abandoned(Parked);
+pub struct AbandonedContext(Parked);
 
-impl Abandoned {
+impl AbandonedContext {
     /// Takes a context that a handler has just left.
     pub(super) const fn new(left: Parked) -> Self {
         Self(left)

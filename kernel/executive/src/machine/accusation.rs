@@ -13,7 +13,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 /// The accusations of one core.
 #[derive(Debug)]
-pub(super) struct Accusation {
+pub(super) struct AccusationBox {
     is_open: AtomicBool,
     /// When the core had taken its last interrupt, as of its last answer.
     interrupted_ns: AtomicU64,
@@ -21,7 +21,7 @@ pub(super) struct Accusation {
     answers: AtomicU32,
 }
 
-impl Accusation {
+impl AccusationBox {
     pub(super) const fn new() -> Self {
         Self {
             is_open: AtomicBool::new(false),
@@ -57,7 +57,7 @@ mod tests {
 
     #[test]
     fn a_core_answers_each_accusation_once() {
-        let accusation = Accusation::new();
+        let accusation = AccusationBox::new();
         assert_eq!(accusation.answer(5), 0);
         assert!(accusation.open());
         assert!(!accusation.open(), "one is enough");
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn answers_count_from_the_last_interrupt() {
-        let accusation = Accusation::new();
+        let accusation = AccusationBox::new();
         let answer = |interrupted_ns| {
             accusation.open();
             accusation.answer(interrupted_ns)

@@ -19,7 +19,7 @@ const MOST_NS: u64 = 1_000;
 /// it waits for the others.
 const ROUNDS: u32 = 100;
 
-static STAMP: Stamp = Stamp(AtomicU64::new(0));
+static STAMP: LatestReading = LatestReading(AtomicU64::new(0));
 
 /// Compares the counter of this core, `core`, a few times.
 pub(super) fn compare_often(core: &Core) {
@@ -62,9 +62,9 @@ fn too_late<C: Iterator<Item = (u64, u32)>>(cores: impl Fn() -> C) -> impl Displ
 }
 
 /// The latest reading of any counter.
-struct Stamp(AtomicU64);
+struct LatestReading(AtomicU64);
 
-impl Stamp {
+impl LatestReading {
     /// Compares a counter, which `read` reads, with the stamp, and returns by how many ticks
     /// it is behind. If it is not, its reading is the stamp from now on.
     fn meet(&self, read: impl FnOnce() -> u64) -> u64 {
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn only_a_counter_that_is_behind_is_found_so() {
-        let stamp = Stamp(AtomicU64::new(0));
+        let stamp = LatestReading(AtomicU64::new(0));
         for time in 100..200 {
             assert_eq!(stamp.meet(|| 10 * time), 0);
             assert_eq!(stamp.meet(|| 10 * time + 3), 0, "it looks a little later");
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn all_others_are_behind_a_counter_that_is_ahead() {
-        let stamp = Stamp(AtomicU64::new(0));
+        let stamp = LatestReading(AtomicU64::new(0));
         assert_eq!(stamp.meet(|| 5_000), 0, "it is core 2's");
         assert_eq!(stamp.meet(|| 100), 4_900, "core 0's");
         assert_eq!(stamp.meet(|| 110), 4_890, "core 1's");

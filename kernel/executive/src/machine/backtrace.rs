@@ -20,7 +20,7 @@ const LONGEST: usize = 7;
 
 /// A place that a call returns to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Call {
+pub struct CallSite {
     /// The address after the call instruction.
     pub returns_to: u64,
     /// The address of the function that was called; `None` if a register had it.
@@ -29,7 +29,7 @@ pub struct Call {
 
 /// Returns the calls on this core's stack from `stack_pointer` on, the innermost first. None
 /// if the address is not of that stack.
-pub fn calls(stack_pointer: u64) -> impl Iterator<Item = Call> {
+pub fn calls(stack_pointer: u64) -> impl Iterator<Item = CallSite> {
     let core = this_core::is_ready().then(this_core::get);
     let stack = core.and_then(|core| core.context().stack_at(stack_pointer));
     let stack = stack.unwrap_or(0..0);
@@ -44,7 +44,7 @@ pub fn calls(stack_pointer: u64) -> impl Iterator<Item = Call> {
 }
 
 /// Returns the call that returns to `address`, if the code there says so.
-fn before(address: u64) -> Option<Call> {
+fn before(address: u64) -> Option<CallSite> {
     let text = image::text();
     let start = address.checked_sub(LONGEST as u64)?;
     if start < text.start || address > text.end {
@@ -56,7 +56,7 @@ fn before(address: u64) -> Option<Call> {
     if callee.is_some_and(|callee| !text.contains(&callee)) {
         return None;
     }
-    Some(Call {
+    Some(CallSite {
         returns_to: address,
         callee,
     })

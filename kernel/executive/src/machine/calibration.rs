@@ -12,7 +12,7 @@
 
 use boot::acpi::{Platform, PmTimer};
 
-use super::clock::{self, Elapsed};
+use super::clock::{self, ElapsedTicks};
 use super::{cpu, local_apic, port};
 
 /// How long the rates are measured: so long that what a reading takes, some microseconds
@@ -24,7 +24,7 @@ const MEASURE_COUNTED_NS: u64 = 5_000_000;
 
 /// What was found of the time stamp counter's rate.
 #[derive(Clone, Copy, Debug)]
-pub struct Rate {
+pub struct TscRate {
     /// The clock that it was measured by.
     pub clock: &'static str,
     /// The rate.
@@ -33,7 +33,7 @@ pub struct Rate {
     pub check: Option<(&'static str, u64)>,
 }
 
-impl Rate {
+impl TscRate {
     /// Reports whether the two rates, if there are two, differ by less than 1 %.
     pub fn is_undisputed(&self) -> bool {
         let (_, other_khz) = self.check.unwrap_or(("", self.khz));
@@ -51,7 +51,7 @@ pub fn calibrate(
     clocks: &[Option<KnownClock>],
     asked: Option<&str>,
     is_counted: bool,
-) -> Option<Rate> {
+) -> Option<TscRate> {
     let long_ns = if is_counted {
         MEASURE_COUNTED_NS
     } else {
@@ -65,14 +65,14 @@ pub fn calibrate(
         Some((
             clock,
             judge,
-            Stopwatch::start(clock, judge).measure(long_ns)?,
+            TickCounter::start(clock, judge).measure(long_ns)?,
         ))
     })?;
     clock::set_rates(base, &elapsed);
     let khz = |ns: u64| elapsed.counter * 1_000_000 / ns.max(1);
     let measured = judge.map(|judge| (judge.name, khz(judge_ns)));
     let stated = || Some(("cpuid", stated_khz(cpu::counter_ratio())?));
-    Some(Rate {
+    Some(TscRate {
         clock: clock.name,
         khz: khz(elapsed.ns),
         check: measured.or_else(stated),
@@ -88,7 +88,7 @@ fn stated_khz([denominator, numerator, crystal_hz]: [u32; 3]) -> Option<u64> {
 }
 
 /// All clocks, read as one.
-struct Reading {
+struct ClockReadings {
     /// How long that took, by the counter.
     width: u64,
     ticks: u64,
@@ -98,14 +98,14 @@ struct Reading {
 }
 
 /// A clock that counts ticks from its start on.
-struct Stopwatch<'c> {
+struct TickCounter<'c> {
     clock: &'c KnownClock,
     judge: Option<&'c KnownClock>,
     last: u32,
     ticks: u64,
 }
 
-impl<'c> Stopwatch<'c> {
+impl<'c> TickCounter<'c> {
     fn start(clock: &'c KnownClock, judge: Option<&'c KnownClock>) -> Self {
         local_apic::start_timer(u32::MAX);
         clock.start();
@@ -120,7 +120,7 @@ impl<'c> Stopwatch<'c> {
 
     /// Measures for so long, and stops the local APIC's timer. Returns with what has elapsed
     /// that by the other clock, in nanoseconds; nothing if the clock stands still.
-    fn measure(mut self, long_ns: u64) -> Option<(Elapsed, u64)> {
+    fn measure(mut self, long_ns: u64) -> Option<(ElapsedTicks, u64)> {
         let start = self.read_all()?;
         while self.clock.ns(self.ticks - start.ticks) < long_ns {
             self.advance();
@@ -128,7 +128,7 @@ impl<'c> Stopwatch<'c> {
         }
         let end = self.read_all()?;
         local_apic::start_timer(0);
-        let elapsed = Elapsed {
+        let elapsed = ElapsedTicks {
             ns: self.clock.ns(end.ticks - start.ticks),
             counter: end.counter.wrapping_sub(start.counter),
             apic: u64::from(start.apic.wrapping_sub(end.apic)),
@@ -154,11 +154,11 @@ impl<'c> Stopwatch<'c> {
     /// takes the processor away in between does no harm. One function for both readings: an
     /// image has little room.
     #[inline(never)]
-    fn read_all(&mut self) -> Option<Reading> {
+    fn read_all(&mut self) -> Option<ClockReadings> {
         const TRIES: u32 = 8;
         /// Many times what the slowest clock needs for all.
         const MOST_READS: u32 = 100_000;
-        let mut best: Option<Reading> = None;
+        let mut best: Option<ClockReadings> = None;
         let mut tries = 0;
         for _ in 0..MOST_READS {
             let before = cpu::time_stamp();
@@ -168,7 +168,7 @@ impl<'c> Stopwatch<'c> {
                 let judge = self.judge.map_or(0, KnownClock::read);
                 let width = cpu::time_stamp().wrapping_sub(before);
                 if best.as_ref().is_none_or(|best| width < best.width) {
-                    best = Some(Reading {
+                    best = Some(ClockReadings {
                         width,
                         ticks: self.ticks,
                         counter,
@@ -198,11 +198,11 @@ pub struct KnownClock {
     pub(super) mask: u32,
     /// Whether others may be compared with it: it needs to be read twice only, at any time.
     pub(super) judges: bool,
-    source: Source,
+    source: ClockSource,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Source {
+enum ClockSource {
     /// At this I/O port.
     PmTimer(u16),
     /// With registers at this address.
@@ -234,14 +234,14 @@ impl KnownClock {
                 tick_fs: 1_000_000,
                 mask: u32::MAX,
                 judges: false,
-                source: Source::LocalApic,
+                source: ClockSource::LocalApic,
             }),
             Some(Self {
                 name: "pit",
                 tick_fs: 12 * QUARTZ_FS,
                 mask: 0xffff,
                 judges: false,
-                source: Source::Pit,
+                source: ClockSource::Pit,
             }),
         ]
     }
@@ -252,7 +252,7 @@ impl KnownClock {
             tick_fs: 4 * QUARTZ_FS,
             mask: u32::MAX >> (32 - timer.bits),
             judges: true,
-            source: Source::PmTimer(timer.port),
+            source: ClockSource::PmTimer(timer.port),
         }
     }
 
@@ -272,7 +272,7 @@ impl KnownClock {
             tick_fs: u64::from(tick_fs),
             mask: u32::MAX,
             judges: true,
-            source: Source::Hpet(base),
+            source: ClockSource::Hpet(base),
         })
     }
 
@@ -280,8 +280,8 @@ impl KnownClock {
     pub(super) fn start(&self) {
         match self.source {
             // The local APIC's timer is measured, too, and counts already.
-            Source::PmTimer(_) | Source::LocalApic => {}
-            Source::Hpet(base) => {
+            ClockSource::PmTimer(_) | ClockSource::LocalApic => {}
+            ClockSource::Hpet(base) => {
                 const ENABLE: u32 = 1;
                 let configuration = (base + 0x10) as *mut u32;
                 // SAFETY: `hpet` was told that there is one, and only this module uses it.
@@ -289,7 +289,7 @@ impl KnownClock {
                 // SAFETY: likewise; its interrupts are masked in the I/O APICs.
                 unsafe { configuration.write_volatile(value | ENABLE) };
             }
-            Source::Pit => {
+            ClockSource::Pit => {
                 // The gate of channel 2 on, its speaker off; then both bytes of the count,
                 // over and over from the top (Intel 8254 data sheet, mode 2).
                 // SAFETY: the ports are the PIT's and its gate's, which only this module uses;
@@ -315,11 +315,11 @@ impl KnownClock {
     pub(super) fn read(&self) -> u32 {
         match self.source {
             // SAFETY: the port is the power management timer's, and reading it changes nothing.
-            Source::PmTimer(port) => unsafe { port::read_u32(port) },
+            ClockSource::PmTimer(port) => unsafe { port::read_u32(port) },
             // SAFETY: the register is the count of the HPET that `hpet` was told of.
-            Source::Hpet(base) => unsafe { ((base + 0xf0) as *const u32).read_volatile() },
-            Source::LocalApic => !local_apic::timer_count(),
-            Source::Pit => {
+            ClockSource::Hpet(base) => unsafe { ((base + 0xf0) as *const u32).read_volatile() },
+            ClockSource::LocalApic => !local_apic::timer_count(),
+            ClockSource::Pit => {
                 const LATCH_2: u8 = 0x80;
                 // SAFETY: the ports are the PIT's, as in `start`.
                 unsafe { port::write_u8(0x43, LATCH_2) };
@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn a_rate_is_disputed_from_1_percent_on() {
-        let rate = |check| Rate {
+        let rate = |check| TscRate {
             clock: "hpet",
             khz: 2_000_000,
             check,

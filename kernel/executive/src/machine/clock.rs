@@ -54,14 +54,14 @@ fn scale(value: u64, factor: u64) -> u64 {
 }
 
 /// What each clock advanced by in the same time.
-pub(super) struct Elapsed {
+pub(super) struct ElapsedTicks {
     pub(super) ns: u64,
     pub(super) counter: u64,
     pub(super) apic: u64,
 }
 
 /// Sets the rates, with time 0 at counter value `base`, from what each clock advanced by.
-pub(super) fn set_rates(base: u64, elapsed: &Elapsed) {
+pub(super) fn set_rates(base: u64, elapsed: &ElapsedTicks) {
     BASE.store(base, Ordering::Relaxed);
     NS_PER_TICK.store(in_2_32(elapsed.ns, elapsed.counter), Ordering::Relaxed);
     APIC_TICKS_PER_NS.store(in_2_32(elapsed.apic, elapsed.ns), Ordering::Relaxed);

@@ -129,27 +129,27 @@ pub struct Context {
     budget_end_ns: AtomicU64,
     /// Whether what it runs has been found at fault.
     is_at_fault: AtomicBool,
-    sections: Sections,
+    sections: SectionNote,
 }
 
 /// A section that a context is in, or is about to be in; see [`section`](super::section).
 #[derive(Debug)]
-pub(super) struct Section {
+pub(super) struct CriticalSection {
     pub(super) holder: *const AtomicPtr<Context>,
     /// The one that it is in.
-    pub(super) outer: *mut Section,
+    pub(super) outer: *mut CriticalSection,
 }
 
 /// A context's note of its sections.
 #[derive(Debug)]
-pub(super) struct Sections {
+pub(super) struct SectionNote {
     /// The innermost one; null if there is none.
-    pub(super) innermost: AtomicPtr<Section>,
+    pub(super) innermost: AtomicPtr<CriticalSection>,
     /// When a preemption was put off first; 0 if none was.
     pub(super) put_off_ns: AtomicU64,
 }
 
-impl Sections {
+impl SectionNote {
     const fn new() -> Self {
         Self {
             innermost: AtomicPtr::new(core::ptr::null_mut()),
@@ -227,7 +227,7 @@ impl Context {
     }
 
     /// Returns what the context notes of its sections.
-    pub(super) const fn sections(&self) -> &Sections {
+    pub(super) const fn sections(&self) -> &SectionNote {
         &self.sections
     }
 
@@ -269,7 +269,7 @@ impl Parked {
             suspended_ns: AtomicU64::new(0),
             budget_end_ns: AtomicU64::new(u64::MAX),
             is_at_fault: AtomicBool::new(false),
-            sections: Sections::new(),
+            sections: SectionNote::new(),
         }));
         let mut parked = Self(context);
         parked.reset();

@@ -14,7 +14,7 @@ const MACHINE_CHECK: u64 = 18;
 
 /// An exception, in words and numbers.
 #[derive(Debug)]
-pub struct Exception<'a> {
+pub struct CpuException<'a> {
     /// What happened, such as `page fault`.
     pub name: &'static str,
     /// The registers at the faulting instruction.
@@ -49,7 +49,7 @@ const NAMES: [&str; 22] = [
     "control protection exception",
 ];
 
-impl fmt::Display for Exception<'_> {
+impl fmt::Display for CpuException<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name)?;
         if let Some(address) = self.address {
@@ -73,7 +73,7 @@ impl fmt::Display for Exception<'_> {
     }
 }
 
-impl<'a> Exception<'a> {
+impl<'a> CpuException<'a> {
     /// Names the exception that has pushed `registers`.
     pub(super) fn new(registers: &'a Registers) -> Self {
         let vector = registers.vector;
@@ -88,7 +88,7 @@ impl<'a> Exception<'a> {
     }
 }
 
-impl Exception<'_> {
+impl CpuException<'_> {
     /// Reports whether the page below the stack was hit: an absent page within one
     /// page of the stack pointer, as compiled code touches each page on its way down.
     fn is_stack_overflow(&self) -> bool {

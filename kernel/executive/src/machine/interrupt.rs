@@ -7,9 +7,9 @@
 use core::arch::global_asm;
 use core::panic::Location;
 
-use super::abandoned::Abandoned;
+use super::abandoned::AbandonedContext;
 use super::context::{Parked, Registers, VECTOR_BYTES};
-use super::fault::{self, Exception};
+use super::fault::{self, CpuException};
 use super::this_core::Core;
 use super::{
     cpu, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core, timer,
@@ -44,7 +44,7 @@ pub struct Handlers {
     pub beat: fn(&Core, u64),
     /// The code that was running cannot go on. If the handler returns, it has
     /// exchanged the context.
-    pub exception: fn(&Exception<'_>, &mut Interrupted),
+    pub exception: fn(&CpuException<'_>, &mut Interrupted),
     /// What a context that begins anew does; it returns, with interrupts
     /// disabled, the context to leave it for.
     pub work: fn() -> Parked,
@@ -81,8 +81,8 @@ impl Interrupted {
 
     /// Has this core go on with `next` when the handler returns, and nothing ever with the
     /// context that was interrupted.
-    pub fn abandon(&mut self, next: Parked) -> Abandoned {
-        Abandoned::new(self.exchange(next))
+    pub fn abandon(&mut self, next: Parked) -> AbandonedContext {
+        AbandonedContext::new(self.exchange(next))
     }
 }
 
@@ -140,7 +140,7 @@ extern "C" fn handle_exception(registers: *mut Registers) -> *mut Registers {
     let Some(handlers) = HANDLERS.get().filter(|_| !is_stopped) else {
         cpu::halt_forever();
     };
-    let mut exception = Exception::new(pushed);
+    let mut exception = CpuException::new(pushed);
     let answers = if is_message {
         non_maskable::answer()
     } else {

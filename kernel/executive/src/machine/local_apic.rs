@@ -12,7 +12,7 @@ use super::{cpu, vector};
 static BASE: AtomicU64 = AtomicU64::new(0);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Register {
+enum ApicRegister {
     Id = 0x20,
     TaskPriority = 0x80,
     EndOfInterrupt = 0xb0,
@@ -79,18 +79,18 @@ fn take_way() {
 }
 
 /// Returns the model-specific register that is `register`.
-const fn specific(register: Register) -> u32 {
+const fn specific(register: ApicRegister) -> u32 {
     0x800 + register as u32 / 16
 }
 
-fn read(register: Register) -> u32 {
+fn read(register: ApicRegister) -> u32 {
     match BASE.load(Ordering::Relaxed) {
         0 => read_specific(specific(register)),
         base => read_mapped(base, register),
     }
 }
 
-fn write(register: Register, value: u32) {
+fn write(register: ApicRegister, value: u32) {
     match BASE.load(Ordering::Relaxed) {
         0 => write_specific(specific(register), value),
         base => write_mapped(base, register, value),
@@ -118,13 +118,13 @@ fn write_specific(register: u32, value: u32) {
     unsafe { cpu::write_msr(register, u64::from(value)) };
 }
 
-fn read_mapped(base: u64, register: Register) -> u32 {
+fn read_mapped(base: u64, register: ApicRegister) -> u32 {
     let address = (base + register as u64) as *const u32;
     // SAFETY: the register is one of the mapped local APIC's (`choose`).
     unsafe { address.read_volatile() }
 }
 
-fn write_mapped(base: u64, register: Register, value: u32) {
+fn write_mapped(base: u64, register: ApicRegister, value: u32) {
     let address = (base + register as u64) as *mut u32;
     // SAFETY: as in `write_specific`.
     unsafe { address.write_volatile(value) };
@@ -132,7 +132,7 @@ fn write_mapped(base: u64, register: Register, value: u32) {
 
 /// Returns the id of the core that executes this.
 pub fn id() -> u32 {
-    let id = read(Register::Id);
+    let id = read(ApicRegister::Id);
     if is_x2apic() { id } else { id >> 24 }
 }
 
@@ -141,17 +141,17 @@ const SOFTWARE_ENABLE: u32 = 1 << 8;
 /// What turns a local APIC on, with only its timer unmasked. The software enable comes
 /// first: until then, and after an INIT, each entry of the local vector table stays masked,
 /// even if it is written (Intel SDM volume 3, 11.4.7.2).
-const TURN_ON: [(Register, u32); 7] = [
+const TURN_ON: [(ApicRegister, u32); 7] = [
     (
-        Register::SpuriousVector,
+        ApicRegister::SpuriousVector,
         SOFTWARE_ENABLE | vector::SPURIOUS as u32,
     ),
-    (Register::TaskPriority, 0),
-    (Register::Pin0Entry, MASKED),
-    (Register::Pin1Entry, MASKED),
-    (Register::ErrorEntry, MASKED),
-    (Register::DivideConfiguration, 0b1011), // by 1
-    (Register::TimerEntry, vector::TIMER as u32),
+    (ApicRegister::TaskPriority, 0),
+    (ApicRegister::Pin0Entry, MASKED),
+    (ApicRegister::Pin1Entry, MASKED),
+    (ApicRegister::ErrorEntry, MASKED),
+    (ApicRegister::DivideConfiguration, 0b1011), // by 1
+    (ApicRegister::TimerEntry, vector::TIMER as u32),
 ];
 
 /// Turns on the local APIC of this core, with only its timer unmasked.
@@ -166,22 +166,22 @@ pub fn enable() {
 pub fn is_interrupt_pending() -> bool {
     // Each such register has the bits of 32 vectors.
     const OURS: u32 = 1 << (vector::TIMER % 32) | 1 << (vector::WAKE % 32);
-    read(Register::Requests) & OURS != 0
+    read(ApicRegister::Requests) & OURS != 0
 }
 
 /// Ends the interrupt that is being handled.
 pub fn acknowledge() {
-    write(Register::EndOfInterrupt, 0);
+    write(ApicRegister::EndOfInterrupt, 0);
 }
 
 /// Starts this core's one-shot timer: it fires after `count` ticks, never if 0.
 pub fn start_timer(count: u32) {
-    write(Register::InitialCount, count);
+    write(ApicRegister::InitialCount, count);
 }
 
 /// Returns the ticks that are left of the running timer.
 pub fn timer_count() -> u32 {
-    read(Register::CurrentCount)
+    read(ApicRegister::CurrentCount)
 }
 
 /// Sends interrupt `vector` to the core with id `apic_id`.
@@ -226,11 +226,11 @@ fn command(apic_id: u32, low: u32) {
     let was_set = cpu::is_interrupt_flag_set();
     cpu::clear_interrupt_flag();
     // Delivery takes microseconds at most; the hardware bounds the wait.
-    while read_mapped(base, Register::CommandLow) & PENDING != 0 {
+    while read_mapped(base, ApicRegister::CommandLow) & PENDING != 0 {
         cpu::relax();
     }
-    write_mapped(base, Register::CommandHigh, apic_id << 24);
-    write_mapped(base, Register::CommandLow, low);
+    write_mapped(base, ApicRegister::CommandHigh, apic_id << 24);
+    write_mapped(base, ApicRegister::CommandLow, low);
     if was_set {
         cpu::set_interrupt_flag();
     }
@@ -244,7 +244,7 @@ fn command_at_once(apic_id: u32, low: u32) {
     cpu::finish_writes();
     let command = u64::from(apic_id) << 32 | u64::from(low);
     // SAFETY: as in `write_specific`.
-    unsafe { cpu::write_msr(specific(Register::CommandLow), command) };
+    unsafe { cpu::write_msr(specific(ApicRegister::CommandLow), command) };
 }
 
 #[cfg(test)]
@@ -253,19 +253,19 @@ mod tests {
 
     /// A local APIC after INIT, as far as its local vector table goes.
     #[derive(Debug)]
-    struct Model {
+    struct ApicModel {
         is_enabled: bool,
         /// The timer, the two pins, the error.
-        entries: [(Register, u32); 4],
+        entries: [(ApicRegister, u32); 4],
     }
 
-    impl Model {
+    impl ApicModel {
         fn after_init() -> Self {
             let entries = [
-                Register::TimerEntry,
-                Register::Pin0Entry,
-                Register::Pin1Entry,
-                Register::ErrorEntry,
+                ApicRegister::TimerEntry,
+                ApicRegister::Pin0Entry,
+                ApicRegister::Pin1Entry,
+                ApicRegister::ErrorEntry,
             ];
             Self {
                 is_enabled: false,
@@ -274,8 +274,8 @@ mod tests {
         }
 
         /// Takes a write as the manual says (Intel SDM volume 3, 11.4.7.2).
-        fn write(&mut self, register: Register, value: u32) {
-            if register == Register::SpuriousVector {
+        fn write(&mut self, register: ApicRegister, value: u32) {
+            if register == ApicRegister::SpuriousVector {
                 self.is_enabled = value & SOFTWARE_ENABLE != 0;
             }
             let entry = self.entries.iter_mut().find(|(of, _)| *of == register);
@@ -288,7 +288,7 @@ mod tests {
 
     #[test]
     fn the_timer_alone_is_unmasked_when_a_processor_comes_from_init() {
-        let mut model = Model::after_init();
+        let mut model = ApicModel::after_init();
         for (register, value) in TURN_ON {
             model.write(register, value);
         }
@@ -297,7 +297,7 @@ mod tests {
         let unmasked: Vec<_> = unmasked.collect();
         assert_eq!(
             unmasked,
-            [&(Register::TimerEntry, u32::from(vector::TIMER))]
+            [&(ApicRegister::TimerEntry, u32::from(vector::TIMER))]
         );
     }
 }

@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicPtr, AtomicU64};
 
 /// What one core has measured, in ticks of the time stamp counter.
 #[derive(Debug)]
-pub(super) struct Meter {
+pub(super) struct CoreMeter {
     /// When the current section began; 0 if there is none.
     pub(super) began: AtomicU64,
     pub(super) began_at: AtomicPtr<Location<'static>>,
@@ -13,7 +13,7 @@ pub(super) struct Meter {
     pub(super) longest_at: AtomicPtr<Location<'static>>,
 }
 
-impl Meter {
+impl CoreMeter {
     pub(super) const fn new() -> Self {
         Self {
             began: AtomicU64::new(0),

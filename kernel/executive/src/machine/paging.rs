@@ -11,7 +11,7 @@ pub(crate) const PAGE: u64 = 4096;
 
 /// What may be done with a page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Access {
+pub(crate) enum PageAccess {
     /// Read only.
     Constant,
     /// Read and write.
@@ -24,7 +24,7 @@ pub(crate) enum Access {
     Screen,
 }
 
-impl Access {
+impl PageAccess {
     const fn bits(self) -> u64 {
         const WRITABLE: u64 = 1 << 1;
         const UNCACHED: u64 = 1 << 3 | 1 << 4;
@@ -101,7 +101,7 @@ impl PageTable {
         &mut self,
         virtual_range: Range<u64>,
         physical: u64,
-        access: Access,
+        access: PageAccess,
         new_frame: &mut dyn FnMut() -> Option<u64>,
     ) -> Result<(), MapError> {
         const PAGE_2_MIB: u64 = 1 << 21;
@@ -137,10 +137,10 @@ impl PageTable {
         address: u64,
         level: u32,
         new_frame: &mut dyn FnMut() -> Option<u64>,
-    ) -> Result<Entry, MapError> {
+    ) -> Result<TableEntry, MapError> {
         let mut table = self.root;
         for above in (level + 1..=3).rev() {
-            let slot = Entry::of(table, address, above);
+            let slot = TableEntry::of(table, address, above);
             let mut entry = read_entry(slot);
             if entry & PRESENT == 0 {
                 entry = new_frame().ok_or(MapError::OutOfFrames)? | PRESENT | WRITABLE;
@@ -150,27 +150,27 @@ impl PageTable {
             }
             table = entry & ADDRESS;
         }
-        Ok(Entry::of(table, address, level))
+        Ok(TableEntry::of(table, address, level))
     }
 }
 
 /// The place of an entry in a table page.
 #[derive(Clone, Copy)]
-struct Entry(*mut u64);
+struct TableEntry(*mut u64);
 
-impl Entry {
+impl TableEntry {
     fn of(table: u64, address: u64, level: u32) -> Self {
         let index = address >> (12 + 9 * level) & 511;
         Self((table + 8 * index) as *mut u64)
     }
 }
 
-fn read_entry(entry: Entry) -> u64 {
+fn read_entry(entry: TableEntry) -> u64 {
     // SAFETY: the entry lies in a page of the table (table invariant).
     unsafe { entry.0.read_volatile() }
 }
 
-fn write_entry(entry: Entry, value: u64) {
+fn write_entry(entry: TableEntry, value: u64) {
     // SAFETY: the entry lies in a page of the table (table invariant); what it
     // newly maps is named by the caller of `PageTable::map`.
     unsafe { entry.0.write_volatile(value) };

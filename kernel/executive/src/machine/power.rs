@@ -11,7 +11,7 @@ use super::{cpu, non_maskable, port, serial, this_core};
 
 /// What to do after the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum PowerAction {
     /// Stay as it is, with all cores halted.
     Halt = 0,
     /// Power the machine off.
@@ -20,11 +20,11 @@ pub enum End {
     Reset = 2,
 }
 
-static END: AtomicU8 = AtomicU8::new(End::Halt as u8);
+static END: AtomicU8 = AtomicU8::new(PowerAction::Halt as u8);
 static POWER: SetOnce<Power> = SetOnce::new();
 
 /// Settles what is done after the verdict.
-pub fn set_end(end: End) {
+pub fn set_end(end: PowerAction) {
     END.store(end as u8, Ordering::Release);
 }
 
@@ -43,12 +43,12 @@ pub unsafe fn set_registers(power: Power) {
 fn end() {
     let end = END.load(Ordering::Acquire);
     let power = POWER.get().copied().unwrap_or_default();
-    if end == End::Off as u8
+    if end == PowerAction::Off as u8
         && let Some(off) = power.off
     {
         power_off(off);
     }
-    if end == End::Reset as u8 {
+    if end == PowerAction::Reset as u8 {
         reset(power);
     }
 }

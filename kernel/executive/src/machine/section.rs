@@ -10,14 +10,14 @@
 //! **Holder invariant**: `holder` is null, or the context that alone touches `data`, or for good
 //! [`LOST`] once a fault has ended a holder.
 //!
-//! **Section invariant**: from a context's innermost [`Section`] on, each lies in a frame of
-//! [`Guarded::with`] on that context's stack that has not returned, and names a lock that this
+//! **Section invariant**: from a context's innermost [`CriticalSection`] on, each lies in a frame of
+//! [`ContextLock::with`] on that context's stack that has not returned, and names a lock that this
 //! frame borrows.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicPtr, Ordering};
 
-use super::context::{Context, Section, Sections};
+use super::context::{Context, CriticalSection, SectionNote};
 use super::this_core::{self, Core};
 use super::timer::{self, Alarm};
 use super::{cpu, interrupt_flag, local_apic, vector};
@@ -30,25 +30,25 @@ const LONGEST_NS: u64 = 1_000_000;
 
 /// Data that one context at a time may use.
 #[derive(Debug)]
-pub struct Guarded<T> {
+pub struct ContextLock<T> {
     holder: AtomicPtr<Context>,
     data: UnsafeCell<T>,
 }
 
 // SAFETY: by the holder invariant one context at a time reaches the data, so sharing
 // this moves the data between cores, for which `T: Send` suffices.
-unsafe impl<T: Send> Sync for Guarded<T> {}
+unsafe impl<T: Send> Sync for ContextLock<T> {}
 
 /// Why the data cannot be had, now or ever.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refusal {
+pub enum LockRefusal {
     /// The caller is in a section of it.
     HeldByCaller,
     /// A fault has ended its holder.
     HolderEnded,
 }
 
-impl<T> Guarded<T> {
+impl<T> ContextLock<T> {
     /// Guards `data`.
     pub const fn new(data: T) -> Self {
         Self {
@@ -58,8 +58,8 @@ impl<T> Guarded<T> {
     }
 
     /// Waits for the data and lends it to `section`.
-    pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> Result<R, Refusal> {
-        let mut own_section = Section {
+    pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> Result<R, LockRefusal> {
+        let mut own_section = CriticalSection {
             holder: &raw const self.holder,
             outer: core::ptr::null_mut(),
         };
@@ -73,10 +73,10 @@ impl<T> Guarded<T> {
             };
             leave(own, &own_section);
             if holder == place {
-                return Err(Refusal::HeldByCaller);
+                return Err(LockRefusal::HeldByCaller);
             }
             if holder == LOST {
-                return Err(Refusal::HolderEnded);
+                return Err(LockRefusal::HolderEnded);
             }
             cpu::relax();
         };
@@ -90,7 +90,7 @@ impl<T> Guarded<T> {
 }
 
 /// Keeps the caller from being preempted, for [`LONGEST_NS`] at most.
-fn enter(section: &mut Section) -> &'static Context {
+fn enter(section: &mut CriticalSection) -> &'static Context {
     let were_enabled = interrupt_flag::disable();
     let own = this_core::get().context();
     let innermost = &own.sections().innermost;
@@ -103,8 +103,8 @@ fn enter(section: &mut Section) -> &'static Context {
 }
 
 /// Ends what `enter` has begun, and does what was put off.
-fn leave(own: &Context, section: &Section) {
-    let Sections {
+fn leave(own: &Context, section: &CriticalSection) {
+    let SectionNote {
         innermost,
         put_off_ns,
     } = own.sections();
@@ -120,7 +120,7 @@ fn leave(own: &Context, section: &Section) {
 
 /// Ends the sections of a context that was abandoned in them: what they guard is lost.
 pub(super) fn lose_all(context: &Context) {
-    let Sections {
+    let SectionNote {
         innermost,
         put_off_ns,
     } = context.sections();
@@ -141,7 +141,7 @@ pub(super) fn lose_all(context: &Context) {
 /// Puts off the preemption of what runs on this core, `core`, if it is in a section.
 /// Reports whether it is put off. In an interrupt handler.
 pub fn puts_off(core: &Core, now_ns: u64) -> bool {
-    let Sections {
+    let SectionNote {
         innermost,
         put_off_ns,
     } = core.context().sections();

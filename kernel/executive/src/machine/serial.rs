@@ -14,19 +14,19 @@ use super::port;
 const MOST_POLLS: u32 = 100_000;
 
 /// A serial port.
-pub struct Port {
+pub struct SerialPort {
     base: u16,
-    /// Whether it is there, which is found at [`Port::initialize`].
+    /// Whether it is there, which is found at [`SerialPort::initialize`].
     is_there: AtomicBool,
 }
 
 /// The port for text.
-pub static FIRST: Port = Port::at(0x3f8);
+pub static FIRST: SerialPort = SerialPort::at(0x3f8);
 
 /// The port for an app's wire.
-pub static SECOND: Port = Port::at(0x2f8);
+pub static SECOND: SerialPort = SerialPort::at(0x2f8);
 
-impl Port {
+impl SerialPort {
     const fn at(base: u16) -> Self {
         Self {
             base,

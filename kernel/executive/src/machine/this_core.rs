@@ -9,17 +9,17 @@ use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU32, AtomicU64, 
 
 use alloc::boxed::Box;
 
-use super::accusation::Accusation;
+use super::accusation::AccusationBox;
 use super::context::{Context, Parked, Registers};
 use super::cpu;
 use super::descriptors::{self, TaskState};
-use super::meter::Meter;
+use super::meter::CoreMeter;
 use fass::SetOnce;
 
 /// What a core needs to begin: the tops of stacks, each with a guard page below,
 /// and the context that it runs first.
 #[derive(Debug)]
-pub struct Stacks {
+pub struct CoreStacks {
     /// What the core does first.
     pub first_context: Parked,
     /// Runs interrupt handlers.
@@ -31,7 +31,7 @@ pub struct Stacks {
 /// A core's part in the turns of those that compute ([`turns`](super::turns)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub(super) enum Part {
+pub(super) enum TimeSlicePart {
     /// It takes no part.
     None,
     /// It has been given an instance, and is on its way to it.
@@ -67,7 +67,7 @@ pub struct Core {
     pub wake: AtomicBool,
     /// This core watches `wake`: it needs no interrupt to see it.
     pub(super) watches: AtomicBool,
-    /// Its [`Part`] in the turns.
+    /// Its [`TimeSlicePart`] in the turns.
     part: AtomicU8,
     /// The times at which this core's timer shall fire, each `u64::MAX` if never.
     pub alarms: [AtomicU64; 4],
@@ -77,10 +77,10 @@ pub struct Core {
     pub timer_interrupts: AtomicU64,
     /// When this core took its last interrupt, by its timer or from another core.
     pub interrupted_ns: AtomicU64,
-    pub(super) accusation: Accusation,
+    pub(super) accusation: AccusationBox,
     /// The time between two heartbeats of this core, 0 if it has none.
     pub heartbeat_ns: AtomicU64,
-    interrupts_off: Meter,
+    interrupts_off: CoreMeter,
     /// By how much the counter has been behind another core's, in ticks.
     pub(super) behind_ticks: AtomicU64,
     /// Whether it is an efficiency core.
@@ -95,7 +95,7 @@ pub(super) const HANDLER_STACK_OFFSET: usize = core::mem::offset_of!(Core, handl
 static CORES: SetOnce<Box<[Core]>> = SetOnce::new();
 
 /// Creates the cores' data, the boot processor's first.
-pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
+pub fn create(cores: impl Iterator<Item = (u32, CoreStacks)>) {
     let cores = cores.zip(0..).map(|((apic_id, stacks), index)| Core {
         this: AtomicU64::new(0),
         handler_stack: stacks.handler,
@@ -111,14 +111,14 @@ pub fn create(cores: impl Iterator<Item = (u32, Stacks)>) {
         spare: AtomicPtr::new(core::ptr::null_mut()),
         wake: AtomicBool::new(false),
         watches: AtomicBool::new(false),
-        part: AtomicU8::new(Part::None as u8),
+        part: AtomicU8::new(TimeSlicePart::None as u8),
         alarms: [const { AtomicU64::new(u64::MAX) }; 4],
         arms_later: AtomicBool::new(false),
         timer_interrupts: AtomicU64::new(0),
         interrupted_ns: AtomicU64::new(0),
-        accusation: Accusation::new(),
+        accusation: AccusationBox::new(),
         heartbeat_ns: AtomicU64::new(0),
-        interrupts_off: Meter::new(),
+        interrupts_off: CoreMeter::new(),
         behind_ticks: AtomicU64::new(0),
         is_efficient: AtomicBool::new(false),
         running: [const { AtomicU64::new(u64::MAX) }; 2],
@@ -254,22 +254,22 @@ pub fn take_spare_context() -> Option<Parked> {
 
 impl Core {
     /// Returns the core's part in the turns.
-    pub(super) fn part(&self) -> Part {
-        const COMES: u8 = Part::Comes as u8;
-        const FRESH: u8 = Part::Fresh as u8;
-        const COMPUTES: u8 = Part::Computes as u8;
-        const WAITS: u8 = Part::Waits as u8;
+    pub(super) fn part(&self) -> TimeSlicePart {
+        const COMES: u8 = TimeSlicePart::Comes as u8;
+        const FRESH: u8 = TimeSlicePart::Fresh as u8;
+        const COMPUTES: u8 = TimeSlicePart::Computes as u8;
+        const WAITS: u8 = TimeSlicePart::Waits as u8;
         match self.part.load(Ordering::Relaxed) {
-            COMES => Part::Comes,
-            FRESH => Part::Fresh,
-            COMPUTES => Part::Computes,
-            WAITS => Part::Waits,
-            _ => Part::None,
+            COMES => TimeSlicePart::Comes,
+            FRESH => TimeSlicePart::Fresh,
+            COMPUTES => TimeSlicePart::Computes,
+            WAITS => TimeSlicePart::Waits,
+            _ => TimeSlicePart::None,
         }
     }
 
     /// Notes the core's part in the turns.
-    pub(super) fn set_part(&self, part: Part) {
+    pub(super) fn set_part(&self, part: TimeSlicePart) {
         self.part.store(part as u8, Ordering::Relaxed);
     }
 
@@ -306,7 +306,7 @@ impl Core {
     }
 
     /// Returns what this core has measured of its sections without interrupts.
-    pub(super) const fn meter(&self) -> &Meter {
+    pub(super) const fn meter(&self) -> &CoreMeter {
         &self.interrupts_off
     }
 

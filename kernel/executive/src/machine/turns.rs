@@ -36,7 +36,7 @@
 use core::panic::Location;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::this_core::{self, Core, Part};
+use super::this_core::{self, Core, TimeSlicePart};
 use super::timer::{self, Alarm};
 use super::{clock, cpu, interrupt_flag, interrupts_off, local_apic, vector};
 
@@ -96,8 +96,8 @@ pub fn end_urgent() {
 /// of another core begins, which the instance would have to wait for.
 #[inline]
 pub fn come(core: &Core) {
-    if is_enabled() && core.part() == Part::None {
-        set_part(core, Part::Comes);
+    if is_enabled() && core.part() == TimeSlicePart::None {
+        set_part(core, TimeSlicePart::Comes);
     }
 }
 
@@ -119,8 +119,8 @@ pub fn give_way() {
 /// Interrupts are disabled.
 #[inline]
 pub fn join(core: &Core) {
-    if is_enabled() && matches!(core.part(), Part::None | Part::Comes) {
-        set_part(core, Part::Fresh);
+    if is_enabled() && matches!(core.part(), TimeSlicePart::None | TimeSlicePart::Comes) {
+        set_part(core, TimeSlicePart::Fresh);
     }
 }
 
@@ -129,15 +129,15 @@ pub fn join(core: &Core) {
 #[inline]
 pub fn leave(core: &Core) {
     if is_enabled() {
-        set_part(core, Part::None);
+        set_part(core, TimeSlicePart::None);
     }
 }
 
 /// Like [`leave`], and sees to it that the core is not interrupted for a turn's end.
 #[inline]
 pub fn rest(core: &Core) {
-    if is_enabled() && core.part() != Part::None {
-        set_part(core, Part::None);
+    if is_enabled() && core.part() != TimeSlicePart::None {
+        set_part(core, TimeSlicePart::None);
         timer::set(Alarm::Hold, u64::MAX);
     }
 }
@@ -156,7 +156,7 @@ fn enter_in_turn() {
     loop {
         let core = this_core::get();
         join(core);
-        if core.part() == Part::Computes {
+        if core.part() == TimeSlicePart::Computes {
             return;
         }
         interrupts_off::end();
@@ -175,7 +175,7 @@ fn enter_in_turn() {
 /// soon as interrupts are enabled, it waits for its turn as after one.
 #[inline]
 pub fn enter_by_interrupt(core: &Core) {
-    if is_enabled() && core.part() == Part::Fresh {
+    if is_enabled() && core.part() == TimeSlicePart::Fresh {
         local_apic::send(core.apic_id(), vector::WAKE);
     }
 }
@@ -212,10 +212,10 @@ fn end_interrupt_in_turn() {
     URGENT.fetch_sub(1, Ordering::Relaxed);
     let core = this_core::get();
     match core.part() {
-        Part::None | Part::Comes => return,
-        Part::Computes if timer::is_set(Alarm::Hold) => return,
-        Part::Computes => pass(core),
-        Part::Fresh | Part::Waits => {}
+        TimeSlicePart::None | TimeSlicePart::Comes => return,
+        TimeSlicePart::Computes if timer::is_set(Alarm::Hold) => return,
+        TimeSlicePart::Computes => pass(core),
+        TimeSlicePart::Fresh | TimeSlicePart::Waits => {}
     }
     wait(core);
 }
@@ -224,9 +224,9 @@ fn end_interrupt_in_turn() {
 fn pass(core: &Core) {
     let (before, from_here) = this_core::all().split_at(core.index as usize);
     let mut others = from_here.iter().skip(1).chain(before);
-    let next = others.find(|other| other.part() == Part::Waits);
+    let next = others.find(|other| other.part() == TimeSlicePart::Waits);
     NEXT.store(next.map_or(NONE, |next| next.index), Ordering::Relaxed);
-    set_part(core, Part::Waits);
+    set_part(core, TimeSlicePart::Waits);
 }
 
 /// Waits until this core has the turn, or until an interrupt is pending. Reports whether
@@ -239,7 +239,7 @@ fn wait(core: &Core) -> bool {
         cpu::relax();
         looks += 1;
         if let Some(length_ns) = begin(core, looks > MOST_LOOKS) {
-            set_part(core, Part::Computes);
+            set_part(core, TimeSlicePart::Computes);
             timer::set(Alarm::Hold, clock::now_ns().saturating_add(length_ns));
             break true;
         }
@@ -268,23 +268,24 @@ fn begin(core: &Core, takes_over: bool) -> Option<u64> {
 fn length_of_turn(core: &Core) -> Option<u64> {
     let fresh = FRESH.load(Ordering::Relaxed);
     let next = this_core::all().get(NEXT.load(Ordering::Relaxed) as usize);
-    let is_next = next.is_none_or(|next| next.index == core.index || next.part() != Part::Waits);
+    let is_next =
+        next.is_none_or(|next| next.index == core.index || next.part() != TimeSlicePart::Waits);
     match core.part() {
-        Part::Fresh if fresh > 1 => Some(FIRST_TURN_NS),
-        Part::Fresh => Some(TURN_NS),
+        TimeSlicePart::Fresh if fresh > 1 => Some(FIRST_TURN_NS),
+        TimeSlicePart::Fresh => Some(TURN_NS),
         _ => (fresh == 0 && is_next).then_some(TURN_NS),
     }
 }
 
 #[cold]
-fn set_part(core: &Core, part: Part) {
+fn set_part(core: &Core, part: TimeSlicePart) {
     let before = core.part();
-    if before == Part::Computes && part != Part::Computes {
+    if before == TimeSlicePart::Computes && part != TimeSlicePart::Computes {
         // Unless the turn has been taken over.
         let (mine, order) = (core.index, Ordering::Relaxed);
         let _ = HAS_TURN.compare_exchange(mine, NONE, order, order);
     }
-    let is_fresh = |part| matches!(part, Part::Comes | Part::Fresh);
+    let is_fresh = |part| matches!(part, TimeSlicePart::Comes | TimeSlicePart::Fresh);
     match (is_fresh(before), is_fresh(part)) {
         (false, true) => FRESH.fetch_add(1, Ordering::Relaxed),
         (true, false) => FRESH.fetch_sub(1, Ordering::Relaxed),

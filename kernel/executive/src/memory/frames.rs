@@ -15,14 +15,14 @@ const LOWEST: u64 = 1 << 20;
 
 /// The frames that nobody has taken.
 #[derive(Debug)]
-pub(crate) struct Frames {
+pub(crate) struct FreeFrames {
     /// Image and module cut two ranges of a map in two.
     free: List<(u64, u64), { MAX_REGIONS + 2 }>,
     /// The bytes of all usable memory, taken or not.
     total: u64,
 }
 
-impl Frames {
+impl FreeFrames {
     /// Creates the stock from the memory map, which ascends, less the `taken` ranges. So does
     /// the stock: what lies below 4 GiB, where page tables have to be at first, goes first.
     pub(crate) fn new(map: &[MemoryRegion], taken: &[Range<u64>]) -> Self {
@@ -117,7 +117,7 @@ mod tests {
             region(MIB, 4 * MIB, true),
             region(4 * MIB, 8 * MIB, false),
         ];
-        let mut frames = Frames::new(&map, &[2 * MIB..3 * MIB]);
+        let mut frames = FreeFrames::new(&map, &[2 * MIB..3 * MIB]);
         assert_eq!(frames.take(256), Some(MIB));
         assert_eq!(frames.take(256), Some(3 * MIB));
         assert_eq!(frames.take(1), None);
@@ -126,14 +126,15 @@ mod tests {
 
     #[test]
     fn takes_whole_frames_only() {
-        let mut frames = Frames::new(&[region(2 * MIB + 1, 2 * MIB + 3 * FRAME - 1, true)], &[]);
+        let mut frames =
+            FreeFrames::new(&[region(2 * MIB + 1, 2 * MIB + 3 * FRAME - 1, true)], &[]);
         assert_eq!(frames.take(1), Some(2 * MIB + FRAME));
         assert_eq!(frames.take(1), None);
     }
 
     #[test]
     fn gives_the_heap_the_most_and_keeps_the_rest() {
-        let mut frames = Frames::new(&[region(4 * MIB, 8 * MIB, true)], &[]);
+        let mut frames = FreeFrames::new(&[region(4 * MIB, 8 * MIB, true)], &[]);
         assert_eq!(frames.take_heap(), Some(5 * MIB..8 * MIB));
         assert_eq!(frames.take(256), Some(4 * MIB));
         assert_eq!(frames.take(1), None);
@@ -153,7 +154,7 @@ mod tests {
 
     #[test]
     fn has_nothing_without_a_map() {
-        let mut frames = Frames::new(&[], &[]);
+        let mut frames = FreeFrames::new(&[], &[]);
         assert_eq!(frames.take(1), None);
         assert_eq!(frames.take_heap(), None);
     }

@@ -14,8 +14,8 @@ use core::alloc::{GlobalAlloc, Layout};
 use core::ops::Range;
 use core::ptr::NonNull;
 
+pub use super::tlsf::HeapUsage;
 use super::tlsf::Tlsf;
-pub use super::tlsf::Usage;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core;
 
@@ -52,7 +52,7 @@ pub unsafe fn add_memory(range: Range<u64>) {
 }
 
 /// Returns what has been allocated so far.
-pub fn usage() -> Usage {
+pub fn usage() -> HeapUsage {
     HEAP.lock().usage()
 }
 

@@ -12,9 +12,9 @@ use core::ops::Range;
 
 use boot::{MEMORY_END, MemoryRegion, Module};
 
-use crate::machine::paging::{Access, MapError, PAGE, PageTable};
+use crate::machine::paging::{MapError, PAGE, PageAccess, PageTable};
 use crate::machine::spinlock::SpinLock;
-use frames::{FRAME, Frames, less};
+use frames::{FRAME, FreeFrames, less};
 
 /// Where stacks live: beyond the memory that is used.
 const STACK_WINDOW: u64 = MEMORY_END;
@@ -24,17 +24,17 @@ pub const MODULE_WINDOW: u64 = 1 << 40;
 
 /// The physical memory and the address space over it.
 #[derive(Debug)]
-struct Memory {
-    frames: Frames,
+struct PhysicalMemory {
+    frames: FreeFrames,
     table: PageTable,
     next_stack: u64,
 }
 
-static MEMORY: SpinLock<Option<Memory>> = SpinLock::new(None);
+static MEMORY: SpinLock<Option<PhysicalMemory>> = SpinLock::new(None);
 
 /// What [`initialize`] found and built.
 #[derive(Clone, Copy, Debug)]
-pub struct Layout {
+pub struct MemoryLayout {
     /// The page table's root, to be loaded by every core.
     pub root_table: u64,
     /// The bytes of usable memory.
@@ -54,8 +54,8 @@ pub unsafe fn initialize(
     module: Option<Module>,
     devices: &[u64],
     screen: Range<u64>,
-) -> Result<Layout, MapError> {
-    let mut frames = Frames::new(map, &[boot_entry::image::whole(), pages_of(module)]);
+) -> Result<MemoryLayout, MapError> {
+    let mut frames = FreeFrames::new(map, &[boot_entry::image::whole(), pages_of(module)]);
     let total_bytes = frames.total_bytes();
     let heap = frames.take_heap().ok_or(MapError::OutOfFrames)?;
     let mut new_frame = || take_zeroed(&mut frames);
@@ -64,7 +64,12 @@ pub unsafe fn initialize(
     let mut table = unsafe { PageTable::new(&mut new_frame) }?;
     map_all(&mut table, map, pages_of(module), &mut new_frame)?;
     map_devices(&mut table, map, devices, &mut new_frame)?;
-    table.map(screen.clone(), screen.start, Access::Screen, &mut new_frame)?;
+    table.map(
+        screen.clone(),
+        screen.start,
+        PageAccess::Screen,
+        &mut new_frame,
+    )?;
     let root_table = table.root();
     // SAFETY: image, data (so the boot stack) and all usable memory are mapped
     // to where they were.
@@ -72,12 +77,12 @@ pub unsafe fn initialize(
     // SAFETY: the range was taken from the frames and is mapped as data; by
     // condition 2 the heap has no memory yet.
     unsafe { heap::add_memory(heap) };
-    *MEMORY.lock() = Some(Memory {
+    *MEMORY.lock() = Some(PhysicalMemory {
         frames,
         table,
         next_stack: STACK_WINDOW,
     });
-    Ok(Layout {
+    Ok(MemoryLayout {
         root_table,
         total_bytes,
     })
@@ -131,21 +136,21 @@ fn map_all(
 ) -> Result<(), MapError> {
     let image = boot_entry::image::whole();
     let sections = [
-        (boot_entry::image::rodata(), Access::Constant),
-        (boot_entry::image::text(), Access::Code),
-        (boot_entry::image::data(), Access::Data),
+        (boot_entry::image::rodata(), PageAccess::Constant),
+        (boot_entry::image::text(), PageAccess::Code),
+        (boot_entry::image::data(), PageAccess::Data),
     ];
     for (range, access) in sections {
         table.map(range.clone(), range.start, access, new_frame)?;
     }
     let shown = MODULE_WINDOW + module.start..MODULE_WINDOW + module.end;
-    table.map(shown, module.start, Access::Constant, new_frame)?;
+    table.map(shown, module.start, PageAccess::Constant, new_frame)?;
     for region in map.iter().filter(|region| region.usable) {
         // Page 0 stays absent, so that a null pointer faults.
         let start = region.start.max(PAGE).next_multiple_of(PAGE);
         let end = region.end / PAGE * PAGE;
         for part in less(start..end, &[image.clone(), module.clone()]) {
-            table.map(part.clone(), part.start, Access::Data, new_frame)?;
+            table.map(part.clone(), part.start, PageAccess::Data, new_frame)?;
         }
     }
     Ok(())
@@ -166,7 +171,7 @@ fn map_devices(
         let is_mapped = devices[..index].iter().any(|before| page(before) == start);
         // A firmware that puts a device into memory is mistaken in one of the two.
         if !is_mapped && !map.iter().any(is_memory) {
-            table.map(start..start + PAGE, start, Access::Device, new_frame)?;
+            table.map(start..start + PAGE, start, PageAccess::Device, new_frame)?;
         }
     }
     Ok(())
@@ -183,7 +188,7 @@ pub fn pages_of_screen(range: Range<u64>, map: &[MemoryRegion]) -> Option<Range<
     (pages.end <= STACK_WINDOW && !map.iter().any(is_hit)).then_some(pages)
 }
 
-fn take_zeroed(frames: &mut Frames) -> Option<u64> {
+fn take_zeroed(frames: &mut FreeFrames) -> Option<u64> {
     let frame = frames.take(1)?;
     let bytes = usize::try_from(FRAME).ok()?;
     // SAFETY: the frame was just taken, so nobody uses it; usable memory is
@@ -212,14 +217,16 @@ pub fn grow_stack(from: u64, to: u64) -> Result<(), MapError> {
         .map_stack(to..from)
 }
 
-impl Memory {
+impl PhysicalMemory {
     /// Puts frames below a part of the window, whole pages.
     #[inline(never)]
     fn map_stack(&mut self, part: Range<u64>) -> Result<(), MapError> {
-        let Memory { frames, table, .. } = self;
+        let PhysicalMemory { frames, table, .. } = self;
         let pages = (part.end - part.start) / PAGE;
         let physical = frames.take(pages).ok_or(MapError::OutOfFrames)?;
-        table.map(part, physical, Access::Data, &mut || take_zeroed(frames))?;
+        table.map(part, physical, PageAccess::Data, &mut || {
+            take_zeroed(frames)
+        })?;
         Ok(())
     }
 }

@@ -22,7 +22,7 @@ use sched_dag::Instance;
 use sched_dag::engine::FaultCost;
 
 use super::{contexts, execution};
-use crate::machine::fault::Exception;
+use crate::machine::fault::CpuException;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{cpu, interrupt_flag, this_core};
@@ -87,7 +87,7 @@ pub fn end_at_fault(interrupted: &mut Interrupted) {
 
 /// Ends the instance that caused an exception, if it is a subtask's, and reports
 /// whether it was.
-pub fn end_faulty(exception: &Exception<'_>, interrupted: &mut Interrupted) -> bool {
+pub fn end_faulty(exception: &CpuException<'_>, interrupted: &mut Interrupted) -> bool {
     if !exception.is_of_interruptible_code() || !this_core::is_ready() {
         return false;
     }

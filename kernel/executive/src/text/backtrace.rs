@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::machine::backtrace::{self, Call};
+use crate::machine::backtrace::{self, CallSite};
 use front::json::Object;
 
 /// The most calls that a line has, so that it stays together (`console`).
@@ -41,7 +41,7 @@ impl Spot {
 }
 
 /// Shows a call as where it returns to and what it called.
-fn shown(call: Call) -> impl fmt::Display {
+fn shown(call: CallSite) -> impl fmt::Display {
     fmt::from_fn(move |f| {
         write!(f, "\"{:#x}", call.returns_to)?;
         if let Some(callee) = call.callee {

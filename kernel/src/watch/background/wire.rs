@@ -17,7 +17,7 @@ use fass::Wire;
 
 use super::{LINE, Line};
 use crate::options::UsageError;
-use executive::machine::serial::{Port, SECOND};
+use executive::machine::serial::{SECOND, SerialPort};
 use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core;
 use executive::machine::timer::{self, Alarm};
@@ -33,7 +33,7 @@ const FIFO_BYTES: usize = 16;
 
 struct Connection {
     wire: Wire,
-    port: &'static Port,
+    port: &'static SerialPort,
     /// What arrives in each run, in place of what the port gets.
     script: Option<&'static [u8]>,
 }

@@ -30,10 +30,10 @@ pub(super) const GRANULE: usize = 16;
 /// Bytes before the payload of a block.
 pub(super) const HEADER_SIZE: usize = size_of::<Header>();
 /// Bytes of the smallest block: its payload holds the links when it is free.
-pub(super) const MIN_BLOCK_SIZE: usize = HEADER_SIZE + size_of::<Links>();
+pub(super) const MIN_BLOCK_SIZE: usize = HEADER_SIZE + size_of::<FreeLinks>();
 
 const _: () = assert!(HEADER_SIZE == GRANULE && align_of::<Header>() == GRANULE);
-const _: () = assert!(MIN_BLOCK_SIZE == 2 * GRANULE && align_of::<Links>() <= GRANULE);
+const _: () = assert!(MIN_BLOCK_SIZE == 2 * GRANULE && align_of::<FreeLinks>() <= GRANULE);
 
 /// The bit of [`Header::size_and_free`] that is set while the block is free.
 const FREE: usize = 1;
@@ -55,7 +55,7 @@ struct Header {
 
 /// The neighbours of a free block in the list of its class.
 #[derive(Clone, Copy)]
-pub(super) struct Links {
+pub(super) struct FreeLinks {
     pub(super) before: Option<Block>,
     pub(super) after: Option<Block>,
 }
@@ -176,16 +176,16 @@ impl Block {
     }
 
     /// Returns the links of a listed block.
-    pub(super) fn links(self) -> Links {
+    pub(super) fn links(self) -> FreeLinks {
         debug_assert!(self.is_free(), "a used block has no links");
-        let links: NonNull<Links> = self.payload().cast();
+        let links: NonNull<FreeLinks> = self.payload().cast();
         // SAFETY: by Listing they are initialised, by Ownership ours to read.
         unsafe { links.read() }
     }
 
     /// Sets the links of a block that is listed, or is about to be.
-    pub(super) fn set_links(self, links: Links) {
-        let place: NonNull<Links> = self.payload().cast();
+    pub(super) fn set_links(self, links: FreeLinks) {
+        let place: NonNull<FreeLinks> = self.payload().cast();
         // SAFETY: no caller holds this block, so that by Ownership its payload is
         // ours; by Tiling it has the room, and the alignment of a granule.
         unsafe { place.write(links) };
@@ -231,14 +231,14 @@ const LINEAR_LIMIT: usize = GRANULE << SECOND_LEVEL_LOG2;
 
 /// A range of block sizes, by its place on both levels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Class {
+pub(super) struct SizeClass {
     /// Below [`FIRST_LEVEL`].
     pub(super) first: usize,
     /// Below [`SECOND_LEVEL`].
     pub(super) second: usize,
 }
 
-impl Class {
+impl SizeClass {
     /// The class of a block of `size` bytes, which is below [`SIZE_LIMIT`].
     pub(super) const fn of(size: usize) -> Self {
         debug_assert!(size < SIZE_LIMIT);
@@ -299,14 +299,14 @@ mod tests {
         small.chain(large)
     }
 
-    fn rank(class: Class) -> usize {
+    fn rank(class: SizeClass) -> usize {
         class.first * SECOND_LEVEL + class.second
     }
 
     #[test]
     fn larger_sizes_never_have_smaller_classes() {
         let ranks: Vec<usize> = interesting_sizes()
-            .map(|size| rank(Class::of(size)))
+            .map(|size| rank(SizeClass::of(size)))
             .collect();
         assert!(ranks.is_sorted());
         assert!(ranks.iter().all(|&rank| rank < FIRST_LEVEL * SECOND_LEVEL));
@@ -315,24 +315,30 @@ mod tests {
     #[test]
     fn fitting_is_the_first_class_above_all_smaller_sizes() {
         for size in interesting_sizes() {
-            let Some(fitting) = Class::fitting(size) else {
+            let Some(fitting) = SizeClass::fitting(size) else {
                 assert!(size > SIZE_LIMIT - SIZE_LIMIT / 32, "{size}");
                 continue;
             };
-            let smaller = Class::of(size - GRANULE);
+            let smaller = SizeClass::of(size - GRANULE);
             assert!(rank(fitting) > rank(smaller), "{size} could find less");
             assert!(rank(fitting) <= rank(smaller) + 1 + usize::from(fitting.first > 0));
-            assert!(rank(fitting) <= rank(Class::of(size)) + 1, "{size}");
+            assert!(rank(fitting) <= rank(SizeClass::of(size)) + 1, "{size}");
         }
     }
 
     #[test]
     fn sizes_from_the_limit_on_have_no_fitting_class() {
         let last_class = SIZE_LIMIT - SIZE_LIMIT / 64;
-        assert_eq!(rank(Class::of(last_class)), FIRST_LEVEL * SECOND_LEVEL - 1);
-        assert_eq!(Class::fitting(last_class), Some(Class::of(last_class)));
-        assert_eq!(Class::fitting(last_class + GRANULE), None);
-        assert_eq!(Class::fitting(SIZE_LIMIT), None);
-        assert_eq!(Class::fitting(usize::MAX), None);
+        assert_eq!(
+            rank(SizeClass::of(last_class)),
+            FIRST_LEVEL * SECOND_LEVEL - 1
+        );
+        assert_eq!(
+            SizeClass::fitting(last_class),
+            Some(SizeClass::of(last_class))
+        );
+        assert_eq!(SizeClass::fitting(last_class + GRANULE), None);
+        assert_eq!(SizeClass::fitting(SIZE_LIMIT), None);
+        assert_eq!(SizeClass::fitting(usize::MAX), None);
     }
 }

@@ -62,15 +62,15 @@ use core::alloc::Layout;
 use core::ptr::NonNull;
 
 use block::{
-    Block, Class, FIRST_LEVEL, GRANULE, HEADER_SIZE, Links, MIN_BLOCK_SIZE, SECOND_LEVEL,
-    SIZE_LIMIT, block_size_for,
+    Block, FIRST_LEVEL, FreeLinks, GRANULE, HEADER_SIZE, MIN_BLOCK_SIZE, SECOND_LEVEL, SIZE_LIMIT,
+    SizeClass, block_size_for,
 };
 
 /// An allocator over any number of memory regions.
 #[derive(Debug)]
 pub(crate) struct Tlsf {
     free: FreeLists,
-    usage: Usage,
+    usage: HeapUsage,
     /// The first block of the region that was added last.
     first: Option<Block>,
 }
@@ -86,7 +86,7 @@ impl Tlsf {
     pub(crate) const fn new() -> Self {
         Self {
             free: FreeLists::new(),
-            usage: Usage::new(),
+            usage: HeapUsage::new(),
             first: None,
         }
     }
@@ -95,7 +95,7 @@ impl Tlsf {
     ///
     /// Both ends are aligned inwards to 16 bytes. A region that then has less
     /// than 48 bytes is ignored, and what exceeds 1 TiB is left alone; the
-    /// growth of [`Usage::capacity_bytes`] tells what was taken.
+    /// growth of [`HeapUsage::capacity_bytes`] tells what was taken.
     ///
     /// # Safety
     ///
@@ -223,7 +223,7 @@ impl Tlsf {
 
     /// Tells how much memory is in use.
     #[must_use]
-    pub(crate) const fn usage(&self) -> Usage {
+    pub(crate) const fn usage(&self) -> HeapUsage {
         self.usage
     }
 
@@ -291,7 +291,7 @@ impl FreeLists {
 
     /// Takes a block of at least `size` bytes out of its list.
     fn take(&mut self, size: usize) -> Option<Block> {
-        let class = self.first_nonempty_from(Class::fitting(size)?)?;
+        let class = self.first_nonempty_from(SizeClass::fitting(size)?)?;
         let block = self.head(class)?;
         self.remove(block);
         Some(block)
@@ -300,14 +300,14 @@ impl FreeLists {
     /// Lists a used block, which makes it free.
     fn insert(&mut self, block: Block) {
         debug_assert!(!block.is_free(), "a listed block cannot be listed again");
-        let class = Class::of(block.size());
+        let class = SizeClass::of(block.size());
         let after = self.head(class);
-        block.set_links(Links {
+        block.set_links(FreeLinks {
             before: None,
             after,
         });
         if let Some(after) = after {
-            after.set_links(Links {
+            after.set_links(FreeLinks {
                 before: Some(block),
                 ..after.links()
             });
@@ -318,31 +318,31 @@ impl FreeLists {
 
     /// Takes a free block out of its list, which makes it used.
     fn remove(&mut self, block: Block) {
-        let Links { before, after } = block.links();
+        let FreeLinks { before, after } = block.links();
         if let Some(after) = after {
-            after.set_links(Links {
+            after.set_links(FreeLinks {
                 before,
                 ..after.links()
             });
         }
         match before {
-            Some(before) => before.set_links(Links {
+            Some(before) => before.set_links(FreeLinks {
                 after,
                 ..before.links()
             }),
-            None => self.set_head(Class::of(block.size()), after),
+            None => self.set_head(SizeClass::of(block.size()), after),
         }
         block.set_free(false);
     }
 
     /// The first block in the list of a class.
-    const fn head(&self, class: Class) -> Option<Block> {
+    const fn head(&self, class: SizeClass) -> Option<Block> {
         self.heads[class.first][class.second]
     }
 
     /// Whether the bitmaps say that a class has blocks.
     #[cfg(test)]
-    const fn is_marked(&self, class: Class) -> bool {
+    const fn is_marked(&self, class: SizeClass) -> bool {
         let range = self.ranges >> class.first & 1 == 1;
         let list = self.classes[class.first] >> class.second & 1 == 1;
         debug_assert!(range == (self.classes[class.first] != 0));
@@ -351,10 +351,10 @@ impl FreeLists {
 
     /// The smallest class from `class` on that has a block: one bit scan in its
     /// own range or, if there is none, one each on both levels.
-    fn first_nonempty_from(&self, class: Class) -> Option<Class> {
+    fn first_nonempty_from(&self, class: SizeClass) -> Option<SizeClass> {
         let same_range = self.classes[class.first] & (u32::MAX << class.second);
         if same_range != 0 {
-            return Some(Class {
+            return Some(SizeClass {
                 second: same_range.trailing_zeros() as usize,
                 ..class
             });
@@ -366,10 +366,10 @@ impl FreeLists {
         }
         let first = larger_ranges.trailing_zeros() as usize;
         let second = self.classes[first].trailing_zeros() as usize;
-        Some(Class { first, second })
+        Some(SizeClass { first, second })
     }
 
-    fn set_head(&mut self, class: Class, head: Option<Block>) {
+    fn set_head(&mut self, class: SizeClass, head: Option<Block>) {
         self.heads[class.first][class.second] = head;
         let list_bit = 1 << class.second;
         if head.is_some() {
@@ -391,7 +391,7 @@ impl FreeLists {
 /// Byte counts are of whole blocks, 16-byte headers and rounding included, so
 /// that `capacity_bytes - in_use_bytes` is what the free blocks hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Usage {
+pub struct HeapUsage {
     /// Allocations that succeeded since the start.
     pub allocations: u64,
     /// Deallocations since the start, at most `allocations`.
@@ -404,7 +404,7 @@ pub struct Usage {
     pub capacity_bytes: usize,
 }
 
-impl Usage {
+impl HeapUsage {
     const fn new() -> Self {
         Self {
             allocations: 0,

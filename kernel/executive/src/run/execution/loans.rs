@@ -15,7 +15,7 @@ use core::ptr::NonNull;
 use sched_dag::placement::Placement;
 
 use super::Runner;
-use crate::machine::abandoned::Abandoned;
+use crate::machine::abandoned::AbandonedContext;
 use crate::machine::context::Parked;
 
 /// A runner that is to be [given back](Self::give_back).
@@ -76,7 +76,7 @@ impl Loans {
         &self,
         placement: &mut Placement<Loan, Parked>,
         core: usize,
-        _left: &Abandoned,
+        _left: &AbandonedContext,
     ) -> Option<Loan> {
         let vertex = placement.lose(core)?;
         // By the loan invariant the other loan lies on the stack that nothing runs on any more.

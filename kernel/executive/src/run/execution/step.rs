@@ -28,7 +28,7 @@ use super::loans::Loan;
 use super::port::{SmpPort, here, instance_time_ns, seat, since_epoch};
 use super::status::{self, note_running};
 use super::{EPOCH_NS, Execution, Work};
-use crate::machine::abandoned::Abandoned;
+use crate::machine::abandoned::AbandonedContext;
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::this_core::{self, Core};
@@ -285,7 +285,7 @@ pub fn complete(finished: Loan, finish_ns: u64) -> Work {
 
 /// Ends this core's instance because of a fault, and with it its DAG or its job. Its context was
 /// `left` here. Interrupts are disabled.
-pub fn fail(left: &Abandoned) {
+pub fn fail(left: &AbandonedContext) {
     let core = this_core::get();
     let mut place = cluster::of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {

@@ -7,24 +7,24 @@ use core::alloc::Layout;
 use core::ptr::NonNull;
 
 use super::super::block::{Block, HEADER_SIZE, MIN_BLOCK_SIZE};
-use super::super::{GRANULE, Tlsf, Usage};
-use crate::memory::tlsf::block::{Class, FIRST_LEVEL, SECOND_LEVEL};
+use super::super::{GRANULE, HeapUsage, Tlsf};
+use crate::memory::tlsf::block::{FIRST_LEVEL, SECOND_LEVEL, SizeClass};
 
 /// Owns the memory of a heap, and frees it.
 pub(super) struct TestHeap {
     tlsf: Tlsf,
-    regions: Vec<Region>,
+    regions: Vec<TestRegion>,
 }
 
 /// What a walk over the tiling found.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Walk {
+pub(super) struct HeapWalk {
     pub(super) used_blocks: usize,
     /// The sizes of the free blocks, in bytes, in the order of the walk.
     pub(super) free_sizes: Vec<usize>,
 }
 
-struct Region {
+struct TestRegion {
     memory: NonNull<u8>,
     layout: Layout,
 }
@@ -49,7 +49,7 @@ impl TestHeap {
         let memory = NonNull::new(memory).expect("memory of the host");
         // SAFETY: (1) it lives as long as the heap, (2) which alone uses it.
         unsafe { self.tlsf.add_region(memory, length) };
-        self.regions.push(Region { memory, layout });
+        self.regions.push(TestRegion { memory, layout });
     }
 
     pub(super) fn allocate(&mut self, size: usize, align: usize) -> Option<NonNull<u8>> {
@@ -84,13 +84,13 @@ impl TestHeap {
         unsafe { self.tlsf.reallocate_in_place(payload, new_size) }
     }
 
-    pub(super) fn usage(&self) -> Usage {
+    pub(super) fn usage(&self) -> HeapUsage {
         self.tlsf.usage()
     }
 
     /// Checks **Tiling**, **Listing**, the merging of neighbours and the counts.
-    pub(super) fn validate(&self) -> Walk {
-        let mut walk = Walk {
+    pub(super) fn validate(&self) -> HeapWalk {
+        let mut walk = HeapWalk {
             used_blocks: 0,
             free_sizes: Vec::new(),
         };
@@ -130,7 +130,7 @@ impl TestHeap {
         assert_eq!(usage.in_use_bytes, used_bytes);
         assert_eq!(
             usage.capacity_bytes,
-            self.regions.iter().map(Region::tileable).sum::<usize>()
+            self.regions.iter().map(TestRegion::tileable).sum::<usize>()
         );
         let outstanding = usage.allocations - usage.deallocations;
         assert_eq!(usize::try_from(outstanding), Ok(walk.used_blocks));
@@ -144,13 +144,13 @@ impl TestHeap {
         for (first, second) in
             (0..FIRST_LEVEL).flat_map(|first| (0..SECOND_LEVEL).map(move |second| (first, second)))
         {
-            let class = Class { first, second };
+            let class = SizeClass { first, second };
             let mut before = None;
             let mut next = self.tlsf.free.head(class);
             assert_eq!(self.tlsf.free.is_marked(class), next.is_some());
             while let Some(block) = next {
                 assert!(free_blocks.contains(&block), "Listing");
-                assert_eq!(Class::of(block.size()), class, "Listing");
+                assert_eq!(SizeClass::of(block.size()), class, "Listing");
                 assert_eq!(block.links().before, before, "Listing");
                 listed += 1;
                 assert!(listed <= free_blocks.len(), "a list runs in circles");
@@ -162,7 +162,7 @@ impl TestHeap {
     }
 }
 
-impl Region {
+impl TestRegion {
     /// Bytes of its blocks: all but the end marker.
     fn tileable(&self) -> usize {
         self.layout.size() / GRANULE * GRANULE - HEADER_SIZE

@@ -7,7 +7,7 @@ mod random;
 
 use core::ptr::NonNull;
 
-use super::{Tlsf, Usage};
+use super::{HeapUsage, Tlsf};
 use heap::TestHeap;
 
 /// Bytes of a test region whose one block has `WHOLE` bytes.
@@ -27,7 +27,7 @@ fn distance(from: NonNull<u8>, to: NonNull<u8>) -> usize {
 fn a_heap_without_regions_has_nothing() {
     let mut heap = TestHeap::new(&[]);
     assert_eq!(heap.allocate(1, 1), None);
-    assert_eq!(heap.usage(), Usage::default());
+    assert_eq!(heap.usage(), HeapUsage::default());
     heap.validate();
 }
 
@@ -156,7 +156,7 @@ fn usage_counts_whole_blocks_and_keeps_the_peak() {
     heap.deallocate(second, 112, 8);
     assert_eq!(heap.allocate(LENGTH, 8), None);
     heap.allocate(1, 8).expect("memory for a byte");
-    let usage = Usage {
+    let usage = HeapUsage {
         allocations: 4,
         deallocations: 1,
         in_use_bytes: 256 + 32,

@@ -21,14 +21,14 @@ fn size(random: &mut Random, log2: usize) -> usize {
     1 + random.index(bound)
 }
 
-struct Held {
+struct HeldBlock {
     payload: NonNull<u8>,
     size: usize,
     align: usize,
     pattern: u8,
 }
 
-impl Held {
+impl HeldBlock {
     fn fill(&self) {
         // SAFETY: the heap says that these bytes are ours; that is under test.
         unsafe { self.payload.write_bytes(self.pattern, self.size) };
@@ -46,13 +46,13 @@ impl Held {
 }
 
 /// The heap, and what its callers hold, by address.
-struct Trace {
+struct CheckedHeap {
     heap: TestHeap,
-    held: BTreeMap<usize, Held>,
+    held: BTreeMap<usize, HeldBlock>,
     random: Random,
 }
 
-impl Trace {
+impl CheckedHeap {
     fn new(seed: u64) -> Self {
         println!("seed {seed}");
         Self {
@@ -103,7 +103,7 @@ impl Trace {
         let taken = self.heap.usage().in_use_bytes - before;
         assert!(taken <= size.next_multiple_of(16) + 16 + 16, "{taken}");
         let pattern = self.random.within(0..=u8::MAX);
-        self.hold(Held {
+        self.hold(HeldBlock {
             payload,
             size,
             align,
@@ -133,7 +133,7 @@ impl Trace {
         self.hold(held);
     }
 
-    fn hold(&mut self, held: Held) {
+    fn hold(&mut self, held: HeldBlock) {
         let start = held.payload.addr().get();
         let end = start + held.size;
         if let Some((_, before)) = self.held.range(..=start).next_back() {
@@ -149,7 +149,7 @@ impl Trace {
         self.held.insert(start, held);
     }
 
-    fn pick(&mut self) -> Option<Held> {
+    fn pick(&mut self) -> Option<HeldBlock> {
         let index = self.random.index(self.held.len().max(1));
         let (&start, _) = self.held.iter().nth(index)?;
         self.held.remove(&start)
@@ -170,7 +170,7 @@ impl Trace {
 #[test]
 fn random_traces_keep_contents_apart_and_merge_at_the_end() {
     for seed in 1..=50 {
-        let mut trace = Trace::new(seed);
+        let mut trace = CheckedHeap::new(seed);
         if seed > 40 {
             trace.exhaust();
         }
