@@ -16,7 +16,7 @@ use executive::machine::fault::CpuException;
 use executive::machine::interrupt::Interrupted;
 use executive::machine::{cpu, interrupt_flag, non_maskable, power, this_core};
 use executive::run::{containment, execution};
-use executive::text::backtrace::Spot;
+use executive::text::backtrace::CodeLocation;
 use executive::text::console::{write_in_emergency, write_line_in_emergency};
 use fass::edge::Excerpt;
 use front::app::ending::Told;
@@ -123,7 +123,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         line.text("place", place).text("message", &message);
     });
     write_line_in_emergency(&line);
-    let spot = registers.map_or_else(Spot::here, |registers| Spot {
+    let spot = registers.map_or_else(CodeLocation::here, |registers| CodeLocation {
         instruction: Some(registers.rip),
         stack_pointer: registers.rsp,
     });

@@ -26,7 +26,7 @@ use crate::machine::fault::CpuException;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{cpu, interrupt_flag, this_core};
-use crate::text::backtrace::Spot;
+use crate::text::backtrace::CodeLocation;
 use fass::edge::Excerpt;
 use front::json;
 
@@ -36,12 +36,12 @@ const MESSAGE_BYTES: usize = 400;
 const NAME_BYTES: usize = 60;
 
 /// What happened, as the report says it.
-struct Fault<'a> {
+struct ContainedFault<'a> {
     cause: &'a str,
     message: &'a dyn Display,
     place: &'a dyn Display,
     address: Option<u64>,
-    spot: Spot,
+    spot: CodeLocation,
 }
 
 /// Ends the instance that panics, if it is a subtask's; else returns.
@@ -66,12 +66,12 @@ pub fn end_panicked(info: &PanicInfo<'_>) {
     };
     report(
         instance,
-        &Fault {
+        &ContainedFault {
             cause: "panic",
             message: &message,
             place: &place_of(info),
             address: None,
-            spot: Spot::here(),
+            spot: CodeLocation::here(),
         },
     );
     cpu::ask_for_end();
@@ -98,12 +98,12 @@ pub fn end_faulty(exception: &CpuException<'_>, interrupted: &mut Interrupted) -
     let rip = exception.registers.rip;
     report(
         instance,
-        &Fault {
+        &ContainedFault {
             cause: exception.name,
             message: exception,
             place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
             address: exception.address,
-            spot: Spot {
+            spot: CodeLocation {
                 instruction: Some(rip),
                 stack_pointer: exception.registers.rsp,
             },
@@ -129,12 +129,12 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
     let rip = interrupted.instruction();
     report(
         instance,
-        &Fault {
+        &ContainedFault {
             cause: "budget overrun",
             message: &format_args!("executed for more than its budget of {budget:?}"),
             place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
             address: None,
-            spot: Spot {
+            spot: CodeLocation {
                 instruction: Some(rip),
                 stack_pointer: interrupted.stack_pointer(),
             },
@@ -159,8 +159,8 @@ pub fn place_of(info: &PanicInfo<'_>) -> impl Display {
     })
 }
 
-fn report(instance: Instance, fault: &Fault<'_>) {
-    let Fault {
+fn report(instance: Instance, fault: &ContainedFault<'_>) {
+    let ContainedFault {
         cause,
         message,
         place,

@@ -28,7 +28,7 @@ const STACK_BYTES: u64 = 64 * 1024;
 const MAIN_STACK_BYTES: u64 = 256 * 1024;
 
 #[derive(Debug)]
-struct Stock {
+struct ContextPool {
     free: Vec<Parked>,
     /// How many there are, free or not.
     total: usize,
@@ -36,7 +36,7 @@ struct Stock {
     stack_bytes: u64,
 }
 
-static STOCK: SpinLock<Stock> = SpinLock::new(Stock {
+static STOCK: SpinLock<ContextPool> = SpinLock::new(ContextPool {
     free: Vec::new(),
     total: 0,
     stack_bytes: 0,

@@ -6,7 +6,7 @@ use crate::machine::{clock, cpu, interrupt_flag, this_core, turns};
 
 /// Occupies the calling instance's core for `ns` of execution, halted in between.
 pub(crate) fn hold(ns: u64) {
-    let executed = Executed::from_now();
+    let executed = ExecutionTimer::from_now();
     loop {
         interrupt_flag::disable();
         let left_ns = ns.saturating_sub(executed.ns());
@@ -27,7 +27,7 @@ pub(crate) fn hold(ns: u64) {
 
 /// Occupies the calling instance's core for `ns` of execution, computing.
 pub(crate) fn spin(ns: u64) {
-    let executed = Executed::from_now();
+    let executed = ExecutionTimer::from_now();
     while executed.ns() < ns {
         turns::stand_back();
         cpu::relax();
@@ -36,13 +36,13 @@ pub(crate) fn spin(ns: u64) {
 }
 
 /// A stopwatch that stands still while its context is suspended.
-struct Executed {
+struct ExecutionTimer {
     context: &'static Context,
     start_ns: u64,
     suspended_before_ns: u64,
 }
 
-impl Executed {
+impl ExecutionTimer {
     fn from_now() -> Self {
         let were_enabled = interrupt_flag::disable();
         let context = this_core::get().context();

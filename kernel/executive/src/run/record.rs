@@ -15,7 +15,7 @@ use crate::machine::spinlock::SpinLock;
 use crate::text::console;
 use front::report::{self, Lines};
 
-type File = BootRecord<To>;
+type File = BootRecord<RecordSink>;
 
 static RECORD: SpinLock<Option<File>> = SpinLock::new(None);
 
@@ -23,12 +23,12 @@ static RECORD: SpinLock<Option<File>> = SpinLock::new(None);
 static IS_LIVE: AtomicBool = AtomicBool::new(false);
 
 /// The way of its bytes out of the machine.
-pub(super) enum To {
+pub(super) enum RecordSink {
     Port,
     Console(Box<Lines>),
 }
 
-impl Sink for To {
+impl Sink for RecordSink {
     fn put(&mut self, bytes: &[u8]) {
         match self {
             Self::Port => debug_port::send(bytes),
@@ -41,8 +41,8 @@ impl Sink for To {
 pub fn begin(is_live: bool) {
     IS_LIVE.store(is_live, Ordering::Relaxed);
     *RECORD.lock() = Some(BootRecord::new(match debug_port::is_there() {
-        true => To::Port,
-        false => To::Console(Box::new(Lines::new())),
+        true => RecordSink::Port,
+        false => RecordSink::Console(Box::new(Lines::new())),
     }));
 }
 
@@ -116,7 +116,7 @@ pub fn end_run(run: &Run) {
 /// Ends the record.
 pub fn end() {
     let record = RECORD.lock().take();
-    if let Some(To::Console(mut lines)) = record.map(BootRecord::end) {
+    if let Some(RecordSink::Console(mut lines)) = record.map(BootRecord::end) {
         lines.flush();
     }
 }

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use super::execution::{self, Loan, Work};
+use super::execution::{self, CoreWork, RunnerLoan};
 use super::heartbeat;
 use crate::machine::context::Parked;
 use crate::machine::this_core::{self, Core};
@@ -17,12 +17,12 @@ pub fn work() -> Parked {
     let mut work = find_work();
     loop {
         work = match work {
-            Work::Run(runner) => run(runner),
-            Work::Continue(context) => {
+            CoreWork::Run(runner) => run(runner),
+            CoreWork::Continue(context) => {
                 turns::enter_by_interrupt(this_core::get());
                 return context;
             }
-            Work::Rest => {
+            CoreWork::Rest => {
                 rest(this_core::get());
                 find_work()
             }
@@ -31,16 +31,16 @@ pub fn work() -> Parked {
 }
 
 /// Finds what this core, which has computed nothing, is to do. Interrupts are disabled.
-fn find_work() -> Work {
+fn find_work() -> CoreWork {
     let work = execution::find_work();
-    if let Work::Run(_) = &work {
+    if let CoreWork::Run(_) = &work {
         turns::enter();
     }
     work
 }
 
 /// Calls a subtask's function, with interrupts enabled meanwhile.
-fn run(mut runner: Loan) -> Work {
+fn run(mut runner: RunnerLoan) -> CoreWork {
     interrupt_flag::enable();
     runner.run();
     interrupt_flag::disable_enabled();

@@ -10,20 +10,20 @@ const MOST: usize = 24;
 
 /// Where code was as it failed.
 #[derive(Clone, Copy, Debug)]
-pub struct Spot {
+pub struct CodeLocation {
     /// The instruction, if it is known apart from the stack.
     pub instruction: Option<u64>,
     /// The stack pointer there, or further down.
     pub stack_pointer: u64,
 }
 
-impl Spot {
+impl CodeLocation {
     /// Returns the place of this very call.
     #[inline(never)]
     #[must_use]
-    pub fn here() -> Spot {
+    pub fn here() -> CodeLocation {
         let local = 0u8;
-        Spot {
+        CodeLocation {
             instruction: None,
             stack_pointer: (&raw const local) as u64,
         }

@@ -39,7 +39,7 @@ use front::console::{Kind, Pieces};
 use crate::machine::spinlock::SpinLock;
 use crate::machine::{screen, serial};
 
-static BUFFER: SpinLock<Buffer<{ 16 * 1024 }>> = SpinLock::new(Buffer::new());
+static BUFFER: SpinLock<OutputRing<{ 16 * 1024 }>> = SpinLock::new(OutputRing::new());
 
 /// Whether text waits for idle cores.
 static DEFERRED: AtomicBool = AtomicBool::new(false);
@@ -202,7 +202,7 @@ impl<W: Write> Write for AtMost<W> {
 const RESERVE: usize = 4096;
 
 /// A ring of `N` bytes.
-struct Buffer<const N: usize> {
+struct OutputRing<const N: usize> {
     bytes: [u8; N],
     /// The place of the oldest byte.
     start: usize,
@@ -214,7 +214,7 @@ struct Buffer<const N: usize> {
     dropped: u64,
 }
 
-impl<const N: usize> Buffer<N> {
+impl<const N: usize> OutputRing<N> {
     const fn new() -> Self {
         Self {
             bytes: [0; N],
@@ -276,14 +276,14 @@ mod tests {
 
     /// Takes all of these and returns what is then to be sent.
     fn sent(pieces: &[(&str, Kind, bool)]) -> String {
-        let mut buffer = Buffer::<SIZE>::new();
+        let mut buffer = OutputRing::<SIZE>::new();
         for (text, kind, begins) in pieces {
             assert!(buffer.take(text.as_bytes(), *kind, *begins), "{text}");
         }
         emptied(&mut buffer)
     }
 
-    fn emptied(buffer: &mut Buffer<SIZE>) -> String {
+    fn emptied(buffer: &mut OutputRing<SIZE>) -> String {
         let bytes: Vec<u8> = core::iter::from_fn(|| buffer.pop()).collect();
         String::from_utf8(bytes).unwrap()
     }
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_piece_that_does_not_fit_is_refused_as_a_whole() {
-        let mut buffer = Buffer::<SIZE>::new();
+        let mut buffer = OutputRing::<SIZE>::new();
         assert!(buffer.take(b"0123456789abcde\n", Kind::Text, true));
         assert!(!buffer.take(b"x", Kind::Text, true));
         assert!(!buffer.take(b"{}\n", Kind::Line, true));
@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn bytes_come_out_in_order_however_often_the_ring_goes_round() {
-        let mut buffer = Buffer::<SIZE>::new();
+        let mut buffer = OutputRing::<SIZE>::new();
         let (mut wanted, mut got) = (String::new(), String::new());
         for number in 0..2000 {
             let text = format!("{number};");

@@ -12,14 +12,14 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering
 use fass::SetOnce;
 use sched_dag::CoreId;
 
-use super::Execution;
+use super::ClusterRun;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core::{self, Core};
 
 /// What a cluster has for itself, on cache lines of its own.
 #[repr(align(128))]
-pub(super) struct Cluster {
-    pub(super) execution: SpinLock<Option<Execution>>,
+pub(super) struct ClusterState {
+    pub(super) execution: SpinLock<Option<ClusterRun>>,
     /// When the first core's timer shall next step the scheduler, on the clock;
     /// `u64::MAX` if never.
     next_event_ns: AtomicU64,
@@ -37,10 +37,10 @@ pub(super) struct Cluster {
 pub(super) const MAY_DIVIDE: bool = cfg!(feature = "clusters");
 
 /// Cluster 0: of all cores, if they are not divided.
-pub(super) static FIRST: Cluster = Cluster::new();
+pub(super) static FIRST: ClusterState = ClusterState::new();
 
 /// The other ones that there can be, made when cores are divided for the first time.
-pub(super) static OTHERS: SetOnce<alloc::boxed::Box<[Cluster]>> = SetOnce::new();
+pub(super) static OTHERS: SetOnce<alloc::boxed::Box<[ClusterState]>> = SetOnce::new();
 
 /// How many there are besides cluster 0.
 pub(super) static BESIDES: AtomicUsize = AtomicUsize::new(0);
@@ -48,7 +48,7 @@ pub(super) static BESIDES: AtomicUsize = AtomicUsize::new(0);
 /// The seat of a cluster's first core.
 pub(super) const FIRST_SEAT: CoreId = CoreId(0);
 
-impl Cluster {
+impl ClusterState {
     /// Returns the number of the core in a seat among all cores.
     pub(super) fn core(&self, seat: CoreId) -> u32 {
         match MAY_DIVIDE {
@@ -87,7 +87,7 @@ impl Cluster {
 }
 
 /// Returns all clusters of the run.
-pub(super) fn all() -> impl Iterator<Item = &'static Cluster> {
+pub(super) fn all() -> impl Iterator<Item = &'static ClusterState> {
     (0..count()).map(nth)
 }
 
@@ -106,7 +106,7 @@ pub(super) fn are_divided() -> bool {
 
 /// Returns a cluster; cluster 0 if there is no such one.
 #[inline]
-pub(super) fn nth(number: usize) -> &'static Cluster {
+pub(super) fn nth(number: usize) -> &'static ClusterState {
     match number {
         1.. if MAY_DIVIDE => another(number),
         _ => &FIRST,
@@ -114,14 +114,14 @@ pub(super) fn nth(number: usize) -> &'static Cluster {
 }
 
 #[inline(never)]
-fn another(number: usize) -> &'static Cluster {
+fn another(number: usize) -> &'static ClusterState {
     let others = OTHERS.get().map_or(&[][..], |others| others);
     others.get(number - 1).unwrap_or(&FIRST)
 }
 
 /// Returns the cluster that a core is in.
 #[inline]
-pub(super) fn of(core: &Core) -> &'static Cluster {
+pub(super) fn of(core: &Core) -> &'static ClusterState {
     nth(core.group.load(Ordering::Relaxed) as usize)
 }
 
@@ -132,7 +132,7 @@ pub fn first_core(number: usize) -> u32 {
 
 /// Has this core belong to another cluster, whose lock is held, and returns its own seat, which it
 /// is to take again. Its seat, if it has one there, is then counted from that cluster's first core.
-pub(super) fn visit(cluster: &Cluster) -> u32 {
+pub(super) fn visit(cluster: &ClusterState) -> u32 {
     let core = this_core::get();
     // As journals have it, and back in the number that it is added to.
     let seat = (core.index.wrapping_sub(cluster.core(FIRST_SEAT))) & u32::from(u16::MAX);

@@ -9,9 +9,9 @@ use fass::LaunchError;
 use sched_dag::lifecycle::{self, Lifecycle, Parts};
 use sched_dag::{DagId, TaskSet};
 
-use super::cluster::{BESIDES, Cluster, MAY_DIVIDE, OTHERS, nth};
+use super::cluster::{BESIDES, ClusterState, MAY_DIVIDE, OTHERS, nth};
 use super::letters::Letters;
-use super::{Execution, cluster};
+use super::{ClusterRun, cluster};
 use crate::machine::this_core;
 
 /// Divides the cores as a task set says, and what serves requests. None of them runs anything.
@@ -31,7 +31,7 @@ pub(super) fn divide(
     let count = task_set.clusters().count();
     if count > 1 && OTHERS.get().is_none() {
         // Each has a core at least; and the cores that no cluster has are one, too.
-        OTHERS.set((1..cores.len()).map(|_| Cluster::new()).collect());
+        OTHERS.set((1..cores.len()).map(|_| ClusterState::new()).collect());
     }
     BESIDES.store(count - 1, Ordering::Relaxed);
     let mut rest = cores.iter();
@@ -52,7 +52,7 @@ pub(super) fn divide(
 
 /// Returns the cluster of a DAG; cluster 0 if there is no run that has it.
 #[inline]
-pub(super) fn of_dag(dag: DagId) -> &'static Cluster {
+pub(super) fn of_dag(dag: DagId) -> &'static ClusterState {
     match MAY_DIVIDE && cluster::are_divided() {
         true => among_several(dag),
         // Known by its address wherever cores cannot be divided.
@@ -60,9 +60,9 @@ pub(super) fn of_dag(dag: DagId) -> &'static Cluster {
     }
 }
 
-fn among_several(dag: DagId) -> &'static Cluster {
+fn among_several(dag: DagId) -> &'static ClusterState {
     let place = nth(0).execution.lock();
-    let task_set = place.as_ref().map(Execution::task_set);
+    let task_set = place.as_ref().map(ClusterRun::task_set);
     let dag = task_set.and_then(|task_set| task_set.dags().get(dag.index()));
     nth(dag.map_or(0, |dag| dag.cluster().index()))
 }

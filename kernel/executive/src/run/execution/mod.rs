@@ -34,9 +34,9 @@ use crate::machine::context::Parked;
 use crate::machine::this_core;
 pub use cluster::{count as clusters, first_core};
 pub use divided::is_finished;
-pub use loans::Loan;
-use loans::Loans;
-use port::{Runner, SmpPort};
+pub use loans::RunnerLoan;
+use loans::RunnerTable;
+use port::{CoreRunner, SmpPort};
 pub use port::{arm_all, arm_next_event, keeps_time, since_epoch};
 pub use status::look_at_clearing;
 pub use status::{
@@ -44,14 +44,14 @@ pub use status::{
     try_names, with_scheduler,
 };
 pub use status::{control, nominal_end_ns, task_set};
-use step::Signals;
+use step::RequestQueue;
 pub use step::{complete, fail, find_work, interrupt};
 pub use step::{raise, raise_in_interrupt};
 
 /// What a core is to do next.
-pub enum Work {
+pub enum CoreWork {
     /// Call the subtask's function for the instance.
-    Run(Loan),
+    Run(RunnerLoan),
     /// Go on with this context.
     Continue(Parked),
     /// Nothing.
@@ -59,10 +59,10 @@ pub enum Work {
 }
 
 /// A run as one cluster has it, from its launch until it is taken out.
-struct Execution {
-    engine: Engine<Loan, Parked>,
-    loans: Loans,
-    cluster: &'static cluster::Cluster,
+struct ClusterRun {
+    engine: Engine<RunnerLoan, Parked>,
+    loans: RunnerTable,
+    cluster: &'static cluster::ClusterState,
     /// What core 0 does when nothing is assigned to it, while something is.
     background: Option<Parked>,
     /// When the next dispatch is due, on the clock, if it waits for further events
@@ -75,7 +75,7 @@ struct Execution {
     /// Whether a completion may be all of a step: no dispatch is owed, nor ever
     /// waits.
     may_hand_off: bool,
-    signals: Signals,
+    signals: RequestQueue,
     /// In the first cluster.
     proven: ProvenBounds,
 }
@@ -105,9 +105,9 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
     let share = task_set.clusters().count();
     let free_bytes = (heap.capacity_bytes - heap.in_use_bytes) / share;
     let most_events = terms.most_events / share as u64;
-    let mut executions: Vec<Execution> = task_set
+    let mut executions: Vec<ClusterRun> = task_set
         .clusters()
-        .map(|id| Execution {
+        .map(|id| ClusterRun {
             engine: Engine::new::<SmpPort<'_>>(
                 id,
                 Scheduler::of_cluster(Arc::clone(task_set), options, id),
@@ -115,21 +115,21 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
                 PendingRequests::new(plan.bodies.len(), lifecycles.next().flatten()),
                 plan.after_fault.clone(),
             ),
-            loans: Loans::new(task_set.vertices()),
+            loans: RunnerTable::new(task_set.vertices()),
             cluster: cluster::nth(id.index()),
             background: None,
             dispatch_due_ns: None,
             coincidence_ns,
             budget_factor: terms.budget_factor,
             may_hand_off: coincidence_ns == 0,
-            signals: Signals::new(&plan, &letters),
+            signals: RequestQueue::new(&plan, &letters),
             proven: ProvenBounds::default(),
         })
         .collect();
     executions[0].proven = plan.proven;
     for runner in port::runners(task_set, plan.bodies, terms.budget_factor) {
         let cluster = task_set.dag(runner.instance.dag).cluster();
-        let Execution { engine, loans, .. } = &mut executions[cluster.index()];
+        let ClusterRun { engine, loans, .. } = &mut executions[cluster.index()];
         let loan = loans.lend(runner);
         engine.put(loan.vertex, loan);
     }
@@ -158,7 +158,7 @@ pub fn begin(epoch_ns: u64) -> Option<u64> {
 /// Takes the run out when it has ended, and drops what it has left behind.
 pub fn end() -> Option<Run> {
     let parts = cluster::all().filter_map(|cluster| cluster.execution.lock().take());
-    let mut parts: Vec<Execution> = parts.collect();
+    let mut parts: Vec<ClusterRun> = parts.collect();
     let (first, others) = parts.split_first_mut()?;
     let cores = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
     let proven = core::mem::take(&mut first.proven);
@@ -170,7 +170,7 @@ pub fn end() -> Option<Run> {
     Some(run)
 }
 
-impl Execution {
+impl ClusterRun {
     const fn task_set(&self) -> &Arc<TaskSet> {
         &self.engine.task_set
     }

@@ -14,9 +14,9 @@ use sched_dag::lifecycle::{self, Request};
 use sched_dag::{ClusterId, CoreId, DriverNotice, Preemption, SchedulerOptions, TaskSet};
 
 use super::EPOCH_NS;
-use super::cluster::{self, Cluster, CoreSet, FIRST_SEAT, MAY_DIVIDE};
+use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, MAY_DIVIDE};
 use super::letters::{self, Letters};
-use super::loans::Loan;
+use super::loans::RunnerLoan;
 use super::status::note_running;
 use crate::machine::clock;
 use crate::machine::this_core::{self, Core};
@@ -25,14 +25,14 @@ use crate::run::{contexts, edge};
 
 /// A step of the engine on this core.
 pub(super) struct SmpPort<'a> {
-    pub(super) cluster: &'static Cluster,
+    pub(super) cluster: &'static ClusterState,
     pub(super) id: ClusterId,
     pub(super) letters: &'a Letters,
     /// The other cores that have to look at what they should run.
     pub(super) woken: &'a mut CoreSet,
 }
 
-impl PlatformPort<Loan> for SmpPort<'_> {
+impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     /// The edge tells of these, where a topic is recorded.
     const HEARS: &'static [EventKind] = fass::edge::HEARS;
 
@@ -48,7 +48,7 @@ impl PlatformPort<Loan> for SmpPort<'_> {
     /// Start and finish are stamped with interrupts disabled, so that no preemption can stand
     /// between a stamp and what it says.
     #[inline(always)]
-    fn start(&mut self, _: CoreId, loan: &mut Loan) -> u64 {
+    fn start(&mut self, _: CoreId, loan: &mut RunnerLoan) -> u64 {
         let core = this_core::get();
         note_running(core, Some(loan.subject()));
         let now_ns = clock::now_ns();
@@ -94,21 +94,21 @@ impl PlatformPort<Loan> for SmpPort<'_> {
     }
 }
 
-/// A subtask's [runner](fass::Runner), and what running an instance of it takes here.
+/// A subtask's [runner](fass::SubtaskRunner), and what running an instance of it takes here.
 ///
 /// There is one for each subtask, as a subtask has one started instance at a time
-/// (R2). Between its place and the core that runs it moves a [`Loan`].
-pub struct Runner {
+/// (R2). Between its place and the core that runs it moves a [`RunnerLoan`].
+pub struct CoreRunner {
     pub(super) inner: fass::SubtaskRunner,
-    cluster: &'static Cluster,
+    cluster: &'static ClusterState,
     /// The time that an instance may execute for, `u64::MAX` if there is no limit.
     pub(super) budget_ns: u64,
 }
 
-impl Runner {
+impl CoreRunner {
     /// Returns the cluster that runs it.
     #[inline]
-    pub(super) const fn cluster(&self) -> &'static Cluster {
+    pub(super) const fn cluster(&self) -> &'static ClusterState {
         match cluster::MAY_DIVIDE {
             true => self.cluster,
             false => &cluster::FIRST,
@@ -116,7 +116,7 @@ impl Runner {
     }
 }
 
-impl Deref for Runner {
+impl Deref for CoreRunner {
     type Target = fass::SubtaskRunner;
 
     #[inline]
@@ -125,7 +125,7 @@ impl Deref for Runner {
     }
 }
 
-impl DerefMut for Runner {
+impl DerefMut for CoreRunner {
     #[inline]
     fn deref_mut(&mut self) -> &mut fass::SubtaskRunner {
         &mut self.inner
@@ -137,11 +137,11 @@ pub(super) fn runners(
     task_set: &TaskSet,
     bodies: Vec<Vec<SubtaskCode>>,
     budget_factor: u64,
-) -> impl Iterator<Item = Runner> {
+) -> impl Iterator<Item = CoreRunner> {
     fass::SubtaskRunner::all(task_set, bodies).map(move |inner| {
         let dag = task_set.dag(inner.instance.dag);
         let subtask = dag.subtask(inner.instance.subtask);
-        Runner {
+        CoreRunner {
             cluster: cluster::nth(dag.cluster().index()),
             budget_ns: subtask.most_execution_ns(budget_factor),
             inner,

@@ -18,7 +18,7 @@ use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet};
 
 use super::cluster::{self, CoreSet, FIRST_SEAT};
-use super::{Execution, Loan, divided};
+use super::{ClusterRun, RunnerLoan, divided};
 use crate::machine::clock;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core::{self, Core};
@@ -192,12 +192,12 @@ pub fn look_at_clearing<R>(look: impl FnOnce(&str, u64) -> R) -> Option<R> {
 }
 
 /// Drops what the clusters of a run have left behind, and gives back what faults have left.
-pub(super) fn clear(executions: &mut [Execution]) {
+pub(super) fn clear(executions: &mut [ClusterRun]) {
     let task_set = Arc::clone(executions[0].task_set());
     for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
         let engine = &mut executions[dag.cluster().index()].engine;
         *CLEARING.lock() = Some((Arc::clone(&task_set), id, clock::now_ns()));
-        let of_dag = |lost: &mut Loan| lost.instance.dag == id;
+        let of_dag = |lost: &mut RunnerLoan| lost.instance.dag == id;
         let lost = engine.lost.extract_if(.., of_dag);
         lost.for_each(|lost| lost.give_back().inner.body.forget());
         for subtask in (0..).map(SubtaskId).take(dag.subtasks().len()) {
@@ -210,7 +210,7 @@ pub(super) fn clear(executions: &mut [Execution]) {
                 engine
                     .placement
                     .take(task_set.vertex(any))
-                    .map(Loan::give_back),
+                    .map(RunnerLoan::give_back),
             );
         }
         drop(CLEARING.lock().take());

@@ -22,12 +22,12 @@ use sched_dag::journal::{EventKind, EventSubject};
 use sched_dag::placement::NextWork;
 use sched_dag::{CoreId, DagId, Instance, Moment};
 
-use super::cluster::{self, Cluster, CoreSet, FIRST_SEAT, MAY_DIVIDE};
+use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, MAY_DIVIDE};
 use super::letters::Letters;
-use super::loans::Loan;
+use super::loans::RunnerLoan;
 use super::port::{SmpPort, here, instance_time_ns, seat, since_epoch};
 use super::status::{self, note_running};
-use super::{EPOCH_NS, Execution, Work};
+use super::{ClusterRun, CoreWork, EPOCH_NS};
 use crate::machine::abandoned::AbandonedContext;
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
@@ -36,13 +36,13 @@ use crate::machine::timer::{self, Alarm};
 use crate::machine::{clock, interrupt_flag, section, turns};
 use crate::run::{contexts, edge};
 
-impl Execution {
+impl ClusterRun {
     /// Returns the engine, and the port for a step of it.
     #[inline(always)]
     pub(super) fn parts<'s>(
         &'s mut self,
         woken: &'s mut CoreSet,
-    ) -> (&'s mut Engine<Loan, Parked>, SmpPort<'s>) {
+    ) -> (&'s mut Engine<RunnerLoan, Parked>, SmpPort<'s>) {
         let port = SmpPort {
             cluster: match MAY_DIVIDE {
                 true => self.cluster,
@@ -94,7 +94,7 @@ impl Execution {
 
     /// Returns the cluster that it is the run of.
     #[inline]
-    pub(super) const fn cluster(&self) -> &'static Cluster {
+    pub(super) const fn cluster(&self) -> &'static ClusterState {
         match MAY_DIVIDE {
             true => self.cluster,
             false => &cluster::FIRST,
@@ -132,22 +132,22 @@ impl Execution {
     }
 
     /// Finds what this core, which runs nothing, is to do.
-    pub(super) fn find_work(&mut self, core: &Core) -> Work {
+    pub(super) fn find_work(&mut self, core: &Core) -> CoreWork {
         let here = seat(core);
         let mut none = CoreSet::default();
         let (engine, mut port) = self.parts(&mut none);
         match engine.next(here, &mut port) {
-            NextWork::Start(_, runner) => Work::Run(runner),
+            NextWork::Start(_, runner) => CoreWork::Run(runner),
             NextWork::Continue(context) => {
                 self.note_resumed(core, &context, clock::now_ns());
                 note_running(core, self.current(here.index()).map(EventSubject::of));
-                Work::Continue(context)
+                CoreWork::Continue(context)
             }
             // Only core 0 has a background, and only while it does other work.
             NextWork::Nothing => {
                 note_running(core, None);
                 let background = self.background.take_if(|_| core.index == 0);
-                background.map_or(Work::Rest, Work::Continue)
+                background.map_or(CoreWork::Rest, CoreWork::Continue)
             }
         }
     }
@@ -230,11 +230,11 @@ impl Execution {
 }
 
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
-pub fn find_work() -> Work {
+pub fn find_work() -> CoreWork {
     let core = this_core::get();
     let mut place = cluster::of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
-        return Work::Rest;
+        return CoreWork::Rest;
     };
     let work = execution.find_work(core);
     drop(place);
@@ -242,23 +242,23 @@ pub fn find_work() -> Work {
 }
 
 /// Leaves the turns to others if this core does not compute.
-fn take_turns(core: &Core, work: Work) -> Work {
+fn take_turns(core: &Core, work: CoreWork) -> CoreWork {
     match &work {
-        Work::Run(_) => {}
-        Work::Continue(context) if !context.is_background() => {}
-        Work::Continue(_) | Work::Rest => turns::rest(core),
+        CoreWork::Run(_) => {}
+        CoreWork::Continue(context) if !context.is_background() => {}
+        CoreWork::Continue(_) | CoreWork::Rest => turns::rest(core),
     }
     work
 }
 
 /// Reports that this core has run its instance, and finds what it is to do
 /// next. Interrupts are disabled.
-pub fn complete(finished: Loan, finish_ns: u64) -> Work {
+pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
     let core = this_core::get();
     let here = seat(core);
     let mut place = finished.cluster().execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
-        return Work::Rest;
+        return CoreWork::Rest;
     };
     let vertex = finished.vertex;
     let run_ns = instance_time_ns(finish_ns);
@@ -266,7 +266,7 @@ pub fn complete(finished: Loan, finish_ns: u64) -> Work {
     let mut woken = CoreSet::default();
     let (engine, mut port) = execution.parts(&mut woken);
     match engine.complete((here, vertex), finished, run_ns, is_alone, &mut port) {
-        NextAction::Run(successor) => return Work::Run(successor),
+        NextAction::Run(successor) => return CoreWork::Run(successor),
         NextAction::Look {
             is_rescheduled: false,
         } => {}
@@ -333,7 +333,7 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
 }
 
 /// The requests of a run that are on their way to its scheduler.
-pub(super) struct Signals {
+pub(super) struct RequestQueue {
     /// The number of the plan that runs.
     pub(super) plan: u64,
     /// Whether the run has begun, so that there is time.
@@ -341,7 +341,7 @@ pub(super) struct Signals {
     pub(super) letters: Letters,
 }
 
-impl Signals {
+impl RequestQueue {
     pub(super) fn new(plan: &Plan, letters: &Letters) -> Self {
         Self {
             plan: plan.number,
@@ -351,7 +351,7 @@ impl Signals {
     }
 }
 
-impl Execution {
+impl ClusterRun {
     /// Begins to pass signals on, those from before at time 0.
     pub(super) fn begin_signals(&mut self) {
         self.signals.has_begun = true;
