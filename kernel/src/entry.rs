@@ -25,7 +25,7 @@ front::output!(write_as);
 /// ```ignore
 /// kernel::entry!(main);
 ///
-/// fn main(machine: &kernel::Machine) -> Result<(), kernel::Ending> { Ok(()) }
+/// fn main(machine: &kernel::Machine) -> Result<(), kernel::AppError> { Ok(()) }
 /// ```
 #[macro_export]
 macro_rules! entry {
@@ -110,7 +110,7 @@ pub fn start(
     info: &'static BootInfo,
     name: &'static str,
     is_unoptimized: bool,
-    app: fn(&crate::Machine) -> Result<(), crate::Ending>,
+    app: fn(&crate::Machine) -> Result<(), crate::AppError>,
 ) -> ! {
     IS_UNOPTIMIZED.store(is_unoptimized, Ordering::Relaxed);
     crate::start::start(info, name, app)

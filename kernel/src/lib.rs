@@ -4,9 +4,9 @@
 //! tells its [`Machine`] to run them; the kernel does the rest:
 //!
 //! ```no_run
-//! use kernel::{Ending, Machine};
+//! use kernel::{AppError, Machine};
 //!
-//! fn app(machine: &Machine) -> Result<(), Ending> {
+//! fn app(machine: &Machine) -> Result<(), AppError> {
 //!     machine.options().finish(&[])?;
 //!     // create_dag(), register_*(), finish_create_dags() ...
 //!     let run = machine.run()?;
@@ -63,10 +63,10 @@ pub use crate::app::lock::Event;
 pub use app::bare_machine::Machine;
 pub use app::lock::Lock;
 pub use executive::memory::heap::KernelHeap;
-pub use front::app::ending::Ending;
+pub use front::app::ending::AppError;
 #[doc(inline)]
 pub use front::named::{console, json, options};
-pub use front::report::Resources;
+pub use front::report::MemoryInUse;
 pub use front::{print, println};
 #[doc(inline)]
 pub use sched_dag::engine::Run;

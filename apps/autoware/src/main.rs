@@ -11,11 +11,11 @@ use core::time::Duration;
 use autoware::{Latencies, SUBTASKS, Workload};
 use fass::{Commit, ConstructionPolicy, CountLimit, Occupation, finish_create_dags_with};
 use kernel::report::{Distribution, Ns};
-use kernel::{Ending, Machine, Run, json, println};
+use kernel::{AppError, Machine, Run, json, println};
 
 kernel::entry!(main);
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let workload = workload(machine)?;
     let system = workload.build();
     system.record();
@@ -45,7 +45,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 }
 
 /// Reads the app's words of the command line.
-fn workload(machine: &Machine) -> Result<Workload, Ending> {
+fn workload(machine: &Machine) -> Result<Workload, AppError> {
     let options = machine.options();
     let jobs = options.number("jobs", 1..=10_000, 100)?;
     let crunch_us = options.number("crunch_us", 100..=1_000_000, 4_000)?;
@@ -96,7 +96,7 @@ impl Bounds {
     }
 }
 
-fn report(run: &Run, latencies: &Latencies, bounds: Bounds, digest: u64) -> Result<(), Ending> {
+fn report(run: &Run, latencies: &Latencies, bounds: Bounds, digest: u64) -> Result<(), AppError> {
     let dags = run.task_set().dags().iter();
     let statistics = dags.map(|dag| run.statistics(dag.name()));
     let violations = run
@@ -149,13 +149,13 @@ fn report(run: &Run, latencies: &Latencies, bounds: Bounds, digest: u64) -> Resu
             .number("digest", digest);
     });
     if violations > 0 {
-        return Err(Ending::Failure(format!(
+        return Err(AppError::Failure(format!(
             "{violations} violations of the model"
         )));
     }
     if run.allocations() > 0 {
         let count = run.allocations();
-        return Err(Ending::Failure(format!(
+        return Err(AppError::Failure(format!(
             "{count} allocations while running"
         )));
     }

@@ -9,11 +9,11 @@ use alloc::format;
 
 use cruise::{Releases, build, careful, trusting};
 use fass::{Wire, finish_create_dags};
-use kernel::{Ending, Machine, println};
+use kernel::{AppError, Machine, println};
 
 kernel::entry!(main);
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let jobs = options.number("jobs", 1..=100_000, 50)?;
     let releases = [("period", Releases::Period), ("packets", Releases::Packets)];
@@ -49,6 +49,6 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     println!("{} allocations while jobs ran", run.allocations());
     match run.violations().count() {
         0 => Ok(()),
-        count => Err(Ending::Failure(format!("{count} violations"))),
+        count => Err(AppError::Failure(format!("{count} violations"))),
     }
 }

@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use dag_file::{DagFile, Execution, Length, Settings, build, check, parse};
 use fass::{ConstructionPolicy, Occupation, finish_create_dags_with};
 use kernel::options::UsageError;
-use kernel::{Ending, Machine, println};
+use kernel::{AppError, Machine, println};
 use sched_dag::{CommitOptions, Policy};
 
 use report::Report;
@@ -41,7 +41,7 @@ struct Wishes {
     is_strict: bool,
 }
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     machine.offer_overheads()?;
     machine.offer_clusters()?;
     let wishes = wishes(machine)?;
@@ -64,15 +64,15 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     machine.report_memory();
     let complaint = |report: &Report| report.complaint(wishes.is_strict);
     let complaint = reports.iter().find_map(complaint);
-    complaint.map_or(Ok(()), |text| Err(Ending::Failure(text)))
+    complaint.map_or(Ok(()), |text| Err(AppError::Failure(text)))
 }
 
-fn usage(message: impl Into<String>) -> Ending {
-    Ending::Usage(UsageError::new(message))
+fn usage(message: impl Into<String>) -> AppError {
+    AppError::Usage(UsageError::new(message))
 }
 
 /// Reads the loader's file, and checks all of it before anything runs.
-fn read(machine: &Machine, length: Length) -> Result<DagFile, Ending> {
+fn read(machine: &Machine, length: Length) -> Result<DagFile, AppError> {
     let module = machine
         .module()
         .ok_or_else(|| usage("no DAG file; give one with `qemu -initrd FILE`"))?;
@@ -97,7 +97,7 @@ fn newlines(bytes: &[u8]) -> usize {
     bytes.iter().filter(|byte| **byte == b'\n').count()
 }
 
-fn wishes(machine: &Machine) -> Result<Wishes, Ending> {
+fn wishes(machine: &Machine) -> Result<Wishes, AppError> {
     let options = machine.options();
     let execution = options
         .text("execution")

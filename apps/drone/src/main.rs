@@ -11,12 +11,12 @@ use core::time::Duration;
 use drone::{Flight, Workload};
 use fass::finish_create_dags;
 use kernel::report::Ns;
-use kernel::{Ending, Machine, Run, json, println};
+use kernel::{AppError, Machine, Run, json, println};
 use sched_dag::Vertex;
 
 kernel::entry!(main);
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let seconds = options.number("seconds", 1..=100_000, 8)?;
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
@@ -52,7 +52,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     report(&run, &system.flight)
 }
 
-fn report(run: &Run, flight: &Flight) -> Result<(), Ending> {
+fn report(run: &Run, flight: &Flight) -> Result<(), AppError> {
     println!();
     println!("{flight}");
     let mut misses = 0;
@@ -98,6 +98,6 @@ fn report(run: &Run, flight: &Flight) -> Result<(), Ending> {
     });
     match violations {
         0 => Ok(()),
-        count => Err(Ending::Failure(format!("{count} violations"))),
+        count => Err(AppError::Failure(format!("{count} violations"))),
     }
 }

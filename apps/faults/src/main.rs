@@ -11,7 +11,7 @@ use alloc::format;
 use fass::finish_create_dags;
 use faults::crimes::{CRIMES, Crime};
 use faults::{FATAL_JOB, JOBS, PERIOD, POLICIES, Policy, doomed, healthy, restless};
-use kernel::{Ending, Machine, Run, json, println};
+use kernel::{AppError, Machine, Run, json, println};
 
 kernel::entry!(main);
 
@@ -19,7 +19,7 @@ kernel::entry!(main);
 /// long as an endless loop may take to be ended.
 const DURING: u64 = 2;
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let only = options.text("fault");
     let times = options.number("faults", 0..=1_000_000, 0)?;
@@ -32,7 +32,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     if !known {
         let names = CRIMES.map(|(name, _)| name).join(", ");
         let only = only.unwrap_or_default();
-        return Err(Ending::Usage(kernel::options::UsageError::new(format!(
+        return Err(AppError::Usage(kernel::options::UsageError::new(format!(
             "`fault={only}`: allowed are {names}"
         ))));
     }
@@ -61,7 +61,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
         println!("{unclear} cannot be judged: the healthy DAG was late even before the fault");
     }
     if harmful > 0 {
-        return Err(Ending::Failure(format!(
+        return Err(AppError::Failure(format!(
             "{harmful} of {tried} faults did harm"
         )));
     }
@@ -69,7 +69,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 }
 
 /// Runs a DAG with a hundred faults, and with so many, and judges what memory is left.
-fn endure(machine: &Machine, times: u32) -> Result<(), Ending> {
+fn endure(machine: &Machine, times: u32) -> Result<(), AppError> {
     machine.accept_faults(); // here they are what is wanted
     let mut before = None;
     for faults in [100, times] {
@@ -95,7 +95,7 @@ fn endure(machine: &Machine, times: u32) -> Result<(), Ending> {
                 .number("contexts", now.contexts as u64);
         });
         if now != *before.get_or_insert(now) || now.contexts != now.contexts_free {
-            return Err(Ending::Failure(format!("{faults} faults took memory")));
+            return Err(AppError::Failure(format!("{faults} faults took memory")));
         }
     }
     Ok(())
@@ -118,7 +118,7 @@ fn commit_crime(
     machine: &Machine,
     (name, crime): (&str, Crime),
     (on_fault, policy): (&str, Policy),
-) -> Result<Verdict, Ending> {
+) -> Result<Verdict, AppError> {
     let dags = [healthy(), doomed(crime, policy)];
     machine.spread(&dags);
     finish_create_dags(&dags)?;

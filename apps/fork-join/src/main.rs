@@ -13,14 +13,14 @@ use core::time::Duration;
 
 use fass::{Occupation, finish_create_dags};
 use fork_join::{MOST_PARALLEL, Pace, WCET, Work, Workload};
-use kernel::options::{Options, UsageError};
-use kernel::{Ending, Machine, println};
+use kernel::options::{CommandLine, UsageError};
+use kernel::{AppError, Machine, println};
 
 use figures::Figures;
 
 kernel::entry!(main);
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let workloads = workloads(machine)?;
     println!(
         "fork-join: source -> N parallel subtasks -> sink, period 25 ms, deadline 100 ms, {} cores;",
@@ -61,11 +61,11 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     machine.report_memory();
     all.iter()
         .find_map(Figures::complaint)
-        .map_or(Ok(()), |text| Err(Ending::Failure(text)))
+        .map_or(Ok(()), |text| Err(AppError::Failure(text)))
 }
 
 /// Reads the app's words of the command line.
-fn workloads(machine: &Machine) -> Result<Vec<Workload>, Ending> {
+fn workloads(machine: &Machine) -> Result<Vec<Workload>, AppError> {
     let options = machine.options();
     let most_parallel = MOST_PARALLEL as u64;
     let subtasks = options.numbers("subtasks", 1..=most_parallel, &[2, 4, 6])?;
@@ -91,7 +91,7 @@ fn workloads(machine: &Machine) -> Result<Vec<Workload>, Ending> {
 }
 
 /// Reads how the parallel subtasks spend their execution times.
-fn work(options: &Options<'_>) -> Result<Work, UsageError> {
+fn work(options: &CommandLine<'_>) -> Result<Work, UsageError> {
     let computes = options.choice("work", &[("simulate", false), ("compute", true)])?;
     let occupations = [("hold", Occupation::Hold), ("spin", Occupation::Spin)];
     if !computes {

@@ -13,7 +13,7 @@ use fass::finish_create_dags;
 use gait::{DAG, Walk, build};
 use kernel::options::UsageError;
 use kernel::report::Ns;
-use kernel::{Ending, Machine, Run, json, println};
+use kernel::{AppError, Machine, Run, json, println};
 use recording::Recording;
 use sched_dag::Vertex;
 
@@ -22,9 +22,9 @@ kernel::entry!(main);
 /// How many angles a machine line has at most.
 const ANGLES_A_LINE: usize = 128;
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&[])?;
-    let usage = |message: String| Ending::Usage(UsageError::new(message));
+    let usage = |message: String| AppError::Usage(UsageError::new(message));
     let module = machine.module().ok_or_else(|| {
         usage("no recording; give one by `./scripts/run --app gait --module FILE`".into())
     })?;
@@ -41,7 +41,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     report(&run, &walk)
 }
 
-fn report(run: &Run, walk: &Walk) -> Result<(), Ending> {
+fn report(run: &Run, walk: &Walk) -> Result<(), AppError> {
     let counts = run.statistics(DAG);
     println!();
     println!(
@@ -83,7 +83,7 @@ fn report(run: &Run, walk: &Walk) -> Result<(), Ending> {
     });
     match violations {
         0 => Ok(()),
-        count => Err(Ending::Failure(format!("{count} violations"))),
+        count => Err(AppError::Failure(format!("{count} violations"))),
     }
 }
 

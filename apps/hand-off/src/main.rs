@@ -13,11 +13,11 @@ mod measure;
 use alloc::vec::Vec;
 
 use kernel::options::UsageError;
-use kernel::{Ending, Machine};
+use kernel::{AppError, Machine};
 
 kernel::entry!(main);
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let plan = Plan::read(machine)?;
     (plan.part)(machine, &plan)?;
     machine.report_memory();
@@ -25,7 +25,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 }
 
 /// Makes some of the measurements.
-type Part = fn(&Machine, &Plan) -> Result<(), Ending>;
+type Part = fn(&Machine, &Plan) -> Result<(), AppError>;
 
 const PARTS: [(&str, Part); 3] = [
     ("hand-off", on_one_core),
@@ -34,7 +34,7 @@ const PARTS: [(&str, Part); 3] = [
 ];
 
 /// Measures all that one core is enough for.
-fn on_one_core(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
+fn on_one_core(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
     measure::clock();
     workloads(machine, plan)?;
     measure::preemption(machine, plan.jobs)?;
@@ -45,7 +45,7 @@ fn on_one_core(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
 }
 
 /// Measures what needs a second core.
-fn elsewhere(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
+fn elsewhere(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
     measure::woken_cores(machine, plan.jobs)?;
     measure::joins(machine, plan.jobs)?;
     measure::preemption(machine, plan.jobs)?;
@@ -53,7 +53,7 @@ fn elsewhere(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
 }
 
 /// Measures chains, fork-joins and layered graphs alone.
-fn workloads(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
+fn workloads(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
     for &subtasks in &plan.chain {
         measure::chain(machine, subtasks, plan.jobs)?;
     }
@@ -66,7 +66,7 @@ fn workloads(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
     Ok(())
 }
 
-fn wake_ups(machine: &Machine, plan: &Plan) -> Result<(), Ending> {
+fn wake_ups(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
     let mut branches = plan.branches.iter();
     branches.try_for_each(|&parallel| measure::wake_ups(machine, parallel))
 }

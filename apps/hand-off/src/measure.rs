@@ -18,7 +18,7 @@ use fass::{
 };
 use hand_off::{Pen, Shape, Stamping, Stamps, Workload, build};
 use kernel::report::Distribution;
-use kernel::{Ending, Machine, Run, json};
+use kernel::{AppError, Machine, Run, json};
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::InstanceRecord;
 use sched_dag::{CoreId, DagId, Instance, SubtaskId};
@@ -39,7 +39,7 @@ pub(crate) fn clock() {
 }
 
 /// A chain: from each subtask to the next, and from end to end.
-pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), Ending> {
+pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), AppError> {
     let name = format!("chain-{subtasks}");
     let shape = Shape::Chain(subtasks);
     let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
@@ -60,7 +60,7 @@ pub(crate) fn chain(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(),
 }
 
 /// The same chain, where each subtask has a budget; and by deadlines.
-pub(crate) fn budgets(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), Ending> {
+pub(crate) fn budgets(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), AppError> {
     let mut workload = workload(Shape::Chain(subtasks), jobs, Stamping::Ends);
     workload.wcet = Some(Duration::from_millis(1));
     let ends = Measured::run(machine, workload)?;
@@ -78,7 +78,7 @@ fn emit_hop(name: &str, ends: &Measured) {
 }
 
 /// A fork and its join: from the last return to the sink.
-pub(crate) fn fork_join(machine: &Machine, parallel: usize, jobs: u64) -> Result<(), Ending> {
+pub(crate) fn fork_join(machine: &Machine, parallel: usize, jobs: u64) -> Result<(), AppError> {
     let name = format!("fork-join-{parallel}");
     let shape = Shape::ForkJoin(parallel);
     let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
@@ -102,7 +102,7 @@ fn emit_join(name: &str, all: &Measured) {
 
 /// A fork and its join: how often the scheduler makes the sink ready. A system that wakes a sink for
 /// each of its inputs makes N wake-ups of a join of N.
-pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), Ending> {
+pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), AppError> {
     const JOBS: u64 = 20;
     let shape = Shape::ForkJoin(parallel);
     let ends = Measured::run(machine, workload(shape, JOBS, Stamping::Ends))?;
@@ -120,7 +120,7 @@ pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), Ending>
 }
 
 /// A layered random graph: from end to end, for each instance.
-pub(crate) fn layered(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), Ending> {
+pub(crate) fn layered(machine: &Machine, subtasks: usize, jobs: u64) -> Result<(), AppError> {
     let name = format!("layered-{subtasks}");
     // As many instances as a chain has, and a few jobs at least.
     let jobs = (jobs.saturating_mul(64) / subtasks as u64).clamp(3, jobs.max(3));
@@ -138,7 +138,7 @@ fn differences(times: impl Iterator<Item = u64> + Clone) -> impl Iterator<Item =
 
 /// A fork into two on an otherwise idle machine: one branch follows on the
 /// source's core, the other on a core that has to be woken.
-pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), Ending> {
+pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     let shape = Shape::ForkJoin(2);
     let all = Measured::run(machine, workload(shape, jobs, Stamping::All))?;
     let core = |subtask, job| all.instance(subtask, job)?.core;
@@ -153,7 +153,7 @@ pub(crate) fn woken_cores(machine: &Machine, jobs: u64) -> Result<(), Ending> {
 }
 
 /// Joins of branches that compute for 2 us each, on different cores.
-pub(crate) fn joins(machine: &Machine, jobs: u64) -> Result<(), Ending> {
+pub(crate) fn joins(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     const WORK: Duration = Duration::from_micros(2);
     for parallel in [2, 4] {
         let mut workload = workload(Shape::ForkJoin(parallel), jobs, Stamping::All);
@@ -173,7 +173,7 @@ const OFFSET: Duration = Duration::from_millis(1);
 const WORK_NS: u64 = 2_000_000;
 
 /// Preempts one of the low subtasks, of which each core has one.
-pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), Ending> {
+pub(crate) fn preemption(machine: &Machine, jobs: u64) -> Result<(), AppError> {
     let mut stamps = Stamps::default();
     let mut dags = alloc::vec![preemptor(jobs, stamps.pen(jobs))];
     for priority in 1..=machine.cores() {
@@ -328,7 +328,7 @@ struct Measured {
 
 impl Measured {
     /// Commits and runs.
-    fn run(machine: &Machine, workload: Workload) -> Result<Self, Ending> {
+    fn run(machine: &Machine, workload: Workload) -> Result<Self, AppError> {
         let (dag, stamps) = build(&workload);
         let before_ns = fass::now_ns();
         let dags = [dag];
@@ -415,10 +415,10 @@ impl Measured {
 }
 
 /// Runs what is committed; a breach of the model's rules is an error.
-fn run(machine: &Machine) -> Result<Run, Ending> {
+fn run(machine: &Machine) -> Result<Run, AppError> {
     let run = machine.run()?;
     if let Some(violation) = run.violations().next() {
-        return Err(Ending::Failure(alloc::format!("{violation}")));
+        return Err(AppError::Failure(alloc::format!("{violation}")));
     }
     Ok(run)
 }

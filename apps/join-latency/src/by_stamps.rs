@@ -19,7 +19,7 @@ use core::time::Duration;
 use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
 use fork_join::{ExecutionTimes, PERIOD};
 use join_latency::{Joined, Samples, Span};
-use kernel::{Ending, Event, Lock, Machine};
+use kernel::{AppError, Event, Lock, Machine};
 use pub_sub::graph::{Call, Graph, Next, TopicId};
 use pub_sub::{ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer};
 
@@ -29,7 +29,7 @@ use super::Outcome;
 const FOREVER: Duration = Duration::from_secs(1_000_000);
 
 /// Runs all jobs.
-pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, Ending> {
+pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, AppError> {
     let shared = Arc::new(Cores {
         graph: Lock::new(experiment.graph()),
         event: Event::new(),

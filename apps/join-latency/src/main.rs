@@ -22,7 +22,7 @@ use fork_join::{MOST_PARALLEL, Work, Workload};
 use join_latency::{Joined, Samples, Span};
 use kernel::options::UsageError;
 use kernel::report::{Distribution, Ns};
-use kernel::{Ending, Machine, Run, json, println};
+use kernel::{AppError, Machine, Run, json, println};
 use sched_dag::law::InstanceRecord;
 use sched_dag::{Instance, SubtaskId};
 
@@ -39,7 +39,7 @@ const WORDS: [&str; 7] = [
     "depth",
 ];
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let max_interval_ms = options.number("max_interval_ms", 1..=1_000_000, 50)?;
     let max_interval_ns = max_interval_ms * 1_000_000;
@@ -104,7 +104,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     machine.report_memory();
     outcome
         .complaint(jobs)
-        .map_or(Ok(()), |text| Err(Ending::Failure(text)))
+        .map_or(Ok(()), |text| Err(AppError::Failure(text)))
 }
 
 /// Converts a number that is within the bounds of a word.
@@ -117,7 +117,7 @@ fn at_least_one(number: u64) -> NonZeroUsize {
 }
 
 /// Runs all jobs.
-fn run_dag(machine: &Machine, workload: &Workload) -> Result<Outcome, Ending> {
+fn run_dag(machine: &Machine, workload: &Workload) -> Result<Outcome, AppError> {
     let (dag, joins) = workload.build();
     // As many jobs in flight as the subscriptions' queues have room for by default,
     // so that no release waits for the backlog on either side.

@@ -19,12 +19,12 @@ use core::time::Duration;
 
 use fass::{ConstructionPolicy, finish_create_dags_with};
 use fork_join::Pace;
-use kernel::{Ending, Machine, json, println};
+use kernel::{AppError, Machine, json, println};
 use replay::{Case, Computing, Epoch, Scale, build, parse};
 
 kernel::entry!(main);
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let cases = cases(machine)?;
     let options = machine.options();
     let unit_us = options.number("unit_us", 1..=10_000_000, 10_000)?;
@@ -50,8 +50,8 @@ fn main(machine: &Machine) -> Result<(), Ending> {
 }
 
 /// Reads the loader's file.
-fn cases(machine: &Machine) -> Result<Vec<Case>, Ending> {
-    let usage = |message: String| Ending::Usage(kernel::options::UsageError::new(message));
+fn cases(machine: &Machine) -> Result<Vec<Case>, AppError> {
+    let usage = |message: String| AppError::Usage(kernel::options::UsageError::new(message));
     let module = machine.module().ok_or_else(|| {
         usage("no file of reference schedules; give one with `qemu -initrd FILE`".to_string())
     })?;
@@ -65,10 +65,10 @@ fn run(
     case: &Case,
     scale: Scale,
     computing: Option<Computing>,
-) -> Result<(), Ending> {
+) -> Result<(), AppError> {
     /// Time for the cores to get ready.
     const LEAD_NS: u64 = 1_000_000;
-    let in_case = |message: String| Ending::Failure(format!("case {}: {message}", case.name));
+    let in_case = |message: String| AppError::Failure(format!("case {}: {message}", case.name));
     if case.cores != machine.cores() {
         let (wanted, here) = (case.cores, machine.cores());
         return Err(in_case(format!(

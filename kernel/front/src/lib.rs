@@ -47,12 +47,12 @@ pub mod named {
     /// The words of the command line.
     pub mod options {
         #[doc(inline)]
-        pub use crate::options::{Options, UsageError};
+        pub use crate::options::{CommandLine, UsageError};
     }
 
     /// Machine lines: lines of JSON among the text, for programs that read it.
     pub mod json {
         #[doc(inline)]
-        pub use crate::text::json::{Object, emit, line, quoted};
+        pub use crate::text::json::{JsonObject, emit, line, quoted};
     }
 }

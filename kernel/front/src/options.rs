@@ -40,9 +40,9 @@ const KERNELS: [&str; 21] = [
 /// The command line, with a note of which words have been taken.
 ///
 /// ```no_run
-/// use kernel::options::Options;
+/// use kernel::options::CommandLine;
 ///
-/// let options = Options::parse("jobs=20 occupy=spin sizes=1,2")?;
+/// let options = CommandLine::parse("jobs=20 occupy=spin sizes=1,2")?;
 /// assert_eq!(options.number("jobs", 1..=100, 50)?, 20);
 /// assert_eq!(options.number("seed", 0..=9, 1)?, 1); // not given: the default
 /// assert_eq!(options.numbers("sizes", 1..=4, &[1])?, [1, 2]);
@@ -51,12 +51,12 @@ const KERNELS: [&str; 21] = [
 /// # Ok::<(), kernel::options::UsageError>(())
 /// ```
 #[derive(Debug)]
-pub struct Options<'a> {
-    words: Vec<Word<'a>>,
+pub struct CommandLine<'a> {
+    words: Vec<OptionWord<'a>>,
 }
 
 #[derive(Debug)]
-struct Word<'a> {
+struct OptionWord<'a> {
     key: &'a str,
     value: &'a str,
     taken: Cell<bool>,
@@ -64,7 +64,7 @@ struct Word<'a> {
 
 /// A word of the command line is wrong: which one, and what is allowed.
 ///
-/// See [`Options::finish`].
+/// See [`CommandLine::finish`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsageError(String);
 
@@ -91,16 +91,16 @@ impl fmt::Display for UsageError {
 
 impl core::error::Error for UsageError {}
 
-impl<'a> Options<'a> {
+impl<'a> CommandLine<'a> {
     /// Splits a command line into words.
     ///
     /// # Errors
     ///
     /// If a word is not of the form `key=value`, or a key occurs twice.
     ///
-    /// See [`Options`].
+    /// See [`CommandLine`].
     pub fn parse(line: &'a str) -> Result<Self, UsageError> {
-        let mut words = Vec::<Word<'a>>::new();
+        let mut words = Vec::<OptionWord<'a>>::new();
         for word in line.split_whitespace() {
             let Some((key, value)) = word.split_once('=') else {
                 return Err(UsageError(format!("`{word}` is not of the form key=value")));
@@ -108,7 +108,7 @@ impl<'a> Options<'a> {
             if words.iter().any(|earlier| earlier.key == key) {
                 return Err(UsageError(format!("`{key}` is given twice; give it once")));
             }
-            words.push(Word {
+            words.push(OptionWord {
                 key,
                 value,
                 taken: Cell::new(false),
@@ -120,7 +120,7 @@ impl<'a> Options<'a> {
     /// Takes the value of `key` as it is, if the key is given.
     ///
     /// ```no_run
-    /// let options = kernel::options::Options::parse("map=town").unwrap();
+    /// let options = kernel::options::CommandLine::parse("map=town").unwrap();
     /// assert_eq!(options.text("map"), Some("town"));
     /// assert_eq!(options.text("seed"), None);
     /// ```
@@ -137,7 +137,7 @@ impl<'a> Options<'a> {
     /// If the value is not a whole number within `allowed`.
     ///
     /// ```no_run
-    /// let options = kernel::options::Options::parse("jobs=0").unwrap();
+    /// let options = kernel::options::CommandLine::parse("jobs=0").unwrap();
     /// let error = options.number("jobs", 1..=100, 50).unwrap_err();
     /// assert_eq!(error.to_string(), "`jobs=0`: allowed are whole numbers from 1 to 100");
     /// ```
@@ -157,7 +157,7 @@ impl<'a> Options<'a> {
     ///
     /// If one of them is not a whole number within `allowed`.
     ///
-    /// See [`Options`].
+    /// See [`CommandLine`].
     pub fn numbers(
         &self,
         key: &str,
@@ -185,7 +185,7 @@ impl<'a> Options<'a> {
     ///
     /// If there are no choices.
     ///
-    /// See [`Options`].
+    /// See [`CommandLine`].
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<T, UsageError> {
         let name = |place: usize| choices.get(place).map(|(name, _)| *name);
         Ok(choices[self.chosen(key, &name)?].1)
@@ -216,7 +216,7 @@ impl<'a> Options<'a> {
     /// If one has not: it names the word and the keys that there are.
     ///
     /// ```no_run
-    /// let options = kernel::options::Options::parse("sed=3").unwrap();
+    /// let options = kernel::options::CommandLine::parse("sed=3").unwrap();
     /// let _ = options.number("seed", 0..=9, 1);
     /// let error = options.finish(&["seed"]).unwrap_err();
     /// assert!(error.to_string().starts_with("`sed` is no option; there are seed, "));
@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn takes_words_and_falls_back_to_defaults() {
-        let options = Options::parse("jobs=20  policy=edf subtasks=2,4").unwrap();
+        let options = CommandLine::parse("jobs=20  policy=edf subtasks=2,4").unwrap();
         assert_eq!(options.number("jobs", 1..=100, 5), Ok(20));
         assert_eq!(options.number("seed", 0..=9, 5), Ok(5));
         assert_eq!(
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn names_the_word_and_what_is_allowed() {
-        let options = Options::parse("jobs=0 policy=lifo sed=1 subtasks=2,x").unwrap();
+        let options = CommandLine::parse("jobs=0 policy=lifo sed=1 subtasks=2,x").unwrap();
         let wrong = message(options.number("jobs", 1..=100, 5));
         assert_eq!(wrong, "`jobs=0`: allowed are whole numbers from 1 to 100");
         let wrong = message(options.choice("policy", &[("static", 1), ("edf", 2)]));
@@ -301,18 +301,18 @@ mod tests {
         for text in ["", " 5", "5 ", "1e3", "0x5", "18446744073709551616"] {
             assert_eq!(whole_number(text), None, "{text}");
         }
-        let options = Options::parse("jobs=+5").unwrap();
+        let options = CommandLine::parse("jobs=+5").unwrap();
         assert!(options.number("jobs", 1..=9, 5).is_err());
     }
 
     #[test]
     fn refuses_lines_that_are_not_words() {
         assert_eq!(
-            message(Options::parse("jobs")),
+            message(CommandLine::parse("jobs")),
             "`jobs` is not of the form key=value"
         );
         assert_eq!(
-            message(Options::parse("a=1 a=2")),
+            message(CommandLine::parse("a=1 a=2")),
             "`a` is given twice; give it once"
         );
     }

@@ -60,7 +60,7 @@ pub fn print_counts(snapshot: &DagSnapshot, model: &Dag) {
 ///
 /// See `Machine::resources`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Resources {
+pub struct MemoryInUse {
     /// The bytes of the heap that are in use.
     pub heap_bytes: usize,
     /// The contexts, each with a stack, that there are for instances; none on Linux, where each
@@ -72,7 +72,7 @@ pub struct Resources {
 
 /// What of its memory a program needs.
 #[derive(Clone, Copy, Debug)]
-pub struct Memory {
+pub struct MemoryDemand {
     /// The bytes of the heap that are in use.
     pub in_use_bytes: usize,
     /// The most that were.
@@ -83,7 +83,7 @@ pub struct Memory {
     pub allocations: u64,
 }
 
-impl Memory {
+impl MemoryDemand {
     /// Prints what was needed.
     pub(crate) fn report(self) {
         crate::println!(
@@ -142,12 +142,12 @@ const LINE_BYTES: usize = 768;
 
 /// Prints a record, by the line.
 #[derive(Debug)]
-pub struct Lines {
+pub struct RecordLines {
     bytes: [u8; LINE_BYTES],
     length: usize,
 }
 
-impl Lines {
+impl RecordLines {
     /// Begins with nothing.
     #[must_use]
     pub const fn new() -> Self {
@@ -168,13 +168,13 @@ impl Lines {
     }
 }
 
-impl Default for Lines {
+impl Default for RecordLines {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Sink for Lines {
+impl Sink for RecordLines {
     fn put(&mut self, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let count = bytes.len().min(LINE_BYTES - self.length);
@@ -256,7 +256,7 @@ pub fn tell_log(task_set: impl Fn() -> Option<Arc<TaskSet>>) {
                     .text("subtask_name", subtask)
                     .number("job", instance.job);
             }
-            let fields = |fields: &mut json::Object<'_, '_>| {
+            let fields = |fields: &mut json::JsonObject<'_, '_>| {
                 for (key, value) in line.fields() {
                     fields.shown(key, &value);
                 }

@@ -31,12 +31,12 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use fass::edge::Sink;
-use front::app::ending::{self, Ending, Told, Verdict};
-use front::app::terms::{self, Chosen};
+use front::app::ending::{self, AppError, AppExit, RunVerdict};
+use front::app::terms::{self, RunTerms};
 use front::json;
-use front::options::{Options, UsageError};
+use front::options::{CommandLine, UsageError};
 pub use front::output;
-use front::report::Lines;
+use front::report::RecordLines;
 use linux::{EndSignals, Linux, Mechanism};
 
 use crate::linux_system::{LinuxSystem, Machine, memory_kib};
@@ -62,32 +62,32 @@ macro_rules! entry {
 /// Runs an app with the words of the program's command line. The exit code is 0 after a
 /// success, 1 after a failure, 2 if the command line is refused.
 #[must_use]
-pub fn start(name: &'static str, app: fn(&Machine) -> Result<(), Ending>) -> ExitCode {
+pub fn start(name: &'static str, app: fn(&Machine) -> Result<(), AppError>) -> ExitCode {
     let line = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
     let run = AssertUnwindSafe(|| run(name, line.leak(), app));
     let result = catch_unwind(run).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied();
         let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
         let text = text.unwrap_or("it says nothing");
-        Err(Ending::Failure(format!(
+        Err(AppError::Failure(format!(
             "the app's function panicked: {text}"
         )))
     });
     match ending::tell(&result) {
-        Told::Success => ExitCode::SUCCESS,
-        Told::Failure => ExitCode::FAILURE,
-        Told::Usage => ExitCode::from(2),
+        AppExit::Success => ExitCode::SUCCESS,
+        AppExit::Failure => ExitCode::FAILURE,
+        AppExit::Usage => ExitCode::from(2),
     }
 }
 
 fn run(
     name: &'static str,
     line: &'static str,
-    app: fn(&Machine) -> Result<(), Ending>,
-) -> Result<(), Ending> {
+    app: fn(&Machine) -> Result<(), AppError>,
+) -> Result<(), AppError> {
     // Who sees the first line may ask for an end.
     let signals = EndSignals::catch_first();
-    let options = Options::parse(line)?;
+    let options = CommandLine::parse(line)?;
     let (linux, module) = apply(name, &options)?;
     json::report("boot", |object| {
         object
@@ -110,10 +110,10 @@ fn run(
         has_console: options.choice("console", &[("off", false), ("on", true)])?,
         is_closed: Cell::new(false),
     };
-    let verdict = Verdict::new(false, false);
+    let verdict = RunVerdict::new(false, false);
     let result = Machine::serve(system, options, module, verdict, app);
     let kept = Linux::end_record();
-    result.and_then(|()| kept.map_err(|why| Ending::Failure(format!("the record: {why}"))))
+    result.and_then(|()| kept.map_err(|why| AppError::Failure(format!("the record: {why}"))))
 }
 
 /// The kernel's words that are about its machine, or about what Linux does not do yet.
@@ -139,7 +139,7 @@ const FOREIGN: [(&str, &str); 12] = [
 /// the app's file.
 pub(crate) fn apply(
     app: &'static str,
-    options: &Options<'static>,
+    options: &CommandLine<'static>,
 ) -> Result<(Linux, Option<&'static [u8]>), UsageError> {
     if let Some((word, why)) = FOREIGN
         .iter()
@@ -148,7 +148,7 @@ pub(crate) fn apply(
         let line = format!("`{word}` is for the bare machine: on Linux {why}; leave it out");
         return Err(UsageError::new(line));
     }
-    let chosen = Chosen::read(options)?;
+    let chosen = RunTerms::read(options)?;
     let mechanisms = [
         ("fifo", Mechanism::Fifo),
         ("sched_ext", Mechanism::SchedExt),
@@ -183,7 +183,7 @@ pub(crate) fn apply(
             let line = "`record` and `keep` exclude `replay`; give one";
             return Err(UsageError::new(line));
         }
-        (Some(("events", "on")), _) => machine.keep_events(ToConsole(Lines::new())),
+        (Some(("events", "on")), _) => machine.keep_events(ToConsole(RecordLines::new())),
         (Some((word, path)), _) => {
             let file = File::create(path);
             let file = file.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
@@ -214,7 +214,7 @@ fn read(word: &str, path: &str) -> Result<&'static [u8], UsageError> {
 }
 
 /// The record as lines of the program's output.
-struct ToConsole(Lines);
+struct ToConsole(RecordLines);
 
 impl Write for ToConsole {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

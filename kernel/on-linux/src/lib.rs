@@ -37,11 +37,11 @@ mod linux_system;
 mod lock;
 mod output;
 
-pub use front::app::ending::Ending;
+pub use front::app::ending::AppError;
 #[doc(inline)]
 pub use front::named::{console, json, options};
 pub use front::report;
-pub use front::report::Resources;
+pub use front::report::MemoryInUse;
 pub use front::{print, println};
 #[doc(hidden)]
 pub use heap::Heap;

@@ -14,12 +14,12 @@ use std::time::Duration;
 
 use fass::edge::WatchedValue;
 use fass::{RunConfig, Signal, Wire};
-use front::app::ending::Ending;
+use front::app::ending::AppError;
 use front::app::machine::{Divisible, System};
 use front::json;
-use front::options::{Options, UsageError};
-use front::report::{self, Memory, tell_log};
-use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, Session};
+use front::options::{CommandLine, UsageError};
+use front::report::{self, MemoryDemand, tell_log};
+use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, ShellSession};
 use linux::{Connection, Control, EndSignals, Linux};
 use sched_dag::engine::Run;
 use sched_dag::lifecycle::Request;
@@ -57,7 +57,7 @@ pub(crate) struct Ends {
 
 impl Ends {
     /// Connects them for a run that is committed.
-    fn connect(&self, machine: &Linux) -> Result<Connection, Ending> {
+    fn connect(&self, machine: &Linux) -> Result<Connection, AppError> {
         let input: Box<dyn Read + Send> = match self.is_live {
             true => Box::new(io::stdin()),
             false => Box::new(io::empty()),
@@ -70,7 +70,7 @@ impl Ends {
             None => Box::new(io::sink()),
         };
         let connected = machine.connect(&self.wire, input, output);
-        connected.map_err(|why| Ending::Failure(format!("wire `{}`: {why}", self.wire.name())))
+        connected.map_err(|why| AppError::Failure(format!("wire `{}`: {why}", self.wire.name())))
     }
 }
 
@@ -96,11 +96,11 @@ impl System for LinuxSystem {
         }
     }
 
-    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, Ending> {
+    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, AppError> {
         if let Some(refusal) = self.refusal.take() {
             return Err(refusal.into());
         }
-        let failure = |why: String| Ending::Failure(why);
+        let failure = |why: String| AppError::Failure(why);
         let ends = self.wire.borrow();
         let connection = ends.as_ref().map(|ends| ends.connect(&self.linux));
         let connection = connection.transpose()?;
@@ -148,9 +148,9 @@ impl System for LinuxSystem {
     fn connect(
         &self,
         wire: &Wire,
-        options: &Options<'static>,
+        options: &CommandLine<'static>,
         _module: &Cell<Option<&'static [u8]>>,
-    ) -> Result<(), Ending> {
+    ) -> Result<(), AppError> {
         let input = options.text("input");
         let output = options.text("output");
         if input.is_some_and(|input| input != "-") {
@@ -172,7 +172,7 @@ impl System for LinuxSystem {
         };
         match self.wire.replace(Some(ends)) {
             None => Ok(()),
-            Some(_) => Err(Ending::Failure(format!(
+            Some(_) => Err(AppError::Failure(format!(
                 "wire `{}` finds its ends taken; connect one wire",
                 wire.name()
             ))),
@@ -183,7 +183,7 @@ impl System for LinuxSystem {
         self.linux.let_look();
     }
 
-    fn measure_overheads(_margin_percent: u32) -> Result<(), Ending> {
+    fn measure_overheads(_margin_percent: u32) -> Result<(), AppError> {
         let line = "`overheads`: what Linux costs is not measured; state it by `overheads_ns=`, \
                     or run the app on the machine";
         Err(UsageError::new(line).into())
@@ -193,8 +193,8 @@ impl System for LinuxSystem {
         Linux::objections()
     }
 
-    fn memory() -> Memory {
-        Memory {
+    fn memory() -> MemoryDemand {
+        MemoryDemand {
             in_use_bytes: heap::in_use_bytes(),
             peak_bytes: heap::peak_bytes() as u64,
             bytes: memory_kib() * 1024,
@@ -328,7 +328,7 @@ pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, 
     let own = Arc::clone(&shared);
     let thread = thread::spawn(move || {
         let (has_begun, is_over) = &*own;
-        let mut session = has_console.then(|| Session::<LinuxRun>::new(false));
+        let mut session = has_console.then(|| ShellSession::<LinuxRun>::new(false));
         let mut is_raised = !has_console;
         has_begun.wait();
         while !is_over.load(Ordering::Acquire) {
@@ -339,7 +339,7 @@ pub(crate) fn talk_during<R>(has_console: bool, run: impl FnOnce() -> R) -> (R, 
                 }
                 tell_log(|| Some(Arc::clone(control.task_set())));
             }
-            while session.as_mut().is_some_and(Session::slice) {}
+            while session.as_mut().is_some_and(ShellSession::slice) {}
             thread::park_timeout(Duration::from_nanos(PERIOD_NS));
         }
     });

@@ -8,24 +8,24 @@ use std::fmt::{self, Write as _};
 use std::io::{Write as _, stdout};
 use std::sync::{Mutex, PoisonError};
 
-use front::console::{Kind, Pieces};
+use front::console::{OutputKind, TextPieces};
 
 /// Whether the output is at the begin of a line.
 static BEGINS: Mutex<bool> = Mutex::new(true);
 
 /// Takes all text of a program; its entry names this to [`front::output!`].
-pub fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
-    let mut pieces = Pieces::new(kind, |piece, is_first| hand_over(piece, kind, is_first));
+pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
+    let mut pieces = TextPieces::new(kind, |piece, is_first| hand_over(piece, kind, is_first));
     // Only a `Display` that fails of its own accord can fail here.
     let _ = pieces.write_fmt(text);
     pieces.end();
 }
 
-fn hand_over(piece: &[u8], kind: Kind, is_first: bool) {
+fn hand_over(piece: &[u8], kind: OutputKind, is_first: bool) {
     let mut begins = BEGINS.lock().unwrap_or_else(PoisonError::into_inner);
     let before: &[u8] = match (kind, *begins) {
-        (Kind::Text, true) if piece.starts_with(b"{") => b" ",
-        (Kind::Line | Kind::KernelLine, false) if is_first => b"\n",
+        (OutputKind::Text, true) if piece.starts_with(b"{") => b" ",
+        (OutputKind::Line | OutputKind::KernelLine, false) if is_first => b"\n",
         _ => b"",
     };
     *begins = piece.ends_with(b"\n");

@@ -10,7 +10,7 @@ use std::process::{Command, ExitCode};
 use std::time::Duration;
 
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-use kernel::{Ending, Machine};
+use kernel::{AppError, Machine};
 
 kernel::entry!(app);
 
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
 }
 
 /// Says a line in main, lines in each job, and a line at the end.
-fn app(machine: &Machine) -> Result<(), Ending> {
+fn app(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&[])?;
     fass::log!(Info, "begins");
     let (dag, period) = (create_dag(), Duration::from_millis(30));

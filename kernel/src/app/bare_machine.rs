@@ -9,7 +9,7 @@ use core::time::Duration;
 use fass::{Platform, RunConfig, Signal, Wire};
 
 use super::calibration;
-use crate::options::{Options, UsageError};
+use crate::options::{CommandLine, UsageError};
 use crate::report::{self, Ns};
 use crate::watch::background::KernelRun;
 use crate::watch::background::{Background, LINE, Wishes, wire};
@@ -18,10 +18,10 @@ use executive::memory::heap;
 use executive::run::platform::KERNEL;
 use executive::run::{contexts, edge, execution, record, worker};
 use executive::text::console;
-use front::app::ending::Ending;
+use front::app::ending::AppError;
 use front::app::machine::System;
 use front::json;
-use front::report::Memory;
+use front::report::MemoryDemand;
 use sched_dag::engine::{Run, RunCounts};
 
 /// The machine, lent to the app's function for the time of the run.
@@ -64,11 +64,11 @@ impl System for BareMachine {
         KERNEL.set_coincidence_ns(u64::try_from(window.as_nanos()).unwrap_or(u64::MAX));
     }
 
-    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, Ending> {
+    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, AppError> {
         /// Time for the cores to get ready between now and the first release.
         const LEAD_NS: u64 = 100_000;
         let epoch_ns = epoch_ns.unwrap_or_else(|| machine::clock::now_ns() + LEAD_NS);
-        let nothing = || Ending::Failure("nothing is committed; call finish_create_dags".into());
+        let nothing = || AppError::Failure("nothing is committed; call finish_create_dags".into());
         let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
         let mut outgoing = edge::get().begin_run(epoch_ns);
         let allocations_before = heap::usage().allocations;
@@ -114,9 +114,9 @@ impl System for BareMachine {
     fn connect(
         &self,
         wire: &Wire,
-        options: &Options<'static>,
+        options: &CommandLine<'static>,
         module: &Cell<Option<&'static [u8]>>,
-    ) -> Result<(), Ending> {
+    ) -> Result<(), AppError> {
         let bytes = options.number("input", 0..=1 << 32, 0)?;
         let file = module.get().unwrap_or_default();
         let own = usize::try_from(bytes)
@@ -133,7 +133,7 @@ impl System for BareMachine {
         edge::get().let_look();
     }
 
-    fn measure_overheads(margin_percent: u32) -> Result<(), Ending> {
+    fn measure_overheads(margin_percent: u32) -> Result<(), AppError> {
         calibration::charge(margin_percent)
     }
 
@@ -147,9 +147,9 @@ impl System for BareMachine {
         edge::objections()
     }
 
-    fn memory() -> Memory {
+    fn memory() -> MemoryDemand {
         let usage = heap::usage();
-        Memory {
+        MemoryDemand {
             in_use_bytes: usage.in_use_bytes,
             peak_bytes: usage.peak_bytes as u64,
             bytes: usage.capacity_bytes as u64,

@@ -23,7 +23,7 @@ use sched_dag::law::MeasuredCosts;
 use executive::machine::clock;
 use executive::run::platform::KERNEL;
 use executive::run::{execution, worker};
-use front::app::ending::Ending;
+use front::app::ending::AppError;
 use front::json;
 
 const PERIOD: Duration = Duration::from_millis(1);
@@ -44,7 +44,7 @@ const BUDGET: Duration = Duration::from_secs(10);
 const LEAD_NS: u64 = 100_000;
 
 /// Measures, and has the commits to come charge it with this margin.
-pub(super) fn charge(margin_percent: u32) -> Result<(), Ending> {
+pub(super) fn charge(margin_percent: u32) -> Result<(), AppError> {
     let costs = run()?;
     let overheads = Overheads::measured(&costs, margin_percent, AT_ONCE);
     KERNEL.change(|terms| {
@@ -72,12 +72,13 @@ pub(super) fn charge(margin_percent: u32) -> Result<(), Ending> {
 }
 
 /// Runs them, and returns what they have shown.
-fn run() -> Result<MeasuredCosts, Ending> {
+fn run() -> Result<MeasuredCosts, AppError> {
     KERNEL.set_calibration(true);
     let committed = finish_create_dags_with(&dags(), ConstructionPolicy::any_graph());
     KERNEL.set_calibration(false);
     committed?;
-    let failure = |what: &str| Ending::Failure(format!("overheads could not be measured: {what}"));
+    let failure =
+        |what: &str| AppError::Failure(format!("overheads could not be measured: {what}"));
     execution::begin(clock::now_ns() + LEAD_NS).ok_or_else(|| failure("nothing is committed"))?;
     execution::arm_all();
     worker::wait_in_background(|| false);

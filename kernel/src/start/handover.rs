@@ -24,18 +24,18 @@ use executive::run::platform::KERNEL;
 use executive::run::{containment, contexts, heartbeat, record, worker};
 use executive::text::console;
 use executive::{interrupts, memory};
-use front::app::ending::{self, Ending, Verdict};
+use front::app::ending::{self, AppError, RunVerdict};
 use front::app::terms;
 use front::json;
 
 use super::{probe, settings};
 use crate::app::bare_machine::{BareMachine, Machine};
-use crate::options::{Options, UsageError};
+use crate::options::{CommandLine, UsageError};
 use crate::println;
 use crate::watch::{self, panic};
 
 /// An app: sets up its DAGs, runs them and reports.
-pub(crate) type App = fn(&Machine) -> Result<(), Ending>;
+pub(crate) type App = fn(&Machine) -> Result<(), AppError>;
 
 /// What tells functions the time, unless that is recorded or replayed.
 ///
@@ -338,8 +338,8 @@ fn run_app(
     name: &'static str,
     app: App,
     processors: usize,
-) -> Result<(), Ending> {
-    let usage = |message: &str| Ending::from(UsageError::new(message));
+) -> Result<(), AppError> {
+    let usage = |message: &str| AppError::from(UsageError::new(message));
     if info.is_command_line_cut {
         return Err(usage(&format!(
             "the command line is longer than {} bytes and was cut; give fewer words",
@@ -349,13 +349,13 @@ fn run_app(
     let line = info
         .command_line()
         .map_err(|_| usage("the command line is not UTF-8"))?;
-    let options = Options::parse(line)?;
+    let options = CommandLine::parse(line)?;
     let settings = settings::apply(&options, processors)?;
     let (wcets, module) = terms::split_wcets(&options, module_bytes(info))?;
     KERNEL.change(|terms| terms.wcets = wcets.map(Cow::Borrowed));
     let module = settings::set_wish(&options, name, module)?;
     let mode = info.value("mode");
-    let verdict = Verdict::new(
+    let verdict = RunVerdict::new(
         settings.chosen.judges_bounds && mode != Some("threads"),
         mode == Some("deterministic") && this_core::all().len() > 1,
     );
@@ -366,7 +366,7 @@ fn run_app(
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.
-fn end(result: Result<(), Ending>) -> ! {
+fn end(result: Result<(), AppError>) -> ! {
     let told = ending::tell(&result);
     console::resume();
     power::exit(told)

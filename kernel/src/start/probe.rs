@@ -20,7 +20,7 @@ use executive::machine::interrupt::{Handlers, Interrupted};
 use executive::machine::timer::{self, Alarm};
 use executive::machine::{clock, cpu, interrupt_flag, local_apic, this_core, vector};
 use executive::run::contexts;
-use front::app::ending::Ending;
+use front::app::ending::AppError;
 use front::json;
 
 /// What the machine layer calls in place of the scheduler's handlers.
@@ -46,7 +46,7 @@ static STEPS: AtomicU32 = AtomicU32::new(0);
 static SUM: AtomicU64 = AtomicU64::new(0);
 
 /// Sends the token round from core 0, which executes this, and says how far it came.
-pub(crate) fn run() -> Result<(), Ending> {
+pub(crate) fn run() -> Result<(), AppError> {
     let cores = this_core::all().len();
     let start_ns = clock::now_ns();
     timer::set(Alarm::Hold, start_ns + HOLD_NS);
@@ -68,7 +68,7 @@ fn steps() -> usize {
 }
 
 /// Says what is missing, if anything is.
-fn judge(cores: usize, steps: usize, sum: f64) -> Result<(), Ending> {
+fn judge(cores: usize, steps: usize, sum: f64) -> Result<(), AppError> {
     let (core, next) = (steps / 2, (steps / 2 + 1) % cores);
     let missing = match steps % 2 {
         _ if steps == 2 * cores => {
@@ -82,7 +82,7 @@ fn judge(cores: usize, steps: usize, sum: f64) -> Result<(), Ending> {
         0 => format!("core {core} took no timer interrupt"),
         _ => format!("core {next} took no wake-up from core {core}"),
     };
-    Err(Ending::Failure(missing))
+    Err(AppError::Failure(missing))
 }
 
 /// Handles the timer of the core that has the token.

@@ -41,8 +41,8 @@ use executive::machine::{counted_time, interrupts_off, turns};
 use executive::run::platform::KERNEL;
 use executive::run::{edge, record, stacks, worker};
 use fass::edge::EdgeMode;
-use front::app::terms::{self, Chosen};
-use front::options::{Options, UsageError, whole_number};
+use front::app::terms::{self, RunTerms};
+use front::options::{CommandLine, UsageError, whole_number};
 
 use crate::watch::background::{Echo, Wishes};
 
@@ -50,7 +50,7 @@ use crate::watch::background::{Echo, Wishes};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
     /// What they say everywhere.
-    pub(crate) chosen: Chosen,
+    pub(crate) chosen: RunTerms,
     /// What else people want to see, and say.
     pub(crate) wishes: Wishes,
 }
@@ -58,7 +58,7 @@ pub(crate) struct Settings {
 /// Has the runs to come recorded or replayed, if the words say so. Returns what is left of the
 /// module.
 pub(crate) fn set_wish(
-    options: &Options<'static>,
+    options: &CommandLine<'static>,
     app: &'static str,
     mut module: Option<&'static [u8]>,
 ) -> Result<Option<&'static [u8]>, UsageError> {
@@ -104,8 +104,8 @@ pub(crate) fn set_wish(
 /// Takes the kernel's words and does what they say.
 ///
 /// The machine has so many `processors`, cores or not.
-pub(crate) fn apply(options: &Options<'_>, processors: usize) -> Result<Settings, UsageError> {
-    let chosen = Chosen::read(options)?;
+pub(crate) fn apply(options: &CommandLine<'_>, processors: usize) -> Result<Settings, UsageError> {
+    let chosen = RunTerms::read(options)?;
     let most_events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;
     KERNEL.change(|terms| {
         chosen.apply(terms);

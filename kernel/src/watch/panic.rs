@@ -19,7 +19,7 @@ use executive::run::{containment, execution};
 use executive::text::backtrace::CodeLocation;
 use executive::text::console::{write_in_emergency, write_line_in_emergency};
 use fass::edge::Excerpt;
-use front::app::ending::Told;
+use front::app::ending::AppExit;
 use front::json;
 
 /// The most recent events of this core that a report shows.
@@ -76,7 +76,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
             ));
             give_verdict(&what)
         }
-        Err(FAILED) => power::exit(Told::Failure),
+        Err(FAILED) => power::exit(AppExit::Failure),
         // Another core reports, and is about to stop this one.
         Err(_) => cpu::halt_forever(),
     }
@@ -138,5 +138,5 @@ fn give_verdict(what: &dyn Display) -> ! {
         line.text("status", "failure").text("reason", what);
     });
     write_line_in_emergency(&verdict);
-    power::exit(Told::Failure)
+    power::exit(AppExit::Failure)
 }

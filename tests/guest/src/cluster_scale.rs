@@ -9,7 +9,7 @@ use core::time::Duration;
 
 use fass::{ConstructionPolicy, finish_create_dags_with};
 use hand_off::{Shape, Stamping, Stamps, Workload, build};
-use kernel::{Ending, Machine};
+use kernel::{AppError, Machine};
 
 use crate::values::emit;
 
@@ -22,7 +22,7 @@ const WORKLOAD: &str = "layered-100";
 
 /// Layered graphs, one in each cluster: the instructions of all cores from a release to the
 /// sink, for each instance.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.offer_clusters()?;
     let jobs = machine.options().number("jobs", 1..=1000, 10)?;
     machine.options().finish(&["test", "clusters", "jobs"])?;
@@ -49,7 +49,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;
     let run = machine.run()?;
     if let Some(violation) = run.violations().next() {
-        return Err(Ending::Failure(format!("{violation}")));
+        return Err(AppError::Failure(format!("{violation}")));
     }
     let period_ns = u64::try_from(PERIOD.as_nanos()).unwrap_or(u64::MAX);
     let of_job = |job| {

@@ -8,14 +8,14 @@ use alloc::vec;
 use core::time::Duration;
 
 use fass::{Dag, Occupation, Parameter, create_dag, execute_for, finish_create_dags};
-use kernel::{Ending, Machine, json};
+use kernel::{AppError, Machine, json};
 
 use crate::single::{named, single};
 
 const EXECUTION: Duration = Duration::from_micros(100);
 
 /// Runs them until the console ends the run.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let gain = Parameter::new("gain", 0.5, 0.0..=2.0);
     let steps = Parameter::new("steps", 3_u32, 1..=9);
     machine.offer(&[&gain, &steps])?;
@@ -27,7 +27,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     machine.spread(&dags);
     finish_create_dags(&dags)?;
     machine.run()?;
-    Err(Ending::Failure("the run has ended by itself".into()))
+    Err(AppError::Failure("the run has ended by itself".into()))
 }
 
 fn left() -> Dag {

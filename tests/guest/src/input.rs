@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::{create_dag, finish_create_dags};
-use kernel::{Ending, Machine, json};
+use kernel::{AppError, Machine, json};
 
 use crate::single::{named, single};
 
@@ -17,7 +17,7 @@ static EPOCH_NS: AtomicU64 = AtomicU64::new(0);
 const LEAD_NS: u64 = 100_000;
 
 /// Runs a periodic DAG and one that bytes release.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let later_ms = machine.options().number("later_ms", 0..=10_000, 0)?;
     machine.options().finish(&["test", "later_ms"])?;
     let ticks = single("ticks", 60, named("tick"), || {

@@ -13,12 +13,12 @@ use fass::{
     finish_create_dags,
 };
 use faults::{JOBS, healthy};
-use kernel::{Ending, Machine};
+use kernel::{AppError, Machine};
 
 const PERIOD: Duration = Duration::from_millis(10);
 
 /// Runs each DAG that ends by a fault, next to the healthy one.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();
     let doomed: [fn() -> Dag; 4] = [
@@ -40,7 +40,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         let violations = run.violations().count();
         let is_unharmed = (healthy.completed, healthy.misses) == (JOBS, 0);
         if !is_unharmed || doomed.faults != 1 || violations != 0 {
-            return Err(Ending::Failure(alloc::format!(
+            return Err(AppError::Failure(alloc::format!(
                 "{healthy:?}, {doomed:?}, {violations} violations"
             )));
         }

@@ -27,12 +27,12 @@ mod upper_halves;
 mod values;
 
 use faults::crimes::{Crime, Unpunished};
-use kernel::{Ending, Machine};
+use kernel::{AppError, Machine};
 
 kernel::entry!(main);
 
 /// A test: it prints its findings and fails by its ending, or by a panic.
-type Test = fn(&Machine) -> Result<(), Ending>;
+type Test = fn(&Machine) -> Result<(), AppError>;
 
 const TESTS: &[(&str, Test)] = &[
     ("attack", attacks::run),
@@ -64,16 +64,16 @@ const TESTS: &[(&str, Test)] = &[
     ("values", values::run),
 ];
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let test: Test = machine.options().choice("test", TESTS)?;
     test(machine)
 }
 
 /// Commits the crime that the command line names, outside any subtask.
-fn crime(machine: &Machine) -> Result<(), Ending> {
+fn crime(machine: &Machine) -> Result<(), AppError> {
     let crimes: [&[(&str, Crime)]; 2] = [&faults::crimes::CRIMES, &kernel_crimes::CRIMES];
     let crime = machine.options().choice("crime", &crimes.concat())?;
     machine.options().finish(&["test", "crime"])?;
     let Unpunished = crime();
-    Err(Ending::Failure("the crime was not stopped".into()))
+    Err(AppError::Failure("the crime was not stopped".into()))
 }

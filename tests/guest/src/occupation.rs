@@ -9,7 +9,7 @@ use core::hint::black_box;
 use core::time::Duration;
 
 use fass::{Occupation, execute_for, finish_create_dags};
-use kernel::{Ending, Machine, json};
+use kernel::{AppError, Machine, json};
 
 use crate::single::{named, single_every};
 
@@ -18,7 +18,7 @@ const STEP_NS: usize = 3_001;
 const JOBS: u64 = 40;
 
 /// Runs both, and counts the jobs whose time was too short.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let mut job = 0_u64;
     let interrupt = move || {
@@ -58,7 +58,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         line.number("jobs", JOBS).number("too_short", too_short);
     });
     if too_short > 0 {
-        return Err(Ending::Failure("a core was left too early".into()));
+        return Err(AppError::Failure("a core was left too early".into()));
     }
     Ok(())
 }

@@ -17,7 +17,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
-use kernel::{Ending, Machine, json};
+use kernel::{AppError, Machine, json};
 
 use crate::checksum::checksum;
 use crate::upper_halves;
@@ -37,7 +37,7 @@ struct Work {
 }
 
 /// Runs the DAGs for `ms` milliseconds of releases.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let ms = options.number("ms", 1..=3_600_000, 500)?;
     let rounds = options.number("rounds", 1..=1_000_000, ROUNDS)?;
@@ -83,7 +83,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     });
     if diverged + violations > 0 {
         let message = format!("{diverged} results diverged, {violations} violations");
-        return Err(Ending::Failure(message));
+        return Err(AppError::Failure(message));
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use core::time::Duration;
 
 use fass::{Occupation, OverrunPolicy, SubtaskAttributes};
 use fass::{create_dag, execute_for, finish_create_dags};
-use kernel::{Ending, Machine};
+use kernel::{AppError, Machine};
 
 use crate::kernel_crimes;
 
@@ -23,7 +23,7 @@ const LINKS: usize = 8;
 
 /// Runs a fork and a join, in which both branches ask for the time, or share a counter behind the
 /// scheduler's back.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let cheats = options.choice("cheats", &[("no", false), ("yes", true)])?;
     let dies_in = options.number("dies_in", 0..=1000, 1000)?;
@@ -71,7 +71,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
 }
 
 /// Runs a chain that leaves one core no pause, each link of which is recorded.
-pub(crate) fn long(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn long(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let dag = create_dag();
     (dag.name("chain").jobs(20)).overrun(OverrunPolicy::Queue);
@@ -98,6 +98,6 @@ pub(crate) fn long(machine: &Machine) -> Result<(), Ending> {
     let run = machine.run()?;
     match run.allocations() {
         0 => Ok(()),
-        count => Err(Ending::Failure(format!("{count} allocations"))),
+        count => Err(AppError::Failure(format!("{count} allocations"))),
     }
 }

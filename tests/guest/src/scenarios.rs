@@ -3,13 +3,13 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use kernel::{Ending, Machine, Run, json};
+use kernel::{AppError, Machine, Run, json};
 use scenarios::Scenario;
 
 /// Runs the scenarios, and prints of each what is wrong.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
-    let all = Scenario::suite().map_err(Ending::Failure)?.into_iter();
+    let all = Scenario::suite().map_err(AppError::Failure)?.into_iter();
     for scenario in all.filter(|scenario| scenario.cores == machine.cores()) {
         let wrong = judged(machine, &scenario, |run| scenario.judge_run(run))?;
         print(&scenario, &wrong);
@@ -22,7 +22,7 @@ pub(crate) fn judged(
     machine: &Machine,
     scenario: &Scenario,
     judge: impl FnOnce(&Run) -> Vec<String>,
-) -> Result<Vec<String>, Ending> {
+) -> Result<Vec<String>, AppError> {
     machine.accept_faults();
     machine.accept_exceeded_bounds();
     machine.configure(scenario.policy, scenario.preemption);

@@ -9,7 +9,7 @@ use core::time::Duration;
 use fass::{
     Dag, FaultLimit, Occupation, SubtaskAttributes, create_dag, execute_for, finish_create_dags,
 };
-use kernel::{Ending, Machine, println};
+use kernel::{AppError, Machine, println};
 use sched_dag::DagId;
 
 use crate::kernel_crimes;
@@ -44,20 +44,20 @@ pub(crate) fn single_every(
     dag
 }
 
-fn run(machine: &Machine, dags: &[Dag]) -> Result<(), Ending> {
+fn run(machine: &Machine, dags: &[Dag]) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     finish_create_dags(dags)?;
     machine.run().map(drop)
 }
 
 /// Prints more in one job than may wait.
-pub(crate) fn talkative(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn talkative(machine: &Machine) -> Result<(), AppError> {
     let talk = || (0..20).for_each(|_| println!("{:>1000}", "much"));
     run(machine, &[single("talkative", 1, named("talks"), talk)])
 }
 
 /// Panics in job 1, and the app does not look at faults. It says so in the log beforehand.
-pub(crate) fn unnoticed(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn unnoticed(machine: &Machine) -> Result<(), AppError> {
     let mut jobs = 0;
     let panics = move || {
         jobs += 1;
@@ -70,7 +70,7 @@ pub(crate) fn unnoticed(machine: &Machine) -> Result<(), Ending> {
 
 /// Holds its core until the budget ends it, long after it has been noticed, next to a DAG that
 /// ends well.
-pub(crate) fn stalled(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn stalled(machine: &Machine) -> Result<(), AppError> {
     machine.accept_faults();
     let good = single("good", 3, named("returns"), || ());
     let holds = named("holds").budget(Duration::from_secs(10));
@@ -80,7 +80,7 @@ pub(crate) fn stalled(machine: &Machine) -> Result<(), Ending> {
 
 /// Takes longer than its WCET says, in jobs 2 and 3 of 5, where a bound was demanded and proven.
 /// With `accept=yes` the app says so beforehand.
-pub(crate) fn exceeded(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn exceeded(machine: &Machine) -> Result<(), AppError> {
     let accepts = (machine.options()).choice("accept", &[("no", false), ("yes", true)])?;
     machine.options().finish(&["test", "accept"])?;
     if accepts {
@@ -100,7 +100,7 @@ pub(crate) fn exceeded(machine: &Machine) -> Result<(), Ending> {
 
 /// Takes no interrupts any more, for another core to notice: on the first core that the
 /// scheduler gives, or on another one, while the first holds.
-pub(crate) fn deaf(machine: &Machine, is_beside: bool) -> Result<(), Ending> {
+pub(crate) fn deaf(machine: &Machine, is_beside: bool) -> Result<(), AppError> {
     let deaf = single("deaf", 1, named("deaf"), || {
         kernel_crimes::take_no_interrupts();
     });
@@ -112,7 +112,7 @@ pub(crate) fn deaf(machine: &Machine, is_beside: bool) -> Result<(), Ending> {
 }
 
 /// Has each of three faults keep 1000 bytes, next to a DAG that keeps as much without a fault.
-pub(crate) fn keep(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn keep(machine: &Machine) -> Result<(), AppError> {
     machine.accept_faults();
     let mut kept = Vec::new();
     let keep = move || kept.push(vec![1_u8; 1000]);
@@ -145,7 +145,7 @@ impl Drop for Stubborn {
 }
 
 /// Has a function own what cannot be dropped, next to a DAG that ends well.
-pub(crate) fn leave(machine: &Machine, loops: bool) -> Result<(), Ending> {
+pub(crate) fn leave(machine: &Machine, loops: bool) -> Result<(), AppError> {
     let good = single("good", 3, named("return"), || ());
     let owned = Stubborn { loops };
     let own = move || {
@@ -156,7 +156,7 @@ pub(crate) fn leave(machine: &Machine, loops: bool) -> Result<(), Ending> {
 
 /// Makes many DAGs panic at once that no stack was made for, as they cannot be suspended: again
 /// and again. The stacks come back.
-pub(crate) fn spend_stacks(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn spend_stacks(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();
     let mut first = None;

@@ -4,7 +4,7 @@ use alloc::format;
 use core::time::Duration;
 
 use ::scenarios::Scenario;
-use kernel::{Ending, Machine, Resources, Run};
+use kernel::{AppError, Machine, MemoryInUse, Run};
 
 use crate::scenarios::{judged, print};
 
@@ -14,7 +14,7 @@ const KEPT_BYTES: usize = 1024;
 /// Runs `rounds` random rounds of `round_ms`, from round `first` of a `seed` on, each twice: what
 /// the first run makes the machine keep is what the second one finds. Prints of each run what is
 /// wrong.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let seed = options.number("seed", 0..=u64::MAX, 1)?;
     let first = options.number("first", 0..=1_000_000, 0)?;
@@ -41,7 +41,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
         let mut wrong = judged(machine, &scenario, &mut judge)?;
         let after = machine.resources();
         let most_bytes = before.heap_bytes + faults.saturating_mul(KEPT_BYTES);
-        let expected = Resources {
+        let expected = MemoryInUse {
             // How much a fault keeps to the byte depends on the heap's holes.
             heap_bytes: after.heap_bytes.clamp(before.heap_bytes, most_bytes),
             contexts_free: before.contexts,

@@ -6,7 +6,7 @@ use core::hint::black_box;
 use core::time::Duration;
 
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
-use kernel::{Ending, Machine, json};
+use kernel::{AppError, Machine, json};
 
 const PERIOD: Duration = Duration::from_millis(10);
 
@@ -15,7 +15,7 @@ const ARRAY_BYTES: usize = 100 << 10;
 
 /// Runs a DAG whose second subtask has a large array, between two others that have none; then
 /// commits one that states a larger stack.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     finish_create_dags(&[deep(256 << 10)])?;
     machine.run()?;
@@ -23,7 +23,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     let refused = refused.map(|error| format!("{error}"));
     match refused {
         Some(text) if text.contains("512 KiB, and the first commit has settled 256 KiB") => Ok(()),
-        other => Err(Ending::Failure(format!("{other:?}"))),
+        other => Err(AppError::Failure(format!("{other:?}"))),
     }
 }
 
@@ -45,7 +45,7 @@ fn deep(stack_bytes: u64) -> Dag {
 }
 
 /// Commits and runs a chain of ten thousand subtasks.
-pub(crate) fn chain(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn chain(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     let dag = create_dag();
     dag.name("chain").jobs(2).in_flight(2);

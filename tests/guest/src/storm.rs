@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::finish_create_dags;
-use kernel::{Ending, Machine, json};
+use kernel::{AppError, Machine, json};
 
 use crate::checksum::checksum;
 use crate::single::{named, single_every};
@@ -29,7 +29,7 @@ struct Findings {
 }
 
 /// Runs the storm until `interrupts` have been taken.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let interrupts = options.number("interrupts", 1..=1_000_000_000, 1_000_000)?;
     options.finish(&["test", "interrupts"])?;
@@ -57,7 +57,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
             .number("cpus", machine.cores());
     });
     if diverged > 0 {
-        return Err(Ending::Failure(format!("{diverged} results diverged")));
+        return Err(AppError::Failure(format!("{diverged} results diverged")));
     }
     Ok(())
 }

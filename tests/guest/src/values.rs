@@ -13,7 +13,7 @@ use core::time::Duration;
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use hand_off::{Pen, Stamps};
 use kernel::report::Distribution;
-use kernel::{Ending, Machine, json};
+use kernel::{AppError, Machine, json};
 
 /// The number of subtasks; the hop from number 1 is the first with a recorded value.
 const SUBTASKS: usize = 10;
@@ -23,7 +23,7 @@ type Value = [u64; 8];
 
 /// Runs the chain, and prints hops of either kind, and the difference between one with a
 /// recorded value and the next one.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let jobs = machine.options().number("jobs", 2..=100_000, 200)?;
     machine.options().finish(&["test", "jobs"])?;
     let (dag, stamps) = build(jobs);
@@ -32,7 +32,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
     fass::set_clock(&kernel::CLOCK);
     let run = machine.run()?;
     if let Some(violation) = run.violations().next() {
-        return Err(Ending::Failure(format!("{violation}")));
+        return Err(AppError::Failure(format!("{violation}")));
     }
     let hop = |(job, from)| {
         let start = stamps.first(from + 1, job)?;

@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use boot::power::{Off, Power, Register};
 use fass::SetOnce;
-use front::app::ending::Told;
+use front::app::ending::AppExit;
 
 use super::{cpu, non_maskable, port, serial, this_core};
 
@@ -115,13 +115,13 @@ fn write_control(control: u16, value: u16) {
 /// Ends the run, and says how: QEMU exits with 33, 35 or 37. Without the debug exit device the machine ends as was settled
 /// ([`set_end`]), or stays halted: all its cores are, or one would look into why
 /// this one is silent.
-pub fn exit(told: Told) -> ! {
+pub fn exit(told: AppExit) -> ! {
     const DEBUG_EXIT: u16 = 0xf4;
     // QEMU's own exit status is twice what its device takes, plus 1.
     let status: u32 = match told {
-        Told::Success => 0x10,
-        Told::Failure => 0x11,
-        Told::Usage => 0x12,
+        AppExit::Success => 0x10,
+        AppExit::Failure => 0x11,
+        AppExit::Usage => 0x12,
     };
     // SAFETY: the port belongs to QEMU's isa-debug-exit device or to nobody.
     unsafe { port::write_u32(DEBUG_EXIT, status) };

@@ -13,7 +13,7 @@ use super::{edge, execution};
 use crate::machine::debug_port;
 use crate::machine::spinlock::SpinLock;
 use crate::text::console;
-use front::report::{self, Lines};
+use front::report::{self, RecordLines};
 
 type File = BootRecord<RecordSink>;
 
@@ -25,7 +25,7 @@ static IS_LIVE: AtomicBool = AtomicBool::new(false);
 /// The way of its bytes out of the machine.
 pub(super) enum RecordSink {
     Port,
-    Console(Box<Lines>),
+    Console(Box<RecordLines>),
 }
 
 impl Sink for RecordSink {
@@ -42,7 +42,7 @@ pub fn begin(is_live: bool) {
     IS_LIVE.store(is_live, Ordering::Relaxed);
     *RECORD.lock() = Some(BootRecord::new(match debug_port::is_there() {
         true => RecordSink::Port,
-        false => RecordSink::Console(Box::new(Lines::new())),
+        false => RecordSink::Console(Box::new(RecordLines::new())),
     }));
 }
 

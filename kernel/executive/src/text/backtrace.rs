@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::machine::backtrace::{self, CallSite};
-use front::json::Object;
+use front::json::JsonObject;
 
 /// The most calls that a line has, so that it stays together (`console`).
 const MOST: usize = 24;
@@ -30,7 +30,7 @@ impl CodeLocation {
     }
 
     /// Writes the members of a line of kind `backtrace`.
-    pub fn write(self, core: u32, line: &mut Object<'_, '_>) {
+    pub fn write(self, core: u32, line: &mut JsonObject<'_, '_>) {
         line.number("cpu", core);
         if let Some(instruction) = self.instruction {
             line.text("place", format_args!("{instruction:#x}"));

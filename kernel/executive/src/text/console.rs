@@ -1,7 +1,7 @@
 //! Text on the serial line, without disturbing what is being measured.
 //!
 //! What is printed is made into text by the context that prints it, outside every
-//! lock (`Pieces`), and goes into a bounded buffer in pieces (`buffer`); the lock is
+//! lock (`TextPieces`), and goes into a bounded buffer in pieces (`buffer`); the lock is
 //! held for the copy of one piece. Outside a run it is sent at once. During a run it
 //! stays in the buffer until an idle core sends it, byte by byte, so that no subtask
 //! ever waits for a serial port; what no longer fits is dropped and counted, never
@@ -34,7 +34,7 @@
 use core::fmt::{self, Display, Write};
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use front::console::{Kind, Pieces};
+use front::console::{OutputKind, TextPieces};
 
 use crate::machine::spinlock::SpinLock;
 use crate::machine::{screen, serial};
@@ -48,9 +48,9 @@ static PENDING: AtomicBool = AtomicBool::new(false);
 
 /// Takes all text of an image; its entry names this to [`front::output!`].
 #[inline(never)]
-pub fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
+pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
     let mut fits = true;
-    let mut pieces = Pieces::new(kind, |piece, begins| {
+    let mut pieces = TextPieces::new(kind, |piece, begins| {
         // What comes after a gap would only look like something else.
         fits = hand_over(piece, kind, begins, fits);
     });
@@ -65,7 +65,7 @@ pub fn write_as(kind: Kind, text: fmt::Arguments<'_>) {
 
 /// Puts a piece into the buffer, or counts it as dropped: if it does not fit, or is not
 /// `wanted`. Reports whether it is in the buffer.
-fn hand_over(piece: &[u8], kind: Kind, begins: bool, wanted: bool) -> bool {
+fn hand_over(piece: &[u8], kind: OutputKind, begins: bool, wanted: bool) -> bool {
     loop {
         let mut buffer = BUFFER.lock();
         if wanted && buffer.take(piece, kind, begins) {
@@ -153,20 +153,20 @@ const MOST_BYTES: usize = 8 * 1024;
 
 /// Writes text, which begins a line.
 pub fn write_in_emergency(text: fmt::Arguments<'_>) {
-    send(Kind::Text, text);
+    send(OutputKind::Text, text);
 }
 
 /// Writes a machine line, and its end.
 pub fn write_line_in_emergency(line: &dyn Display) {
-    send(Kind::KernelLine, format_args!("{line}"));
+    send(OutputKind::KernelLine, format_args!("{line}"));
 }
 
-fn send(kind: Kind, text: fmt::Arguments<'_>) {
+fn send(kind: OutputKind, text: fmt::Arguments<'_>) {
     if let Some(mut buffer) = BUFFER.try_lock() {
         core::iter::from_fn(|| buffer.pop()).for_each(send_byte);
     }
-    let mut pieces = Pieces::new(kind, |piece: &[u8], begins| {
-        let before = kind == Kind::Text && begins && piece[0] == b'{';
+    let mut pieces = TextPieces::new(kind, |piece: &[u8], begins| {
+        let before = kind == OutputKind::Text && begins && piece[0] == b'{';
         let before: &[u8] = if before { b" " } else { b"" };
         before.iter().chain(piece).copied().for_each(send_byte);
     });
@@ -227,16 +227,20 @@ impl<const N: usize> OutputRing<N> {
 
     /// Takes a piece, unless there is no room for all of it. `begins`: it is the first
     /// one of its text or line.
-    fn take(&mut self, piece: &[u8], kind: Kind, begins: bool) -> bool {
+    fn take(&mut self, piece: &[u8], kind: OutputKind, begins: bool) -> bool {
         let Some(last) = piece.last() else {
             return true;
         };
         let before: &[u8] = match kind {
-            Kind::Text if !self.is_within_line && piece[0] == b'{' => b" ",
-            Kind::Line | Kind::KernelLine if begins && self.is_within_line => b"\n",
+            OutputKind::Text if !self.is_within_line && piece[0] == b'{' => b" ",
+            OutputKind::Line | OutputKind::KernelLine if begins && self.is_within_line => b"\n",
             _ => b"",
         };
-        let kept = if kind == Kind::KernelLine { 0 } else { RESERVE };
+        let kept = if kind == OutputKind::KernelLine {
+            0
+        } else {
+            RESERVE
+        };
         if self.length + before.len() + piece.len() + kept > N {
             return false;
         }
@@ -275,7 +279,7 @@ mod tests {
     const SIZE: usize = RESERVE + 16;
 
     /// Takes all of these and returns what is then to be sent.
-    fn sent(pieces: &[(&str, Kind, bool)]) -> String {
+    fn sent(pieces: &[(&str, OutputKind, bool)]) -> String {
         let mut buffer = OutputRing::<SIZE>::new();
         for (text, kind, begins) in pieces {
             assert!(buffer.take(text.as_bytes(), *kind, *begins), "{text}");
@@ -290,7 +294,7 @@ mod tests {
 
     #[test]
     fn no_text_looks_like_a_machine_line() {
-        use Kind::{KernelLine, Line, Text};
+        use OutputKind::{KernelLine, Line, Text};
         assert_eq!(sent(&[("{a\n", Text, true)]), " {a\n");
         assert_eq!(sent(&[("a", Text, true), ("{b\n", Text, true)]), "a{b\n");
         assert_eq!(
@@ -314,15 +318,18 @@ mod tests {
     #[test]
     fn a_piece_that_does_not_fit_is_refused_as_a_whole() {
         let mut buffer = OutputRing::<SIZE>::new();
-        assert!(buffer.take(b"0123456789abcde\n", Kind::Text, true));
-        assert!(!buffer.take(b"x", Kind::Text, true));
-        assert!(!buffer.take(b"{}\n", Kind::Line, true));
-        assert!(buffer.take(b"{}\n", Kind::KernelLine, true), "the reserve");
+        assert!(buffer.take(b"0123456789abcde\n", OutputKind::Text, true));
+        assert!(!buffer.take(b"x", OutputKind::Text, true));
+        assert!(!buffer.take(b"{}\n", OutputKind::Line, true));
+        assert!(
+            buffer.take(b"{}\n", OutputKind::KernelLine, true),
+            "the reserve"
+        );
         assert_eq!(emptied(&mut buffer), "0123456789abcde\n{}\n");
         assert!(buffer.is_empty() && buffer.pop().is_none());
-        assert!(!buffer.take(b"0123456789abcdefg", Kind::Text, true));
+        assert!(!buffer.take(b"0123456789abcdefg", OutputKind::Text, true));
         assert!(
-            buffer.take(b"{123456789abcde", Kind::Text, true),
+            buffer.take(b"{123456789abcde", OutputKind::Text, true),
             "and a blank"
         );
     }
@@ -334,7 +341,7 @@ mod tests {
         for number in 0..2000 {
             let text = format!("{number};");
             wanted.push_str(&text);
-            assert!(buffer.take(text.as_bytes(), Kind::Text, true));
+            assert!(buffer.take(text.as_bytes(), OutputKind::Text, true));
             got.push_str(&emptied(&mut buffer));
         }
         assert_eq!(got, wanted);

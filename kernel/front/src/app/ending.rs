@@ -40,14 +40,14 @@ use crate::text::json;
 /// Why an app ends other than by success.
 ///
 /// ```no_run
-/// use kernel::{Ending, options::UsageError};
+/// use kernel::{AppError, options::UsageError};
 ///
-/// let ending = Ending::from(UsageError::new("`jobs=0`: give at least 1"));
-/// assert!(matches!(ending, Ending::Usage(_)));
+/// let ending = AppError::from(UsageError::new("`jobs=0`: give at least 1"));
+/// assert!(matches!(ending, AppError::Usage(_)));
 /// assert_eq!(ending.to_string(), "`jobs=0`: give at least 1");
 /// ```
 #[derive(Debug)]
-pub enum Ending {
+pub enum AppError {
     /// The command line is wrong; QEMU exits with 37.
     Usage(UsageError),
     /// The DAGs could not be committed; QEMU exits with 35.
@@ -58,7 +58,7 @@ pub enum Ending {
     Shutdown,
 }
 
-impl Ending {
+impl AppError {
     /// Tells of a run that a person has ended, and returns how its app ends.
     pub fn after_shutdown(run: &Run) -> Self {
         for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
@@ -82,7 +82,7 @@ impl Ending {
 
 /// How an app has ended, for the program or the machine that ends with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum AppExit {
     /// Well, or as a person wants it.
     Success,
     /// By a command line that is wrong.
@@ -92,15 +92,15 @@ pub enum Told {
 }
 
 /// Prints how the app ended; the verdict is the last line.
-pub fn tell(result: &Result<(), Ending>) -> Told {
+pub fn tell(result: &Result<(), AppError>) -> AppExit {
     // What was said outside of runs.
     report::tell_log(|| None);
     let (told, word) = match result {
-        Ok(()) | Err(Ending::Shutdown) => (Told::Success, "success"),
-        Err(Ending::Usage(_)) => (Told::Usage, "usage"),
-        Err(_) => (Told::Failure, "failure"),
+        Ok(()) | Err(AppError::Shutdown) => (AppExit::Success, "success"),
+        Err(AppError::Usage(_)) => (AppExit::Usage, "usage"),
+        Err(_) => (AppExit::Failure, "failure"),
     };
-    if let Err(Ending::Commit(error)) = result {
+    if let Err(AppError::Commit(error)) = result {
         for fault in error.faults() {
             json::report("commit_fault", |line| {
                 line.text("fault", fault.code()).text("message", fault);
@@ -113,7 +113,7 @@ pub fn tell(result: &Result<(), Ending>) -> Told {
     json::report("verdict", |line| {
         line.text("status", word);
         if let Err(ending) = result
-            && told != Told::Success
+            && told != AppExit::Success
         {
             line.text("reason", ending);
         }
@@ -121,19 +121,19 @@ pub fn tell(result: &Result<(), Ending>) -> Told {
     told
 }
 
-impl From<UsageError> for Ending {
+impl From<UsageError> for AppError {
     fn from(error: UsageError) -> Self {
         Self::Usage(error)
     }
 }
 
-impl From<CommitError> for Ending {
+impl From<CommitError> for AppError {
     fn from(error: CommitError) -> Self {
         Self::Commit(error)
     }
 }
 
-impl fmt::Display for Ending {
+impl fmt::Display for AppError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Usage(error) => error.fmt(f),
@@ -149,7 +149,7 @@ pub static IS_UNOPTIMIZED: AtomicBool = AtomicBool::new(false);
 
 /// The faults and exceeded bounds that are known of the runs so far.
 #[derive(Debug)]
-pub struct Verdict {
+pub struct RunVerdict {
     judges_faults: Cell<bool>,
     judges_bounds: Cell<bool>,
     /// Whether several cores share one clock.
@@ -162,7 +162,7 @@ pub struct Verdict {
 
 /// The jobs of a DAG that took longer than is proven, until all of them or one sink had
 /// finished.
-struct Exceeded {
+struct ExceededBound {
     dag: DagId,
     sink: Option<SubtaskId>,
     jobs: u64,
@@ -172,7 +172,7 @@ struct Exceeded {
     bound_ns: u64,
 }
 
-impl Verdict {
+impl RunVerdict {
     /// Begins without a run. `shares_clock`: several cores share one clock.
     #[must_use]
     pub const fn new(judges_bounds: bool, shares_clock: bool) -> Self {
@@ -207,7 +207,7 @@ impl Verdict {
             let several = sinks.iter().filter(|_| sinks.len() > 1).copied().map(Some);
             several.chain([None]).map(move |sink| (dag, sink))
         });
-        for exceeded in ends.filter_map(|(dag, sink)| Exceeded::find(run, dag, sink)) {
+        for exceeded in ends.filter_map(|(dag, sink)| ExceededBound::find(run, dag, sink)) {
             let is_unoptimized = IS_UNOPTIMIZED.load(Ordering::Relaxed);
             let also = causes(is_unoptimized, self.shares_clock);
             let text = exceeded.report(run.task_set(), also);
@@ -262,7 +262,7 @@ const fn causes(is_unoptimized: bool, shares_clock: bool) -> &'static str {
     }
 }
 
-impl Exceeded {
+impl ExceededBound {
     /// Looks at a DAG's jobs that are complete.
     fn find(run: &Run, dag: DagId, sink: Option<SubtaskId>) -> Option<Self> {
         let bound_ns = match sink {
@@ -386,10 +386,10 @@ mod tests {
     use sched_dag::{CommitOptions, DagSpec, SubtaskSpec, verify};
 
     use super::*;
-    use crate::app::ending::Ending;
+    use crate::app::ending::AppError;
 
     /// Judges an app that had one run of the DAGs `a`, `b` and `c`.
-    fn judged(faults: [u64; 3], accepts: bool, result: Result<(), Ending>) -> String {
+    fn judged(faults: [u64; 3], accepts: bool, result: Result<(), AppError>) -> String {
         let dags = ["a", "b", "c"].map(|name| DagSpec {
             name: name.into(),
             period_ns: Some(10),
@@ -399,12 +399,12 @@ mod tests {
         });
         let options = CommitOptions::new(Policy::Edf, 1);
         let task_set = verify(&dags, &options).expect("sound DAGs").task_set;
-        let verdict = Verdict::new(true, false);
+        let verdict = RunVerdict::new(true, false);
         verdict.note_faults(&task_set, |dag| faults[dag.index()]);
         if accepts {
             verdict.accept_faults();
         }
-        match Ending::or_complaint(result, verdict.complaint()) {
+        match AppError::or_complaint(result, verdict.complaint()) {
             Ok(()) => "success".into(),
             Err(ending) => format!("{ending}"),
         }
@@ -415,7 +415,7 @@ mod tests {
         assert_eq!(judged([0; 3], false, Ok(())), "success");
         let one = "a fault ended dag `b`; the line that begins with `fault:` says which";
         assert_eq!(judged([0, 2, 0], false, Ok(())), one);
-        assert_eq!(judged([0, 2, 0], false, Err(Ending::Shutdown)), one);
+        assert_eq!(judged([0, 2, 0], false, Err(AppError::Shutdown)), one);
         assert_eq!(
             judged([1, 0, 1], false, Ok(())),
             "a fault ended dag `a`, and 1 more; the line that begins with `fault:` says which"
@@ -425,7 +425,7 @@ mod tests {
     #[test]
     fn the_app_has_the_last_word() {
         assert_eq!(judged([1; 3], true, Ok(())), "success");
-        let own = || Err(Ending::Failure("late".into()));
+        let own = || Err(AppError::Failure("late".into()));
         assert_eq!(judged([1; 3], false, own()), "late");
     }
 }

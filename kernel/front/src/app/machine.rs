@@ -19,12 +19,12 @@ use core::time::Duration;
 use fass::{CoreDivision, Dag, Policy, Preemption, RunConfig, Signal, Tunable, Wire};
 use sched_dag::engine::Run;
 
-use super::ending::Ending;
-use super::ending::{self, Verdict};
-use crate::options::{Options, UsageError};
-use crate::report::{Memory, Resources};
-use crate::shell::parameters::Parameters;
-use crate::shell::topics::Topics;
+use super::ending::AppError;
+use super::ending::{self, RunVerdict};
+use crate::options::{CommandLine, UsageError};
+use crate::report::{MemoryDemand, MemoryInUse};
+use crate::shell::parameters::ParameterTable;
+use crate::shell::topics::TopicCommands;
 use crate::shell::{LiveRun, PARAMETERS, TOPICS};
 
 /// What an app's machine is made of: the bare machine, or Linux.
@@ -50,7 +50,7 @@ pub trait System: Sized {
 
     /// Runs the committed DAGs, from `epoch_ns` on or as soon as may be, and tells what is its
     /// own of the run.
-    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, Ending>;
+    fn run(&self, epoch_ns: Option<u64>, input: Option<&Signal>) -> Result<Run, AppError>;
 
     /// Reports whether a person has ended the latest run.
     fn is_shut_down(&self) -> bool;
@@ -60,15 +60,15 @@ pub trait System: Sized {
     fn connect(
         &self,
         wire: &Wire,
-        options: &Options<'static>,
+        options: &CommandLine<'static>,
         module: &Cell<Option<&'static [u8]>>,
-    ) -> Result<(), Ending>;
+    ) -> Result<(), AppError>;
 
     /// Has the topics of the runs to come be there to be looked at.
     fn let_look(&self);
 
     /// Measures what it takes itself, and charges that with so many hundredths more.
-    fn measure_overheads(margin_percent: u32) -> Result<(), Ending>;
+    fn measure_overheads(margin_percent: u32) -> Result<(), AppError>;
 
     /// Returns how many contexts there are for instances, and how many of these can be taken.
     fn contexts() -> (usize, usize) {
@@ -80,7 +80,7 @@ pub trait System: Sized {
     fn objections() -> [Option<String>; 2];
 
     /// Returns what memory is needed.
-    fn memory() -> Memory;
+    fn memory() -> MemoryDemand;
 }
 
 /// The machine, lent to the app's function for the time of the run.
@@ -88,9 +88,9 @@ pub trait System: Sized {
 /// An app's function gets it; there is no other way to one.
 ///
 /// ```no_run
-/// use kernel::{Ending, Machine, println};
+/// use kernel::{AppError, Machine, println};
 ///
-/// fn app(machine: &Machine) -> Result<(), Ending> {
+/// fn app(machine: &Machine) -> Result<(), AppError> {
 ///     let jobs = machine.options().number("jobs", 1..=100_000, 100)?;
 ///     machine.options().finish(&["jobs"])?;
 ///     // build DAGs with that number of jobs and commit them
@@ -103,14 +103,14 @@ pub trait System: Sized {
 #[derive(Debug)]
 pub struct Machine<S> {
     pub(super) system: S,
-    pub(super) options: Options<'static>,
+    pub(super) options: CommandLine<'static>,
     pub(super) module: Cell<Option<&'static [u8]>>,
     /// Whether the app has asked for that.
     has_asked: Cell<bool>,
     /// What bytes of input raise during a run.
     input: RefCell<Option<Signal>>,
     /// Whether what they were like makes the app fail.
-    verdict: Verdict,
+    verdict: RunVerdict,
 }
 
 impl<S: System> Machine<S> {
@@ -121,11 +121,11 @@ impl<S: System> Machine<S> {
     #[doc(hidden)]
     pub fn serve(
         system: S,
-        options: Options<'static>,
+        options: CommandLine<'static>,
         module: Option<&'static [u8]>,
-        verdict: Verdict,
-        app: fn(&Self) -> Result<(), Ending>,
-    ) -> Result<(), Ending> {
+        verdict: RunVerdict,
+        app: fn(&Self) -> Result<(), AppError>,
+    ) -> Result<(), AppError> {
         let machine = Self {
             system,
             options,
@@ -143,15 +143,15 @@ impl<S: System> Machine<S> {
         let complaint = machine.verdict.complaint();
         match S::objections() {
             [Some(refusal), _] => Err(UsageError::new(refusal).into()),
-            [None, other] => Ending::or_complaint(result, complaint.or(other)),
+            [None, other] => AppError::or_complaint(result, complaint.or(other)),
         }
     }
 
     /// Returns the words of the command line that the kernel left to the app.
     ///
-    /// See [`Options`].
+    /// See [`CommandLine`].
     #[must_use]
-    pub const fn options(&self) -> &Options<'static> {
+    pub const fn options(&self) -> &CommandLine<'static> {
         &self.options
     }
 
@@ -198,7 +198,7 @@ impl<S: System> Machine<S> {
     /// ```no_run
     /// use fass::{Policy, Preemption};
     ///
-    /// fn compare(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    /// fn compare(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     for policy in [Policy::StaticPriority, Policy::Edf] {
     ///         machine.configure(policy, Preemption::Enabled);
     ///         // build and commit the DAGs anew
@@ -238,12 +238,12 @@ impl<S: System> Machine<S> {
     /// function returns, a fault that ended a DAG in any of its runs makes it fail.
     ///
     /// ```no_run
-    /// fn may_lose_a_camera(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    /// fn may_lose_a_camera(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     machine.accept_faults();
     ///     let run = machine.run()?;
     ///     let lost = ["left", "right"].map(|camera| run.statistics(camera).faults > 0);
     ///     match lost {
-    ///         [true, true] => Err(kernel::Ending::Failure("both cameras are lost".into())),
+    ///         [true, true] => Err(kernel::AppError::Failure("both cameras are lost".into())),
     ///         _ => Ok(()),
     ///     }
     /// }
@@ -257,7 +257,7 @@ impl<S: System> Machine<S> {
     /// it fail (neither in the tool's mode `threads` nor on Linux). A line says so in any case.
     ///
     /// ```no_run
-    /// fn measures_wcets(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    /// fn measures_wcets(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     machine.accept_exceeded_bounds(); // those stated are guesses
     ///     machine.run().map(drop)
     /// }
@@ -274,13 +274,13 @@ impl<S: System> Machine<S> {
     ///
     /// # Errors
     ///
-    /// [`Ending::Failure`] if nothing has been committed since the last run.
-    /// [`Ending::Shutdown`] if a person has ended the run, at the console, by ctrl-C, or on Linux by
+    /// [`AppError::Failure`] if nothing has been committed since the last run.
+    /// [`AppError::Shutdown`] if a person has ended the run, at the console, by ctrl-C, or on Linux by
     /// SIGTERM: then each DAG has ended the jobs that it had in flight and released no more. If that
     /// run broke a rule of the model, it is a failure instead.
     ///
     /// See [`Run`].
-    pub fn run(&self) -> Result<Run, Ending> {
+    pub fn run(&self) -> Result<Run, AppError> {
         self.run_when(None)
     }
 
@@ -293,22 +293,22 @@ impl<S: System> Machine<S> {
     ///
     /// ```no_run
     /// /// Sets the first release to a second from now.
-    /// fn later(machine: &kernel::Machine) -> Result<kernel::Run, kernel::Ending> {
+    /// fn later(machine: &kernel::Machine) -> Result<kernel::Run, kernel::AppError> {
     ///     machine.run_from(fass::now_ns() + 1_000_000_000)
     /// }
     /// ```
-    pub fn run_from(&self, epoch_ns: u64) -> Result<Run, Ending> {
+    pub fn run_from(&self, epoch_ns: u64) -> Result<Run, AppError> {
         self.run_when(Some(epoch_ns))
     }
 
     // Within an app's function it would make the image larger.
     #[inline(never)]
-    fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, Ending> {
+    fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, AppError> {
         let run = self.system.run(epoch_ns, self.input.borrow().as_ref())?;
         self.verdict.note(&run);
         ending::note(&run, self.system.terms().overheads);
         if self.system.is_shut_down() {
-            return Err(Ending::after_shutdown(&run));
+            return Err(AppError::after_shutdown(&run));
         }
         Ok(run)
     }
@@ -328,7 +328,7 @@ impl<S: System> Machine<S> {
     /// use core::time::Duration;
     /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
     ///
-    /// fn answer_keys(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    /// fn answer_keys(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     let dag = create_dag();
     ///     dag.jobs(10).relative_deadline(Duration::from_millis(5));
     ///     let key = dag.sporadic(Duration::from_millis(50));
@@ -354,7 +354,7 @@ impl<S: System> Machine<S> {
     /// Connects a wire to the second serial port (COM2, at I/O port 0x2f8): what is sent goes
     /// there in the runs to come, and what it gets arrives. If the word `input=` says that the
     /// end of the loader's module is a script of bytes and times, these arrive instead, in each
-    /// run. To be called before [`Options::finish`](crate::options::Options::finish), which
+    /// run. To be called before [`CommandLine::finish`](crate::options::CommandLine::finish), which
     /// otherwise refuses that word, and before [`module`](Self::module).
     ///
     /// The port is looked at every millisecond. Core 0 sends when it has nothing else to do.
@@ -363,13 +363,13 @@ impl<S: System> Machine<S> {
     ///
     /// # Errors
     ///
-    /// [`Ending::Usage`] if there is no such port, or neither end is named; [`Ending::Failure`] if
+    /// [`AppError::Usage`] if there is no such port, or neither end is named; [`AppError::Failure`] if
     /// it has a wire already.
     ///
     /// ```no_run
     /// use fass::{Received, SubtaskAttributes, Wire, create_dag, finish_create_dags};
     ///
-    /// fn listen(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    /// fn listen(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     let wire = Wire::new("keys");
     ///     machine.connect(&wire)?;
     ///     machine.options().finish(&[])?;
@@ -384,7 +384,7 @@ impl<S: System> Machine<S> {
     ///     machine.run().map(drop)
     /// }
     /// ```
-    pub fn connect(&self, wire: &Wire) -> Result<(), Ending> {
+    pub fn connect(&self, wire: &Wire) -> Result<(), AppError> {
         self.system.connect(wire, &self.options, &self.module)
     }
 
@@ -394,7 +394,7 @@ impl<S: System> Machine<S> {
     /// does nothing.
     ///
     /// ```no_run
-    /// fn app(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    /// fn app(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     machine.show_topics();
     ///     machine.options().finish(&[])?;
     ///     // build DAGs, record topics, commit
@@ -405,38 +405,38 @@ impl<S: System> Machine<S> {
         if self.has_console() {
             self.system.let_look();
             // Once is enough.
-            TOPICS.set(Box::leak(Box::new(Topics::<S::Run>::new())));
+            TOPICS.set(Box::leak(Box::new(TopicCommands::<S::Run>::new())));
         }
     }
 
     /// Lets people set parameters: at the console by `set NAME VALUE`, before the first run by the
     /// word `set=NAME=VALUE,...` of the command line, which `./scripts/run --set` and `--params`
-    /// make. To be called before [`Options::finish`](crate::options::Options::finish), which
+    /// make. To be called before [`CommandLine::finish`](crate::options::CommandLine::finish), which
     /// otherwise refuses that word.
     ///
     /// # Errors
     ///
-    /// [`Ending::Usage`] in one line, if the word names no parameter, or no value of its type and
-    /// range; [`Ending::Failure`] if two have one name, or it was called before.
+    /// [`AppError::Usage`] in one line, if the word names no parameter, or no value of its type and
+    /// range; [`AppError::Failure`] if two have one name, or it was called before.
     ///
     /// ```no_run
     /// use fass::Parameter;
     ///
-    /// fn gain(machine: &kernel::Machine) -> Result<Parameter<f64>, kernel::Ending> {
+    /// fn gain(machine: &kernel::Machine) -> Result<Parameter<f64>, kernel::AppError> {
     ///     let gain = Parameter::new("gain", 0.5, 0.0..=2.0);
     ///     machine.offer(&[&gain])?;
     ///     machine.options().finish(&[])?;
     ///     Ok(gain)
     /// }
     /// ```
-    pub fn offer(&self, parameters: &[&dyn Tunable]) -> Result<(), Ending> {
-        let offered = Parameters::new(parameters).map_err(Ending::Failure)?;
+    pub fn offer(&self, parameters: &[&dyn Tunable]) -> Result<(), AppError> {
+        let offered = ParameterTable::new(parameters).map_err(AppError::Failure)?;
         if let Some(word) = self.options.text("set") {
             offered.set_all(word)?;
         }
         match PARAMETERS.set(Box::leak(Box::new(offered))) {
             true => Ok(()),
-            false => Err(Ending::Failure(
+            false => Err(AppError::Failure(
                 "parameters are offered twice; offer all at once".into(),
             )),
         }
@@ -455,14 +455,14 @@ impl<S: System> Machine<S> {
     /// memory for it; on Linux, where what it costs is not measured.
     ///
     /// ```no_run
-    /// fn take_part(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    /// fn take_part(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     machine.offer_overheads()?;
     ///     machine.options().finish(&["overheads", "overheads_margin"])?;
     ///     // build and commit DAGs
     ///     machine.run().map(drop)
     /// }
     /// ```
-    pub fn offer_overheads(&self) -> Result<(), Ending> {
+    pub fn offer_overheads(&self) -> Result<(), AppError> {
         let options = self.options();
         let measures = options.choice("overheads", &[("stated", false), ("measured", true)])?;
         let margin = options.text("overheads_margin").is_some();
@@ -495,9 +495,9 @@ impl<S: System> Machine<S> {
     /// }
     /// ```
     #[must_use]
-    pub fn resources(&self) -> Resources {
+    pub fn resources(&self) -> MemoryInUse {
         let (contexts, contexts_free) = S::contexts();
-        Resources {
+        MemoryInUse {
             heap_bytes: S::memory().in_use_bytes,
             contexts,
             contexts_free,
@@ -544,7 +544,7 @@ impl<S: Divisible> Machine<S> {
     /// If the word is neither `auto` nor numbers of cores.
     ///
     /// ```no_run
-    /// fn take_part(machine: &kernel::Machine) -> Result<(), kernel::Ending> {
+    /// fn take_part(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     machine.offer_clusters()?;
     ///     // build and commit DAGs
     ///     machine.run().map(drop)
@@ -567,7 +567,7 @@ impl<S: Divisible> Machine<S> {
     /// Gives each of these DAGs to one of the clusters that there are, in turn.
     ///
     /// ```no_run
-    /// fn take_part(machine: &kernel::Machine, dags: &[fass::Dag]) -> Result<(), kernel::Ending> {
+    /// fn take_part(machine: &kernel::Machine, dags: &[fass::Dag]) -> Result<(), kernel::AppError> {
     ///     machine.offer_clusters()?;
     ///     machine.spread(dags);
     ///     fass::finish_create_dags(dags)?;

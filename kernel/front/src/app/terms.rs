@@ -8,7 +8,7 @@ use fass::log::Level::{Debug, Error, Info, Warn};
 use fass::log::{Level, set_level};
 use fass::{Overheads, Policy, Preemption, RunConfig};
 
-use crate::options::{Options, UsageError};
+use crate::options::{CommandLine, UsageError};
 
 const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf", Policy::Edf)];
 
@@ -17,7 +17,7 @@ const PREEMPTIONS: [(&str, Preemption); 2] =
 
 /// What these words say.
 #[derive(Clone, Copy, Debug)]
-pub struct Chosen {
+pub struct RunTerms {
     policy: Policy,
     preemption: Preemption,
     budget_factor: u64,
@@ -26,9 +26,9 @@ pub struct Chosen {
     pub judges_bounds: bool,
 }
 
-impl Chosen {
+impl RunTerms {
     /// Takes the words. The log has its level from now on.
-    pub fn read(options: &Options<'_>) -> Result<Self, UsageError> {
+    pub fn read(options: &CommandLine<'_>) -> Result<Self, UsageError> {
         let levels = [Some(Info), None, Some(Error), Some(Warn), Some(Debug)];
         let levels = levels.map(|most| (most.map_or("off", Level::word), most));
         set_level(options.choice("log", &levels)?);
@@ -51,7 +51,7 @@ impl Chosen {
 }
 
 /// Takes the job that the word `from` says a replay shall begin with, or before it.
-pub fn from<'a>(options: &Options<'a>) -> Result<Option<(&'a str, u64)>, UsageError> {
+pub fn from<'a>(options: &CommandLine<'a>) -> Result<Option<(&'a str, u64)>, UsageError> {
     let Some(text) = options.text("from") else {
         return Ok(None);
     };
@@ -62,7 +62,7 @@ pub fn from<'a>(options: &Options<'a>) -> Result<Option<(&'a str, u64)>, UsageEr
 /// Takes the WCETs that the word `wcets` says the app's file begins with. Returns them, if there
 /// are any, and the rest of the file.
 pub fn split_wcets<'a>(
-    options: &Options<'_>,
+    options: &CommandLine<'_>,
     module: Option<&'a [u8]>,
 ) -> Result<(Option<&'a str>, Option<&'a [u8]>), UsageError> {
     let bytes = options.number("wcets", 0..=1 << 32, 0)?;
@@ -83,7 +83,7 @@ pub fn split(module: Option<&[u8]>, bytes: u64) -> Option<(&[u8], Option<&[u8]>)
     Some((first, Some(rest).filter(|rest| !rest.is_empty())))
 }
 
-fn overheads(options: &Options<'_>) -> Result<Overheads, UsageError> {
+fn overheads(options: &CommandLine<'_>) -> Result<Overheads, UsageError> {
     let mut numbers = options.numbers("overheads_ns", 0..=1_000_000_000, &[0, 0, 0])?;
     if numbers.len() == 3 {
         numbers.push(0);

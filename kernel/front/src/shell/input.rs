@@ -8,7 +8,7 @@ const DELETE: u8 = 0x7f;
 
 /// A line that is being typed.
 #[derive(Debug)]
-pub(super) struct Input {
+pub(super) struct LineEditor {
     bytes: [u8; LONGEST],
     length: usize,
     is_too_long: bool,
@@ -18,7 +18,7 @@ pub(super) struct Input {
 
 /// What a byte has come to.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Typed<'a> {
+pub(super) enum TypedByte<'a> {
     /// The line goes on.
     Nothing,
     /// The line is complete.
@@ -29,7 +29,7 @@ pub(super) enum Typed<'a> {
     NotText,
 }
 
-impl Input {
+impl LineEditor {
     pub(super) const fn new() -> Self {
         Self {
             bytes: [0; LONGEST],
@@ -47,23 +47,23 @@ impl Input {
 
     /// Takes a byte. A line ends with `\r` or `\n`; an empty one is nothing, and
     /// so `\r\n` ends one line.
-    pub(super) fn take(&mut self, byte: u8) -> Typed<'_> {
+    pub(super) fn take(&mut self, byte: u8) -> TypedByte<'_> {
         match byte {
             b'\r' | b'\n' => {
                 let length = core::mem::take(&mut self.length);
                 self.complete = length;
                 if core::mem::take(&mut self.is_too_long) {
-                    return Typed::TooLong;
+                    return TypedByte::TooLong;
                 }
                 match core::str::from_utf8(&self.bytes[..length]).map(str::trim) {
-                    Ok("") => Typed::Nothing,
-                    Ok(line) => Typed::Line(line),
-                    Err(_) => Typed::NotText,
+                    Ok("") => TypedByte::Nothing,
+                    Ok(line) => TypedByte::Line(line),
+                    Err(_) => TypedByte::NotText,
                 }
             }
             BACKSPACE | DELETE => {
                 self.length = self.length.saturating_sub(1);
-                Typed::Nothing
+                TypedByte::Nothing
             }
             byte => {
                 self.complete = 0;
@@ -74,7 +74,7 @@ impl Input {
                     }
                     None => self.is_too_long = true,
                 }
-                Typed::Nothing
+                TypedByte::Nothing
             }
         }
     }
@@ -86,14 +86,14 @@ mod tests {
 
     /// Types all and returns what came of it in words.
     fn typed(text: &[u8]) -> Vec<String> {
-        let mut input = Input::new();
+        let mut input = LineEditor::new();
         let mut lines = Vec::new();
         for byte in text {
             match input.take(*byte) {
-                Typed::Nothing => {}
-                Typed::Line(line) => lines.push(line.into()),
-                Typed::TooLong => lines.push("(too long)".into()),
-                Typed::NotText => lines.push("(not text)".into()),
+                TypedByte::Nothing => {}
+                TypedByte::Line(line) => lines.push(line.into()),
+                TypedByte::TooLong => lines.push("(too long)".into()),
+                TypedByte::NotText => lines.push("(not text)".into()),
             }
         }
         lines
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn a_line_stays_until_the_next_one_begins() {
-        let mut input = Input::new();
+        let mut input = LineEditor::new();
         b" stats \n".iter().for_each(|byte| {
             input.take(*byte);
         });

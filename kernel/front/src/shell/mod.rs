@@ -27,7 +27,7 @@ use sched_dag::{Dag, DagId, DagSnapshot, Scheduler, TaskSet};
 use crate::options::whole_number;
 use crate::text::json;
 use crate::{println, report};
-use input::{Input, Typed};
+use input::{LineEditor, TypedByte};
 
 /// How often a platform looks for bytes, at least.
 pub const PERIOD_NS: u64 = 20_000_000;
@@ -154,28 +154,28 @@ pub trait Commands: Sync {
 
 /// A conversation.
 #[derive(Debug)]
-pub struct Session<R> {
-    input: Input,
+pub struct ShellSession<R> {
+    input: LineEditor,
     echoes: bool,
-    listing: Option<Listing>,
+    listing: Option<DagListing>,
     run: PhantomData<fn() -> R>,
 }
 
 /// DAGs that are still to be listed, each in a slice of its own.
 #[derive(Clone, Copy, Debug)]
-struct Listing {
+struct DagListing {
     next: DagId,
     /// The first one that is not to be listed.
     end: DagId,
     print: fn(&DagSnapshot, &Dag),
 }
 
-impl<R: LiveRun> Session<R> {
+impl<R: LiveRun> ShellSession<R> {
     /// Begins a conversation; `echoes`: what is typed is sent back.
     #[must_use]
     pub const fn new(echoes: bool) -> Self {
         Self {
-            input: Input::new(),
+            input: LineEditor::new(),
             echoes,
             listing: None,
             run: PhantomData,
@@ -208,8 +208,8 @@ impl<R: LiveRun> Session<R> {
                 crate::print!("{}", char::from(if byte == b'\r' { b'\n' } else { byte }));
             }
             match self.input.take(byte) {
-                Typed::Nothing => continue,
-                Typed::Line(line) => {
+                TypedByte::Nothing => continue,
+                TypedByte::Line(line) => {
                     let mut is_refused = false;
                     self.listing = answer::<R>(line, &task_set, &mut |why| {
                         is_refused = true;
@@ -219,8 +219,8 @@ impl<R: LiveRun> Session<R> {
                         accept(line);
                     }
                 }
-                Typed::TooLong => refuse("", &"the line is too long: no command is as long"),
-                Typed::NotText => refuse("", &"the line is not UTF-8"),
+                TypedByte::TooLong => refuse("", &"the line is too long: no command is as long"),
+                TypedByte::NotText => refuse("", &"the line is not UTF-8"),
             }
             break;
         }
@@ -228,20 +228,20 @@ impl<R: LiveRun> Session<R> {
     }
 }
 
-impl Listing {
+impl DagListing {
     /// Prints the next DAG's lines and returns what is left to be listed.
-    fn print_one<R: LiveRun>(self, task_set: &TaskSet) -> Option<Listing> {
+    fn print_one<R: LiveRun>(self, task_set: &TaskSet) -> Option<DagListing> {
         let (dag, model) = (self.next, task_set.dag(self.next));
         if let Some(snapshot) = snapshot::<R>(task_set, dag) {
             report::show_dag(&snapshot, dag, model, self.print);
         }
         let next = DagId(dag.0 + 1);
-        (next < self.end).then_some(Listing { next, ..self })
+        (next < self.end).then_some(DagListing { next, ..self })
     }
 }
 
 /// Does what a line says, or tells why not. Returns what is to be listed for it.
-fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Option<Listing> {
+fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Option<DagListing> {
     let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
     let rest = rest.trim();
     let wants = |what: &str, refuse: Refuse<'_>| refuse(&format_args!("`{name}` wants {what}"));
@@ -311,7 +311,7 @@ fn list(
     name: &str,
     print: fn(&DagSnapshot, &Dag),
     refuse: Refuse<'_>,
-) -> Option<Listing> {
+) -> Option<DagListing> {
     let all = u32::try_from(task_set.dags().len()).unwrap_or(u32::MAX);
     let (next, end) = match name {
         "" => (DagId(0), DagId(all)),
@@ -320,7 +320,7 @@ fn list(
             (dag, DagId(dag.0 + 1))
         }
     };
-    Some(Listing { next, end, print })
+    Some(DagListing { next, end, print })
 }
 
 fn describe(snapshot: &DagSnapshot, dag: &Dag) {

@@ -15,9 +15,9 @@ use crate::options::UsageError;
 use crate::println;
 
 /// The parameters that an app offers.
-pub struct Parameters(pub Vec<Arc<dyn Tunable>>);
+pub struct ParameterTable(pub Vec<Arc<dyn Tunable>>);
 
-impl Parameters {
+impl ParameterTable {
     /// Takes those that an app offers; two of one name are refused in words.
     pub fn new(parameters: &[&dyn Tunable]) -> Result<Self, String> {
         let mut names = (1..).zip(parameters);
@@ -76,7 +76,7 @@ impl Parameters {
     }
 }
 
-impl Commands for Parameters {
+impl Commands for ParameterTable {
     fn help(&self) -> &'static [(&'static str, &'static str)] {
         &[
             ("params", "list the parameters"),

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use sched_dag::{CommitOptions, DagSpec, Policy, SubtaskSpec, TopicPort, verify};
 
-use super::topics::Topics;
+use super::topics::TopicCommands;
 use super::*;
 
 thread_local! {
@@ -74,11 +74,11 @@ impl LiveRun for NoRun {
 fn what_is_typed_is_asked_of_the_run_and_no_function_is_told_the_time_for_it() {
     static TOLD: fass::Clock = || panic!("it is told to the function that is interrupted");
     fass::set_clock(&TOLD);
-    TOPICS.set(Box::leak(Box::new(Topics::<NoRun>::new())));
+    TOPICS.set(Box::leak(Box::new(TopicCommands::<NoRun>::new())));
     let typed =
         b"stop lidar\nstart 0\nstop radar\necho points\necho off\nhz points\n\x03shutdown\n";
     TYPED.with_borrow_mut(|bytes| bytes.extend(typed));
-    let mut session = Session::<NoRun>::new(false);
+    let mut session = ShellSession::<NoRun>::new(false);
     while session.slice() {}
     let expected = [
         "Pause(DagId(0))",

@@ -34,7 +34,7 @@ const NONE: u64 = u64::MAX;
 
 /// The commands, and the topic that is echoed. Only the session uses it, a slice at a time.
 #[derive(Debug)]
-pub struct Topics<R> {
+pub struct TopicCommands<R> {
     /// The topic: its DAG, and its place there in the lower half; or [`NONE`].
     echoed: AtomicU64,
     /// When a value was shown last.
@@ -42,7 +42,7 @@ pub struct Topics<R> {
     run: PhantomData<fn() -> R>,
 }
 
-impl<R: LiveRun> Topics<R> {
+impl<R: LiveRun> TopicCommands<R> {
     /// Makes them; no topic is echoed.
     #[must_use]
     #[allow(clippy::new_without_default, reason = "it is for a static")]
@@ -99,7 +99,7 @@ impl<R: LiveRun> Topics<R> {
     }
 }
 
-impl<R: LiveRun> Commands for Topics<R> {
+impl<R: LiveRun> Commands for TopicCommands<R> {
     fn help(&self) -> &'static [(&'static str, &'static str)] {
         &[
             (
@@ -152,7 +152,7 @@ fn hz<R: LiveRun>(name: &str, task_set: &TaskSet, refuse: Refuse<'_>) {
         return;
     };
     let writer = task_set.dag(dag).topics()[topic].writer;
-    let rate = Rate::look::<R>(task_set, dag, writer);
+    let rate = CompletionRate::look::<R>(task_set, dag, writer);
     let Some(mean_ns) = rate.mean_ns() else {
         return refuse(&format_args!(
             "of topic `{name}` there are {} values among the latest {MOST_EVENTS} events; \
@@ -186,7 +186,7 @@ fn microseconds(ns: u64) -> impl Display {
 
 /// The completions of a subtask, taken from the latest one back.
 #[derive(Clone, Copy, Debug, Default)]
-struct Rate {
+struct CompletionRate {
     values: u64,
     last_ns: u64,
     first_ns: u64,
@@ -195,7 +195,7 @@ struct Rate {
     most_ns: u64,
 }
 
-impl Rate {
+impl CompletionRate {
     /// Looks at the latest events of the journal.
     fn look<R: LiveRun>(task_set: &TaskSet, dag: DagId, writer: SubtaskId) -> Self {
         let mut rate = Self::default();
@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn a_rate_is_that_of_the_completions_of_the_writer() {
-        let mut rate = Rate::default();
+        let mut rate = CompletionRate::default();
         let finish = |time_ns, subtask| Event {
             time_ns,
             what: EventKind::Finish,
@@ -284,9 +284,9 @@ mod tests {
         }
         assert_eq!((rate.values, rate.mean_ns()), (4, Some(10)));
         assert_eq!((rate.least_ns, rate.most_ns), (8, 12));
-        let mut one = Rate::default();
+        let mut one = CompletionRate::default();
         one.take(&finish(7, 2), DagId(1), SubtaskId(2));
         assert_eq!((one.values, one.mean_ns()), (1, None));
-        assert_eq!(Rate::default().mean_ns(), None);
+        assert_eq!(CompletionRate::default().mean_ns(), None);
     }
 }

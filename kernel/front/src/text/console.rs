@@ -18,22 +18,22 @@ use core::fmt;
 mod bound {
     use core::fmt;
 
-    use super::Kind;
+    use super::OutputKind;
 
     // SAFETY: `output!` alone defines the symbol, as a safe function of this very type; the linker
     // refuses a program that has none or two.
     unsafe extern "Rust" {
-        pub(super) safe fn front_output(kind: Kind, text: fmt::Arguments<'_>);
+        pub(super) safe fn front_output(kind: OutputKind, text: fmt::Arguments<'_>);
     }
 }
 
-/// Makes a function of the platform's, `fn(Kind, fmt::Arguments<'_>)`, the one that all text of
+/// Makes a function of the platform's, `fn(OutputKind, fmt::Arguments<'_>)`, the one that all text of
 /// the program goes to. To be called once in a program.
 #[macro_export]
 macro_rules! output {
     ($write:path) => {
         #[unsafe(no_mangle)]
-        fn front_output(kind: $crate::console::Kind, text: ::core::fmt::Arguments<'_>) {
+        fn front_output(kind: $crate::console::OutputKind, text: ::core::fmt::Arguments<'_>) {
             $write(kind, text);
         }
     };
@@ -46,11 +46,11 @@ macro_rules! output {
 /// kernel::println!("{} jobs", 3); // calls it
 /// ```
 pub fn write(text: fmt::Arguments<'_>) {
-    bound::front_output(Kind::Text, text);
+    bound::front_output(OutputKind::Text, text);
 }
 
 /// Writes a machine line and its end, on a line of its own.
-pub(super) fn write_line(kind: Kind, line: &dyn fmt::Display) {
+pub(super) fn write_line(kind: OutputKind, line: &dyn fmt::Display) {
     bound::front_output(kind, format_args!("{line}"));
 }
 
@@ -75,7 +75,7 @@ macro_rules! println {
 mod output {
     crate::output!(forget);
 
-    fn forget(_: super::Kind, _: core::fmt::Arguments<'_>) {}
+    fn forget(_: super::OutputKind, _: core::fmt::Arguments<'_>) {}
 }
 
 /// The most bytes that are handed over at once.
@@ -83,7 +83,7 @@ pub const LONGEST: usize = 1024;
 
 /// What is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum OutputKind {
     /// Text for people.
     Text,
     /// A machine line of an app's.
@@ -94,17 +94,17 @@ pub enum Kind {
 
 /// Collects text and hands it over in pieces; `hand_over` gets each one, and whether
 /// it is the first.
-pub struct Pieces<F: FnMut(&[u8], bool)> {
+pub struct TextPieces<F: FnMut(&[u8], bool)> {
     bytes: [u8; LONGEST],
     length: usize,
-    kind: Kind,
+    kind: OutputKind,
     begins: bool,
     hand_over: F,
 }
 
-impl<F: FnMut(&[u8], bool)> Pieces<F> {
+impl<F: FnMut(&[u8], bool)> TextPieces<F> {
     /// Begins a text, or a line.
-    pub const fn new(kind: Kind, hand_over: F) -> Self {
+    pub const fn new(kind: OutputKind, hand_over: F) -> Self {
         Self {
             bytes: [0; LONGEST],
             length: 0,
@@ -116,7 +116,7 @@ impl<F: FnMut(&[u8], bool)> Pieces<F> {
 
     /// Ends the text, or the line.
     pub fn end(mut self) {
-        if self.kind != Kind::Text {
+        if self.kind != OutputKind::Text {
             self.push(b'\n');
         }
         self.flush();
@@ -143,17 +143,17 @@ impl<F: FnMut(&[u8], bool)> Pieces<F> {
     }
 }
 
-impl<F: FnMut(&[u8], bool)> fmt::Write for Pieces<F> {
+impl<F: FnMut(&[u8], bool)> fmt::Write for TextPieces<F> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         for byte in text.bytes() {
             match (self.kind, byte) {
                 // As at the seam of two pieces, see `buffer`.
-                (Kind::Text, b'{') if self.bytes[..self.length].ends_with(b"\n") => {
+                (OutputKind::Text, b'{') if self.bytes[..self.length].ends_with(b"\n") => {
                     self.push(b' ');
                 }
                 _ => {}
             }
-            let is_end = self.kind != Kind::Text && byte == b'\n';
+            let is_end = self.kind != OutputKind::Text && byte == b'\n';
             // JSON has no line ends but as white space between its parts.
             self.push(if is_end { b' ' } else { byte });
         }
@@ -167,9 +167,9 @@ mod tests {
 
     use super::*;
 
-    fn pieces(kind: Kind, text: &str) -> Vec<String> {
+    fn pieces(kind: OutputKind, text: &str) -> Vec<String> {
         let mut all = Vec::new();
-        let mut pieces = Pieces::new(kind, |piece, _| {
+        let mut pieces = TextPieces::new(kind, |piece, _| {
             all.push(String::from_utf8(piece.to_vec()).expect("whole characters"));
         });
         pieces.write_str(text).expect("it cannot fail");
@@ -179,15 +179,15 @@ mod tests {
 
     #[test]
     fn a_brace_after_a_line_end_gets_a_blank_in_text_alone() {
-        assert_eq!(pieces(Kind::Text, "a{\n{b\n\n{"), ["a{\n {b\n\n {"]);
-        assert_eq!(pieces(Kind::Line, "[1,\n{}]"), ["[1, {}]\n"]);
-        assert_eq!(pieces(Kind::KernelLine, "\n{"), [" {\n"]);
+        assert_eq!(pieces(OutputKind::Text, "a{\n{b\n\n{"), ["a{\n {b\n\n {"]);
+        assert_eq!(pieces(OutputKind::Line, "[1,\n{}]"), ["[1, {}]\n"]);
+        assert_eq!(pieces(OutputKind::KernelLine, "\n{"), [" {\n"]);
     }
 
     #[test]
     fn long_text_is_cut_between_characters() {
         let text = "äöü€🦀".repeat(300);
-        let all = pieces(Kind::Text, &text);
+        let all = pieces(OutputKind::Text, &text);
         assert!(all.len() > 1 && all.iter().all(|piece| piece.len() <= LONGEST));
         assert_eq!(all.concat(), text);
     }
@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn only_the_first_piece_begins() {
         let mut begun = Vec::new();
-        let mut pieces = Pieces::new(Kind::Text, |_: &[u8], begins| begun.push(begins));
+        let mut pieces = TextPieces::new(OutputKind::Text, |_: &[u8], begins| begun.push(begins));
         pieces.flush();
         write!(pieces, "{}", "x".repeat(3000)).expect("it cannot fail");
         pieces.end();

@@ -30,39 +30,39 @@ use super::console;
 /// );
 /// ```
 #[expect(missing_debug_implementations, reason = "a `Formatter` has none")]
-pub struct Object<'a, 'f> {
+pub struct JsonObject<'a, 'f> {
     out: &'a mut Formatter<'f>,
     first: bool,
     result: fmt::Result,
 }
 
-impl Object<'_, '_> {
+impl JsonObject<'_, '_> {
     /// Writes a field with a whole number.
     ///
-    /// See [`Object`].
+    /// See [`JsonObject`].
     pub fn number(&mut self, name: &str, value: impl Into<u64>) -> &mut Self {
         self.whole(name, value.into())
     }
 
     /// Writes a field with a truth value.
     ///
-    /// See [`Object`].
+    /// See [`JsonObject`].
     pub fn flag(&mut self, name: &str, value: bool) -> &mut Self {
         self.shown(name, &value)
     }
 
     /// Writes a field with text.
     ///
-    /// See [`Object`].
+    /// See [`JsonObject`].
     pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
         self.quoted(name, &value)
     }
 
     /// Writes a field with an object.
     ///
-    /// See [`Object`].
-    pub fn object(&mut self, name: &str, fields: impl Fn(&mut Object<'_, '_>)) -> &mut Self {
-        self.shown(name, &Fields(&fields))
+    /// See [`JsonObject`].
+    pub fn object(&mut self, name: &str, fields: impl Fn(&mut JsonObject<'_, '_>)) -> &mut Self {
+        self.shown(name, &JsonFields(&fields))
     }
 
     /// Writes a field with an object of a distribution's `min`, `median`, `p99` and `max`.
@@ -91,7 +91,7 @@ impl Object<'_, '_> {
 
     /// Writes a field with a list of values, each of which is JSON already.
     ///
-    /// See [`Object`].
+    /// See [`JsonObject`].
     pub fn list(
         &mut self,
         name: &str,
@@ -149,13 +149,13 @@ impl Object<'_, '_> {
 type Show<'s> = &'s mut dyn FnMut(&dyn Display);
 
 /// An object as text.
-struct Fields<'a>(&'a dyn Fn(&mut Object<'_, '_>));
+struct JsonFields<'a>(&'a dyn Fn(&mut JsonObject<'_, '_>));
 
-impl Display for Fields<'_> {
+impl Display for JsonFields<'_> {
     #[inline(never)]
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
         out.write_str("{")?;
-        let mut object = Object {
+        let mut object = JsonObject {
             out,
             first: true,
             result: Ok(()),
@@ -174,15 +174,15 @@ impl Display for Fields<'_> {
 pub fn quoted(value: impl Display) -> impl Display {
     fmt::from_fn(move |out| {
         out.write_str("\"")?;
-        fmt::Write::write_fmt(&mut Escaped(out), format_args!("{value}"))?;
+        fmt::Write::write_fmt(&mut EscapedText(out), format_args!("{value}"))?;
         out.write_str("\"")
     })
 }
 
 /// Text inside the quotes of a JSON string (RFC 8259, section 7).
-struct Escaped<'a, 'f>(&'a mut Formatter<'f>);
+struct EscapedText<'a, 'f>(&'a mut Formatter<'f>);
 
-impl fmt::Write for Escaped<'_, '_> {
+impl fmt::Write for EscapedText<'_, '_> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         text.chars().try_for_each(|character| match character {
             '"' => self.0.write_str("\\\""),
@@ -196,11 +196,11 @@ impl fmt::Write for Escaped<'_, '_> {
 
 /// Returns a machine line of kind `kind`, without the line's end.
 ///
-/// See [`Object`].
-pub fn line(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) -> impl Display {
+/// See [`JsonObject`].
+pub fn line(kind: &str, fields: impl Fn(&mut JsonObject<'_, '_>)) -> impl Display {
     fmt::from_fn(move |out| {
-        let whole = |object: &mut Object<'_, '_>| fields(object.quoted("kind", &kind));
-        Fields(&whole).fmt(out)
+        let whole = |object: &mut JsonObject<'_, '_>| fields(object.quoted("kind", &kind));
+        JsonFields(&whole).fmt(out)
     })
 }
 
@@ -227,17 +227,17 @@ const KERNELS: [&str; 6] = [
 /// });
 /// ```
 #[track_caller]
-pub fn emit(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
+pub fn emit(kind: &str, fields: impl Fn(&mut JsonObject<'_, '_>)) {
     assert!(
         !KERNELS.contains(&kind),
         "a machine line of kind `{kind}` is the kernel's to print; choose another kind"
     );
-    console::write_line(console::Kind::Line, &line(kind, fields));
+    console::write_line(console::OutputKind::Line, &line(kind, fields));
 }
 
 /// Prints a machine line of the kernel's own, of any kind.
-pub fn report(kind: &str, fields: impl Fn(&mut Object<'_, '_>)) {
-    console::write_line(console::Kind::KernelLine, &line(kind, fields));
+pub fn report(kind: &str, fields: impl Fn(&mut JsonObject<'_, '_>)) {
+    console::write_line(console::OutputKind::KernelLine, &line(kind, fields));
 }
 
 #[cfg(test)]

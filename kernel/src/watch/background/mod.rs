@@ -41,7 +41,7 @@ use executive::text::console;
 use fass::SetOnce;
 use fass::edge::WatchedValue;
 use front::report::tell_log;
-use front::shell::{self, END, LiveRun, Session, shut_down};
+use front::shell::{self, END, LiveRun, ShellSession, shut_down};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Scheduler, TaskSet};
 use status::{Progress, Status};
@@ -95,7 +95,7 @@ const STARVED_NS: u64 = 200_000_000;
 #[derive(Debug)]
 struct Sliced {
     status: Option<Status>,
-    session: Option<Session<KernelRun>>,
+    session: Option<ShellSession<KernelRun>>,
 }
 
 static SLICED: SpinLock<Sliced> = SpinLock::new(Sliced {
@@ -112,7 +112,7 @@ impl Sliced {
         if let Some(status) = &mut self.status {
             status.print_when_due(is_starved);
         }
-        self.session.as_mut().is_some_and(Session::slice)
+        self.session.as_mut().is_some_and(ShellSession::slice)
     }
 }
 
@@ -160,7 +160,9 @@ impl Background {
         if is_sliced {
             *SLICED.lock() = Sliced {
                 status: (wishes.status_ns > 0).then(|| Status::begin(wishes.status_ns, total)),
-                session: wishes.console.map(|echo| Session::new(echo == Echo::On)),
+                session: wishes
+                    .console
+                    .map(|echo| ShellSession::new(echo == Echo::On)),
             };
             RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         }

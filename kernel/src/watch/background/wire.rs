@@ -22,7 +22,7 @@ use executive::machine::spinlock::SpinLock;
 use executive::machine::this_core;
 use executive::machine::timer::{self, Alarm};
 use executive::run::execution;
-use front::app::ending::Ending;
+use front::app::ending::AppError;
 use front::report::tell_wire;
 
 /// The time between two looks at the port.
@@ -42,10 +42,10 @@ struct Connection {
 static REST: SpinLock<Option<&'static [u8]>> = SpinLock::new(None);
 
 /// Connects the wire to the port, or its way in to the script.
-pub(crate) fn connect(wire: &Wire, script: Option<&'static [u8]>) -> Result<(), Ending> {
+pub(crate) fn connect(wire: &Wire, script: Option<&'static [u8]>) -> Result<(), AppError> {
     let name = wire.name();
     if !SECOND.is_there() {
-        return Err(Ending::Usage(UsageError::new(format!(
+        return Err(AppError::Usage(UsageError::new(format!(
             "wire `{name}` has no device, as there is no second serial port; give --input FILE or \
              --output FILE"
         ))));
@@ -57,7 +57,7 @@ pub(crate) fn connect(wire: &Wire, script: Option<&'static [u8]>) -> Result<(), 
     }));
     match LINE.set(connection) {
         true => Ok(()),
-        false => Err(Ending::Failure(format!(
+        false => Err(AppError::Failure(format!(
             "wire `{name}` finds the second serial port taken; connect one wire"
         ))),
     }

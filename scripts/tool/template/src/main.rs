@@ -9,11 +9,11 @@ use alloc::format;
 
 use fass::finish_create_dags;
 use kernel::report::{Distribution, Ns};
-use kernel::{Ending, Machine, Run, println};
+use kernel::{AppError, Machine, Run, println};
 
 kernel::entry!(main);
 
-fn main(machine: &Machine) -> Result<(), Ending> {
+fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let jobs = options.number("jobs", 1..=100_000, 100)?;
     options.finish(&["jobs"])?;
@@ -36,7 +36,7 @@ fn main(machine: &Machine) -> Result<(), Ending> {
     // failure, check `misses` here.
     match run.violations().count() {
         0 => Ok(()),
-        count => Err(Ending::Failure(format!(
+        count => Err(AppError::Failure(format!(
             "{count} violations of the model's rules"
         ))),
     }

@@ -15,7 +15,7 @@ use alloc::vec::Vec;
 use fass::finish_create_dags;
 use faults::crimes::Crime;
 use faults::{JOBS, Policy, doomed, doomed_at_leisure, healthy};
-use kernel::{Ending, Machine, json};
+use kernel::{AppError, Machine, json};
 
 /// Whether the crime has a budget.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -58,7 +58,7 @@ const ALONE: [Attack; 3] = [
 
 /// Commits the attack that the command line names, or those that can be one after the other, and
 /// prints what came of each.
-pub(crate) fn run(machine: &Machine) -> Result<(), Ending> {
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let named = machine.options().text("attack");
     machine.options().finish(&["test", "attack"])?;
     let attacks: Vec<Attack> = match named {
