@@ -34,7 +34,7 @@ pub type Machine = front::app::machine::Machine<LinuxSystem>;
 #[derive(Debug)]
 pub struct LinuxSystem {
     pub(crate) linux: Linux,
-    pub(crate) wire: RefCell<Option<Ends>>,
+    pub(crate) wire: RefCell<Option<WireEnds>>,
     /// What the app has asked for that Linux does not have.
     pub(crate) refusal: RefCell<Option<UsageError>>,
     /// The reasons that end a run before its time.
@@ -47,7 +47,7 @@ pub struct LinuxSystem {
 
 /// The ends of an app's wire: where bytes come from, and where they go.
 #[derive(Clone, Debug)]
-pub(crate) struct Ends {
+pub(crate) struct WireEnds {
     wire: Wire,
     /// Whether bytes come on standard input.
     is_live: bool,
@@ -55,7 +55,7 @@ pub(crate) struct Ends {
     output: Option<&'static str>,
 }
 
-impl Ends {
+impl WireEnds {
     /// Connects them for a run that is committed.
     fn connect(&self, machine: &Linux) -> Result<Connection, AppError> {
         let input: Box<dyn Read + Send> = match self.is_live {
@@ -165,7 +165,7 @@ impl System for LinuxSystem {
             let line = "has no ends; give --input - or --output FILE";
             return Err(UsageError::new(format!("wire `{}` {line}", wire.name())).into());
         }
-        let ends = Ends {
+        let ends = WireEnds {
             wire: wire.clone(),
             is_live: input.is_some(),
             output,

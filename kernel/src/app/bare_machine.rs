@@ -12,7 +12,7 @@ use super::calibration;
 use crate::options::{CommandLine, UsageError};
 use crate::report::{self, Ns};
 use crate::watch::background::KernelRun;
-use crate::watch::background::{Background, LINE, Wishes, wire};
+use crate::watch::background::{Background, BackgroundOptions, LINE, wire};
 use executive::machine::{self, interrupts_off, this_core};
 use executive::memory::heap;
 use executive::run::platform::KERNEL;
@@ -31,13 +31,13 @@ pub type Machine = front::app::machine::Machine<BareMachine>;
 #[derive(Debug)]
 pub struct BareMachine {
     /// What people want to see, and say, during a run.
-    wishes: Wishes,
+    wishes: BackgroundOptions,
     /// Whether a person has ended the latest run.
     is_shut_down: Cell<bool>,
 }
 
 impl BareMachine {
-    pub(crate) const fn new(wishes: Wishes) -> Self {
+    pub(crate) const fn new(wishes: BackgroundOptions) -> Self {
         Self {
             wishes,
             is_shut_down: Cell::new(false),

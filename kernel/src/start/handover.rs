@@ -127,7 +127,7 @@ pub(crate) fn start(info: &'static BootInfo, name: &'static str, app: App) -> ! 
     this_core::create(with_stacks(selected(info, &platform)));
     let core = processors::become_core(local_apic::id());
     let stack = core.context().stack_top();
-    let start = Start {
+    let start = BootHandover {
         info,
         name,
         app,
@@ -194,7 +194,7 @@ fn module_bytes(info: &'static BootInfo) -> Option<&'static [u8]> {
 }
 
 /// What the boot processor takes along to its own stack.
-struct Start {
+struct BootHandover {
     info: &'static BootInfo,
     name: &'static str,
     app: App,
@@ -205,8 +205,8 @@ struct Start {
 }
 
 /// Measures time, starts the other cores and runs the app.
-extern "C" fn start_cores(start: &Start) -> ! {
-    let Start {
+extern "C" fn start_cores(start: &BootHandover) -> ! {
+    let BootHandover {
         info,
         name,
         app,

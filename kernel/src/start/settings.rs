@@ -44,15 +44,15 @@ use fass::edge::EdgeMode;
 use front::app::terms::{self, RunTerms};
 use front::options::{CommandLine, UsageError, whole_number};
 
-use crate::watch::background::{Echo, Wishes};
+use crate::watch::background::{BackgroundOptions, ConsoleEcho};
 
 /// What the words say about runs to come; all else is set where it belongs.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Settings {
+pub(crate) struct RunSettings {
     /// What they say everywhere.
     pub(crate) chosen: RunTerms,
     /// What else people want to see, and say.
-    pub(crate) wishes: Wishes,
+    pub(crate) wishes: BackgroundOptions,
 }
 
 /// Has the runs to come recorded or replayed, if the words say so. Returns what is left of the
@@ -104,7 +104,10 @@ pub(crate) fn set_wish(
 /// Takes the kernel's words and does what they say.
 ///
 /// The machine has so many `processors`, cores or not.
-pub(crate) fn apply(options: &CommandLine<'_>, processors: usize) -> Result<Settings, UsageError> {
+pub(crate) fn apply(
+    options: &CommandLine<'_>,
+    processors: usize,
+) -> Result<RunSettings, UsageError> {
     let chosen = RunTerms::read(options)?;
     let most_events = options.number("trace_events", 0..=u64::MAX, u64::MAX)?;
     KERNEL.change(|terms| {
@@ -142,13 +145,13 @@ pub(crate) fn apply(options: &CommandLine<'_>, processors: usize) -> Result<Sett
     let consoles = [
         ("off", (None, false)),
         ("stop", (None, true)),
-        ("on", (Some(Echo::Off), true)),
-        ("echo", (Some(Echo::On), true)),
+        ("on", (Some(ConsoleEcho::Off), true)),
+        ("echo", (Some(ConsoleEcho::On), true)),
     ];
     let (console, stops) = options.choice("console", &consoles)?;
-    Ok(Settings {
+    Ok(RunSettings {
         chosen,
-        wishes: Wishes {
+        wishes: BackgroundOptions {
             console,
             stops,
             status_ns: status_s * 1_000_000_000,

@@ -44,13 +44,13 @@ use front::report::tell_log;
 use front::shell::{self, END, LiveRun, ShellSession, shut_down};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Scheduler, TaskSet};
-use status::{Progress, Status};
+use status::{RunProgress, StatusPrinter};
 
 /// What the command line says about the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Wishes {
+pub(crate) struct BackgroundOptions {
     /// Whether there is a console, and whether it sends back what is typed.
-    pub(crate) console: Option<Echo>,
+    pub(crate) console: Option<ConsoleEcho>,
     /// Whether one byte ends the run, in order.
     pub(crate) stops: bool,
     /// The time between two lines of kind `status`; 0: none.
@@ -59,7 +59,7 @@ pub(crate) struct Wishes {
 
 /// Whether the console sends back what is typed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Echo {
+pub(crate) enum ConsoleEcho {
     /// It does, for a terminal that does not show it by itself.
     On,
     /// It does not.
@@ -93,12 +93,12 @@ const STARVED_NS: u64 = 200_000_000;
 
 /// What is done in slices, by the background or by the heartbeat.
 #[derive(Debug)]
-struct Sliced {
-    status: Option<Status>,
+struct SlicedWork {
+    status: Option<StatusPrinter>,
     session: Option<ShellSession<KernelRun>>,
 }
 
-static SLICED: SpinLock<Sliced> = SpinLock::new(Sliced {
+static SLICED: SpinLock<SlicedWork> = SpinLock::new(SlicedWork {
     status: None,
     session: None,
 });
@@ -106,7 +106,7 @@ static SLICED: SpinLock<Sliced> = SpinLock::new(Sliced {
 /// When the background ran last, on the clock; `u64::MAX` if there are no slices.
 static RAN_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
-impl Sliced {
+impl SlicedWork {
     /// Does a slice. Reports whether there is more to do at once.
     fn slice(&mut self, is_starved: bool) -> bool {
         if let Some(status) = &mut self.status {
@@ -136,8 +136,8 @@ pub(crate) fn beat(now_ns: u64) {
 /// The background of one run.
 #[derive(Debug)]
 pub(crate) struct Background {
-    progress: Progress,
-    listener: Option<Listener>,
+    progress: RunProgress,
+    listener: Option<ByteListener>,
     /// Whether [`SLICED`] has something to do.
     is_sliced: bool,
     /// The heartbeat that the core had before.
@@ -147,7 +147,11 @@ pub(crate) struct Background {
 impl Background {
     /// Begins the background of a run of `total` jobs; 0 if their number is not known. Each byte
     /// of input raises a sporadic DAG of a plan.
-    pub(crate) fn begin(wishes: Wishes, input: Option<(u64, DagId)>, total: u64) -> Self {
+    pub(crate) fn begin(
+        wishes: BackgroundOptions,
+        input: Option<(u64, DagId)>,
+        total: u64,
+    ) -> Self {
         let before_ns = heartbeat::own_heartbeat_ns();
         let periods = [
             (wishes.console.is_some() || input.is_some()).then_some(shell::PERIOD_NS),
@@ -158,25 +162,26 @@ impl Background {
         heartbeat::set_own_heartbeat(periods.fold(before_ns.min(stall::LOOK_NS), u64::min));
         let is_sliced = wishes.console.is_some() || wishes.status_ns > 0;
         if is_sliced {
-            *SLICED.lock() = Sliced {
-                status: (wishes.status_ns > 0).then(|| Status::begin(wishes.status_ns, total)),
+            *SLICED.lock() = SlicedWork {
+                status: (wishes.status_ns > 0)
+                    .then(|| StatusPrinter::begin(wishes.status_ns, total)),
                 session: wishes
                     .console
-                    .map(|echo| ShellSession::new(echo == Echo::On)),
+                    .map(|echo| ShellSession::new(echo == ConsoleEcho::On)),
             };
             RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         }
         stall::begin();
         // What a person says to the console is no event.
         let input = input.filter(|_| wishes.console.is_none());
-        let listener = input.map(|input| Listener::new(input, wishes.stops));
+        let listener = input.map(|input| ByteListener::new(input, wishes.stops));
         watch_for_end(wishes.stops && wishes.console.is_none() && listener.is_none());
         if let Some(line) = LINE.get() {
             line.begin(clock::now_ns());
         }
         Self {
             heartbeat_before_ns: before_ns,
-            progress: Progress::new(total),
+            progress: RunProgress::new(total),
             is_sliced,
             listener,
         }
@@ -235,14 +240,14 @@ fn look_for_end() {
 
 /// The DAG that bytes are for.
 #[derive(Debug)]
-pub(super) struct Listener {
+pub(super) struct ByteListener {
     plan: u64,
     dag: DagId,
     /// Whether one byte ends the run instead.
     stops: bool,
 }
 
-impl Listener {
+impl ByteListener {
     pub(super) const fn new((plan, dag): (u64, DagId), stops: bool) -> Self {
         Self { plan, dag, stops }
     }

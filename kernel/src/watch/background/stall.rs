@@ -48,35 +48,35 @@ const MOST_NAMED: usize = 16;
 
 /// What was seen in this run. It begins as zeros, which take no room in an image.
 #[derive(Debug)]
-struct Watch {
+struct StallWatch {
     /// Whether there is a run.
     looks: bool,
     /// When to look again, on the clock.
     next_look_ns: u64,
-    cores: [Seen; MOST_CORES],
+    cores: [SeenInstance; MOST_CORES],
     named: usize,
 }
 
 /// What a core was seen to run.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct SeenInstance {
     instance: Option<Instance>,
     since_ns: u64,
     is_named: bool,
 }
 
-static WATCH: SpinLock<Watch> = SpinLock::new(Watch::NONE);
+static WATCH: SpinLock<StallWatch> = SpinLock::new(StallWatch::NONE);
 
-impl Watch {
+impl StallWatch {
     const NONE: Self = Self {
         looks: false,
         next_look_ns: 0,
-        cores: [Seen::NOTHING; MOST_CORES],
+        cores: [SeenInstance::NOTHING; MOST_CORES],
         named: 0,
     };
 }
 
-impl Seen {
+impl SeenInstance {
     const NOTHING: Self = Self {
         instance: None,
         since_ns: 0,
@@ -110,10 +110,10 @@ impl Seen {
 
 /// Begins to look, at a run that begins now.
 pub(super) fn begin() {
-    *WATCH.lock() = Watch {
+    *WATCH.lock() = StallWatch {
         looks: true,
         next_look_ns: clock::now_ns(),
-        ..Watch::NONE
+        ..StallWatch::NONE
     };
 }
 
@@ -132,7 +132,7 @@ pub(super) fn beat(now_ns: u64) {
         return;
     }
     watch.next_look_ns = now_ns.saturating_add(LOOK_NS);
-    let Watch { cores, named, .. } = &mut *watch;
+    let StallWatch { cores, named, .. } = &mut *watch;
     for (core, seen) in this_core::all().iter().zip(cores) {
         if *named == MOST_NAMED {
             break;
@@ -199,18 +199,18 @@ const _: () = assert!(
 
 /// What is to be done about a core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Doubt {
+enum StallResponse {
     None,
     Ask,
     Accuse,
 }
 
 /// Judges a core that took its last interrupt so long ago.
-const fn judge(silent_ns: u64) -> Doubt {
+const fn judge(silent_ns: u64) -> StallResponse {
     match silent_ns {
-        SILENT_NS.. => Doubt::Accuse,
-        QUIET_NS.. => Doubt::Ask,
-        _ => Doubt::None,
+        SILENT_NS.. => StallResponse::Accuse,
+        QUIET_NS.. => StallResponse::Ask,
+        _ => StallResponse::None,
     }
 }
 
@@ -230,9 +230,9 @@ pub(crate) fn look(own: &Core, now_ns: u64) {
         }
         let silent_ns = now_ns.saturating_sub(core.interrupted_ns.load(Ordering::Relaxed));
         match judge(silent_ns) {
-            Doubt::None => {}
-            Doubt::Ask => core.wake_up(),
-            Doubt::Accuse => non_maskable::accuse(core),
+            StallResponse::None => {}
+            StallResponse::Ask => core.wake_up(),
+            StallResponse::Accuse => non_maskable::accuse(core),
         }
     }
 }
@@ -246,7 +246,7 @@ mod tests {
     /// Looks at a core that runs instances of these jobs; returns at which looks one
     /// was named.
     fn named(jobs: &[Option<u64>], wcet_ns: u64) -> Vec<usize> {
-        let mut seen = Seen::NOTHING;
+        let mut seen = SeenInstance::NOTHING;
         let looks = (0..).zip(jobs).filter(|&(look, &job)| {
             let running = job.map(|job| Instance {
                 dag: DagId(0),

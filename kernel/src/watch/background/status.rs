@@ -34,22 +34,22 @@ const MOST_EVENTS: u64 = 2048;
 
 /// When and what to print.
 #[derive(Debug)]
-pub(super) struct Status {
+pub(super) struct StatusPrinter {
     period_ns: u64,
     total: u64,
     /// When the last line was printed.
     last_ns: u64,
-    patience: Patience,
+    patience: LinePatience,
 }
 
-impl Status {
+impl StatusPrinter {
     /// Begins with the first line due after `period_ns`.
     pub(super) fn begin(period_ns: u64, total: u64) -> Self {
         Self {
             period_ns,
             total,
             last_ns: clock::now_ns(),
-            patience: Patience::new(),
+            patience: LinePatience::new(),
         }
     }
 
@@ -89,19 +89,19 @@ impl Status {
 
 /// How far a run has come.
 #[derive(Debug)]
-pub(super) struct Progress {
+pub(super) struct RunProgress {
     total: u64,
     printed: u64,
-    patience: Patience,
+    patience: LinePatience,
 }
 
-impl Progress {
+impl RunProgress {
     /// Begins with no job ended of `total`; 0: there is no end to come nearer to.
     pub(super) const fn new(total: u64) -> Self {
         Self {
             total,
             printed: 0,
-            patience: Patience::new(),
+            patience: LinePatience::new(),
         }
     }
 
@@ -136,7 +136,7 @@ pub(crate) fn loads_permille(
     let mut permille = [0; CORES];
     let mut is_recorded = true;
     for cluster in 0..execution::clusters() {
-        match of_cluster(cluster, Loads::new(from_ns, to_ns), most) {
+        match of_cluster(cluster, CoreLoads::new(from_ns, to_ns), most) {
             Some(loads) => {
                 let first = execution::first_core(cluster) as usize;
                 let its = permille.iter_mut().skip(first).zip(0..);
@@ -155,7 +155,7 @@ pub(crate) fn loads_permille(
 }
 
 /// Takes the events of a cluster's journal; nothing if they are not recorded.
-fn of_cluster(cluster: usize, mut loads: Loads, most: u64) -> Option<Loads> {
+fn of_cluster(cluster: usize, mut loads: CoreLoads, most: u64) -> Option<CoreLoads> {
     let is_on =
         execution::with_scheduler(cluster, |scheduler| scheduler.log.journal.is_recording());
     is_on.filter(|is_on| *is_on)?;
@@ -168,7 +168,7 @@ fn of_cluster(cluster: usize, mut loads: Loads, most: u64) -> Option<Loads> {
 
 /// The loads, while events are taken from the latest one back.
 #[derive(Clone, Debug)]
-struct Loads {
+struct CoreLoads {
     from_ns: u64,
     to_ns: u64,
     /// The time of the oldest event taken.
@@ -183,7 +183,7 @@ struct Loads {
     is_over: bool,
 }
 
-impl Loads {
+impl CoreLoads {
     fn new(from_ns: u64, to_ns: u64) -> Self {
         Self {
             // What the journal holds may all have happened since `to_ns` was read.
@@ -244,11 +244,11 @@ const PATIENCE_NS: u64 = 100_000_000;
 
 /// Since when a line has waited.
 #[derive(Debug)]
-pub(super) struct Patience {
+pub(super) struct LinePatience {
     since_ns: Option<u64>,
 }
 
-impl Patience {
+impl LinePatience {
     pub(super) const fn new() -> Self {
         Self { since_ns: None }
     }
@@ -274,11 +274,11 @@ impl Patience {
 mod tests {
     use sched_dag::{CoreId, DagId, SubtaskId};
 
-    use super::{PATIENCE_NS, Patience, *};
+    use super::{LinePatience, PATIENCE_NS, *};
 
     /// The load of core 0 by events in the order of time.
     fn load(events: &[(u64, EventKind)], from_ns: u64, to_ns: u64) -> u64 {
-        let mut loads = Loads::new(from_ns, to_ns);
+        let mut loads = CoreLoads::new(from_ns, to_ns);
         for &(time_ns, what) in events.iter().rev() {
             loads.take(&Event {
                 time_ns,
@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn a_line_waits_for_a_gap_but_not_for_ever() {
-        let mut patience = Patience::new();
+        let mut patience = LinePatience::new();
         assert!(patience.ends(1_000, u64::MAX));
         assert!(!patience.ends(2_000, 3_000));
         assert!(

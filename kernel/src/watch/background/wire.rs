@@ -31,7 +31,7 @@ pub(super) const PERIOD_NS: u64 = 1_000_000;
 /// What the port's FIFO holds.
 const FIFO_BYTES: usize = 16;
 
-struct Connection {
+struct WireConnection {
     wire: Wire,
     port: &'static SerialPort,
     /// What arrives in each run, in place of what the port gets.
@@ -50,7 +50,7 @@ pub(crate) fn connect(wire: &Wire, script: Option<&'static [u8]>) -> Result<(), 
              --output FILE"
         ))));
     }
-    let connection = Box::leak(Box::new(Connection {
+    let connection = Box::leak(Box::new(WireConnection {
         wire: wire.clone(),
         port: &SECOND,
         script,
@@ -72,7 +72,7 @@ fn first(script: &[u8]) -> Option<(u64, &[u8], &[u8])> {
     Some((u64::from_le_bytes(*at_ns), bytes, rest))
 }
 
-impl Connection {
+impl WireConnection {
     fn arrive(&self, bytes: &[u8], now_ns: u64) {
         if let Some((plan, dag)) = self.wire.arrive(bytes, now_ns) {
             execution::raise_in_interrupt(plan, dag);
@@ -99,7 +99,7 @@ impl Connection {
     }
 }
 
-impl Line for Connection {
+impl Line for WireConnection {
     fn begin(&self, now_ns: u64) {
         *REST.lock() = Some(self.script.unwrap_or_default());
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, now_ns);
