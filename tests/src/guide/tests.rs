@@ -1,4 +1,4 @@
-//! The guide holds what it promises; the README's index of pages is complete.
+//! The guide holds what it promises; the index of pages is complete.
 
 use std::ffi::OsString;
 use std::fs;
@@ -32,12 +32,13 @@ fn lines_of(info: &str) -> Vec<String> {
     texts.concat().lines().map(String::from).collect()
 }
 
-/// Returns the names of the files in a folder, in their order.
+/// Returns the names of the pages in a folder, in their order.
 fn files(folder: &str) -> Vec<String> {
     let entries = fs::read_dir(workspace().join(folder)).expect(folder);
     let entries = entries.flatten().filter(|entry| entry.path().is_file());
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     let mut names: Vec<String> = names.collect();
+    names.retain(|name| name.ends_with(".md"));
     names.sort();
     names
 }
@@ -113,28 +114,31 @@ fn what_they_say_of_a_fault_is_its_entrys_text_with_names_of_their_own() {
 }
 
 #[test]
-fn the_readme_shows_what_the_first_command_prints() {
-    let mut blocks = blocks(&page("README.md")).into_iter();
-    let shown = blocks.find(|block| block.info == "text");
+fn the_guide_shows_what_the_first_example_prints() {
+    let mut blocks = blocks(&page("docs/guide.md")).into_iter();
+    let shown = blocks.find(|block| block.info == "text output-vision");
     let golden = Golden {
-        file: "README.md",
-        below: "The first command prints",
+        file: "docs/guide.md",
+        below: "cargo run --example vision",
         text: &shown.expect("it is there").text,
     };
     golden.assert_is(&vision::run().expect("the DAG is sound"));
 }
 
 #[test]
-fn the_readme_lists_every_page() {
-    let readme = page("README.md");
-    let index = readme.split("\n## More\n").nth(1).expect("the index");
-    let pages = files("docs");
+fn the_order_of_reading_has_every_page() {
+    let index = page("docs/README.md");
+    let mut pages = files("docs");
+    pages.retain(|name| name != "README.md");
     assert!(pages.len() > 5);
     for name in pages {
-        let link = format!("(docs/{name})");
-        assert!(index.contains(&link), "the README's list lacks {link}");
+        let link = format!("({name})");
+        assert!(index.contains(&link), "docs/README.md lacks {link}");
     }
-    assert!(index.contains("(docs/decisions)"), "it lacks the decisions");
+    assert!(
+        index.contains("(decisions/README.md)"),
+        "it lacks the decisions"
+    );
 }
 
 /// Returns the entries of the decisions' index: number and file.

@@ -275,3 +275,46 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
         assert!(said.lines().any(hint), "{said}");
     }
 }
+
+/// The README's picture, by the commands that stand below it.
+#[test]
+fn the_readmes_picture_is_what_its_commands_draw() {
+    let shown = blocks(&page("README.md")).into_iter();
+    let shown = shown.find(|block| block.text.contains("--svg"));
+    let trace = system::new_log("picture").expect("a folder for logs");
+    let trace = trace.with_extension("trace");
+    let mut drawn = String::new();
+    for command in shown.expect("it is there").text.lines() {
+        let words = command.trim_start_matches("$ ").split_whitespace();
+        let words = words.take_while(|word| *word != "-o");
+        let [program, words @ ..] = &*words.collect::<Vec<_>>() else {
+            continue;
+        };
+        let words = words.iter().map(|&word| match word {
+            "run.trace" => trace.as_os_str(),
+            word => word.as_ref(),
+        });
+        let mut command = Command::new(system::workspace().join(program));
+        let output = command
+            .args(words)
+            .current_dir(system::workspace())
+            .output();
+        let Output {
+            status,
+            stdout,
+            stderr,
+        } = output.expect("it can be started");
+        let stderr = String::from_utf8_lossy(&stderr);
+        assert!(status.success(), "{program}: {stderr}");
+        drawn = String::from_utf8(stdout).expect("text");
+    }
+    let _ = fs::remove_file(&trace);
+    let file = "docs/schedule.svg";
+    let kept = page(file);
+    let golden = Golden {
+        file,
+        below: "<svg",
+        text: &kept["<svg".len()..],
+    };
+    golden.assert_is(&drawn["<svg".len()..]);
+}

@@ -54,7 +54,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "on" in "where": Takes::OneOf(&["machine", "linux", "debian"]), or "machine";
         /// Processors; 4 on debian.
         "cores": Takes::number(1..=MOST_CORES), or "8";
-        /// See README.md.
+        /// See docs/commands.md.
         "mode": Takes::OneOf(Mode::NAMES);
         /// The board.
         "machine": Takes::OneOf(Machine::NAMES), or "microvm";
@@ -138,7 +138,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "gdb": Takes::Nothing;
     },
     notes: "\
-Modes: README.md. Ctrl-C and the timeout end a run in order, ctrl-C again at once.
+Modes: docs/commands.md. Ctrl-C and the timeout end a run in order, ctrl-C again at once.
 exit codes: 0 all is well; 1 a failure; 2 a refused command line; 130 ended by ctrl-C
 ",
 };

@@ -32,6 +32,7 @@
 //! A trace is *complete from* the first instant after the first event that is left; what
 //! happened before is left out.
 
+pub mod picture;
 pub mod viewer;
 
 use std::collections::BTreeMap;

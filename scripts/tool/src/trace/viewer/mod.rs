@@ -46,7 +46,7 @@ use sched_dag::journal::EventKind;
 use sched_dag::law::Violation;
 use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 
-use super::{JobHistory, Slice, View};
+use super::{JobHistory, Slice, View, picture};
 use super::{check, read_file};
 use crate::files;
 use crate::json::{Object, quoted};
@@ -138,7 +138,7 @@ fn draw_piece(
 /// The table of `trace`.
 pub static TRACE: Command = Command {
     invocation: "./scripts/trace",
-    about: "Converts the traces of runs for Perfetto's viewer.",
+    about: "Draws the traces of runs: for Perfetto's viewer, or as one picture.",
     positional: Some((
         Takes::File("FILE"),
         "A serial log, or another file of JSON lines, with traces: \
@@ -147,6 +147,10 @@ pub static TRACE: Command = Command {
     options: options! {
         /// Write to this file; else to standard output.
         "out" 'o': Takes::File("FILE");
+        /// Draw one run as an SVG instead: its DAGs above their schedule, with bounds and deadlines.
+        "svg": Takes::Nothing;
+        /// How many times the longest period the picture shows.
+        "periods": Takes::number(1..=1000), or "1";
         /// Only the run of this number; else all of them, side by side from time 0.
         "run": Takes::number(0..=u64::MAX);
         /// As for ./scripts/check-trace, whose breaches are shown as markers.
@@ -171,7 +175,11 @@ pub fn trace(words: &[OsString]) -> ExitCode {
             Some(out) => {
                 let place = files::place(out);
                 fs::write(out, text).map_err(|error| format!("cannot write {place}: {error}"))?;
-                eprintln!("{place}: open it at https://ui.perfetto.dev");
+                let by = match options.is_given("svg") {
+                    true => "in a browser",
+                    false => "at https://ui.perfetto.dev",
+                };
+                eprintln!("{place}: open it {by}");
             }
         }
         Ok(ExitCode::SUCCESS)
@@ -193,6 +201,11 @@ fn draw(options: &Parsed) -> Result<String, String> {
                 "`--run {number}`: {file} has no such run; its runs are {there}"
             ));
         }
+    }
+    if options.is_given("svg") {
+        // Without `--run` the first one: a picture has one axis of time.
+        let run = runs.first().ok_or("the file has no run")?;
+        return picture::draw(run, options.number("periods").unwrap_or(1));
     }
     // The runs of a log are those of one boot.
     let bound_ns = runs.first().map_or(0, |run| bound::of(run, options));

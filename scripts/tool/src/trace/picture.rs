@@ -1,0 +1,300 @@
+//! A run as a picture: each DAG above its schedule, as SVG.
+//!
+//! At the top stands each graph: a box for each subtask with its WCET, and an arrow for each
+//! edge. Below are the first jobs on a common axis of time: a row for each core with what it
+//! executed, in the colour of its subtask; then a row for each DAG with the response time of each
+//! job, its proven bound and its deadline.
+//!
+//! Coordinates are whole pixels, so that a run whose times differ by less than that has the same
+//! picture, byte by byte. Pages keep such pictures, and tests draw them again.
+
+use std::fmt::Write;
+
+use sched_dag::{Dag, DagId, SubtaskId};
+
+use super::View;
+use crate::record::Run;
+
+const WIDTH: u64 = 820;
+/// The width of the rows' names, and where the axis of time begins.
+const LEFT: u64 = 84;
+/// The room behind the axis, for half a label.
+const RIGHT: u64 = 36;
+const ROW: u64 = 30;
+const BOX: (u64, u64) = (104, 40);
+/// The distance of two boxes.
+const GAP: (u64, u64) = (44, 12);
+/// About how wide a letter is.
+const LETTER: u64 = 7;
+/// Light enough for black letters, and different without colour, too.
+const COLOURS: [&str; 10] = [
+    "#8ecae6", "#ffb703", "#b7e4c7", "#f4a6a6", "#cdb4db", "#ffe59e", "#a3b8cc", "#d9ae94",
+    "#90d5c9", "#e3e3e3",
+];
+
+/// Draws what the jobs did that were released in the first `periods` of the longest period.
+///
+/// # Errors
+///
+/// In words: no job is left of that time.
+pub fn draw(run: &Run, periods: u64) -> Result<String, String> {
+    let view = View::new(run);
+    let dags = run.task_set.dags();
+    let longest_ns = dags.iter().map(Dag::period_ns).max().unwrap_or(0);
+    let span_ns = longest_ns.saturating_mul(periods);
+    let mut picture = Picture {
+        view: &view,
+        svg: String::new(),
+        span_ns,
+        end_ns: span_ns,
+    };
+    let ends = view.jobs.values().filter_map(|job| {
+        let is_drawn = job.released_ns.is_some_and(|at_ns| at_ns < span_ns);
+        is_drawn.then_some(job.completed_ns.unwrap_or(0))
+    });
+    let last_ns = ends.max().ok_or_else(|| {
+        format!(
+            "run {} keeps no job that was released before {}; ask for more by `--periods`",
+            run.number,
+            time(span_ns)
+        )
+    })?;
+    picture.end_ns = picture.end_ns.max(last_ns);
+    let mut y = 12;
+    for (dag, model) in picture.dags() {
+        y = picture.graph(dag, model, y) + 18;
+    }
+    let axis = y;
+    y = picture.cores(axis);
+    for (dag, model) in picture.dags() {
+        y = picture.responses(dag, model, y);
+    }
+    picture.axis(axis, y);
+    let height = y + 30;
+    Ok(format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" \
+         viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" font-size=\"13\">\n\
+         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n{}</svg>\n",
+        picture.svg
+    ))
+}
+
+struct Picture<'v> {
+    view: &'v View<'v>,
+    svg: String,
+    /// Jobs that are released before this are drawn.
+    span_ns: u64,
+    /// Where the axis of time ends.
+    end_ns: u64,
+}
+
+// Writing into a `String` cannot fail.
+impl<'v> Picture<'v> {
+    fn dags(&self) -> impl Iterator<Item = (DagId, &'v Dag)> + use<'v> {
+        (0..).map(DagId).zip(self.view.run.task_set.dags())
+    }
+
+    fn is_drawn(&self, dag: DagId, job: u64) -> bool {
+        let released_ns = self
+            .view
+            .jobs
+            .get(&(dag, job))
+            .and_then(|job| job.released_ns);
+        released_ns.is_some_and(|released_ns| released_ns < self.span_ns)
+    }
+
+    /// Where an instant is on the axis.
+    fn x(&self, time_ns: u64) -> u64 {
+        let pixels = u128::from(WIDTH - LEFT - RIGHT);
+        let end_ns = u128::from(self.end_ns.max(1));
+        // To the nearest pixel.
+        let x = (2 * u128::from(time_ns) * pixels + end_ns) / (2 * end_ns);
+        LEFT + u64::try_from(x).expect("within the picture")
+    }
+
+    /// The colour of a subtask: the next one for each of all DAGs.
+    fn colour(&self, dag: DagId, subtask: SubtaskId) -> &'static str {
+        let before = self.dags().take_while(|&(other, _)| other != dag);
+        let before: usize = before.map(|(_, model)| model.subtasks().len()).sum();
+        COLOURS[(before + subtask.0 as usize) % COLOURS.len()]
+    }
+
+    fn text(&mut self, (x, y): (u64, u64), anchor: &str, text: &str) {
+        let text = text.replace('&', "&amp;").replace('<', "&lt;");
+        let _ = writeln!(
+            self.svg,
+            "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>"
+        );
+    }
+
+    fn rect(&mut self, (x, y): (u64, u64), (width, height): (u64, u64), fill: &str) {
+        let _ = writeln!(
+            self.svg,
+            "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"3\" \
+             fill=\"{fill}\" stroke=\"#333333\"/>"
+        );
+    }
+
+    fn line(&mut self, (x1, y1): (u64, u64), (x2, y2): (u64, u64), style: &str) {
+        let _ = writeln!(
+            self.svg,
+            "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" {style}/>"
+        );
+    }
+
+    /// Draws a DAG from `y` on, by layers: a subtask's is the longest path to it.
+    fn graph(&mut self, dag: DagId, model: &Dag, y: u64) -> u64 {
+        let mut layers: Vec<Vec<SubtaskId>> = Vec::new();
+        let mut layer_of = vec![0; model.subtasks().len()];
+        for &subtask in model.topological_order() {
+            let before = model.predecessors(subtask).iter();
+            let layer = before.map(|it| layer_of[it.0 as usize] + 1).max();
+            let layer = layer.unwrap_or(0);
+            layer_of[subtask.0 as usize] = layer;
+            layers.resize(layers.len().max(layer + 1), Vec::new());
+            layers[layer].push(subtask);
+        }
+        let tallest = layers.iter().map(Vec::len).max().unwrap_or(0) as u64;
+        let (width, height) = (BOX.0 + GAP.0, BOX.1 + GAP.1);
+        let mut corners = vec![(0, 0); model.subtasks().len()];
+        for (x, layer) in (0..).zip(&layers) {
+            let above = (tallest - layer.len() as u64) * height / 2;
+            for (row, subtask) in (0..).zip(layer) {
+                corners[subtask.0 as usize] = (LEFT + x * width, y + above + row * height);
+            }
+        }
+        self.text((8, y + tallest * height / 2), "start", model.name());
+        for (subtask, &from) in (0..).map(SubtaskId).zip(&corners) {
+            for successor in model.successors(subtask) {
+                let to = corners[successor.0 as usize];
+                let style = "stroke=\"#333333\"";
+                let end = (to.0, to.1 + BOX.1 / 2);
+                self.line((from.0 + BOX.0, from.1 + BOX.1 / 2), end, style);
+                let (x, y) = end;
+                let _ = writeln!(
+                    self.svg,
+                    "<path d=\"M{x} {y} l-8 -4 v8 z\" fill=\"#333333\"/>"
+                );
+            }
+        }
+        for (subtask, &(x, y)) in (0..).map(SubtaskId).zip(&corners) {
+            self.rect((x, y), BOX, self.colour(dag, subtask));
+            let model = model.subtask(subtask);
+            self.text((x + BOX.0 / 2, y + 17), "middle", model.name());
+            if let Some(wcet_ns) = model.wcet_ns() {
+                let wcet = format!("WCET {}", time(wcet_ns));
+                self.text((x + BOX.0 / 2, y + 33), "middle", &wcet);
+            }
+        }
+        y + tallest * height
+    }
+
+    /// Draws what each core executed, from `y` on.
+    fn cores(&mut self, y: u64) -> u64 {
+        let cores = u64::from(self.view.run.options.cores);
+        for core in 0..cores {
+            let middle = y + core * ROW + 20;
+            self.text((8, middle), "start", &format!("core {core}"));
+        }
+        for (&instance, history) in &self.view.histories {
+            if !self.is_drawn(instance.dag, instance.job) {
+                continue;
+            }
+            let model = self.view.run.task_set.dag(instance.dag);
+            let name = model.subtask(instance.subtask).name();
+            for slice in &history.slices {
+                let from = self.x(slice.from_ns.min(self.end_ns));
+                let to = self.x(slice.to_ns.unwrap_or(self.end_ns).min(self.end_ns));
+                let (top, width) = (y + u64::from(slice.core.0) * ROW + 3, (to - from).max(1));
+                let colour = self.colour(instance.dag, instance.subtask);
+                self.rect((from, top), (width, ROW - 6), colour);
+                if width > LETTER * name.len() as u64 {
+                    self.text((from + width / 2, top + 17), "middle", name);
+                }
+            }
+        }
+        y + cores * ROW
+    }
+
+    /// Draws the response time of each job of a DAG, from `y` on, with bound and deadline.
+    fn responses(&mut self, dag: DagId, model: &Dag, y: u64) -> u64 {
+        let bound_ns = self.view.run.bounds_ns.get(dag.0 as usize);
+        let marks = [
+            // Of two rows of labels the later mark's is the upper one: its line ends above the other.
+            (Some(model.relative_deadline_ns()), "#c1121f", "deadline"),
+            (bound_ns.copied().flatten(), "#1a7f37", "bound"),
+        ];
+        self.text((8, y + 20), "start", model.name());
+        let view = self.view;
+        let mut is_first = true;
+        for (&(_, job), history) in view.jobs.iter().filter(|((of, _), _)| *of == dag) {
+            let Some(completed_ns) = history.completed_ns.filter(|_| self.is_drawn(dag, job))
+            else {
+                continue;
+            };
+            // A sporadic job counts from its signal, which its grid does not tell.
+            let release_ns = view.due_ns.get(&(dag, job)).copied();
+            let release_ns = release_ns.unwrap_or_else(|| model.grid_ns(job));
+            let (from, to) = (self.x(release_ns), self.x(completed_ns));
+            self.rect((from, y + 8), ((to - from).max(1), 16), "#eeeeee");
+            let response = time(completed_ns - release_ns);
+            if to - from > LETTER * response.len() as u64 {
+                self.text((from + (to - from) / 2, y + 21), "middle", &response);
+            }
+            for (row, (after_ns, colour, name)) in (0..).zip(marks) {
+                let Some(at_ns) = after_ns.map(|after_ns| release_ns + after_ns) else {
+                    continue;
+                };
+                if at_ns > self.end_ns {
+                    continue;
+                }
+                let (x, label_y) = (self.x(at_ns), y + 38 + 16 * row);
+                let style = format!("stroke=\"{colour}\" stroke-width=\"2\"");
+                let end_y = if is_first { label_y } else { y + 28 };
+                self.line((x, y + 2), (x, end_y), &style);
+                if is_first {
+                    let label = format!("{name} {}", time(at_ns - release_ns));
+                    let is_wide = x + LETTER * label.len() as u64 > WIDTH - 8;
+                    let (x, anchor) = if is_wide {
+                        (x - 4, "end")
+                    } else {
+                        (x + 4, "start")
+                    };
+                    self.text((x, label_y), anchor, &label);
+                }
+            }
+            is_first = false;
+        }
+        y + 2 * ROW
+    }
+
+    /// Draws the axis between two heights, with some ten marks.
+    fn axis(&mut self, top: u64, bottom: u64) {
+        let steps = (0..).flat_map(|power| [1, 2, 5].map(|step| step * 10_u64.pow(power)));
+        let step_ns = steps.take(54).find(|step| self.end_ns / step <= 12);
+        let step_ns = step_ns.unwrap_or(self.end_ns.max(1));
+        for time_ns in (0..=self.end_ns).step_by(usize::try_from(step_ns).unwrap_or(usize::MAX)) {
+            let x = self.x(time_ns);
+            self.line(
+                (x, top),
+                (x, bottom),
+                "stroke=\"#333333\" stroke-opacity=\"0.12\"",
+            );
+            self.text((x, bottom + 16), "middle", &time(time_ns));
+        }
+    }
+}
+
+/// Writes a time with at most one decimal, in the largest unit that makes it 1 or more.
+fn time(ns: u64) -> String {
+    let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1000, "us")];
+    let (unit_ns, unit) = units.into_iter().find(|it| ns >= it.0).unwrap_or((1, "ns"));
+    if ns == 0 {
+        return "0".into();
+    }
+    let tenths = (ns * 10 + unit_ns / 2) / unit_ns;
+    match tenths % 10 {
+        0 => format!("{} {unit}", tenths / 10),
+        tenth => format!("{}.{tenth} {unit}", tenths / 10),
+    }
+}
