@@ -1,11 +1,10 @@
-//! A child process with a limit: it is waited for, watched, and killed by its
-//! own process id when its time is over or when we let go of it. One that can end in order is
-//! asked to do so first.
+//! A child process with a time limit: it is waited for, watched, and killed by its own process id
+//! at the limit or when it is dropped. A child that can end in order is asked to first.
 //!
 //! It is asked at its limit, and when a *signal* asks us to end, such as ctrl-C. After its limit it
-//! has for as long as it prints, and 10 s; the next signal kills it at once. Before it has
-//! printed anything it does not listen, and is not asked. What it prints goes to a file, of which
-//! each whole line is shown once, when it ends.
+//! may run on as long as it prints, and 10 s longer; the next signal kills it at once. A child that
+//! has not printed yet does not listen, so it is not asked. Its output goes to a file; each line of
+//! that is shown once, when it is complete.
 //!
 //! Where the program `setpriv` exists, the system kills the child also if the
 //! tool itself is killed, so nothing is left behind in any case.
@@ -23,7 +22,7 @@ use linux::EndSignals;
 use crate::protocol::written;
 use crate::system;
 
-/// How long one look at the process is from the next.
+/// The time between two looks at the process.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// A child process that was started.
@@ -33,14 +32,14 @@ pub struct Child {
     started: Instant,
 }
 
-/// Why the wait for a child ended.
+/// The reason why the wait for a child ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Waited {
     /// It ended by itself.
     Ended(ExitStatus),
     /// Its time was over, and it was killed.
     TimedOut,
-    /// The watcher gave it up, and it was killed.
+    /// The watcher gave up, and the child was killed.
     GivenUp,
     /// A person pressed ctrl-C again before it had ended, and it was killed.
     Killed,
@@ -51,9 +50,9 @@ pub enum Waited {
 pub struct Followed {
     /// Why the wait ended.
     pub waited: Waited,
-    /// Why it was asked to end before its time, if it was.
+    /// The reason why it was asked to end early, if it was.
     pub asked: Option<Asked>,
-    /// All that it has printed; bytes that are no UTF-8 are replaced.
+    /// Its whole output; bytes that are no UTF-8 are replaced.
     pub text: String,
 }
 
@@ -69,14 +68,14 @@ impl Child {
         Ok(Child { process, started })
     }
 
-    /// Waits for the end, for at most `limit` since the start. `watch` is
-    /// called now and then; when it returns `false`, the child is given up.
+    /// Waits for the end, for at most `limit` since the start. `watch` is called at each look; when
+    /// it returns `false`, the child is killed.
     pub fn wait(&mut self, limit: Duration, mut watch: impl FnMut() -> bool) -> Waited {
         loop {
             match self.process.try_wait() {
                 Ok(Some(status)) => return Waited::Ended(status),
                 Ok(None) => {}
-                // It is no child of ours any more: nothing is left to kill.
+                // It is no longer a child of ours, so there is nothing left to kill.
                 Err(_) => return Waited::GivenUp,
             }
             if self.started.elapsed() >= limit {
@@ -91,9 +90,9 @@ impl Child {
         }
     }
 
-    /// Works like [`wait`](Self::wait), and shows each whole line of `log`, where the child
-    /// prints, to `show` as it comes. It is given up when `is_well`, which gets the number of
-    /// bytes there, says so. One that can end in order is asked to by `stop` before it is killed.
+    /// Works like [`wait`](Self::wait), and shows each complete line of `log`, the child's output,
+    /// to `show` as it comes. `is_well` gets the number of bytes in the log and returns `false` to
+    /// give the child up. `stop`, if given, asks the child to end in order before it is killed.
     ///
     /// # Errors
     ///
@@ -109,8 +108,10 @@ impl Child {
         let (mut tail, mut asking) = (Tail::new(log), Asking::new(limit));
         let signals = stop.as_ref().map(|_| EndSignals::catch());
         let (started, mut killed) = (self.started, Waited::GivenUp);
+        // A child that can be asked to end outlives its limit; `Asking` decides when it is killed.
         let of_wait = signals.as_ref().map_or(limit, |_| Duration::MAX);
         let waited = self.wait(of_wait, || {
+            // The log may not exist yet, and an error that lasts shows in `finish` below.
             let _ = tail.follow(show);
             let printed_bytes = tail.bytes();
             if !is_well(printed_bytes) {
@@ -135,6 +136,7 @@ impl Child {
         });
         let text = tail.finish(show);
         Ok(Followed {
+            // `wait` knows only that the watcher gave up; `killed` says why it did.
             waited: if waited == Waited::GivenUp {
                 killed
             } else {
@@ -163,7 +165,7 @@ impl Child {
         self.process.stdin.take()
     }
 
-    /// Takes what the child prints, if that is a pipe and was not taken.
+    /// Takes the child's standard output, if that is a pipe and was not taken.
     pub fn output(&mut self) -> Option<ChildStdout> {
         self.process.stdout.take()
     }
@@ -175,8 +177,9 @@ impl Child {
     }
 
     fn kill(&mut self) {
-        // It may have ended by itself in between: then there is nothing to do.
+        // It may have ended by itself in between; then there is nothing to kill.
         let _ = self.process.kill();
+        // Reaps the process, which would stay a zombie otherwise.
         let _ = self.process.wait();
     }
 }
@@ -187,9 +190,9 @@ impl Drop for Child {
     }
 }
 
-/// Returns a command for `program` that the system kills when the calling
-/// thread dies, if `setpriv` is there to ask for it. `setpriv` becomes the
-/// program, so the process id stays the same.
+/// Returns a command for `program` that the system kills when the calling thread dies, if `setpriv`
+/// is there to ask for it. `setpriv` executes the program in its own place, so the process id stays
+/// the same.
 #[must_use]
 pub fn bound_to_us(program: &Path) -> Command {
     if system::find_program("setpriv").is_none() {
@@ -200,28 +203,28 @@ pub fn bound_to_us(program: &Path) -> Command {
     command
 }
 
-/// For how long a child that was asked at its limit may print nothing.
+/// The longest silence of a child that was asked to end at its limit.
 const GRACE: Duration = Duration::from_secs(10);
 
-/// Why a child was asked to end.
+/// The reason why a child was asked to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
-    /// A person has pressed ctrl-C, or this program was asked to end.
+    /// A person pressed ctrl-C, or this program was asked to end.
     ByPerson,
-    /// This limit was over.
+    /// This limit was exceeded.
     ByLimit(Duration),
 }
 
 /// The next step after a look at the child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// To look again.
+    /// Look again.
     Wait,
-    /// To ask it.
+    /// Ask the child to end.
     Ask(Asked),
-    /// To kill it, as a person wants.
+    /// Kill it, as a person wants.
     Kill,
-    /// To kill it, for its time is over.
+    /// Kill it, since its time is over.
     TimeOut,
 }
 
@@ -229,7 +232,7 @@ enum Step {
 #[derive(Debug)]
 struct Asking {
     limit: Duration,
-    /// Why, and how many signals there had been then.
+    /// The reason, and the number of signals at that time.
     why: Option<(Asked, u32)>,
     is_asked: bool,
     printed_bytes: u64,
@@ -237,7 +240,7 @@ struct Asking {
 }
 
 impl Asking {
-    /// Begins at the child's start.
+    /// Makes the state at the child's start.
     const fn new(limit: Duration) -> Asking {
         Asking {
             limit,
@@ -248,12 +251,12 @@ impl Asking {
         }
     }
 
-    /// Returns why the child was asked, if it was.
+    /// Returns the reason why the child was asked to end, if it was.
     fn why(&self) -> Option<Asked> {
         self.why.map(|(why, _)| why)
     }
 
-    /// Takes a look: so much time, so many signals and so many bytes since the start.
+    /// Decides the next step from the time, the signals and the bytes printed since the start.
     fn step(&mut self, elapsed: Duration, signals: u32, printed_bytes: u64) -> Step {
         let is_over = elapsed >= self.limit;
         if printed_bytes > self.printed_bytes {
@@ -261,14 +264,18 @@ impl Asking {
             self.quiet_since = elapsed;
         }
         match self.why {
+            // Only signals after the request count: those that came with the first one are one
+            // wish.
             Some((_, before)) if signals > before => return Step::Kill,
             None if signals > 0 => self.why = Some((Asked::ByPerson, signals)),
             None if is_over => self.why = Some((Asked::ByLimit(self.limit), signals)),
             _ => {}
         }
         match self.why {
+            // Until it prints, it is not listening; the request waits for its first byte.
             Some((why, _)) if !self.is_asked && printed_bytes > 0 => {
                 self.is_asked = true;
+                // The grace begins at the request, however long it was silent before.
                 self.quiet_since = elapsed;
                 Step::Ask(why)
             }
@@ -282,13 +289,13 @@ impl Asking {
 #[derive(Debug)]
 struct Tail<'p> {
     path: &'p Path,
-    /// The text that has been read, and how much of it was shown.
+    /// The bytes that were read; `shown` of them have been shown.
     read: Vec<u8>,
     shown: usize,
 }
 
 impl Tail<'_> {
-    /// Begins at the start of the file; it need not exist yet.
+    /// Makes a reader at the start of the file, which need not exist yet.
     fn new(path: &Path) -> Tail<'_> {
         Tail {
             path,
@@ -311,6 +318,7 @@ impl Tail<'_> {
             .iter()
             .position(|byte| *byte == b'\n')
         {
+            // Whole lines only, so a character that was read in halves is never shown broken.
             let line = &self.read[self.shown..self.shown + length];
             show(written(&String::from_utf8_lossy(line)));
             self.shown += length + 1;
@@ -318,7 +326,8 @@ impl Tail<'_> {
         Ok(())
     }
 
-    /// Shows the lines left, the last one also if it has no end, and returns all that is there.
+    /// Shows the remaining lines, the last one even if it is incomplete, and returns the whole
+    /// text.
     fn finish(mut self, show: &mut dyn FnMut(&str)) -> io::Result<String> {
         self.follow(show)?;
         if self.shown < self.read.len() {
@@ -363,10 +372,10 @@ mod tests {
                 &[(1, 0, 9), (2, 1, 9), (3, 1, 9), (4, 2, 9)][..],
                 &[(2, person), (4, Step::Kill)][..],
             ),
-            // Two at once are one, and nobody is asked who cannot hear.
+            // Two signals at once count as one, and a child that cannot hear is not asked.
             (&[(1, 2, 0), (2, 2, 0), (3, 2, 1)], &[(3, person)]),
             (&[(1, 1, 0), (2, 2, 0)], &[(2, Step::Kill)]),
-            // After the limit it has as long as it prints.
+            // After the limit it may run on as long as it prints.
             (
                 &[
                     (59, 0, 9),

@@ -30,7 +30,7 @@ pub fn text(record: &Record) -> Result<String, String> {
          fontname=\"sans-serif\"];\n  edge [fontname=\"sans-serif\", fontsize=10];\n  \
          graph [fontname=\"sans-serif\"];\n",
     );
-    // An arrow between two clusters stands outside both.
+    // A node belongs to every cluster that mentions it, so arrows between clusters stand outside.
     let mut between = String::new();
     for commit in &record.commits {
         for (number, dag) in (0..).zip(&commit.told.dags) {
@@ -126,7 +126,7 @@ impl Dag<'_> {
         if let Some(wcet_ns) = subtask.wcet_ns {
             label += &format!("\nWCET {}", briefly(wcet_ns));
         }
-        // Under EDF the priority is of no effect.
+        // Under EDF the priority has no effect.
         if !self.commit.told.is_edf {
             label += &format!("\npriority {}", subtask.priority);
         }
@@ -138,6 +138,7 @@ impl Dag<'_> {
 
     /// Adds an arrow for each reader of a topic, for each state, and for each other edge.
     fn add_edges(&self, id: &str, text: &mut String) {
+        // Edges that a topic or a state makes are drawn by these, with a label.
         let mut explained = BTreeSet::new();
         for (number, topic) in self.dag.topics.iter().enumerate() {
             let label = format!("{}: {}", topic.name, without_paths(&topic.type_name));
@@ -166,7 +167,7 @@ impl Dag<'_> {
     }
 }
 
-/// A type's name without the paths of what it is made of.
+/// Returns a type's name without the paths of its parts.
 fn without_paths(name: &str) -> String {
     let mut short = String::new();
     for part in name.split_inclusive(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')) {
@@ -175,8 +176,8 @@ fn without_paths(name: &str) -> String {
     short
 }
 
-/// Text inside quotes as DOT has them: a quote and a backslash are escaped, and a
-/// line's end is `\n`.
+/// Returns text as a quoted string of DOT: quotes and backslashes are escaped, and a line's end is
+/// `\n`.
 fn quoted(text: &str) -> String {
     let escaped = text.replace('\\', "\\\\").replace('"', "\\\"");
     format!("\"{}\"", escaped.replace('\n', "\\n"))
@@ -210,7 +211,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
         eye.samples = vec![(0, 0, 0, Some(12_000_000)), (2, 0, 0, None)];
         let told = Commit { is_edf, ..told };
         let mut committed = Committed::new(0, told).expect("it is right");
-        // A commit refuses both, and a picture shows them.
+        // A commit refuses both, but a picture can show them.
         committed.told.dags[0].name = "the \"eye\"".into();
         committed.told.dags[0].subtasks[1].name.clear();
         Record {
@@ -234,7 +235,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
   c0_d0_t0 -> c0_d0_s2 [style=dashed];
 "#;
 
-    /// Samples of other DAGs are shown by `tests/tests/boots/seeing.rs`.
+    /// `tests/tests/boots/seeing.rs` shows samples of other DAGs.
     #[test]
     fn a_dag_is_a_cluster_with_all_that_was_committed() {
         let dot = text(&committed(false)).expect("a commit");

@@ -1,13 +1,12 @@
-//! As much of ELF as it takes to weigh an image, and to tell it from a program for the
-//! host.
+//! The part of ELF that is needed to measure an image, and to tell it from a program for the host.
 //!
-//! *Stripped size* is what `strip` would leave: the file's headers, every
-//! byte that is loaded or a note, and a section table of the sections left
-//! with their names. Symbols and debugging data do not count. The sum is a
-//! few bytes above what `strip` gives, never below, as padding is included.
+//! *Stripped size* is the size that `strip` would leave: the file's headers, every byte that is
+//! loaded or a note, and the table of the remaining sections with their names. Symbols and
+//! debugging data do not count. The sum is a few bytes above that of `strip`, never below, as
+//! padding is included.
 
-/// Where the fields of a 64-bit ELF header and its tables stand (System V
-/// ABI, AMD64 supplement; gabi, chapters 4 and 5).
+/// Sizes and constants of 64-bit ELF headers and tables (System V ABI, AMD64 supplement; gabi,
+/// chapters 4 and 5).
 const SECTION_HEADER_BYTES: u64 = 64;
 const PROGRAM_HEADER_BYTES: u64 = 56;
 const SHF_ALLOC: u64 = 2;
@@ -16,27 +15,28 @@ const PT_NOTE: u64 = 4;
 /// Xen's number for the note that holds the 32-bit entry address.
 const XEN_ELFNOTE_PHYS32_ENTRY: u64 = 18;
 
-/// The mean length that we take for a section's name, and its alignment.
+/// The mean length assumed for a section's name and its alignment.
 const NAME_BYTES: u64 = 24;
 
 /// Returns the stripped size of a 64-bit little-endian ELF file.
 ///
 /// # Errors
 ///
-/// In words: it is none, or a table points outside it.
+/// In words: it is no such file, or a table points outside it.
 pub fn stripped_bytes(file: &[u8]) -> Result<u64, String> {
     check(file)?;
     let end = loaded_bytes(file)?;
     let mut kept = 2; // the null section and the section names
     for section in table(file, 40, 60, SECTION_HEADER_BYTES)? {
         let flags = number(file, section + 8, 8)?;
+        // `strip` keeps the sections that are loaded.
         kept += u64::from(flags & SHF_ALLOC != 0);
     }
     Ok(end + kept * (SECTION_HEADER_BYTES + NAME_BYTES))
 }
 
-/// Cuts a file down to what is loaded of it: symbols and debugging data go, and with them the
-/// table of sections, which GRUB would load otherwise.
+/// Cuts a file down to its loaded part: symbols and debugging data go, and the table of sections,
+/// which GRUB would load otherwise.
 ///
 /// # Errors
 ///
@@ -48,13 +48,13 @@ pub fn loaded(mut file: Vec<u8>) -> Result<Vec<u8>, String> {
         return Err("a segment lies outside the file".into());
     }
     file.truncate(end);
-    // Where the table of sections begins; its entries' size, their number, that of the names.
+    // Clears `e_shoff`, and `e_shentsize`, `e_shnum` and `e_shstrndx`: there is no table any more.
     file[40..48].fill(0);
     file[58..64].fill(0);
     Ok(file)
 }
 
-/// Returns how far headers and segments reach into the file.
+/// Returns the end of headers and segments in the file, in bytes.
 fn loaded_bytes(file: &[u8]) -> Result<u64, String> {
     let segments = table(file, 32, 56, PROGRAM_HEADER_BYTES)?;
     let mut end = 64 + PROGRAM_HEADER_BYTES * segments.len() as u64;
@@ -66,24 +66,24 @@ fn loaded_bytes(file: &[u8]) -> Result<u64, String> {
     Ok(end)
 }
 
-/// An address in a position-independent file that has to be corrected for the file's place.
+/// An address in a position-independent file that must be corrected for the load address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Correction {
-    /// Where it stands, from the file's place in memory on.
+    /// Its offset from the load address.
     pub at: u64,
-    /// What it is if the file lies at 0.
+    /// Its value if the file is loaded at 0.
     pub address: u64,
 }
 
-/// Returns all addresses that have to be corrected for the file's place, in ascending order.
+/// Returns all addresses to correct for the load address, in ascending order.
 ///
 /// # Errors
 ///
-/// In words: it is no ELF file, a table points outside it, or something else than that is to
-/// be done about its place.
+/// In words: it is no ELF file, a table points outside it, or it needs relocations of another
+/// kind.
 pub fn corrections(file: &[u8]) -> Result<Vec<Correction>, String> {
     const SHT_RELA: u64 = 4;
-    /// Kinds of sections that correct otherwise (SHT_REL, SHT_RELR).
+    /// Kinds of sections with relocations in another form (SHT_REL, SHT_RELR).
     const OTHERS: [u64; 2] = [9, 19];
     const ENTRY_BYTES: u64 = 24;
     const R_X86_64_RELATIVE: u64 = 8;
@@ -92,6 +92,7 @@ pub fn corrections(file: &[u8]) -> Result<Vec<Correction>, String> {
     for section in table(file, 40, 60, SECTION_HEADER_BYTES)? {
         let kind = number(file, section + 4, 4)?;
         let bytes = number(file, section + 32, 8)?;
+        // Relocations that are not loaded are for linkers and debuggers.
         if number(file, section + 8, 8)? & SHF_ALLOC == 0 || bytes == 0 {
             continue;
         }
@@ -105,6 +106,7 @@ pub fn corrections(file: &[u8]) -> Result<Vec<Correction>, String> {
         };
         let start = number(file, section + 24, 8)?;
         for entry in (0..count).map(|index| start.saturating_add(index * ENTRY_BYTES)) {
+            // Any other kind refers to a symbol, which a file of its own must not need.
             if number(file, entry + 8, 8)? != R_X86_64_RELATIVE {
                 return Err("it has an address of something that is not in it".into());
             }
@@ -132,8 +134,8 @@ pub fn check_bootable(file: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Returns the name of the app that an image is of, which `kernel::entry!` notes there;
-/// `None` if no note tells.
+/// Returns the name of the app of an image, which `kernel::entry!` notes there; `None` if there is
+/// no such note.
 #[must_use]
 pub fn app_name(file: &[u8]) -> Option<String> {
     let notes = notes(file).ok()?;
@@ -142,6 +144,7 @@ pub fn app_name(file: &[u8]) -> Option<String> {
     let bytes = usize::try_from(note.content_bytes).ok()?;
     let content = file.get(from..from.checked_add(bytes)?)?;
     let name = content.split(|byte| *byte == 0).next()?;
+    // The bytes come from a file that a person names; only a plain name goes into messages.
     let is_of_names = |byte: &u8| byte.is_ascii_alphanumeric() || b"-_".contains(byte);
     let is_name = !name.is_empty() && name.iter().all(is_of_names);
     is_name.then(|| String::from_utf8_lossy(name).into_owned())
@@ -151,7 +154,7 @@ pub fn app_name(file: &[u8]) -> Option<String> {
 struct Note {
     owner: [u8; 4],
     kind: u64,
-    /// Where its content begins in the file.
+    /// The offset of its content in the file.
     content: u64,
     content_bytes: u64,
 }
@@ -165,11 +168,12 @@ fn notes(file: &[u8]) -> Result<Vec<Note>, String> {
         }
         let mut at = number(file, segment + 8, 8)?;
         let end = at.saturating_add(number(file, segment + 32, 8)?);
-        // A note: the lengths of name and content, its type, and both, padded.
+        // A note has the lengths of name and content, its type, and both, padded to 4 bytes.
         while at < end {
             let owner_bytes = number(file, at, 4)?;
             let content_bytes = number(file, at + 4, 4)?;
             let content = at + 12 + owner_bytes.next_multiple_of(4);
+            // Both owners that matter, `Xen` and `App`, have three letters and a zero.
             if owner_bytes == 4 {
                 let owner = number(file, at + 12, 4)?;
                 notes.push(Note {
@@ -193,8 +197,8 @@ fn check(file: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Returns the offsets of a table's entries; `offset_at` and `count_at` say
-/// where in the ELF header its place and length stand.
+/// Returns the offsets of a table's entries; `offset_at` and `count_at` are the positions of its
+/// offset and its length in the ELF header.
 fn table(file: &[u8], offset_at: u64, count_at: u64, entry: u64) -> Result<Vec<u64>, String> {
     let offset = number(file, offset_at, 8)?;
     let entries = number(file, count_at, 2)?;
@@ -241,7 +245,7 @@ mod tests {
         assert_eq!(error, "a segment lies outside the file");
     }
 
-    /// Programs and texts are refused by `tests/commands/files.rs`.
+    /// `tests/it/files.rs` has programs and texts that are refused.
     #[test]
     fn an_image_is_told_from_other_files() {
         let mut image = tiny_image("hello", TinyEnd::Never);

@@ -1,12 +1,12 @@
-//! Files that a person names: reading what is one, and keeping what is there.
+//! Files that a person names: they are read with care and never overwritten by mistake.
 //!
-//! An *input* is a file that a command reads, an *output* one that it writes. Before a
-//! command begins its work it calls [`check`], which promises: no output is also an
-//! input or another output, by whatever names, and each can be written. Nothing is
-//! emptied meanwhile; an output gets its new content when there is one.
+//! An *input* is a file that a command reads, an *output* one that it writes. Before a command
+//! begins its work it calls [`check`], which promises: no output is also an input or another
+//! output, under whatever name, and each can be written. No file is emptied by the check; an output
+//! gets its new content when there is one.
 //!
-//! Inputs are read by [`read`] alone, which takes no folders, no devices, and no named
-//! pipes, which may have no end or no writer.
+//! Inputs are read by [`read`] alone, which refuses folders, devices and named pipes: those may
+//! have no end or no writer.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
@@ -28,7 +28,7 @@ const MOST_TEXT_BYTES: usize = 64 << 20;
 /// A file of a command line.
 #[derive(Clone, Copy, Debug)]
 pub struct Named<'n> {
-    /// The option that names it, without its dashes; empty: it is a word of its own.
+    /// The option that names it, without its dashes; empty: it is a positional word.
     pub option: &'n str,
     /// Its name.
     pub path: &'n Path,
@@ -46,7 +46,7 @@ impl Named<'_> {
     }
 }
 
-/// Returns a file's name for a message: all of it, visibly.
+/// Returns a file's whole name for a message, with control characters made visible.
 #[must_use]
 pub fn place(path: &Path) -> String {
     visible(&path.to_string_lossy()).to_string()
@@ -56,7 +56,7 @@ pub fn place(path: &Path) -> String {
 ///
 /// # Errors
 ///
-/// Why not, without the file's name.
+/// The reason, without the file's name.
 pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     let cannot = |why: &dyn Display| format!("cannot be read: {why}");
     let data = fs::metadata(path).map_err(|error| cannot(&error))?;
@@ -64,7 +64,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     if kind.is_dir() {
         return Err(cannot(&"it is a folder"));
     }
-    // A pipe of the shell's `<(...)` has a writer, and no place in the file system.
+    // A pipe of the shell's `<(...)` has a writer, but no path in the file system.
     let is_open_pipe = kind.is_fifo() && path.canonicalize().is_err();
     if !kind.is_file() && !is_open_pipe {
         return Err(cannot(&"it is a device or a pipe"));
@@ -75,6 +75,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     if data.len() > MOST_BYTES {
         return Err(too_long());
     }
+    // One byte more than allowed: a pipe has no length that could be asked for before.
     let all = file.take(MOST_BYTES + 1).read_to_end(&mut bytes);
     all.map_err(|error| cannot(&error))?;
     match bytes.len() as u64 > MOST_BYTES {
@@ -101,7 +102,7 @@ pub(crate) fn read_named(named: &Named<'_>) -> Result<Vec<u8>, String> {
     read(named.path).map_err(|why| format!("{} {why}; name another file", named.words()))
 }
 
-/// Writes what an option wants to the file that it names.
+/// Writes the file that an option names.
 ///
 /// # Errors
 ///
@@ -116,7 +117,7 @@ pub(crate) fn write_named(
     written.map_err(|error| format!("{}: cannot be written: {error}", named.words()))
 }
 
-/// Writes a file of ours, and makes the folder that it lies in.
+/// Writes a file of ours, and makes its folder if need be.
 ///
 /// # Errors
 ///
@@ -126,7 +127,7 @@ pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), String
     written.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }
 
-/// Lends `work` the name of a folder of ours, which is removed afterwards.
+/// Calls `work` with the path of a new folder of ours, which is removed afterwards.
 ///
 /// # Errors
 ///
@@ -137,17 +138,17 @@ pub(crate) fn in_folder<R>(
 ) -> Result<R, String> {
     let folder = system::new_log(name)?.with_extension("folder");
     let result = work(&folder);
-    // It is ours, and in the way of no one if it cannot be removed.
+    // The folder is ours; one that cannot be removed harms nothing.
     let _ = fs::remove_dir_all(&folder);
     result
 }
 
-/// Reads an input that must be text, of at most 64 MiB. The invisible mark by which some
-/// editors begin UTF-8 is left out.
+/// Reads an input that must be text, of at most 64 MiB. The byte order mark by which some editors
+/// begin UTF-8 is left out.
 ///
 /// # Errors
 ///
-/// In words that begin with the file, and with the line where it is no text: as [`read`],
+/// In words that begin with the file, and with the line of bytes that are no text: as [`read`],
 /// that it is not UTF-8, or that it is too long.
 pub fn read_text(path: &Path) -> Result<String, String> {
     let refused = |line: &dyn Display, why: &dyn Display| {
@@ -170,17 +171,17 @@ pub fn read_text(path: &Path) -> Result<String, String> {
     Ok(text)
 }
 
-/// Makes sure that outputs overwrite no input and no other output, and that each can be
-/// written. What is in them stays.
+/// Makes sure that no output overwrites an input or another output, and that each can be written.
+/// Their content stays.
 ///
 /// # Errors
 ///
-/// In words, with the offender: which are one file, or what cannot be written.
+/// In words, with the offender: the two names of one file, or the output that cannot be written.
 pub fn check(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), String> {
     for (position, output) in outputs.iter().enumerate() {
         let before = inputs.iter().chain(&outputs[..position]);
         let own = identity(output.path);
-        // A device may take what several write: it keeps nothing.
+        // A device keeps nothing, so several outputs may go to one.
         let is_kept = fs::metadata(output.path).map_or(true, |data| data.is_file());
         for other in before.filter(|_| is_kept) {
             if own.is_some() && own == identity(other.path) {
@@ -195,7 +196,7 @@ pub fn check(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), String> 
     outputs.iter().try_for_each(try_output)
 }
 
-/// Makes sure that no input stands twice, for it would count twice.
+/// Makes sure that no input is given twice, since it would count twice.
 ///
 /// # Errors
 ///
@@ -203,6 +204,7 @@ pub fn check(inputs: &[Named<'_>], outputs: &[Named<'_>]) -> Result<(), String> 
 pub fn check_once<'n>(inputs: impl Iterator<Item = &'n Path>) -> Result<(), String> {
     let mut before: Vec<(&Path, Identity)> = Vec::new();
     for path in inputs {
+        // A file in a folder that is not there is refused when it is read.
         let Some(own) = identity(path) else {
             continue;
         };
@@ -215,12 +217,12 @@ pub fn check_once<'n>(inputs: impl Iterator<Item = &'n Path>) -> Result<(), Stri
     Ok(())
 }
 
-/// What two names of one file have in common.
+/// The identity of a file, equal for all its names.
 #[derive(PartialEq, Eq)]
 enum Identity {
-    /// It exists: its device and its number there.
+    /// It exists: its device and its inode.
     There(u64, u64),
-    /// It does not: the folder that it will be in, and its name there.
+    /// It does not exist yet: its folder and its name there.
     ToCome(PathBuf),
 }
 
@@ -228,6 +230,7 @@ fn identity(path: &Path) -> Option<Identity> {
     if let Ok(data) = fs::metadata(path) {
         return Some(Identity::There(data.dev(), data.ino()));
     }
+    // The folder's canonical path resolves links and `..`, so two spellings compare equal.
     let folder = folder_of(path).canonicalize().ok()?;
     Some(Identity::ToCome(folder.join(path.file_name()?)))
 }
@@ -247,14 +250,15 @@ fn try_output(output: &Named<'_>) -> Result<(), String> {
         let words = output.words();
         format!("{words}: cannot be written: {why}; name another file")
     };
-    // To open a named pipe waits for a reader; the shell's `>(...)` has one.
+    // Opening a named pipe would wait for a reader; a pipe of the shell's `>(...)` has one.
     if fs::symlink_metadata(path).is_ok_and(|data| data.file_type().is_fifo()) {
         return Err(cannot(&"it is a named pipe"));
     }
+    // `append` keeps the content; the trial writes nothing.
     let opened = OpenOptions::new().append(true).create(true).open(path);
     opened.map_err(|error| cannot(&error))?;
     if there.is_none() {
-        // It was made for the trial; where a link led to nothing, at its other end.
+        // It was made by the trial. A dangling link has made it at the link's other end.
         let made = path.canonicalize().map_err(|error| cannot(&error))?;
         fs::remove_file(made).map_err(|error| cannot(&error))?;
     }
@@ -277,7 +281,7 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
     });
     let why = match there {
         Some((folder, data)) if data.is_dir() => {
-            // Two threads may try one folder.
+            // Two threads may try the same folder at once.
             static TRIALS: AtomicU64 = AtomicU64::new(0);
             let (process, trial) = (std::process::id(), TRIALS.fetch_add(1, Ordering::Relaxed));
             let probe = folder.join(format!(".trial-{process}-{trial}"));
@@ -296,12 +300,12 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
     Err(format!("{}: {why}; name another folder", output.words()))
 }
 
-/// A file of ours, removed when it is of no more use.
+/// A file of ours, removed when this value is dropped.
 #[derive(Debug)]
 pub(crate) struct Temporary(pub(crate) Option<PathBuf>);
 
 impl Temporary {
-    /// Returns its name; nothing if there is no file.
+    /// Returns its path; empty if there is no file.
     pub(crate) fn path(&self) -> &Path {
         self.0.as_deref().unwrap_or(Path::new(""))
     }
@@ -309,7 +313,7 @@ impl Temporary {
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        // It is in the way of no one if it cannot be removed.
+        // The file is ours; one that cannot be removed harms nothing.
         let _ = self.0.take().map(fs::remove_file);
     }
 }
@@ -331,7 +335,7 @@ mod tests {
         Named { option, path }
     }
 
-    /// Commands that are refused for it are in `tests/commands/files.rs`.
+    /// `tests/it/files.rs` has the commands that refuse such names.
     #[test]
     fn one_file_of_two_names_is_found_and_kept() {
         let folder = folder("one-file");

@@ -1,11 +1,11 @@
-//! Goldens: texts that the tree keeps of what its programs say.
+//! Goldens: texts in the tree that must equal the output of its programs.
 //!
-//! A *golden* is a fault's text in its page, an output or code that a page shows, a baseline,
-//! the table of budgets. A test compares it with what is said now. Under
-//! `./scripts/test --bless` a golden that differs is rewritten in its file, and the test
-//! passes, so that a person reads the change in `git diff`; the command ends with the files
-//! that were rewritten. It guarantees that nothing else of a file changes. A golden that its
-//! file does not hold letter by letter cannot be rewritten: its test still fails.
+//! A *golden* is a fault's text in its page, an output or code that a page shows, a baseline, the
+//! table of budgets. A test compares it with the present output. Under `./scripts/test --bless` a
+//! golden that differs is rewritten in its file, and the test passes, so that a person reads the
+//! change in `git diff`; the command ends with the files that were rewritten. Nothing else of a
+//! file changes. A golden that its file does not hold letter by letter cannot be rewritten: its
+//! test still fails.
 
 use std::env;
 use std::fs::{self, File};
@@ -15,27 +15,26 @@ use std::sync::Mutex;
 
 use crate::system::workspace;
 
-/// The variable by which `--bless` reaches test programs: it names the file that lists what
-/// they have rewritten.
+/// The variable by which `--bless` reaches test programs: the path of the list of rewritten files.
 pub(crate) const BLESSED: &str = "TOOL_BLESSED";
 
-/// A text that a file keeps.
+/// A text that is kept in a file.
 #[derive(Clone, Copy, Debug)]
 pub struct Golden<'t> {
     /// The file, from the workspace's root.
     pub file: &'t str,
-    /// The nearest text above the golden that stands there once, such as a heading.
+    /// The nearest text above the golden that occurs once in the file, such as a heading.
     pub below: &'t str,
     /// The golden.
     pub text: &'t str,
 }
 
 impl Golden<'_> {
-    /// Compares the golden with what a program says now.
+    /// Compares the golden with the present output of a program.
     ///
     /// # Panics
     ///
-    /// Panics if they differ, and the golden is not to be rewritten, or cannot be.
+    /// Panics if they differ and the golden is not rewritten.
     #[track_caller]
     pub fn assert_is(&self, said: &str) {
         let list = env::var_os(BLESSED);
@@ -44,8 +43,8 @@ impl Golden<'_> {
         }
     }
 
-    /// Compares the golden with what a program says now; rewrites it if there is a `list` of
-    /// rewritten files.
+    /// Compares the golden with the present output of a program; rewrites it if there is a `list`
+    /// of rewritten files.
     ///
     /// # Errors
     ///
@@ -68,25 +67,28 @@ impl Golden<'_> {
     }
 
     fn rewrite(&self, said: &str, list: &Path) -> io::Result<()> {
-        // The tests of a program are threads, and some have goldens in one file.
+        // The tests of a program are threads, and some share a file.
         static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
         let _one = ONE_AT_A_TIME.lock();
         let file = workspace().join(self.file);
         let page = fs::read_to_string(&file)?;
         let place = page.find(self.below).and_then(|start| {
+            // Only below its heading: the same text may stand elsewhere, too.
             let start = start + self.below.len();
             Some(start + page[start..].find(self.text)?)
         });
         let place = place.ok_or_else(|| io::Error::other("it does not stand there"))?;
         let rest = &page[place + self.text.len()..];
         fs::write(&file, [&page[..place], said, rest].concat())?;
+        // Appended, since several test programs share the list.
         let mut list = File::options().create(true).append(true).open(list)?;
         writeln!(list, "{}", self.file)
     }
 }
 
-/// Returns an excerpt of an output: where a line of `kept` is said no more, the line that
-/// begins most like it. Lines are the same if `shown` makes them so.
+/// Returns an excerpt of an output. A line of `kept` that the output still has stays; otherwise it
+/// becomes the line of the output with the longest common beginning. `shown` decides which lines
+/// are equal.
 #[must_use]
 pub fn excerpt(kept: &str, output: &str, shown: impl Fn(&str) -> String) -> String {
     let common = |a: &str, b: &str| a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();

@@ -1,10 +1,10 @@
-//! Images: building them with cargo, finding the file, weighing it.
+//! Images: building them with cargo, finding the file, measuring its size.
 //!
 //! An *image* is the freestanding ELF file that a package under `apps/` (or
 //! the guest side of the boot tests) is linked into; it bears the package's
-//! name. Images that run are built in release, those for a debugger by a profile
-//! of their own. Cargo itself is asked where the
-//! file lies, so no setting of cargo's can make us boot a stale one.
+//! name. Images that run are built in release, those for a debugger by a profile of their own.
+//! Cargo itself is asked for the file's path, so no setting of cargo's can make us boot a stale
+//! one.
 
 use std::env;
 use std::fs::{self, File, TryLockError};
@@ -19,11 +19,11 @@ use crate::options::did_you_mean;
 use crate::progress::Lasting;
 use crate::system;
 
-/// Returns the most that an app's stripped image may weigh. Two measure, and carry all their
-/// workloads and baselines besides what every image has. The drone has three DAGs and their
-/// mathematics; three can divide their cores; three others record and replay.
+/// Returns the most bytes that an app's stripped image may have. Apps with their own workloads and
+/// baselines, several DAGs, divided cores or recordings get more.
 #[must_use]
 pub fn most_stripped_bytes(app: &str) -> u64 {
+    // `hand-off` and `join-latency` measure: their workloads and baselines are in the image.
     match app {
         "dag-file" | "drone" | "hand-off" | "join-latency" | "replay" => 576 << 10,
         "autoware" | "cruise" | "gait" => 640 << 10,
@@ -34,7 +34,7 @@ pub fn most_stripped_bytes(app: &str) -> u64 {
 /// A built image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// Where it lies.
+    /// The path of the file.
     pub path: PathBuf,
 }
 
@@ -52,7 +52,7 @@ pub fn apps() -> Vec<String> {
     names
 }
 
-/// Reads the name of a package; a manifest may be of a workspace alone.
+/// Reads the name of a package; `None` for the manifest of a workspace alone.
 pub(crate) fn package_name(manifest: &str) -> Option<String> {
     let package = manifest.split("[package]").nth(1)?;
     let line = package.lines().find(|line| line.starts_with("name"))?;
@@ -63,7 +63,7 @@ pub(crate) fn package_name(manifest: &str) -> Option<String> {
 ///
 /// # Errors
 ///
-/// One line that names it and those there are.
+/// One line that names it and the apps that exist.
 pub fn check_app(name: &str) -> Result<(), String> {
     let apps = apps();
     if apps.iter().any(|app| app == name) {
@@ -78,11 +78,11 @@ pub fn check_app(name: &str) -> Result<(), String> {
     ))
 }
 
-/// Makes sure that a file is an image, and returns the name of its app, if it tells.
+/// Makes sure that a file is an image, and returns the name of its app, if it has a note of it.
 ///
 /// # Errors
 ///
-/// One line that says why not, and which files are.
+/// One line with the reason, and the files that are images.
 pub fn check_file(path: &Path) -> Result<Option<String>, String> {
     let app = files::read(path).and_then(|bytes| {
         let bootable = elf::check_bootable(&bytes);
@@ -97,7 +97,7 @@ pub fn check_file(path: &Path) -> Result<Option<String>, String> {
     })
 }
 
-/// Makes sure that a file may be an app's program for Linux, and returns the app's name.
+/// Makes sure that a file can be an app's program for Linux, and returns the app's name.
 ///
 /// # Errors
 ///
@@ -107,6 +107,7 @@ pub fn check_linux_file(path: &Path) -> Result<Option<String>, String> {
         .file_name()
         .and_then(|name| name.to_str()?.strip_suffix("-linux"));
     let is_image = |bytes: Vec<u8>| elf::check_bootable(&bytes).is_ok();
+    // An image for the bare machine may bear such a name, too; it does not run on Linux.
     match (name, files::read(path).map(is_image)?) {
         (Some(app), false) => Ok(Some(app.into())),
         _ => Err(
@@ -117,14 +118,14 @@ pub fn check_linux_file(path: &Path) -> Result<Option<String>, String> {
     }
 }
 
-/// All that is on a medium from which a PC boots.
+/// The contents of a medium from which a PC boots.
 #[derive(Debug)]
 pub struct Contents<'w> {
-    /// The image, as far as it is loaded.
+    /// The loaded part of the image.
     pub image: Vec<u8>,
-    /// The words for it.
+    /// The words for its command line.
     pub words: &'w str,
-    /// A file to be left in memory.
+    /// A file to leave in memory.
     pub module: Option<Vec<u8>>,
 }
 
@@ -144,17 +145,17 @@ impl<'w> Contents<'w> {
     }
 }
 
-/// How an image is compiled.
+/// The cargo profile of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Profile {
-    /// As small and quick as it runs.
+    /// Optimized, as it runs.
     Release,
-    /// So that a debugger shows all of it.
+    /// Not optimized, so that a debugger shows every variable.
     Gdb,
 }
 
-/// Builds the image of a package, as it runs. Cargo's progress and errors go to standard
-/// error as they come.
+/// Builds the image of a package in release. Cargo's progress and errors go to standard error as
+/// they come.
 ///
 /// # Errors
 ///
@@ -203,7 +204,7 @@ fn linux_name(app: &str) -> String {
     format!("{app}-linux")
 }
 
-/// Builds an app's program for Linux, as [`build`] does its image. A folder is that of a package
+/// Builds an app's program for Linux, as [`build`] does its image. A `folder` is that of a package
 /// elsewhere.
 ///
 /// # Errors
@@ -222,8 +223,8 @@ pub fn build_test(package: &str, test: &str) -> Result<Image, String> {
     build_target(package, "linux", ["--test", test], None)
 }
 
-/// How a whole image is compiled beyond what a profile can say, for size: it lies where the linker
-/// script says, so addresses are constants; no loop is padded; a jump table pays from eight cases on.
+/// Flags beyond those of a profile, to make an image small: its addresses are constants, since the
+/// linker script fixes them; no loop is padded; a jump table pays from eight cases on.
 const FOR_IMAGES: [&str; 4] = [
     "--",
     "-Crelocation-model=static",
@@ -231,10 +232,10 @@ const FOR_IMAGES: [&str; 4] = [
     "-Cllvm-args=-min-jump-table-entries=8",
 ];
 
-/// The one binary that is no image: firmware places it where it likes.
+/// The one binary that is no image: firmware chooses its address.
 const PLACED_BY_FIRMWARE: &str = "boot-efi";
 
-/// Builds one target of a package, of a kind and a name.
+/// Builds one target of a package; `target` is its kind and name, as cargo takes them.
 fn build_target(
     package: &str,
     profile: &str,
@@ -243,6 +244,7 @@ fn build_target(
 ) -> Result<Image, String> {
     let [kind, name] = target;
     let (verb, flags) = match kind {
+        // Only `cargo rustc` takes flags for the last crate alone.
         "--bin" if package != PLACED_BY_FIRMWARE => ("rustc", &FOR_IMAGES[..]),
         _ => ("build", &[][..]),
     };
@@ -264,7 +266,7 @@ fn build_target(
     }
 }
 
-/// Says so if another command builds images: cargo would wait for it without a word.
+/// Reports on standard error that another command builds images: cargo would wait for it silently.
 fn say_if_cargo_waits(profile: &str) {
     let target = env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
     let folder = system::workspace().join(target).join(profile);
@@ -275,12 +277,12 @@ fn say_if_cargo_waits(profile: &str) {
 }
 
 fn is_locked(file: &Path) -> bool {
-    // Where there is no such file, there is no one to wait for.
+    // Without the file no one can hold the lock.
     let locked = File::open(file).map(|file| file.try_lock_shared());
     matches!(locked, Ok(Err(TryLockError::WouldBlock)))
 }
 
-/// Reads one of cargo's messages: the executable, if it announces ours.
+/// Returns the executable that one of cargo's messages announces, if it is ours.
 fn executable(message: &Value, package: &str) -> Option<PathBuf> {
     let name = message.at(&["target", "name"]).and_then(Value::as_text)?;
     let path = message.get("executable").and_then(Value::as_text)?;

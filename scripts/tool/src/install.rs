@@ -1,8 +1,8 @@
-//! Getting what a command needs onto the machine, by the system's own package manager.
+//! Installing the programs that a command needs, by the system's own package manager.
 //!
 //! A command that needs QEMU installs it if it is missing; one that needs GRUB, a firmware
-//! or Bochs does likewise. Which manager there is decides what is run; nothing is
-//! downloaded by ourselves. Without one that we know, the person is told what to install.
+//! or Bochs does likewise. The package manager on this system decides the command; the tool
+//! downloads nothing itself. Without a known manager the person is told what to install.
 
 use std::io;
 use std::path::Path;
@@ -14,13 +14,13 @@ use crate::system::find_program;
 /// Something of the host's that a command needs.
 #[derive(Debug)]
 pub struct Need {
-    /// What it is called, and what it is.
+    /// Its name, and a description for messages.
     name: &'static str,
     what: &'static str,
-    /// What it is there by: programs on the `PATH`, and files or folders.
+    /// The parts by which it is recognized: programs on the `PATH`, and files or folders.
     parts: &'static [&'static str],
-    /// The packages by the managers in their order, with blanks between; empty where a manager
-    /// is not known to have it.
+    /// The packages for each of `MANAGERS` in turn, with blanks between; empty if a manager is not
+    /// known to have it.
     packages: [&'static str; 5],
 }
 
@@ -50,7 +50,7 @@ pub static GDB: Need = Need {
     packages: ["gdb"; 5],
 };
 
-/// What an ISO is made with, for BIOS and for UEFI.
+/// The programs that make an ISO, for BIOS and for UEFI.
 pub static GRUB: Need = Need {
     name: "GRUB",
     what: "GRUB for BIOS and for UEFI, xorriso and mtools",
@@ -64,7 +64,7 @@ pub static GRUB: Need = Need {
     packages: by_apt("grub-pc-bin grub-efi-amd64-bin xorriso mtools"),
 };
 
-/// What makes a FAT stick.
+/// The programs that make a FAT stick.
 pub static MTOOLS: Need = Need {
     name: "mtools",
     what: "mtools, which write FAT file systems",
@@ -92,8 +92,8 @@ pub static BOCHS: Need = Need {
     packages: by_apt("bochs bochs-sdl bochsbios vgabios"),
 };
 
-/// The package managers: the program, the words by which it updates what it knows, if it needs
-/// to be told so, and those by which it installs the packages that follow.
+/// The package managers: the program, its words to update the list of packages, if that is a step
+/// of its own, and its words to install the packages that follow.
 const MANAGERS: [(&str, Option<&str>, &str); 5] = [
     (
         "apt-get",
@@ -115,7 +115,7 @@ pub fn ensure_qemu() -> Result<(), String> {
     ensure(&QEMU)
 }
 
-/// Makes sure that what a loader takes besides QEMU is there, as [`ensure`] does.
+/// Makes sure that everything a loader needs besides QEMU is there, as [`ensure`] does.
 ///
 /// # Errors
 ///
@@ -129,21 +129,20 @@ pub fn ensure_loader(loader: Loader) -> Result<(), String> {
     }
 }
 
-/// Makes sure that something is there, installing it if it is not. What the package manager
-/// says goes to standard error.
+/// Makes sure that something is there, and installs it if it is not. The package manager's output
+/// goes to standard error.
 ///
 /// # Errors
 ///
-/// In words: the system is not known, or the installation failed, and what to
-/// do by hand.
+/// In words: the system is not known, or the installation failed, with the remedy by hand.
 pub fn ensure(need: &Need) -> Result<(), String> {
     let Some(part) = missing(need) else {
         return Ok(());
     };
     let (update, install) = plan(need, part, |name| find_program(name).is_some(), is_root())?;
     let name = need.name;
-    // One source of packages that cannot be reached fails the whole update,
-    // and need not be the one with what is needed: the installation will tell.
+    // One unreachable source fails the whole update, but the needed package may come from another:
+    // the installation decides.
     if let Some(Err(why)) = update.map(|line| run(name, &line)) {
         eprintln!("{why}");
     }
@@ -159,7 +158,7 @@ pub fn ensure(need: &Need) -> Result<(), String> {
     }
 }
 
-/// Returns the first part that is not there.
+/// Returns the first part that is missing.
 fn missing(need: &Need) -> Option<&'static str> {
     let is_there = |part: &&str| match part.starts_with('/') {
         true => Path::new(part).exists(),
@@ -168,8 +167,8 @@ fn missing(need: &Need) -> Option<&'static str> {
     need.parts.iter().copied().find(|part| !is_there(part))
 }
 
-/// Decides on the commands that update, if there is one, and install, given what is missing,
-/// which programs exist and whether we are root.
+/// Decides on the commands that update (if there is one) and install, from the programs that exist
+/// and whether we are root.
 fn plan(
     need: &Need,
     part: &str,
@@ -179,6 +178,7 @@ fn plan(
     let Need { name, what, .. } = need;
     let known = MANAGERS.iter().zip(need.packages);
     let known = known.filter(|(_, packages)| !packages.is_empty());
+    // The first that exists: a system mostly has one, and the order breaks ties.
     let found = known.clone().find(|((manager, ..), _)| exists(manager));
     let ((manager, update, install), packages) = found.ok_or_else(|| {
         let known: Vec<&str> = known.map(|((manager, ..), _)| *manager).collect();
@@ -206,8 +206,9 @@ fn run(name: &str, line: &str) -> Result<(), String> {
     let mut words = line.split(' ');
     let mut command = Command::new(words.next().unwrap_or_default());
     command.args(words);
+    // Packages of Debian would ask questions, which nobody answers here.
     command.env("DEBIAN_FRONTEND", "noninteractive");
-    // Our standard output may be read by a machine.
+    // A program may read our standard output.
     command.stdout(Stdio::from(io::stderr()));
     match command.status() {
         Ok(status) if status.success() => Ok(()),
@@ -217,7 +218,7 @@ fn run(name: &str, line: &str) -> Result<(), String> {
 }
 
 fn is_root() -> bool {
-    // The standard library does not tell; `id` is in every system's base.
+    // The standard library cannot tell; `id` is in every base system.
     let id = Command::new("id").arg("-u").output();
     id.is_ok_and(|output| output.stdout.trim_ascii() == b"0")
 }

@@ -3,16 +3,15 @@
 //! The serial protocol and cargo's messages are JSON Lines; both are read by
 //! this one parser. *Strict* means: exactly RFC 8259, nothing before or after
 //! the value but blanks, no key twice in one object, and no nesting deeper
-//! than [`DEEPEST`]. Whatever breaks a rule is refused with the column where
-//! it stands, so that a damaged serial line is found and never guessed at.
+//! than [`DEEPEST`]. A text that breaks a rule is refused with the column of the offence, so that a
+//! damaged serial line is found and never guessed at.
 //!
 //! Integers stay integers (`i128` holds every `u64` of nanoseconds); only a
-//! number with a fraction or an exponent becomes a float. What the host itself
-//! writes, it writes by [`Object`] and [`quoted`]; machine lines are printed by
-//! the guest. Members come in the order of the calls.
+//! number with a fraction or an exponent becomes a float. The host writes JSON by [`Object`] and
+//! [`quoted`], with members in the order of the calls; machine lines are printed by the guest.
 //!
-//! The reader walks over the bytes once, by recursive descent. Its `position` is always the byte
-//! to be read next, and stands on a character's first byte whenever a message is made.
+//! The reader is a recursive descent over the bytes. Its `position` is the next byte to read, and
+//! is at a character's first byte whenever an error is made.
 
 use std::fmt::{self, Write};
 
@@ -97,12 +96,12 @@ impl Value {
     }
 }
 
-/// Why a text is no JSON value.
+/// The reason why a text is no JSON value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JsonError {
     /// The column of the offending byte, counted from 1.
     pub column: usize,
-    /// What was found and what may stand there instead.
+    /// The text that was found, and what may stand there instead.
     pub message: String,
 }
 
@@ -128,8 +127,8 @@ pub fn parse(text: &str) -> Result<Value, JsonError> {
     Parser::new(text).whole()
 }
 
-/// Reads as [`parse`], and returns also at which bytes the elements begin of the list
-/// that is the member `name` of the outermost object.
+/// Reads as [`parse`] does, and also returns the byte offsets at which the elements of the list
+/// `name`, a member of the outermost object, begin.
 ///
 /// # Errors
 ///
@@ -148,7 +147,7 @@ struct Parser<'t> {
     text: &'t str,
     position: usize,
     depth: usize,
-    /// The member of the outermost object whose elements' places are noted.
+    /// The member of the outermost object whose elements' offsets are recorded.
     watched: Option<&'t str>,
     /// Whether that member's value is being read.
     is_watched: bool,
@@ -195,6 +194,7 @@ impl<'t> Parser<'t> {
         &mut self,
         read: fn(&mut Self) -> Result<Value, JsonError>,
     ) -> Result<Value, JsonError> {
+        // A recursion without a limit would overflow the stack on hostile input.
         if self.depth == DEEPEST {
             return Err(self.error(format!("nested deeper than {DEEPEST} levels")));
         }
@@ -223,6 +223,7 @@ impl<'t> Parser<'t> {
             if !self.take(b':') {
                 return Err(self.unexpected("`:`"));
             }
+            // Depth 1 is inside the outermost object; equal names further in do not count.
             self.is_watched = self.depth == 1 && self.watched == Some(key.as_str());
             let value = self.value()?;
             members.push((key, value));
@@ -237,6 +238,7 @@ impl<'t> Parser<'t> {
         match repeated(members.iter().map(|(key, _)| key)) {
             None => Ok(Value::Object(members)),
             Some((_, second)) => {
+                // The column of the second key, where the object went wrong.
                 self.position = starts[second];
                 let key = shown::quoted(&members[second].0);
                 Err(self.error(format!("key {key} stands twice in one object")))
@@ -250,6 +252,7 @@ impl<'t> Parser<'t> {
         if self.take(b']') {
             return Ok(Value::Array(elements));
         }
+        // A list inside the watched member has its own elements, which are not recorded.
         let is_watched = self.is_watched && self.depth == 2;
         loop {
             self.skip_blanks();
@@ -312,6 +315,8 @@ impl<'t> Parser<'t> {
         let first = self.hexadecimal()?;
         let code = match first {
             0xd800..=0xdbff => {
+                // A high surrogate stands for half a character; the other half must follow (RFC
+                // 8259, section 7).
                 if !self.take(b'\\') || self.peek() != Some(b'u') {
                     return Err(self.error("half a surrogate pair".into()));
                 }
@@ -323,6 +328,7 @@ impl<'t> Parser<'t> {
             }
             _ => first,
         };
+        // A lone low surrogate is the only code that fails here.
         char::from_u32(code).ok_or_else(|| self.error("half a surrogate pair".into()))
     }
 
@@ -339,6 +345,7 @@ impl<'t> Parser<'t> {
         let start = self.position;
         self.take(b'-');
         if self.take(b'0') {
+            // RFC 8259 allows no leading zeros (section 6).
             if matches!(self.peek(), Some(b'0'..=b'9')) {
                 return Err(self.error("a number with a leading zero".into()));
             }
@@ -362,6 +369,7 @@ impl<'t> Parser<'t> {
         let value = if integer {
             lexeme.parse().ok().map(Value::Integer)
         } else {
+            // A float that overflows to infinity is refused: JSON has no such number.
             let number = lexeme
                 .parse()
                 .ok()
@@ -429,7 +437,7 @@ impl<'t> Parser<'t> {
 pub struct Object(String);
 
 impl Object {
-    /// Begins an object without members.
+    /// Makes an object without members.
     #[must_use]
     pub fn new() -> Object {
         Object::default()
@@ -552,7 +560,7 @@ nul | 1
 1 x | 3
 {} {} | 4"#;
 
-    /// What others let pass.
+    /// Texts that lenient readers accept.
     const PASSES_ELSEWHERE: &str =
         r#"01 +1 .5 1. 1e - 'a' "a "\x" "\u12" NaN "\ud800" "\ud800\u0041" "\udc00" 1e999"#;
 
@@ -573,7 +581,7 @@ nul | 1
         let (column, message) = refused(r#"{"kind":"a","kind":"b"}"#);
         assert_eq!(column, 13);
         assert_eq!(message, "key `kind` stands twice in one object");
-        // The first one that is too many, whatever the order of the keys.
+        // The first member too many, in any order of the keys.
         assert_eq!(refused(r#"{"b":1,"a":1,"b":2,"a":2}"#).0, 14);
         let long = format!("\\u001b{}", "k".repeat(5000));
         let (_, message) = refused(&format!(r#"{{"{long}":1,"{long}":2}}"#));

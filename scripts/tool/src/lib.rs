@@ -3,24 +3,24 @@
 //! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is
 //! all it printed, lines for people and machine lines mixed. Its *ending* is
 //! how QEMU's process ended; its *verdict* is its own last line. The tool's
-//! *subcommands* (`run`, `test`, ...) are what the scripts in `scripts/` call.
+//! *subcommands* (`run`, `test`, ...) are called by the scripts in `scripts/`.
 //!
 //! The library serves two callers: the program (`main.rs`), and the tests, its own and
 //! the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
 //!
-//! - [`json`], [`protocol`]: what a guest prints, read strictly;
-//! - [`elf`], [`image`], [`medium`], [`places`], [`tiny`]: what is booted;
-//! - [`child`], [`qemu`], [`outcome`]: booting it and judging the end;
-//! - [`install`], [`probe`], [`system`]: what the host has;
-//! - [`options`]: command lines by a table; [`files`]: what they name;
-//!   [`output`], [`progress`]: printing without a panic, and while it takes long;
-//!   [`random`]: sets that are drawn;
+//! - [`json`], [`protocol`]: the guest's output, read strictly;
+//! - [`elf`], [`image`], [`medium`], [`places`], [`tiny`]: images and media to boot;
+//! - [`child`], [`qemu`], [`outcome`]: the boot, and the judgement of its end;
+//! - [`install`], [`probe`], [`system`]: programs and abilities of the host;
+//! - [`options`]: command lines by a table; [`files`]: the files they name; [`output`],
+//!   [`progress`]: printing without a panic, and progress of long work; [`random`]: task sets that
+//!   are drawn;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`golden`]: texts of the tree that tests hold to their word;
-//! - [`trace`]: what happened in a run, held against the model's rules;
-//! - [`recordings`]: what entered a run, and other formats of that;
+//! - [`trace`]: the events of a run, checked against the model's rules;
+//! - [`recordings`]: the inputs of a run, and conversion to and from other formats;
 //! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
-//! - [`mod@bench`]: what is measured, and compared with a baseline;
+//! - [`mod@bench`]: measurements, compared with a baseline;
 //! - [`oracle`]: reference schedules, bounds and synchronizers;
 //! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
 //!   [`new_app`](mod@new_app): the subcommands.
@@ -31,7 +31,7 @@
 
 #![forbid(unsafe_code)]
 
-// First, for its macros are in force in the modules after it.
+// First: its macros hide the standard library's only in the modules after it.
 #[macro_use]
 pub mod output;
 

@@ -1,4 +1,4 @@
-//! The host tool: its subcommands are what the scripts in `scripts/` call.
+//! The host tool. The scripts in `scripts/` call its subcommands.
 //!
 //! A subcommand takes the words after its name and returns the exit code:
 //! 0 all is well, 1 a failure, 2 a refused command line.

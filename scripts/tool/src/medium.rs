@@ -1,18 +1,18 @@
-//! What a PC boots an app from, and the subcommand `image`, which makes it.
+//! Boot media for a PC, and the subcommand `image`, which makes them.
 //!
-//! It is an ISO or an application of UEFI, with the app's image as far as it is loaded, the words
-//! that it is to be given, and a file that it is to find in memory if there is one. A [`Medium`]
-//! is a stick for one boot: a file that QEMU shows as one, and that is gone afterwards. What can
-//! be refused is, before anything is built, and nothing is written before all of it is there.
+//! A medium is an ISO or an application of UEFI. It holds the loaded part of the app's image, its
+//! words, and a file to leave in memory if there is one. A [`Medium`] is a stick for one boot: a
+//! file that QEMU shows as one, and that is removed afterwards. Everything is checked before
+//! anything is built, and no file is written before its content is complete.
 //!
-//! The ISO is for a stick or a disc. On it are GRUB for BIOS and for UEFI, and GRUB's commands to
-//! boot the image with the words. `grub-mkrescue` makes it, with the few of GRUB's modules that
+//! The ISO is for a stick or a disc. It holds GRUB for BIOS and for UEFI, and the commands by which
+//! GRUB boots the image with the words. `grub-mkrescue` makes it, with the few modules of GRUB that
 //! this takes.
 //!
-//! The application is one file for a FAT stick. It is a PE file of the application `boot-efi`,
-//! which the firmware starts, and of what that looks for. The layout is that of Microsoft's PE
-//! format, for a PE32+ file. It runs wherever the firmware puts it. So each absolute address in it
-//! is in the list by which the firmware corrects them; one that cannot be is refused.
+//! The application is one file for a FAT stick. It is a PE file: the application `boot-efi`, which
+//! the firmware starts, and the sections that this looks for. The layout is that of Microsoft's PE
+//! format, for a PE32+ file. The firmware loads it at any address, so each absolute address in it
+//! is in its list of relocations; one that cannot be is refused.
 //!
 //! Exit codes: 0 the files are there, 1 one could not be made, 2 a refused command line.
 
@@ -75,7 +75,7 @@ pub fn image(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Makes sure of everything that can be refused, and returns the words for the guest.
+/// Checks everything that can be refused, and returns the words for the guest.
 fn check(options: &Parsed) -> Result<String, String> {
     let outputs = options.named(&["iso", "efi"]);
     if outputs.is_empty() {
@@ -97,6 +97,7 @@ fn check(options: &Parsed) -> Result<String, String> {
     }
     let words = options.files().map(Path::to_string_lossy);
     let guest_words = words.collect::<Vec<_>>().join(" ");
+    // Only GRUB changes words; the application passes them on as they are.
     if options.is_given("iso") {
         check_words(&guest_words)?;
     }
@@ -108,7 +109,7 @@ fn check(options: &Parsed) -> Result<String, String> {
     Ok(guest.guest_words)
 }
 
-/// Makes the files, and returns what to say of each, a line.
+/// Makes the files, and returns a line about each.
 fn make(options: &Parsed, words: &str) -> Result<String, String> {
     let image = match options.path("image") {
         Some(path) => path.into(),
@@ -117,6 +118,7 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
     let module = options.path("module");
     let mut lines = String::new();
     if let Some(path) = options.path("iso") {
+        // `Bios` and `Uefi` boot the same ISO, so either will do.
         let made = Medium::new(Loader::Bios, &image, words, module)?;
         let place = files::place(path);
         let bytes = fs::copy(made.path(), path)
@@ -140,13 +142,13 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
     Ok(lines)
 }
 
-/// A stick's content, which is removed with this value.
+/// The content of a stick; the file is removed when this value is dropped.
 #[derive(Debug)]
 pub struct Medium(Temporary);
 
 impl Medium {
-    /// Makes what `loader` boots `image` from, with `words`, and with `module` to be left
-    /// in memory.
+    /// Makes the medium from which `loader` boots `image`, with `words`, and with `module` left in
+    /// memory.
     ///
     /// # Errors
     ///
@@ -170,17 +172,17 @@ impl Medium {
         Ok(medium)
     }
 
-    /// Returns where it lies.
+    /// Returns the path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.0.path()
     }
 }
 
-/// Writes a FAT file system that has the application where a firmware looks for it.
+/// Writes a FAT file system with the application at the path where firmware looks for it.
 fn write_fat(stick: &Path, application: &[u8]) -> Result<(), String> {
     install::ensure(&install::MTOOLS)?;
-    // More than what the file system itself takes.
+    // Room for the file system's own tables: 4 MiB and a 64th of the content.
     let bytes = (4 << 20) + application.len() as u64 / 64 * 65;
     let sized = File::create(stick).and_then(|file| file.set_len(bytes));
     sized.map_err(|why| format!("cannot write `{}`: {why}", stick.display()))?;
@@ -195,9 +197,9 @@ fn write_fat(stick: &Path, application: &[u8]) -> Result<(), String> {
     tool("mcopy", &[file.path(), &on_stick(PLACE)])
 }
 
-/// What GRUB has to be able to do besides what it brings itself to its own files.
-/// The kinds of partitions are those that it asks for at its start. A test has it leave a
-/// processor as some firmware does, by `wrmsr`.
+/// The modules of GRUB, besides those that it needs to read its own files. The kinds of partitions
+/// are those that it asks for at its start. A test uses `wrmsr` to leave a processor as some
+/// firmware does.
 const MODULES: &str = "--install-modules=normal multiboot2 cpuid echo read wrmsr iso9660 \
                        all_video part_acorn \
                        part_amiga part_apple part_bsd part_dfly part_dvh part_gpt part_msdos \
@@ -221,8 +223,7 @@ pub fn check_words(words: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Makes the ISO `iso` that boots what `contents` have.
-/// What it is made with is installed if it is missing.
+/// Writes the ISO `iso` that boots `contents`. Missing tools are installed.
 fn write_iso(iso: &Path, contents: &Contents<'_>) -> Result<(), String> {
     check_words(contents.words)?;
     install::ensure(&install::GRUB)?;
@@ -238,12 +239,12 @@ fn write_iso(iso: &Path, contents: &Contents<'_>) -> Result<(), String> {
     })
 }
 
-/// Returns GRUB's commands. A file is left as it is, compressed or not. A processor without
-/// 64 bits can execute nothing of the image, so it is GRUB that says so.
+/// Returns GRUB's commands. A file stays as it is, compressed or not. GRUB itself reports a
+/// processor without 64 bits, on which the image cannot run a single instruction.
 ///
-/// Under UEFI the first module is put at address 0, where the firmware reads no file to: it takes
-/// the address for a missing one, unless GRUB reads by way of its cache, which depends on where
-/// the file lies. So a small module goes first, which is always read by that way.
+/// Under UEFI GRUB puts the first module at address 0. The firmware takes that address for a
+/// missing one and reads no file to it, unless GRUB reads through its cache, which depends on where
+/// the file lies. So a small module comes first, which always goes through the cache.
 fn commands(words: &str, has_module: bool) -> String {
     let quoted = words.split_whitespace().map(|word| format!(" '{word}'"));
     let quoted: String = quoted.collect();
@@ -266,6 +267,7 @@ fn rescue(folder: &Path, iso: &Path) -> Result<(), String> {
     let mut command = process::Command::new("grub-mkrescue");
     command.args(["--locales=", "--themes=", "--fonts=", MODULES]);
     let made = system::run(command.arg(output).arg(folder));
+    // Its success alone does not prove that the file is there.
     made.and_then(|_| match iso.is_file() {
         true => Ok(()),
         false => Err(format!(
@@ -275,14 +277,14 @@ fn rescue(folder: &Path, iso: &Path) -> Result<(), String> {
     })
 }
 
-/// Where a firmware looks for it on a stick.
+/// The path on a stick where firmware looks for an application.
 pub const PLACE: &str = "EFI/BOOT/BOOTX64.EFI";
 
-/// In memory a section begins at a multiple of this, in the file of that.
+/// The alignment of a section in memory, and in the file.
 const PAGE: u64 = 4096;
 const BLOCK: u64 = 512;
 
-/// What is done with a section, as its header says.
+/// The characteristics of a section's header: its content and its access rights.
 const CODE: u32 = 0x6000_0020;
 const CONSTANT: u32 = 0x4000_0040;
 const DISCARDABLE: u32 = 0x4200_0040;
@@ -300,14 +302,13 @@ impl Section {
         bytes_of(&self.bytes).next_multiple_of(BLOCK)
     }
 
-    /// Returns where the next one may begin in memory. One without bytes has a page all the same.
+    /// Returns the first address after it, page-aligned. An empty section takes a page, too.
     fn end_in_memory(&self) -> u64 {
         (self.start + bytes_of(&self.bytes).max(1)).next_multiple_of(PAGE)
     }
 }
 
-/// Makes the application that boots what `contents` have. The part that the firmware starts is
-/// built first.
+/// Makes the application that boots `contents`. The part that the firmware starts is built first.
 ///
 /// # Errors
 ///
@@ -326,6 +327,7 @@ fn parts(contents: &Contents<'_>) -> Vec<(&'static str, Vec<u8>)> {
         module,
     } = contents;
     let content = module.as_deref().unwrap_or_default();
+    // The application checks the sum before it boots, so that a damaged stick is found.
     let sum = file::sum([image, words.as_bytes(), content]);
     let always = [
         (IMAGE, image.clone()),
@@ -336,7 +338,7 @@ fn parts(contents: &Contents<'_>) -> Vec<(&'static str, Vec<u8>)> {
     always.into_iter().chain(module).collect()
 }
 
-/// Makes a PE file of a position-independent program and of sections behind it.
+/// Makes a PE file from a position-independent program and further sections.
 fn assemble(program: &[u8], parts: Vec<(&'static str, Vec<u8>)>) -> Result<Vec<u8>, String> {
     let corrections = elf::corrections(program)?;
     let entry = file::entry(program).ok_or("it has no entry")?;
@@ -344,6 +346,8 @@ fn assemble(program: &[u8], parts: Vec<(&'static str, Vec<u8>)>) -> Result<Vec<u
     let kinds = [(".text", CODE), (".rdata", CONSTANT)];
     for (segment, (name, rights)) in file::segments(program).zip(kinds) {
         let mut bytes = segment.bytes.to_vec();
+        // A segment longer in memory than in the file has zeroed variables, which no section here
+        // holds.
         if bytes_of(&bytes) != segment.end - segment.start {
             return Err("it has variables".into());
         }
@@ -351,6 +355,7 @@ fn assemble(program: &[u8], parts: Vec<(&'static str, Vec<u8>)>) -> Result<Vec<u
             let place = at.checked_sub(segment.start);
             let place = place.and_then(|at| usize::try_from(at).ok());
             if let Some(place) = place.and_then(|at| bytes.get_mut(at..at + 8)) {
+                // Stored as if loaded at 0: the firmware adds the load address.
                 place.copy_from_slice(&address.to_le_bytes());
             }
         }
@@ -376,15 +381,14 @@ fn assemble(program: &[u8], parts: Vec<(&'static str, Vec<u8>)>) -> Result<Vec<u
     Ok(lay_out(entry, &sections))
 }
 
-/// Returns the list by which the firmware corrects addresses: a block for each page that
-/// has some, of the page's address, the block's size, and for each address kind and place
-/// in the page. There is a block even if there is nothing to correct, as some firmware
-/// takes a file without one for one that cannot be moved.
+/// Returns the list of relocations: a block for each page that has some, with the page's address,
+/// the block's size, and for each address its kind and its offset in the page. There is a block
+/// even without relocations, as some firmware
 fn corrections_list(corrections: &[Correction]) -> Vec<u8> {
     const ADDRESS_OF_64_BITS: u64 = 10;
     let mut list = Vec::new();
     let mut block = |page: u64, mut entries: Vec<u64>| {
-        // A block's size is a multiple of 4; an entry 0 says nothing.
+        // A block's size is a multiple of 4; an entry of 0 is padding.
         entries.resize(entries.len().next_multiple_of(2).max(2), 0);
         list.extend(long(page));
         list.extend(long(8 + 2 * entries.len() as u64));
@@ -496,7 +500,7 @@ mod tests {
     use crate::tiny::{TinyEnd, tiny_image};
     use boot_efi::file::{is_whole, section};
 
-    /// That a module is there is shown by `tests/tests/boots/by_grub.rs`.
+    /// `tests/tests/boots/by_grub.rs` shows that a module arrives.
     #[test]
     fn grub_gets_each_word_as_it_is_or_it_is_refused_by_name() {
         let words = "jobs=3  a=$x;{}#";
@@ -587,7 +591,7 @@ mod tests {
         assert_eq!(why, "which file? give --iso FILE or --efi FILE");
         let twice = TABLE.right("").with("iso", &iso).with("efi", &iso);
         assert!(check(&twice).unwrap_err().contains("`--efi "));
-        // Without GRUB any word will do.
+        // Without GRUB every word is allowed.
         for (option, words) in [("efi", "it's"), ("iso", "jobs=3 seed=7")] {
             let right = check(&TABLE.right(words).with(option, &iso));
             assert_eq!(right.as_deref(), Ok(words));

@@ -1,17 +1,16 @@
 //! The subcommand `new-app`: an app of one's own, under `apps/` or in a repository of its own.
 //!
-//! The *template* is an app that is complete: a library with the functions and
-//! their DAG, a program that boots it, the same as a program for Linux, and a test that runs
-//! it on the host in virtual time. A new app is a copy in which the template's name is replaced.
-//! Under `apps/` cargo finds it by the workspace's `apps/*`, so nothing else changes. In a
-//! repository it has what the workspace gives otherwise: profiles, the toolchain's
-//! version, where the crates are. Cargo's *runner* there boots what is an image, so that
-//! `cargo run` and `cargo test` do what they do for any program.
+//! The *template* is a complete app: a library with the functions and their DAG, a program that
+//! boots it, the same as a program for Linux, and a test that runs it on the host in virtual time.
+//! A new app is a copy in which the template's name is replaced. Under `apps/` cargo finds it by
+//! the workspace's `apps/*`, so nothing else changes. A repository also gets its share of the
+//! workspace: profiles, the toolchain's version, the sources of the crates. Cargo's *runner* there
+//! boots images, so that `cargo run` and `cargo test` work as for any program.
 //!
-//! The name is a package's, a folder's and, with `_` for `-`, a crate's at once,
-//! so it must be possible as each: no word of the language, no library that every
-//! program knows, no package that the workspace has. Another is refused before anything is
-//! written. If writing fails in the middle, what was written is removed.
+//! The name is that of a package, of a folder and, with `_` for `-`, of a crate. So it must be
+//! possible as each: no keyword, no library that every program has, no package of the workspace. A
+//! name that is not possible is refused before anything is written. If writing fails in the middle,
+//! the new folder is removed.
 //!
 //! Exit codes: 0 the app is there, 1 its files could not be written, 2 a refused
 //! command line.
@@ -59,10 +58,10 @@ command line
 /// The template's name, as a package and as a crate.
 const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
 
-/// A file of an app: where it goes in the app's folder, and its text.
+/// A file of an app: its path in the app's folder, and its text.
 type AppFile = (&'static str, &'static str);
 
-/// Returns a file of the template, which lies there by this name or another one.
+/// Returns a file of the template, which has this name there or another one.
 macro_rules! template {
     ($file:literal) => {
         template!($file, $file)
@@ -72,10 +71,10 @@ macro_rules! template {
     };
 }
 
-/// What says how an app under `apps/` is built.
+/// The manifest of an app under `apps/`.
 const MANIFEST: AppFile = template!("Cargo.toml", "manifest.toml");
 
-/// The template's other files, which any app has.
+/// The template's other files, which every app has.
 const FILES: &[AppFile] = &[
     template!("build.rs"),
     template!("src/lib.rs"),
@@ -85,7 +84,7 @@ const FILES: &[AppFile] = &[
     template!("tests/virtual_time.rs"),
 ];
 
-/// Texts of the template, and those that stand for them in an app.
+/// Texts of the template, and their replacements in an app.
 type Changes = Vec<(String, String)>;
 
 /// Runs the subcommand with the words after its name.
@@ -97,7 +96,7 @@ pub fn new_app(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Makes the app, and returns what to do with it.
+/// Makes the app, and returns the next steps for the person.
 fn make(options: &Parsed) -> Result<String, Refusal> {
     let usage = |line: &str| Err(Refusal::Usage(line.into()));
     let Some(name) = options.positional() else {
@@ -122,13 +121,13 @@ pub fn create(workspace: &Path, name: &str) -> Result<PathBuf, Refusal> {
     check(workspace, name).map_err(Refusal::Usage)?;
     let folder = workspace.join("apps").join(name);
     let files = [MANIFEST].into_iter().chain(FILES.iter().copied());
-    // Another command may have been as quick.
+    // `check` has passed, but another command may have made the folder since.
     write_folder(&folder, name, files, Changes::new(), &taken(name))?;
     Ok(folder)
 }
 
-/// Makes an app's folder, which must not be there, and writes its files, each changed as it
-/// has to be. `taken` says that the folder is there.
+/// Makes an app's folder, which must not exist, and writes its files with the changes. `taken` is
+/// the error if the folder exists.
 fn write_folder(
     folder: &Path,
     name: &str,
@@ -140,6 +139,7 @@ fn write_folder(
     if let Some(parent) = folder.parent() {
         fs::create_dir_all(parent).map_err(failed)?;
     }
+    // `create_dir` is the one atomic test that the folder is new, so removing it later is safe.
     fs::create_dir(folder).map_err(|error| match error.kind() {
         ErrorKind::AlreadyExists => Refusal::Usage(taken.into()),
         _ => failed(error),
@@ -153,14 +153,13 @@ fn write_folder(
         files::write(&place, text)
     });
     written.map_err(|line| {
-        // What cannot be written can perhaps not be removed either; the line
-        // names the place.
+        // A folder that cannot be written can perhaps not be removed either; the error names it.
         let _ = fs::remove_dir_all(folder);
         Refusal::Failure(line)
     })
 }
 
-/// Says what is in an app's folder.
+/// Returns the list of the files in an app's folder.
 fn is_there(folder: &str) -> String {
     format!(
         "\
@@ -190,11 +189,11 @@ fn next_steps(name: &str) -> String {
     )
 }
 
-/// The longest name, in bytes, with which the template's lines stay short.
+/// The longest name, in bytes: with it the template's lines stay within the width.
 const LONGEST: usize = 32;
 
-/// Names that cannot be crates, because they mean something already: keywords,
-/// the compiler's own crates, and folders that cargo makes.
+/// Names that cannot be crates, since they have a meaning: keywords, the compiler's own crates, and
+/// folders that cargo makes.
 const RESERVED: &str = "\
     abstract alloc as async await become box break build const continue core crate deps do dyn \
     else enum examples extern false final fn for gen if impl in incremental let loop macro \
@@ -205,7 +204,7 @@ const RESERVED: &str = "\
 ///
 /// # Errors
 ///
-/// One line: the name, what is wrong with it, and what is possible.
+/// One line: the name, the fault, and the rule.
 pub fn check(workspace: &Path, name: &str) -> Result<(), String> {
     check_word(name)?;
     let folder = Path::new("apps").join(name);
@@ -225,7 +224,7 @@ fn refuse(name: &str, why: &str) -> Result<(), String> {
     Err(format!("{} cannot be an app's name: {why}", quoted(name)))
 }
 
-/// Checks that a name can be an app's wherever that is: a package's and a crate's.
+/// Checks that a name can be that of an app, wherever it is: of a package and of a crate.
 ///
 /// # Errors
 ///
@@ -249,12 +248,12 @@ fn check_word(name: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Says that there is an app of the name.
+/// Returns the error that there is an app of that name.
 fn taken(name: &str) -> String {
     format!("there is an app `{name}` already; choose another name, or edit apps/{name}")
 }
 
-/// Returns the folder, within the workspace, of the package with such a name.
+/// Returns the folder, within the workspace, of the package with this name.
 fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
     let manifest = files_below(workspace, |_| true).into_iter().find(|file| {
         let text = || fs::read_to_string(file).unwrap_or_default();
@@ -264,8 +263,8 @@ fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
     folder.ok().map(Path::to_path_buf)
 }
 
-/// Returns the names that a manifest gives to a package, a library or a program, with
-/// `-` for `_`. Those of examples, tests and benchmarks are in nobody's way.
+/// Returns the names that a manifest gives to a package, a library or a program, with `-` for `_`.
+/// Names of examples, tests and benchmarks do not clash.
 fn names(manifest: &str) -> impl Iterator<Item = String> {
     let mut table = "";
     manifest.lines().filter_map(move |line| {
@@ -279,7 +278,7 @@ fn names(manifest: &str) -> impl Iterator<Item = String> {
     })
 }
 
-/// Where a repository's app has the crates from, and cargo its runner.
+/// The source of a repository's crates, and of cargo's runner.
 #[derive(Clone, Copy, Debug)]
 pub enum Source<'a> {
     /// The root of a workspace in this file system.
@@ -300,7 +299,7 @@ const PACKAGES: [&str; 5] = [
     "boot/link",
 ];
 
-/// The files that an app under `apps/` does without, or has others for.
+/// The files that only an app in its own repository has.
 const OWN_FILES: [AppFile; 6] = [
     template!("Cargo.toml", "repository/manifest.toml"),
     template!(".cargo/config.toml", "repository/config.toml"),
@@ -320,6 +319,7 @@ const OWN_FILES: [AppFile; 6] = [
 /// The name or the folder is refused, or a file cannot be written; nothing is left then.
 pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(), Refusal> {
     check_word(name).map_err(Refusal::Usage)?;
+    // Cargo could not tell the app from a dependency of the same name.
     if PACKAGES
         .iter()
         .any(|package| package.replace("fass/", "").replace('/', "-") == name)
@@ -331,6 +331,7 @@ pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(
     }
     let shown = quoted(&out.to_string_lossy()).to_string();
     let changes = match source {
+        // The URL goes into a TOML string as it is.
         Source::Git(url) if url.contains(['"', '\\', '\n']) => {
             let line = format!("`--git {}`: no URL has such a character", quoted(url));
             return Err(Refusal::Usage(line));
@@ -349,8 +350,9 @@ pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(
     write_folder(out, name, files, changes, &taken)
 }
 
-/// Returns how texts change for crates of this workspace. Nothing is installed for them.
+/// Returns the changes for crates of this workspace. Nothing is installed for them.
 fn from_folder(root: &str) -> Changes {
+    // The runner is in the workspace, so the workflow need not install it.
     let install = "      - run: cargo install --locked --git /workspace tool\n";
     let changes = [
         (install, ""),
@@ -360,7 +362,7 @@ fn from_folder(root: &str) -> Changes {
     changes.map(|(old, new)| (old.into(), new.into())).into()
 }
 
-/// Returns how texts change for crates of this git repository.
+/// Returns the changes for crates of this git repository.
 fn from_git(url: &str) -> Changes {
     let by_path = |package| format!("path = \"{WORKSPACE}/{package}\"");
     let crates = PACKAGES.map(|package| (by_path(package), format!("git = \"{url}\"")));
@@ -373,7 +375,7 @@ fn from_git(url: &str) -> Changes {
     crates.into_iter().chain(others).collect()
 }
 
-/// Says what to do in the repository.
+/// Returns the next steps in the repository.
 fn next_steps_there(out: &Path, source: Source<'_>) -> String {
     let install = match source {
         Source::Folder(_) => String::new(),
@@ -421,7 +423,7 @@ mod tests {
         let line = "there is an app `brake-assist` already; choose another name, or edit \
                     apps/brake-assist";
         assert_eq!(again, Refusal::Usage(line.into()));
-        // Of two at once one makes it.
+        // Of two commands at once one makes it.
         for number in 0..50 {
             let (name, barrier) = (format!("app-{number}"), std::sync::Barrier::new(2));
             let make = || {
@@ -440,7 +442,7 @@ mod tests {
     fn what_cannot_be_written_is_said_and_leaves_nothing() {
         let workspace = std::env::temp_dir().join(format!("no-app-{}", std::process::id()));
         fs::create_dir_all(&workspace).unwrap();
-        // A file where a folder has to be.
+        // A file in the place of a folder.
         fs::write(workspace.join("apps"), "").unwrap();
         let Refusal::Failure(line) = create(&workspace, "brake-assist").unwrap_err() else {
             panic!("a file has become a folder");
@@ -449,7 +451,7 @@ mod tests {
         fs::remove_dir_all(workspace).unwrap();
     }
 
-    /// Names, and why they are refused.
+    /// Names, and the reasons for their refusal.
     const BAD: &str = "Brake_Assist | `Brake_Assist` cannot be an app's name: give small letters, digits and single hyphens, a letter first, 32 at most, as in `brake-assist`
 struct | `struct` cannot be an app's name: Rust or cargo use the word themselves; add another, such as `my-`
 fork-join | there is an app `fork-join` already; choose another name, or edit apps/fork-join
@@ -481,7 +483,7 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
         assert_eq!(found, ["virtual-time", "virtual-time", "tool"]);
     }
 
-    /// That the app is built and boots is shown by `tests/tests/boots/new_app.rs`.
+    /// `tests/tests/boots/new_app.rs` shows that the app builds and boots.
     #[test]
     fn from_git_the_url_is_all_that_is_named_and_from_a_folder_nothing_is_installed() {
         let url = "https://example.org/kernel.git";

@@ -1,10 +1,9 @@
-//! What became of one guest, and the judgement on it.
+//! The outcome of one guest's run, and the judgement on it.
 //!
-//! Two witnesses speak at the end of a run: QEMU's exit status and the
-//! verdict, the last line of the serial log. A run is good only if both are
-//! there, both say success, no machine line is damaged, and no line reports a
-//! violation. One witness alone proves nothing: a guest could print success
-//! and then hang, or end in success having printed nothing.
+//! At the end of a run two witnesses must agree: QEMU's exit status and the verdict, the last line
+//! of the serial log. A run is good only if both are there and say success, no machine line is
+//! damaged, and no line reports a violation. One witness alone proves nothing: a guest could print
+//! success and then hang, or end in success without having printed anything.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -22,7 +21,7 @@ use crate::system;
 /// How many of the last serial lines are shown at a failure.
 const SHOWN_LINES: usize = 30;
 
-/// What became of one guest.
+/// The outcome of one guest's run.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// How QEMU ended.
@@ -31,21 +30,21 @@ pub struct Outcome {
     pub serial: String,
     /// The log taken apart.
     pub transcript: Transcript,
-    /// The bytes of the record, whatever way it took; empty if none was kept.
+    /// The bytes of the record, by whichever way they came; empty if none was kept.
     pub sent: Vec<u8>,
-    /// Where the log lies.
+    /// The path of the log.
     pub log: PathBuf,
-    /// Where the image lies that was booted.
+    /// The path of the image that was booted.
     pub image: PathBuf,
-    /// Why it was asked to end before its time, if it was.
+    /// The reason why it was asked to end early, if it was.
     pub asked: Option<Asked>,
     /// The wall time from start to end.
     pub elapsed: Duration,
-    /// What QEMU itself complained of; mostly empty.
+    /// QEMU's own error output; mostly empty.
     pub complaints: String,
 }
 
-/// Why a run is not good.
+/// The reason why a run is not good.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// [`Status::Usage`] if the guest refused its command line, otherwise
@@ -71,8 +70,8 @@ pub fn boot(
     boot_with_input(qemu, image, log, limit, drop, show)
 }
 
-/// Works like [`boot()`], and hands `talk` the way to the guest's serial port, if the
-/// guest has one, as soon as it runs.
+/// Works like [`boot()`], and passes the input of the guest's serial port, if it has one, to `talk`
+/// as soon as the guest runs.
 ///
 /// # Errors
 ///
@@ -109,7 +108,7 @@ const fn failure(reason: String) -> Fault {
     Fault { status, reason }
 }
 
-/// Judges what a guest has printed: no machine line is damaged, the verdict is success, and
+/// Judges the lines of a guest: no machine line is damaged, the verdict is success, and
 /// no line reports a violation.
 ///
 /// # Errors
@@ -141,7 +140,7 @@ impl Outcome {
     ///
     /// # Errors
     ///
-    /// In words: what is wrong with it.
+    /// In words: the fault of the record.
     pub fn record(&self) -> Result<Record, String> {
         match self.sent.is_empty() {
             true => Record::of_log(&self.serial),
@@ -149,7 +148,7 @@ impl Outcome {
         }
     }
 
-    /// Takes the log of a guest apart that has ended, without being asked and without complaints.
+    /// Makes the outcome of a guest that was not asked to end and did not complain.
     pub(crate) fn of(ending: Ending, serial: String, log: &Path, image: &Path) -> Outcome {
         Outcome {
             ending,
@@ -170,7 +169,8 @@ impl Outcome {
     ///
     /// The first reason why it is not good.
     pub fn judge(&self) -> Result<(), Fault> {
-        // A kernel that ends says so. Its status alone is one that the app has made.
+        // The kernel prints a verdict before it ends by the exit port. So a status of that port
+        // without a verdict comes from the app.
         let is_odd = matches!(self.ending, Ending::Status(status) if status > 1 && status % 2 == 1);
         if (is_odd || matches!(self.ending, Ending::Guest(_)))
             && self.transcript.of_kind("verdict").next().is_none()
@@ -181,7 +181,7 @@ impl Outcome {
             )));
         }
         let Ending::Guest(by_exit) = self.ending else {
-            // QEMU obeys such a signal and ends with the status of a shutdown.
+            // QEMU handles such signals itself and ends with the status of a shutdown.
             let mut reason = match self.ending {
                 _ if self.complaints.contains("terminating on signal") => {
                     Ending::Signal.to_string()
@@ -199,12 +199,14 @@ impl Outcome {
             return Err(failure(reason));
         };
         let verdict = self.transcript.verdict().map_err(failure)?;
+        // A guest may have printed success and then failed on the way to its exit.
         if verdict.status != by_exit {
             return Err(failure(format!(
                 "the verdict line says {:?}, QEMU's exit status {by_exit:?}",
                 verdict.status
             )));
         }
+        // Last: a fault in the log says more than the limit does.
         judge_lines(&self.transcript)?;
         match self.asked {
             Some(Asked::ByLimit(limit)) => Err(failure(format!(
@@ -216,11 +218,11 @@ impl Outcome {
         }
     }
 
-    /// Returns the last serial lines, indented, and where all of them are. To
-    /// a fault at an address it adds the function.
+    /// Returns the last serial lines, indented, and the path of the whole log. After a fault at an
+    /// address it adds the function.
     #[must_use]
     pub fn tail(&self) -> String {
-        // The record says nothing to people.
+        // Lines of the record are of no use to people.
         let lines = self.serial.lines();
         let lines = lines.filter(|line| !line.starts_with("{\"kind\":\"record\""));
         let lines: Vec<&str> = lines.collect();

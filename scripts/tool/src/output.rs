@@ -1,16 +1,15 @@
-//! What the tool prints, also where nobody reads it.
+//! Printing that survives a reader that has left.
 //!
 //! The standard library's printing macros panic when a write fails, and a write fails
-//! as soon as the reader of a pipe has left (`./scripts/oracle ... | head -1`). That no
-//! one reads on is no failure: the work goes on, and its exit code says how it ended.
-//! Any other reason why standard output takes nothing, such as a full disk, is one: it is
-//! said at the end, by [`conclude`].
+//! as soon as the reader of a pipe has left (`./scripts/oracle ... | head -1`). A reader that has
+//! left is no failure: the work goes on, and its exit code says how it ended. Any other write error
+//! on standard output, such as a full disk, is a failure; [`conclude`] reports it at the end.
 //!
-//! So this library has macros of the same names, which hide those of the standard
-//! library in all its modules; nobody has to think of it where something is printed.
+//! So this library has macros of the same names, which hide those of the standard library in
+//! all its modules, so that no caller can use the wrong ones.
 //!
-//! A `Table` is what people read of figures: columns of fixed widths, under their headings;
-//! `shown` and `briefly` write the times in it.
+//! A `Table` shows figures to people: columns of fixed widths, under their headings; `shown` and
+//! `briefly` write the times in it.
 
 /// Writes to standard output; as the standard library's, but it never panics.
 #[macro_export]
@@ -50,7 +49,7 @@ use std::mem;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
-/// Why standard output did not take everything, if it did not.
+/// The first write error of standard output, if there was one.
 static LOST: OnceLock<io::Error> = OnceLock::new();
 
 /// Writes to standard output; for the macros.
@@ -58,7 +57,7 @@ pub fn put(what: Arguments<'_>) {
     note(stdout().write_fmt(what));
 }
 
-/// Writes to standard error; for the macros. That it cannot be written can be said nowhere.
+/// Writes to standard error; for the macros. An error is ignored: there is no place to report it.
 pub fn complain(what: Arguments<'_>) {
     let _ = stderr().write_fmt(what);
 }
@@ -67,20 +66,22 @@ fn note(written: io::Result<()>) {
     if let Err(error) = written
         && error.kind() != ErrorKind::BrokenPipe
     {
-        // The first reason is the one that is said.
+        // Only the first error is kept: later ones mostly follow from it.
         let _ = LOST.set(error);
     }
 }
 
-/// Returns the exit code of the tool, whose work has ended with `code`: a failure, which
-/// is said here, if not all output could be written.
+/// Returns the exit code of the tool, whose work has ended with `code`. If some output could not be
+/// written, says so and makes success a failure.
 #[must_use]
 pub fn conclude(code: ExitCode) -> ExitCode {
+    // Standard output buffers: the last write error shows only in a flush.
     note(stdout().flush());
     let Some(error) = LOST.get() else {
         return code;
     };
     eprintln!("fass-tool: standard output could not be written: {error}");
+    // Another code than success already says more than a lost line would.
     if code == ExitCode::SUCCESS {
         return ExitCode::FAILURE;
     }
@@ -97,10 +98,11 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Begins a table, below a line if there is a `title`. A column is `heading:width`, or
+    /// Makes a table, below a line if there is a `title`. A column is `heading:width`, or
     /// `heading:width.decimals`, or `heading:<width` if its cells begin at the left; `|` stands
     /// between.
     pub(crate) fn new(title: &str, columns: &str) -> Self {
+        // The formats are literals of this crate; a missing number means no width or no decimals.
         let number = |digits: &str| digits.parse().unwrap_or(0);
         let column = |column| {
             let (heading, form) = str::rsplit_once(column, ':').unwrap_or((column, "0"));
@@ -121,6 +123,7 @@ impl Table {
     /// Adds a row with a cell for each column.
     pub(crate) fn row(&mut self, cells: &[&dyn Display]) {
         let cells: Vec<String> = (cells.iter().zip(&self.columns))
+            // Rounding is for floats only; integers and text take no precision.
             .map(|(cell, &(_, _, decimals))| match decimals {
                 0 => cell.to_string(),
                 _ => format!("{cell:.decimals$}"),
@@ -146,22 +149,23 @@ impl Table {
         self.line(&line);
     }
 
-    /// Returns the whole table, or what was added since the last call.
+    /// Returns the table, or the part that was added since the last call.
     pub(crate) fn text(&mut self) -> String {
         mem::take(&mut self.text)
     }
 }
 
-/// Returns a time in the unit that has one to three digits before the point.
+/// Formats a time in the largest unit that it reaches, with three decimals (none for ns).
 pub(crate) fn shown(ns: u64) -> String {
     let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us")];
     match units.into_iter().find(|(unit, _)| ns >= *unit) {
         None => format!("{ns} ns"),
+        // `unit / 1000` scales the rest to thousandths of the unit.
         Some((unit, name)) => format!("{}.{:03} {name}", ns / unit, ns % unit / (unit / 1000)),
     }
 }
 
-/// Returns the same without zeros at the end.
+/// Formats a time as [`shown`] does, without trailing zeros.
 pub(crate) fn briefly(ns: u64) -> String {
     let text = shown(ns);
     match text.split_once(' ') {

@@ -1,21 +1,20 @@
 //! Places in code: the function of an image that an address lies in, and the calls to it.
 //!
-//! A guest that reports a fault knows the address of the instruction, and its
-//! image has no names in it that it could read. So wherever the tool shows a line
-//! of kind `panic` or `fault` whose `place` is an address, it adds one
-//! line that names the function, and the app's line there, if there is one. After a line of
-//! kind `backtrace` it tells the calls. What the guest printed stays as it is.
+//! A guest that reports a fault knows the address of the instruction, but its image has no names
+//! that it could read. So when the tool shows a line of kind `panic` or `fault` whose `place` is an
+//! address, it adds a line that names the function, and the app's source line if there is one.
+//! After a line of kind `backtrace` it lists the calls. The guest's own lines stay as they are.
 //!
 //! Names and lines are found by `addr2line`, which reads the image's symbols and
-//! debugging information and knows both ways in which the compiler writes names. It
-//! is part of binutils, which C compilers bring along. Where it is missing, or the image cannot be
-//! read, nothing is added: the report of a fault is no place for another one.
+//! debugging information and demangles names. It is part of binutils, which C compilers bring
+//! along. Where it is missing, or the image cannot be read, nothing is added: the report of a fault
+//! is no place for another one.
 //!
-//! For a backtrace the guest tells for each word of the stack that follows a call instruction where
-//! it returns to and, if the instruction says so, what it called. Some are left over from calls
-//! that have returned. So the chain is followed from the innermost call outwards: the next one is
-//! the first that called the function we are in. If none did, it was called through a pointer or
-//! reached by a jump, and the next one is taken.
+//! For a backtrace the guest prints, for each word of the stack that follows a call instruction,
+//! the return address and, if the instruction tells it, the callee. Some words are left over from
+//! calls that have returned. So the chain is followed from the innermost call outwards: the next
+//! call is the first that called the current function. If there is none, the function was called
+//! through a pointer or reached by a jump, and the next word is taken.
 
 use std::collections::BTreeMap;
 use std::env;
@@ -29,7 +28,7 @@ use crate::system;
 /// The kinds whose `place` may be an address.
 const KINDS: [&str; 3] = ["panic", "fault", BACKTRACE];
 
-/// The kind that has the calls on a stack.
+/// The kind of lines with the calls on a stack.
 const BACKTRACE: &str = "backtrace";
 
 /// Folders of the workspace whose code is not the app's.
@@ -42,7 +41,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// Begins with an image that need not be there, or be an ELF file.
+    /// Makes the names of an image, which need not exist or be an ELF file.
     #[must_use]
     pub fn new(image: &Path) -> Places {
         Places {
@@ -50,8 +49,8 @@ impl Places {
         }
     }
 
-    /// Returns what to add to a line of the serial log, if anything, such as
-    /// `0x20e0b8 is faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`.
+    /// Returns the text to add to a line of the serial log, if any, such as `0x20e0b8 is
+    /// faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`.
     #[must_use]
     pub fn explain(&self, line: &str) -> Option<String> {
         let line = read_line(0, line)?.ok()?;
@@ -65,6 +64,7 @@ impl Places {
         let addresses: Vec<u64> = address.into_iter().chain(addresses).collect();
         let first = *addresses.first()?;
         let program = system::find_program("addr2line")?;
+        // All addresses in one call: the program reads the whole debugging information each time.
         let frames = frames(&program, &self.image, &addresses)?;
         if is_backtrace {
             return tell(address, &calls, &frames);
@@ -82,8 +82,8 @@ pub struct Frame {
     pub line: String,
 }
 
-/// Returns what contains each of the addresses in an image, the innermost first, as
-/// `addr2line` (`program`) tells; nothing if it fails.
+/// Returns the functions that contain each of the addresses in an image, the innermost first, by
+/// `addr2line` (`program`); nothing if it fails.
 #[must_use]
 pub fn frames(
     program: &Path,
@@ -108,12 +108,13 @@ fn read_frames(found: &str) -> BTreeMap<u64, Vec<Frame>> {
     let mut lines = found.lines();
     let mut frames: &mut Vec<Frame> = &mut Vec::new();
     while let Some(line) = lines.next() {
+        // `addr2line -a` prints 16 digits; a function's name never looks so.
         let digits = line.strip_prefix("0x").filter(|digits| digits.len() == 16);
         if let Some(address) = digits.and_then(|digits| u64::from_str_radix(digits, 16).ok()) {
             frames = all.entry(address).or_default();
             continue;
         }
-        // ` (discriminator 2)` after the line tells copies of it apart; a path may have spaces.
+        // ` (discriminator 2)` after the line tells copies of it apart; a path may contain blanks.
         let place = lines.next().unwrap_or("??:?");
         frames.push(Frame {
             function: line.into(),
@@ -127,7 +128,7 @@ fn read_frames(found: &str) -> BTreeMap<u64, Vec<Frame>> {
     all
 }
 
-/// Returns the address at which a line says that something happened.
+/// Returns the address in a line's `place`, if its kind has one.
 fn address(line: &MachineLine) -> Option<u64> {
     let place = line.text_at("place")?;
     let digits = place.strip_prefix("0x")?;
@@ -136,24 +137,25 @@ fn address(line: &MachineLine) -> Option<u64> {
         .then(|| u64::from_str_radix(digits, 16).ok())?
 }
 
-/// Says in our words what the program has found.
+/// Describes an address by its frames in one sentence.
 fn sentence(address: u64, frames: &[Frame]) -> String {
     let function = frames.first().map_or("??", |frame| &frame.function);
     if function == "??" {
         return format!("{address:#x} is in no function of the image");
     }
+    // The innermost line of the app, since the fault itself is often in a library.
     let line = frames.iter().find_map(line_of_app);
     let line = line.map_or_else(String::new, |line| format!(", of {line}"));
     format!("{address:#x} is {function}{line}")
 }
 
 impl Frame {
-    /// Reports whether the code is Rust's library.
+    /// Reports whether the code belongs to Rust's library.
     fn is_of_library(&self) -> bool {
         self.line.starts_with("/rustc/")
     }
 
-    /// Returns file and line in short: from the workspace on, or from the library's root on.
+    /// Returns file and line in short form: from the workspace's root, or from the library's root.
     fn place(&self) -> &str {
         let line = self.line.as_str();
         if let Some((_, below)) = line
@@ -168,8 +170,8 @@ impl Frame {
     }
 }
 
-/// Returns a file and line if it is the app's: from the workspace on, or from this folder on,
-/// which is the root of the app's own repository where cargo starts the tool.
+/// Returns a file and line if they are the app's: from the workspace's root, or from the current
+/// folder, which is the root of the app's own repository if cargo starts the tool there.
 fn line_of_app(frame: &Frame) -> Option<&str> {
     let below = |folder: &Path| frame.line.strip_prefix(folder.to_str()?)?.strip_prefix('/');
     let path = match below(system::workspace()) {
@@ -177,13 +179,14 @@ fn line_of_app(frame: &Frame) -> Option<&str> {
         Some(path) => path,
         None => below(&env::current_dir().ok()?)?,
     };
+    // `addr2line` may know the file but not the line.
     (!path.ends_with(":?") && !path.ends_with(":0")).then_some(path)
 }
 
-/// The most lines that are shown.
+/// The most lines of a backtrace that are shown.
 const SHOWN: usize = 12;
 
-/// Where the functions of apps are called, and what comes of a panic: nobody looks for these.
+/// The functions that call into apps, and those that handle a panic: they are not shown.
 const OUTERMOST: [&str; 2] = ["executive::run::worker::work", "kernel::start::"];
 const OF_PANICS: [&str; 7] = [
     "executive::text::backtrace::",
@@ -203,7 +206,7 @@ struct Call {
 }
 
 impl Call {
-    /// Reads the list of a line of kind `backtrace`; what is no call is left out.
+    /// Reads the list of a line of kind `backtrace`; malformed entries are left out.
     fn list(value: Option<&Value>) -> Vec<Call> {
         let texts = value.map_or(&[][..], Value::elements).iter();
         texts
@@ -222,10 +225,11 @@ impl Call {
 
     /// Returns an address within the call instruction.
     fn instruction(self) -> u64 {
+        // The return address may belong to the next line, or even to the next function.
         self.returns_to.saturating_sub(1)
     }
 
-    /// Returns the addresses whose names the chain needs.
+    /// Returns the addresses whose functions the chain needs.
     fn addresses(self) -> impl Iterator<Item = u64> {
         [Some(self.instruction()), self.callee]
             .into_iter()
@@ -233,24 +237,26 @@ impl Call {
     }
 }
 
-/// Tells the chain of calls that leads to `place`, or to the innermost call, a line each; nothing
-/// if no name is known.
+/// Describes the chain of calls that leads to `place`, or to the innermost call, in one line each;
+/// `None` if no name is known.
 fn tell(place: Option<u64>, calls: &[Call], frames: &BTreeMap<u64, Vec<Frame>>) -> Option<String> {
     let known = |address: u64| frames.get(&address).map_or(&[][..], Vec::as_slice);
     let mut lines: Vec<(String, usize)> = Vec::new();
     let chain = chain(place, calls, &known);
+    // A panic's own functions come first, and say nothing of its cause.
     let own = |frame: &&Frame| !OF_PANICS.iter().any(|of| frame.function.starts_with(of));
     let all = chain.into_iter().flat_map(known);
     let all = all.take_while(|frame| !OUTERMOST.iter().any(|of| frame.function.starts_with(of)));
     let all = all.skip_while(|frame| !own(frame));
     let mut all = all.filter(|frame| frame.function != "??").peekable();
     while let Some(frame) = all.next() {
-        // Of what the library calls within itself, the call that is not its own tells most.
+        // Of several library frames only the outermost is shown: the app called that one.
         if frame.is_of_library() && all.peek().is_some_and(|outer| outer.is_of_library()) {
             continue;
         }
         let line = format!("{}, {}", brief(&frame.function), frame.place());
         match lines.last_mut() {
+            // A recursion fills the list with one line, so it is counted.
             Some((last, times)) if *last == line => *times += 1,
             _ => lines.push((line, 1)),
         }
@@ -272,40 +278,43 @@ fn tell(place: Option<u64>, calls: &[Call], frames: &BTreeMap<u64, Vec<Frame>>) 
     Some(text)
 }
 
-/// Leaves out what types a function was made for: those are pages long.
+/// Removes generic arguments from a function's name: they may be pages long.
 fn brief(function: &str) -> String {
     let mut depth = 0;
     let mut brief = String::new();
     let mut before = ' ';
     for letter in function.chars() {
-        // An angle bracket after a name begins arguments; after anything else, it is a type's.
+        // `<` after a name opens arguments; elsewhere it opens a type such as `<A as B>`.
         depth += i32::from(letter == '<' && (depth > 0 || before.is_alphanumeric()));
         if depth == 0 {
             brief.push(letter);
         }
+        // The `>` of `->` closes nothing.
         depth -= i32::from(letter == '>' && depth > 0 && before != '-');
         before = letter;
     }
     brief
 }
 
-/// Returns addresses of the instructions that called one another, the innermost first.
+/// Returns the addresses of the call instructions, the innermost first.
 fn chain<'f>(
     place: Option<u64>,
     mut calls: &[Call],
     known: &impl Fn(u64) -> &'f [Frame],
 ) -> Vec<u64> {
-    // The last of an address' frames is the function that was really called.
+    // An address' last frame is the function that was really called; the others are inlined.
     let function = |address: u64| known(address).last().map(|frame| frame.function.as_str());
     let mut chain: Vec<u64> = place.into_iter().collect();
     loop {
         let inner = chain.last().and_then(|&address| function(address));
         let called = |call: &Call| inner.is_some() && call.callee.and_then(function) == inner;
+        // No call fits: it came through a pointer or a jump, so the next word is taken.
         let next = calls.iter().position(called).unwrap_or(0);
         let Some(call) = calls.get(next) else {
             return chain;
         };
         chain.push(call.instruction());
+        // Words further in were passed over as left over, and stay so.
         calls = &calls[next + 1..];
     }
 }
@@ -322,8 +331,8 @@ mod tests {
         format!("{{\"kind\":\"{kind}\",\"cpu\":0,\"place\":\"{place}\",\"message\":\"m\"}}")
     }
 
-    /// Returns where an address of this program is in its file: programs of the host
-    /// are loaded anywhere.
+    /// Returns the offset of an address of this program in its file: programs of the host are
+    /// loaded anywhere.
     fn in_file(address: usize) -> String {
         let program = std::env::current_exe().unwrap();
         let program = program.to_str().unwrap();
@@ -388,8 +397,8 @@ mod tests {
         assert_eq!(told(0x20_70e9), "0x2070e9 is interrupt_common");
     }
 
-    /// Addresses with what contains them, the innermost first. The worker (0x10) calls `app`
-    /// (0x20) by a pointer, which calls `deep` (0x30), within which `small` is inlined.
+    /// Addresses with the functions that contain them, the innermost first. The worker (0x10) calls
+    /// `app` (0x20) by a pointer, which calls `deep` (0x30), into which `small` is inlined.
     const IMAGE: &str = "10 executive::run::worker::work /w/worker.rs:1
 14 executive::run::worker::work /w/worker.rs:1
 20 app /w/app.rs:1
@@ -425,7 +434,7 @@ mod tests {
         let expected = "called, the innermost first:\n    small, /w/small.rs:7\n    \
                         deep, /w/deep.rs:9\n    app, /w/app.rs:5";
         assert_eq!(told.as_deref(), Some(expected));
-        // Without names nothing is told.
+        // Without names nothing is listed.
         assert_eq!(tell(Some(1), &calls, &BTreeMap::new()), None);
     }
 

@@ -1,10 +1,9 @@
-//! Whether KVM is of use here, and so in which mode a guest is booted.
+//! The probe for KVM, which decides the mode in which a guest is booted.
 //!
-//! The device `/dev/kvm` may exist and be of no use: no permission, no hardware
-//! behind it, or hardware that runs a guest of a few instructions and no kernel. So the
-//! image that is to be booted is booted first with the word `probe=on`, on the machine
-//! that it is to have: it then only shows that its cores come up, take interrupts and
-//! calculate (`kernel/src/start/probe.rs`).
+//! The device `/dev/kvm` may exist and not work: no permission, no hardware behind it, or hardware
+//! that runs a guest of a few instructions and no kernel. So the image is first booted with the
+//! word `probe=on`, on the machine that it is to have: it then only shows that its cores come up,
+//! take interrupts and calculate (`kernel/src/start/probe.rs`).
 //!
 //! Every command that boots takes its mode from [`choose`].
 
@@ -16,21 +15,22 @@ use crate::outcome::boot;
 use crate::qemu::{Ending, Loader, Mode, Qemu};
 use crate::system;
 
-/// How long the probe may take; where all is well it takes a tenth of this.
+/// The time limit of the probe; a working KVM takes a tenth of it.
 const LIMIT: Duration = Duration::from_secs(3);
 
-/// Settles the mode in which `image` is booted on `machine`: the one that the person has
-/// named; without one, KVM if it is of use and else `otherwise`, and the reason.
+/// Chooses the mode in which `image` is booted on `machine`: the mode that the person has named;
+/// without one, KVM if it works and else `otherwise`, with the reason.
 ///
 /// # Errors
 ///
-/// In words: the person has named KVM, and it is of no use.
+/// In words: the person has named KVM, and it does not work.
 pub fn choose(
     named: Option<Mode>,
     otherwise: Mode,
     machine: &Qemu,
     image: &Path,
 ) -> Result<(Mode, Option<String>), String> {
+    // Only KVM needs a probe; the emulator works everywhere.
     if let Some(mode) = named.filter(|mode| *mode != Mode::Kvm) {
         return Ok((mode, None));
     }
@@ -51,18 +51,18 @@ pub fn choose(
 ///
 /// # Errors
 ///
-/// Why KVM is of no use here, in words.
+/// The reason why KVM does not work here, in words.
 pub fn kvm(machine: &Qemu, image: &Path) -> Result<(), String> {
     let mut machine = machine.clone();
     machine.mode = Mode::Kvm;
     run(&machine, image, LIMIT)
 }
 
-/// Boots the probe on `machine`, for at most `limit`, without a firmware, which takes longer.
+/// Boots the probe on `machine`, for at most `limit`, without a firmware, which would take longer.
 ///
 /// # Errors
 ///
-/// What happened instead of success, in words.
+/// In words, how the probe failed.
 pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> {
     let qemu = Qemu {
         guest_words: "probe=on".into(),
@@ -76,16 +76,17 @@ pub fn run(machine: &Qemu, image: &Path, limit: Duration) -> Result<(), String> 
     };
     let log = system::new_log("probe")?;
     let outcome = boot(&qemu, image, &log, limit, |_| {});
-    // It is ours, and in the way of no one if it cannot be removed.
+    // The log is ours; one that cannot be removed harms nothing.
     let _ = fs::remove_file(&log);
     let outcome = outcome?;
     let Err(fault) = outcome.judge() else {
         return Ok(());
     };
+    // The guest itself has found a fault, so its words say more than QEMU's.
     if matches!(outcome.ending, Ending::Guest(_)) {
         return Err(fault.reason);
     }
-    // The first complaint is the cause, the others follow from it.
+    // The first complaint is the cause, and the others follow from it.
     let mut complaints = outcome.complaints.split("; ");
     let first = complaints.find(|line| !line.is_empty() && !line.contains("warning: "));
     let ending = outcome.ending;

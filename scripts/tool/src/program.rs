@@ -1,6 +1,7 @@
-//! A program of this computer that is run and judged as a guest is: an app on Linux.
+//! Runs an app as a Linux program of this computer and judges it like a guest.
 //!
-//! Its standard output is the log. Its exit code is one of two witnesses, as QEMU's status is.
+//! Its standard output is the log. The verdict in it and the exit code must agree, as a guest's
+//! verdict and QEMU's status must.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -24,7 +25,7 @@ pub struct Order<'a> {
     pub program: &'a Path,
     /// Its words.
     pub words: &'a [OsString],
-    /// Whether it reads our standard input; else it has none.
+    /// Whether it inherits our standard input; if not, its input is empty.
     pub is_live: bool,
     /// Whether it ends in order at SIGINT, and so is asked before it is killed.
     pub stops: bool,
@@ -43,7 +44,7 @@ pub fn run(order: &Order<'_>, show: &mut impl FnMut(&str)) -> Result<Outcome, St
     run_for(order, show, ExitStatus::code)
 }
 
-/// Works like [`run`], where `code` tells from the program's end the exit code of what it runs.
+/// Works like [`run`]; `code` derives the app's exit code from the end of the started program.
 ///
 /// # Errors
 ///
@@ -79,10 +80,12 @@ pub fn run_for(
         .map_err(|error| format!("cannot start `{}`: {error}", program.display()))?;
     let process = child.id();
     let mut ask = |why| {
+        // In our process group ctrl-C has reached it already; a second signal would end it at once.
         if is_apart || why != Asked::ByPerson {
             EndSignals::send(process);
         }
     };
+    // Without `stop` the limit kills the program at once, and ctrl-C is not caught.
     let stop: Option<&mut dyn FnMut(Asked)> = if stops { Some(&mut ask) } else { None };
     let followed = child.follow(limit, log, show, stop, |_| true)?;
     let mut outcome = Outcome {
@@ -104,6 +107,7 @@ pub fn run_for(
 
 fn ending_of(status: ExitStatus, code: Option<i32>, transcript: &Transcript) -> Ending {
     let has_verdict = transcript.of_kind("verdict").next().is_some();
+    // An exit code counts only with a verdict: a program may end with 0 and not have run the app.
     match code.filter(|_| has_verdict) {
         Some(0) => Ending::Guest(Status::Success),
         Some(1) => Ending::Guest(Status::Failure),

@@ -1,5 +1,5 @@
-//! Progress while something takes long: how far it is, and the time left; or that it goes
-//! on, if no one knows how far it is.
+//! Progress of long work: the amount done and the time left, or a sign of life if the total is
+//! unknown.
 
 use std::io::{Write, stderr};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -8,14 +8,14 @@ use std::time::{Duration, Instant};
 
 use crate::system;
 
-/// How long nothing is said, at most, where lines do not renew themselves.
+/// The longest time without a line, where lines do not renew themselves.
 pub const SILENCE: Duration = Duration::from_secs(5);
 
 /// Progress on standard error: one line that renews itself if that is a terminal, and
 /// otherwise a line whenever nothing was said for [`SILENCE`].
 #[derive(Debug)]
 pub struct Progress {
-    /// What is counted.
+    /// The name of the counted units, such as `files`.
     unit: &'static str,
     total: u64,
     since: Instant,
@@ -36,10 +36,10 @@ impl Progress {
         }
     }
 
-    /// Shows that `over` units are over.
+    /// Shows that `over` units are done.
     pub fn show(&mut self, over: u64) {
         let line = line(over, self.total, self.unit, self.since.elapsed());
-        // That no one reads it must not end the run.
+        // An error is ignored: a closed standard error must not end the run.
         if self.on_terminal {
             let _ = write!(stderr(), "\r\x1b[K{line}");
         } else if self.said.elapsed() >= SILENCE {
@@ -58,10 +58,11 @@ impl Progress {
 
 fn line(over: u64, total: u64, unit: &str, elapsed: Duration) -> String {
     let left = total.saturating_sub(over);
+    // No unit is done, so there is no rate to extrapolate from (and no divisor).
     if over == 0 {
         return format!("progress: 0 of {total} {unit}");
     }
-    // What is to come is taken to last as long as what is over.
+    // The rest is assumed to take as long per unit as the part that is done.
     let left_s = elapsed.as_secs().saturating_mul(left) / over;
     let left = in_words(left_s);
     format!("progress: {over} of {total} {unit}, {left} left")
@@ -74,18 +75,18 @@ fn in_words(seconds: u64) -> String {
     }
 }
 
-/// The longest time between two lines.
+/// The longest pause between two lines.
 const MOST: Duration = Duration::from_secs(60);
 
-/// Says on standard error what goes on, after [`SILENCE`] and then ever more seldom, until it is
-/// dropped.
+/// Repeats on standard error that work goes on, first after [`SILENCE`] and then with doubling
+/// pauses, until it is dropped.
 #[derive(Debug)]
 pub struct Lasting {
     _over: Sender<()>,
 }
 
 impl Lasting {
-    /// Begins what goes on, in words such as "building `drone`".
+    /// Starts the reports; `what` names the work, such as "building `drone`".
     #[must_use = "it ends when it is dropped"]
     pub fn new(what: &str) -> Lasting {
         let what = what.to_string();
@@ -98,6 +99,8 @@ impl Lasting {
         let (over, is_over) = channel::<()>();
         thread::spawn(move || {
             let (begun, mut pause) = (Instant::now(), first);
+            // Dropping the sender disconnects the channel, which ends the wait and the loop at
+            // once.
             while is_over.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
                 say(begun.elapsed());
                 pause = (pause * 2).min(MOST);
@@ -132,7 +135,7 @@ mod tests {
         let first = said.recv().expect("it lasts");
         assert!(first < said.recv().expect("it still lasts"));
         drop(lasting);
-        // The thread ends, and with it the way.
+        // The thread ends, and the channel with it.
         while said.recv().is_ok() {}
     }
 }

@@ -1,4 +1,4 @@
-//! The serial protocol, host side: the one reader of what a guest prints.
+//! The serial protocol on the host's side: the one reader of a guest's output.
 //!
 //! A *machine line* begins with `{` in column 0 and is one JSON object with a
 //! text member `kind`; every other line is for people. A [`Transcript`] is a
@@ -33,8 +33,11 @@ static MEMBERS: LazyLock<BTreeMap<&str, Vec<&str>>> = LazyLock::new(|| {
     let members = |text: &'static str| {
         let rows = text.lines();
         let cells = rows.filter_map(|row| row.strip_prefix("| `")?.split(" |").next());
+        // An optional member may be missing from a line, so its absence is no damage.
         let certain = cells.filter(|cell| !cell.ends_with(", optional"));
         certain
+            // One row may describe several members, each in backquotes: every second piece is a
+            // name.
             .flat_map(|cell| cell.split('`').step_by(2))
             .collect()
     };
@@ -46,7 +49,7 @@ static MEMBERS: LazyLock<BTreeMap<&str, Vec<&str>>> = LazyLock::new(|| {
 pub struct MachineLine {
     /// The line's number in the log, counted from 1.
     pub number: usize,
-    /// What it reports.
+    /// The kind of report, its member `kind`.
     pub kind: String,
     /// The whole object, `kind` included.
     pub value: Value,
@@ -62,19 +65,19 @@ impl MachineLine {
         self.value.at(&names).and_then(Value::as_u64)
     }
 
-    /// Returns the string member `name`.
+    /// Returns the string member `name`, if there is one.
     #[must_use]
     pub fn text_at(&self, name: &str) -> Option<&str> {
         self.value.get(name).and_then(Value::as_text)
     }
 }
 
-/// A line that looks like a machine line and is none.
+/// A line that begins like a machine line but is damaged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProtocolError {
     /// The line's number in the log, counted from 1.
     pub number: usize,
-    /// What is wrong with it.
+    /// The defect, in words.
     pub message: String,
 }
 
@@ -86,7 +89,7 @@ impl fmt::Display for ProtocolError {
 
 impl std::error::Error for ProtocolError {}
 
-/// What a guest says of its own run.
+/// A guest's own status of its run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// All is well.
@@ -100,7 +103,7 @@ pub enum Status {
 /// The last line of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Verdict {
-    /// What the guest says of its run.
+    /// The status that the guest states.
     pub status: Status,
     /// Why, in words; may be empty.
     pub reason: String,
@@ -118,7 +121,7 @@ pub struct Transcript {
 }
 
 impl Transcript {
-    /// Takes a whole log apart.
+    /// Reads a whole log.
     #[must_use]
     pub fn read(log: &str) -> Transcript {
         let mut transcript = Transcript::default();
@@ -150,12 +153,14 @@ impl Transcript {
     pub fn verdict(&self) -> Result<Verdict, String> {
         let mut verdicts = self.of_kind("verdict");
         let line = verdicts.next().ok_or("the guest printed no verdict line")?;
+        // A second verdict would let a guest take back a failure.
         if let Some(second) = verdicts.next() {
             return Err(format!(
                 "there are two verdict lines, {} and {}",
                 line.number, second.number
             ));
         }
+        // Lines after it show that the guest went on, so the verdict was not its end.
         if line.number != self.last_line {
             return Err(format!(
                 "the verdict stands in line {}, but the log goes on to line {}",
@@ -173,8 +178,8 @@ impl Transcript {
     }
 }
 
-/// Returns what the guest has written of a line. A terminal's line end is no part of it, nor
-/// is what a firmware has left there, which ends in a carriage return.
+/// Returns the part of a line that the guest has printed: without the line end, and without the
+/// remains of a firmware's output before the last carriage return.
 #[must_use]
 pub fn written(line: &str) -> &str {
     let line = line.trim_end_matches(['\r', '\n']);

@@ -1,25 +1,22 @@
-//! Starting QEMU: which machine, in which sense of time, with what image.
+//! Starting QEMU: the machine, the meaning of time, and the image.
 //!
-//! A [`Qemu`] is a description that becomes a command line; [`Qemu::start`]
-//! makes it a process ([`Running`]). The *mode* says what the guest's clock
-//! means, the *machine* which board QEMU imitates, the
-//! *loader* what brings the image into its memory: QEMU itself, or a firmware, with GRUB or
-//! without. Everything a guest could
-//! see of the host is fixed or left out (`-nodefaults`, no display, no
-//! network), so that in [`Mode::Deterministic`] two runs give the same bytes.
+//! A [`Qemu`] is a description that becomes a command line; [`Qemu::start`] makes it a process
+//! ([`Running`]). The *mode* says what the guest's clock means, the *machine* is the board that
+//! QEMU imitates, and the *loader* brings the image into memory: QEMU itself, or a firmware, with
+//! GRUB or without. Everything a guest could see of the host is fixed or left out (`-nodefaults`,
+//! no display, no network), so that in [`Mode::Deterministic`] two runs give the same bytes.
 //!
-//! Serial output goes to a file, for that loses nothing, whereas a slow pipe
-//! drops bytes. The guest ends its run by writing to the port of QEMU's
-//! `isa-debug-exit` device, see [`Ending`]. Input to the serial port comes from us by a pipe.
+//! Serial output goes to a file, which loses nothing, whereas a slow pipe drops bytes. The guest
+//! ends its run by writing to the port of QEMU's `isa-debug-exit` device, see [`Ending`]. Input to
+//! the serial port comes from us by a pipe.
 //!
-//! *Ending* is how the process went, seen from outside. A guest writes a byte
-//! `v` to port 0xf4, and QEMU's `isa-debug-exit` ends the process with status
-//! `(v << 1) | 1`: 33 for success, 35 for failure, 37 for a refused command
-//! line. No other status is a guest's own word.
+//! An [`Ending`] is the end of the process, seen from outside. A guest writes a byte `v` to port
+//! 0xf4, and QEMU's `isa-debug-exit` ends the process with status `(v << 1) | 1`: 33 for success,
+//! 35 for failure, 37 for a refused command line. No other status is a guest's own word.
 //!
-//! A QEMU started here does not outlive the tool, see [`crate::child`]. One whose guest ends in
-//! order at ctrl-C is no member of the terminal's process group, which ctrl-C would reach: we tell
-//! the guest, by its serial port.
+//! A QEMU started here does not outlive the tool, see [`crate::child`]. If its guest ends in order
+//! at ctrl-C, QEMU leaves the terminal's process group, so that ctrl-C does not reach it: we pass
+//! it on to the guest, by its serial port.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -50,9 +47,9 @@ pub const MOST_CORES: u64 = replay::lines::MOST_CORES as u64;
 /// The other end of a guest's second serial port.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Second {
-    /// Hand what is written to [`Running::input`] to this port; then the first one has none.
+    /// Forward the bytes written to [`Running::input`] to this port; then the first one has none.
     pub is_live: bool,
-    /// The file that gets what the guest sends.
+    /// The file for the bytes that the guest sends.
     pub output: Option<PathBuf>,
 }
 
@@ -75,11 +72,11 @@ impl Second {
 pub struct Qemu {
     /// The QEMU to use: a name on the `PATH`, or a path.
     pub program: PathBuf,
-    /// What time means.
+    /// The meaning of time.
     pub mode: Mode,
     /// The board.
     pub machine: Machine,
-    /// What brings the image into memory.
+    /// The way of the image into memory.
     pub loader: Loader,
     /// The number of processors.
     pub cores: u64,
@@ -89,17 +86,17 @@ pub struct Qemu {
     pub guest_words: String,
     /// A file to leave in the guest's memory.
     pub module: Option<PathBuf>,
-    /// Where the bytes go that the guest sends to QEMU's debug port; it has none otherwise.
+    /// The file for the bytes that the guest sends to QEMU's debug port; `None`: no such port.
     pub records: Option<PathBuf>,
-    /// Hand what is written to [`Running::input`] to the guest's serial port.
+    /// Forward the bytes written to [`Running::input`] to the guest's serial port.
     pub has_input: bool,
     /// Have the guest end in order before it is killed, by ctrl-C at its first serial port.
     pub stops: bool,
-    /// What the second serial port is connected to; `None`: there is none.
+    /// The connection of the second serial port; `None`: there is no such port.
     pub second: Option<Second>,
     /// Write the address of each instruction that is executed to [`Running::log`].
     pub logs_instructions: bool,
-    /// Wait for a debugger there, before the first instruction: what QEMU's `-gdb` takes.
+    /// Wait for a debugger before the first instruction, at this value of QEMU's `-gdb`.
     pub debugger: Option<OsString>,
 }
 
@@ -138,6 +135,7 @@ impl Qemu {
         arguments.extend(self.loading(image));
         if self.has_input || self.stops {
             // The log file gets every byte; QEMU's own output goes nowhere.
+            // `signal=off`: the byte of ctrl-C goes to the guest instead of ending QEMU.
             let port = file_value("stdio,id=console,signal=off,logfile=", serial);
             arguments.extend(["-chardev".into(), port]);
             arguments.extend(words("-serial chardev:console"));
@@ -154,13 +152,14 @@ impl Qemu {
             "-device isa-debug-exit,iobase=0xf4,iosize=0x04 -nodefaults -no-user-config \
              -display none -no-reboot",
         ));
+        // `-S` stops the processor before its first instruction.
         if let Some(device) = &self.debugger {
             arguments.extend(["-S".into(), "-gdb".into(), device.clone()]);
         }
         arguments
     }
 
-    /// Returns the arguments by which the image comes into memory, with words and module.
+    /// Returns the arguments that load the image, with its words and module.
     fn loading(&self, image: &Path) -> Vec<OsString> {
         if self.loader.needs_stick() {
             let drive = file_value("if=none,id=stick,format=raw,readonly=on,file=", image);
@@ -169,6 +168,7 @@ impl Qemu {
             if self.loader.is_by_uefi() {
                 arguments.extend(["-bios", OVMF_FILE].map(OsString::from));
             }
+            // Words and module are on the stick already.
             return arguments;
         }
         let mut arguments: Vec<OsString> = vec!["-kernel".into(), image.into()];
@@ -219,8 +219,8 @@ impl Qemu {
     }
 }
 
-/// Makes QEMU translate, and so log, each instruction by itself. From version 8.1 on
-/// that is an option of the accelerator.
+/// Makes QEMU translate, and so log, each instruction by itself. Since version 8.1 that is an
+/// option of the accelerator.
 fn log_instructions(program: &Path, arguments: &mut Vec<OsString>) {
     let said = Command::new(program).arg("--version").output();
     let said = said.map_or_else(|_| Vec::new(), |output| output.stdout);
@@ -242,7 +242,7 @@ pub(crate) fn words(text: &str) -> Vec<OsString> {
     text.split_whitespace().map(OsString::from).collect()
 }
 
-/// Returns a value that ends in a file's name. A comma would end the name in QEMU's syntax unless
+/// Returns a value that ends in a file's name. QEMU's syntax ends the name at a comma unless it is
 /// doubled.
 pub(crate) fn file_value(before: &str, path: &Path) -> OsString {
     let parts = path.as_os_str().as_bytes().split(|byte| *byte == b',');
@@ -250,10 +250,10 @@ pub(crate) fn file_value(before: &str, path: &Path) -> OsString {
     OsString::from_vec([before.as_bytes(), &name].concat())
 }
 
-/// Where Debian's package `ovmf` has its firmware.
+/// The path of the firmware in Debian's package `ovmf`.
 pub const OVMF_FILE: &str = "/usr/share/ovmf/OVMF.fd";
 
-/// Makes an enumeration each of whose choices has a name, by which it is written and read.
+/// Makes an enumeration whose variants are written and read by names.
 macro_rules! named {
     ($(#[$about:meta])* $kind:ident {
         $($(#[$what:meta])* $choice:ident = $name:literal,)*
@@ -307,7 +307,7 @@ named! {
 }
 
 impl Mode {
-    /// Says in one sentence what a time printed in this mode is worth.
+    /// Says in one sentence how far times in this mode can be trusted.
     #[must_use]
     pub fn meaning(self) -> &'static str {
         match self {
@@ -328,7 +328,7 @@ impl Mode {
     pub(crate) fn arguments(self) -> &'static str {
         match self {
             Mode::Kvm => "-accel kvm -cpu host",
-            // The sleep=off makes an idle guest jump to its next timer.
+            // With `sleep=off` an idle guest jumps to its next timer.
             Mode::Deterministic => {
                 "-accel tcg -icount shift=0,sleep=off -cpu max -seed 1 \
                  -rtc base=2000-01-01,clock=vm"
@@ -363,13 +363,13 @@ named! {
 }
 
 impl Loader {
-    /// Reports whether it loads from a stick, by the firmware of a PC.
+    /// Reports whether the image is on a stick, which a PC's firmware reads.
     #[must_use]
     pub fn needs_stick(self) -> bool {
         self != Loader::Pvh
     }
 
-    /// Reports whether the words come by GRUB.
+    /// Reports whether GRUB passes the words on.
     #[must_use]
     pub fn is_grub(self) -> bool {
         matches!(self, Loader::Bios | Loader::Uefi)
@@ -381,7 +381,7 @@ impl Loader {
         matches!(self, Loader::Uefi | Loader::Efi)
     }
 
-    /// Returns the least memory in MiB with which it has been seen to come to the image.
+    /// Returns the least memory in MiB with which the loader has been seen to reach the image.
     #[must_use]
     pub fn least_memory_mib(self) -> u64 {
         match self {
@@ -391,14 +391,14 @@ impl Loader {
     }
 }
 
-/// The most that a guest may print; beyond it something prints without end.
+/// The most bytes that a guest may print; beyond that it is taken to print without end.
 const MOST_SERIAL_BYTES: u64 = 64 << 20;
 
 /// The byte that ends a guest's run in order (`console=stop`): ctrl-C on a serial line.
 const CTRL_C: &[u8] = &[3];
 
-/// What QEMU says when KVM cannot run the guest any further. It then keeps the guest
-/// paused for ever, and none of its options makes it end.
+/// QEMU's messages when KVM cannot run the guest any further. QEMU then keeps the guest paused for
+/// ever, and none of its options makes it end.
 const KVM_FAILURES: [&str; 4] = [
     "KVM internal error",
     "KVM: entry failed",
@@ -428,7 +428,7 @@ pub enum Ending {
     KvmFailed,
     /// It printed more than a run may and was killed.
     TooMuchOutput,
-    /// It was no QEMU but a program of this computer, and ended as these words say.
+    /// It was no QEMU but a program of this computer; the words describe its end.
     Program(String),
 }
 
@@ -468,7 +468,7 @@ pub struct Running {
     child: Child,
     serial: PathBuf,
     complaints: Temporary,
-    /// The way by which the guest is asked to end, if it listens.
+    /// The serial port through which the guest is asked to end, if it listens.
     stop: Option<File>,
     asked: Option<Asked>,
 }
@@ -486,6 +486,7 @@ impl Running {
             let path = path.display().to_string();
             move |error| format!("cannot write `{path}`: {error}; name a file elsewhere")
         };
+        // Created before QEMU opens it, so that a reader finds a file from the start.
         File::create(serial).map_err(file_error(serial))?;
         let mut complaints = serial.as_os_str().to_owned();
         complaints.push(OsString::from(".qemu"));
@@ -498,6 +499,7 @@ impl Running {
         };
         command.stdin(piped(has_input)).stdout(piped(has_log));
         command.stderr(errors);
+        // Out of the terminal's process group: ctrl-C is for us, and we ask the guest.
         if stops {
             command.process_group(0);
         }
@@ -526,12 +528,13 @@ impl Running {
         let complaints = self.complaints.path();
         let mut kvm_failed = false;
         let is_well = |bytes| {
+            // A short file, read at each look: QEMU does not end by itself after such a message.
             let said = fs::read(complaints).unwrap_or_default();
             let said = String::from_utf8_lossy(&said);
             kvm_failed = KVM_FAILURES.iter().any(|failure| said.contains(failure));
             !kvm_failed && bytes <= MOST_SERIAL_BYTES
         };
-        // One that has just ended hears nothing any more.
+        // The request may fail: a guest that has just ended does not listen.
         let stop = self.stop.take();
         let mut ask = |_| drop(stop.as_ref().map(|mut stop| stop.write_all(CTRL_C)));
         let ask: Option<&mut dyn FnMut(Asked)> = if stop.is_some() { Some(&mut ask) } else { None };
@@ -550,13 +553,13 @@ impl Running {
         Ok((ending, followed.text))
     }
 
-    /// Returns why the guest was asked to end, if it was.
+    /// Returns the reason why the guest was asked to end, if it was.
     #[must_use]
     pub fn asked(&self) -> Option<Asked> {
         self.asked
     }
 
-    /// Takes the way to the guest's serial port, if it has one and it was not taken.
+    /// Takes the input of the guest's serial port, if it has one and it was not taken.
     pub fn input(&mut self) -> Option<ChildStdin> {
         self.child.input()
     }
@@ -572,7 +575,7 @@ impl Running {
         self.child.elapsed()
     }
 
-    /// Returns what QEMU itself complained of, on one line; mostly empty.
+    /// Returns QEMU's own error output on one line; mostly empty.
     #[must_use]
     pub fn complaints(&self) -> String {
         let text = fs::read(self.complaints.path()).unwrap_or_default();
@@ -605,7 +608,7 @@ mod tests {
         assert_eq!(Mode::from_name("fast"), None);
     }
 
-    /// Holds QEMU's words for a guest to those that are in it, and those that are not.
+    /// Asserts which words are among QEMU's arguments, and which are not.
     fn has(qemu: &Qemu, parts: &[&str], others: &[&str]) {
         let words = qemu.arguments(Path::new("image"), Path::new("a,b.log"));
         let line = words.join(OsStr::new(" ")).into_string().unwrap();

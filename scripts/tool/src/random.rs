@@ -1,13 +1,13 @@
-//! Sets of DAGs that are drawn, to be analysed.
+//! Random sets of DAGs for the analysis.
 
 use std::ops::RangeInclusive;
 
 use common::random::Random;
 use sched_dag::{DagSpec, Priority, SubtaskSpec};
 
-/// Draws up to 4 DAGs for clusters of so many cores, which they take in turn, at least one for
-/// each: from light to full load, deadlines below, at and beyond the period, priorities by DAG or
-/// by subtask.
+/// Draws up to 4 DAGs for clusters of `clusters` cores, which they take in turn, at least one each:
+/// from light to full load, deadlines below, at and beyond the period, priorities by DAG or by
+/// subtask.
 pub(crate) fn set(random: &mut Random, unit_ns: u64, clusters: &[u32]) -> Vec<DagSpec> {
     let count = random.within(clusters.len()..=4);
     let (overlaps, by_subtask) = (random.once_in(3), random.once_in(4));
@@ -26,21 +26,24 @@ pub(crate) fn set(random: &mut Random, unit_ns: u64, clusters: &[u32]) -> Vec<Da
     dags.collect()
 }
 
-/// Draws a DAG of up to 8 subtasks, which take 1 to 9 units or 6 times as long. Its period is
-/// that in which `cores` cores do `share` quarters of its work, or a longer one; its deadline is
-/// at most the period, or beyond it if jobs may overlap.
+/// Draws a DAG of up to 8 subtasks of 1 to 9 units, or 6 times as long. In its shortest period
+/// `cores` cores do `share` quarters of its work; its deadline is at most the period, or may exceed
+/// it if jobs overlap.
 fn dag(random: &mut Random, unit_ns: u64, cores: u64, share: u64, overlaps: bool) -> DagSpec {
-    // Some DAGs have longer subtasks, which others may have to wait for.
+    // Some DAGs have long subtasks, which block others.
     let factor = random.one_of(&[1, 1, 6]);
     let spec = graph(random, 1..=8, 2..=7, unit_ns..=9 * unit_ns, factor);
     let wcets_ns = || spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
     let (volume_ns, longest_ns): (u64, _) = (wcets_ns().sum(), wcets_ns().max().unwrap_or(1));
     let period_ns = (volume_ns * share).div_ceil(cores * 4) + random.within(0..=10 * unit_ns);
     let (period_ns, deadline_ns) = if overlaps {
+        // With overlapping jobs the period may be shorter than a job, but not than its longest
+        // subtask.
         let period_ns = period_ns.max(longest_ns);
         let more_ns = random.within(0..=period_ns);
         (period_ns, period_ns * random.within(1..=4) + more_ns)
     } else {
+        // Without overlap a job needs room for its share of the work and its longest subtask.
         let period_ns = period_ns.max(volume_ns / cores + longest_ns);
         (period_ns, period_ns - random.within(0..=period_ns / 4))
     };
@@ -52,8 +55,8 @@ fn dag(random: &mut Random, unit_ns: u64, cores: u64, share: u64, overlaps: bool
     }
 }
 
-/// Draws a graph of so many subtasks, whose WCETs are so many units, and edges from subtasks to
-/// later ones, of which once in `once_in` times one is there.
+/// Draws a graph with a number of subtasks and WCETs, in units, from these ranges. An edge leads
+/// from a subtask to a later one with probability 1 / `once_in`.
 pub(crate) fn graph(
     random: &mut Random,
     subtasks: RangeInclusive<usize>,

@@ -1,9 +1,9 @@
 //! The subcommand `soak`: random DAG sets for a long time, everything checked.
 //!
 //! A *round* is a random scenario (`tests/scenarios/src/random.rs`). The guest of the boot tests
-//! draws rounds, runs each twice, and checks after each run what can be checked there: rules,
-//! accounts, allocations, memory, stacks. Here each round is a boot, a few at a time,
-//! and the trace of each run is held against the same rules, from other evidence.
+//! draws a round, runs it twice, and checks after each run what it can: rules, accounts,
+//! allocations, memory, stacks. Here each round is a boot, several at a time, and the trace of each
+//! run is judged by the same rules, from other evidence.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -88,7 +88,7 @@ pub fn soak(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Makes the plan that the options ask for.
+/// Makes the plan from the options.
 fn plan(options: &Parsed) -> Plan {
     let plan = match options.is_given("short") {
         true => Plan::SHORT,
@@ -97,13 +97,14 @@ fn plan(options: &Parsed) -> Plan {
     let number = |name, usual| options.number(name).unwrap_or(usual);
     let mode = options.text("mode").and_then(Mode::from_name);
     let mode = mode.unwrap_or(plan.mode);
-    // Some decisions and a switch, and where time is real, what the host does meanwhile.
+    // The deterministic bound covers some decisions and a switch; where time is real the host's
+    // noise comes on top.
     let usual_us = match mode {
         Mode::Deterministic => plan.bound_ns / 1000,
         Mode::Kvm => 10_000,
         Mode::Threads => 1_000_000,
     };
-    // Where time is virtual, guests do not notice each other.
+    // In virtual time guests do not disturb each other, so they may share the host.
     let at_once = match mode {
         Mode::Deterministic => std::thread::available_parallelism().map_or(1, usize::from),
         Mode::Kvm | Mode::Threads => 1,
@@ -148,46 +149,46 @@ const GUEST: &str = "guest-tests";
 /// The guest's memory, up to a quarter of which is for journals.
 const MEMORY_MIB: u64 = 256;
 
-/// How often a round runs.
+/// The number of runs of a round.
 const RUNS_A_ROUND: u64 = 2;
 
-/// How many breaches of a run are told in words.
+/// The number of breaches of a run that are shown.
 const SHOWN: usize = 5;
 
-/// The rounds to run, and on what.
+/// The rounds to run, and their settings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// The numbers of the rounds.
     pub rounds: Range<u64>,
-    /// The guest time in which a run of a round releases jobs, in milliseconds.
+    /// The guest time in which each run releases jobs, in milliseconds.
     pub round_ms: u64,
-    /// The seed of all that is random.
+    /// The seed of all random draws.
     pub seed: u64,
     /// The cores of each guest.
     pub cores: u64,
     /// The meaning of time.
     pub mode: Mode,
-    /// For how long an instance may wait for what it is owed.
+    /// The longest time for which an instance may wait for a core that the rules owe it.
     pub bound_ns: u64,
-    /// How many guests run at the same time.
+    /// The number of guests that run at the same time.
     pub side_by_side: usize,
 }
 
-/// What a soak run has come to.
+/// The result of a soak run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
-    /// How many events there were, by what happened.
+    /// The number of events of each kind.
     pub events: BTreeMap<String, u64>,
-    /// How many DAGs had which combination of policy, overrun policy and division of the cores
-    /// with a fault, a restart and a pause.
+    /// The number of DAGs with each combination of policy, overrun policy, division of the cores,
+    /// fault, restart and pause.
     pub dags: BTreeMap<String, u64>,
-    /// The longest time for which an instance waited that should have run.
+    /// The longest time for which an instance waited although it should have run.
     pub longest_wait_ns: u64,
-    /// A line for each thing that is wrong, with the command that shows it again.
+    /// A line for each failure, with the command that repeats it.
     pub failures: Vec<String>,
-    /// The rounds in which nothing is wrong.
+    /// The rounds without a failure.
     pub passed: u64,
-    /// The rounds in which something is.
+    /// The rounds with one.
     pub failed: u64,
 }
 
@@ -203,7 +204,7 @@ impl Plan {
         side_by_side: 1,
     };
 
-    /// Some seconds, for a test.
+    /// The rounds of the short form: some seconds, for a test.
     pub const SHORT: Plan = Plan {
         rounds: 0..16,
         round_ms: 500,
@@ -228,8 +229,8 @@ impl Plan {
     }
 }
 
-/// Runs a plan to its end, and calls `show` with the rounds that are over: after each
-/// boot, and now and then.
+/// Runs a plan to its end, and calls `show` with the number of finished rounds: after each boot,
+/// and at least every [`SILENCE`].
 ///
 /// # Errors
 ///
@@ -252,18 +253,20 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
             let (send, next, qemu, path) = (send.clone(), &next, &qemu, &image.path);
             scope.spawn(move || {
                 loop {
+                    // Each worker takes the next round, so that none waits for a slow one.
                     let round = next.fetch_add(1, Ordering::Relaxed);
                     if round >= plan.rounds.end {
                         return;
                     }
                     let booted = boot(plan, qemu, path, round);
-                    // Nobody listens any more once another guest did not start.
+                    // The receiver is gone once another guest did not start.
                     if send.send((round, booted)).is_err() {
                         return;
                     }
                 }
             });
         }
+        // The last sender: the loop below ends when all workers have dropped theirs.
         drop(send);
         loop {
             match receive.recv_timeout(SILENCE) {
@@ -277,7 +280,7 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
 }
 
 fn boot(plan: &Plan, qemu: &Qemu, image: &Path, round: u64) -> Result<Outcome, String> {
-    // In real time the host's noise would exceed budgets that nobody asked for.
+    // In real time the host's noise would exceed budgets, and rounds would fail.
     let budget_factor = match plan.mode {
         Mode::Deterministic => 10,
         Mode::Kvm | Mode::Threads => 0,
@@ -290,18 +293,19 @@ fn boot(plan: &Plan, qemu: &Qemu, image: &Path, round: u64) -> Result<Outcome, S
         ),
         ..qemu.clone()
     };
-    // The guest's own time, and far more for its traces, which go through a serial line.
+    // The guest's own time, and far more for its traces, which pass a serial line.
     let guest_time = Duration::from_millis(plan.round_ms.saturating_mul(RUNS_A_ROUND));
     let limit = Duration::from_secs(60) + guest_time.saturating_mul(30);
     outcome::boot(&qemu, image, &system::new_log("soak")?, limit, |_| {})
 }
 
 impl Report {
-    /// Judges a round and removes its log, unless something is wrong.
+    /// Judges a round, and removes its log if nothing is wrong.
     fn take(&mut self, plan: &Plan, round: u64, outcome: &Outcome) {
         let mut wrong = Vec::from_iter(outcome.judge().err().map(|fault| fault.reason));
         let lines: Vec<_> = outcome.transcript.of_kind("scenario").collect();
         match read(&outcome.serial) {
+            // Two runs, each with its line and its trace; fewer mean that the guest died.
             Ok(runs) if [lines.len() as u64, runs.len() as u64] == [RUNS_A_ROUND; 2] => {
                 for (line, run) in lines.into_iter().zip(&runs) {
                     wrong.extend(self.judge(round, line, run, plan.bound_ns));
@@ -315,6 +319,7 @@ impl Report {
             let _ = fs::remove_file(&outcome.log);
             return;
         }
+        // The log stays: it is the evidence.
         self.failed += 1;
         wrong.push(format!("the serial log is {}", outcome.log.display()));
         wrong.push(format!("again by: {}", plan.command(round)));
@@ -322,7 +327,7 @@ impl Report {
         self.failures.extend(wrong);
     }
 
-    /// Judges a run by what the guest says of it and by its trace; returns what is wrong.
+    /// Judges a run by the guest's own line and by its trace; returns the failures.
     fn judge(&mut self, round: u64, line: &MachineLine, run: &Run, bound_ns: u64) -> Vec<String> {
         let title = line.text_at("title").unwrap_or_default();
         let mut wrong = Vec::new();
@@ -330,6 +335,7 @@ impl Report {
             Some("") if title.starts_with(&format!("round {round}: ")) => {}
             _ => wrong.push(line.text.clone()),
         }
+        // Without its first events a trace proves too little.
         if run.lost > 0 || !run.complete {
             let lost = run.lost;
             wrong.push(format!(
@@ -354,7 +360,7 @@ impl Report {
     }
 }
 
-/// Says under what a DAG has run, and what has happened to it.
+/// Describes the settings under which a DAG ran, and the incidents of its run.
 fn fate(run: &Run, dag: DagId) -> String {
     let (policy, overrun) = (run.options.policy, run.task_set.dag(dag).overrun());
     let cores = match run.task_set.is_divided() {

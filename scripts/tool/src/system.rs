@@ -1,5 +1,4 @@
-//! What the tool needs to know of the system it runs on: which programs are
-//! there, where the workspace lies, and where logs go.
+//! The system that the tool runs on: its programs, the workspace's root, and the folder for logs.
 
 use std::env;
 use std::ffi::OsStr;
@@ -14,8 +13,8 @@ use std::time::Duration;
 
 use crate::json::{self, Value};
 
-/// Returns the root of the workspace: as `scripts/tool/start` says, or else where this tool
-/// was built, which is another place once the workspace has been moved.
+/// Returns the root of the workspace: as `scripts/tool/start` says, or else where this tool was
+/// built, which is wrong once the workspace has been moved.
 #[must_use]
 pub fn workspace() -> &'static Path {
     static ROOT: OnceLock<PathBuf> = OnceLock::new();
@@ -49,14 +48,15 @@ pub fn cargo() -> Command {
     command
 }
 
-/// Runs cargo, whose errors go to standard error as they come, and returns the messages that it
-/// prints as JSON, and why it failed if it did.
+/// Runs cargo, whose errors go to standard error as they come. Returns its JSON messages, and an
+/// error if it failed.
 pub(crate) fn messages_of(cargo: &mut Command) -> (Vec<Value>, Result<(), String>) {
     let output = match cargo.stdin(Stdio::null()).stderr(Stdio::inherit()).output() {
         Ok(output) => output,
         Err(error) => return (Vec::new(), Err(format!("cannot start cargo: {error}"))),
     };
     let said = String::from_utf8_lossy(&output.stdout);
+    // Lines that are no JSON are not messages of cargo's.
     let messages = said.lines().filter_map(|line| json::parse(line).ok());
     let ended = match output.status.success() {
         true => Ok(()),
@@ -65,11 +65,11 @@ pub(crate) fn messages_of(cargo: &mut Command) -> (Vec<Value>, Result<(), String
     (messages.collect(), ended)
 }
 
-/// Runs a command to its end, and returns what it has printed.
+/// Runs a command to its end, and returns its standard output.
 ///
 /// # Errors
 ///
-/// In words, with the program and the last lines that it has complained by.
+/// In words, with the program and the last lines of its error output.
 pub(crate) fn run(command: &mut Command) -> Result<String, String> {
     let name = command.get_program().display().to_string();
     let output = command.stdin(Stdio::null()).output();
@@ -89,8 +89,7 @@ pub(crate) fn last_lines(said: &[u8]) -> String {
     lines[lines.len().saturating_sub(LINES)..].join("\n")
 }
 
-/// Returns where a program lies: a path that is one itself, or a name found
-/// on the `PATH`.
+/// Returns the path of a program: the path itself, or a name found on the `PATH`.
 #[must_use]
 pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
     let name = name.as_ref();
@@ -102,8 +101,8 @@ pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
     candidates.into_iter().find(|file| is_program(file))
 }
 
-/// Returns all files below a folder but the generated and hidden ones, sorted; `enters` says for
-/// each folder whether to look into it.
+/// Returns all files below a folder but the generated and hidden ones, sorted; `enters` decides for
+/// each folder whether to descend.
 pub(crate) fn files_below(root: &Path, enters: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![root.to_path_buf()];
@@ -130,7 +129,7 @@ fn is_program(file: &Path) -> bool {
     fs::metadata(file).is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
 }
 
-/// Says how busy the host is, and what to do about it: for what did not end in time.
+/// Describes how busy the host is, and the remedy: for a run that exceeded its time.
 #[must_use]
 pub fn host_load() -> String {
     let averages = fs::read_to_string("/proc/loadavg").unwrap_or_default();
@@ -153,23 +152,24 @@ pub fn new_log(name: &str) -> Result<PathBuf, String> {
     fs::create_dir_all(&folder)
         .map_err(|error| format!("cannot make the folder `{}`: {error}", folder.display()))?;
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    // Once in each process, at its first log.
     if number == 0 {
         clear(&folder);
     }
     Ok(folder.join(format!("{name}-{}-{number}.log", std::process::id())))
 }
 
-/// How long what is in the folder for logs is kept: longer than any run lasts.
+/// The time for which files in the folder for logs are kept: longer than any run lasts.
 const KEPT: Duration = Duration::from_secs(7 * 86_400);
 
-/// Removes old files: logs of guests that failed, which a person has read by now, and what
-/// processes that were ended from outside have left.
+/// Removes old files: logs of guests that failed, which a person has read by now, and files of
+/// processes that were killed.
 fn clear(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let changed = entry.metadata().and_then(|data| data.modified());
         let age = changed.ok().and_then(|changed| changed.elapsed().ok());
         if age > Some(KEPT) {
-            // It is ours, and in the way of no one if it cannot be removed.
+            // The file is ours; one that cannot be removed harms nothing.
             let _ = fs::remove_file(entry.path());
         }
     }

@@ -2,9 +2,9 @@
 //!
 //! It prints a given text on the first serial port, then ends QEMU with a
 //! given byte or halts for good. It needs no compiler and no kernel, so it
-//! answers two questions by themselves: does virtualization truly work here
-//! (the device file may exist and be of no use), and does the tool's own way
-//! of starting, reading and ending QEMU work.
+//! given byte or halts for good. It needs no compiler and no kernel, so it answers two questions by
+//! itself: whether virtualization truly works here (the device file may exist and not work), and
+//! whether the tool's own way of starting, reading and ending QEMU works.
 //!
 //! The image is an ELF file with the note that makes QEMU's `-kernel` enter
 //! it by PVH: 32-bit protected mode, flat segments, at the address in the
@@ -31,7 +31,7 @@ pub enum TinyEnd {
     Never,
 }
 
-/// Returns the image of a guest that prints `text` and ends so.
+/// Returns the image of a guest that prints `text` and then ends as `end` says.
 ///
 /// # Panics
 ///

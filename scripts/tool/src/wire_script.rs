@@ -1,4 +1,4 @@
-//! Bytes with their times, as a file for `run --input` has them.
+//! Bytes with their times, in the form of a file for `run --input`.
 //!
 //! Each line is a time of the run and bytes, as text in quotation marks or as hexadecimal pairs:
 //!
@@ -9,8 +9,8 @@
 //! ```
 //!
 //! In quotation marks `\n`, `\r`, `\t`, `\0`, `\"` and `\\` stand for bytes, and `\x` with two
-//! hexadecimal digits for any. What begins with `#`, and an empty line, is nothing. Times do not
-//! go back. The guest gets entries: a time in nanoseconds, a length, and the bytes.
+//! hexadecimal digits for any byte. Lines that begin with `#`, and empty lines, are ignored. Times
+//! must not decrease. The guest gets entries: a time in nanoseconds, a length, and the bytes.
 
 use dag_file::time::parse_ns;
 use replay::shown::visible;
@@ -25,7 +25,7 @@ pub type Entry = (u64, Vec<u8>);
 ///
 /// # Errors
 ///
-/// In words that begin with the number of the line: what is wrong, and what would be right.
+/// In words that begin with the number of the line: the fault and the remedy.
 pub fn read(text: &str) -> Result<Vec<Entry>, String> {
     let mut entries: Vec<Entry> = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
@@ -34,6 +34,7 @@ pub fn read(text: &str) -> Result<Vec<Entry>, String> {
             continue;
         }
         let entry = entry(line).map_err(|why| format!("{number}: {why}"))?;
+        // The guest delivers them in order, so an earlier time could not be met.
         if entries.last().is_some_and(|last| last.0 > entry.0) {
             return Err(format!(
                 "{number}: this is before the line above; put the lines in the order of their times"
@@ -64,7 +65,7 @@ fn entry(line: &str) -> Result<Entry, String> {
     }
 }
 
-/// Reads what stands behind a quotation mark, up to the next.
+/// Reads the text after a quotation mark, up to the closing one.
 fn unescaped(text: &str) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     let mut rest = text.chars();
@@ -122,6 +123,7 @@ fn pair(digits: &str) -> Result<u8, String> {
 pub fn for_guest(entries: &[Entry]) -> Vec<u8> {
     let mut script = Vec::new();
     for (at_ns, bytes) in entries {
+        // No entry is longer than 1024 bytes, see `MOST_BYTES`.
         let length = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
         script.extend(at_ns.to_le_bytes());
         script.extend(length.to_le_bytes());
@@ -151,7 +153,7 @@ mod tests {
         assert_eq!(script, b"\x00\xca\x9a\x3b\0\0\0\0\x02\0g\n");
     }
 
-    /// What is refused, a `/` ending a line, and why.
+    /// Texts that are refused, with `/` for a line's end, and the reasons.
     const REFUSED: &str = r#"5 "a" | 1: `5` has no unit; append one of ns, us, ms and s
 # a/soon 0a | 2: `soon` is no time
 5ms | 1: there are no bytes; give a text

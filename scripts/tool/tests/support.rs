@@ -1,6 +1,6 @@
 //! Calling the tool as a person does.
 //!
-//! Command lines that must be refused are tables: a row is the line, ` | `, and what is said.
+//! Command lines that must be refused are tables: a row is the line, ` | `, and the message.
 
 #![allow(dead_code, reason = "each program uses a part of this")]
 
@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-/// What a call has come to.
+/// The result of a call.
 pub(crate) struct Called {
     pub(crate) code: Option<i32>,
     pub(crate) out: String,
@@ -49,7 +49,7 @@ pub(crate) fn call<W: AsRef<OsStr>>(folder: &Path, words: impl IntoIterator<Item
     Called::of(output.expect("the tool can be started"))
 }
 
-/// Calls the tool, which must succeed, and returns what it prints.
+/// Calls the tool, which must succeed, and returns its output.
 pub(crate) fn succeed(folder: &Path, line: &str) -> String {
     let called = call(folder, line.split(' '));
     let complaint = called.complaint;
@@ -70,8 +70,8 @@ pub(crate) fn refusal<W: AsRef<OsStr>>(
     said.trim_end().into()
 }
 
-/// Asserts that each row's command line is refused: with these words in what is said, which are all
-/// of it if they begin with the command's name.
+/// Asserts that each row's command line is refused with the words of the row. Words that begin with
+/// the command's name are the whole message.
 pub(crate) fn assert_refused(folder: &Path, rows: &str) {
     for row in rows.lines().filter(|row| !row.is_empty()) {
         let (line, words) = row.split_once(" | ").expect(row);

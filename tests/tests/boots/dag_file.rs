@@ -279,7 +279,7 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
 /// The README's picture, by the commands that stand below it.
 #[test]
 fn the_readmes_picture_is_what_its_commands_draw() {
-    let shown = blocks(&page("README.md")).into_iter();
+    let mut shown = blocks(&page("README.md")).into_iter();
     let shown = shown.find(|block| block.text.contains("--svg"));
     let trace = system::new_log("picture").expect("a folder for logs");
     let trace = trace.with_extension("trace");

@@ -1,18 +1,17 @@
-//! How many random sets of DAGs are proven, by the load that they are.
+//! The share of random sets of DAGs that are proven, by load.
 //!
-//! For each number of cores and each load, from a tenth of the cores to all of them, the
-//! same random sets are analysed twice: by the commit's answer, and by the forms that it
-//! had before the multi-path bound (those of the oracle, with the width refinement, and the
-//! utilisation tests, which both have). Nothing is measured in time, so the table is the
-//! same on every host.
+//! For each number of cores and each load, from a tenth of the cores to all of them, the same
+//! random sets are analysed twice: by the commit's answer, and by the forms that it had before the
+//! multi-path bound (those of the oracle, with the width refinement, and the utilisation tests,
+//! which both have). No time is measured, so the table is the same on every host.
 //!
 //! Two more tables follow: small sets with short deadlines, where the multi-path bound gains
 //! most, and bounds of Kasahara's task graphs, alone on their cores, over Graham's.
 //!
 //! Sizes and cores of small sets are those of the random test that came with the proof of the
-//! multi-path bound, which counted 91,351 sets by it and 47,638 by Melani's form with the width
-//! under fixed priorities, 53,230 and 30,335 under EDF. How that test drew WCETs, edges, periods
-//! and deadlines is not known, so the ratios can be compared and the counts cannot.
+//! multi-path bound. It counted 91,351 sets by that bound and 47,638 by Melani's form with the
+//! width under fixed priorities, 53,230 and 30,335 under EDF. How it drew WCETs, edges, periods and
+//! deadlines is unknown, so the ratios can be compared, but not the counts.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -66,7 +65,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     by_plan(&COMMAND, words, plan, |(cores, sets)| measure(cores, *sets))
 }
 
-/// Counts and prints; returns whether all that was proven still is.
+/// Counts and prints; an error if a set that was proven before is not now.
 fn measure(cores: &[u32], count: u64) -> Result<bool, String> {
     let of_cores = |&cores: &u32| by_load(cores, count, SEED);
     let points: Vec<Point> = cores.iter().flat_map(of_cores).collect();
@@ -80,7 +79,7 @@ fn measure(cores: &[u32], count: u64) -> Result<bool, String> {
     }
 }
 
-/// Returns what any graphs are committed and analysed with.
+/// Returns the options and settings for any graphs.
 fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
     let options = CommitOptions::new(policy, cores);
     let settings = AnalysisSettings {
@@ -95,20 +94,20 @@ fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
     )
 }
 
-/// The policies, and what people call them.
+/// The policies, with their usual names.
 const POLICIES: [(Policy, &str); 2] = [(Policy::StaticPriority, "G-FP"), (Policy::Edf, "G-EDF")];
 
-/// How many of some sets are proven under one policy.
+/// The number of sets proven under one policy.
 #[derive(Clone, Copy, Default)]
 struct Proven {
     sets: u64,
     /// By Melani's form with the width refinement alone.
     melani: u64,
-    /// By one of the forms before the multi-path bound.
+    /// By any of the forms before the multi-path bound.
     before: u64,
     /// By the commit's answer.
     now: u64,
-    /// Before, and not now.
+    /// Proven before, but not now.
     lost: u64,
 }
 
@@ -118,7 +117,7 @@ impl Proven {
         self.sets += 1;
         let (options, settings) = terms(policy, cores);
         let Ok(verified) = verify(specs, &options) else {
-            // A WCET beyond the deadline.
+            // It has a WCET beyond the deadline, and counts as not proven by all forms.
             return;
         };
         let now = answer(&verified.task_set, &settings).is_proven();
@@ -128,7 +127,8 @@ impl Proven {
         let mut tasks: Vec<&Task> = tasks.iter().collect();
         let (melani, others) = match policy {
             Policy::StaticPriority => {
-                // As a commit derives priorities: deadline-monotonic, equal ones in order.
+                // In the order in which a commit derives priorities: deadline-monotonic, ties by
+                // position.
                 tasks.sort_by_key(|task| task.relative_deadline_ns());
                 let others =
                     grm_capacity(&tasks, cores) == Some(true) || bonifaci_dm(&tasks, cores);
@@ -140,7 +140,7 @@ impl Proven {
                 (melani_edf(&tasks, cores, Width::Used).is_some(), others)
             }
         };
-        // The most urgent DAG had the bound of long paths.
+        // Before, the most urgent DAG had to pass the bound by long paths.
         let first = tasks.first().is_none_or(|task| {
             policy == Policy::Edf || long_paths(task, cores) <= task.relative_deadline_ns()
         });
@@ -152,7 +152,7 @@ impl Proven {
     }
 }
 
-/// How many sets are proven, by policy.
+/// The number of proven sets, by policy.
 type ByPolicy = [Proven; POLICIES.len()];
 
 /// Analyses sets, each on its cores.
@@ -166,7 +166,7 @@ fn proofs(sets: impl Iterator<Item = (Vec<DagSpec>, u32)>) -> ByPolicy {
     all
 }
 
-/// Returns how many sets were proven before and are not now.
+/// Returns the number of sets that were proven before and are not now.
 fn lost<'p>(all: impl IntoIterator<Item = &'p ByPolicy>) -> u64 {
     all.into_iter().flatten().map(|proven| proven.lost).sum()
 }
@@ -179,7 +179,7 @@ struct Point {
     proven: ByPolicy,
 }
 
-/// Analyses `sets` sets at each load.
+/// Analyses `sets` random sets at each load.
 fn by_load(cores: u32, sets: u64, seed: u64) -> Vec<Point> {
     let mut random = Random::new(seed);
     let point = |tenths| Point {
@@ -190,7 +190,7 @@ fn by_load(cores: u32, sets: u64, seed: u64) -> Vec<Point> {
     (1..=10).map(point).collect()
 }
 
-/// Analyses `sets` small sets.
+/// Analyses `sets` small random sets.
 fn small(sets: u64, seed: u64) -> ByPolicy {
     let mut random = Random::new(seed);
     proofs((0..sets).map(|_| {
@@ -199,7 +199,7 @@ fn small(sets: u64, seed: u64) -> ByPolicy {
     }))
 }
 
-/// Returns a row a load, and the sums for each number of cores.
+/// Returns a table with a row for each load, and the sums for each number of cores.
 fn table(points: &[Point]) -> String {
     let columns = "cores:6|load:6.1|sets:8|G-FP before:14.1|now:10.1|G-EDF before:14.1|now:10.1";
     let title = "sets proven, in percent: before and with the multi-path bound\n";
@@ -227,7 +227,7 @@ fn table(points: &[Point]) -> String {
     table.text()
 }
 
-/// Returns a row a policy.
+/// Returns a table with a row for each policy.
 fn small_table(proven: &ByPolicy) -> String {
     let columns = "policy:8|sets:9|Melani:10|before:10|now:10|now / Melani:14.2|now / before:14.2";
     let mut table = Table::new("small sets with short deadlines, proven\n", columns);
@@ -244,8 +244,8 @@ fn ratio(count: u64, of: u64) -> f64 {
     count as f64 / of.max(1) as f64
 }
 
-/// The unit of small sets: 2 to 4 cores divide it, so that it does not matter that the forms
-/// before rounded down.
+/// The unit of small sets in nanoseconds: 2, 3 and 4 cores divide it, so that the rounding of the
+/// older forms has no effect.
 const UNIT_NS: u64 = 12;
 
 /// Draws a set whose load on `cores` cores is about `tenths` tenths.
@@ -258,7 +258,7 @@ fn draw_set(random: &mut Random, cores: u32, tenths: u64) -> Vec<DagSpec> {
     let shares: Vec<u64> = (0..count).map(|_| random.within(1..=20)).collect();
     let all: u64 = shares.iter().sum();
     let dags = shares.iter().enumerate().map(|(number, share)| {
-        // In us, so that it does not matter that the forms before rounded down.
+        // In units of 1 us, so that the rounding of the older forms has no effect.
         let mut spec = graph(random, 5..=20, 3..=9, 1..=100, 1_000);
         let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
         let volume: u64 = wcets.sum();
@@ -303,7 +303,7 @@ type Means = (u32, [f64; 3]);
 ///
 /// # Errors
 ///
-/// In words: a graph that is wrong.
+/// In words: the fault of a graph.
 fn bound_graphs() -> Result<(usize, Vec<Means>), String> {
     let file = stg::read(GRAPHS, None, 1).map_err(|malformed| malformed.reason)?;
     let dags = file.sets.into_iter().flat_map(|set| set.dags);
@@ -332,6 +332,7 @@ fn bound_graphs() -> Result<(usize, Vec<Means>), String> {
 fn task(spec: &DagSpec, order: SubtaskOrder, cores: u32) -> Result<Task, String> {
     let spec = DagSpec {
         order,
+        // Far beyond every job, and a quarter of the range, so that sums of times do not overflow.
         period_ns: Some(u64::MAX / 4),
         relative_deadline_ns: Some(u64::MAX / 4),
         ..spec.clone()
@@ -343,11 +344,11 @@ fn task(spec: &DagSpec, order: SubtaskOrder, cores: u32) -> Result<Task, String>
     Task::from_dag(&task_set.dags()[0], 0).map_err(|error| error.to_string())
 }
 
-/// Returns a row a number of cores.
+/// Returns a table with a row for each number of cores.
 ///
 /// # Errors
 ///
-/// In words: a graph that is wrong.
+/// In words: the fault of a graph.
 fn graph_table() -> Result<String, String> {
     let columns = "cores:6|graphs:8|long paths:12.3|multi-path:12.3|order fixed:14.3";
     let title = "task graphs (STG) alone: mean bound over Graham's\n";

@@ -1,6 +1,6 @@
-//! The code of an image: its instructions, and the functions that each is of.
+//! The code of an image: its instructions, and the functions that contain them.
 //!
-//! `objdump` and `addr2line` of binutils know both.
+//! `objdump` and `addr2line` of binutils provide both.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,13 +9,13 @@ use std::process::{Command, Stdio};
 use crate::places::{self, Frame};
 use crate::system;
 
-/// Addresses with everything that contains them, the innermost first.
+/// For each address the functions that contain it, the innermost first.
 pub(super) type Frames = BTreeMap<u64, Vec<Frame>>;
 
-/// The most addresses that fit a command line with room to spare.
+/// The largest number of addresses in one command line, with room to spare.
 const AT_ONCE: usize = 20_000;
 
-/// Returns the instructions of an image by their addresses.
+/// Returns the instructions of an image by address.
 ///
 /// # Errors
 ///
@@ -36,7 +36,7 @@ pub(super) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String
     Ok(text.lines().filter_map(instruction).collect())
 }
 
-/// Returns what contains each of some addresses.
+/// Returns the functions that contain each of some addresses.
 ///
 /// # Errors
 ///
@@ -46,14 +46,15 @@ pub(super) fn frames(image: &Path, addresses: &[u64]) -> Result<Frames, String> 
     let mut all = Frames::new();
     for some in addresses.chunks(AT_ONCE) {
         let found = places::frames(&addr2line, image, some);
+        // Chunks have different addresses, so no entry is overwritten.
         all.append(&mut found.ok_or_else(|| format!("`{}` failed", addr2line.display()))?);
     }
     Ok(all)
 }
 
-/// Returns the innermost of what contains an address that is in a file of ours: its line, from the
-/// workspace's root, such as `fass/src/run/plan.rs:183`, and its function. So what the library does
-/// for a file counts as the file's.
+/// Returns the innermost frame of an address that is in a file of ours: its line, relative to the
+/// workspace's root, such as `fass/src/run/plan.rs:183`, and its function. So code of the library
+/// counts for the file that uses it.
 pub(super) fn own(frames: &[Frame]) -> Option<(&str, &str)> {
     let root = system::workspace().to_str()?;
     frames.iter().find_map(|frame| {

@@ -1,9 +1,9 @@
-//! The frame that all measurements share.
+//! The framework that all measurements share.
 //!
 //! - [`by_plan`]: from a command line to an exit code;
-//! - [`judged`]: a run whose lines are read if it is good, a guest's or a program's;
+//! - [`judged`]: a run of a guest or a program whose lines are read if it is good;
 //! - [`Figure`]: one measured quantity, as a guest prints it and as a baseline keeps it;
-//! - [`draw`]: pictures, by the Python scripts of `scripts/plot`, if there is what they need.
+//! - [`draw`]: pictures, by the Python scripts of `scripts/plot`, where these can run.
 
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -19,8 +19,8 @@ use crate::outcome::Outcome;
 use crate::protocol::Transcript;
 use crate::system;
 
-/// Runs a measurement: `measure` gets what `plan` makes of the options, and says whether all limits
-/// hold.
+/// Runs a measurement: `plan` turns the options into a plan, and `measure` returns whether all
+/// limits hold.
 pub(super) fn by_plan<Plan>(
     table: &Command,
     words: &[OsString],
@@ -34,12 +34,12 @@ pub(super) fn by_plan<Plan>(
     })
 }
 
-/// Runs `what` is measured, with a new log, and returns what `read` finds in its lines.
+/// Runs a measurement with a new log, and returns what `read` finds in its lines. `what` names it
+/// in errors.
 ///
 /// # Errors
 ///
-/// In words: it could not be run, has failed, or its lines are not as they should be; then the log
-/// stays.
+/// In words: it could not be run, has failed, or its lines are malformed; then the log stays.
 pub(super) fn judged<T>(
     what: impl Display,
     name: &str,
@@ -51,7 +51,7 @@ pub(super) fn judged<T>(
     let judgement = outcome.judge().map_err(|fault| fault.reason);
     let found = judgement.and_then(|()| read(&outcome));
     let found = found.map_err(|why| format!("{what} failed: {why}\n{}", outcome.tail()))?;
-    // It is ours, and in the way of no one if it cannot be removed.
+    // The log is ours; one that cannot be removed harms nothing.
     let _ = fs::remove_file(&log);
     Ok(found)
 }
@@ -62,7 +62,7 @@ pub(super) struct Figure {
     pub(super) cores: u64,
     pub(super) workload: String,
     pub(super) figure: String,
-    /// How many steps each of the numbers below is of.
+    /// The number of steps that each of the numbers below covers.
     pub(super) per: u64,
     pub(super) median: u64,
     pub(super) p99: u64,
@@ -74,7 +74,7 @@ pub(super) struct Figure {
 }
 
 impl Figure {
-    /// Makes a figure of samples that are of `per` steps each.
+    /// Makes a figure from samples of `per` steps each.
     pub(super) fn new(
         (cores, workload, figure): (u64, impl ToString, &str),
         per: u64,
@@ -110,7 +110,7 @@ impl Figure {
         Self::read(value, value.get("cores")?.as_u64()?, value)
     }
 
-    /// Reads a figure whose numbers are members of an object of their own, or of the same.
+    /// Reads a figure; `numbers` is the object with its numbers, a member or the same one.
     fn read(value: &Value, cores: u64, numbers: &Value) -> Option<Self> {
         let text = |name| value.get(name)?.as_text().map(String::from);
         let number = |name| numbers.get(name)?.as_u64();
@@ -118,6 +118,7 @@ impl Figure {
             cores,
             workload: text("workload")?,
             figure: text("figure")?,
+            // A figure per 0 steps could not be divided.
             per: value.get("per")?.as_u64().filter(|per| *per > 0)?,
             median: number("median")?,
             p99: number("p99")?,
@@ -126,7 +127,7 @@ impl Figure {
         })
     }
 
-    /// Ends an object with its members.
+    /// Adds the members of the figure to an object, and returns its text.
     pub(super) fn json(&self, begun: Object) -> String {
         begun
             .number("cores", self.cores)
@@ -139,22 +140,22 @@ impl Figure {
             .end()
     }
 
-    /// Returns whether two are of the same quantity.
+    /// Returns whether two figures are of the same quantity.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         (self.cores, &self.workload, &self.figure) == (other.cores, &other.workload, &other.figure)
     }
 
-    /// Returns whether it counts something else than time or instructions.
+    /// Returns whether it counts something other than time or instructions.
     pub(super) fn is_count(&self) -> bool {
         matches!(&*self.figure, "allocations" | "locks" | "sink_wakeups")
     }
 
-    /// Returns a number of this figure for one step.
+    /// Returns one of its numbers per step.
     pub(super) fn of_step(&self, number: u64) -> f64 {
         number as f64 / self.per as f64
     }
 
-    /// Returns a number of this figure for one step, as text.
+    /// Returns one of its numbers per step, as text.
     pub(super) fn one(&self, number: u64) -> String {
         let decimals = match (self.per, self.is_count()) {
             (1, _) => 0,
@@ -165,24 +166,24 @@ impl Figure {
     }
 }
 
-/// Has a script of `scripts/plot` draw into `out/plots` what is in `out`.
+/// Runs a script of `scripts/plot` on the results in `out`; it draws into `out/plots`.
 ///
 /// # Errors
 ///
-/// One line: what is missing, or what went wrong.
+/// One line: the missing program or package, or the error.
 pub(super) fn draw(script: &str, out: &Path) -> Result<(), String> {
     let before = fs::read_dir(out.join("plots"));
     for picture in before.into_iter().flatten().flatten() {
         let path = picture.path();
         if path.extension().is_some_and(|ending| ending == "svg") {
-            // One of earlier figures would be wrong.
+            // A picture of earlier figures would be wrong; a new one may fail.
             let _ = fs::remove_file(path);
         }
     }
     let script = system::workspace().join("scripts/plot").join(script);
     let mut complaint = String::new();
-    // A Python of the person's own may hide the system's, which the package
-    // manager installs matplotlib for.
+    // A person's own Python may hide the system's, for which the package manager installs
+    // matplotlib.
     for program in ["python3", "/usr/bin/python3"] {
         let mut command = process::Command::new(program);
         match command.args([&script, out]).stdin(Stdio::null()).output() {

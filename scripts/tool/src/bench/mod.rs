@@ -1,15 +1,15 @@
 //! Measurements on the host, for people and for machines.
 //!
-//! `bench WHAT` measures one part of the project on this host, in this build,
-//! and prints a table and one JSON object a figure. Times depend on the host and on
-//! what else it does, so none of them has a limit; counted instructions have. The exit code is
-//! 0 if all limits hold, 1 if one does not, and 2 for a refused command line.
+//! `bench WHAT` measures one part of the project on this host, in this build, and prints a table
+//! and one JSON object for each figure. Times depend on the host and its load, so none of them has
+//! a limit; counted instructions have. The exit code is 0 if all limits hold, 1 if one does not,
+//! and 2 for a refused command line.
 //!
 //! - [`bounds`]: random sets of DAGs that the analysis proves;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
 //! - [`native`]: the scheduler on this host's own processors;
-//! - [`sizes`]: what each part of an image takes of its room.
+//! - [`sizes`]: the size of each part of an image.
 
 pub mod bounds;
 mod code;
@@ -46,7 +46,7 @@ const SILENT: [&str; 2] = ["bounds", "sizes"];
 /// Runs the subcommand.
 #[must_use]
 pub fn bench(words: &[OsString]) -> ExitCode {
-    // The others say themselves how far they are.
+    // The others report their progress themselves.
     let is_silent = |word: &OsString| SILENT.iter().any(|silent| word == silent);
     let of_silent = words.first().is_some_and(is_silent);
     let _lasting = of_silent.then(|| Lasting::new("measuring"));

@@ -1,10 +1,10 @@
-//! What each part of an image takes of its room.
+//! The size of each part of an image.
 //!
-//! An instruction is its part's: of the functions that it was inlined from, the innermost
-//! that is in a file of ours decides, so what the library does for a part counts as the
-//! part's. A part is a crate's room, or the file there, that the file is in. What comes
-//! from no file of ours, like the code that drops a value, is told apart, and so is what is
-//! no code: constants, variables that do not begin as zeros, headers.
+//! An instruction belongs to one part: of the functions that it was inlined from, the innermost in
+//! a file of ours decides, so code of the library counts for the part that uses it. A part is a
+//! folder or file right below a crate's `src`. Code from no file of ours, such as the code that
+//! drops a value, is listed apart, and so is everything other than code: constants, variables that
+//! do not begin as zeros, headers.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -33,10 +33,10 @@ command line is refused.
 ",
 };
 
-/// Of no file of ours.
+/// The part of code from no file of ours.
 const LIBRARY: &str = "the library, and what drops values";
 
-/// Weighs, and prints.
+/// Measures, and prints.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
     let app = |options: &Parsed| {
         let app = options.text("app").unwrap_or_default();
@@ -45,7 +45,8 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     by_plan(&TABLE, words, app, |app| weigh(app))
 }
 
-/// Prints what the parts of an app's image take, and returns whether all are within its limit.
+/// Prints the sizes of the parts of an app's image, and returns whether the sum is within its
+/// limit.
 fn weigh(app: &str) -> Result<bool, String> {
     let image = image::build(app)?;
     let stripped = image.stripped_bytes()?;
@@ -70,15 +71,16 @@ fn weigh(app: &str) -> Result<bool, String> {
     Ok(stripped <= most)
 }
 
-/// Returns the bytes of each part. An instruction is as long as it is to the next one; the
-/// last one, and what ends before a gap, counts as one byte.
+/// Returns the bytes of each part. An instruction extends to the next one; the last one, and one
+/// before a gap, counts as one byte.
 fn parts(addresses: &[u64], frames: &Frames) -> BTreeMap<String, u64> {
-    /// No instruction is longer (Intel SDM, volume 2, 2.3.11).
+    /// The length of the longest instruction (Intel SDM, volume 2, 2.3.11).
     const LONGEST: u64 = 15;
     let next = addresses.iter().skip(1).chain(addresses.last());
     let mut parts = BTreeMap::new();
     for (address, next) in addresses.iter().zip(next) {
         let bytes = match next - address {
+            // A larger distance is a gap between functions or sections, which is no code.
             bytes @ 1..=LONGEST => bytes,
             _ => 1,
         };
@@ -89,7 +91,7 @@ fn parts(addresses: &[u64], frames: &Frames) -> BTreeMap<String, u64> {
     parts
 }
 
-/// Returns the part that a line of ours is in, such as `kernel: run`.
+/// Returns the part of a line of ours, such as `kernel: run`.
 fn part(line: &str) -> Option<String> {
     let (owner, below) = line.split_once("/src/")?;
     let room = below.split(['/', ':']).next()?;

@@ -1,19 +1,18 @@
-//! DAG files on the host: reading all formats, and what a run of one needs.
+//! DAG files on the host: reading all formats, and preparing a run of one.
 //!
-//! The kernel reads one format, `docs/dag-file.md`. Here others become that one:
+//! The kernel reads one format, `docs/dag-file.md`. Here other formats are converted to it:
 //!
 //! - [`rd_gen`]: RD-Gen's YAML, by [`yaml`], with several rates split by [`rates`];
 //! - [`stg`]: task graphs, from JSON;
-//! - [`load()`]: whichever of them a file is, checked as the commit will check it;
-//! - [`prepare()`]: what `./scripts/run --dag FILE` boots: the file that becomes the boot module,
+//! - [`load()`]: reads a file of any of these, and checks it as the commit will;
+//! - [`prepare()`]: the input of `./scripts/run --dag FILE`: the file that becomes the boot module,
 //!   words for the guest, and enough memory and time.
 //!
-//! Every message about a file begins `FILE:LINE:`, with a line of the file that was named,
-//! whatever it became on the way to the guest.
-//! The guest reads the file in our format, as it was written for it, and the commit
-//! knows names alone. Whatever can be told before a boot has been told by then with the
-//! right lines; what remains are words for the guest that the host does not read, and a
-//! machine that is too small.
+//! Every message about a file begins `FILE:LINE:`, with a line of the file that was named, even if
+//! the guest reads it in another form. The guest reads the file in our format, as it was written
+//! for it, and the commit knows names alone. So everything that can be checked before a boot is
+//! checked here, with the right lines; the rest are words for the guest that the host does not
+//! read, and a machine that is too small.
 
 pub mod rates;
 pub mod rd_gen;
@@ -30,18 +29,18 @@ use sched_dag::{CommitOptions, CoreDivision, Policy};
 use crate::files;
 use crate::options::Parsed;
 
-/// How a file is read.
+/// The settings for reading a file.
 #[derive(Clone, Debug)]
 pub struct Import {
     /// The length of a unit, for formats whose numbers have none.
     pub unit_ns: u64,
-    /// The one graph wanted of a set of task graphs.
+    /// The only graph wanted of a set of task graphs.
     pub graph: Option<String>,
-    /// The number of cores that it will run on.
+    /// The number of cores for the run.
     pub cores: u32,
-    /// How they are divided.
+    /// The division of the cores.
     pub clusters: CoreDivision,
-    /// For how long it will run.
+    /// The length of the run.
     pub length: Length,
 }
 
@@ -57,8 +56,8 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    /// Returns the format that a file's name tells, in small or in capital letters;
-    /// `None` if its ending is none of those that are known.
+    /// Returns the format that a file's name states, in small or in capital letters; `None` if its
+    /// ending is unknown.
     pub(crate) fn of(path: &Path) -> Option<Format> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         match ending.as_str() {
@@ -70,8 +69,8 @@ impl Format {
     }
 }
 
-/// Returns a name for the DAGs of a file: its own without the ending, with `_` in place
-/// of what no name may have.
+/// Returns a name for the DAGs of a file: its own without the ending, with `_` in place of
+/// characters that a name must not have.
 fn name_of(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let plain = |character: char| match character.is_whitespace() || !is_seen(character) {
@@ -81,12 +80,13 @@ fn name_of(path: &Path) -> String {
     let name: String = stem.chars().map(plain).collect();
     match is_name(&name) {
         true => name,
+        // Such as a name that begins with `#` or is `->`, which our format reads otherwise.
         false => format!("_{name}"),
     }
 }
 
-/// Reads a file of the format that its name tells, our own if it tells none. It is then
-/// checked as its commit will be.
+/// Reads a file in the format that its name states, else in our own, and checks it as the commit
+/// will.
 ///
 /// # Errors
 ///
@@ -108,6 +108,7 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
             stg::read(text, import.graph.as_deref(), import.unit_ns).map_err(|one| vec![one])
         }
         Some(Format::Ours) => parse(text).map_err(|one| vec![one]),
+        // A wrong ending is the likeliest cause, so the message names the others.
         None => parse(text).map_err(|Malformed { line, reason }| {
             let hint = "read as our format; a name in .yaml or .yml tells RD-Gen's, in .json a task \
                         graph set";
@@ -124,7 +125,7 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
             shown(graph)
         )]);
     }
-    // Static priorities ask for all that EDF does, and more.
+    // A commit with static priorities makes all checks of one with EDF, and more.
     let options = CommitOptions::new(Policy::StaticPriority, import.cores)
         .with_clusters(import.clusters.clone());
     for set in &file.sets {
@@ -143,17 +144,17 @@ const COMPANIONS: [&str; 6] = [
     "strict-deadlines",
 ];
 
-/// The jobs of each DAG if nobody says how many.
+/// The jobs of each DAG if no number is given.
 const JOBS: u64 = 50;
 
-/// Returns the word for what the kernel costs at most, as measured in deterministic
-/// mode: a context switch, a dispatch, an interrupt. The commit adds it to WCETs before
-/// it bounds anything. A dispatch may wait for those of all cores, which take turns.
+/// Returns the word with the kernel's worst overheads, as measured in deterministic mode: a context
+/// switch, a dispatch, an interrupt, an instance that becomes ready. The commit adds them to WCETs
+/// before it computes bounds. A dispatch may wait for those of all other cores, which take turns.
 fn overheads(cores: u64) -> String {
     format!("overheads_ns=1000,{},4000,1000", 2500 * cores)
 }
 
-/// Reports whether a command line says what the kernel costs, or has it measure that.
+/// Reports whether a command line states the kernel's overheads, or has them measured.
 pub(crate) fn states_overheads(words: &str) -> bool {
     words
         .split_whitespace()
@@ -165,19 +166,19 @@ pub(crate) fn states_overheads(words: &str) -> bool {
 pub struct Prepared {
     /// Its name.
     pub path: PathBuf,
-    /// What it says.
+    /// Its content.
     pub file: DagFile,
-    /// The least memory for it, in MiB.
+    /// The memory that it needs, in MiB.
     pub memory_mib: u64,
-    /// Words for the guest besides those that options become.
+    /// Words for the guest besides those of options.
     pub words: Vec<String>,
-    /// A limit that is generous also where a job takes its real time, in seconds.
+    /// A time limit that is generous also where a job takes its real time, in seconds.
     pub limit_s: u64,
 }
 
 impl Prepared {
-    /// Returns what the guest says of the file as [`load`] would have said it, one line a
-    /// fault; `None` if it speaks of something else.
+    /// Translates a guest's refusal of the file into one as of [`load`], one line a fault; `None`
+    /// if it is about something else.
     #[must_use]
     pub fn translate(&self, said: &str) -> Option<String> {
         translate(said, &self.path, &self.file)
@@ -188,8 +189,9 @@ impl Prepared {
 ///
 /// # Errors
 ///
-/// Lines for people: what is wrong with the options or with the file.
+/// In lines for people: the faults of the options or of the file.
 pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
+    // Without a file, an option that is about one is a mistake.
     let Some(path) = options.path("dag") else {
         return options.given_of(&COMPANIONS).map_or(Ok(None), |name| {
             Err(vec![format!(
@@ -234,6 +236,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     }
     let limit_s = limit_s(&file, length);
     let has_limit = options.is_given("timeout") || options.is_given("print-dag");
+    // Printing boots nothing, and a person's limit is a person's choice.
     if limit_s > MOST_S && !has_limit {
         return Err(refuse(format!(
             "{}: its jobs take {} hours or more, and a run has {} if nobody says how long; give \
@@ -259,7 +262,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     }))
 }
 
-/// Reads how the cores are to be divided. Where the commit is to find that, it has not yet.
+/// Reads the division of the cores. With `auto` the commit finds it, so here they are undivided.
 fn clusters(text: Option<&str>) -> Result<CoreDivision, String> {
     let Some(text) = text.filter(|text| *text != "auto") else {
         return Ok(CoreDivision::Undivided);
@@ -278,7 +281,7 @@ fn length(options: &Parsed) -> Length {
     }
 }
 
-/// Returns the jobs and instances of a set that a run has in all: its records.
+/// Returns the number of records of a set in a run: its jobs and instances.
 fn records(set: &Set, length: Length) -> u64 {
     let of = |dag: &FileDag| {
         let jobs = length.jobs(&dag.spec);
@@ -290,12 +293,12 @@ fn records(set: &Set, length: Length) -> u64 {
 /// The most memory in MiB: a guest has its stacks and its heap below 3 GiB.
 const MOST_MEMORY_MIB: u64 = 3072;
 
-/// Returns how much memory a file needs. A quarter of it becomes stacks, of which
-/// each subtask has one and each core a few, and the rest the heap, of which records may take half.
+/// Returns the memory that a file needs, in MiB. A quarter of it becomes stacks, of which each
+/// subtask has one and each core a few; the rest is the heap, half of which records may take.
 ///
-/// The guest has the file as text, and in the heap what it says: measured, an edge takes
-/// some 210 bytes and a sample some 17, while a line has 12 bytes and a sample 4. So the
-/// heap has 20 bytes for each of the text, and three quarters of the memory are the heap.
+/// The guest has the file as text, and its content in the heap: measured, an edge takes some 210
+/// bytes and a sample some 17, while a line has 12 bytes and a sample 4. So the heap has 20 bytes
+/// for each byte of the text, and three quarters of the memory are the heap.
 fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
     const OF_A_CORE: u64 = 4 * (336 << 10);
     const OF_A_SUBTASK: u64 = 4 * (65 << 10);
@@ -303,22 +306,24 @@ fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
     const OF_A_BYTE: u64 = 1 + 20 * 4 / 3;
     const MIB: u64 = 1 << 20;
     let subtasks = file.most_subtasks() as u64;
+    // Sets run one after the other, so the largest counts.
     let records = file.sets.iter().map(|set| records(set, length));
     let bytes = (subtasks.saturating_mul(OF_A_SUBTASK))
         .saturating_add(records.max().unwrap_or(0).saturating_mul(OF_A_RECORD))
         .saturating_add(cores.saturating_mul(OF_A_CORE))
+        // The text as the guest gets it, which may be longer than the person's file.
         .saturating_add((file.to_string().len() as u64).saturating_mul(OF_A_BYTE));
     12 + bytes.div_ceil(MIB)
 }
 
-/// The longest that a run may take if nobody says how long, in seconds: a day.
+/// The longest run if no limit is given, in seconds: a day.
 const MOST_S: u64 = 86_400;
 
-/// Returns for how long a run may take, in seconds: two minutes, the time from the first
-/// release to the last, the time that all jobs would take on one core, and a second for
-/// every 500 records.
+/// Returns the time limit of a run in seconds: two minutes, the time from the first release to the
+/// last, the time that all jobs would take on one core, and a second for every 500 records.
 fn limit_s(file: &DagFile, length: Length) -> u64 {
     const NS_PER_S: u128 = 1_000_000_000;
+    // In 128 bits: periods and numbers of jobs come from a file and may be of any size.
     let mut seconds = 120_u128;
     for set in &file.sets {
         seconds += u128::from(records(set, length) / 500);
@@ -330,6 +335,7 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
             let period_ns = u128::from(spec.period_ns.unwrap_or(0));
             let last_ns =
                 period_ns.saturating_mul(jobs.saturating_sub(1)) + u128::from(spec.offset_ns);
+            // DAGs of a set run at the same time: the longest span counts, and the sum of the work.
             span_ns = span_ns.max(last_ns);
             busy_ns = busy_ns.saturating_add(of_job_ns.saturating_mul(jobs));
         }
@@ -338,8 +344,8 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
     u64::try_from(seconds).unwrap_or(u64::MAX)
 }
 
-/// Returns what the guest says with `path` and its lines in place of the words `DAG
-/// file`, one line a fault; `None` if it speaks of no file.
+/// Translates a guest's message: `path` and its lines take the place of the words `DAG file`, one
+/// line a fault; `None` if the message is not about the file.
 fn translate(said: &str, path: &Path, file: &DagFile) -> Option<String> {
     let place = path.display();
     let said = said.strip_prefix("DAG file")?;
@@ -357,8 +363,9 @@ fn translate(said: &str, path: &Path, file: &DagFile) -> Option<String> {
     Some(lines.join("\n"))
 }
 
-/// Returns the line of the person's file that became this line of the guest's.
+/// Returns the line of the person's file for a line of the guest's file.
 fn source_line(file: &DagFile, line: usize) -> Option<usize> {
+    // Parsed again, since only the parser knows the lines of the written form.
     let written = parse(&file.to_string()).ok()?;
     let dags = |file: &DagFile| -> Vec<Vec<usize>> {
         let dags = file.sets.iter().flat_map(|set| &set.dags);
@@ -371,7 +378,7 @@ fn source_line(file: &DagFile, line: usize) -> Option<usize> {
         .map(|(_, read)| *read)
 }
 
-/// Returns all lines of a DAG, in an order that is the same for every writing of it.
+/// Returns all lines of a DAG, in an order that does not depend on how it is written.
 fn lines(dag: &FileDag) -> Vec<usize> {
     let subtasks = dag.subtasks.iter().map(|subtask| subtask.line);
     let all = std::iter::once(dag.line).chain(subtasks);
@@ -442,7 +449,7 @@ mod tests {
             for (text, read) in readers {
                 let text = damaged(text, number);
                 match read(&text) {
-                    // What is accepted here is written for the guest, whose reader is ours.
+                    // An accepted file is written for the guest, whose reader is ours.
                     Ok(file) => {
                         let refused = parse(&file.to_string()).err();
                         assert_eq!(refused, None, "damage {number}:\n{file}");
@@ -501,7 +508,7 @@ mod tests {
         std::fs::remove_file(path).unwrap();
     }
 
-    /// What the guest says, and what the person is told.
+    /// The guest's message, and the one for the person.
     const SAID: &str = r"DAG file, line 1: late; drop it | f.dag:3: late; drop it
 DAG file, line 2: a | f.dag:5: a
 DAG file, line 4: a | f.dag:8: a

@@ -1,15 +1,15 @@
-//! A Linux of Debian's in QEMU, for programs of ours that need another kernel than this
-//! computer's: one with `sched_ext`, or one that grants SCHED_FIFO.
+//! Debian's Linux in QEMU, for our programs that need another kernel than this computer's: one with
+//! `sched_ext`, or one that grants SCHED_FIFO.
 //!
-//! Kernel and tools are Debian's packages. What the guest has of files is in an
-//! archive that the kernel unpacks into memory: the program, the libraries that it
-//! names, and a script that runs it. What it prints comes through a port of its own, as bytes
-//! and at any speed; its exit code through another one, into a file.
+//! Kernel and tools are Debian's packages. The guest's files are in an archive that the kernel
+//! unpacks into memory: the program, its libraries, and a script that runs it. The program's output
+//! comes through a port of its own, as bytes and at any speed; its exit code through another one,
+//! into a file.
 //!
-//! The packages are unpacked next to this computer's system and not into it.
-//! `apt-get` fetches them with sources, lists and downloads of its own, below `target/debian`, and
-//! `dpkg` unpacks them there. They are trixie's, with a kernel of trixie's backports,
-//! whatever Debian or Ubuntu this computer has; programs of them are run by their own loader.
+//! The packages are unpacked next to this computer's system and not into it. `apt-get` fetches them
+//! with its own sources, lists and downloads below `target/debian`, and `dpkg` unpacks them there.
+//! They are trixie's, with a kernel of trixie's backports, on any Debian or Ubuntu; their programs
+//! are run by their own loader.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -22,7 +22,7 @@ use crate::progress::Lasting;
 use crate::qemu::{self, Mode, PROGRAM, file_value};
 use crate::system::{self, find_program, run};
 
-/// What the guest runs first, and all that it runs besides the program.
+/// The guest's first program, a script that runs the others.
 const INIT: &str = include_str!("init.sh");
 
 /// The policy of `sched_ext`, as source.
@@ -36,35 +36,35 @@ const MEMORY_MIB: u64 = 1024;
 pub struct Order<'a> {
     /// The program.
     pub program: &'a Path,
-    /// Its words. One that begins with `module=` names a file of ours.
+    /// Its words. A word that begins with `module=` names a file of this computer.
     pub words: &'a [OsString],
-    /// Whether the policy is loaded before.
+    /// Whether the policy is loaded first.
     pub with_policy: bool,
-    /// How many programs compute next to it.
+    /// The number of programs that compute next to it.
     pub busy: u64,
-    /// What time means there.
+    /// The meaning of time in the guest.
     pub mode: Mode,
     /// The guest's processors.
     pub cores: u64,
 }
 
-/// A guest that can be started: QEMU, and what it is told.
+/// A guest that can be started: QEMU, and its arguments.
 #[derive(Debug)]
 pub struct Guest {
     /// QEMU.
     pub program: PathBuf,
     /// Its words.
     pub words: Vec<OsString>,
-    /// What the kernel and the script say.
+    /// The file with the output of kernel and script.
     console: PathBuf,
-    /// The program's exit code.
+    /// The file with the program's exit code.
     end: Temporary,
     _archive: Temporary,
 }
 
 impl Guest {
-    /// Gets what the guest takes, compiles the policy if it is wanted, and makes the archive. The
-    /// guest's own files lie next to `log`.
+    /// Gets the packages, compiles the policy if it is wanted, and makes the archive. The guest's
+    /// own files lie next to `log`.
     ///
     /// # Errors
     ///
@@ -80,13 +80,14 @@ impl Guest {
             order.lay_out(folder, &packages)?;
             pack(folder, &packages, archive.path())
         })?;
+        // The file must exist: until the guest has written a code, it is empty and so none.
         write(end.path(), "")?;
         let mut words = qemu::words(match order.mode {
-            // Two instructions of Linux's a nanosecond are nearer to a PC than one.
+            // Two of Linux's instructions per nanosecond are nearer to a PC than one.
             Mode::Deterministic => "-icount shift=1,sleep=off -cpu max",
             other => other.arguments(),
         });
-        // Not by standard output: the port would be closed with the end of standard input.
+        // Not by standard output: that port would close at the end of standard input.
         for (port, path) in [("out", log), ("end", end.path())] {
             let file = file_value(&format!("file,id={port},path="), path);
             words.extend(["-chardev".into(), file]);
@@ -96,8 +97,8 @@ impl Guest {
              -device virtserialport,nr=1,chardev=out -device virtserialport,nr=2,chardev=end \
              -append",
         ));
-        // Where instructions are counted, a processor that computes keeps the emulator until a
-        // timer ends: processors whose ticks are apart wait less for each other.
+        // With counted instructions a computing processor keeps the emulator until a timer fires:
+        // with ticks apart, the processors wait less for each other.
         words.push("console=ttyS0 quiet panic=-1 skew_tick=1".into());
         for (option, value) in [
             ("-smp", order.cores.to_string().into()),
@@ -117,7 +118,7 @@ impl Guest {
         })
     }
 
-    /// Returns the program's exit code; `None` if it has none: the guest did not get so far, or
+    /// Returns the program's exit code; `None` if there is none: the guest did not get that far, or
     /// Linux has ended the policy before the program's end.
     #[must_use]
     pub fn code(&self) -> Option<i32> {
@@ -125,7 +126,7 @@ impl Guest {
         end.ok()?.trim().parse().ok()
     }
 
-    /// Returns the last lines of what the guest itself has said, and where all of it is.
+    /// Returns the last lines of the guest's console, and the path of its file.
     #[must_use]
     pub fn said(&self) -> String {
         let said = system::last_lines(&fs::read(&self.console).unwrap_or_default());
@@ -134,7 +135,7 @@ impl Guest {
 }
 
 impl Order<'_> {
-    /// Lays out what the guest needs of files in a folder.
+    /// Lays out the guest's files in a folder.
     fn lay_out(&self, folder: &Path, packages: &Packages) -> Result<(), String> {
         let add = |name: &str, source: &Path| write(&folder.join(name), files::read_at(source)?);
         let mut words = Vec::new();
@@ -169,8 +170,8 @@ impl Order<'_> {
     }
 }
 
-/// Packs a folder for Linux, which unpacks it into memory when it starts: in cpio's format, with
-/// the folders that the script mounts. Everything may be executed, and is root's.
+/// Packs a folder into an archive in cpio's format, which Linux unpacks into memory when it starts,
+/// with the folders that the script mounts. Every file is executable and root's.
 fn pack(folder: &Path, packages: &Packages, archive: &Path) -> Result<(), String> {
     const LINES: &str = "set -e; mkdir proc sys dev tmp; chmod -R 755 .
         find . | \"$0\" cpio -o -H newc -R 0:0 >\"$1\"";
@@ -190,28 +191,28 @@ fn compile(packages: &Packages, object: &Path) -> Result<(), String> {
     run(clang.arg("-o").arg(object)).map(drop)
 }
 
-/// What is fetched besides the kernel, with all that it depends on.
+/// The packages that are fetched besides the kernel, with their dependencies.
 const PACKAGES: [&str; 4] = ["busybox-static", "bpftool", "clang-19", "libbpf-dev"];
 
-/// With what the lists of packages are signed.
+/// The keys by which the lists of packages are signed.
 const KEYS: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 
-/// The kernels that are preferred: the policy was tried with these.
+/// The preferred kernel version: the policy was tried with it.
 const TRIED: [u32; 2] = [6, 18];
-/// The first kernels whose `sched_ext` has what the policy uses.
+/// The first version whose `sched_ext` has everything that the policy uses.
 const LEAST: [u32; 2] = [6, 13];
 
 /// The packages, unpacked.
 #[derive(Debug)]
 struct Packages {
-    /// What would be the root of a file system.
+    /// The folder that stands for a file system's root.
     root: PathBuf,
     /// The kernel.
     kernel: PathBuf,
 }
 
 impl Packages {
-    /// Makes sure that they are there.
+    /// Makes sure that the packages are there.
     fn get() -> Result<Packages, String> {
         let folder = system::workspace().join("target/debian");
         let parts = ["lists/partial", "cache/archives/partial", "root"];
@@ -219,11 +220,12 @@ impl Packages {
             fs::create_dir_all(&part)
                 .map_err(|why| format!("cannot make the folder `{}`: {why}", part.display()))?;
         }
-        // Two commands at once fetch them once.
+        // Of two commands at once the second waits, and finds the packages.
         let lock = File::create(folder.join("lock"));
         let locked = lock.and_then(|lock| lock.lock().map(|()| lock));
         let _lock = locked.map_err(|why| format!("cannot lock `{}`: {why}", folder.display()))?;
         let (root, ready) = (folder.join("root"), folder.join("kernel"));
+        // Written last of all, so it is there only if everything is unpacked.
         if !ready.is_file() {
             let kernel = fetch(&folder)?;
             files::write(&ready, kernel)?;
@@ -234,17 +236,17 @@ impl Packages {
         Ok(Packages { root, kernel })
     }
 
-    /// Returns the loader of programs that are linked with libraries.
+    /// Returns the dynamic loader of the packages.
     fn loader(&self) -> PathBuf {
         self.root.join("usr/lib64/ld-linux-x86-64.so.2")
     }
 
-    /// Returns the program of many tools, which needs no libraries.
+    /// Returns the statically linked program of many tools.
     fn busybox(&self) -> PathBuf {
         self.root.join("usr/bin/busybox")
     }
 
-    /// Returns a command of one of the packages' programs.
+    /// Returns a command for a program of the packages.
     fn command(&self, program: &str) -> Command {
         let mut command = self.loading();
         command.arg(self.root.join(program));
@@ -265,7 +267,7 @@ impl Packages {
         for program in programs {
             let list = run(self.loading().arg("--list").arg(program))?;
             found.extend(list.lines().filter_map(library).filter(|path| {
-                // The loader lies elsewhere.
+                // The loader lies elsewhere in the guest.
                 !path.ends_with("ld-linux-x86-64.so.2")
             }));
         }
@@ -282,7 +284,7 @@ fn library(line: &str) -> Option<PathBuf> {
     Some(path.into())
 }
 
-/// Fetches and unpacks everything, and returns the kernel's name.
+/// Fetches and unpacks everything, and returns the kernel's file name.
 fn fetch(folder: &Path) -> Result<String, String> {
     for (name, what) in [("apt-get", "apt"), ("dpkg", "dpkg")] {
         if find_program(name).is_none() {
@@ -317,6 +319,7 @@ fn fetch(folder: &Path) -> Result<String, String> {
         "Debian's lists have no kernel of 6.13 or later for clouds; look for a newer state of this project",
     )?;
     let mut install = apt("apt-get", folder);
+    // `--download-only`: this computer's own packages must not change.
     install.args("--yes --no-install-recommends --download-only install".split(' '));
     run(install.args(PACKAGES))?;
     let archives = folder.join("cache/archives");
@@ -333,14 +336,14 @@ fn fetch(folder: &Path) -> Result<String, String> {
                 .arg("-x")
                 .arg(&file)
                 .arg(folder.join("root")))?;
-            // It is unpacked, and could be fetched again.
+            // It is unpacked, and can be fetched again.
             let _ = fs::remove_file(&file);
         }
     }
     Ok(kernel.replacen("linux-image-", "vmlinuz-", 1))
 }
 
-/// Returns a command of apt's that knows nothing of this computer's packages, and changes none.
+/// Returns a command of apt's that neither knows nor changes this computer's packages.
 fn apt(program: &str, folder: &Path) -> Command {
     let mut command = Command::new(program);
     for (name, part) in [
@@ -354,7 +357,7 @@ fn apt(program: &str, folder: &Path) -> Command {
         let place = folder.join(part);
         command.arg("-o").arg(format!("{name}={}", place.display()));
     }
-    // Its own user could not write there.
+    // The user `_apt` could not write into our folder.
     command.args([
         "-o",
         "APT::Sandbox::User=root",
@@ -366,7 +369,7 @@ fn apt(program: &str, folder: &Path) -> Command {
     command
 }
 
-/// Chooses a kernel for virtual machines: the latest of those that were tried, or else the latest.
+/// Chooses a kernel for virtual machines: the latest of the tried version, or else the latest.
 fn choose<'a>(names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let version = |name: &str| -> Option<[u32; 3]> {
         let name = name.strip_prefix("linux-image-")?;
@@ -378,6 +381,7 @@ fn choose<'a>(names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     };
     let rated = names.filter_map(|name| {
         let version = version(name)?;
+        // A version that was tried beats any other; among equals the latest wins.
         Some(((version[..2] == TRIED, version), name))
     });
     rated.max().map(|(_, name)| name)

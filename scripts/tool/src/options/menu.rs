@@ -1,4 +1,4 @@
-//! A first word that chooses what the rest is for: `bench WHAT`, `oracle KIND`.
+//! A first word that chooses a function for the words after it: `bench WHAT`, `oracle KIND`.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -10,15 +10,15 @@ use super::{Refusal, nearest};
 /// The words to choose from.
 #[derive(Debug)]
 pub struct Menu {
-    /// What the person types before the word, such as `./scripts/bench`.
+    /// The command as a person types it, such as `./scripts/bench`.
     pub invocation: &'static str,
-    /// What the word stands for, such as `WHAT`.
+    /// The placeholder of the word in the help text, such as `WHAT`.
     pub word: &'static str,
-    /// One or more sentences on what the command does.
+    /// One or more sentences that describe the command.
     pub about: &'static str,
     /// The words, in the order of the help text.
     pub choices: &'static [Choice],
-    /// What else the help text says, after the words.
+    /// Further text of the help, after the words.
     pub notes: &'static str,
 }
 
@@ -29,11 +29,11 @@ pub struct Choice {
     pub name: &'static str,
     /// A few words for the help text.
     pub about: &'static str,
-    /// What it does with the words after it, and its exit code.
+    /// The function that gets the words after this one and returns the exit code.
     pub work: fn(&[OsString]) -> ExitCode,
 }
 
-/// Makes the choices of a [`Menu`]: behind each word what the help text says of it, and what it does.
+/// Makes the choices of a [`Menu`]: each word with its help text and its function.
 #[macro_export]
 macro_rules! choices {
     ($($name:literal: $about:literal, $work:expr;)*) => {
@@ -43,8 +43,7 @@ macro_rules! choices {
 pub use choices;
 
 impl Menu {
-    /// Does what a command line chooses, shows the help text, or refuses the word with
-    /// exit code 2.
+    /// Runs the chosen function, shows the help text, or refuses the word with exit code 2.
     #[must_use]
     pub fn run(&self, words: &[OsString]) -> ExitCode {
         match self.choose(words) {
@@ -59,6 +58,7 @@ impl Menu {
             return Err(Refusal::Usage(question));
         };
         let word = &*word.to_string_lossy();
+        // Before the lookup: no choice may be called `--help`.
         if word == "--help" || word == "-h" {
             return Err(Refusal::Help(self.help()));
         }
@@ -66,6 +66,7 @@ impl Menu {
             return Ok(choice);
         }
         let names: Vec<&str> = self.choices.iter().map(|choice| choice.name).collect();
+        // No choice begins with a dash, so a near one would only mislead.
         let (what, near) = match word.starts_with('-') {
             true => ("option", None),
             false => (self.word, nearest(word, &names)),

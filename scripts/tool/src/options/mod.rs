@@ -5,11 +5,11 @@
 //! all come from it. An option is written `--name value` or `--name=value`,
 //! a *flag* takes no value, and a *positional* is any word that is no option.
 //!
-//! Whatever is not in the table is refused with one line that names it, says
-//! what is allowed and, where a name is near, suggests it. Nothing is guessed
-//! and nothing is done before the whole line is understood.
+//! A word that is not in the table is refused with one line that names it, says what is allowed
+//! and, where a name is near, suggests it. Nothing is guessed and nothing is done before the whole
+//! line is understood.
 //!
-//! Words come as the system hands them over, and need not be text. The name of a file
+//! Words come as bytes of the operating system and need not be text. The name of a file
 //! may be anything; every other word must be UTF-8.
 //! A command line that was understood is [`Parsed`].
 
@@ -31,35 +31,35 @@ use crate::files::Named;
 pub use menu::{Choice, Menu, choices};
 pub use sched_dag::nearest;
 
-/// The exit code of a run that a person has ended before its time, as a shell has it for ctrl-C.
+/// The exit code of a run that a person has ended early, as a shell has it for ctrl-C.
 pub(crate) const BY_PERSON: u8 = 130;
 
 /// A subcommand of the tool.
 #[derive(Debug)]
 pub struct Command {
-    /// What the person types, such as `./scripts/run`.
+    /// The command as a person types it, such as `./scripts/run`.
     pub invocation: &'static str,
-    /// One sentence on what it does.
+    /// One sentence that describes the command.
     pub about: &'static str,
     /// The positional words it takes, if any, and their help. One word, or any
     /// number if the name that stands for it ends in `...`.
     pub positional: Option<(Takes, &'static str)>,
     /// The options, in the order of the help text.
     pub options: &'static [Opt],
-    /// What else the help text says, after the options.
+    /// Further text of the help, after the options.
     pub notes: &'static str,
 }
 
-/// Why a command's work has come to nothing.
+/// The reason why a command did not do its work.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// The person wants to be shown this help text instead.
+    /// The help text, which the person asked for.
     Help(String),
     /// The command line, or a file that it names, is at fault: exit code 2.
     Usage(String),
-    /// Something else is: exit code 1.
+    /// Another failure: exit code 1.
     Failure(String),
-    /// A person has ended a run before others that were to follow: exit code 130.
+    /// A person has ended a run that others were to follow: exit code 130.
     ByPerson,
 }
 
@@ -70,7 +70,7 @@ impl From<String> for Refusal {
 }
 
 impl Refusal {
-    /// Says to a person why nothing has come of this invocation, and returns its exit code.
+    /// Prints the reason under the command's name and returns its exit code.
     fn end(self, invocation: &str) -> ExitCode {
         let (lines, code) = match self {
             Refusal::Help(text) => {
@@ -86,16 +86,17 @@ impl Refusal {
     }
 }
 
-/// Says lines under a command's name. What they repeat of files and of words must
-/// not rewrite a terminal.
+/// Prints lines under a command's name. Control characters are made visible, since text from files
+/// and command lines must not rewrite a terminal.
 fn complain(invocation: &str, lines: &str) {
+    // The scripts have short names; the prefix would only lengthen each line.
     let name = invocation.trim_start_matches("./scripts/");
     (lines.lines()).for_each(|line| eprintln!("{name}: {}", visible(line)));
 }
 
 impl Command {
-    /// Does the work that a command line asks for, and returns the exit code. Help, and what is
-    /// refused, or failed, is shown here.
+    /// Parses a command line, runs `work` on it, and returns the exit code. Help, refusals and
+    /// failures are printed here.
     pub(crate) fn carry_out(
         &self,
         words: &[OsString],
@@ -105,23 +106,23 @@ impl Command {
         done.unwrap_or_else(|refusal| refusal.end(self.invocation))
     }
 
-    /// Says why the command line, or a file that it names, is refused, each line under
-    /// the command's name, and returns the exit code for it.
+    /// Reports why the command line, or a file that it names, is refused, each line under the
+    /// command's name, and returns exit code 2.
     pub fn refuse(&self, lines: &str) -> ExitCode {
         Refusal::Usage(lines.into()).end(self.invocation)
     }
 
-    /// Says what failed, as [`refuse`](Self::refuse), and returns the exit code for it.
+    /// Reports a failure, as [`refuse`](Self::refuse) does, and returns exit code 1.
     pub fn fail(&self, lines: &str) -> ExitCode {
         Refusal::Failure(lines.into()).end(self.invocation)
     }
 
-    /// Says lines under the command's name.
+    /// Prints lines under the command's name.
     pub(crate) fn complain(&self, lines: &str) {
         complain(self.invocation, lines);
     }
 
-    /// Returns the options of a command line that is right, for tests.
+    /// Parses a command line that must be valid; for tests.
     #[cfg(test)]
     pub(crate) fn right(&self, line: &str) -> Parsed {
         let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
@@ -133,7 +134,7 @@ impl Command {
     ///
     /// # Errors
     ///
-    /// The first word that the table does not allow, or the help text if that is asked for.
+    /// The first word that the table does not allow; or the help text, if the line asks for it.
     pub fn parse(&self, words: &[OsString]) -> Result<Parsed, Refusal> {
         let mut parsed = Parsed::new(self.options);
         let mut words = words.iter().map(OsString::as_os_str).peekable();
@@ -141,6 +142,7 @@ impl Command {
             if word == "--help" || word == "-h" {
                 return Err(Refusal::Help(self.help()));
             }
+            // A lone `-` is a positional word: by custom it means standard input or output.
             if !word.as_bytes().starts_with(b"-") || word == "-" {
                 self.take_positional(&mut parsed, word)?;
                 continue;
@@ -156,7 +158,7 @@ impl Command {
                 (Takes::Nothing, None) => OsStr::new("yes"),
                 (Takes::Nothing, Some(_)) => return Err(takes_no_value(name)),
                 (_, Some(value)) => value,
-                // What looks like an option is meant as one.
+                // A next word that is an option is no value: the value was forgotten.
                 (_, None) => words
                     .next_if(|next| !self.is_option(next))
                     .ok_or_else(|| Refusal::Usage(option.missing(words.peek().is_some())))?,
@@ -176,6 +178,7 @@ impl Command {
             )));
         };
         let name = takes.name();
+        // Positional words are stored as files whatever their type, so this sees the first one.
         if let Some(first) = parsed.files().next()
             && !name.ends_with("...")
         {
@@ -209,8 +212,10 @@ impl Command {
             })
     }
 
-    /// Finds the option of this name, to which this value is attached.
+    /// Finds the option of this name; `attached` is the value after its `=`, if any.
     fn find(&self, name: &OsStr, attached: Option<&OsStr>) -> Result<&'static Opt, Refusal> {
+        // A name that is no UTF-8 cannot match an option, so the lossy form serves only the
+        // message.
         let name = name.to_string_lossy();
         if attached.is_some() && (name == "--help" || name == "-h") {
             return Err(takes_no_value("help"));
@@ -218,6 +223,7 @@ impl Command {
         self.named(&name).ok_or_else(|| {
             let names = self.options.iter().map(|option| option.name);
             let allowed = names.chain(["help"]).collect::<Vec<_>>();
+            // Both are compared without dashes: `-jobs` is most often a mistyped `--jobs`.
             let hint = match nearest(name.trim_start_matches('-'), &allowed) {
                 Some(near) => format!("did you mean `--{near}`?"),
                 None => format!("allowed are --{}", allowed.join(", --")),
@@ -237,9 +243,11 @@ impl Command {
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "{}\n", self.about);
         let _ = writeln!(text, "usage: {}{positional} [options]\n", self.invocation);
-        // A group's name stands before its first option.
+        // The column of group names is as wide as the longest; it is absent if no option has a
+        // group.
         let groups = self.options.iter().map(|option| option.group.len());
         let indent = groups.max().filter(|longest| *longest > 0);
+        // Two blanks stand between the longest group name and the headings.
         let indent = indent.map_or(0, |longest| longest + 2);
         let mut add = |group: &str, heading: &str, sentence: &str| {
             add_entry(
@@ -263,10 +271,11 @@ impl Command {
     }
 }
 
-/// Adds an entry to a help text: the sentence begins at a column, and is broken to a width.
+/// Adds an entry to a help text: the sentence starts at `column` and wraps after 54 characters.
 fn add_entry(text: &mut String, heading: &str, column: usize, sentence: &str) {
     const WIDTH: usize = 54;
     let mut line = heading.to_string();
+    // A heading that is too long gets a line of its own, so that the sentences stay aligned.
     if line.len() + 2 > column {
         let _ = writeln!(text, "{line}");
         line.clear();
@@ -289,6 +298,7 @@ fn takes_no_value(name: &str) -> Refusal {
 
 /// Splits a word into the name of an option and the value attached by `=`.
 fn split(word: &OsStr) -> (&OsStr, Option<&OsStr>) {
+    // Only the first `=` splits: a value such as `gain=0.5` may contain more.
     let mut parts = word.as_bytes().splitn(2, |byte| *byte == b'=');
     let name = parts.next().unwrap_or_default();
     (OsStr::from_bytes(name), parts.next().map(OsStr::from_bytes))
@@ -301,19 +311,19 @@ pub struct Opt {
     pub name: &'static str,
     /// The short form without its dash, such as `q`.
     pub short: Option<char>,
-    /// The form of what must follow.
+    /// The kind of value that must follow.
     pub takes: Takes,
-    /// The value when the option is not given; empty: it has none.
+    /// The value if the option is not given; empty: none.
     pub default: &'static str,
     /// One sentence for the help text.
     pub help: &'static str,
-    /// The group that begins with it in the help text; empty: none does.
+    /// The name of the group that this option starts in the help text; empty: none.
     pub group: &'static str,
 }
 
-/// Makes the options of a [`Command`]: above each its sentence for the help text; a
-/// short form stands behind the name, the group that begins with it behind `in`, and the value when
-/// the option is not given behind `or`.
+/// Makes the options of a [`Command`]. The doc comment of each is its help sentence; then come the
+/// name, a short form, `in` and the group that it starts, a colon and the value it takes, and `or`
+/// with the default.
 macro_rules! options {
     ($(
         $(#[doc = $help:literal])+
@@ -345,12 +355,12 @@ pub enum Takes {
     OneOf(&'static [&'static str]),
     /// Any text; the word stands for it in the help text.
     Text(&'static str),
-    /// The name of a file or folder, of any bytes; the word stands for it likewise.
+    /// The name of a file or folder, of any bytes; the word stands for it in the help text.
     File(&'static str),
 }
 
 impl Takes {
-    /// Takes a number of a range.
+    /// Returns the kind of a number within a range.
     #[must_use]
     pub const fn number(range: RangeInclusive<u64>) -> Takes {
         let (least, most, is_list) = (*range.start(), *range.end(), false);
@@ -361,7 +371,7 @@ impl Takes {
         }
     }
 
-    /// Takes numbers of a range with commas between.
+    /// Returns the kind of numbers within a range, with commas between.
     #[must_use]
     pub const fn numbers(range: RangeInclusive<u64>) -> Takes {
         let (least, most, is_list) = (*range.start(), *range.end(), true);
@@ -372,7 +382,7 @@ impl Takes {
         }
     }
 
-    /// Returns the word that stands for a value in the help text; empty: none does.
+    /// Returns the placeholder of a value in the help text; empty for a flag.
     const fn name(self) -> &'static str {
         match self {
             Takes::Nothing => "",
@@ -383,7 +393,7 @@ impl Takes {
         }
     }
 
-    /// Says in words which values are allowed.
+    /// Describes the allowed values in words.
     fn allowed(self) -> String {
         match self {
             Takes::Nothing => "nothing".into(),
@@ -422,26 +432,28 @@ impl Opt {
         self
     }
 
-    /// Has a group of this name begin with the option.
+    /// Makes the option the first of a group of this name.
     #[must_use]
     pub const fn begins(mut self, group: &'static str) -> Opt {
         self.group = group;
         self
     }
 
-    /// Adds the value when the option is not given.
+    /// Adds a default.
     #[must_use]
     pub const fn or(mut self, default: &'static str) -> Opt {
         self.default = default;
         self
     }
 
-    /// Checks a value against what the option takes.
+    /// Checks a value against the kind of value that the option takes.
     fn check(&self, value: &OsStr) -> Result<(), String> {
         let text = value.to_str();
         let valid = match (self.takes, text) {
             (Takes::Nothing, _) => true,
+            // A file name may be any bytes; only an empty one, from `--name=`, is a mistake.
             (Takes::File(_), _) => !value.is_empty(),
+            // All other values are text.
             (_, None) => false,
             (
                 Takes::Number {
@@ -473,8 +485,8 @@ impl Opt {
         Err(format!("`--{} {}`: {must}", self.name, shown(&value)))
     }
 
-    /// Says that no value stands after the option. Where an option follows, one that
-    /// was meant as the value could be attached.
+    /// Reports that no value stands after the option. If an option follows, it may have been meant
+    /// as the value; then the message says how to attach it.
     fn missing(&self, is_followed: bool) -> String {
         let (name, allowed) = (self.name, self.takes.allowed());
         let remedy = match (self.takes, is_followed) {
@@ -486,7 +498,7 @@ impl Opt {
         format!("option `--{name}` lacks its value: {allowed}{remedy}")
     }
 
-    /// Returns how the help text writes the option.
+    /// Returns the option as the help text writes it.
     fn heading(&self) -> String {
         let short = self.short.map(|short| format!("-{short}, "));
         let heading = format!(
@@ -498,11 +510,11 @@ impl Opt {
         heading.trim_end().into()
     }
 
-    /// Returns the help text's sentence, with what is allowed and the default.
+    /// Returns the help text's sentence, with the allowed values and the default.
     fn sentence(&self) -> String {
         let mut parts = Vec::new();
         match self.takes {
-            // A bound that no one can reach would only be noise.
+            // `u64::MAX` stands for "no upper bound"; printing it would only be noise.
             Takes::Number { least, most, .. } => parts.push(match most {
                 u64::MAX => format!("from {least}"),
                 most => format!("{least} to {most}"),
@@ -520,7 +532,8 @@ impl Opt {
     }
 }
 
-/// Asks whether the nearest of the names was meant, behind a semicolon; nothing if none is near.
+/// Returns the question whether the nearest of the names was meant, after a semicolon; empty if
+/// none is near.
 pub(crate) fn did_you_mean(name: &str, names: &[&str]) -> String {
     nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
@@ -531,7 +544,7 @@ fn number(text: &str) -> Option<u64> {
     text.parse().ok().filter(|_| is_plain)
 }
 
-/// A command line that was understood.
+/// A command line that was parsed and checked.
 #[derive(Clone, Debug)]
 pub struct Parsed {
     options: &'static [Opt],
@@ -540,7 +553,7 @@ pub struct Parsed {
 }
 
 impl Parsed {
-    /// Begins with the defaults of these options.
+    /// Starts without any given option.
     fn new(options: &'static [Opt]) -> Parsed {
         Parsed {
             options,
@@ -588,7 +601,7 @@ impl Parsed {
         self.value(name).map(Path::new)
     }
 
-    /// Returns the files that options of these names name, as far as they are given.
+    /// Returns the files that these options name, of those that are given or have a default.
     #[must_use]
     pub fn named(&self, options: &[&'static str]) -> Vec<Named<'_>> {
         let named = options.iter().filter_map(|option| {
@@ -611,8 +624,7 @@ impl Parsed {
         words.filter_map(|word| word.parse().ok()).collect()
     }
 
-    /// Makes sure that nothing stands twice among the values with commas between of
-    /// these options.
+    /// Makes sure that no value is repeated in the comma-separated lists of these options.
     ///
     /// # Errors
     ///
@@ -625,6 +637,7 @@ impl Parsed {
                     let value = quoted(value);
                     return Err(format!("`--{option}`: {value} stands twice; give it once"));
                 }
+                // A list on a command line is short, so a search through it will do.
                 before.push(value);
             }
         }
@@ -635,7 +648,7 @@ impl Parsed {
     ///
     /// # Errors
     ///
-    /// In words, with both and what they do, such as to exclude each other.
+    /// In words, with both names and the third text of the pair, such as "exclude each other".
     pub fn check_apart(&self, pairs: &[(&str, &str, &str)]) -> Result<(), String> {
         let both =
             |(one, other, _): &&(&str, &str, &str)| self.is_given(one) && self.is_given(other);
@@ -653,8 +666,7 @@ impl Parsed {
         names.iter().copied().find(|name| self.is_given(name))
     }
 
-    /// Returns the same command line with another value of an option, as if the
-    /// person had given it.
+    /// Returns a copy of the command line with another value of an option.
     #[must_use]
     pub fn with(&self, name: &'static str, value: impl AsRef<OsStr>) -> Parsed {
         let mut other = self.clone();
@@ -662,7 +674,7 @@ impl Parsed {
         other
     }
 
-    /// Returns the same as if a flag had not been given.
+    /// Returns a copy of the command line without an option.
     #[must_use]
     pub fn without(&self, name: &str) -> Parsed {
         let mut other = self.clone();
@@ -676,7 +688,7 @@ impl Parsed {
         self.positionals.first().and_then(|word| word.to_str())
     }
 
-    /// Returns the first positional argument as a file, or else the question which it is.
+    /// Returns the first positional word as a file, or else the question which file it is.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! What a table accepts, what it refuses, and in which words.
+//! Command lines that a table accepts or refuses, and the words of refusals.
 
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
@@ -61,7 +61,7 @@ fn what_is_given_holds_and_else_the_default() {
     }
 }
 
-/// A command line, and what is said of it.
+/// Command lines, and the words of their refusal.
 const REFUSED: &str = "\
 --cores 0 | `--cores 0`: must be a number from 1 to 64
 --cores 65 | `--cores 65`: must be a number from 1 to 64

@@ -1,8 +1,8 @@
 //! Reference values of the analysis at commit: lengths, widths, bounds, verdicts.
 //!
-//! A case gives task sets and what independent implementations computed for
-//! them; [`check`] computes the same with `sched_dag::analysis` and compares
-//! every quantity. There are two kinds of files, and a case is of one of them. In both it is
+//! A case gives task sets and the results of independent implementations for them; [`check`]
+//! computes the same with `sched_dag::analysis` and compares every quantity. There are two kinds of
+//! files, and a case is of one of them. In both it is
 //!
 //! ```text
 //! case NAME m ntasks
@@ -49,10 +49,10 @@ pub struct Case {
     quantities: Quantities,
 }
 
-/// What is computed, in the words of the file, and its value.
+/// The computed quantities: name in the file, and value.
 type Quantities = Vec<(String, String)>;
 
-/// The quantities of a DAG and of a set, by kind of file; each case has each of them once, but the
+/// The quantities of a DAG and of a set, by kind of file. Each case has each of them once, but the
 /// last one of a DAG once for each number of cores.
 const FORMS: [[&[&str]; 2]; 2] = [
     [
@@ -97,6 +97,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     let mut dags = Vec::new();
     for _ in 0..count {
         let task = parse_task(lines)?;
+        // Only `multi_path.txt` begins with `cov`; the first DAG decides for the whole case.
         let is_multi_path = || lines.clone().next_if("cov").is_some();
         let [of_dag, _] = *form.get_or_insert_with(|| FORMS[usize::from(is_multi_path())]);
         let quantities = parse_quantities(lines, of_dag, task.wcets_ns().len())?;
@@ -142,13 +143,15 @@ fn parse_quantities(
     let has =
         |name: &str| (quantities.iter()).any(|(what, _)| what.split(' ').next() == Some(name));
     match names.iter().find(|name| !has(name)) {
+        // The next line tells which record stands there instead.
         Some(missing) => Err(lines.expect(missing).err().unwrap_or(lines.ended(missing))),
         None => Ok(quantities),
     }
 }
 
-/// Checks the form of a quantity, and returns it in plain form.
+/// Checks the form of a quantity, and returns it in normal form.
 fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malformed> {
+    // Numbers are printed again, so that spellings such as `007` compare equal.
     let plain = |words: &[&str]| {
         let numbers = words.iter().map(|word| line.number::<u64>(word));
         Ok(list(&numbers.collect::<Result<Vec<_>, Malformed>>()?))
@@ -180,6 +183,7 @@ fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malf
             }
             list(&order)
         }
+        // Below here every quantity may be refused by its test.
         (_, ["-"]) => "-".to_owned(),
         ("gedf_capacity" | "bonifaci_gedf", _) => {
             let [verdict] = line.fixed()?;
@@ -241,10 +245,12 @@ fn compute_of_dag(what: &str, task: &Task) -> String {
 /// Computes one quantity of a set.
 fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
     let mut order: Vec<usize> = (0..tasks.len()).collect();
+    // Ties go to the DAG that comes first.
     order.sort_by_key(|&dag| (tasks[dag].relative_deadline_ns(), dag));
     let by_deadline: Vec<&Task> = order.iter().map(|&dag| tasks[dag]).collect();
     let accepted = |yes: bool| u8::from(yes).to_string();
     let bounds = |bounds: Option<Vec<u64>>| bounds.map(|bounds| list(&bounds));
+    // The multi-path bound under fixed priorities is for deadlines up to the period.
     let is_constrained = |task: &&Task| task.relative_deadline_ns() <= task.period_ns();
     let by_priority = |clip: InterferenceBound| {
         let bounds = multi_path_fp(&by_deadline, cores, clip);
@@ -301,8 +307,8 @@ mod tests {
         }
     }
 
-    /// Returns the cells of each row, and the first public case with the second cell, in which `\n`
-    /// is the end of a line and `\x` turns what follows, in place of the first.
+    /// Returns the cells of each row, and the first public case with its first cell replaced by the
+    /// second, in which `\n` is the end of a line and `\x` alters the rest.
     fn altered(rows: &str) -> impl Iterator<Item = (Vec<&str>, String)> {
         let first = FILE.split_inclusive("end\n").next().unwrap();
         rows.lines().map(move |row| {
@@ -314,7 +320,7 @@ mod tests {
         })
     }
 
-    /// What stands in the first case, what is put in its place, and the difference that makes.
+    /// A part of the first case, its replacement, and the difference that it makes.
     const WRONG: &str = r"\nlen 41 | \nlen 42 | dag 1: len: expected 42, computed 41
 graham 50 long_paths 46 | graham 50 long_paths 47 | dag 2: single 7: expected graham 50 long_paths 47, computed graham 50 long_paths 46
 melani_gedf 11 44 60 | melani_gedf - | melani_gedf: expected -, computed 11 44 60
@@ -328,7 +334,7 @@ federated 7 | federated 6 0:1 | federated: expected 6 0:1, computed 7";
         }
     }
 
-    /// The same of what is refused: with its line, and the reason if it is worth its words.
+    /// The same for refusals: with the line, and the reason where it is worth a test.
     const MALFORMED: &str = r"dag 31 31 | dag 0 31 | 2
 wcet 2 8 1 | wcet 2 8 | 3 | `wcet` takes 3 words, found 2
 edge 1 2 | edge 1 3 | 6 | there is no subtask 3

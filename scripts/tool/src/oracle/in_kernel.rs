@@ -1,32 +1,29 @@
 //! Reference schedules on the bare machine: the kernel against the oracle.
 //!
-//! The app `replay` runs the cases, all that have the same number of cores in
-//! one boot; what happened is in their traces, which are compared here. For every
-//! instance start and finish have to be near the reference, the number of
-//! preemptions equal; for every job the release and whether it missed equal, the
-//! finish near. *Near* is within a tolerance, a fraction of a unit below a half,
-//! so the order of what is a unit apart in the reference is compared, too.
+//! The app `replay` runs the cases, all with the same number of cores in one boot; their traces are
+//! compared here. For every instance start and finish must be near the reference, the number of
+//! preemptions equal; for every job the release and the miss must be equal, the finish near. *Near*
+//! is within a tolerance, a fraction of a unit below a half, so the order of events a unit apart in
+//! the reference is compared, too.
 //!
-//! What is done about the difference between a model and a machine, and what
-//! the tolerance is for:
+//! The differences between the model and a machine, and the measures against them:
 //!
 //! - *The kernel takes time*, microseconds for every decision and switch, more
 //!   with more cores. That shifts starts, and is most of the tolerance. So that
 //!   it does not add up along chains of instances, execution times include it: a
 //!   unit of execution lasts up to the end of a unit of time (`replay::Scale`).
-//! - *Events that coincide* in the model come one after the other on a machine,
-//!   in an order that means nothing. A decision between two of them is right by
-//!   the rules and still not the reference's: it would start an instance that
-//!   the model does not, and without preemption that one keeps its core.
-//!   The kernel therefore takes events less than a *window* apart for one
-//!   instant (`Machine::set_coincidence`): it decides so much later, which is
-//!   the other part of the tolerance. With a window of 0 it decides at once, as
-//!   it does in apps; cases in which nothing coincides pass that way too.
+//! - *Simultaneous events* of the model come one after the other on a machine, in an arbitrary
+//!   order. A decision between two of them is right by the rules but not the reference's: it would
+//!   start an instance that the model does not, and without preemption that one keeps its core. The
+//!   kernel therefore treats events less than a *window* apart as one instant
+//!   (`Machine::set_coincidence`): it decides so much later, which is the other part of the
+//!   tolerance. With a window of 0 it decides at once, as it does in apps; cases without
+//!   simultaneous events pass that way too.
 //! - *Completions come before releases* of the same instant, and a finish at the
 //!   deadline is no miss: execution ends a *guard* before the unit of time does.
-//! - *Functions may compute* at the beginning of each unit of execution, and only then hold
-//!   their cores (`replay::Computing`). Where cores take turns, all of them are through
-//!   after half a unit, so that the schedule stays what it is.
+//! - *Functions may compute* at the beginning of each unit of execution, and only then hold their
+//!   cores (`replay::Computing`). Where cores take turns, all of them are done after half a unit,
+//!   so that the schedule stays the same.
 
 use std::ffi::OsString;
 use std::fs;
@@ -108,6 +105,7 @@ fn run_files(options: &Parsed) -> Result<ExitCode, Refusal> {
     let mut cases = read(options.files(), schedules::parse).map_err(Refusal::Usage)?;
     let most_cores = options.number("cores-up-to").unwrap_or(MOST_CORES);
     let all = cases.len();
+    // The number of those left out is printed, so that they do not pass unseen.
     cases.retain(|case| u64::from(case.cores) <= most_cores);
     if cases.len() < all {
         let left_out = all - cases.len();
@@ -136,7 +134,7 @@ fn settings(options: &Parsed) -> Settings {
     }
 }
 
-/// Prints what became of the cases and returns how many failed.
+/// Prints the results of the cases, and returns how many failed.
 fn report(judged: &[Judged], settings: &Settings) -> usize {
     for case in judged {
         if let Err(difference) = &case.outcome {
@@ -163,33 +161,33 @@ fn report(judged: &[Judged], settings: &Settings) -> usize {
     failed
 }
 
-/// How cases are run and compared.
+/// The settings for running and comparing cases.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// What time means.
+    /// The meaning of time.
     pub mode: Mode,
     /// The board.
     pub machine: Machine,
     /// The length of a unit, in microseconds.
     pub unit_us: u64,
-    /// How much before the end of a unit of time a unit of execution ends.
+    /// The time before the end of a unit at which execution in it ends, in microseconds.
     pub guard_us: u64,
-    /// Events less than this apart count as one instant.
+    /// The distance below which events count as one instant, in microseconds.
     pub window_us: u64,
-    /// How far a start or finish may be from the reference, in percent of a unit.
+    /// The tolerance for starts and finishes, in per cent of a unit.
     pub tolerance_percent: u64,
     /// Whether cores really compute in each unit of execution.
     pub computes: bool,
 }
 
-/// What became of one case.
+/// The result of one case.
 #[derive(Clone, Debug)]
 pub struct Judged {
     /// The case's name.
     pub name: String,
     /// Its number of cores.
     pub cores: u32,
-    /// How near it came, or the first difference, in one line.
+    /// Its deviation, or the first difference, in one line.
     pub outcome: Result<Deviation, String>,
 }
 
@@ -209,7 +207,7 @@ impl Settings {
         }
     }
 
-    /// Lets cores compute. As events then wait for others' turns, guard and window are a
+    /// Makes cores compute. As events then wait for the turns of others, guard and window are a
     /// 40th of a unit, and the tolerance is 5 %.
     #[must_use]
     pub fn computing(self) -> Self {
@@ -233,7 +231,7 @@ impl Settings {
         self.unit_us.saturating_mul(10 * self.tolerance_percent)
     }
 
-    /// Returns how long a boot with these cases may take in wall time.
+    /// Returns the limit for a boot with these cases, in wall time.
     fn limit(&self, cases: &[&Case]) -> Duration {
         const FOR_BOOT: Duration = Duration::from_secs(120);
         const FOR_CASE: Duration = Duration::from_secs(5);
@@ -241,6 +239,7 @@ impl Settings {
         let finishes = |case: &&Case| case.instances.values().map(|times| times.finish_ns).max();
         let units = cases.iter().filter_map(finishes);
         let real = match self.mode {
+            // In virtual time idle units are skipped, so only the other modes wait for them.
             Mode::Deterministic => Duration::ZERO,
             Mode::Kvm | Mode::Threads => Duration::from_micros(self.unit_us)
                 .saturating_mul(u32::try_from(units.sum::<u64>()).unwrap_or(u32::MAX)),
@@ -249,7 +248,7 @@ impl Settings {
     }
 }
 
-/// The most cases of one boot: the guest has them all in memory.
+/// The largest number of cases of one boot: the guest has them all in memory.
 const MOST_CASES: usize = 64;
 
 /// The guest's memory.
@@ -279,13 +278,14 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
     let mut judged = Vec::with_capacity(cases.len());
     let mut progress = Progress::new(cases.len() as u64, "cases");
     while let Some(first) = waiting.first() {
-        // What the guest cannot run would end the whole boot.
+        // A case that the guest refuses would end the whole boot.
         let fits = |case: &&&Case| case.cores == first.cores && runs_there(case, settings).is_ok();
         let count = waiting.iter().take(MOST_CASES).take_while(fits).count();
         let found = match &waiting[..count] {
             [] => vec![verdict(first, runs_there(first, settings))],
             cases => judge(&boot_with(&image.path, cases, settings)?, cases, settings),
         };
+        // A boot may judge fewer cases than it was given: the rest go into the next one.
         waiting = &waiting[found.len()..];
         judged.extend(found);
         progress.show(judged.len() as u64);
@@ -294,7 +294,7 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
     Ok(judged)
 }
 
-/// Returns why a case is not for the guest: its times are none in nanoseconds.
+/// Returns the reason why the guest cannot run a case: its times do not fit in nanoseconds.
 fn runs_there(case: &Case, settings: &Settings) -> Result<Deviation, String> {
     let built = build(case, settings.scale(), &Epoch::default(), None);
     built.map(|_| Deviation::default())
@@ -336,13 +336,13 @@ fn boot_with(image: &Path, cases: &[&Case], settings: &Settings) -> Result<Outco
         ..Qemu::default()
     };
     let outcome = boot(&qemu, image, &log, settings.limit(cases), |_| {});
-    // It is ours, and in the way of no one if it cannot be removed.
+    // The file is ours; one that cannot be removed harms nothing.
     let _ = fs::remove_file(&module);
     outcome
 }
 
-/// Judges the cases that ran and, if the guest did not get through, the one that
-/// ended it; what comes after that has not been run.
+/// Judges the cases that ran and, if the guest did not run all, the one that ended it. The cases
+/// after that have not run.
 pub(super) fn judge(outcome: &Outcome, cases: &[&Case], settings: &Settings) -> Vec<Judged> {
     let mut judged = Vec::with_capacity(cases.len());
     let ending = outcome.judge().err();
@@ -363,6 +363,7 @@ pub(super) fn judge(outcome: &Outcome, cases: &[&Case], settings: &Settings) -> 
         judged.push(verdict(case, compare_run(case, line, run, settings)));
     }
     match (ending, judged.last_mut()) {
+        // The guest failed after its last case; none of the others is to blame.
         (Some(fault), Some(last)) if last.outcome.is_ok() => last.outcome = Err(fault.reason),
         (None, _) => {
             let _ = fs::remove_file(&outcome.log);
@@ -372,7 +373,7 @@ pub(super) fn judge(outcome: &Outcome, cases: &[&Case], settings: &Settings) -> 
     judged
 }
 
-/// Compares a case with its trace, and with what the guest itself says of the run.
+/// Compares a case with its trace, and with the guest's own report of the run.
 fn compare_run(
     case: &Case,
     line: &MachineLine,
@@ -417,8 +418,8 @@ j 0 0 0 1 1 0
 end
 ";
 
-    /// A run of it with units of 1 ms, which starts 10 us late and finishes 10 us early: what is
-    /// committed, what happened, and what is printed.
+    /// A run of it with units of 1 ms, which starts 10 us late and finishes 10 us early: the
+    /// commit, the events, and the output.
     const LOG: &str = r#"static 1
 0 T=4000000 D=9000000 O=0: a/0
 ;
@@ -432,7 +433,7 @@ end
 {"kind":"verdict","status":"success","reason":""}
 "#;
 
-    /// A part of that, what is put in its place, and the difference that makes.
+    /// A part of that, its replacement, and the difference that it makes.
     const ALTERED: &str = r#"10000 | 20001 | dag 0 job 0 subtask 0: start: expected 0, found 0.020
 990000 finish | 979999 finish | dag 0 job 0 subtask 0: finish: expected 1, found 0.979
 990000 finish | 500000 suspend c0 0.0.0;600000 request c0 0.0.0;600000 resume c0 0.0.0;990000 finish | dag 0 job 0 subtask 0: preemptions: expected 0, found 1

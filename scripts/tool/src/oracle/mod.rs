@@ -1,18 +1,16 @@
 //! The oracle: reference data against the scheduler, its analysis, and the baseline.
 //!
-//! `oracle KIND FILE...` reads reference files and compares each case with what
-//! this project computes. For a failing case the first difference is printed;
-//! the last line is `N passed, M failed`. The exit code is 0 if none failed, 1
-//! if some did, and 2 if a file could not be read as what it should be, which
-//! is said with its line number, and then nothing is compared.
+//! `oracle KIND FILE...` reads reference files and compares each case with the results of this
+//! project. For a failing case the first difference is printed; the last line is `N passed, M
+//! failed`. The exit code is 0 if none failed, 1 if some did, and 2 if a file is malformed, which
+//! is reported with its line number, and then nothing is compared.
 //!
 //! - [`bounds`]: the analysis at commit;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
 //! - [`synchronizer`]: the policies of the publish/subscribe baseline.
 //!
-//! One kind reads no files: what the analysis accepts of random sets is simulated
-//! (`responses`).
+//! One kind reads no files: it simulates random sets that the analysis accepts (`responses`).
 
 pub mod bounds;
 pub mod in_kernel;
@@ -32,7 +30,7 @@ use crate::files;
 use crate::options::{Command, Menu, Refusal, Takes, choices, options};
 use crate::progress::Progress;
 
-/// What reads the cases of one kind.
+/// A reader of the cases of one kind.
 type Parse<Case> = fn(&str) -> Result<Vec<Case>, Malformed>;
 
 static ORACLE: Menu = Menu {
@@ -58,7 +56,7 @@ static ORACLE: Menu = Menu {
     notes: NOTES,
 };
 
-/// What all kinds have in common, for the help texts.
+/// The part of the help texts that all kinds share.
 const NOTES: &str = "\
 Prints the first difference of each failing case, then `N passed, M failed`.
 
@@ -106,7 +104,7 @@ pub fn oracle(words: &[OsString]) -> ExitCode {
     ORACLE.run(words)
 }
 
-/// Reads the cases of one kind, checks each, and prints the differences by the cases' names.
+/// Reads the cases of one kind, checks each, and prints the differences by case.
 fn run_files<Case>(
     words: &[OsString],
     table: &Command,
@@ -124,6 +122,7 @@ fn run_files<Case>(
             if let Err(difference) = checked {
                 failed += 1;
                 progress.end();
+                // The progress line is gone by now, so the difference has its own line.
                 println!("{}: {difference}", name(case));
             }
         }
@@ -133,7 +132,7 @@ fn run_files<Case>(
     })
 }
 
-/// Reads the cases of all files, of which there must be one.
+/// Reads the cases of all files, at least one.
 fn read<'f, Case>(
     names: impl ExactSizeIterator<Item = &'f Path> + Clone,
     parse: Parse<Case>,
@@ -141,6 +140,7 @@ fn read<'f, Case>(
     if names.len() == 0 {
         return Err("which files? name at least one reference file".into());
     }
+    // A file that is given twice would count its cases twice.
     files::check_once(names.clone())?;
     let mut cases = Vec::new();
     for file in names {
@@ -152,7 +152,7 @@ fn read<'f, Case>(
     Ok(cases)
 }
 
-/// Compares a value that a case expects with the one that was found.
+/// Compares the expected value of a case with the one found.
 fn equal(place: impl Display, what: &str, expected: u64, found: u64) -> Result<(), String> {
     match expected == found {
         true => Ok(()),

@@ -1,7 +1,7 @@
 //! Published bounds that the multi-path ones have replaced, for comparison with them.
 //!
-//! They round down, as `bounds.txt` does, and find their fixed points by creeping up, which
-//! is slow where times are nanoseconds. All assume `D <= T`; priorities are the order given.
+//! They round down, as `bounds.txt` does, and find their fixed points by small steps, which is slow
+//! where times are nanoseconds. All assume `D <= T`; priorities are the order given.
 //!
 //! - [`graham`]: R. L. Graham, SIAM J. Applied Mathematics 17(2), 1969;
 //! - [`long_paths`]: Q. He et al., RTSS 2022: path 0 is a longest path, path `j` a longest
@@ -13,12 +13,12 @@ use std::cmp::Reverse;
 
 use sched_dag::analysis::{Task, parallelism};
 
-/// Whether a workload uses no more cores than the DAG is wide.
+/// Whether a workload is limited to as many cores as the DAG is wide.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Width {
-    /// It uses all cores, as published.
+    /// It may use all cores, as published.
     Ignored,
-    /// It does not: the bound of Bertogna and Cirinei (RTSS 2007) for chains.
+    /// It may not: the bound of Bertogna and Cirinei (RTSS 2007) for chains.
     Used,
 }
 
@@ -31,17 +31,18 @@ impl Width {
     }
 }
 
-/// Returns Graham's bound on one job alone.
+/// Returns Graham's bound for one job alone.
 pub(crate) fn graham(task: &Task, cores: u32) -> u64 {
     task.length_ns() + (task.volume_ns() - task.length_ns()) / u64::from(cores)
 }
 
-/// Returns the bound of long paths on one job alone.
+/// Returns the bound by long paths for one job alone.
 pub(crate) fn long_paths(task: &Task, cores: u32) -> u64 {
     let mut weights = task.wcets_ns().to_vec();
     let mut rest = task.volume_ns();
     let waits = (0..u64::from(cores)).map(|j| {
         for subtask in task.longest_path(&weights) {
+            // Subtasks of earlier paths weigh nothing from here on.
             rest -= std::mem::take(&mut weights[subtask]);
         }
         rest / (u64::from(cores) - j)
@@ -54,13 +55,14 @@ pub(crate) fn melani_fp(tasks: &[&Task], cores: u32, width: Width) -> Option<Vec
     by_priority(tasks, cores, width, |_| 0)
 }
 
-/// As [`melani_fp`], of subtasks that are never preempted.
+/// Works like [`melani_fp`], for subtasks that are never preempted.
 pub(crate) fn np_safe_fp(tasks: &[&Task], cores: u32) -> Option<Vec<u64>> {
     by_priority(tasks, cores, Width::Ignored, |dag| {
         let lower = tasks[dag + 1..].iter();
         let mut wcets: Vec<u64> = lower.flat_map(|task| task.wcets_ns()).copied().collect();
         wcets.sort_by_key(|&wcet| Reverse(wcet));
         let largest = |count: u32| wcets.iter().take(count as usize).sum::<u64>();
+        // Each later subtask of the path may be blocked again, on one core less.
         let later = tasks[dag].most_subtasks_on_a_path().saturating_sub(1);
         largest(cores) + later * largest(cores - 1)
     })
@@ -72,6 +74,7 @@ pub(crate) fn melani_edf(tasks: &[&Task], cores: u32, width: Width) -> Option<Ve
         return None;
     }
     let mut bounds: Vec<u64> = tasks.iter().map(|task| graham(task, cores)).collect();
+    // Repeated until no bound changes, since each depends on the others'.
     loop {
         let before = bounds.clone();
         for dag in 0..tasks.len() {
@@ -80,6 +83,7 @@ pub(crate) fn melani_edf(tasks: &[&Task], cores: u32, width: Width) -> Option<Ve
                 let others = (0..tasks.len()).filter(|&other| other != dag);
                 let workloads = others.map(|other| {
                     let used = width.of(tasks[other], cores);
+                    // No more than the jobs whose deadlines come no later can delay it under EDF.
                     let limit = due(tasks[other], used, bounds[other], deadline);
                     workload(tasks[other], used, bounds[other], window).min(limit)
                 });
@@ -131,7 +135,7 @@ fn least(task: &Task, cores: u32, blocking: u64, interference: impl Fn(u64) -> u
     None
 }
 
-/// Returns the most that jobs done within `bound` execute in a window, on `p` cores.
+/// Returns the largest execution in a window, on `p` cores, of jobs that are done within `bound`.
 fn workload(task: &Task, p: u64, bound: u64, window: u64) -> u64 {
     let (volume, pitch) = (task.volume_ns(), p * task.period_ns());
     let area = (p * (window + bound)).checked_sub(volume);
@@ -141,7 +145,7 @@ fn workload(task: &Task, p: u64, bound: u64, window: u64) -> u64 {
     packed.min(p * window)
 }
 
-/// Returns the most that jobs with deadlines no later than one of `deadline` execute.
+/// Returns the largest execution of jobs whose deadlines are no later than `deadline`.
 fn due(task: &Task, p: u64, bound: u64, deadline: u64) -> u64 {
     let (volume, own) = (task.volume_ns(), task.relative_deadline_ns());
     let jobs = (deadline.checked_sub(own)).map_or(0, |gap| gap / task.period_ns() + 1);

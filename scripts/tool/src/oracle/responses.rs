@@ -1,16 +1,17 @@
-//! `oracle responses`: random accepted sets on a machine whose work takes time.
+//! `oracle responses`: random accepted sets on a simulated machine with overheads.
 //!
-//! No response of a set that the analysis accepts is above its bound, where the machine's own
-//! work takes what is charged for it. The scheduler is that of the project, in virtual time; what it
-//! costs is drawn, up to what is charged:
+//! If a set is accepted, no response may exceed its bound as long as the machine's own work takes
+//! no more than is charged for it. The scheduler is the project's own, in virtual time; its
+//! overheads are drawn, up to the charge:
 //!
-//! - a timer interrupt is late, so a release is, unless a completion's step comes first;
+//! - a timer interrupt is late, and with it a release, unless a completion's step comes first;
 //! - an instance that starts keeps its core for the decision and two switches more;
-//! - a step that releases jobs takes the longer, the more instances become ready; meanwhile no
-//!   core goes on, and no other step begins;
-//! - one that is resumed keeps it for an interrupt more, which the one that preempted it pays.
+//! - a step that releases jobs takes longer, the more instances become ready; meanwhile no core
+//!   executes, and no other step begins;
+//! - a resumed instance keeps its core for an interrupt more, which is charged to the one that
+//!   preempted it.
 //!
-//! What is observed is the response of each job, from its nominal release on.
+//! Observed is the response time of each job, from its nominal release.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -50,16 +51,16 @@ command line is refused.
 ",
 };
 
-/// What was seen of all sets.
+/// The observations of all sets.
 #[derive(Default)]
 struct Seen {
     accepted: u64,
     drawn: u64,
     responses: u64,
     above: u64,
-    /// Bounds by the test that gave them.
+    /// The number of bounds by the test that gave them.
     by_test: BTreeMap<String, u64>,
-    /// The largest response as a part of its bound, in thousandths.
+    /// The largest response in thousandths of its bound.
     tightest_permille: u64,
 }
 
@@ -94,7 +95,7 @@ impl Seen {
         let commit = CommitOptions::new(options.policy, options.cores)
             .with_construction(ConstructionPolicy::any_graph());
         let Ok(verified) = verify(&specs, &commit) else {
-            // A WCET or a path beyond the deadline.
+            // It has a WCET or a path beyond the deadline.
             return Vec::new();
         };
         let mut task_set = verified.task_set;
@@ -103,6 +104,7 @@ impl Seen {
             preemption: options.preemption,
             cores: options.cores,
             overheads: Overheads {
+                // Lateness of a release is charged with the dispatch.
                 dispatch_ns: costs.overheads.dispatch_ns + costs.late_ns,
                 ..costs.overheads
             },
@@ -162,8 +164,8 @@ impl Seen {
     }
 }
 
-/// Draws a set, the platform of up to 5 cores it runs on, and what that costs. Some subtasks keep their cores; a cost
-/// is up to a fifth of the least WCET.
+/// Draws a set, a platform of up to 5 cores, and its overheads. Some subtasks keep their cores; an
+/// overhead is up to a fifth of the least WCET.
 fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
     let cores = random.within(1..=5);
     let mut specs = set(random, 1_000, &[cores]);
@@ -191,28 +193,28 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
     (specs, options, Costs { overheads, late_ns })
 }
 
-/// What the platform's own work takes at most.
+/// The largest overheads of the platform.
 #[derive(Clone, Copy, Debug)]
 struct Costs {
     overheads: Overheads,
-    /// From a nominal release to the interrupt for it.
+    /// The time from a nominal release to its interrupt.
     late_ns: u64,
 }
 
-/// How long things take, of what they may.
+/// How long executions and overheads take, of their maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Takes {
-    /// All of it.
+    /// The maximum.
     Most,
-    /// A drawn part.
+    /// A drawn part of the maximum.
     Drawn,
 }
 
 struct Machine<'r> {
     scheduler: Scheduler,
-    /// What each core executes, and when it finishes.
+    /// The instance that each core executes, and its finish.
     cores: Vec<Option<(Instance, u64)>>,
-    /// What is left of each preempted instance.
+    /// The remaining time of each preempted instance.
     left_ns: BTreeMap<Instance, u64>,
     /// The nominal releases of jobs in flight.
     flying: BTreeMap<(DagId, u64), u64>,
@@ -224,8 +226,8 @@ struct Machine<'r> {
 }
 
 impl Machine<'_> {
-    /// Runs a set of DAGs with WCETs until some time, and returns each DAG's longest response, that
-    /// of a job in flight at the end as far as it is known.
+    /// Runs the set until `until_ns`, and returns each DAG's longest response; a job in flight at
+    /// the end counts with its time so far.
     fn longest_responses_ns(mut self, until_ns: u64) -> Vec<u64> {
         self.longest_ns = vec![0; self.scheduler.task_set().dags().len()];
         self.run(until_ns);
@@ -239,24 +241,27 @@ impl Machine<'_> {
         let (costs, mut notices) = (self.costs, Vec::new());
         self.scheduler
             .hear([EventKind::Released, EventKind::Completed]);
-        // The scheduler's next event, and when its interrupt comes.
+        // The scheduler's next event, and the time of its interrupt.
         let mut alarm: Option<(u64, u64)> = None;
         let mut now_ns = 0;
-        // When the last step is over.
+        // The end of the last step.
         let mut over_ns = 0;
         loop {
             let due_ns = self.scheduler.next_event_ns();
+            // A lateness is drawn once for each event, not at each look.
             if alarm.map(|(due_ns, _)| due_ns) != due_ns {
                 alarm = due_ns.map(|due_ns| (due_ns, due_ns + self.draw(costs.late_ns)));
             }
             let finish_ns = self.cores.iter().flatten().map(|(_, finish_ns)| *finish_ns);
             let interrupt_ns = alarm.map(|(_, at_ns)| at_ns.max(now_ns));
             let next_ns = finish_ns.chain(interrupt_ns).min();
+            // No step begins before the last one is over.
             let next_ns = next_ns.map(|next_ns| next_ns.max(over_ns));
             let Some(next_ns) = next_ns.filter(|next_ns| *next_ns <= until_ns) else {
                 return;
             };
             now_ns = next_ns;
+            // Completions come before the releases of the same instant.
             for core in &mut self.cores {
                 if let Some((instance, _)) = core.take_if(|(_, finish_ns)| *finish_ns <= now_ns) {
                     self.scheduler.at(now_ns).complete(instance);
@@ -270,13 +275,14 @@ impl Machine<'_> {
             }
             let takes_ns = self.draw(ready * costs.overheads.ready_ns);
             over_ns = now_ns + takes_ns;
+            // The step takes the time of all cores, so every finish moves.
             for (_, finish_ns) in self.cores.iter_mut().flatten() {
                 *finish_ns += takes_ns;
             }
         }
     }
 
-    /// Notes a release or a completion; returns how many instances it has made ready by releases.
+    /// Handles a release or a completion; returns how many instances a release has made ready.
     fn hear(&mut self, notice: &DriverNotice, now_ns: u64) -> u64 {
         let (dag, job) = (notice.event.dag, notice.event.job);
         if notice.event.what == EventKind::Released {
@@ -312,6 +318,7 @@ impl Machine<'_> {
                 let dag = self.scheduler.task_set().dag(instance.dag);
                 let wcet_ns = dag.subtask(instance.subtask).wcet_ns().unwrap_or(0);
                 let own_ns = overheads.dispatch_ns + 2 * overheads.context_switch_ns;
+                // An instance of no length could finish before it starts.
                 self.draw(wcet_ns).max(1) + self.draw(own_ns)
             }
         };

@@ -1,11 +1,10 @@
-//! Reference schedules: what runs when, to the unit.
+//! Reference schedules: the execution of every instance, exact to the unit.
 //!
-//! A case is a set of DAGs with the execution time of every instance, and the
-//! schedule that two independent implementations agree on (`replay::Case` has the
-//! format). [`check`] replays the DAGs through the real scheduler in virtual
-//! time; [`compare`] holds what ran, there or on a machine, against the case: each
-//! start, finish and number of preemptions, and of each job release, finish, response
-//! time and miss.
+//! A case is a set of DAGs with the execution time of every instance, and the schedule that two
+//! independent implementations agree on (`replay::Case` has the format). [`check`] replays the DAGs
+//! through the real scheduler in virtual time; [`compare`] compares a run, there or on a machine,
+//! with the case: each start, finish and number of preemptions, and of each job release, finish,
+//! response time and miss.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -18,21 +17,21 @@ pub use ::replay::{Case, parse};
 
 use crate::oracle::equal;
 
-/// More cores than these are only simulated if there are as many subtasks: of
-/// each subtask at most one instance runs at a time.
+/// More cores than this are only simulated if there are as many subtasks: of each subtask at most
+/// one instance runs at a time.
 const ALWAYS_SIMULATED: usize = 1024;
 
-/// How far starts and finishes were from the reference.
+/// The deviation of starts and finishes from the reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Deviation {
-    /// The most that one was early, in nanoseconds, as a negative number.
+    /// The largest earliness, in nanoseconds, as a negative number.
     pub earliest_ns: i128,
-    /// The most that one was late, in nanoseconds.
+    /// The largest lateness, in nanoseconds.
     pub latest_ns: i128,
 }
 
 impl Deviation {
-    /// Returns what holds for both.
+    /// Returns the deviation that covers both.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
@@ -42,7 +41,7 @@ impl Deviation {
     }
 }
 
-/// Replays a case and compares everything that it expects.
+/// Replays a case and compares everything that it states.
 ///
 /// # Errors
 ///
@@ -67,6 +66,7 @@ pub fn check(case: &Case) -> Result<(), String> {
         }
         RunOutcome::TimeOverflow(instance) => return Err(format!("{instance} never finishes")),
     }
+    // The run ended without an event to come, and yet jobs are left: they are stuck.
     if !run.is_finished() {
         return Err("some jobs have not ended".to_owned());
     }
@@ -75,8 +75,8 @@ pub fn check(case: &Case) -> Result<(), String> {
     compare(case, &case.task_set, &record, 1, 0).map(drop)
 }
 
-/// Compares a case with the record of a run in which a unit of its time was so long; starts,
-/// finishes and response times may be `tolerance_ns` off. Returns how far they were.
+/// Compares a case with the record of a run in which a unit of its time took `unit_ns`. Starts,
+/// finishes and response times may deviate by `tolerance_ns`. Returns their deviation.
 ///
 /// # Errors
 ///
@@ -103,6 +103,7 @@ pub fn compare(
         tolerance_ns,
         deviation: Deviation::default(),
     };
+    // In the order of starts, the first difference is the cause of the later ones.
     let mut by_start: Vec<_> = case.instances.iter().zip(instances.values()).collect();
     by_start.sort_by_key(|((_, expected), _)| expected.start_ns);
     for ((instance, expected), found) in by_start {
@@ -115,6 +116,7 @@ pub fn compare(
         let place = format!("dag {} job {job}", dag.0);
         let release_ns = found.release_ns.unwrap_or(u64::MAX);
         let expected_ns = expected.release_ns.saturating_mul(unit_ns);
+        // A release has no tolerance: it is nominal, and no machine delays it.
         equal(&place, "release", expected_ns, release_ns)?;
         let finish_ns = record.completion_ns(dag, job);
         near.check(&place, "finish", expected.finish_ns, finish_ns)?;
@@ -126,7 +128,7 @@ pub fn compare(
     Ok(near.deviation)
 }
 
-/// Compares times, and remembers the greatest differences.
+/// Compares times, and keeps the largest deviations.
 struct Near {
     unit_ns: u64,
     tolerance_ns: u64,
@@ -144,6 +146,7 @@ impl Near {
         let found_ns = found_ns.ok_or_else(|| format!("{place}: {what}: there was none"))?;
         let difference_ns = i128::from(found_ns) - i128::from(units) * i128::from(self.unit_ns);
         if difference_ns.unsigned_abs() > u128::from(self.tolerance_ns) {
+            // With decimals, since the difference may be a fraction of a unit.
             let (whole, part) = (found_ns / self.unit_ns, found_ns % self.unit_ns);
             let found = match u128::from(part) * 1000 / u128::from(self.unit_ns) {
                 0 => whole.to_string(),

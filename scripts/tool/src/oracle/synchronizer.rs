@@ -1,8 +1,8 @@
-//! Reference traces of message synchronizers: what comes out at which arrival.
+//! Reference traces of message synchronizers: the output at each arrival.
 //!
-//! A case is a policy with its parameters, a list of arrivals, and what the
-//! original emitted and dropped at each. [`check`] feeds the arrivals to the
-//! policy of the crate `pub-sub` and compares. The records of `synchronizer.txt`:
+//! A case is a policy with its parameters, a list of arrivals, and the sets that the original
+//! emitted and the messages that it dropped at each. [`check`] feeds the arrivals to the policy of
+//! the crate `pub-sub` and compares. The records of `synchronizer.txt`:
 //!
 //! ```text
 //! case NAME exact|approximate N QUEUE_SIZE
@@ -15,9 +15,9 @@
 //! end
 //! ```
 //!
-//! Times are in nanoseconds. An exact queue size of 0 is no limit. A `SEQ` names
-//! one arrival of its topic; that it is unique is checked, but a set of messages
-//! that never arrived is a difference, not an error of the file.
+//! Times are in nanoseconds. An exact queue size of 0 is no limit. A `SEQ` names one arrival of its
+//! topic, and must be unique. A set of messages that never arrived is a difference, not an error of
+//! the file.
 
 use std::collections::{BTreeSet, HashSet};
 use std::num::NonZeroUsize;
@@ -27,7 +27,7 @@ use pub_sub::{
 };
 use replay::lines::{Line, Lines, Malformed, cases, quoted};
 
-/// One synchronizer with its arrivals and what is expected of it.
+/// One synchronizer with its arrivals and the expected output.
 #[derive(Debug)]
 pub struct Case {
     /// The case's name.
@@ -47,17 +47,17 @@ struct Arrival {
     expected: Departures,
 }
 
-/// What leaves a synchronizer while one arrival is handled.
+/// The messages that leave a synchronizer during one arrival.
 #[derive(Clone, Debug, Default)]
 struct Departures {
-    /// For each set the sequence numbers in the order of the topics.
+    /// For each set its sequence numbers in the order of the topics.
     sets: Vec<Vec<u64>>,
-    /// Topic and sequence number of what left in no set.
+    /// Topic and sequence number of each message that left in no set.
     dropped: BTreeSet<(usize, u64)>,
 }
 
-/// Reserved storage grows with the topics whatever the arrivals are, so a number
-/// that no trace can need is refused before it is reserved.
+/// The most topics. Storage is reserved by their number, so one that no trace needs is refused
+/// first.
 const MOST_TOPICS: usize = 1024;
 
 /// Reads all cases of a file.
@@ -91,7 +91,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
         }
     };
     let arrivals = parse_arrivals(lines, topics)?;
-    // A queue with room for all arrivals never overflows, so no more than that is reserved.
+    // A queue with room for all arrivals never overflows, so no more is reserved.
     let most = NonZeroUsize::new(arrivals.len()).unwrap_or(NonZeroUsize::MIN);
     let parameters = |(line, queue_size): (Line<'_>, NonZeroUsize)| {
         let parameters = Parameters::new(topics, queue_size.min(most));
@@ -137,6 +137,7 @@ fn parse_arrivals(lines: &mut Lines<'_>, topics: usize) -> Result<Vec<Arrival>, 
         let message = |topic, sequence| {
             Ok::<_, Malformed>((line.index("topic", topic, topics)?, line.number(sequence)?))
         };
+        // A message that arrives or leaves twice would hide a difference.
         let once =
             |seen: &mut HashSet<_>, (topic, sequence), what| match seen.insert((topic, sequence)) {
                 true => Ok(()),
@@ -182,7 +183,7 @@ fn parse_arrivals(lines: &mut Lines<'_>, topics: usize) -> Result<Vec<Arrival>, 
     }
 }
 
-/// Feeds a case and compares everything that it expects.
+/// Feeds a case and compares everything that it states.
 ///
 /// # Errors
 ///
@@ -204,8 +205,8 @@ pub fn check(case: &Case) -> Result<(), String> {
     Ok(())
 }
 
-/// A policy's own account of what leaves. The original gives no notice of a message
-/// that another replaces, but it has left, and so the traces list it.
+/// Records the messages that leave. The original does not report a message that another one
+/// replaces, but it has left, and so the traces list it.
 impl Outlet<u64> for Departures {
     fn emitted(&mut self, set: Set<'_, u64>) {
         self.sets.push(set.map(|stamped| stamped.message).collect());
@@ -221,12 +222,14 @@ impl Outlet<u64> for Departures {
 }
 
 fn compare(expected: &Departures, departures: &Departures) -> Result<(), String> {
+    // Up to the longer list: a missing set and a set too many are both differences.
     for index in 0..expected.sets.len().max(departures.sets.len()) {
         let [expected, emitted] = [expected, departures].map(|of| {
             let set = of.sets.get(index);
             let words = set.map(|set| set.iter().map(u64::to_string).collect::<Vec<_>>());
             words.map_or("none".to_owned(), |words| words.join(" "))
         });
+        // By position: the order in which sets come out is part of the policy.
         if expected != emitted {
             return Err(format!(
                 "set {index}: expected {expected}, emitted {emitted}"
@@ -295,7 +298,7 @@ end
         }
     }
 
-    /// What stands in a case, what is put in its place, and the difference that makes.
+    /// A part of a case, its replacement, and the difference that it makes.
     const EXACT_WRONG: &str = r"s 2 8 4 | s 2 7 4 | arrival 2 (topic 1, message 4): set 0: expected 7 4, emitted 8 4
 s 2 8 4\n |  | arrival 2 (topic 1, message 4): set 0: expected none, emitted 8 4
 s 2 8 4 | s 2 8 4\ns 2 8 999 | arrival 2 (topic 1, message 4): set 1: expected 8 999, emitted none
@@ -330,8 +333,8 @@ a 0 1 19 | a 0 1 20 | arrival 2 (topic 0, message 1): set 0: expected 1 0, emitt
         }
     }
 
-    /// The same of what is refused: with its line and the reason. What is wrong with a line of any
-    /// kind of file is told by the tests of bounds.
+    /// The same for refusals: with the line and the reason. The tests of bounds cover faults that
+    /// lines of every kind of file can have.
     const EXACT_MALFORMED: &str = r"exact 2 5 | exactly 2 5 | 1 | found `exactly`
 exact 2 5 | exact 0 5 | 1 | 1 to 1024 topics
 exact 2 5 | exact 1025 5 | 1 | 1 to 1024 topics

@@ -1,15 +1,13 @@
-//! What a run has proven, and what it was observed to take.
+//! Bounds of a run, recomputed on the host, next to the times that were observed.
 //!
-//! A record tells everything that bounds follow from: the graphs with WCETs and priorities, the
-//! policy, the cores, what each instance was charged, and the bounds. From that the host asks the
-//! same analysis. What the guest has not room for, such as a witness, or where a bound comes
-//! from ([`report`]), the host so has too; where the two disagree about a bound, that is an
-//! error.
+//! A record has everything that bounds follow from: the graphs with WCETs and priorities, the
+//! policy, the cores, the charge on each instance, and the bounds. From these the host runs the
+//! same analysis. So it also gets results for which the guest has no room, such as a witness, or
+//! the parts of a bound ([`report`]). If host and guest disagree about a bound, that is an error.
 //!
-//! It also tells what the runs took and what the platform itself costs
-//! ([`observed`]). The longest calls, and a margin, are WCETs
-//! that a later commit can take; the longest responses stand next to the bounds
-//! ([`report`]).
+//! It also measures the execution times of the runs and the platform's own overheads
+//! ([`observed`]). The longest calls, with a margin, are WCETs that a later commit can take; the
+//! longest responses are shown next to the bounds ([`report`]).
 
 pub mod observed;
 pub mod report;

@@ -1,14 +1,15 @@
-//! What runs were observed to take: per subtask the execution times, per DAG the response
-//! times, and what the platform's own work costs.
+//! Observed times of runs: execution times per subtask, response times per DAG, and the platform's
+//! overheads.
 //!
-//! Runs of other boots can be added: DAGs are the same if the hashes of their names and edges are.
+//! Runs of other boots can be added: two DAGs are the same if the hashes of their names and edges
+//! are.
 //!
-//! The platform's costs are measured in the journal of a run: `sched_dag::law::Costs` says what is
-//! measured, `sched_dag::analysis::Overheads::measured` what is charged for it.
+//! The overheads are measured from the journal of a run: `sched_dag::law::Costs` defines the
+//! measurement, `sched_dag::analysis::Overheads::measured` the charge for it.
 //!
-//! WCETs that were observed go to files, for later commits. `sched_dag::wcets` has the format and
-//! its reader, which the guest's commit uses, too. A file is refused here for what can be seen
-//! without the DAGs; the rest the commit says.
+//! Observed WCETs go to files, for later commits. `sched_dag::wcets` has the format and its reader,
+//! which the guest's commit uses, too. Faults that can be seen without the DAGs are refused here;
+//! the commit reports the others.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -38,7 +39,7 @@ pub struct OfDag {
     pub subtasks: Vec<(String, Distribution)>,
 }
 
-/// Adds what a boot's runs took to what was seen before.
+/// Adds the times of a boot's runs to those seen before.
 ///
 /// # Errors
 ///
@@ -49,6 +50,7 @@ pub fn add(all: &mut Vec<OfDag>, record: &Record) -> Result<(), String> {
         let committed = &record.commits[*place];
         is_told |= !times.dags.is_empty();
         for (dag, times) in committed.told.dags.iter().zip(&times.dags) {
+            // A record is a file of a person and may combine a commit with the times of another.
             if times.subtasks.len() != dag.subtasks.len() {
                 return Err(format!(
                     "the times of dag `{}` are not of its subtasks",
@@ -56,6 +58,7 @@ pub fn add(all: &mut Vec<OfDag>, record: &Record) -> Result<(), String> {
                 ));
             }
             let place = all.iter().position(|other| other.hash == dag.hash);
+            // A DAG of this shape was not seen before.
             let place = place.unwrap_or_else(|| {
                 let names = dag.subtasks.iter().map(|subtask| subtask.name.clone());
                 all.push(OfDag {
@@ -68,6 +71,7 @@ pub fn add(all: &mut Vec<OfDag>, record: &Record) -> Result<(), String> {
             });
             let of_dag = &mut all[place];
             let longest_ns = distribution(&times.response).max();
+            // By commit: the bounds of two commits of one DAG may differ.
             let so_far = of_dag.longest_responses_ns.entry(committed.number);
             let so_far = so_far.or_default();
             *so_far = longest_ns.max(*so_far);
@@ -82,7 +86,7 @@ pub fn add(all: &mut Vec<OfDag>, record: &Record) -> Result<(), String> {
     }
 }
 
-/// Makes a distribution of what a record has counted.
+/// Makes a distribution from the counts of a record.
 #[must_use]
 pub fn distribution(counted: &Counted) -> Distribution {
     Distribution::counted(counted.min_ns, counted.buckets.clone())
@@ -115,11 +119,11 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
     all.iter().flat_map(of_dag)
 }
 
-/// What was measured.
+/// The measured overheads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Measured(pub MeasuredCosts);
 
-/// Measures the runs of a guest.
+/// Measures the overheads in the runs of a guest: the largest of all runs.
 ///
 /// # Errors
 ///
@@ -137,6 +141,7 @@ pub fn measure(runs: &[Run]) -> Result<Measured, String> {
 }
 
 fn of_run(run: &Run) -> MeasuredCosts {
+    // Without a tolerance nothing is a breach, and only the figures are needed.
     let figures = trace::check(run, u64::MAX).figures;
     MeasuredCosts {
         dispatches: figures.instances as u64,
@@ -146,7 +151,7 @@ fn of_run(run: &Run) -> MeasuredCosts {
 }
 
 impl Measured {
-    /// Returns the guest's word for what is charged, with a margin in hundredths.
+    /// Returns the guest's word for the charged overheads, with a margin in per cent.
     #[must_use]
     pub fn word(&self, margin_percent: u64) -> String {
         let margin_percent = u32::try_from(margin_percent).unwrap_or(u32::MAX);
@@ -159,7 +164,7 @@ impl Measured {
         format!("overheads_ns={context_switch_ns},{dispatch_ns},{interrupt_ns}")
     }
 
-    /// Returns what was measured and is charged, for people.
+    /// Returns the measured and the charged overheads as text for people.
     #[must_use]
     pub fn text(&self, margin_percent: u64) -> String {
         format!(
@@ -169,7 +174,7 @@ impl Measured {
         )
     }
 
-    /// Returns the same as a machine line.
+    /// Returns the measured overheads as a machine line.
     #[must_use]
     pub fn line(&self, margin_percent: u64) -> String {
         Object::new()
@@ -183,10 +188,10 @@ impl Measured {
     }
 }
 
-/// What is added to the longest call if nobody says how much, in hundredths of it.
+/// The margin on the longest call, in per cent of it, if no other is given.
 pub const MARGIN_PERCENT: u64 = 20;
 
-/// Returns a file of the longest calls and a margin. A subtask that never ran has none.
+/// Returns a file of the longest calls with a margin. A subtask that never ran is left out.
 #[must_use]
 pub fn text(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::from(
@@ -210,11 +215,13 @@ pub fn text(all: &[OfDag], margin_percent: u64) -> String {
 }
 
 fn with_margin(longest_ns: u64, margin_percent: u64) -> u64 {
+    // In 128 bits: a long call times the factor may exceed 64.
     let ns = u128::from(longest_ns) * u128::from(100 + margin_percent);
+    // Rounded up, and at least 1: the commit takes no WCET of 0.
     u64::try_from(ns.div_ceil(100)).unwrap_or(u64::MAX).max(1)
 }
 
-/// Reads a file of WCETs, which a commit can then only refuse because of its DAGs.
+/// Reads a file of WCETs, and checks everything that does not depend on the DAGs.
 ///
 /// # Errors
 ///
@@ -238,6 +245,7 @@ pub fn read(path: &Path) -> Result<String, String> {
             }
             wcets::WcetRecord::Dag { hash, .. } => {
                 hashes.push(hash);
+                // Numbers of subtasks count anew in each DAG.
                 numbers.clear();
                 has_dag = true;
             }
@@ -255,6 +263,7 @@ pub fn read(path: &Path) -> Result<String, String> {
         }
     }
     match (has_ended, has_dag) {
+        // A file that was cut off must not pass as one with fewer WCETs.
         (false, _) => {
             let why = "the file does not end by `end`; is a part of it missing?";
             Err(refuse(last.max(1), why))
@@ -264,8 +273,8 @@ pub fn read(path: &Path) -> Result<String, String> {
     }
 }
 
-/// Returns what the guest says of the file, by its name and line; `None` if it speaks of
-/// something else.
+/// Translates a guest's refusal of the file into one with its name and line; `None` if the message
+/// is about something else.
 #[must_use]
 pub fn translate(said: &str, path: &Path) -> Option<String> {
     let (before, rest) = said.split_once("line ")?;
@@ -274,7 +283,7 @@ pub fn translate(said: &str, path: &Path) -> Option<String> {
     is_line.then(|| format!("{before}{}:{line}: {after}", files::place(path)))
 }
 
-/// Returns the table of what was observed.
+/// Returns the table of the observed times.
 #[must_use]
 pub fn table(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::new();
@@ -306,7 +315,7 @@ pub fn table(all: &[OfDag], margin_percent: u64) -> String {
     text
 }
 
-/// Returns a histogram of ten equal parts between the smallest and the largest value.
+/// Returns a histogram of ten bins of equal width between the smallest and the largest value.
 fn bars(times: &Distribution) -> String {
     const PARTS: usize = 10;
     const HEIGHTS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
@@ -315,12 +324,14 @@ fn bars(times: &Distribution) -> String {
     for (top, count) in times.values() {
         let from = u128::from(top - times.min());
         let part = from * PARTS as u128 / u128::from(width);
+        // The largest value falls on the upper end, into the last bin.
         parts[usize::try_from(part).map_or(PARTS - 1, |part| part.min(PARTS - 1))] += count;
     }
     let most = parts.into_iter().max().unwrap_or(0).max(1);
     let height = |&count: &u64| match count {
         0 => ' ',
         _ => {
+            // The tallest bin gets the last of the eight heights.
             let height = u128::from(count) * 7 / u128::from(most);
             HEIGHTS[usize::try_from(height).map_or(7, |height| height.min(7))]
         }

@@ -1,16 +1,16 @@
-//! What was proven next to what was observed: a table, machine lines, and a verdict.
+//! Bounds next to observed response times: a table, machine lines, and a verdict.
 //!
-//! To tell where a bound is above what was observed, the same analysis is asked again with less and
-//! less: without the platform's overheads, then with every subtask preemptible, then with the DAG
-//! alone. What each step takes off the bound is the part of what it leaves out:
+//! To attribute the slack of a bound, the same analysis is run again with less and less: without
+//! the platform's overheads, then with every subtask preemptible, then with the DAG alone. The
+//! difference that each step makes is the part of what it leaves out:
 //!
 //! ```text
 //! bound = overheads + blocking + interference + own order + longest path
 //! ```
 //!
-//! *Own order* is what the DAG's other subtasks may delay its longest path by, *overheads*
-//! are those of all DAGs. What is left between the longest path at its WCETs and the
-//! longest response time is what WCETs are above what calls took.
+//! *Own order* is the delay of the longest path by the DAG's other subtasks, *overheads* are those
+//! of all DAGs. The rest, from the longest observed response up to the longest path at its WCETs,
+//! is the pessimism of the WCETs.
 //!
 //! The witnesses of a guest's bounds go to files, for `./scripts/check-witness`.
 
@@ -28,7 +28,7 @@ use crate::record::{self, Committed};
 /// One DAG of one commit.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// The file that the DAG is from, if there are several.
+    /// The file of the DAG, if there are several.
     file: Option<String>,
     commit: usize,
     dag: String,
@@ -66,7 +66,7 @@ pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<Row>, Strin
 }
 
 impl Row {
-    /// Names the file that the DAG is from.
+    /// Names the file of the DAG.
     #[must_use]
     pub fn of_file(self, name: &str) -> Self {
         Self {
@@ -89,6 +89,7 @@ impl Row {
 
     /// Returns the longest response in thousandths of the bound.
     fn permille(&self) -> Option<u64> {
+        // In 128 bits, since a response of 213 days times 1000 exceeds 64.
         let permille = u128::from(self.longest_ns) * 1000 / u128::from(self.bound_ns?.max(1));
         u64::try_from(permille).ok()
     }
@@ -120,6 +121,7 @@ impl Row {
         ];
         let parts = self.parts();
         for (name, number) in permille.into_iter().chain(parts) {
+            // Parts without a bound would add up to nothing.
             if let (Some(number), true) = (number, self.bound_ns.is_some()) {
                 line = line.number(name, number);
             }
@@ -154,14 +156,14 @@ pub fn table(rows: &[Row]) -> String {
     table.text()
 }
 
-/// Returns thousandths as hundredths for people.
+/// Formats thousandths as per cent with one decimal.
 pub(crate) fn ratio(permille: Option<u64>) -> String {
     permille.map_or("-".into(), |permille| {
         format!("{}.{} %", permille / 10, permille % 10)
     })
 }
 
-/// Returns how many DAGs are proven, and how many responses were above their bounds.
+/// Returns the number of proven DAGs, and of responses above their bounds.
 #[must_use]
 pub fn summary(rows: &[Row]) -> String {
     let proven = rows.iter().filter(|row| row.bound_ns.is_some()).count();
@@ -170,7 +172,7 @@ pub fn summary(rows: &[Row]) -> String {
     format!("{proven} of {dags} DAGs proven, {above} responses above a bound")
 }
 
-/// Returns what makes the proof worthless, if anything does: a response above its bound.
+/// Returns the complaint about a response above its bound, which makes the proof worthless.
 #[must_use]
 pub fn complaint(rows: &[Row]) -> Option<String> {
     let row = rows.iter().find(|row| row.exceeds())?;
@@ -183,23 +185,23 @@ pub fn complaint(rows: &[Row]) -> Option<String> {
     ))
 }
 
-/// The parts of a bound, in nanoseconds. Each is `None` if a bound that it is the
-/// difference of is not proven.
+/// The parts of a bound, in nanoseconds. A part is `None` if a bound that it is a difference of is
+/// not proven.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Slack {
-    /// What the platform's costs add.
+    /// The part of the platform's overheads.
     pub overheads_ns: Option<u64>,
-    /// What less urgent instances that keep their cores add.
+    /// The part of less urgent instances that keep their cores.
     pub blocking_ns: Option<u64>,
-    /// What other DAGs' more urgent instances add.
+    /// The part of other DAGs' more urgent instances.
     pub interference_ns: Option<u64>,
-    /// What its own subtasks off the longest path add.
+    /// The part of its own subtasks off the longest path.
     pub own_order_ns: Option<u64>,
-    /// The longest path, at its WCETs.
+    /// The length of the longest path, at its WCETs.
     pub length_ns: Option<u64>,
 }
 
-/// Takes the bound of a DAG of a commit apart.
+/// Splits the bound of a DAG of a commit into its parts.
 #[must_use]
 pub fn of(commit: &Committed, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
@@ -212,7 +214,7 @@ pub fn of(commit: &Committed, dag: DagId) -> Slack {
         let answer = analysis::answer(&task_set, settings);
         answer.bounds[dag].map(|bound| bound.bound_ns)
     };
-    // What is in other clusters has no part in it.
+    // DAGs of other clusters do not interfere.
     let task_set = &commit.task_set;
     let cluster = task_set.dag(dag).cluster();
     let is_here = |(_, model): &(usize, &Dag)| model.cluster() == cluster;
@@ -220,8 +222,10 @@ pub fn of(commit: &Committed, dag: DagId) -> Slack {
     let specs = here().map(|(place, _)| &commit.specs[place]);
     let mut all: Vec<DagSpec> = specs.cloned().collect();
     (all.iter_mut()).for_each(|dag| dag.cluster = None);
+    // Its index among the DAGs of its cluster.
     let index = here().take_while(|(place, _)| *place < dag.index()).count();
     let full = commit.told.dags[dag.index()].bound_ns;
+    // The order of the steps decides which part gets an effect that two of them have.
     let mut settings = commit.settings();
     let cores = task_set.cores_of(cluster, settings.cores).len();
     settings.cores = u32::try_from(cores).unwrap_or(u32::MAX);
@@ -247,8 +251,8 @@ pub fn of(commit: &Committed, dag: DagId) -> Slack {
     }
 }
 
-/// Writes the witness of each commit, and returns what to say of them. Those of later
-/// commits go to files of their own, with the commit's number as their last extension.
+/// Writes the witness of each commit, and returns a line that names the files. Witnesses of later
+/// commits get files of their own, with the commit's number as the last extension.
 ///
 /// # Errors
 ///

@@ -18,8 +18,8 @@ use crate::record::Record;
 const CHAIN: &str = "static 2
 demo T=10000000 D=10000000 O=0 bound=5002000 hash=5: a/0/2000000 b/1/3000000; 0>1";
 
-/// The record of that chain, which says of `a` what three calls took; the longest call and
-/// response took so long.
+/// The record of that chain, with three calls of `a`; the parameters are the longest call and
+/// response.
 fn record(longest_ns: u64) -> Record {
     let commit = Commit {
         charge_ns: Some(1000),
@@ -64,7 +64,7 @@ fn the_model_is_made_again_and_bounded_alike() {
     let commits = record.proven().unwrap();
     assert_eq!(commits[0].told.dags[0].bound_ns, Some(5_002_000));
     assert_eq!(commits[0].task_set.dags()[0].name(), "demo");
-    // The parts of a bound are the bound.
+    // The parts add up to the bound.
     let expected = report::Slack {
         overheads_ns: Some(2_000),
         blocking_ns: Some(0),
@@ -138,8 +138,8 @@ fn what_is_of_one_of_several_files_or_commits_has_its_name() {
     fs::remove_file(&path).and(fs::remove_file(second)).unwrap();
 }
 
-/// What stands in a file of WCETs, what is put in its place, the line and the reason of the refusal.
-/// A line's end is `/`.
+/// A part of a file of WCETs, its replacement, and the line and the reason of the refusal. A line's
+/// end is `/`.
 const WRONG: &str = "\
 wcet 11 | wcet 0 | 7 | a WCET of 0
 wcet 11 | wect 11 | 7 | this is no record

@@ -1,7 +1,7 @@
-//! The record of a boot, read: its commits, the events of its runs, and what they took.
+//! The record of a boot, read: its commits, and the events and times of its runs.
 //!
-//! It comes as a file, or as lines of a serial log, each with some of the file's bytes. All that
-//! is shown, judged, drawn or computed of a run is a view of what is here.
+//! It comes as a file, or as lines of a serial log with the file's bytes. Every view of a run
+//! (shown, judged, drawn or computed) is derived from it.
 
 pub mod bound;
 
@@ -22,7 +22,7 @@ use sched_dag::{
 use crate::protocol::{Transcript, read_line};
 use crate::qemu::MOST_CORES;
 
-/// The record that a boot has left.
+/// The record of a boot.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
     /// The machine lines, as far as the record has them.
@@ -31,7 +31,7 @@ pub struct Record {
     pub commits: Vec<Committed>,
     /// The runs. The last one may have died.
     pub runs: Vec<Run>,
-    /// The times of each run that has ended, and the place of its commit.
+    /// The times of each run that has ended, each with the index of its commit.
     pub times: Vec<(usize, Times)>,
 }
 
@@ -39,17 +39,17 @@ pub struct Record {
 #[derive(Default)]
 struct Open {
     clusters: Vec<Vec<Event>>,
-    /// How many were lost so far.
+    /// The number of events lost so far.
     lost: u64,
-    /// How many each journal has taken so far.
+    /// The number of events that each journal has written so far.
     taken: Vec<u64>,
 }
 
-/// Returns the bytes of the record that is in a log, and nothing if there is none.
+/// Returns the bytes of the record in a log; none if it has no record.
 ///
 /// # Errors
 ///
-/// A line of the record is damaged: which one.
+/// In words: the line of the record that is damaged.
 pub fn bytes_of_log(log: &str) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     for (number, text) in (1..).zip(log.lines()) {
@@ -64,7 +64,7 @@ pub fn bytes_of_log(log: &str) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// Returns what stands for these bytes as RFC 4648 has it, section 4.
+/// Decodes base 64 (RFC 4648, section 4); `None` if the text is malformed.
 fn of_base64(text: &str) -> Option<Vec<u8>> {
     let digit = |byte: u8| match byte {
         b'A'..=b'Z' => Some(byte - b'A'),
@@ -79,34 +79,36 @@ fn of_base64(text: &str) -> Option<Vec<u8>> {
         let pad = four.iter().rev().take_while(|byte| **byte == b'=').count();
         let digits = four.iter().take(four.len() - pad).map(|byte| digit(*byte));
         let digits: Vec<u8> = digits.collect::<Option<_>>()?;
+        // Four digits at a time; a shorter rest, or more than two pads, is no base 64.
         if four.len() != 4 || pad > 2 {
             return None;
         }
         let bits = (0..4).fold(0_u32, |bits, place| {
             bits << 6 | u32::from(digits.get(place).copied().unwrap_or(0))
         });
+        // Each pad stands for a byte less.
         bytes.extend(&bits.to_be_bytes()[1..4 - pad]);
     }
     Some(bytes)
 }
 
 impl Record {
-    /// Reads a record, or the log that has one in its lines. Of a boot that died it is what was
-    /// sent until then.
+    /// Reads a record, or the log that has one in its lines. Of a boot that died it has the part
+    /// that was sent until then.
     ///
     /// # Errors
     ///
-    /// In words: what is wrong with it, and where.
+    /// In words: the fault and its position.
     pub fn read(bytes: &[u8]) -> Result<Self, String> {
         if bytes.starts_with(&MAGIC) {
             let recording = Recording::read(bytes).map_err(|malformed| malformed.to_string())?;
             return Self::of(&recording, String::new());
         }
-        // A person's line may be damaged; a machine line then is found to be.
+        // A damaged line for people is no fault; a damaged machine line is found below.
         Self::of_log(&String::from_utf8_lossy(bytes))
     }
 
-    /// Reads the record that stands in a log.
+    /// Reads the record in a log.
     ///
     /// # Errors
     ///
@@ -115,7 +117,7 @@ impl Record {
         Self::sent(&bytes_of_log(log)?, log)
     }
 
-    /// Reads what was sent by a guest that may have died, and has printed this log.
+    /// Reads the record sent by a guest that may have died, and that printed this log.
     ///
     /// # Errors
     ///
@@ -123,6 +125,7 @@ impl Record {
     pub fn sent(bytes: &[u8], log: &str) -> Result<Self, String> {
         let mut whole = Cow::Borrowed(bytes);
         if bytes.is_empty() {
+            // No bytes are the record of a boot that recorded nothing.
             whole = Cow::Owned(recording::Writer::begin(Vec::new()).end());
         } else if Recording::read(bytes).is_err() {
             let mended = recording::mended(bytes);
@@ -133,11 +136,11 @@ impl Record {
         Self::of(&recording, log.into())
     }
 
-    /// Takes a recording apart, with lines that are known besides.
+    /// Reads the chunks of a recording, and adds machine lines that are already known.
     ///
     /// # Errors
     ///
-    /// In words: what is not as a run leaves it.
+    /// In words: the first thing that no run leaves.
     pub fn of(recording: &Recording<'_>, lines: String) -> Result<Self, String> {
         let mut record = Self {
             lines,
@@ -161,15 +164,18 @@ impl Record {
                         .map_err(|why| format!("events of run {run}: {why}"))?;
                 }
                 Chunk::Times(times) => {
+                    // The times come last: they end the run whose events came before.
                     record.end_run(std::mem::take(&mut open), Some(&times))?;
                     record.times.push((record.commits.len() - 1, times));
                 }
             }
         }
+        // Events without times are those of a run that died.
         if !open.taken.is_empty() {
             record.end_run(open, None)?;
         }
         let transcript = Transcript::read(&record.lines);
+        // Only now, since the line may come in any chunk of text.
         if let Some(boot) = transcript.of_kind("boot").next() {
             let usual_bound_ns = bound::usual_ns(boot);
             record
@@ -190,6 +196,7 @@ impl Record {
             .flat_map(|times| times.written.iter().enumerate())
         {
             let taken = open.taken.get(cluster).copied().unwrap_or(0);
+            // Events that were written and not sent are lost, too.
             open.lost += written.saturating_sub(taken);
         }
         let first = open.clusters.into_iter().reduce(merged);
@@ -215,11 +222,11 @@ impl Record {
         Ok(())
     }
 
-    /// Returns what was committed, whose bounds are those that the analysis gives here.
+    /// Returns the commits, after a check that their bounds are those that the analysis gives here.
     ///
     /// # Errors
     ///
-    /// In words: one is another.
+    /// In words: the first bound that differs.
     pub fn proven(&self) -> Result<&[Committed], String> {
         self.commits.iter().try_for_each(Committed::check_bounds)?;
         Ok(&self.commits)
@@ -243,16 +250,19 @@ impl Open {
         }
         self.clusters.resize(clusters, Vec::new());
         self.taken.resize(clusters, 0);
+        // A gap in the numbering means lost events; an overlap means a damaged record.
         let gap = events.before.checked_sub(self.taken[cluster]);
         self.lost += gap.ok_or("some stand twice, or out of their order")?;
         let all = task_set.cores_of(ClusterId(events.cluster.into()), committed.told.cores);
-        // Journals that were merged before they were sent are those of cluster 0.
+        // Journals that were merged before they were sent come as cluster 0, with events of all
+        // cores.
         let last = match cluster {
             0 => committed.told.cores,
             _ => all.end,
         };
         for words in events.words() {
             let event = Event::unpack(words).ok_or("one is none that is known")?;
+            // A journal numbers the cores within its cluster.
             let core = CoreId(event.core.0.saturating_add(all.start));
             let dag = task_set.dags().get(event.dag.index());
             let subtasks = dag.map_or(0, |dag| dag.subtasks().len());
@@ -269,8 +279,8 @@ impl Open {
     }
 }
 
-/// Merges the events of two clusters by time, those of the first one before others of the same
-/// time, as a kernel does that ends a run.
+/// Merges the events of two clusters by time; at equal times those of the first come before, as in
+/// a kernel that ends a run.
 fn merged(ours: Vec<Event>, theirs: Vec<Event>) -> Vec<Event> {
     let mut merged = Vec::with_capacity(ours.len() + theirs.len());
     let mut theirs = theirs.into_iter().peekable();
@@ -288,7 +298,7 @@ fn merged(ours: Vec<Event>, theirs: Vec<Event>) -> Vec<Event> {
 fn in_order(run: &Run) -> Result<(), CoreId> {
     let mut latest_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
     for event in &run.events {
-        // These two state another core, and another time, than those of their making.
+        // These two carry the core and the time that they are about, not those of their writing.
         if matches!(event.what, EventKind::Request | EventKind::Due) {
             continue;
         }
@@ -301,16 +311,16 @@ fn in_order(run: &Run) -> Result<(), CoreId> {
     Ok(())
 }
 
-/// DAGs that were committed together, and what was proven of them.
+/// DAGs that were committed together, and their bounds.
 #[derive(Clone, Debug, Default)]
 pub struct Committed {
     /// Its number within the boot, from 0.
     pub number: usize,
     /// The commit as the record has it.
     pub told: Commit,
-    /// The same as specifications.
+    /// The commit as specifications.
     pub specs: Vec<DagSpec>,
-    /// The same as a model.
+    /// The commit as a model.
     pub task_set: TaskSet,
 }
 
@@ -344,7 +354,7 @@ impl Committed {
         Ok(committed)
     }
 
-    /// Returns how it is scheduled.
+    /// Returns the options of the scheduler.
     #[must_use]
     pub const fn options(&self) -> SchedulerOptions {
         SchedulerOptions {
@@ -360,7 +370,7 @@ impl Committed {
         }
     }
 
-    /// Returns what the analysis takes for granted besides the DAGs.
+    /// Returns the assumptions of the analysis besides the DAGs.
     #[must_use]
     pub fn settings(&self) -> AnalysisSettings {
         let options = self.options();
@@ -368,8 +378,10 @@ impl Committed {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,
-            // Two numbers are all that the analysis makes of them.
+            // The record has two numbers only, which is all that the analysis derives from
+            // overheads.
             overheads: Overheads {
+                // `None` is a charge without an end: no bound must come out here either.
                 dispatch_ns: self.told.charge_ns.unwrap_or(u64::MAX),
                 ready_ns: self.told.ready_ns,
                 ..Overheads::default()
@@ -381,7 +393,7 @@ impl Committed {
     ///
     /// # Errors
     ///
-    /// In words: one is another.
+    /// In words: the first bound that differs.
     pub fn check_bounds(&self) -> Result<(), String> {
         let answer = analysis::answer(&self.task_set, &self.settings());
         let here = answer
@@ -401,7 +413,7 @@ impl Committed {
         Ok(())
     }
 
-    /// Returns what samples what, of the model's subtasks.
+    /// Returns which subtask samples the topic of which other, as positions in the model.
     #[must_use]
     pub fn samplings(&self) -> Vec<SampledEdge> {
         let dags = (0..).map(DagId).zip(&self.told.dags);
@@ -462,8 +474,9 @@ fn spec(dag: &CommittedDag) -> Result<DagSpec, String> {
         .collect();
     let index = |subtask: u32| usize::try_from(subtask).unwrap_or(usize::MAX);
     let edges = dag.edges.iter().map(|&(from, to)| (index(from), index(to)));
-    // With one sink the deadline is the DAG's.
+    // With one sink the deadline is the DAG's own.
     for &(sink, deadline_ns) in dag.sinks.iter().filter(|_| dag.sinks.len() > 1) {
+        // A deadline of a subtask with successors is no sink's; the record is damaged.
         let is_followed = dag.edges.iter().any(|(from, _)| *from == sink);
         let subtask = subtasks.get_mut(index(sink)).filter(|_| !is_followed);
         let subtask = subtask.ok_or_else(|| format!("dag `{name}` has no sink {sink}"))?;
@@ -504,14 +517,14 @@ fn spec(dag: &CommittedDag) -> Result<DagSpec, String> {
     })
 }
 
-/// A run: its model, and what happened in it.
+/// A run: its model, and its events.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Its number within the boot, from 0.
     pub number: u64,
     /// How it was scheduled.
     pub options: SchedulerOptions,
-    /// How late cores may be, if nobody says otherwise, in nanoseconds.
+    /// The tolerance for late decisions if none is given, in nanoseconds.
     pub usual_bound_ns: u64,
     /// The DAGs.
     pub task_set: TaskSet,
@@ -521,14 +534,14 @@ pub struct Run {
     pub bounds_ns: Vec<Option<u64>>,
     /// The events, in the order of the journal.
     pub events: Vec<Event>,
-    /// How many events came before these, and are lost.
+    /// The number of lost events, all before these.
     pub lost: u64,
-    /// Whether the run has ended in order, so that nothing is to come.
+    /// Whether the run has ended in order, so that no events are missing at its end.
     pub complete: bool,
 }
 
 impl Run {
-    /// Returns on which terms it is judged, by a bound in nanoseconds.
+    /// Returns the terms on which the run is judged, with a tolerance in nanoseconds.
     #[must_use]
     pub const fn terms(&self, bound_ns: u64) -> JudgeOptions {
         JudgeOptions {

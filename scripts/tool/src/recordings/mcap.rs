@@ -1,22 +1,22 @@
 //! A recording as an MCAP file, by the specification on mcap.dev, version 0.
 //!
-//! A channel for each of the recording's, named `/DAG/TOPIC`, and for what else happened
-//! `/DAG/events`. A message is a JSON object, the job and the value, logged when the instance
-//! was complete and published at the job's nominal release. Messages stand in chunks without
-//! compression, each with its index, so that a reader finds a time without reading all.
+//! There is a channel for each of the recording's, named `/DAG/TOPIC`, and `/DAG/events` for other
+//! entries. A message is a JSON object of the job and the value; its log time is the completion of
+//! the instance, its publish time the job's nominal release. Messages are in chunks without
+//! compression, each with its index, so that a reader finds a time without reading everything.
 //!
-//! Types are JSON schemas (draft 2020-12), and values JSON of these. Viewers take a part of a
-//! schema only if it has one type: a list of types, `anyOf`, tuples and arrays of arrays make them
-//! refuse the channel. So
+//! Types are JSON schemas (draft 2020-12), and values are JSON. Viewers accept a part of a schema
+//! only if it has one type: a list of types, `anyOf`, tuples or arrays of arrays make them refuse
+//! the channel. So
 //!
-//! - a tuple is an object, whose fields are called `0`, `1` and so on;
-//! - what may have no value is not `required`, and is left out of its object without one: an
-//!   option, a number (JSON has none for NaN), and an array of numbers, as a whole;
-//! - an array or an option that is an element, and an option of an option, is the field `value`
-//!   of an object of its own;
-//! - what is infinite is `1e999`, a number of JSON that is beyond the range of every reader's.
+//! - a tuple is an object with the fields `0`, `1` and so on;
+//! - a part that may have no value is not `required`, and is left out of its object without one: an
+//!   option, a number (JSON has no NaN), and an array of numbers, as a whole;
+//! - an array or an option that is an element, and an option of an option, is the field `value` of
+//!   an object of its own;
+//! - an infinite number is `1e999`, which is beyond the range of every JSON reader's numbers.
 //!
-//! A schema says what is written here and nothing else; the tests hold one against the other.
+//! A schema describes exactly what is written here; the tests check one against the other.
 
 use std::collections::BTreeMap;
 use std::fmt::{Display, Write as _};
@@ -31,7 +31,7 @@ use crate::json::{Object, quoted};
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// The records' kinds.
+/// The kinds of records.
 const HEADER: u8 = 0x01;
 const FOOTER: u8 = 0x02;
 const SCHEMA: u8 = 0x03;
@@ -43,14 +43,14 @@ const CHUNK_INDEX: u8 = 0x08;
 const STATISTICS: u8 = 0x0b;
 const DATA_END: u8 = 0x0f;
 
-/// The bytes of messages after which a chunk ends.
+/// The size of messages, in bytes, at which a chunk ends.
 const CHUNK_BYTES: usize = 1 << 20;
 
 /// Writes a recording, and returns the number of messages.
 ///
 /// # Errors
 ///
-/// What the output says.
+/// The error of the output.
 pub fn write(recording: &Recording<'_>, out: &mut dyn Write) -> io::Result<u64> {
     let header = recording.header();
     let channels = channels(header);
@@ -76,24 +76,25 @@ pub fn write(recording: &Recording<'_>, out: &mut dyn Write) -> io::Result<u64> 
         file.message(channel, &entry, json.as_bytes())?;
     }
     file.end_chunk()?;
-    // Checksums of files are optional; each chunk has one.
+    // The checksum of the data section is optional; each chunk has its own.
     file.record(DATA_END, &0_u32.to_le_bytes())?;
     file.summary(&channels)
 }
 
-/// Returns the number of the channel that an entry is in, and writes its message.
+/// Writes an entry's message to `json`, and returns the number of its channel.
 fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
     json.clear();
     let number = |index: usize| u16::try_from(index).unwrap_or(u16::MAX);
     let channel = header.channels.get(usize::from(entry.place));
     match (entry.what, channel) {
         (EntryKind::Value, Some(channel)) => {
-            // The reader has gone through every value.
+            // The recording's reader has checked every value, so this cannot fail.
             let _ = write_message((entry.job, &channel.schema, entry.value), json);
             entry.place
         }
         (what, channel) => {
             let subtask = match what {
+                // Of a lost value the place is its channel, of other entries the subtask.
                 EntryKind::Lost => channel.map_or(entry.place, |channel| channel.subtask),
                 _ => entry.place,
             };
@@ -102,13 +103,14 @@ fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
                 .number("subtask", subtask);
             // Writing into a `String` cannot fail.
             let _ = write!(json, "{{\"job\":{},\"value\":{}}}", entry.job, event.end());
+            // The channels of events follow those of values, one for each DAG.
             number(header.channels.len()).saturating_add(entry.dag)
         }
     }
 }
 
-/// Returns the records of schemas and channels: those of the recording, then one of each DAG
-/// for what else happened.
+/// Returns the records of schemas and channels: those of the recording, then one channel for each
+/// DAG for other entries.
 fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
     let event = "Event { what: text, subtask: u16 }";
     let event = recording::Schema::parse(event).expect("it is a schema");
@@ -127,7 +129,7 @@ fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
     let (mut schemas, mut channels) = (Vec::new(), Vec::new());
     for (id, (topic, role, schema)) in (0_u16..).zip(of_values.chain(of_events)) {
         let mut content = Vec::new();
-        // No schema has the number 0.
+        // The id 0 is reserved for "no schema".
         content.extend((id + 1).to_le_bytes());
         text(&mut content, &schema.to_string());
         text(&mut content, "jsonschema");
@@ -148,9 +150,9 @@ fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
     schemas
 }
 
-/// Adds bytes with their number before them.
+/// Adds bytes behind their length.
 fn bytes(to: &mut Vec<u8>, content: &[u8]) {
-    // What is described here has names of some bytes.
+    // Only names and schemas come here, which are far shorter.
     let length = u32::try_from(content.len()).unwrap_or(u32::MAX);
     to.extend(length.to_le_bytes());
     to.extend(content);
@@ -160,20 +162,20 @@ fn text(to: &mut Vec<u8>, text: &str) {
     bytes(to, text.as_bytes());
 }
 
-/// Returns numbers as bytes, one behind the other.
+/// Returns numbers as little-endian bytes, one behind the other.
 fn longs<const COUNT: usize>(numbers: [u64; COUNT]) -> impl Iterator<Item = u8> {
     numbers.into_iter().flat_map(u64::to_le_bytes)
 }
 
-/// The messages that are written together.
+/// The messages of one chunk.
 #[derive(Default)]
 struct Chunk {
     records: Vec<u8>,
-    /// By channel, the times of the messages and where they stand.
+    /// For each channel, the times of its messages and their offsets in the chunk.
     index: BTreeMap<u16, Vec<(u64, u64)>>,
 }
 
-/// The earliest and the latest time of messages.
+/// The earliest and the latest time of some messages.
 type Times = Option<(u64, u64)>;
 
 fn including(times: Times, time_ns: u64) -> Times {
@@ -181,12 +183,12 @@ fn including(times: Times, time_ns: u64) -> Times {
     Some((first.min(time_ns), last.max(time_ns)))
 }
 
-/// The file as far as it is written.
+/// The part of the file that is written.
 struct File<'o> {
     out: &'o mut dyn Write,
     length: u64,
     chunk: Chunk,
-    /// The records that say where the chunks are.
+    /// The records with the positions of the chunks.
     chunk_indexes: Vec<Vec<u8>>,
     counts: BTreeMap<u16, u64>,
     times: Times,
@@ -206,11 +208,12 @@ impl File<'_> {
 
     fn message(&mut self, channel: u16, entry: &Entry<'_>, json: &[u8]) -> io::Result<()> {
         let place = self.chunk.records.len() as u64;
+        // 22 bytes of fixed fields: channel, sequence, log time, publish time.
         let records = &mut self.chunk.records;
         records.push(MESSAGE);
         records.extend((22 + json.len() as u64).to_le_bytes());
         records.extend(channel.to_le_bytes());
-        // A counter of 32 bits; its low bits are enough to find gaps.
+        // The sequence number has 32 bits; the low bits of the job suffice to find gaps.
         let [low @ .., _, _, _, _] = entry.job.to_le_bytes();
         records.extend(low);
         records.extend(longs([entry.at_ns, entry.release_ns]));
@@ -228,9 +231,10 @@ impl File<'_> {
         }
     }
 
-    /// Writes the messages so far, and their index.
+    /// Writes the messages so far as a chunk, with its index.
     fn end_chunk(&mut self) -> io::Result<()> {
         let Chunk { records, index } = std::mem::take(&mut self.chunk);
+        // An empty chunk would have no times.
         if records.is_empty() {
             return Ok(());
         }
@@ -243,6 +247,7 @@ impl File<'_> {
         let mut content = Vec::with_capacity(records.len() + 64);
         content.extend(longs([first, last, size]));
         content.extend(crc.value().to_le_bytes());
+        // An empty name of the compression: none, so both sizes are equal.
         text(&mut content, "");
         content.extend(longs([size]));
         content.extend(records);
@@ -273,12 +278,13 @@ impl File<'_> {
         Ok(())
     }
 
-    /// Writes what stands after the messages, and returns their number.
+    /// Writes the summary after the messages, and returns their number.
     fn summary(&mut self, channels: &[(u8, Vec<u8>)]) -> io::Result<u64> {
         let start = self.length;
         let messages: u64 = self.counts.values().sum();
         let mut statistics = messages.to_le_bytes().to_vec();
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+        // `channels` has a schema and a channel for each.
         let of_each = u16::try_from(channels.len() / 2).unwrap_or(u16::MAX);
         statistics.extend(of_each.to_le_bytes());
         statistics.extend(u32::from(of_each).to_le_bytes());
@@ -297,11 +303,12 @@ impl File<'_> {
         let indexes = std::mem::take(&mut self.chunk_indexes);
         let indexes = indexes.into_iter().map(|content| (CHUNK_INDEX, content));
         let statistics = [(STATISTICS, statistics)];
+        // Schemas and channels are repeated, so that a reader needs the summary alone.
         let all = channels.iter().cloned().chain(indexes).chain(statistics);
         for (kind, content) in all {
             self.record(kind, &content)?;
         }
-        // The summary is short: readers get no offsets within it.
+        // No offsets within the summary: it is short.
         let mut footer: Vec<u8> = longs([start, 0]).collect();
         footer.extend(0_u32.to_le_bytes());
         self.record(FOOTER, &footer)?;
@@ -353,18 +360,19 @@ fn object<'s>(fields: impl Iterator<Item = (impl Display, &'s Schema)>) -> Objec
         .list("required", required)
 }
 
-/// Reports whether a part of this type may have no value.
+/// Reports whether a part of this type may be left out.
 fn may_lack(schema: &Schema) -> bool {
     match schema {
         Schema::Scalar(Scalar::F32 | Scalar::F64) | Schema::Option(_) => true,
         Schema::List(element) | Schema::Array(element, _) => {
+            // Of an array of numbers a single NaN leaves out the whole.
             !is_wrapped(element) && may_lack(element)
         }
         _ => false,
     }
 }
 
-/// Reports whether an element of this type is an object of its own.
+/// Reports whether an element of this type becomes an object of its own.
 fn is_wrapped(schema: &Schema) -> bool {
     matches!(
         schema,
@@ -404,7 +412,7 @@ fn named(fields: &[Field]) -> impl Iterator<Item = (&str, &Schema)> {
     fields.iter().map(|field| (&*field.name, &field.schema))
 }
 
-/// Writes values, one after the other.
+/// Writes values, one behind the other.
 struct Values<'v, 'b> {
     bytes: &'b [u8],
     input: &'v mut Decoder<'b>,
@@ -412,12 +420,13 @@ struct Values<'v, 'b> {
 }
 
 impl Values<'_, '_> {
-    /// Writes a field behind others, if it has a value.
+    /// Writes a field after others, if it has a value.
     fn write_field(&mut self, name: impl Display, schema: &Schema) -> Result<(), Malformed> {
         let before = self.out.len();
         let comma = if self.out.ends_with('{') { "" } else { "," };
         let _ = write!(self.out, "{comma}{}:", quoted(&name.to_string()));
         if !self.write(schema)? {
+            // Without a value the name that was written goes, too.
             self.out.truncate(before);
         }
         Ok(())
@@ -439,6 +448,7 @@ impl Values<'_, '_> {
         let mut has_all = true;
         for number in 0..count {
             self.out.push(if number == 0 { '[' } else { ',' });
+            // All elements are read in any case: the next field begins behind them.
             has_all &= match is_wrapped(element) {
                 true => self.write_object([("value", element)].into_iter())?,
                 false => self.write(element)?,
@@ -448,7 +458,7 @@ impl Values<'_, '_> {
         Ok(has_all)
     }
 
-    /// Writes a value, and reports whether it has one. If not, what is written is to be dropped.
+    /// Writes a value. Returns whether it has one; if not, the caller drops the text.
     fn write(&mut self, schema: &Schema) -> Result<bool, Malformed> {
         match schema {
             Schema::Scalar(_) => self.write_scalar(schema),
@@ -475,6 +485,7 @@ impl Values<'_, '_> {
             _ => {}
         })?;
         if real.is_infinite() {
+            // `write_json` would print `inf`, which is no JSON.
             *self.out += if real > 0.0 { "1e999" } else { "-1e999" };
         } else {
             let bytes = &self.bytes[start..self.input.offset()];
@@ -491,7 +502,7 @@ mod tests {
     use common::random::Random;
     use recording::{Recordable, Schema, to_bytes};
 
-    /// Returns all types that are made of one another this deep.
+    /// Returns all types up to a depth of nesting.
     fn types(depth: u32) -> Vec<String> {
         let scalars = ["bool", "text", "u16", "i64", "f64"].map(String::from);
         let deeper = |inner: String| {
@@ -527,8 +538,8 @@ mod tests {
         }
     }
 
-    /// Reports whether Foxglove's and Lichtblick's `parseJsonSchema` takes a part of a schema, and
-    /// it says nothing else.
+    /// Reports whether Foxglove's and Lichtblick's `parseJsonSchema` accepts a part of a schema,
+    /// and the part has no other members.
     fn is_taken(part: &Value, is_element: bool) -> bool {
         let Value::Object(members) = part else {
             return false;
@@ -550,7 +561,7 @@ mod tests {
         (members.iter()).all(|(name, _)| name == "type" || says.contains(&&**name))
     }
 
-    /// Reports whether a value is of a schema.
+    /// Reports whether a value matches a schema.
     fn is_of(schema: &Value, value: &Value) -> bool {
         let bound = |name| schema.get(name).and_then(Value::as_u64);
         match (schema.get("type").and_then(Value::as_text), value) {

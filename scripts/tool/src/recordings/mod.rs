@@ -1,8 +1,8 @@
-//! The subcommand `recording`: what is in a recording, and other formats of it.
+//! The subcommand `recording`: shows a recording, and converts it to and from other formats.
 //!
-//! A recording is the file of what entered a run; the crate `recording` has its format. It is shown
-//! as a table, of all or of one job, written as tables of comma-separated values and as an MCAP
-//! file (`mcap`), and made of a table (`table`).
+//! A recording is the file of a run's inputs; the crate `recording` has its format. It can be shown
+//! as a table, whole or for one job, written as tables of comma-separated values or as an MCAP file
+//! (`mcap`), and made from a table (`table`).
 
 pub mod mcap;
 mod table;
@@ -25,7 +25,7 @@ use crate::output;
 use crate::proof::{observed, report};
 use crate::record::Record;
 
-/// The options that want something of the runs of a record.
+/// The options that write views of the commits and runs of a record.
 const OF_RUNS: [&str; 3] = ["dot", "witness", "observe"];
 
 /// The table of `recording`.
@@ -97,6 +97,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     }
     let bytes = read(file).map_err(Refusal::Usage)?;
     let recording = parse(file, &bytes).map_err(Refusal::Usage)?;
+    // Before anything is printed, since it may refuse.
     of_runs(&recording, options).map_err(Refusal::Usage)?;
     match options.text("until") {
         Some(job) => print!("{}", inputs_until(&recording, job).map_err(Refusal::Usage)?),
@@ -120,12 +121,13 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Writes what the options want of the commits and runs of a record.
+/// Writes the views of commits and runs that the options name.
 fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
     let Some(name) = options.given_of(&OF_RUNS) else {
         return Ok(());
     };
     let record = Record::of(recording, String::new())?;
+    // Recordings of values alone have no commit.
     if record.commits.is_empty() {
         let line = "it has values alone; `./scripts/run --keep FILE` keeps all of a run";
         return Err(format!("`--{name}`: {line}"));
@@ -143,8 +145,8 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes the picture and the witnesses that the options want of a record, and returns the words
-/// that announce them.
+/// Writes the picture and the witnesses that the options name, and returns lines that announce
+/// them.
 pub(crate) fn drawn_and_proven(record: &Record, options: &Parsed) -> Result<Vec<String>, String> {
     let mut announced = Vec::new();
     if let Some(path) = options.path("dot") {
@@ -160,7 +162,7 @@ pub(crate) fn drawn_and_proven(record: &Record, options: &Parsed) -> Result<Vec<
     Ok(announced)
 }
 
-/// Makes sure of the options and of all files, before any is opened.
+/// Checks the options and all files, before any is opened.
 fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
     let of_tables = ["out", "dag", "topic"];
     if options.is_given("from-csv") {
@@ -185,12 +187,13 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
     (options.named(&["csv"]).iter()).try_for_each(files::check_folder)
 }
 
-/// Reads a file that should be a recording.
+/// Reads a file that must be a recording.
 pub(crate) fn read(file: &Path) -> Result<Vec<u8>, String> {
     files::read(file).map_err(|why| format!("{}: {why}; name another file", files::place(file)))
 }
 
-/// Reads what a guest has sent to the debug port. Firmware says what it does there, before.
+/// Reads the bytes that a guest has sent to the debug port. A firmware prints there, too, before
+/// the guest.
 ///
 /// # Errors
 ///
@@ -199,11 +202,12 @@ pub fn received(file: &Path) -> std::io::Result<Vec<u8>> {
     let mut bytes = fs::read(file)?;
     let mut windows = bytes.windows(recording::MAGIC.len());
     let start = windows.position(|window| window == recording::MAGIC);
+    // Without a beginning there is no recording, and all bytes are dropped.
     bytes.drain(..start.unwrap_or(bytes.len()));
     Ok(bytes)
 }
 
-/// Takes what was read for a recording.
+/// Reads bytes as a recording.
 pub(crate) fn parse<'b>(file: &Path, bytes: &'b [u8]) -> Result<Recording<'b>, String> {
     let place = files::place(file);
     Recording::read(bytes).map_err(|malformed| format!("{place}: {malformed}"))
@@ -224,11 +228,11 @@ fn write(
     write().map_err(|error| format!("cannot write {}: {error}", files::place(path)))
 }
 
-/// Returns a Python that has PyPI's `mcap`, which reads such files independently of us.
+/// Returns a Python that has PyPI's `mcap`, a reader of such files independent of this one.
 ///
 /// # Errors
 ///
-/// In words: it has not.
+/// In words: it has no such package.
 pub fn independent_reader() -> Result<OsString, String> {
     let python = env::var_os("MCAP_PYTHON").unwrap_or("python3".into());
     let tried = process::Command::new(&python)
@@ -243,7 +247,7 @@ pub fn independent_reader() -> Result<OsString, String> {
     }
 }
 
-/// Returns the lines.
+/// Returns a description of the recording for people.
 fn shown(recording: &Recording<'_>) -> String {
     let header = recording.header();
     let mut values = vec![0_u64; header.channels.len()];
@@ -329,7 +333,7 @@ fn shown(recording: &Recording<'_>) -> String {
     text + &tables
 }
 
-/// Shows what all jobs of a run took, also those whose events are lost.
+/// Returns the times of all jobs of a run, also those whose events are lost.
 fn table(run: usize, commit: &Commit, times: &Times) -> String {
     let mut text = String::new();
     let mut row = |name: &str, counted: &Counted| {
@@ -339,6 +343,7 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
             .map(|ns| format!("{:>12}", output::shown(ns)))
             .concat();
         // Writing into a `String` cannot fail.
+        // A row without samples would show zeros that nobody has measured.
         let _ = match times.count() {
             0 => Ok(()),
             count => writeln!(text, "  {name:<34}{count:>8}{figures}"),
@@ -366,9 +371,10 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
     }
 }
 
-/// Returns the lines about a job, which is given as `DAG/JOB`.
+/// Returns the lines about a job, given as `DAG/JOB`.
 fn inputs_until(recording: &Recording<'_>, job: &str) -> Result<String, String> {
     let header = recording.header();
+    // The last `/`, since a DAG's name may contain one.
     let parts = job.rsplit_once('/');
     let Some((name, number)) =
         parts.and_then(|(dag, number)| Some((dag, number.parse::<u64>().ok()?)))

@@ -1,13 +1,13 @@
-//! A recording out of a table, and as tables, of comma-separated values (RFC 4180).
+//! Recordings from and to tables of comma-separated values (RFC 4180).
 //!
-//! Out of a table each row is what a source returns in one job. The columns `job`, `release_ns` and
-//! `at_ns`, if they are there, say what their names say. The others, in their order, are the
-//! numbers and texts that the type is made of.
+//! In a table that becomes a recording each row is the value that a source returns in one job. The
+//! columns `job`, `release_ns` and `at_ns` are optional and mean what they are called. The others,
+//! in their order, are the numbers and texts of the type.
 //!
-//! A recording becomes one table for each channel, and one of what else happened. A column for each
-//! number: structs, tuples and arrays are spread, and the name of a column is the way to it. What
-//! has no fixed number of parts, a list or an option, is JSON in one cell, and so is a large array;
-//! an option without a value is an empty cell.
+//! A recording becomes one table for each channel, and one for other entries. Each number has a
+//! column: structs, tuples and arrays are spread, and the name of a column is the path to it. A
+//! part without a fixed number of columns, a list or an option, is JSON in one cell, and so is a
+//! large array; an option without a value is an empty cell.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -23,7 +23,7 @@ use replay::shown::quoted;
 use crate::files;
 use crate::options::Parsed;
 
-/// Returns the recording.
+/// Converts a table to a recording.
 pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> {
     let text = files::read_text(file)?;
     let place = files::place(file);
@@ -51,6 +51,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         Some(Ok(period_ns)) => Some(period_ns),
         None => None,
     };
+    // Every job needs a release; without a column it is a multiple of the period.
     if columns.release_ns.is_none() && period_ns.is_none() {
         let line = "there is no column release_ns; say by --period how far apart the rows are";
         return Err(at(1, line.into()));
@@ -94,6 +95,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
             }),
         };
         let job = number(columns.job, row)?;
+        // A replay looks values up by job, so a job must have one value.
         if let Some(before) = lines_of_jobs.insert(job, line) {
             let why = format!("job {job} stands in line {before} already; number them apart");
             return Err(at(line, why));
@@ -104,6 +106,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         let mut own = columns.values.iter();
         encode(
             &schema,
+            // The cells of a row are as many as the type's parts: `schema` has checked it.
             &mut || own.next().map_or("", |&column| &cells[column]),
             &mut value,
         )
@@ -122,12 +125,12 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
     Ok(writer.end())
 }
 
-/// What the columns are, by their numbers.
+/// The roles of the columns, by their numbers.
 struct Columns {
     job: Option<usize>,
     release_ns: Option<usize>,
     at_ns: Option<usize>,
-    /// Those of the values, with the names that they have.
+    /// The columns of values, and their names.
     values: Vec<usize>,
     names: Vec<String>,
 }
@@ -168,20 +171,20 @@ impl Columns {
     }
 }
 
-/// Returns the names of the columns that are no part of the values.
+/// Returns the names of the columns that are left out of the values.
 fn ignored(options: &Parsed) -> Vec<&str> {
     let all = options.text("ignore");
     all.map_or(Vec::new(), |all| all.split(',').collect())
 }
 
-/// Returns a name that two columns have, unless they are left out.
+/// Returns a name that two columns share, unless it is ignored.
 fn twice<'t>(titles: &'t [String], options: &Parsed) -> Option<&'t str> {
     let (ignored, mut seen) = (ignored(options), BTreeSet::new());
     let mut used = (titles.iter().map(String::as_str)).filter(|title| !ignored.contains(title));
     used.find(|title| !seen.insert(*title))
 }
 
-/// Returns the type of the values, which has to fit the columns.
+/// Returns the type of the values, after a check that it fits the columns.
 fn schema(columns: &Columns, options: &Parsed) -> Result<Schema, String> {
     let Some(text) = options.text("type") else {
         let field = |name: &String| Field {
@@ -208,7 +211,7 @@ fn schema(columns: &Columns, options: &Parsed) -> Result<Schema, String> {
     Ok(schema)
 }
 
-/// Adds the bytes of a value whose parts are the next cells.
+/// Appends the bytes of a value whose parts are the next cells.
 fn encode<'c>(
     schema: &Schema,
     next: &mut dyn FnMut() -> &'c str,
@@ -223,10 +226,12 @@ fn encode<'c>(
         }
         Schema::Option(inner) => {
             let cell = next();
+            // An empty cell is an option without a value.
             out.push(u8::from(!cell.is_empty()));
             match (&**inner, cell.is_empty()) {
                 (_, true) => Ok(()),
                 (Schema::Scalar(_), false) => encode(inner, &mut || cell, out),
+                // Other options are JSON in their cell, which is only written.
                 _ => Err(format!("a value of type {schema} is not read from a table")),
             }
         }
@@ -269,7 +274,7 @@ fn scalar_bytes(scalar: Scalar, cell: &str) -> Option<Vec<u8>> {
     }
 }
 
-/// The rows of a table, by RFC 4180.
+/// The rows of a table (RFC 4180).
 struct Rows<'t> {
     text: &'t str,
     /// The line on which the latest row ended, counted from 1.
@@ -289,11 +294,13 @@ impl Iterator for Rows<'_> {
         let mut letters = self.text.char_indices().peekable();
         while let Some((place, letter)) = letters.next() {
             match letter {
+                // Two quotation marks within a quoted cell stand for one.
                 '"' if quotes && letters.next_if(|(_, next)| *next == '"').is_some() => {
                     cell.push('"')
                 }
                 '"' if quotes || cell.is_empty() => quotes = !quotes,
                 ',' if !quotes => cells.push(std::mem::take(&mut cell)),
+                // A row may end in CR LF, or in LF alone.
                 '\r' if !quotes => {}
                 '\n' if !quotes => {
                     self.text = &self.text[place + 1..];
@@ -301,12 +308,14 @@ impl Iterator for Rows<'_> {
                     return Some(Ok(cells));
                 }
                 other => {
+                    // A quoted cell may contain line ends; messages still name the right line.
                     self.line += usize::from(other == '\n');
                     cell.push(other);
                 }
             }
         }
         self.text = "";
+        // The rest of the table would be one cell.
         if quotes {
             let why = "a cell that begins with a quotation mark has no end";
             return Some(Err((first, why.into())));
@@ -316,10 +325,10 @@ impl Iterator for Rows<'_> {
     }
 }
 
-/// The most columns that an array becomes.
+/// The largest number of columns that an array is spread into.
 pub(super) const MOST_COLUMNS: usize = 256;
 
-/// Returns the tables, with names for their files.
+/// Returns the tables, with the names of their files.
 pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
     let header = recording.header();
     let mut names = BTreeMap::<String, usize>::new();
@@ -332,6 +341,7 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
             Role::Source | Role::Result => "",
         };
         let name = format!("{}.{}{found}", plain(dag), plain(&channel.topic));
+        // Two names may differ only in characters that `plain` replaces.
         let same = names.entry(name.clone()).or_default();
         *same += 1;
         let name = if *same > 1 {
@@ -360,7 +370,7 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
             let place = usize::from(place);
             cells.extend([job, release_ns, at_ns].map(|number| number.to_string()));
             let schema = &header.channels[place].schema;
-            // The reader has gone through every value.
+            // The recording's reader has checked every value, so this cannot fail.
             let _ = fill(
                 schema,
                 &mut Decoder::new(entry.value),
@@ -386,7 +396,7 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
     tables
 }
 
-/// Returns a name with nothing in it that a file system minds.
+/// Returns a name without characters that a file system may reject.
 fn plain(name: &str) -> String {
     let is_plain = |letter: char| letter.is_alphanumeric() || letter == '-';
     name.chars()
@@ -394,7 +404,7 @@ fn plain(name: &str) -> String {
         .collect()
 }
 
-/// Returns the cells as a line.
+/// Returns the cells as a line of the table.
 fn row(cells: &[String]) -> String {
     let mut line = String::new();
     for (number, cell) in cells.iter().enumerate() {
@@ -411,7 +421,7 @@ fn row(cells: &[String]) -> String {
     line
 }
 
-/// Returns how many columns a type takes.
+/// Returns the number of columns of a type.
 fn width(schema: &Schema) -> usize {
     let sum = |width: usize, schema: &Schema| width.saturating_add(self::width(schema));
     match schema {
@@ -422,13 +432,13 @@ fn width(schema: &Schema) -> usize {
     }
 }
 
-/// Returns how many columns an array takes, if it becomes columns.
+/// Returns the number of columns of an array, if it is spread.
 pub(super) fn spread_width(element: &Schema, count: u32) -> Option<usize> {
     let all = width(element).checked_mul(usize::try_from(count).ok()?)?;
     Some(all).filter(|&all| all <= MOST_COLUMNS)
 }
 
-/// Adds the names of the columns that a type takes.
+/// Adds the names of a type's columns.
 pub(super) fn spread(schema: &Schema, name: &str, columns: &mut Vec<String>) {
     let within = |part: &dyn std::fmt::Display| match name {
         "value" => part.to_string(),
@@ -452,7 +462,7 @@ pub(super) fn spread(schema: &Schema, name: &str, columns: &mut Vec<String>) {
     }
 }
 
-/// Adds the cells of a value of `all`, in as many columns.
+/// Adds the cells of a value that is read from `input`, a decoder of `all`.
 fn fill(
     schema: &Schema,
     input: &mut Decoder<'_>,

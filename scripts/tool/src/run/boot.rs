@@ -1,9 +1,9 @@
-//! The subcommand `boot`: what cargo starts a program by.
+//! The subcommand `boot`: a runner for cargo.
 //!
-//! Cargo hands each program that it would start to a *runner*, images and tests alike. Here an
-//! image is booted, as by `run --image`; any other program takes this process over, so that it
-//! has its words, its streams and its exit code. With `--on linux`, or `--on debian`, what runs is
-//! the app's program for Linux, which cargo builds first.
+//! Cargo hands each program that it would start to a *runner*, images and tests alike. An image is
+//! booted, as by `run --image`; any other program replaces this process, and so keeps its words,
+//! streams and exit code. With `--on linux`, or `--on debian`, the app's Linux program is built by
+//! cargo and run instead.
 
 use std::env;
 use std::ffi::OsString;
@@ -41,13 +41,17 @@ exit codes: those of ./scripts/run, or of the program
 #[must_use]
 pub fn boot(words: &[OsString]) -> ExitCode {
     let named = words.split_first();
+    // The first word is the file, even if words after it look like our options: they are the
+    // program's.
     let Some((file, rest)) = named.filter(|(file, _)| !file.as_bytes().starts_with(b"-")) else {
         return BOOT.carry_out(words, |_| {
             let question = "which file? name an image, such as `target/release/fork-join`";
             Err(Refusal::Usage(question.into()))
         });
     };
+    // An image is recognized by its content; all else is a program of the host.
     if let Ok(app) = image::check_file(Path::new(file)) {
+        // A line that does not parse is refused by `run` below, with its own words.
         if let Ok(options) = RUN.parse(rest)
             && on_linux::is_asked_for(&options)
         {
@@ -58,6 +62,7 @@ pub fn boot(words: &[OsString]) -> ExitCode {
         }
         return run(&[&["--image".into(), file.clone()], rest].concat());
     }
+    // `exec` returns only if it failed.
     let error = process::Command::new(file).args(rest).exec();
     BOOT.fail(&format!(
         "cannot start {}: {error}",
@@ -67,7 +72,8 @@ pub fn boot(words: &[OsString]) -> ExitCode {
 
 /// Builds the program for Linux of the package whose image cargo has built.
 fn for_linux(app: Option<&str>) -> Result<PathBuf, String> {
-    // `scripts/tool/start` sets the former; without it cargo's own word is of that package.
+    // `scripts/tool/start` sets `TOOL_PACKAGE`, since the `cargo run` of the tool changes cargo's
+    // own.
     let names = ["TOOL_PACKAGE", "CARGO_MANIFEST_DIR"];
     let folder = names.into_iter().find_map(env::var_os);
     let package = app.zip(folder.filter(|folder| !folder.is_empty()));

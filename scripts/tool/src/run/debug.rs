@@ -1,16 +1,15 @@
 //! The subcommand `debug`: an app in QEMU, and gdb at it.
 //!
-//! The image is built by the profile `gdb`, which optimizes nothing and keeps what gdb needs to
-//! show variables. QEMU waits before the first instruction; gdb is told of it by a script, with
-//! the breakpoints that the person names, and takes this process over: so the terminal is gdb's
-//! alone, and QEMU, which the system ends with it, does not hear a ctrl-C that is meant for gdb.
+//! The image is built by the profile `gdb`, which optimizes nothing and keeps all that gdb needs to
+//! show variables. QEMU waits before the first instruction. A script connects gdb to it and sets
+//! the breakpoints; then gdb replaces this process. So the terminal is gdb's alone: QEMU, which
+//! ends with it, does not get a ctrl-C that is meant for gdb.
+//! The guest's lines for people appear between gdb's. Budgets are off, since code without
+//! optimization takes many times its WCET.
 //!
-//! What the guest prints for people comes between gdb's lines. Budgets are off, for code that
-//! is not optimized takes many times its WCET.
-//!
-//! A *place* is where to stop: a function, by the last parts of its path, or `FILE:LINE`. gdb
-//! itself takes whole paths only, such as `drone::camera::detect`; so it is asked for the
-//! functions that there are. What is not there is refused before anything starts.
+//! A *place* is a breakpoint: a function, by the last parts of its path, or `FILE:LINE`. gdb itself
+//! takes whole paths only, such as `drone::camera::detect`; so it is asked for the functions of the
+//! image. A place that is not in the image is refused before anything starts.
 
 use std::ffi::OsString;
 use std::fmt::Write;
@@ -33,10 +32,10 @@ use crate::options::{Command, Opt, Parsed, Refusal, Takes, did_you_mean};
 use crate::qemu::{Mode, Qemu};
 use crate::system;
 
-/// How long QEMU may take until gdb can reach it.
+/// The longest time from QEMU's start until gdb can reach it.
 const START: Duration = Duration::from_secs(30);
 
-/// The table of `debug`. What is an option of `run`, too, means the same.
+/// The table of `debug`. Options that `run` has, too, mean the same.
 static DEBUG: Command = Command {
     invocation: "./scripts/debug",
     about: "Boots an app in QEMU with gdb at it, in an image that gdb shows whole.",
@@ -80,12 +79,14 @@ exit codes: gdb's; 1 a failure; 2 a refused command line
 /// Returns an option of `run`.
 const fn of_run(name: &str) -> Opt {
     let mut at = 0;
+    // A loop with an index, since a `const fn` can use neither iterators nor `==` on text.
     while at < RUN.options.len() {
         if is_same(RUN.options[at].name.as_bytes(), name.as_bytes()) {
             return RUN.options[at].begins("");
         }
         at += 1;
     }
+    // Evaluated by the compiler: a wrong name does not build.
     panic!("`run` has no such option")
 }
 
@@ -103,13 +104,14 @@ pub fn debug(words: &[OsString]) -> ExitCode {
     DEBUG.carry_out(words, attempt)
 }
 
-/// Does so. Where all is well gdb takes this process over, and this never returns.
+/// Starts gdb in place of this process; returns only if something fails.
 fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let run = as_run(own)?;
     check_files(&run)?;
     let commands = own.path("commands");
     if let Some(path) = commands {
         let place = files::place(path);
+        // Read to see that it can be; gdb itself would only complain after the boot.
         files::read(path)
             .map_err(|why| Refusal::Usage(format!("`--commands {place}` {why}; name another")))?;
     }
@@ -140,13 +142,14 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let script = log.with_extension("gdb");
     let text = script_text(&socket, &places);
     files::write(&script, text)?;
+    // The guest waits for gdb, so nothing is lost between these two.
     start(qemu, &image, &log, &socket)?;
     let error = gdb(&image, &script, commands).exec();
     Err(Refusal::Failure(format!("cannot start gdb: {error}")))
 }
 
-/// Returns the options as those of `run`, whose names they have: what the person gave, and
-/// where the defaults differ.
+/// Returns a command line of `run` with the options that both commands have: those given, and those
+/// whose defaults differ.
 fn as_run(own: &Parsed) -> Result<Parsed, Refusal> {
     let shared = DEBUG.options.iter().map(|option| option.name);
     let shared = shared.filter(|name| RUN.options.iter().any(|option| option.name == *name));
@@ -159,13 +162,14 @@ fn as_run(own: &Parsed) -> Result<Parsed, Refusal> {
     RUN.parse(&words.collect::<Vec<_>>())
 }
 
-/// Starts QEMU, which waits for gdb at the socket, and a filter that shows what the guest
-/// prints for people.
+/// Starts QEMU, which waits for gdb at the socket, and a filter that shows the guest's lines for
+/// people.
 fn start(mut qemu: Qemu, image: &Path, log: &Path, socket: &Path) -> Result<(), String> {
     let mut device = OsString::from("unix:");
     device.push(socket);
     device.push(",server=on,wait=off");
     qemu.debugger = Some(device);
+    // A process of its own: this one becomes gdb and can filter no more.
     let shown = process::Command::new("grep")
         .args(["--line-buffered", "-v", "^{"])
         .stdin(Stdio::piped())
@@ -189,8 +193,10 @@ fn start(mut qemu: Qemu, image: &Path, log: &Path, socket: &Path) -> Result<(), 
     let running = command.spawn();
     let mut running = running.map_err(|error| format!("cannot start QEMU: {error}"))?;
     let begun = Instant::now();
+    // gdb fails at once if the socket is missing, so we wait for it.
     while !socket.exists() {
         if !matches!(running.try_wait(), Ok(None)) || begun.elapsed() > START {
+            // It may have ended by itself; then there is nothing to kill.
             let _ = running.kill();
             let said = fs::read_to_string(&complaints).unwrap_or_default();
             return Err(format!("QEMU did not start: {}", said.trim()));
@@ -200,20 +206,21 @@ fn start(mut qemu: Qemu, image: &Path, log: &Path, socket: &Path) -> Result<(), 
     Ok(())
 }
 
-/// The most functions that one place may mean.
+/// The most functions that one place may match.
 const MOST: usize = 8;
 
-/// Stands before what gdb says of each place.
+/// Marks the start of gdb's answer to each place.
 const MARK: &str = "@@ place";
 
-/// Returns what to tell gdb for places with commas between, in the image of an app.
+/// Translates places, separated by commas, into gdb's breakpoints in the image of an app.
 ///
 /// # Errors
 ///
-/// In words: gdb cannot be started, or what no place is, with what it may be.
+/// In words: gdb cannot be started, or a place is not in the image, with a suggestion.
 pub(super) fn resolve(image: &Path, app: &str, places: &str) -> Result<Vec<String>, String> {
     let places: Vec<&str> = places.split(',').map(str::trim).collect();
     let mut gdb = process::Command::new("gdb");
+    // `-nx`: a person's own settings could change the answers.
     gdb.args(["-nx", "-batch"]).arg(image);
     for place in &places {
         gdb.args(["-ex", &format!("echo {MARK}\\n")]);
@@ -222,7 +229,7 @@ pub(super) fn resolve(image: &Path, app: &str, places: &str) -> Result<Vec<Strin
             false => gdb.args(["-ex", &format!("info functions -q -n {}", last(place))]),
         };
     }
-    // For a hint.
+    // The app's own functions, for a suggestion.
     let own = app.replace('-', "_");
     gdb.args(["-ex", &format!("echo {MARK}\\n")]);
     gdb.args(["-ex", &format!("info functions -q -n ^{own}::")]);
@@ -235,6 +242,7 @@ pub(super) fn resolve(image: &Path, app: &str, places: &str) -> Result<Vec<Strin
     let mut found = Vec::new();
     for (place, answer) in places.into_iter().zip(answers) {
         match is_line(place) {
+            // gdb names an address only for a line with code; it also answers for lines without.
             true if answer.contains(" address ") => found.push(place.into()),
             true => {
                 return Err(format!(
@@ -261,8 +269,8 @@ fn last(path: &str) -> &str {
     path.rsplit("::").next().unwrap_or(path)
 }
 
-/// Reads the paths of functions from what gdb lists. Of functions with parameters in angle
-/// brackets it finds none by name.
+/// Reads the paths of functions from gdb's list. Generic ones are left out, as gdb does not find
+/// them by name.
 fn functions(listed: &str) -> Vec<&str> {
     let lines = listed.lines().filter_map(|line| line.split_once("fn "));
     let paths = lines.filter_map(|(_, rest)| {
@@ -275,7 +283,7 @@ fn functions(listed: &str) -> Vec<&str> {
     paths
 }
 
-/// Chooses the functions that a place means: of the app's own, if there are such.
+/// Chooses the functions that a place matches; those of the app prevail.
 fn choose(
     place: &str,
     own: &str,
@@ -284,6 +292,7 @@ fn choose(
 ) -> Result<Vec<String>, String> {
     let is_meant = |path: &&str| {
         let before = path.strip_suffix(place);
+        // Only whole parts of a path match: `trol` is not `control`.
         before.is_some_and(|before| before.is_empty() || before.ends_with("::"))
     };
     let mut meant: Vec<&str> = listed.into_iter().filter(is_meant).collect();
@@ -299,6 +308,7 @@ fn choose(
             "`--break`: the image has no function {shown}; a closure is found by `FILE:LINE`{hint}"
         ));
     }
+    // The processor has few hardware breakpoints, and so many stops are hardly meant.
     if meant.len() > MOST {
         return Err(format!(
             "`--break`: {} functions are called {shown}; give more of the path, such as `{}`",
@@ -309,9 +319,9 @@ fn choose(
     Ok(meant.into_iter().map(String::from).collect())
 }
 
-/// Returns the script by which gdb reaches the guest and runs it to the first of the places.
+/// Returns the script that connects gdb to the guest, sets the breakpoints and continues.
 ///
-/// A breakpoint of hardware needs no code to be there yet.
+/// The breakpoints are hardware ones: they work before the code has been loaded.
 pub(super) fn script_text(socket: &Path, places: &[String]) -> String {
     let mut text = String::from("set pagination off\nset confirm off\nset width 0\n");
     if let Some(printers) = printers() {
@@ -324,7 +334,7 @@ pub(super) fn script_text(socket: &Path, places: &[String]) -> String {
     text + "continue\n"
 }
 
-/// Returns where Rust's toolchain has what makes gdb show vectors and strings as such.
+/// Returns the path of the Rust toolchain's script that makes gdb show vectors and strings.
 fn printers() -> Option<String> {
     let mut rustc = process::Command::new("rustc");
     rustc.current_dir(system::workspace());
@@ -335,8 +345,8 @@ fn printers() -> Option<String> {
     file.is_file().then(|| file.display().to_string())
 }
 
-/// Returns the command that starts gdb with its script, and then with a person's commands
-/// instead of the person.
+/// Returns the command that starts gdb with its script and, in place of a person, with a file of
+/// commands.
 pub(super) fn gdb(image: &Path, script: &Path, commands: Option<&Path>) -> process::Command {
     let mut gdb = process::Command::new("gdb");
     gdb.arg("-q");

@@ -1,13 +1,13 @@
-//! What is handed to the guest as its boot module: DAGs of a file behind `--wcets`, or else
+//! The boot module handed to the guest. It is the DAGs of a file behind `--wcets`, or else
 //! `--wcets`, `--replay`, `--module` and `--input`, in this order.
 //!
-//! Of the parameters that `--params FILE` and `--set NAME=VALUE,...` tell it, the guest knows the
-//! types and ranges; here only that a word can be made of it all. What `--set` says comes after
+//! The guest alone knows the types and ranges of the parameters that `--params FILE` and `--set
+//! NAME=VALUE,...` give it; here they are only checked to fit into one word. `--set` comes after
 //! the file, and so prevails.
 //!
-//! `--input` and `--output` are about the guest's second serial port, which is an app's wire. A
+//! `--input` and `--output` belong to the guest's second serial port, which is an app's wire. A
 //! file of bytes with their times goes to the guest with the boot module, so that runs repeat.
-//! Standard input goes to the port, as it comes. What the guest sends goes to a file.
+//! Standard input goes to the port as it comes. The guest's output there goes to a file.
 
 use std::path::{Path, PathBuf};
 
@@ -25,15 +25,15 @@ use crate::wire_script;
 
 /// Files on their way to the guest.
 pub(super) struct Handed {
-    /// The words that tell the guest how many bytes of the module are whose, and its parameters,
-    /// each after a blank.
+    /// The guest's words with the parameters and the length of each part of the module, each after
+    /// a blank.
     pub(super) words: String,
-    /// Where the module lies, if there is something in it. It is removed with this value.
+    /// The file of the module, if it has any content; removed when this value is dropped.
     module: Temporary,
 }
 
 impl Handed {
-    /// Reads the files that the options name, if they do, and writes a module of them.
+    /// Reads the files that the options name, and writes the module.
     pub(super) fn read(options: &Parsed, dags: Option<&Prepared>) -> Result<Handed, Refusal> {
         let read = |path: &Path| observed::read(path).map_err(Refusal::Usage);
         let text = options.path("wcets").map(read).transpose()?;
@@ -47,6 +47,7 @@ impl Handed {
             Some(dags) => ("dag", format!("{text}{}", dags.file).into_bytes()),
             None => {
                 let own = own.unwrap_or_default();
+                // The order is part of the contract: the guest cuts the parts off by their lengths.
                 let parts = [text.as_bytes(), &replayed, &own, &input];
                 ("module", parts.concat())
             }
@@ -63,6 +64,7 @@ impl Handed {
             ("replay", &replayed),
             ("input", &input),
         ] {
+            // `--module` needs no length: it is the part without one.
             if !part.is_empty() {
                 words += &format!(" {name}={}", part.len());
             }
@@ -76,8 +78,8 @@ impl Handed {
     }
 }
 
-/// Returns the recording to replay that belongs into the module, if there is one; a program of
-/// Linux reads the file itself.
+/// Returns the bytes of the recording for the module; none if no replay is asked for, or on Linux,
+/// where the program reads the file itself.
 fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path("replay") else {
         return Ok(Vec::new());
@@ -85,6 +87,7 @@ fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     let refused = |why| Refusal::Usage(format!("`--replay` {why}"));
     let bytes = recordings::read(path).map_err(refused)?;
     recordings::parse(path, &bytes).map_err(refused)?;
+    // Parsed above all the same, so that a damaged file is refused before the build.
     match options.is_given("on") {
         true => Ok(Vec::new()),
         false => Ok(bytes),
@@ -128,7 +131,7 @@ fn of_file(text: &str) -> Result<Vec<String>, String> {
     .collect()
 }
 
-/// Returns `NAME=VALUE` without blanks around, if it is that.
+/// Returns `NAME=VALUE` with the blanks around name and value removed; `None` if it is malformed.
 fn pair(text: &str) -> Option<String> {
     let (name, value) = text.split_once('=')?;
     let parts = [name.trim(), value.trim()];
@@ -138,7 +141,7 @@ fn pair(text: &str) -> Option<String> {
     is_pair.then(|| parts.join("="))
 }
 
-/// What stands for standard input.
+/// The name that stands for standard input.
 const STREAM: &str = "-";
 
 /// Reports whether standard input goes to the port.
@@ -154,7 +157,7 @@ pub(super) fn input(options: &Parsed) -> Vec<Named<'_>> {
     }
 }
 
-/// Makes sure that both go with the other options.
+/// Makes sure that `--input` and `--output` go with the other options.
 pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
     let usage = |line: &str| Err(Refusal::Usage(line.into()));
     if is_live(options) && options.is_given("console") {
@@ -174,7 +177,7 @@ pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
     }
 }
 
-/// Returns the script for the guest of the file that `--input` names; empty if it names none.
+/// Returns the script for the guest from the file that `--input` names; empty if it names none.
 fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path("input").filter(|_| !is_live(options)) else {
         return Ok(Vec::new());
@@ -191,7 +194,7 @@ fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     Ok(wire_script::for_guest(&entries))
 }
 
-/// Returns what the port is connected to, if either is given.
+/// Returns the other end of the second serial port, if `--input` or `--output` is given.
 pub(super) fn second(options: &Parsed) -> Option<Second> {
     let output = options.path("output").map(PathBuf::from);
     (output.is_some() || options.is_given("input")).then(|| Second {
@@ -200,7 +203,7 @@ pub(super) fn second(options: &Parsed) -> Option<Second> {
     })
 }
 
-/// Returns what to say if the app has no wire, and so nothing was sent.
+/// Returns a warning if `--output` is given but the app has no wire, so that nothing was sent.
 pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
     let file = options.path("output").map(files::place)?;
     let has_wire = outcome.transcript.of_kind("wire").next().is_some();
@@ -237,7 +240,7 @@ mod tests {
         for text in "gain;=1;gain=;gain=1 2;ga in=1;gain=1,2;gain=1\n2".split(';') {
             assert_eq!(pair(text), None, "{text}");
         }
-        // The value may have what the name has not.
+        // A value may contain `=`.
         assert_eq!(pair("a=b=c").as_deref(), Some("a=b=c"));
     }
 

@@ -1,13 +1,13 @@
-//! What stays of a boot: its record, views of that, and its serial log.
+//! The files that stay of a boot: its record, views of that, and its serial log.
 //!
-//! The record comes while the guest runs, is completed with what the guest has
-//! said, and is written where the options want it, or views of it are.
+//! The record arrives while the guest runs and is completed with the guest's machine lines. It is
+//! written to the files that the options name; views of it (`--dot`, `--witness`) are made from it.
 //!
-//! Also if nobody has asked for it, a guest sends what it keeps of its last jobs before a fault;
-//! then the file lies beside the log.
+//! Even without such an option a guest sends the inputs of its last jobs before a fault; they are
+//! written to a file next to the log.
 //!
-//! A log that the person names stays. What was in the file before is lost only to a run:
-//! where the guest refuses its command line, the file is as it was.
+//! A log that the person names stays. If the guest refuses its command line, nothing has run, and
+//! the file gets its previous content back.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,29 +24,30 @@ use crate::qemu::Ending;
 use crate::recordings;
 use crate::system;
 
-/// The kinds of lines that say how far a run is, and nothing of what it was, or what the record
-/// itself is made of.
+/// The kinds of lines that are left out of the record: those about progress, and those that carry
+/// the record itself.
 const PASSING: [&str; 3] = ["progress", "record", "status"];
 
 /// The options that name a file for the record.
 const FILES: [&str; 3] = ["keep", "record", "trace"];
 
-/// How many KiB values may wait in for the background to send them.
+/// The buffer in KiB for values that wait for the background to send them.
 const ROOM_KIB: &str = "1024";
 
 /// The files that a boot keeps.
 pub(super) struct Kept {
-    /// Where the bytes go while they come.
+    /// The file that takes the bytes as they arrive.
     raw: Temporary,
     app: String,
-    /// The guest's word for what is kept, if anything is.
+    /// The guest's word for the wanted kind of record; `None`: none is wanted.
     word: Option<&'static str>,
 }
 
-/// Returns the guest's word for what the options want.
+/// Returns the guest's word for the kind of record that the options want.
 pub(super) fn word(options: &Parsed) -> Option<&'static str> {
     let views = ["trace", "dot", "witness", "observe", "prove"];
     let all = ["record", "keep"].into_iter();
+    // A full record has the events, too, so it prevails over the views.
     let mut all = all.filter(|name| options.is_given(name));
     all.next().or(options.given_of(&views).map(|_| "events"))
 }
@@ -61,17 +62,17 @@ impl Kept {
         })
     }
 
-    /// Returns where what is sent is to go.
+    /// Returns the file for the bytes that the guest sends.
     pub(super) fn raw(&self) -> Option<PathBuf> {
         self.raw.0.clone()
     }
 
-    /// Returns the word with that file, for a program that writes it itself.
+    /// Returns the guest's word and the file, for a Linux program that writes the file itself.
     pub(super) fn word_with_file(&self) -> Option<(&'static str, PathBuf)> {
         self.word.zip(self.raw())
     }
 
-    /// Returns the word for the machine.
+    /// Returns the guest's word after a blank, with the size of its buffer; empty if there is none.
     pub(super) fn guest_word(&self) -> String {
         match self.word {
             Some("events") => " events=on".into(),
@@ -80,22 +81,25 @@ impl Kept {
         }
     }
 
-    /// Takes what has come.
+    /// Reads the bytes that the guest has sent into `outcome`, from the file or else from the log.
     pub(super) fn receive(&self, outcome: &mut Outcome) -> Result<(), String> {
-        // No guest, no file.
+        // A boot that failed before the guest started leaves no file.
         let sent = self.raw.0.as_deref().map(recordings::received);
         outcome.sent = sent.and_then(Result::ok).unwrap_or_default();
+        // Without the port for records the bytes come as text in lines of kind `record`.
         if outcome.sent.is_empty() {
             outcome.sent = crate::record::bytes_of_log(&outcome.serial)?;
         }
         Ok(())
     }
 
-    /// Writes the record where it is wanted. Returns the words that announce it.
+    /// Writes the record to the files that the options name. Returns lines that announce them.
     pub(super) fn write(&self, options: &Parsed, outcome: &Outcome) -> Result<Vec<String>, String> {
+        // A refused command line: nothing has run, and an older file must stay as it is.
         if outcome.ending == Ending::Guest(Status::Usage) {
             return Ok(Vec::new());
         }
+        // Bytes without being asked for are those of a crash.
         if self.word.is_none() {
             return self.write_crash(&outcome.sent);
         }
@@ -124,10 +128,11 @@ impl Kept {
         wanted.into_iter().map(announce).collect()
     }
 
-    /// Returns the record with what the guest has said, and with a header.
+    /// Returns the record with a header and with the guest's machine lines.
     fn completed(&self, outcome: &Outcome) -> Vec<u8> {
         let sent = match Recording::read(&outcome.sent) {
             Ok(_) => outcome.sent.clone(),
+            // The guest died while it sent: the whole chunks before the break are kept.
             Err(_) => recording::mended(&outcome.sent).unwrap_or_default(),
         };
         let recording = Recording::read(&sent).ok();
@@ -140,6 +145,7 @@ impl Kept {
         let mut record = Writer::new(&header);
         for chunk in recording.iter().flat_map(Recording::chunks) {
             match chunk {
+                // The new header is written already.
                 Chunk::Header(_) => {}
                 Chunk::Entry(entry) => record.write(&entry),
                 Chunk::Text(text) => record.text(text),
@@ -156,6 +162,7 @@ impl Kept {
         let lines: String = lasting.map(|line| line.text.clone() + "\n").collect();
         record.text(&lines);
         let is_whole = outcome.transcript.verdict().is_ok();
+        // A reader must be able to tell a run that ended from one that was cut off.
         match is_whole && !recording.is_some_and(|recording| recording.is_cut()) {
             true => record.end(),
             false => record.cut(),
@@ -163,6 +170,7 @@ impl Kept {
     }
 
     fn write_crash(&self, bytes: &[u8]) -> Result<Vec<String>, String> {
+        // Bytes that are no recording are noise on the port, and not worth a file.
         let (Ok(_), Some(raw)) = (Recording::read(bytes), &self.raw.0) else {
             return Ok(Vec::new());
         };
@@ -181,7 +189,8 @@ impl Kept {
         )])
     }
 
-    /// Returns which package has the app's own replay, as cargo is told; `None` if none has.
+    /// Returns cargo's argument for the package with the app's own replay program; `None` if there
+    /// is none.
     fn replay_package(&self) -> Option<String> {
         const EXAMPLE: &str = "examples/replay.rs";
         let app = &self.app;
@@ -191,8 +200,8 @@ impl Kept {
     }
 }
 
-/// Writes what the options want in files of a run, and says so; of a run that has failed it speaks
-/// only of trace and recording.
+/// Writes the files that the options want of a run, and announces them. Of a run that failed only
+/// the record is written.
 pub(super) fn write(
     options: &Parsed,
     kept: &Kept,
@@ -204,7 +213,7 @@ pub(super) fn write(
     for line in kept.write(options, &outcome)? {
         screen.say(&line);
     }
-    // Else there are worse news.
+    // After a failure views would be wrong or missing, and would hide its message.
     if outcome.judge().is_ok() {
         let views = match options.given_of(&["dot", "witness"]) {
             Some(_) => recordings::drawn_and_proven(&outcome.record()?, options)?,
@@ -228,7 +237,7 @@ pub(super) struct Log {
     pub(super) path: PathBuf,
     /// Whether the person has named it.
     stays: bool,
-    /// What was in the file before.
+    /// The content of the file before the run.
     before: Option<Vec<u8>>,
 }
 
@@ -248,7 +257,7 @@ pub(super) fn check(options: &Parsed) -> Result<(), String> {
 }
 
 impl Log {
-    /// Settles where it goes. The file is made when the guest starts.
+    /// Chooses the log's path. The file is made when the guest starts.
     pub(super) fn choose(options: &Parsed, app: &str) -> Result<Log, String> {
         let named = options.path("serial").map(Path::to_path_buf);
         let stays = named.is_some();
@@ -263,14 +272,14 @@ impl Log {
     /// Removes it, unless the person has named it.
     pub(super) fn discard(&self) {
         if !self.stays {
-            // It is ours, and in the way of no one if it cannot be removed.
+            // The log is ours; one that cannot be removed harms nothing.
             let _ = fs::remove_file(&self.path);
         }
     }
 
-    /// Leaves the file as it was before, for nothing has run.
+    /// Gives the file its previous content back, since nothing has run.
     pub(super) fn restore(&self) {
-        // The person is told of the refusal, which is what matters.
+        // An error is ignored: the message about the refusal matters more.
         let _ = match &self.before {
             Some(before) => fs::write(&self.path, before),
             None => fs::remove_file(&self.path),

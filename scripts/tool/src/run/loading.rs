@@ -1,5 +1,4 @@
-//! What brings the image into memory: which loader the options choose, and on what machine of
-//! which QEMU.
+//! The loader that the options choose, with the board, the memory and the QEMU it needs.
 
 use std::path::PathBuf;
 
@@ -16,7 +15,7 @@ pub(super) fn chosen(options: &Parsed) -> Loader {
     named.unwrap_or(Loader::Pvh)
 }
 
-/// Returns the board that the options choose, which a stick needs to be a PC.
+/// Returns the board that the options choose; a loader on a stick needs a PC.
 pub(super) fn machine(options: &Parsed) -> Machine {
     if chosen(options).needs_stick() {
         return Machine::Q35;
@@ -33,6 +32,7 @@ pub(super) fn machine(options: &Parsed) -> Machine {
 pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> {
     let loader = chosen(options);
     let microvm = Machine::Microvm.name();
+    // Only a board that the person has named: the default gives way to the stick.
     if loader.needs_stick()
         && options.is_given("machine")
         && options.text("machine") == Some(microvm)
@@ -52,19 +52,22 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
     Ok(())
 }
 
-/// Settles the memory: the person's choice, or what is usual, and in both
-/// cases enough for the stacks and tables of that many processors.
+/// Chooses the memory in MiB: the person's choice or the usual amount, in both cases enough for the
+/// stacks and tables of that many processors.
 pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refusal> {
     let cores = options.number("cores").unwrap_or(1);
     let loader = chosen(options);
     let bytes = |name| {
         let data = options.path(name).and_then(|path| path.metadata().ok());
+        // A file that is not there counts as empty; it is refused when it is read.
         data.map_or(0, |data| data.len())
     };
-    // A replay has a table of its values besides.
+    // A replay also builds a table of its values in memory; twice the file's size is set aside for
+    // it.
     let module_mib = (bytes("module") + 3 * bytes("replay")).div_ceil(1 << 20);
     // Each processor has stacks and tables; a quarter of the memory is for them, the rest is heap.
     let mut least = loader.least_memory_mib().max(8 + cores) + module_mib;
+    // The DAG file's estimate is for the usual amount; a person may know that less will do.
     if let Some(dags) = dags.filter(|_| !options.is_given("memory")) {
         least = least.max(dags.memory_mib);
     }
@@ -82,10 +85,11 @@ pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result
              {least} MiB; give more, or fewer cores"
         )));
     }
+    // The default is below the need: it grows silently, since the person chose nothing.
     Ok(least)
 }
 
-/// Finds the QEMU to use, installing one if none is named and none is there.
+/// Finds the QEMU to use; installs one if none is named and none is there.
 pub(super) fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
     if let Some(named) = options.path("qemu") {
         return system::find_program(named).ok_or_else(|| {

@@ -1,9 +1,9 @@
 //! The subcommand `run`: from a command line to a judged run of an app.
 //!
 //! The order matters: first everything that can be refused is checked, then
-//! QEMU is made sure of, the image is built, the mode is settled by it, the guest
-//! is booted, and its output is shown while it runs. Whatever is refused
-//! before the build leaves nothing behind.
+//! QEMU is found or installed, the image is built, the mode is chosen by a probe with it, the guest
+//! is booted, and its output is shown while it runs. A command line that is refused before the
+//! build leaves nothing behind.
 //!
 //! Exit codes: 0 all is well, 1 a failure, 2 a refused command line (ours or
 //! the guest's), 130 a run that a person has ended.
@@ -62,7 +62,9 @@ pub fn run(words: &[OsString]) -> ExitCode {
 }
 
 fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
+    // First: the default number of cores depends on the platform.
     let options = &on_linux::settle(options)?;
+    // Before the checks below: a folder, and an observed run, have rules of their own.
     if let Some(folder) = several::folder(options) {
         return several::run_folder(options, &folder);
     }
@@ -105,14 +107,14 @@ fn check_files(options: &Parsed) -> Result<(), Refusal> {
     kept::check(options).map_err(Refusal::Usage)
 }
 
-/// A guest that has been booted and has ended, somehow.
+/// A run that has ended in any way.
 struct Booted {
     outcome: Outcome,
     log: Log,
     screen: Screen,
 }
 
-/// Boots what the options name, and shows its lines if it shall.
+/// Boots the app that the options name; `shows` says whether its lines are shown.
 fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Booted, Refusal> {
     let app = choose_app(options, dags.is_some())?;
     if on_linux::is_asked_for(options) {
@@ -122,6 +124,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let named = options.text("mode").and_then(Mode::from_name);
     loading::check(options, named).map_err(Refusal::Usage)?;
     let program = loading::choose_program(options)?;
+    // May install packages, so it comes after the checks of the loader.
     install::ensure_loader(loading::chosen(options))?;
 
     let handed = Handed::read(options, dags)?;
@@ -134,7 +137,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         qemu.module = handed.module();
         qemu
     };
-    // No mode has a longer name than this one.
+    // The words of the longest mode name are checked, as the mode is chosen only after the build.
     let longest = describe(named.unwrap_or(Mode::Deterministic));
     longest.check_words().map_err(Refusal::Usage)?;
     if longest.loader.is_grub() {
@@ -145,7 +148,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         Some(path) => path.into(),
         None => image::build(&app)?.path,
     };
-    // A person needs time to type, and a firmware takes long where instructions are counted.
+    // Interactive runs need real time; a firmware takes minutes where instructions are counted.
     let is_live = options.is_given("console") || handed::is_live(options);
     let otherwise = match is_live || longest.loader.needs_stick() {
         true => Mode::Threads,
@@ -158,8 +161,9 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let mut screen = Screen::new(options, &image);
     introduce(&screen, &app, &qemu, why);
     let show = |line: &str| {
-        // Where a firmware paints on the serial port, it is not for this screen.
+        // A firmware draws its menus on the serial port with escape sequences; they are not shown.
         if shows && !(qemu.loader.needs_stick() && line.contains('\x1b')) {
+            // The guest's messages about a DAG file give lines of the form written for the guest.
             let translated = dags.and_then(|dags| dags.translate(line));
             screen.show(translated.as_deref().unwrap_or(line));
         }
@@ -170,8 +174,8 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     kept::write(options, &kept, outcome?, log, screen)
 }
 
-/// Settles which app runs: the one that the options name, which a given image must be of,
-/// or else the one that the image names.
+/// Returns the app to run: the one that the options name (a given image must be of it), or else the
+/// one that the image names.
 fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
     let app = match is_dag_file {
         true => "dag-file",
@@ -191,6 +195,7 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
         false => image::check_file(path),
     };
     let of_image = checked.map_err(|why| Refusal::Usage(format!("`--image {place}`: {why}")))?;
+    // The default app is no wish: without `--app` an image of any app will do.
     let wanted = (is_dag_file || options.is_given("app")).then_some(app);
     match (of_image, wanted) {
         (Some(own), Some(wanted)) if own != wanted => Err(Refusal::Usage(format!(
@@ -200,6 +205,7 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
         ))),
         (Some(own), _) => Ok(own),
         (None, Some(wanted)) => Ok(wanted.into()),
+        // An image without a note of its app can run; the name only labels its files.
         (None, None) => Ok("unknown".into()),
     }
 }
@@ -230,8 +236,8 @@ fn describe(
     }
 }
 
-/// Returns the words that the options make for an app, with a platform's own, and last those that
-/// the person adds.
+/// Returns the guest's words: those of the options, then those of the platform, and last the
+/// person's own.
 fn words(options: &Parsed, dags: Option<&Prepared>, own: Vec<String>) -> Vec<String> {
     let mut words = Vec::new();
     for name in table::GUEST_WORDS {
@@ -245,21 +251,21 @@ fn words(options: &Parsed, dags: Option<&Prepared>, own: Vec<String>) -> Vec<Str
     words
 }
 
-/// The person's limit, or one that is generous also where a job takes its
-/// real time: two minutes, and a second for each job. A DAG file has its own.
+/// Returns the time limit: the person's, or two minutes and a second for each job, which is
+/// generous also where a job takes its real time. A DAG file states its own.
 fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
     let jobs = options.number("jobs").unwrap_or(200);
     let usual = dags.map_or(120 + jobs, |dags| dags.limit_s);
     let seconds = options.number("timeout").unwrap_or(usual);
     let is_short = options.is_given("timeout");
     if options.is_given("gdb") || options.is_given("console") && !is_short {
-        // A person takes all day.
+        // Under a debugger or a console the person sets the pace: a day.
         return Duration::from_secs(86_400);
     }
     Duration::from_secs(seconds)
 }
 
-/// Says what is run, and what its times are worth.
+/// Prints the app, its guest, and how far the times can be trusted.
 fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say(&format!("app {app}, guest words: {}", qemu.guest_words));
     screen.say(&format!(
@@ -276,7 +282,7 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say("");
 }
 
-/// Says how a run has ended, and returns the exit code.
+/// Reports how a run has ended, and returns the exit code.
 fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitCode {
     let Booted {
         outcome,
@@ -291,9 +297,11 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         };
         let seconds = outcome.elapsed.as_secs_f64();
         screen.say(&format!("\n{how} after {seconds:.1} s"));
+        // A good run needs no log; `discard` keeps one that the person has named.
         log.discard();
         return code;
     };
+    // A fault in the WCET file is reported with its name and line instead of the guest's words.
     if several::refused(options, &fault.reason) {
         log.restore();
         return ExitCode::from(2);
@@ -307,17 +315,20 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         };
         let lines = of_file
             .unwrap_or_else(|| format!("the {who} refused its command line: {}", fault.reason));
+        // Apps without draws do not know the word `seed`, which `--seeds` adds on its own.
         let draws_nothing = options.is_given("seeds") && fault.reason.starts_with("`seed`");
         let remedy = match draws_nothing {
             true => "; this app draws nothing by a seed: leave `--seeds` out",
             false => "",
         };
+        // Nothing has run, so the person's earlier log must not be lost.
         log.restore();
         return RUN.refuse(&(lines + remedy));
     }
     match outcome.transcript.verdict() {
-        // The screen has shown all that it said.
+        // The screen has shown the guest's own reason already.
         Ok(_) => eprintln!("the serial log is {}", outcome.log.display()),
+        // Without a verdict the last lines are the only hint at the cause.
         Err(_) => eprint!("{}", outcome.tail()),
     }
     let remedy = match outcome.ending {
@@ -332,13 +343,14 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         _ => String::new(),
     };
     let code = RUN.fail(&format!("failed: {}{remedy}", fault.reason));
+    // Ctrl-C has the last word: the fault of a run that was cut short is not the app's.
     if by_person {
         return ExitCode::from(BY_PERSON);
     }
     code
 }
 
-/// Goes on to the next run, unless a person has ended this one.
+/// Returns an error that stops a series of runs if a person has ended this one.
 fn go_on(booted: &Booted) -> Result<(), Refusal> {
     match booted.outcome.asked {
         Some(Asked::ByPerson) => Err(Refusal::ByPerson),
@@ -346,7 +358,7 @@ fn go_on(booted: &Booted) -> Result<(), Refusal> {
     }
 }
 
-/// Names the subtasks that the guest has found to keep their cores, if it has.
+/// Names the subtasks that the guest reported as never giving up their cores.
 fn stalled(transcript: &Transcript) -> String {
     let named = transcript.of_kind("stalled").filter_map(|line| {
         let (subtask, dag) = (line.text_at("subtask_name")?, line.text_at("dag_name")?);

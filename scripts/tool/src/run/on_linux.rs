@@ -1,5 +1,5 @@
-//! `run --on linux`: the app as a program of this computer, built, started, shown and judged as
-//! a guest is. With `--on debian` it is a program of Debian's Linux, in QEMU.
+//! `run --on linux`: the app as a program of this computer, built, started, shown and judged like a
+//! guest. With `--on debian` it runs on Debian's Linux in QEMU.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -18,14 +18,14 @@ use crate::options::{Parsed, Refusal};
 use crate::program;
 use crate::qemu::{self, Ending, Mode};
 
-/// The options that are about QEMU, its guest, or what the kernel alone does.
+/// Options that concern QEMU, its guest, or the bare-metal kernel alone.
 const FOREIGN: [&str; 6] = ["boot", "gdb", "latest", "machine", "memory", "qemu"];
 
-/// Those of the rest that a guest has no way for, and those that only a guest has.
+/// Options that `--on debian` cannot pass on to its guest, and options only for that guest.
 const NOT_IN_GUEST: [&str; 6] = ["console", "input", "keep", "output", "record", "replay"];
 const ONLY_IN_GUEST: [&str; 2] = ["mode", "busy"];
 
-/// How much longer a guest may take: Linux has to start.
+/// The additional time that a guest may take, in which Linux starts.
 const START: Duration = Duration::from_secs(120);
 
 /// Reports whether the options ask for Linux.
@@ -33,14 +33,15 @@ pub(super) fn is_asked_for(options: &Parsed) -> bool {
     options.text("on") == Some("linux") || is_in_guest(options)
 }
 
-/// Reports whether that Linux is a guest's.
+/// Reports whether that Linux runs as a guest, in QEMU.
 fn is_in_guest(options: &Parsed) -> bool {
     options.text("on") == Some("debian")
 }
 
-/// Refuses what there is not on Linux, and settles how many cores there are.
+/// Refuses options that Linux does not have, and settles the number of cores.
 pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
     if !is_asked_for(options) {
+        // The reverse case: options of Linux on the bare machine.
         return match options.given_of(&["mechanism", "busy"]) {
             None => Ok(options.clone()),
             Some(name) => Err(Refusal::Usage(format!(
@@ -62,11 +63,13 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
             format!("`--{name}` is not for `--on {on}`; leave it out, or give `--on {place}`");
         return Err(Refusal::Usage(line));
     }
+    // Bytes with times make sense only where the times repeat.
     if options.is_given("input") && !handed::is_live(options) {
         let line = "`--input FILE` is for the bare machine, which can repeat its times; with \
             `--on linux` give `--input -`";
         return Err(Refusal::Usage(line.into()));
     }
+    // An explicit number stands, even above that of this computer.
     if options.is_given("cores") {
         return Ok(options.clone());
     }
@@ -75,13 +78,14 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
     }
     let usual = options.number("cores").unwrap_or(1);
     let there = thread::available_parallelism().map_or(1, |count| count.get() as u64);
+    // More workers than processors would share them, and the times would say little.
     Ok(options.with("cores", usual.min(there).to_string()))
 }
 
-/// How many processors a guest has if nobody says.
+/// The number of processors of a guest if `--cores` is not given.
 const GUEST_CORES: &str = "4";
 
-/// Builds the app's program, and runs it as the options say.
+/// Builds the app's program and runs it as the options say.
 pub(super) fn run_app(
     options: &Parsed,
     app: &str,
@@ -100,6 +104,7 @@ pub(super) fn run_app(
     words.extend(qemu::words(&handed.words));
     let kept = Kept::new(options, app)?;
     let replayed = options.path("replay").map(Path::to_path_buf);
+    // As bytes: the name of a file need not be UTF-8.
     for (name, path) in [("module=", handed.module()), ("replay=", replayed)] {
         if let Some(path) = path {
             let mut word = OsString::from(name);
@@ -108,6 +113,7 @@ pub(super) fn run_app(
         }
     }
     if is_in_guest(options) {
+        // The file must lie in the guest; only its events come back, through the log.
         words.extend(kept::word(options).map(|word| format!("{word}=on").into()));
     } else if let Some((word, path)) = kept.word_with_file() {
         let mut word = OsString::from(format!("{word}="));
@@ -158,6 +164,8 @@ pub(super) fn run_app(
     };
     let outcome = match &guest {
         None => program::run(&order, &mut show),
+        // The program to run is QEMU, without a terminal and with the time that Linux takes to
+        // start.
         Some(guest) => {
             let order = program::Order {
                 program: &guest.program,
@@ -172,13 +180,14 @@ pub(super) fn run_app(
     };
     screen.end();
     let mut outcome = outcome?;
+    // If Linux itself failed, the app's log is empty; the console of the guest tells why.
     if let (Some(guest), Ending::Program(why)) = (&guest, &mut outcome.ending) {
         *why = format!("{why}; the guest's last words:\n{}", guest.said());
     }
     kept::write(options, &kept, outcome, log, screen)
 }
 
-/// Says which program is run, and what its times are worth.
+/// Prints which program is run and how far its times can be trusted.
 fn introduce(
     screen: &Screen,
     app: &str,
@@ -200,7 +209,7 @@ fn introduce(
     screen.say("time: real nanoseconds on real cores, whatever else this computer does\n");
 }
 
-/// Says what a time of a guest's is worth.
+/// Says how far the times of a guest can be trusted.
 fn meaning(mode: Mode) -> &'static str {
     match mode {
         Mode::Deterministic => {
@@ -211,7 +220,7 @@ fn meaning(mode: Mode) -> &'static str {
     }
 }
 
-/// Returns the words that only a program of Linux is given.
+/// Returns the words that only a Linux program gets.
 fn own_words(options: &Parsed) -> Vec<String> {
     let mut words = Vec::new();
     for name in ["cores", "mechanism", "output"] {
@@ -228,7 +237,7 @@ mod tests {
     use crate::options::Refusal;
     use crate::run::RUN;
 
-    /// Command lines, and what is said of them; more are in `tests/on_linux.rs`.
+    /// Command lines, and their refusals; more are in `tests/it/on_linux.rs`.
     const REFUSED: &str = "--on linux --machine q35 | `--machine` is for the bare machine; leave
 --on linux --gdb | `--gdb` is for the bare machine; leave
 --on linux --latest 3 | `--latest` is for the bare machine; leave

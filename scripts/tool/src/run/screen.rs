@@ -1,15 +1,13 @@
-//! What a person (or a program) sees of a run while it goes on, and says to it.
+//! The output of a run while it goes on, and a person's input to it.
 //!
 //! Lines for people and machine lines go to standard output in the order of
 //! the serial log, so that `grep '^{'` works there as on the log itself.
-//! Progress lines become one line on standard error, as the progress of every command.
-//! Status lines take its place on a terminal. A fault at an address gets a line of our own that
-//! names the function.
+//! Progress lines become one line on standard error, as for every command. On a terminal status
+//! lines take its place. After a fault at an address a line of our own names the function.
 //!
-//! The console's input comes from standard input, byte by byte; the terminal
-//! itself shows and edits the line. The status is asked for only where a person
-//! looks: what a guest prints changes its times, and a run whose output goes to a
-//! file or a pipe must not depend on who started it.
+//! The console's input comes from standard input, byte by byte; the terminal itself shows and edits
+//! the line. The status is asked for only on a terminal: printing changes a guest's times, and a
+//! run whose output goes to a file or a pipe must not depend on the caller.
 
 use std::fs;
 use std::io::{ErrorKind, IsTerminal, Read, Write, stdin, stdout};
@@ -25,10 +23,10 @@ use crate::progress::Progress;
 use crate::protocol::{MachineLine, read_line};
 use crate::system;
 
-/// As the value of `quiet`: no machine lines, either. Of a run that only prepares another one.
+/// The value of `quiet` that suppresses machine lines, too: for a run that only prepares another.
 pub(super) const NOTHING: &str = "nothing";
 
-/// Where each kind of line goes.
+/// The destinations of each kind of line.
 pub(super) struct Screen {
     people: bool,
     machine: bool,
@@ -36,7 +34,7 @@ pub(super) struct Screen {
     on_terminal: bool,
     bar_is_shown: bool,
     status: StatusLine,
-    /// That of a run, and how many jobs were over.
+    /// The progress of this run, and how many jobs were done.
     progress: Option<(Progress, u64)>,
     places: Places,
 }
@@ -56,7 +54,7 @@ impl Screen {
         }
     }
 
-    /// Says something of our own, unless we shall be quiet.
+    /// Prints a line of our own, unless `--quiet` is given.
     pub(super) fn say(&self, line: &str) {
         if self.quiet {
             return;
@@ -64,6 +62,7 @@ impl Screen {
         if self.people {
             println!("{line}");
         } else {
+            // Standard output is for machine lines alone then.
             eprintln!("{line}");
         }
     }
@@ -75,7 +74,7 @@ impl Screen {
         if let Some(Ok(machine)) = &read {
             match machine.kind.as_str() {
                 "progress" => return self.advance(machine),
-                // What it says is in a file, or nobody has asked for it here.
+                // Records are written to files; on the screen they say nothing.
                 "record" => return,
                 "status" if self.on_terminal => return self.show_status(machine),
                 _ => {}
@@ -87,6 +86,7 @@ impl Screen {
             self.people
         };
         if wanted {
+            // A progress line may stand there; the new line would begin behind it.
             self.end();
             println!("{line}");
         }
@@ -117,7 +117,7 @@ impl Screen {
         if self.quiet || total == 0 {
             return;
         }
-        // Another run of the same boot begins at 0 again.
+        // A second run of the same boot counts from 0 again, and gets a new estimate.
         let begun = self.progress.take().filter(|(_, before)| *before <= done);
         let begun = begun.map(|(progress, _)| progress);
         let mut progress = begun.unwrap_or_else(|| Progress::new(total, "jobs"));
@@ -127,23 +127,23 @@ impl Screen {
     }
 }
 
-/// The longest line, so that a narrow terminal does not break it.
+/// The longest line in bytes, so that a narrow terminal does not break it.
 const WIDTH: usize = 100;
 
-/// What is known of a run's speed.
+/// The data for estimates of a run's speed.
 #[derive(Debug, Default)]
 pub(super) struct StatusLine {
-    /// When the first line came, and the run's time in it.
+    /// The arrival of the first line, and the run's time in it.
     first: Option<(Instant, u64)>,
 }
 
 impl StatusLine {
-    /// Says in one line how the run does; `None` if the machine line does not.
+    /// Describes in one line how the run does; `None` if the machine line lacks a member.
     pub(super) fn text(&mut self, line: &MachineLine) -> Option<String> {
         let now = Instant::now();
         let time_ns = line.number_at("time_ns")?;
         let (since, since_ns) = match self.first {
-            // Another run of the same boot begins at 0 again.
+            // A second run of the same boot counts from 0 again.
             Some(first) if first.1 <= time_ns => first,
             _ => *self.first.insert((now, time_ns)),
         };
@@ -152,7 +152,7 @@ impl StatusLine {
     }
 }
 
-/// Does so, `wall_ns` of our time after `run_ns` of the run's time have passed.
+/// Describes the run after `wall_ns` of real time, in which `run_ns` of its own time have passed.
 fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
     let (done, total) = (line.number_at("done")?, line.number_at("total")?);
     let misses = line.number_at("misses")?;
@@ -171,18 +171,21 @@ fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
     if !loads.is_empty() {
         text += &format!(", load {} %", loads.join(" "));
     }
+    // Before any time has passed there is no speed to extrapolate from.
     if let Some(left_ns) = line.number_at("left_ns").filter(|_| run_ns > 0) {
+        // In 128 bits: two times in ns multiplied exceed 64 bits within seconds.
         let left_ns = u128::from(left_ns) * u128::from(wall_ns) / u128::from(run_ns);
         text += &format!(", {} s left", left_ns.div_ceil(1_000_000_000));
     }
     if text.len() > WIDTH {
+        // Not in the middle of a character.
         text.truncate(text.floor_char_boundary(WIDTH - 2));
         text += "..";
     }
     Some(text)
 }
 
-/// Returns the guest's words for what the options ask for.
+/// Returns the guest's words that the screen needs.
 pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
     let mut words = Vec::new();
     if options.is_given("console") {
@@ -194,8 +197,8 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
     words
 }
 
-/// Reports whether the guest can be asked to end: not where standard input goes to its other port,
-/// since QEMU has one such way in.
+/// Reports whether the guest can be asked to end by ctrl-C: not if standard input feeds its second
+/// port, since QEMU has one standard input.
 pub(super) fn can_stop(options: &Parsed) -> bool {
     let says_otherwise = options
         .text("append")
@@ -203,18 +206,17 @@ pub(super) fn can_stop(options: &Parsed) -> bool {
     !handed::is_live(options) && !says_otherwise
 }
 
-/// Reports whether a person watches, and does not talk meanwhile.
+/// Reports whether a person watches and does not type meanwhile.
 fn is_watched(options: &Parsed) -> bool {
     let is_silent = options.given_of(&["quiet", "json", "gdb"]).is_some();
     stdout().is_terminal() && system::stderr_moves() && !is_silent
 }
 
-/// Hands standard input on to the guest's serial port, until either ends. At its end a console's
-/// last line is ended, too; a run without end is shut down then, for nobody can do so
-/// any more.
+/// Copies standard input to the guest's serial port until either ends. At the end of input a
+/// console's last line is completed; an endless run is also shut down, since no one could do so
+/// later.
 ///
-/// Begins when the guest has written into `log`: its serial port loses what comes before
-/// it is set up.
+/// Starts when the guest has written to `log`: before its serial port is set up, input is lost.
 pub(super) fn relay(options: &Parsed, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
     let log = log.to_path_buf();
     let is_read = options.is_given("console") || handed::is_live(options);
@@ -231,18 +233,17 @@ pub(super) fn relay(options: &Parsed, log: &Path) -> impl FnOnce(Option<ChildStd
 }
 
 fn hand_on(mut input: ChildStdin, log: PathBuf, farewell: &'static str) {
-    // The thread is not waited for: it may stand in a read for ever, and ends with
-    // the tool.
+    // The thread is never joined: it may block in a read until the tool ends.
     thread::spawn(move || {
         let mut bytes = [0; 256];
-        // A log that is gone is that of a guest that has ended.
+        // The log is removed when the guest has ended; then the wait ends, too.
         while fs::metadata(&log).is_ok_and(|log| log.len() == 0) {
             thread::sleep(Duration::from_millis(10));
         }
         loop {
             match stdin().read(&mut bytes) {
                 Ok(0) => {
-                    // The guest may have ended before.
+                    // An error is ignored: the guest may have ended already.
                     let _ = input.write_all(farewell.as_bytes());
                     let _ = input.flush();
                     break;
@@ -278,7 +279,7 @@ mod tests {
         let text = described(full, 2_000_000_000, 3_000_000_000);
         let expected = "12 of 60 jobs, 3 missed, load 89 100 0 %, 6 s left";
         assert_eq!(text.as_deref(), Some(expected));
-        // At the first line nothing is known of the speed.
+        // At the first line the speed is unknown.
         let expected = expected.strip_suffix(", 6 s left");
         assert_eq!(described(full, 0, 0).as_deref(), expected);
         let endless = "\"total\":0,\"misses\":0,\"load_permille\":[]";

@@ -1,13 +1,12 @@
-//! More than one run: the files of a folder (`--dag FOLDER`), and runs that are observed, by
-//! `--observe` and `--prove`: what calls took, and whether bounds have held.
+//! More than one run: the files of a folder (`--dag FOLDER`), and runs that measure WCETs
+//! (`--observe`) or compare bounds with response times (`--prove`).
 //!
-//! Both of these boot with the words by which a guest tells its DAGs and its times. `--prove` boots
-//! twice: the first run is observed, the second one commits with the WCETs and the overheads
-//! that the first has shown, except for what the person states.
+//! An observed guest records its DAGs and times. `--prove` boots twice: the first run is observed,
+//! the second one commits with the WCETs and overheads of the first, unless the person states them.
 //!
-//! Of a folder every file whose name ends in `.dag`, `.yaml` or `.yml` is run, in the order of
-//! their names: one boot each, with `--prove` two boots each, in one table. One that is refused, or
-//! fails, does not keep the others from being run.
+//! Every file of a folder whose name ends in `.dag`, `.yaml` or `.yml` is run, in the order of the
+//! names: one boot each, with `--prove` two, in one table. A file that is refused or fails does not
+//! keep the others from being run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,21 +27,22 @@ use crate::protocol::Status;
 use crate::record::Record;
 use crate::system;
 
-/// What the platform costs; an error in words if no trace was kept.
+/// The platform's overheads; an error in words if no trace was kept.
 type Measurement = Result<Measured, String>;
 
-/// Reports whether the options ask for any of this.
+/// Reports whether the options ask for an observed run.
 pub(super) fn is_asked_for(options: &Parsed) -> bool {
     options.is_given("observe") || options.is_given("prove")
 }
 
-/// Does what the options ask for.
+/// Runs the observation or the proof.
 pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
     if let Some(name) = options.given_of(&["console", "gdb", "print-dag"]) {
         let line = format!("`--{name}` is for a run that is not observed; leave one of them out");
         return Err(Refusal::Usage(line));
     }
     check_files(options)?;
+    // Without a comparison the exit code says only whether each run was good.
     if !options.is_given("prove") {
         return Ok(match observe(options, options.path("observe"))? {
             Some(_) => ExitCode::SUCCESS,
@@ -63,12 +63,13 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
         rows.iter().map(report::Row::line),
     );
     match report::complaint(&rows) {
+        // A failed run has been reported; a second message would hide the first.
         Some(complaint) if is_well => Err(Refusal::Failure(complaint)),
         _ => Ok(code),
     }
 }
 
-/// Proves the DAGs of each file, one after the other, and says all in one table. A file that is
+/// Proves the DAGs of each file, one after the other, and prints all in one table. A file that is
 /// refused or fails does not keep the others from being proven.
 pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, Refusal> {
     let mut progress = Progress::new(files.len() as u64, "files");
@@ -77,7 +78,7 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
         progress.show(over);
         over += 1;
         let one = options.with("dag", file).with("quiet", NOTHING);
-        // Neither people nor programs want the lines of each run.
+        // The lines of the single runs would drown the one table.
         let one = one.with("json", "yes");
         let Some(proven) = prove(&one)? else {
             return Ok(Status::Failure);
@@ -112,10 +113,11 @@ struct Proven {
     is_well: bool,
 }
 
-/// Observes a run, commits with what it has shown, and compares; `None` if the first run has
-/// failed, which has been said.
+/// Observes a run, commits with its measurements, and compares; `None` if the first run failed,
+/// which has been reported.
 fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     let log = system::new_log("observed")?;
+    // Without `--observe` the WCETs of the first run lie in a file of ours.
     let own = Temporary(Some(log.with_extension("wcets")));
     let Some(proving) = observe_first(options, own.0.as_deref())? else {
         return Ok(None);
@@ -127,7 +129,7 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     go_on(&booted)?;
     let rows = match compare(&booted).map_err(Refusal::Failure) {
         Ok(rows) => rows,
-        // There are worse news.
+        // The failed run itself is the worse news.
         Err(_) if !is_well => Vec::new(),
         Err(refusal) => return Err(refusal),
     };
@@ -138,15 +140,17 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     }))
 }
 
-/// Observes a run, unless the person states both WCETs and overheads, and returns the command
-/// line by which the next one commits with what was seen; `None` if the run has failed.
+/// Observes a run, unless the person states both WCETs and overheads. Returns the command line by
+/// which the next run commits with the measurements; `None` if the run failed.
 fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>, Refusal> {
     let append = options.text("append").unwrap_or_default();
     let measures = !states_overheads(append);
     if options.is_given("wcets") && !measures {
         return Ok(Some(options.clone()));
     }
+    // The person asked for the second run; the first only prepares it.
     let first = options.with("quiet", NOTHING);
+    // WCETs that the person states are not overwritten by observed ones.
     let file = options.path("observe").or(own);
     let Some(seen) = observe(&first, file.filter(|_| !options.is_given("wcets")))? else {
         return Ok(None);
@@ -172,17 +176,20 @@ fn compare(booted: &Booted) -> Result<Vec<report::Row>, String> {
     report::rows(record.proven()?, &all)
 }
 
-/// Observes a run for each seed, says what the calls took, and writes the file of WCETs.
-/// Returns what else was seen; `None` if a run has failed, which has been said.
+/// Observes a run for each seed, prints the execution times, and writes the file of WCETs. Returns
+/// the overheads; `None` if a run failed, which has been reported.
 fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
     let observing = options.without("prove");
+    // An empty name observes all the same; only no file is written.
     let observing = observing.with("observe", file.unwrap_or(Path::new("")));
+    // Saturating, since a person's seed may be the largest `u64`.
     let first = options.number("seed").unwrap_or(1);
     let seeds = options.number("seeds").unwrap_or(1);
     let mut all: Vec<OfDag> = Vec::new();
     let mut latest = Record::default();
     for seed in first..first.saturating_add(seeds) {
         let one = match seeds {
+            // An app without draws refuses the word `seed`, so a single run does not get it.
             1 => observing.clone(),
             _ => observing.with("seed", seed.to_string()),
         };
@@ -191,6 +198,7 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         let is_well = booted.outcome.judge().is_ok();
         conclude(&booted, dags.as_ref(), &one);
         go_on(&booted)?;
+        // A failed run may have been cut short, so its times would be too small.
         if !is_well {
             return Ok(None);
         }
@@ -210,11 +218,11 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
             println!("{place}: the WCETs; `--wcets {place}` commits with them");
         }
     }
-    // Those of the last seed stand for all.
+    // The overheads in the last seed's run stand for those of all.
     Ok(Some(observed::measure(&latest.runs)))
 }
 
-/// Says a table to people and lines to programs, as the options want it.
+/// Prints a table for people and lines for programs, as the options want.
 fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
     if !options.is_given("json") {
         print!("{table}");
@@ -224,14 +232,15 @@ fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
     }
 }
 
-/// A run that only observes judges no bound: what its WCETs and overheads should be is what it is
-/// to show.
+/// Returns the word that keeps a run which only observes from judging bounds: its WCETs and
+/// overheads are still to be found.
 pub(super) fn bounds_word(options: &Parsed) -> Option<String> {
     let observes = options.is_given("observe") && !options.is_given("prove");
     observes.then(|| "bounds=observe".into())
 }
 
-/// Says what a guest has refused of a file of WCETs, by its name and line.
+/// Reports a guest's refusal of a WCET file with the file's name and line; returns whether it was
+/// one.
 pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
     let path = options.path("wcets");
     match path.and_then(|path| observed::translate(reason, path)) {
@@ -243,7 +252,7 @@ pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
     }
 }
 
-/// The options that say something of one run.
+/// Options that make sense for one file only.
 const FOR_ONE_FILE: [&str; 10] = [
     "print-dag",
     "graph",
@@ -264,6 +273,7 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
         let line = format!("`--{name}` is for one file; name one with `--dag`");
         return Err(Refusal::Usage(line));
     }
+    // Before any boot, so that a folder without files is refused at once.
     let files = files(folder).map_err(Refusal::Usage)?;
     if options.is_given("prove") {
         return of_files(options, &files);
@@ -279,6 +289,7 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
         let booted = boot_app(&one, dags.as_ref(), false)?;
         let judged = booted.outcome.judge();
         let status = judged.map_or_else(|fault| fault.status, |()| Status::Success);
+        // The messages of a failed run do not name its file.
         if status == Status::Failure {
             RUN.complain(&format!("{}:", files::place(file)));
         }
@@ -318,6 +329,7 @@ pub(super) fn each(
                 RUN.complain(&format!("{}: {line}", files::place(file)));
                 Status::Failure
             }
+            // Ctrl-C ends the whole series, not only this file.
             Err(refusal) => return Err(refusal),
         };
         refused += usize::from(status == Status::Usage);
@@ -356,6 +368,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
             "{place}: the folder has no file .dag, .yaml or .yml; name another"
         ));
     }
+    // The order of a folder's entries is up to the file system.
     files.sort();
     Ok(files)
 }
@@ -396,12 +409,13 @@ fn decimal(ns: u64) -> String {
     format!("{}.{:03}", us / 1000, us % 1000)
 }
 
-/// The machine lines of a file's DAGs, each with a member that names the file.
+/// Returns the machine lines of a file's DAGs, each with a member that names the file.
 fn lines<'o>(file: &Path, outcome: &'o Outcome) -> impl Iterator<Item = String> + use<'o> {
     const BEGINNING: &str = "{\"kind\":\"dag_run\",";
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let name = quoted(&name);
     outcome.serial.lines().filter_map(move |line| {
+        // The member goes in first: the rest of the line stays byte for byte the guest's.
         let rest = line.strip_prefix(BEGINNING)?;
         Some(format!("{BEGINNING}\"file\":{name},{rest}"))
     })

@@ -1,4 +1,4 @@
-//! What `run` accepts: the one table behind its parser and its help text.
+//! The options of `run`: the one table behind its parser and its help text.
 
 use crate::options::{Command, Takes, options};
 use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};

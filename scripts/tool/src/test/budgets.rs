@@ -1,12 +1,12 @@
-//! A budget of lines for each crate: what is added beyond it, something else gives way to.
+//! Budgets of lines: a crate may grow beyond its budget only if something else shrinks.
 //!
-//! A *row* of the table is a folder with a `Cargo.toml`, less the folders in it that have
-//! one; what lies in no package is of its first folder, `scripts`. Its lines are those of
-//! Rust, assembly, C, Python and shell that are neither blank nor a comment alone. Tests are
-//! counted apart: what lies in a folder `tests` or in `tests.rs`, and modules below
-//! `#[cfg(test)]`. `--bless` makes each budget what is there, lower or higher. It guarantees,
-//! by [`escape`], that what is counted has the default format, that Rust and assembly lie
-//! only in files that are counted, and that nothing is called a test that a product contains.
+//! A *row* of the table is a folder with a `Cargo.toml`, without the folders in it that have one;
+//! files outside all packages belong to the row of their top folder, such as `scripts`. Counted are
+//! lines of Rust, assembly, C, Python and shell that are neither blank nor a comment alone. Tests
+//! are counted apart: files in a folder `tests` or called `tests.rs`, and modules below
+//! `#[cfg(test)]`. `--bless` sets each budget to the present count, lower or higher. The check
+//! [`escape`] makes sure that counted files have the default format, that Rust and assembly are
+//! only in counted files, and that product code is not named like a test.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -20,13 +20,13 @@ use crate::system::workspace;
 /// The table, from the workspace's root.
 const TABLE: &str = "tests/baselines/lines.txt";
 
-/// How the names of counted files end. Timelines as data are tests: their ending goes here.
+/// The endings of counted files. Timelines as data are tests: their ending goes here.
 const ENDINGS: [&str; 5] = [".rs", ".s", ".c", ".py", ".sh"];
 
 /// Lines of code and of tests, by the row's name.
 type Rows = BTreeMap<String, [usize; 2]>;
 
-/// Holds these files to the table; rewrites it if there is a `list` of rewritten files.
+/// Compares these files with the table; rewrites it if there is a `list` of rewritten files.
 pub(super) fn check(sources: &[Source], list: Option<&Path>) -> Result<(), String> {
     let table = fs::read_to_string(workspace().join(TABLE));
     let table = table.map_err(|error| format!("{TABLE}: {error}"))?;
@@ -58,6 +58,7 @@ fn write(rows: &Rows) -> String {
 fn complaints(budgets: &Rows, there: &Rows) -> Vec<String> {
     let mut complaints = Vec::new();
     for row in budgets.keys().chain(there.keys()).collect::<BTreeSet<_>>() {
+        // A row on one side only: a crate is new, or gone.
         let (Some(budget), Some(lines)) = (budgets.get(row), there.get(row)) else {
             complaints.push(format!(
                 "`{row}` is not both in {TABLE} and in the tree; bless it"
@@ -80,6 +81,7 @@ fn count(sources: &[Source]) -> Rows {
     let mut rows = Rows::new();
     for Source { name, text } in sources {
         let path = Path::new(name);
+        // Scripts of the shell in `scripts/` have no ending.
         let is_script = name.starts_with("scripts/") && path.extension().is_none();
         if !is_script && !ENDINGS.iter().any(|ending| name.ends_with(ending)) {
             continue;
@@ -88,6 +90,7 @@ fn count(sources: &[Source]) -> Rows {
         let package = path.ancestors().skip(1).find(is_package);
         let first = || path.iter().next().map(Path::new);
         let row = package
+            // The workspace's own manifest makes no row of the whole tree.
             .filter(|folder| folder.parent().is_some())
             .or_else(first);
         let row = row.map_or(String::new(), |row| row.display().to_string());
@@ -103,11 +106,11 @@ fn lines(name: &str, text: &str) -> [usize; 2] {
     let comment = match name.rsplit_once('.') {
         Some((_, "rs" | "c")) => "//",
         Some((_, "py" | "sh")) => "#",
-        // Comments of other files are counted, for no line begins so.
+        // No line begins with a line end: in other files comments are counted.
         _ => "\n",
     };
     let mut counts = [0, 0];
-    // How the module ends that is below `#[cfg(test)]`.
+    // The line that ends the module below `#[cfg(test)]`, if one is open.
     let mut end: Option<String> = None;
     let mut lines = text.lines().peekable();
     while let Some(line) = lines.next() {
@@ -115,6 +118,7 @@ fn lines(name: &str, text: &str) -> [usize; 2] {
         let next = lines.peek().map_or("", |next| next.trim());
         let is_module = next.trim_start_matches("pub ").starts_with("mod ") && next.ends_with('{');
         if trimmed.starts_with("#[cfg(test)]") && is_module {
+            // The closing brace at the same indentation, as the default format writes it.
             end = Some(line.replace(trimmed, "}"));
         }
         if !trimmed.is_empty() && !trimmed.starts_with(comment) {
@@ -129,14 +133,14 @@ fn is_test(name: &str) -> bool {
     name.starts_with("tests/") || name.contains("/tests/") || name.ends_with("tests.rs")
 }
 
-/// Says by what a source file or one of settings has lines that are not counted as what they
-/// are.
+/// Returns how a source or settings file makes lines escape the count, or be counted as tests
+/// wrongly.
 pub(super) fn escape(name: &str, text: &str) -> Option<String> {
     if !name.ends_with(".rs") && !name.ends_with(".toml") {
         return None;
     }
     let lines = || text.lines().map(str::trim);
-    // What stands in quotation marks only looks like code.
+    // Text in quotation marks only looks like code.
     let code = || lines().filter(|line| !line.starts_with("//"));
     let has =
         |word: &str| code().any(|line| line.split('"').step_by(2).any(|part| part.contains(word)));
@@ -148,6 +152,7 @@ pub(super) fn escape(name: &str, text: &str) -> Option<String> {
     let assembly = (has("asm!(") && texts.any(is_odd)).then_some("assembly");
     let mut above = "";
     let line = lines().find(|line| {
+        // The attribute stands right above its module.
         let is_test_only = mem::replace(&mut above, line) == "#[cfg(test)]";
         let is_module = line.ends_with("tests;") && line.contains("mod ");
         let starts = ["#[path = \"", "path = \"", "build = \""];

@@ -1,12 +1,12 @@
 //! Checks: properties of the whole tree, each counted as one test.
 //!
 //! They hold the promises that no unit test can: no package from elsewhere, no file too long,
-//! layers in order, no crate beyond its budget of lines, nothing for the formatter, the linter
-//! and the documentation to complain of, a hand-off of no more instructions than its
-//! baseline, and a guest under KVM where KVM works. They judge the project's own packages.
+//! layers in order, no crate beyond its budget of lines, nothing for the formatter, the linter and
+//! the documentation to complain of, a hand-off of no more instructions than its baseline, and a
+//! guest under KVM where KVM works. They judge the project's own packages.
 //!
-//! Room for what the tests are built into is looked for before anything is built: a disk
-//! that is full in the middle shows as an error of the linker, or as a guest without log.
+//! Free disk space is checked before anything is built: a disk that fills up in the middle shows as
+//! an error of the linker, or as a guest without a log.
 
 use std::env;
 use std::fs;
@@ -25,7 +25,7 @@ use crate::system;
 /// The most lines of a source file.
 const MOST_LINES: usize = 800;
 
-/// Runs the checks that the plan wants.
+/// Runs the wanted checks, without those of cargo.
 pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
     let blessed = plan.blessed.as_deref();
     let mut run = |name: &str, check: &dyn Fn() -> Result<(), Why>| {
@@ -59,9 +59,11 @@ pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
         "an independent reader opens MCAP files in their test",
         &|| {
             let reader = recordings::independent_reader();
+            // A missing reader is reported as skipped, not as a failure.
             reader.map(drop).map_err(Why::Skipped)
         },
     );
+    // From here on the checks build images and boot guests.
     if plan.quick {
         return;
     }
@@ -76,7 +78,7 @@ pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
     });
 }
 
-/// Runs those checks of them that cargo makes, beside whatever else runs.
+/// Runs the checks that cargo makes, while other things run.
 pub(super) fn lint_all(plan: &Plan, sources: &[Source]) -> Tally {
     let mut tally = Tally::default();
     let mut run = |name: &str, words: &str, remedy: &str| {
@@ -105,11 +107,12 @@ pub(super) fn lint_all(plan: &Plan, sources: &[Source]) -> Tally {
     tally
 }
 
-/// Runs cargo on the packages of these files; whatever it says goes to the terminal only if it fails.
+/// Runs cargo on the packages of these files; its output is printed only if it fails.
 fn cargo(sources: &[Source], words: &str, remedy: &str) -> Result<(), String> {
     let mut command = system::cargo();
     let mut each = words.split(' ');
     command.args(each.next());
+    // By name, since `--workspace` would also judge apps that are not the project's own.
     for package in packages(sources) {
         command.args(["-p", &package]);
     }
@@ -125,7 +128,7 @@ fn cargo(sources: &[Source], words: &str, remedy: &str) -> Result<(), String> {
     Err(format!("`cargo {words}` failed; {remedy}"))
 }
 
-/// Names packages of others: one of ours has no `source`, it lies in the workspace.
+/// Names packages from elsewhere: ours lie in the workspace, and have no `source`.
 fn foreign(lock: &str) -> Result<(), String> {
     let packages = lock.split("[[package]]").skip(1);
     let foreign = packages.filter(|package| package.contains("\nsource = "));
@@ -148,7 +151,7 @@ fn lacks_essay(name: &str, text: &str) -> Option<String> {
     lacks.then(|| "does not open with `//!`".to_string())
 }
 
-/// Asks for a fault of each file, by its name and its text, and gathers them on one line.
+/// Collects the fault of each file, with its name, on one line.
 fn complain(
     sources: &[Source],
     fault: impl Fn(&str, &str) -> Option<String>,
@@ -160,16 +163,16 @@ fn complain(
     none_of(faults.collect())
 }
 
-/// What all tests and images, built from nothing, take at most, in MiB.
+/// The most disk space that all tests and images take, built from nothing, in MiB.
 const NEEDED_MIB: u64 = 3 << 10;
 
-/// Makes sure that there is room. If that cannot be known, it says so and no more.
+/// Makes sure that there is room. If the free space is unknown, only says so.
 ///
 /// # Errors
 ///
-/// One sentence: how much is missing where, and the remedy.
+/// One sentence: the missing space, its place, and the remedy.
 pub(super) fn check() -> Result<(), String> {
-    // The tool itself lies in the target folder, whatever cargo was told of it.
+    // The tool itself lies in the target folder, wherever that is.
     let tool = env::current_exe().unwrap_or_default();
     let folder = tool.parent().unwrap_or(Path::new("."));
     let answer = Command::new("df").arg("-Pk").arg(folder).output();
@@ -193,9 +196,10 @@ fn judge(free_mib: u64, folder: &Path) -> Result<(), String> {
     ))
 }
 
-/// Reads how much is available, in MiB, from what `df -Pk` says of one folder (POSIX,
-/// `df`, under STDOUT): the number before the percentage. Names may contain blanks.
+/// Reads the available space, in MiB, from the output of `df -Pk` for one folder (POSIX, `df`,
+/// under STDOUT): the number before the percentage. Names may contain blanks.
 fn free_mib(said: &str) -> Option<u64> {
+    // From the end, since a device's name may contain blanks, too.
     let mut words = said.lines().nth(1)?.split_whitespace().rev();
     words.find(|word| word.ends_with('%'))?;
     let kib: u64 = words.next()?.parse().ok()?;

@@ -1,15 +1,15 @@
-//! The order within each crate: which folder may name which, and no circles.
+//! The order within each crate: which folder may name which other; circles are refused.
 //!
 //! A crate's folders (and single files) right below `src` are its *layers*. The page
-//! docs/architecture.md lists them from top to bottom, and nowhere else are they listed; a
-//! layer may name those that stand after it. A folder may have a row of its own, which
-//! orders what is right below it. Everywhere, no file may lead back to itself through files
-//! that name each other, but for a file and those it contains.
+//! docs/architecture.md, and no other, lists them from top to bottom; a layer may name those listed
+//! after it. A folder may have a row of its own, which orders the modules right below it.
+//! Everywhere, no file may lead back to itself through files that name each other, except for a
+//! file and those it contains.
 //!
-//! A file's *module* is its path from the workspace's root, without `.rs` and `/mod`; the
-//! crate's root is its folder `src`. It *names* a module if a path in its code, within `use`
-//! or without, begins with `crate`, `super`, `self` or a child's name and leads into that
-//! module. Code for tests is left out: a test may name anything.
+//! A file's *module* is its path from the workspace's root, without `.rs` and `/mod`; the crate's
+//! root is its folder `src`. It *names* a module if a path in its code, in a `use` or elsewhere,
+//! begins with `crate`, `super`, `self` or a child's name and leads into that module. Code for
+//! tests is left out: a test may name anything.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -18,22 +18,22 @@ use std::path::{Path, PathBuf};
 use super::{Source, none_of};
 use crate::system::workspace;
 
-/// Where the table stands: the page, and the heading right above it.
+/// The page with the table, and the heading right above it.
 const PAGE: &str = "docs/architecture.md";
 const HEADING: &str = "## Layers inside the crates";
 
-/// A row of the table: the folder of a crate's sources, or one in it, and the layers there
-/// from top to bottom.
+/// A row of the table: the folder of a crate's sources, or one in it, and its layers from top to
+/// bottom.
 #[derive(Debug, PartialEq, Eq)]
 struct Row {
     src: String,
     layers: Vec<String>,
 }
 
-/// Which modules of its crate each module names, itself left out.
+/// The modules of its own crate that each module names, without itself.
 type Names = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
 
-/// Holds the files of every crate of the table against it.
+/// Checks the files of every crate in the table.
 pub(super) fn check(sources: &[Source]) -> Result<(), String> {
     let page = fs::read_to_string(workspace().join(PAGE));
     let rows = rows(&page.map_err(|error| format!("{PAGE}: {error}"))?);
@@ -79,7 +79,7 @@ fn rows(page: &str) -> Vec<Row> {
     section.lines().filter_map(row).collect()
 }
 
-/// Returns a source file's module; nothing for tests and for what is no source.
+/// Returns a source file's module; `None` for tests and other files.
 fn module(place: &Path) -> Option<PathBuf> {
     let mut module = place.with_extension("");
     let is_source = place.extension().is_some_and(|ending| ending == "rs");
@@ -87,6 +87,7 @@ fn module(place: &Path) -> Option<PathBuf> {
         return None;
     }
     if ["mod", "lib", "main"]
+        // A crate's root and a folder's `mod.rs` stand for the folder.
         .iter()
         .any(|name| module.ends_with(name))
     {
@@ -115,8 +116,8 @@ fn names(codes: &BTreeMap<PathBuf, String>) -> Names {
     codes.iter().map(named).collect()
 }
 
-/// Returns the module that a path leads into, seen from `module`; nothing for a path into
-/// another crate.
+/// Returns the module that a path leads into, seen from `module`; `None` for a path into another
+/// crate.
 fn target(module: &Path, path: &[&str], modules: &BTreeMap<PathBuf, String>) -> Option<PathBuf> {
     let [first, rest @ ..] = path else {
         return None;
@@ -133,6 +134,7 @@ fn target(module: &Path, path: &[&str], modules: &BTreeMap<PathBuf, String>) -> 
         }
         "self" => {}
         "super" => drop(from.pop()),
+        // A name that is no child of the module comes from a `use` or is another crate.
         child => {
             from.push(child);
             modules.get(&from)?;
@@ -144,20 +146,22 @@ fn target(module: &Path, path: &[&str], modules: &BTreeMap<PathBuf, String>) -> 
             word => from.push(word),
         }
     }
+    // The end of a path is mostly an item of a module, not a module.
     while !modules.contains_key(&from) {
         from.pop().then_some(())?;
     }
     Some(from)
 }
 
-/// Returns every path of the code, those of a `use` written out one by one.
+/// Returns every path of the code; those of a `use` are written out one by one.
 fn paths(code: &str) -> Vec<Vec<&str>> {
     let mut found = Vec::new();
-    // The path so far, whether it is one by itself, and how much of it the branches within each
-    // open brace begin with.
+    // The path so far, whether it is complete, and for each open brace the length of the path that
+    // its branches begin with.
     let (mut path, mut is_whole, mut begins) = (Vec::new(), false, Vec::new());
     let mut is_joined = false;
     for token in tokens(code) {
+        // Without `::` before it, the token begins another path.
         if !is_joined && token != "::" {
             if is_whole {
                 found.push(path.clone());
@@ -172,7 +176,7 @@ fn paths(code: &str) -> Vec<Vec<&str>> {
             }
             "}" => drop(begins.pop()),
             "*" if is_joined => path.push("*"),
-            // What follows `::` at the begin of a path is another crate's, or of a type.
+            // At the beginning of a path `::` is followed by another crate, or by part of a type.
             word if is_word(word) && (!is_joined || !path.is_empty()) => {
                 path.push(word);
                 is_whole = true;
@@ -205,13 +209,13 @@ fn tokens(code: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Returns the layer of a row that a module lies in.
+/// Returns the layer of a row that contains a module.
 fn layer(row: &Row, module: &Path) -> Option<String> {
     let first = module.strip_prefix(&row.src).ok()?.iter().next()?;
     Some(first.to_string_lossy().into())
 }
 
-/// Layers that only the table or only the folder has.
+/// Returns the layers that only the table or only the folder has.
 fn strangers(row: &Row, names: &Names) -> Vec<String> {
     let there: BTreeSet<String> = names.keys().filter_map(|it| layer(row, it)).collect();
     let listed: BTreeSet<String> = row.layers.iter().cloned().collect();
@@ -227,7 +231,7 @@ fn strangers(row: &Row, names: &Names) -> Vec<String> {
     missing.chain(gone).collect()
 }
 
-/// Files that name a layer above their own.
+/// Returns the files that name a layer above their own.
 fn upward(row: &Row, names: &Names) -> impl Iterator<Item = String> {
     let place = |module: &Path| {
         let layer = layer(row, module)?;
@@ -236,6 +240,7 @@ fn upward(row: &Row, names: &Names) -> impl Iterator<Item = String> {
     let all = names.iter();
     let arrows = all.flat_map(|(from, named)| named.iter().map(move |to| (from, to)));
     let is_upward = move |(from, to): &(&PathBuf, &PathBuf)| {
+        // A module outside of the row has no place in its order.
         place(to)
             .zip(place(from))
             .is_some_and(|(to, from)| to < from)
@@ -271,6 +276,7 @@ fn reached_from<'n>(module: &'n PathBuf, names: &'n Names) -> BTreeSet<&'n PathB
     let mut open = vec![module];
     while let Some(next) = open.pop() {
         for named in names.get(next).into_iter().flatten() {
+            // A file and those it contains may name each other.
             let contains = next.starts_with(named) || named.starts_with(next);
             if !contains && reached.insert(named) {
                 open.push(named);

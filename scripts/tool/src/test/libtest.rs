@@ -1,8 +1,8 @@
-//! The tests of all packages: cargo compiles them and says where, libtest counts them.
+//! The tests of all packages: compiled by cargo, run here, counted by libtest's output.
 //!
-//! The binaries are run here, one after the other, so that each has a limit of its own and a
-//! name in the report, and guests are booted only where they can be. A binary's last word is
-//! its `test result:` lines, which are summed. Output is shown in full if something failed.
+//! The binaries are run here, one after the other, so that each has a limit of its own and a name
+//! in the report, and guests are booted only where they can be. A binary's last word is its `test
+//! result:` lines, which are summed. Output is shown in full if something failed.
 
 use std::fs::{self, File};
 use std::path::PathBuf;
@@ -17,14 +17,14 @@ use crate::json::Value;
 use crate::progress::Lasting;
 use crate::system;
 
-/// How long one test binary, or all doctests, may take: what hangs, and not what a busy
-/// host makes slow. Each guest has a limit of its own.
+/// The limit for one test binary, or for all doctests: for tests that hang, far beyond a busy
+/// host's delays. Each guest has a limit of its own.
 const LIMIT: Duration = Duration::from_secs(3600);
 
 /// The integration test of a package that boots guests; no other does.
 const BOOTS: &str = "boots";
 
-/// The programs that modules of such tests need besides QEMU.
+/// The programs that modules of boot tests need besides QEMU.
 const NEEDS: [(&str, &[&Need]); 4] = [
     ("by_efi::", &[&install::MTOOLS, &install::OVMF]),
     (
@@ -45,7 +45,7 @@ pub(super) struct TestBinary {
     executable: PathBuf,
 }
 
-/// Test programs, and whether all are compiled.
+/// The test binaries, and whether all have compiled.
 pub(super) type Compiled = (Vec<TestBinary>, Result<(), String>);
 
 /// Runs the tests of all packages.
@@ -64,6 +64,7 @@ pub(super) fn run_all(plan: &Plan, (binaries, compiled): Compiled, tally: &mut T
                 true => Err("left out by --quick".into()),
                 false => plan.boots.clone(),
             };
+            // Skipped and counted as such: a guest that cannot boot must not pass silently.
             if let Err(why) = obstacle {
                 tally.skip(&name, &why);
                 continue;
@@ -75,6 +76,7 @@ pub(super) fn run_all(plan: &Plan, (binaries, compiled): Compiled, tally: &mut T
         }
         run(plan, &name, command, tally);
     }
+    // Doctests need cargo to compile each, which is not quick.
     if !plan.quick {
         run(plan, "doctests", doctests(plan), tally);
     }
@@ -90,7 +92,7 @@ pub(super) fn compile() -> Compiled {
     command.args(words.split_whitespace());
     let (messages, compiled) = system::messages_of(&mut command);
     let mut binaries: Vec<TestBinary> = messages.iter().filter_map(TestBinary::read).collect();
-    // Cheap ones first: a mistake shows soon.
+    // Fast ones first: a mistake shows early.
     binaries.sort_by_key(|binary| (binary.boots_guests(), binary.name()));
     (binaries, compiled)
 }
@@ -106,7 +108,7 @@ impl TestBinary {
         let target = text(&["target", "name"])?;
         let kind = message.at(&["target", "kind"])?.elements().first()?;
         let target = match kind.as_text()? {
-            // The tool's package has a library and a program of one name.
+            // The tool's package has a library and a program of the same name.
             "bin" => format!("{target} (program)"),
             _ => target.into(),
         };
@@ -124,14 +126,13 @@ impl TestBinary {
         format!("{folder}: {}", self.target)
     }
 
-    /// Whether its tests need QEMU; they say so by the target's name.
+    /// Reports whether its tests need QEMU; the target's name says so.
     fn boots_guests(&self) -> bool {
         self.target == BOOTS
     }
 
-    /// Returns what runs the tests that the filter wants. As cargo does it: tests run in their
-    /// package's folder. A tool that they start is called from where they start it, not from
-    /// where this one was.
+    /// Returns the command for the wanted tests. As with cargo, tests run in their package's
+    /// folder. A tool that they start must resolve paths from there, so `TOOL_CALLED_IN` is unset.
     fn command(&self, plan: &Plan) -> Command {
         let mut command = bound_to_us(&self.executable);
         command.current_dir(&self.folder).args(&plan.filter);
@@ -140,8 +141,8 @@ impl TestBinary {
         command
     }
 
-    /// Lists the tests that the filter wants, if there are any. A program that cannot say so
-    /// counts as if it had some.
+    /// Lists the wanted tests; `None` if there are none. A program that cannot list them counts as
+    /// having some.
     fn wanted(&self, plan: &Plan) -> Option<String> {
         let mut listed = self.command(plan);
         listed.args(["--list", "--format=terse"]);
@@ -155,8 +156,8 @@ impl TestBinary {
     }
 }
 
-/// Installs what these tests need besides QEMU; returns the modules for which that cannot be had,
-/// and why.
+/// Installs what these tests need besides QEMU. Returns the modules whose needs cannot be met, with
+/// the reasons.
 fn lacking(tests: &str) -> Vec<(&'static str, String)> {
     let is_there = |module| tests.lines().any(|test| test.starts_with(module));
     let needed = NEEDS.iter().filter(|(module, _)| is_there(*module));
@@ -167,19 +168,19 @@ fn lacking(tests: &str) -> Vec<(&'static str, String)> {
     lacks.collect()
 }
 
-/// Returns what runs the examples in the documentation.
+/// Returns the command for the examples in the documentation.
 fn doctests(plan: &Plan) -> Command {
     let mut command = system::cargo();
-    // What the kernel on Linux shares with the kernel has examples that name the latter, where
-    // they are tested; and `--doc` does not ask whether a library wants its examples tested.
-    // `--quiet` makes libtest quiet too, which would hide the names.
+    // The kernel on Linux shares sources with the kernel; their examples name the latter and are
+    // tested there, and `--doc` ignores a library's wish not to test examples. `--quiet` reaches
+    // libtest, too, and would hide the names.
     let words = "test --quiet --workspace --exclude=kernel-on-linux --doc --no-fail-fast -- \
                  --format=pretty";
     command.args(words.split_whitespace()).args(&plan.filter);
     command
 }
 
-/// Runs one command and counts what its output says.
+/// Runs one command and counts the results in its output.
 fn run(plan: &Plan, name: &str, command: Command, tally: &mut Tally) {
     let mut report = Report::default();
     let (waited, elapsed) = match follow(plan, command, &mut report) {
@@ -196,6 +197,7 @@ fn run(plan: &Plan, name: &str, command: Command, tally: &mut Tally) {
     tally.pass(report.passed);
 
     let died = match waited {
+        // A crash, or an exit without the result line, is a failure that no test reports.
         Waited::Ended(status) if !status.success() && failed.is_empty() => {
             Some(format!("ended with {status} although no test failed"))
         }
@@ -241,17 +243,17 @@ fn follow(
         report.take(line);
     };
     let followed = child.follow(LIMIT, &log, &mut show, None, |_| true);
-    // It is ours, and in the way of no one if it cannot be removed.
+    // The file is ours; one that cannot be removed harms nothing.
     let _ = fs::remove_file(&log);
     Ok((followed?.waited, child.elapsed()))
 }
 
-/// What libtest's output says.
+/// The results in libtest's output.
 #[derive(Default)]
 struct Report {
     output: String,
     passed: u64,
-    /// The number of failures, and the names of those that have a line of their own.
+    /// The number of failures, and the names of those with a line of their own.
     failures: u64,
     named: Vec<String>,
     /// Names and reasons.
@@ -280,8 +282,9 @@ impl Report {
         }
     }
 
-    /// Returns the names of the tests that failed.
+    /// Returns the names of the failed tests.
     fn failed(&self) -> Vec<&str> {
+        // A test that prints in the middle of its line hides its name; the sum still counts it.
         let unnamed = self.failures.saturating_sub(self.named.len() as u64);
         let unnamed = (0..unnamed).map(|_| "a test without a line of its own");
         self.named

@@ -1,17 +1,16 @@
-//! The subcommand `test`: every test there is, counted.
+//! The subcommand `test`: runs and counts every test.
 //!
-//! A *test* is a libtest test of any package (boot tests are such: they boot
-//! guests), a doctest, or a *check*: one property of the whole tree with a
-//! name of its own, such as "clippy has nothing to say". All of them end up
-//! in one tally, whose last line is `N passed, M failed`, with
-//! `, K skipped` if something could not run; the reasons stand above it.
+//! A *test* is a libtest test of any package (boot tests, which boot guests, are such tests), a
+//! doctest, or a *check*: one property of the whole tree with a name of its own, such as "clippy
+//! has nothing to say". All of them are counted in one tally, whose last line is `N passed, M
+//! failed`, with `, K skipped` if something could not run; the reasons stand above it.
 //!
 //! Nothing passes by not running: a test binary that does not compile, dies
 //! without its result line, or does not end within its time is a failure.
 //!
-//! The checks judge the project's own packages. An app that somebody makes here need not follow the
-//! project's rules on lints, format and files, only pass its tests. A package takes the rules on
-//! itself by one thing: by taking the workspace's lints.
+//! The checks judge the project's own packages. Other apps in this tree need not follow the
+//! project's rules on lints, format and files, but must pass their tests. A package accepts the
+//! rules by taking the workspace's lints.
 
 mod budgets;
 mod checks;
@@ -61,17 +60,17 @@ a FILTER by which nothing has run
 ",
 };
 
-/// The tests that shall run.
+/// The tests to run.
 struct Plan {
-    /// A part of the names of the tests wanted; `None`: all.
+    /// A part of the names of the wanted tests; `None`: all.
     filter: Option<String>,
     /// Leave out guests, images and lints.
     quick: bool,
     /// Show every test by name.
     verbose: bool,
-    /// Whether guests can be booted, or why not.
+    /// Whether guests can be booted; if not, the reason.
     boots: Result<(), String>,
-    /// The list of rewritten files, if what differs is to be rewritten.
+    /// The list of rewritten files, if goldens are to be rewritten.
     blessed: Option<PathBuf>,
 }
 
@@ -86,6 +85,7 @@ impl Plan {
 #[must_use]
 pub fn test(words: &[OsString]) -> ExitCode {
     TEST.carry_out(words, |options| {
+        // Before anything is built: a full disk would show as an error of the linker.
         checks::check()?;
         let list = options.is_given("bless");
         let list = list.then(|| system::new_log("blessed"));
@@ -101,8 +101,8 @@ pub fn test(words: &[OsString]) -> ExitCode {
         let plan = &plan;
         let (send, compiled) = mpsc::channel();
         thread::scope(|scope| {
-            // Cargo keeps images apart from what tests and lints are made of, so while it makes
-            // the one on a processor, it makes the other, and lints while tests run.
+            // Cargo builds images in another folder than tests and lints. So both are built at the
+            // same time, and lints run while tests run.
             let aside = scope.spawn(move || {
                 let _ = send.send(libtest::compile());
                 checks::lint_all(plan, sources)
@@ -118,13 +118,13 @@ pub fn test(words: &[OsString]) -> ExitCode {
             Ok::<(), String>(())
         })?;
         if let Some(list) = &plan.blessed {
-            // There is none if nothing was rewritten.
+            // Without a rewritten file there is no list.
             tally.bless(&fs::read_to_string(list).unwrap_or_default());
             let _ = fs::remove_file(list);
         }
 
-        // A filter without a match ends in the complaint alone: `0 passed, 0 failed`
-        // would look like success.
+        // A filter without a match ends in the complaint alone: `0 passed, 0 failed` would look
+        // like success.
         if !tally.is_empty() {
             print!("{tally}");
         }
@@ -135,7 +135,7 @@ pub fn test(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Says what is wrong with a filter by which nothing has run.
+/// Returns the complaint about a filter that nothing matched.
 fn complaint(filter: Option<&str>, tally: &Tally) -> Option<String> {
     let filter = filter.filter(|_| !tally.has_run())?;
     if tally.is_empty() {
@@ -149,8 +149,8 @@ fn complaint(filter: Option<&str>, tally: &Tally) -> Option<String> {
     ))
 }
 
-/// Builds the images before the tests that boot them, so that their limits do
-/// not have to hold for a compiler too. One of the project's own must be light.
+/// Builds the images before the tests that boot them, so that the limits of these tests need not
+/// include a compiler. An image of the project's own must be small.
 fn build_images(plan: &Plan, sources: &[Source], tally: &mut Tally) {
     if plan.quick {
         return;
@@ -177,7 +177,7 @@ fn build_image(app: &str, most: u64) -> Result<(), String> {
     Err(format!("it weighs {bytes} bytes, {most} are allowed"))
 }
 
-/// Why a check has not passed.
+/// The reason why a check has not passed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Why {
     /// It failed.
@@ -192,7 +192,7 @@ impl From<String> for Why {
     }
 }
 
-/// Reports that there are no faults, or which there are.
+/// Returns an error that lists the faults, if there are any.
 fn none_of(faults: Vec<String>) -> Result<(), String> {
     match faults.is_empty() {
         true => Ok(()),
@@ -200,15 +200,15 @@ fn none_of(faults: Vec<String>) -> Result<(), String> {
     }
 }
 
-/// A file: its name from the workspace's root, and its text.
+/// A file: its name, relative to the workspace's root, and its text.
 #[derive(Debug, PartialEq, Eq)]
 struct Source {
     name: String,
     text: String,
 }
 
-/// Returns all files of the workspace but the generated ones, and but those of packages that
-/// are not the project's own; sorted.
+/// Returns all files of the workspace, sorted, without the generated ones and without those of
+/// packages that are not the project's own.
 fn sources() -> Vec<Source> {
     below(system::workspace())
 }
@@ -234,7 +234,7 @@ fn below(root: &Path) -> Vec<Source> {
             .unwrap_or(file)
             .display()
             .to_string(),
-        // One that cannot be read has no essay.
+        // A file that cannot be read counts as empty, and so lacks its essay.
         text: String::from_utf8_lossy(&fs::read(file).unwrap_or_default()).into_owned(),
     };
     files.iter().map(|file| source(file)).collect()
@@ -247,7 +247,7 @@ fn takes_lints(manifest: &str) -> bool {
     of_lints.any(|line| line.replace(' ', "") == "workspace=true")
 }
 
-/// The count, and the names behind it.
+/// The counts, and the names of failures and skipped tests.
 #[derive(Debug, Default)]
 struct Tally {
     passed: u64,
@@ -257,7 +257,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// Runs a check, counts it, and says on standard output how it went and how long it took.
+    /// Runs a check, counts it, and prints its result and its time.
     fn run(&mut self, name: &str, check: impl FnOnce() -> Result<(), Why>) {
         let start = Instant::now();
         let result = check();
@@ -275,7 +275,7 @@ impl Tally {
         }
     }
 
-    /// Counts what another one has counted.
+    /// Adds the counts of another tally.
     fn take(&mut self, other: Tally) {
         self.passed += other.passed;
         self.failures.extend(other.failures);
@@ -289,6 +289,7 @@ impl Tally {
 
     /// Counts a failure.
     fn fail(&mut self, name: &str, why: &str) {
+        // One line for the summary; the whole reason stands above.
         let first = why.lines().next().unwrap_or_default();
         self.failures.push(format!("{name}: {first}"));
     }
@@ -298,7 +299,7 @@ impl Tally {
         self.skips.push(format!("{name}: {why}"));
     }
 
-    /// Notes the files of a list, a line each, as rewritten.
+    /// Records the files of a list, one in each line, as rewritten.
     fn bless(&mut self, list: &str) {
         self.blessed.extend(list.lines().map(String::from));
     }

@@ -1,22 +1,23 @@
-//! The trace checker: what happened in a run, held against the model's rules.
+//! The trace checker: the events of a run, judged by the model's rules.
 //!
-//! A [record](crate::record) has the model that was run, and its journal: a [`Run`]. The judge is
-//! [`sched_dag::law`], which judges all runs, within a stated *bound*, because a decision
-//! takes effect after an interrupt.
+//! A [record](crate::record) has the model of a run and its journal: a [`Run`]. The judge is
+//! [`sched_dag::law`], which judges all runs, within a stated *bound*, because a decision takes
+//! effect after an interrupt.
 //!
-//! Here are besides: the subcommand `check-trace`; the [`Figures`], from a `View`, which puts a
-//! run in the order of time; how long effects take from DAG to DAG ([`sched_dag::chains`]); and
-//! [`viewer`], which draws a run instead of judging it. All files are read before the first run
-//! is judged, so that a damaged one does not hide behind the breaches of another.
+//! This module has the subcommand `check-trace`; the [`Figures`], computed from a `View`, which
+//! puts a run in the order of time; the latencies of effects from DAG to DAG
+//! ([`sched_dag::chains`]); and [`viewer`], which draws a run instead of judging it. All files are
+//! read before the first run is judged, so that a damaged one does not hide behind the breaches of
+//! another.
 //!
-//! If events were lost, they were the oldest, and only what came after the instant of the
-//! first one that is left is judged. An instance that has not finished when the trace
-//! ends breaks no rule, unless the run says that it is complete.
+//! Lost events are always the oldest, and only events after the instant of the first one that is
+//! left are judged. An instance that has not finished when the trace ends breaks no rule, unless
+//! the run says that it is complete.
 //!
-//! A trace tells in numbers:
+//! The figures of a trace:
 //!
-//! - *finish to ready*: from the finish that was the last thing an instance
-//!   waited for to its readiness; the largest.
+//! - *finish to ready*: from the last finish that an instance waited for to its readiness; the
+//!   largest.
 //! - *ready to start*: from readiness to the function's call, of instances for
 //!   which a core was idle when they became ready, unless another instance with
 //!   a smaller key became ready meanwhile and took it.
@@ -29,8 +30,8 @@
 //! - *load*: the part of the time from the first event to the last for which a
 //!   core had an instance, in thousandths.
 //!
-//! A trace is *complete from* the first instant after the first event that is left; what
-//! happened before is left out.
+//! A trace is *complete from* the first instant after the first event that is left; earlier events
+//! are left out.
 
 pub mod picture;
 pub mod viewer;
@@ -55,7 +56,7 @@ use crate::record::{Record, Run, bound};
 pub use viewer::TRACE;
 pub use viewer::trace;
 
-/// What a run's trace shows.
+/// The findings in a run's trace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Findings {
     /// The breaches by time.
@@ -64,17 +65,17 @@ pub struct Findings {
     pub figures: Figures,
 }
 
-/// Reads the runs of the record that stands in a log.
+/// Reads the runs of the record in a log.
 ///
 /// # Errors
 ///
-/// In words: what is wrong with it.
+/// In words: the fault of the record.
 pub fn read(log: &str) -> Result<Vec<Run>, String> {
     Record::of_log(log).map(|record| record.runs)
 }
 
-/// Holds a run against the rules. Nothing waits longer than `bound_ns` for what
-/// it is owed; 0 is for virtual time.
+/// Judges a run. `bound_ns` is the longest time for which an instance may wait for a core that it
+/// is owed; 0 is for virtual time.
 #[must_use]
 pub fn check(run: &Run, bound_ns: u64) -> Findings {
     let (view, terms) = (View::new(run), run.terms(bound_ns));
@@ -83,6 +84,7 @@ pub fn check(run: &Run, bound_ns: u64) -> Findings {
     let dispatch = law::judge_dispatch(&run.task_set, &run.options, terms, by_time);
     let mut breaches = verdict.violations;
     breaches.extend(dispatch.violations);
+    // Two judges have reported; people read one list by time.
     breaches.sort_by_key(|breach| (breach.time_ns(), breach.rule()));
     Findings {
         breaches,
@@ -145,7 +147,7 @@ pub fn check_trace(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Judges the runs of all files, and returns how many breaches there are.
+/// Judges the runs of all files, and returns the number of breaches.
 fn judge_all(options: &Parsed) -> Result<usize, String> {
     if options.files().len() == 0 {
         return Err("which files? name at least one serial log with a trace".into());
@@ -156,7 +158,7 @@ fn judge_all(options: &Parsed) -> Result<usize, String> {
         let found = read_file(file)?.into_iter();
         runs.extend(found.map(|run| (files::place(file), run)));
     }
-    // A wrong name is told before anything is shown.
+    // All chains are measured first, so that a wrong name is reported before any output.
     let measured = runs.iter().map(|(_, run)| measure(run, options));
     let measured: Vec<_> = measured.collect::<Result<_, _>>()?;
     let judged = runs.iter().zip(&measured);
@@ -182,7 +184,7 @@ fn read_file(path: &Path) -> Result<Vec<Run>, String> {
     }
 }
 
-/// Checks a run, prints what was found, and returns the number of breaches.
+/// Judges a run, prints the findings, and returns the number of breaches.
 fn judge(file: &str, run: &Run, chains: &[Measured], options: &Parsed) -> usize {
     let bound_ns = bound::of(run, options);
     let shown = options.number("show").unwrap_or(u64::MAX);
@@ -315,7 +317,7 @@ fn object(of: &Distribution) -> String {
     )
 }
 
-/// The most chains that are shown of a run, unless one is named.
+/// The largest number of chains shown for a run, unless one is named.
 const SHOWN: usize = 8;
 
 /// The times of a chain in a run, and their bounds.
@@ -357,6 +359,7 @@ fn measure(run: &Run, options: &Parsed) -> Result<Vec<Measured>, String> {
         let bounds = &run.bounds_ns;
         let reaction = chain.reaction_bound_ns(&run.task_set, bounds);
         let names = chain.names(&run.task_set).map(|name| name.to_string());
+        // Reaction time and data age have the same bound.
         Measured {
             names: names.collect(),
             output_age: (
@@ -390,7 +393,7 @@ fn place(run: &Run, option: &str, name: &str) -> Result<SubtaskRef, String> {
     })
 }
 
-/// Returns the lines for people.
+/// Returns the lines about chains for people.
 fn chain_table(run: &Run, chains: &[Measured], is_named: bool) -> String {
     let mut text = String::new();
     let shown = if is_named { chains.len() } else { SHOWN };
@@ -444,16 +447,16 @@ fn chain_line(file: &str, run: &Run, chain: &Measured) -> String {
 /// The figures of one run. Times are in nanoseconds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Figures {
-    /// Events that were judged.
+    /// The number of judged events.
     pub events: usize,
-    /// Instances that started.
+    /// The number of instances that started.
     pub instances: usize,
-    /// How often an instance was suspended.
+    /// The number of suspensions.
     pub preemptions: u64,
     /// The first instant from which the trace is complete; 0 if nothing was
     /// lost.
     pub from_ns: u64,
-    /// From the first judged event to the last.
+    /// The time from the first judged event to the last.
     pub span_ns: u64,
     /// See the module; 0 if there was none.
     pub finish_to_ready_max_ns: u64,
@@ -488,14 +491,16 @@ fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: WaitCounts) -> F
 
 fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
     let mut latencies_ns = Vec::new();
-    // The next request for each core, as seen from the one at hand.
+    // For each core, the time of the next request after the one at hand.
     let mut next_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
+    // Backwards, so that the next request for the core is known already.
     let requests = view.events.iter().rev();
     for event in requests.filter(|event| event.what == EventKind::Request) {
         let overtaken_ns = next_ns.insert(event.core, event.time_ns);
         let history = event.instance().and_then(|it| view.histories.get(&it));
         let slices = history.map_or(&[][..], |history| &history.slices);
         let mut later = slices.iter().filter(|it| it.from_ns >= event.time_ns);
+        // The instance must come to this core, and before the core is wanted for another.
         if let Some(slice) = later.next()
             && slice.core == event.core
             && overtaken_ns.is_none_or(|overtaken_ns| slice.from_ns <= overtaken_ns)
@@ -509,6 +514,7 @@ fn preemption_latencies_ns(view: &View<'_>) -> Vec<u64> {
 fn load_permille(view: &View<'_>, first_ns: u64, span_ns: u64) -> Vec<u64> {
     let mut busy_ns: BTreeMap<CoreId, u64> = BTreeMap::new();
     for slice in view.histories.values().flat_map(|it| &it.slices) {
+        // An instance that ran when the trace ended has its core up to there.
         let to_ns = slice.to_ns.unwrap_or(view.end_ns);
         let from_ns = slice.from_ns.max(first_ns);
         let busy_ns = busy_ns.entry(slice.core).or_insert(0);
@@ -533,13 +539,13 @@ struct View<'r> {
     /// The events from `from_ns` on, by time.
     events: Vec<Event>,
     histories: BTreeMap<Instance, History>,
-    /// The jobs, each with what has happened to it and when.
+    /// The jobs, each with its history.
     jobs: BTreeMap<(DagId, u64), JobHistory>,
-    /// When sporadic jobs were due.
+    /// The due times of sporadic jobs.
     due_ns: BTreeMap<(DagId, u64), u64>,
 }
 
-/// What happened to a job, and when first.
+/// The times of a job's first events of each kind.
 #[derive(Clone, Debug, Default)]
 struct JobHistory {
     released_ns: Option<u64>,
@@ -548,20 +554,20 @@ struct JobHistory {
     completed_ns: Option<u64>,
 }
 
-/// What happened to an instance, and when first.
+/// The times of an instance's first events of each kind.
 #[derive(Clone, Debug, Default)]
 struct History {
     ready_ns: Option<u64>,
     start_ns: Option<u64>,
     finish_ns: Option<u64>,
-    /// When it was cancelled, or ended by a fault.
+    /// The time of its cancellation, or of its end by a fault.
     dropped_ns: Option<u64>,
     /// The times on a core.
     slices: Vec<Slice>,
     suspensions: u64,
 }
 
-/// A stretch of time on one core.
+/// A stretch of execution on one core.
 #[derive(Clone, Copy, Debug)]
 struct Slice {
     core: CoreId,
@@ -571,7 +577,7 @@ struct Slice {
 }
 
 impl<'r> View<'r> {
-    /// Puts a run in order.
+    /// Builds the view of a run.
     fn new(run: &'r Run) -> View<'r> {
         let mut view = View {
             run,
@@ -583,6 +589,7 @@ impl<'r> View<'r> {
             due_ns: BTreeMap::new(),
         };
         view.events = view.in_the_order_of_the_log().collect();
+        // Stable: events of one instant keep the order of the journal.
         view.events.sort_by_key(|event| event.time_ns);
         view.end_ns = view.events.last().map_or(view.from_ns, |last| last.time_ns);
         for event in &view.events {
@@ -604,14 +611,13 @@ impl<'r> View<'r> {
         view
     }
 
-    /// Returns the events that are judged, in the order in which they were learnt of.
+    /// Returns the judged events in the order of the journal.
     fn in_the_order_of_the_log(&self) -> impl Iterator<Item = Event> {
         let events = self.run.events.iter().copied();
         events.filter(|event| event.time_ns >= self.from_ns)
     }
 
-    /// Returns the nominal release of a job; 0 if nothing is known of that of a sporadic
-    /// one.
+    /// Returns the nominal release of a job; 0 if that of a sporadic one is unknown.
     fn release_ns(&self, dag: DagId, job: u64) -> u64 {
         let model = self.run.task_set.dag(dag);
         match model.is_sporadic() {
@@ -627,15 +633,16 @@ impl<'r> View<'r> {
     }
 }
 
-/// Finds the first instant after which no event is missing.
+/// Returns the first instant after which no event is missing.
 fn complete_from_ns(run: &Run) -> u64 {
     if run.lost == 0 {
         return 0;
     }
-    // What is lost came before it, and the time of these was read as they were written.
+    // Finishes and due times may be dated before their writing; the others bear the time at which
+    // they were written, so every lost event is older.
     let mut events = run.events.iter();
     let first = events.find(|event| !matches!(event.what, EventKind::Finish | EventKind::Due));
-    // At that very instant something may be missing.
+    // Other events of that very instant may be lost.
     first.map_or(u64::MAX, |first| first.time_ns.saturating_add(1))
 }
 
@@ -653,22 +660,24 @@ impl JobHistory {
 }
 
 impl History {
-    /// Returns when the instance was over: finished, cancelled or ended.
+    /// Returns the time when the instance was over: finished, cancelled or ended.
     fn over_ns(&self) -> Option<u64> {
         self.finish_ns.or(self.dropped_ns)
     }
 
     fn note(&mut self, event: &Event, is_lossy: bool, from_ns: u64) {
         let time_ns = event.time_ns;
+        // A resumption needs no such start: it begins a slice by itself.
         let is_first = self.slices.is_empty() && self.start_ns.is_none();
         let ran = matches!(
             event.what,
             EventKind::Suspend | EventKind::Finish | EventKind::Ended
         );
         if is_lossy && is_first && ran {
-            // It has been running since before the trace.
+            // Its start is lost: it has run since before the trace.
             self.begin(event.core, from_ns);
         }
+        // Any later event of the instance ends the slice; a second one does not move its end.
         if let Some(slice) = self.slices.last_mut() {
             slice.to_ns.get_or_insert(time_ns);
         }

@@ -1,4 +1,4 @@
-//! The app on Linux: the function is the image's, the machine is this computer.
+//! The app on Linux: the same `main` as the image's, on this computer.
 
 extern crate alloc;
 extern crate kernel_on_linux as kernel;

@@ -1,5 +1,5 @@
-//! Replays a recording of the app on this computer: `--until app-template/17` shows what each
-//! subtask got and gave in a job.
+//! Replays a recording of the app on this computer: `--until app-template/17` shows the inputs
+//! and outputs of each subtask in a job.
 
 use std::process::ExitCode;
 
@@ -7,7 +7,7 @@ use fass::finish_create_dags;
 
 fn main() -> ExitCode {
     virtual_time::replay_command(|_file| {
-        // As many jobs as any run has: those that were not recorded are passed over.
+        // As many jobs as any run has: those that were not recorded are skipped.
         finish_create_dags(&[app_template::build(100_000)])?;
         Ok(())
     })

@@ -1,4 +1,4 @@
-//! The app's functions, and the DAG that they make.
+//! The app's functions, and the DAG of them.
 //!
 //! Nothing here knows the machine, so the same code is booted (`src/main.rs`)
 //! and tested on the host (`tests/virtual_time.rs`). Put your own functions in
@@ -22,12 +22,12 @@ pub const PERIOD: Duration = Duration::from_millis(10);
 #[must_use]
 pub fn build(jobs: u64) -> Dag {
     let dag = create_dag();
-    // By `--record FILE`, what the source returns is written down, to be replayed.
+    // With `--record FILE` the source's values are recorded, for a replay.
     dag.name("app-template").jobs(jobs).record::<u32>("distance");
     let mut distance = 100_u32;
     let sense = move || {
         work(800);
-        distance -= 1; // a function may keep what it alone needs
+        distance -= 1; // a function may keep state of its own
         if distance == 0 {
             distance = 100;
         }
@@ -40,25 +40,25 @@ pub fn build(jobs: u64) -> Dag {
     dag
 }
 
-/// Brakes the harder the nearer the obstacle is.
+/// Brakes harder, the nearer the obstacle is.
 fn brake((distance,): (u32,)) -> (u32,) {
     work(2_500);
     (100 - distance,)
 }
 
-/// Steers away from what is near.
+/// Steers away from an obstacle that is near.
 fn steer((distance,): (u32,)) -> (bool,) {
     work(3_500);
     (distance < 20,)
 }
 
-/// Acts on both results, which are always of one job.
+/// Acts on both results, which always belong to the same job.
 fn act((force, turns): (u32, bool)) {
     work(500);
     assert_eq!(turns, force > 80, "two jobs were mixed");
 }
 
-/// A subtask's name, and the longest that one call of it takes.
+/// Returns the attributes of a subtask: its name and its WCET.
 fn taking(name: &str, wcet_ms: u64) -> SubtaskAttributes {
     SubtaskAttributes::named(name).wcet(Duration::from_millis(wcet_ms))
 }

@@ -1,4 +1,4 @@
-//! Boots the app and says how its jobs went.
+//! Boots the app and reports on its jobs.
 
 #![no_std]
 #![no_main]
@@ -32,8 +32,8 @@ fn main(machine: &Machine) -> Result<(), AppError> {
         report(&run, dag.name());
     }
     println!("{} allocations while jobs ran", run.allocations());
-    // A fault is a failure already. A missed deadline is a matter of load. To make it a
-    // failure, check `misses` here.
+    // A fault is a failure already, but a missed deadline, which depends on the load, is not:
+    // to make it one, check `misses` here.
     match run.violations().count() {
         0 => Ok(()),
         count => Err(AppError::Failure(format!(
@@ -42,7 +42,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     }
 }
 
-/// Says how the jobs of one DAG went.
+/// Reports on the jobs of one DAG.
 fn report(run: &Run, name: &str) {
     let statistics = run.statistics(name);
     println!(
@@ -50,7 +50,7 @@ fn report(run: &Run, name: &str) {
         statistics.completed, statistics.misses
     );
     let response_times = Distribution::new(run.response_times_ns(name));
-    // Times are kept of DAGs with a limit of jobs.
+    // Times are kept only for DAGs with a limited number of jobs.
     if response_times.count() > 0 {
         println!(
             "{name}: response time: median {}, at most {}",

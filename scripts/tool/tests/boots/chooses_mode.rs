@@ -1,8 +1,8 @@
-//! The mode that a command takes: by the probe where KVM comes into question, with one
-//! sentence where KVM is of no use.
+//! The mode that a command chooses: by the probe where KVM is possible, with one sentence where KVM
+//! does not work.
 //!
-//! A script in QEMU's place plays a KVM that is of no use, and hands every other mode on
-//! to QEMU; so the tests run on any host. The last one takes the host as it is.
+//! A script in QEMU's place acts as a KVM that does not work, and passes every other mode on to
+//! QEMU; so the tests run on any host. The last test uses the host as it is.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -39,7 +39,7 @@ fn stub(name: &str, under_kvm: &str) -> PathBuf {
     folder
 }
 
-/// Calls the tool where the programs of a folder come first.
+/// Calls the tool with a folder in front of the `PATH`.
 fn call_by(stub: &Path, line: &str) -> Called {
     let path = std::env::var("PATH").expect("a PATH");
     let mut command = command(system::workspace(), line.split(' '));

@@ -1,4 +1,4 @@
-//! What a run hears: a console and a wire on a pipe as standard input, which ends, and files of
+//! Input of a run: a console and a wire on a pipe as standard input, which ends, and files of
 //! bytes.
 
 use std::fs;
@@ -21,8 +21,8 @@ fn feed(line: &str, input: &str) -> Called {
     Called::of(child.wait_with_output().expect("it ends"))
 }
 
-/// A run with a console ends well for each input, and its standard output has this so many times.
-/// A run of 0 jobs ends with its input.
+/// Runs with a console end well for each input, and their standard output has a text as often as
+/// given. A run of 0 jobs ends with its input.
 #[test]
 fn a_console_hears_a_pipe_to_its_end() {
     for (input, jobs, words, count) in [
@@ -49,7 +49,7 @@ fn a_console_hears_a_pipe_to_its_end() {
 #[test]
 fn a_wire_takes_standard_input() {
     let file = folder("speeds").join("speeds");
-    // Whenever the line comes, there is a time for it.
+    // There is a time for the line, whenever it comes.
     let run = "run --app cruise --mode=threads --jobs=300 --input=- --append=budget_factor=0";
     let line = format!("{run} --output {}", file.display());
     let called = feed(&line, "gap 2350\ngap x\n");

@@ -1,5 +1,5 @@
-//! A crash on the machine, and its evidence: what `run` leaves without being asked shows the job
-//! that crashed on the host.
+//! A crash on the machine, and its evidence: the file that `run` leaves without being asked shows
+//! the job that crashed on the host.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `debug` as a person uses it: gdb stops in a subtask and shows what is there.
+//! `debug` as a person uses it: gdb stops in a subtask and shows its variables.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -9,7 +9,7 @@ use tool::{install, system::workspace};
 
 use crate::support::{call, folder};
 
-/// Reports whether there is a gdb, or one can be installed; says so if not, past the test's
+/// Reports whether there is a gdb, or one can be installed. If not, says so past the test's
 /// captured output.
 fn is_gdb_here() -> bool {
     let ensured = install::ensure(&install::GDB);
@@ -37,7 +37,7 @@ fn a_breakpoint_in_a_subtask_shows_locals_and_callers() {
         "\nwanted = [0, 0]\n",
         "\n$1 = 3\n",
         "drone::dags::{impl#0}::register_attitude::{closure#2}",
-        // What the guest prints for people stands between, and no machine line does.
+        // The guest's lines for people stand between, and no machine line does.
         "dag `attitude` takes at most ",
     ] {
         assert!(said.contains(shown), "no `{shown}` in:\n{said}");

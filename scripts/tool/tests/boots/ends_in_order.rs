@@ -17,7 +17,7 @@ use crate::support::{call, command, folder, succeed};
 /// The exit code after ctrl-C.
 const BY_PERSON: Option<i32> = Some(130);
 
-/// Reads lines up to one that has this in it.
+/// Reads lines up to the first that contains a text.
 fn await_line(said: &mut impl BufRead, awaited: &str) {
     let mut line = String::new();
     while !line.contains(awaited) {
@@ -27,7 +27,7 @@ fn await_line(said: &mut impl BufRead, awaited: &str) {
     }
 }
 
-/// Starts a run, and returns it with what it says after it has booted.
+/// Starts a run, and returns it with its output up to the end of its boot.
 fn start(folder: &Path, line: &str) -> (Child, BufReader<impl Read>) {
     let mut command = command(folder, line.split(' '));
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -37,7 +37,7 @@ fn start(folder: &Path, line: &str) -> (Child, BufReader<impl Read>) {
     (child, said)
 }
 
-/// Waits for the end; returns what it has said on standard output, and its exit code.
+/// Waits for the end; returns the rest of standard output, and the exit code.
 fn end(mut child: Child, mut said: BufReader<impl Read>) -> (String, Option<i32>) {
     let mut text = String::new();
     said.read_to_string(&mut text).expect("UTF-8");
@@ -45,7 +45,8 @@ fn end(mut child: Child, mut said: BufReader<impl Read>) -> (String, Option<i32>
     (text, status.code())
 }
 
-/// Makes sure that the trace in a folder breaks no rule; returns how many of its events close a DAG.
+/// Makes sure that the trace in a folder breaks no rule; returns the number of events that close a
+/// DAG.
 fn closings(folder: &Path) -> usize {
     succeed(folder, "check-trace --bound-us 5000000 trace.rec");
     let bytes = fs::read(folder.join("trace.rec")).expect("it is there");
@@ -102,7 +103,7 @@ fn so_does_the_timeout_which_is_a_failure() {
 
 #[test]
 fn the_second_ctrl_c_kills() {
-    // The first one is heard, and what is in flight takes long.
+    // The first ctrl-C is received, and the jobs in flight take long.
     let folder = folder("endless");
     let dag = "dag d period 1000s\nsubtask a wcet 500s\nend\n";
     fs::write(folder.join("endless.dag"), dag).expect("the tests' folder takes a file");

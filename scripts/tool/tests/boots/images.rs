@@ -1,5 +1,5 @@
-//! `run --image FILE`: an image says whose it is, and is run as nothing else; and the memory that
-//! `run` chooses by itself.
+//! `run --image FILE`: an image names its app, and runs as no other; and the memory that `run`
+//! chooses by itself.
 
 use std::fs;
 

@@ -34,7 +34,7 @@ fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
     let replayed = succeed(&folder, &format!("{RUN} --policy edf --replay run.kept"));
     assert!(replayed.contains("\"uncompared\":0"), "{replayed}");
 
-    // What is made of it is what the options of a run write.
+    // The commands make the same views of it as the options of a run.
     let line = "--record values --dot dags.own --witness proof.own";
     succeed(&folder, &format!("{RUN} {line}"));
     for file in ["dags", "proof"] {

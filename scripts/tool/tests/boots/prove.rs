@@ -74,6 +74,6 @@ fn a_folder_is_proven_file_by_file_and_a_wrong_one_keeps_none_back() {
     assert_eq!(text(line, "file"), Some("chain.dag"));
     let number = |name| line.get(name).and_then(Value::as_u64);
     assert!(number("bound_ns") >= number("longest_ns"), "{said}");
-    // A chain takes its WCETs, which the bound has with a margin of a fifth.
+    // A chain takes its WCETs; the bound includes them with a margin of a fifth.
     assert!(number("longest_ns") >= Some(3_000_000), "{said}");
 }

@@ -1,5 +1,4 @@
-//! The short form of `./scripts/soak`: random DAG sets with everything that may befall them, and
-//! everything checked.
+//! The short form of `./scripts/soak`: random DAG sets with every kind of incident, and all checks.
 
 use tool::soak::{self, Plan};
 
@@ -13,7 +12,7 @@ fn random_sets_break_no_rule_and_leave_nothing_behind() {
     let report = soak::run(&plan, |_| {}).expect("the guests start");
     assert_eq!(report.failures, Vec::<String>::new());
     assert_eq!((report.passed, report.failed), (16, 0));
-    // The run has to be one in which something could have gone wrong.
+    // The run must be one in which a fault could show.
     let least = [
         ("completed", 1000),
         ("missed", 50),

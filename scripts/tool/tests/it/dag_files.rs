@@ -13,8 +13,8 @@ const YAML: &str = "nodes:\n- id: 0\n  execution_time: 5\n  period: 9\n- id: 1\n
     execution_time: 2\nlinks:\n- source: 0\n  target: 1\n";
 const JSON: &str = "{\"graphs\":[\n{\"name\":\"a\",\"c\":[1,2,4],\"edges\":[[0,1],[1,2]]}]}";
 
-/// A file's name, what stands in the good file of its format, what is put in its place, and what is
-/// said. A line's end is `/`, and `..` is all from there on.
+/// A file's name, a part of the good file of its format, its replacement, and the refusal. A line's
+/// end is `/`, and `..` is the rest of the file.
 const WRONG: &str = r#"
 cycle.dag | end | edge b -> a/end | cycle.dag:5: dag `x` has a cycle: subtask `a` -> subtask `b` -> subtask `a`; remove one
 cycle.yaml | target: 1 | target: 1/- source: 1/  target: 0 | cycle.yaml:10: dag `cycle` has a cycle

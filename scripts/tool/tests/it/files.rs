@@ -1,5 +1,5 @@
-//! The files that a command line names: what is there is kept, and what is no file is
-//! refused in words before any work.
+//! The files that a command line names: existing ones are kept, and names of other things than
+//! files are refused in words before any work.
 
 use std::ffi::OsStr;
 use std::fs;

@@ -1,14 +1,14 @@
 //! Single changes to a right trace that each break a rule.
 //!
-//! Each is told where it can be. What would not break a rule, such as moving an event within an
-//! instant, is never told.
+//! Each is applied where it can be. A change that would not break a rule, such as moving an event
+//! within an instant, is never made.
 
 use common::random::Random;
 use sched_dag::journal::{Event, EventKind};
 use tool::record::Run;
 
-/// A lie: its name, of what and of which events it can be told, and how it changes the one at a
-/// place.
+/// A lie: its name, the kinds of events to which it can be applied, and the change to the event at
+/// a position.
 pub(crate) type Lie = (
     &'static str,
     EventKind,
@@ -51,7 +51,7 @@ pub(crate) const LIES: [Lie; 16] = [
     ),
 ];
 
-/// Tells a lie about one of the events of which it can be told, if there is one.
+/// Applies a lie to one of the events to which it can be applied, if there is one.
 pub(crate) fn tell((_, what, can_be, change): Lie, run: &mut Run, random: &mut Random) -> bool {
     let events = run.events.iter().enumerate();
     let of_these = events.filter(|(_, event)| event.what == what && can_be(run, event));
@@ -65,7 +65,7 @@ pub(crate) fn tell((_, what, can_be, change): Lie, run: &mut Run, random: &mut R
     true
 }
 
-/// Returns where something else happened to the instance or the job of an event.
+/// Returns the positions of other events of the same instance or job.
 fn find(run: &Run, like: &Event, what: EventKind) -> Option<usize> {
     let of = |event: &Event| (event.dag, event.job, event.subtask);
     let mut events = run.events.iter();

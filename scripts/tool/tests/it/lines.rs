@@ -1,5 +1,5 @@
-//! What holds for every command of the tool alike: how it refuses what it does not know,
-//! and that it does not mind who reads.
+//! Properties of all commands of the tool: the refusal of unknown words, and output that no one
+//! reads.
 
 use std::fs;
 use std::io::{self, BufRead};
@@ -104,7 +104,7 @@ new-app one --git https://example.org | new-app: `--git` is for a repository; ad
     assert_eq!(refusal(workspace(), words), expected);
 }
 
-/// In each line, a word stands for one that a terminal would obey.
+/// In each line, a word stands for a character that a terminal would obey.
 #[test]
 fn what_a_message_repeats_cannot_rewrite_the_terminal() {
     for word in ["\u{1b}[2J", "a\nb", "\u{202e}abc", "\u{feff}"] {

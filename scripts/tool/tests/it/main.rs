@@ -1,4 +1,4 @@
-//! The commands of the tool as a person calls them: what they print, what they refuse, and their
+//! The commands of the tool as a person calls them: their output, their refusals, and their
 //! exit codes; and schedules and traces held against references. Nothing is booted.
 
 mod dag_files;

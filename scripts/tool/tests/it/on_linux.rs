@@ -19,7 +19,7 @@ fn fork_joins<const N: usize>(said: &str, members: [&str; N]) -> Vec<[Option<u64
     transcript.of_kind("fork_join").map(row).collect()
 }
 
-/// Asserts that a trace breaks no rule. The bound is for a host that has much else to do.
+/// Asserts that a trace breaks no rule. The bound is for a busy host.
 fn check_trace(folder: &Path, runs: usize) {
     let judged = succeed(folder, "check-trace --bound-us 5000000 trace.rec");
     let checks = Transcript::read(&judged);
@@ -87,7 +87,7 @@ fn programs_without_qemu() -> PathBuf {
         for file in file.flatten() {
             let name = file.file_name().to_string_lossy().into_owned();
             if !name.starts_with("qemu-") && !MANAGERS.contains(&&*name) {
-                // Of two programs of a name the first one counts.
+                // Of two programs of one name the first counts.
                 let _ = std::os::unix::fs::symlink(file.path(), folder.join(name));
             }
         }
@@ -135,7 +135,7 @@ run --app fork-join --on linux --mode threads | `--mode` is not for `--on linux`
     }
 }
 
-/// That the guest says success means that the policy was there until the program's end, and not after.
+/// The guest's success means that the policy was there until the program's end, and no longer.
 #[test]
 #[ignore = "fetches 145 MB of Debian's; `cargo test -p tool --test it -- --ignored` runs it"]
 fn in_a_guest_both_mechanisms_keep_the_rules() {

@@ -41,8 +41,8 @@ fn all_public_schedules_agree() {
     }
 }
 
-/// Compares a case with how the DAGs run that the app `replay` builds of it, in virtual time with
-/// units of 1000 ns and this guard.
+/// Compares a case with a run, in virtual time, of the DAGs that the app `replay` builds from it,
+/// with units of 1000 ns and this guard.
 fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, String> {
     let machine = VirtualTime::new()
         .cores(case.cores)
@@ -72,7 +72,7 @@ fn what_is_near_passes_and_by_how_much_is_told() {
     assert_eq!(built(&case, 10, 9), Err(far.to_owned()));
 }
 
-/// What stands in the small case, what is put in its place, and the difference that makes.
+/// A part of the small case, its replacement, and the difference that it makes.
 const WRONG: &str =
     "x 0 1 0 5 6 0 | x 0 1 0 4 6 0 | dag 0 job 1 subtask 0: start: expected 4, found 5
 x 0 1 1 6 10 0 | x 0 1 1 6 11 0 | dag 0 job 1 subtask 1: finish: expected 11, found 10
@@ -91,8 +91,7 @@ fn the_first_difference_is_named() {
     }
 }
 
-/// What stands in the small case, what is put in its place, and the line and the reason of the
-/// refusal.
+/// A part of the small case, its replacement, and the line and the reason of the refusal.
 const MALFORMED: &str = r"case small 1 0 1 1 | case small 0 0 1 1 | 1 | expected 1 to 64 cores, found 0
 case small 1 0 1 1 | case small 4294967295 0 1 1 | 1 | expected 1 to 64 cores, found 4294967295
 case small 1 0 1 1 | case small 1 2 1 1 | 1 | expected 0 or 1

@@ -13,7 +13,7 @@ use virtual_time::VirtualTime;
 /// A length of a unit that leaves no rest.
 const UNIT_NS: u64 = 1000;
 
-/// Returns how long a graph's one job takes in virtual time, in units.
+/// Returns the length of a graph's one job in virtual time, in units.
 fn in_virtual_time(graph: &Set, cores: u32) -> u64 {
     let machine = VirtualTime::new()
         .cores(cores)

@@ -1,4 +1,4 @@
-//! The command `recording`: tables become recordings and come back, what is wrong is refused,
+//! The command `recording`: tables become recordings and come back, malformed ones are refused,
 //! and an independent reader opens the MCAP file.
 
 use std::fs;
@@ -11,7 +11,7 @@ use crate::support::{assert_refused, call, folder, refusal, succeed};
 
 type Value = (String, Option<f64>, [i16; 2], Vec<u64>);
 
-/// A recording of 5,000 values, and of something else.
+/// A recording of 5,000 values, and of other entries.
 fn recording() -> Vec<u8> {
     let header = Header {
         app: "demo".into(),
@@ -113,7 +113,7 @@ fn a_table_becomes_a_recording_and_the_same_table() {
     assert_eq!(back.expect("a table"), table);
 }
 
-/// That nothing that is altered or cut off is taken for a recording, is told by the format's tests.
+/// The format's own tests show that no altered or cut recording is accepted.
 #[test]
 fn what_is_no_recording_is_refused_in_one_line() {
     let folder = recorded("recording-refused");
@@ -127,7 +127,7 @@ recording foreign | foreign: at byte 0: expected the mark of a recording";
     assert_refused(&folder, rows);
 }
 
-/// The lines of a table, options, and what is said of them. A line's end is `/`.
+/// The lines of a table, the options, and the refusal. A line's end is `/`.
 const WRONG: &str = "
 a,b/1,2/ |  | in.csv:1: there is no column release_ns; say by --period
 a,b/1/ | --period 1ms | in.csv:2: 1 cells, and there are 2 columns
@@ -191,7 +191,7 @@ fn an_independent_reader_opens_the_mcap_file() {
     let folder = recorded("recording-mcap");
     let said = succeed(&folder, "recording demo.rec --mcap demo.mcap");
     assert!(said.contains("demo.mcap: 5000 messages"), "{said}");
-    // `./scripts/test` counts the lack of it as skipped.
+    // `./scripts/test` counts the missing reader as skipped.
     let python = match tool::recordings::independent_reader() {
         Ok(python) => python,
         Err(why) => return eprintln!("skipped: {why}"),

@@ -19,7 +19,7 @@ use crate::lies;
 use crate::sets::set::{self, Overruns, Set};
 use crate::sets::{commit, number};
 
-/// Draws a set from each seed, runs it, and hands its trace on.
+/// Draws a set from each seed, runs it, and passes its trace on.
 fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, Run)) {
     let count = number("TRACES", count);
     let first_seed = number("TRACE_SEED", 1);
@@ -35,7 +35,7 @@ fn for_each_trace(count: u64, mut with: impl FnMut(u64, &mut Random, Run)) {
     }
 }
 
-/// Runs a set to its end, and returns what a trace tells of that.
+/// Runs a set to its end, and returns its trace.
 fn record(set: &Set) -> Run {
     let task_set = commit(&set.specs(), set.options);
     let mut run = VirtualTime::new(&task_set, set.options).recording();
@@ -89,7 +89,7 @@ fn a_right_trace_has_no_breach_also_if_its_oldest_events_are_lost() {
             assert_right(seed, &run);
         }
     });
-    // The sets were worth checking.
+    // The sets had events worth checking.
     println!("{instances} instances, {preemptions} preemptions");
     assert!(instances > 1000 && preemptions > 300);
 }

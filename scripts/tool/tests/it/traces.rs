@@ -1,4 +1,4 @@
-//! `check-trace` and `trace`: what they print, and their exit codes.
+//! `check-trace` and `trace`: their output and their exit codes.
 
 use std::fs;
 use std::path::PathBuf;
@@ -71,8 +71,8 @@ fn a_breach_is_1_and_the_bound_decides() {
     succeed(&folder, "check-trace --bound-us 1500 late.rec");
 }
 
-/// All files are read before the first run is judged. What is wrong with a line is told by the
-/// reader's own tests.
+/// All files are read before the first run is judged. The reader's own tests show the faults of a
+/// line.
 #[test]
 fn a_file_without_a_trace_or_with_a_damaged_one_is_2() {
     let (empty, cut) = (of_events(""), &good()[..100]);

@@ -1,9 +1,9 @@
-//! The figures that the repository keeps, how new ones stand to them, and the tables.
+//! The figures kept in the repository, the comparison with new ones, and the tables.
 //!
-//! A baseline holds counted instructions, which repeat exactly on one core: one that
-//! differs comes from a change of the code, of the compiler or of QEMU. On several cores
-//! a rare interrupt comes some nanoseconds later, so there the margin is wider and the
-//! p99 does not count. [`MARGIN_RULE`] says when a figure has *grown*.
+//! A baseline holds counted instructions, which repeat exactly on one core: a difference comes from
+//! a change of the code, of the compiler or of QEMU. On several cores a rare interrupt may come
+//! some nanoseconds later, so there the margin is wider and the p99 does not count. [`MARGIN_RULE`]
+//! says when a figure has *grown*.
 
 use std::fs;
 use std::iter;
@@ -16,23 +16,23 @@ use crate::output::Table;
 use crate::qemu::Mode;
 use crate::system;
 
-/// The baseline that is kept, from the workspace's root.
+/// The path of the baseline, relative to the workspace's root.
 const BASELINE: &str = "tests/baselines/hand-off.json";
 
-/// When a figure has grown, in words; [`margin`] says the same.
+/// The rule for a figure that has grown, in words; [`margin`] implements it.
 const MARGIN_RULE: &str = "grown: median or p99 larger by more than 3 % and 4 \
      instructions, the jitter by 20; a commit by more than 10 %; on several cores the median \
      by more than 10 % and 40";
 
-/// Returns by how much a figure may be larger: in per cent, and in any case in
-/// instructions a step, since one of a few instructions is many per cent.
+/// Returns the margin of a figure: in per cent, and in instructions a step. It has grown only if it
+/// exceeds both, since one instruction of a few is many per cent.
 fn margin(figure: &Figure) -> (u128, u128) {
     match &*figure.figure {
-        // One more in each step is a change.
+        // A single count more in each step is a change.
         _ if figure.is_count() => (3, 0),
         _ if figure.cores > 1 => (10, 40),
         "commit" => (10, 0),
-        // A difference of two times that have margins of their own.
+        // It is a difference of two times, each with a margin.
         "release_jitter" => (3, 20),
         _ => (3, 4),
     }
@@ -42,11 +42,12 @@ fn margin(figure: &Figure) -> (u128, u128) {
 fn has_grown(now: &Figure, before: &Figure) -> bool {
     let (percent, instructions) = margin(now);
     let grows = |now_is: u64, was: u64| {
-        // Both for the same number of steps.
+        // Scaled to the same number of steps.
         let was = u128::from(was) * u128::from(now.per) / u128::from(before.per);
         let growth = u128::from(now_is).saturating_sub(was);
         growth > u128::from(now.per) * instructions && growth * 100 > was * percent
     };
+    // On several cores the p99 varies from run to run.
     grows(now.median, before.median) || (now.cores == 1 && grows(now.p99, before.p99))
 }
 
@@ -78,12 +79,12 @@ fn figures(text: &str) -> Result<Vec<Figure>, String> {
     figures.ok_or_else(|| "it holds no figures".into())
 }
 
-/// Compares the baseline with new figures as a text; rewrites it if there is a `list` of rewritten
+/// Compares the baseline with new figures as text; rewrites it if there is a `list` of rewritten
 /// files.
 ///
 /// # Errors
 ///
-/// In words: they differ, and it was not rewritten.
+/// In words: they differ, and the baseline was not rewritten.
 pub(super) fn golden(before: &[Figure], now: &[Figure], list: Option<&Path>) -> Result<(), String> {
     let (file, below, text_before) = (BASELINE, "", text(before));
     let golden = Golden {
@@ -94,7 +95,7 @@ pub(super) fn golden(before: &[Figure], now: &[Figure], list: Option<&Path>) -> 
     golden.compare(&text(now), list)
 }
 
-/// Returns a baseline's text, a line a figure.
+/// Returns a baseline's text, one line for each figure.
 pub(super) fn text(figures: &[Figure]) -> String {
     let lines: Vec<String> = figures
         .iter()
@@ -104,7 +105,7 @@ pub(super) fn text(figures: &[Figure]) -> String {
     format!("{{\"counts\":\"instructions\",\"figures\":[\n{lines}\n]}}\n")
 }
 
-/// The figures, and what a person reads of each.
+/// The figures, with their names for people.
 const NAMES: &str = "\
 reading | reading the clock
 stamp | a body's stamp
@@ -128,7 +129,7 @@ finish_to_resumed | preemptor finished -> the preempted resumed
 preempted_to_start | preempted -> preemptor's first instruction
 return_to_resumed | preemptor's return -> the preempted goes on";
 
-/// Says in words what it is a figure of.
+/// Returns the name of a figure for people.
 fn name(figure: &Figure) -> &str {
     let mut names = NAMES.lines().filter_map(|line| line.split_once(" | "));
     let named = names.find(|(of, _)| *of == figure.figure);
@@ -142,7 +143,7 @@ fn heading(figure: &Figure) -> String {
     }
 }
 
-/// Adds a row for each figure, under the workload that it is of.
+/// Adds a row for each figure, below its workload.
 fn add_rows(table: &mut Table, figures: &[Figure], mut cells: impl FnMut(&Figure) -> Vec<String>) {
     let mut before = String::new();
     for figure in figures {
@@ -155,7 +156,7 @@ fn add_rows(table: &mut Table, figures: &[Figure], mut cells: impl FnMut(&Figure
     }
 }
 
-/// Returns the table of all figures, with the modes side by side.
+/// Returns the table of all figures, with the modes in columns.
 pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
     let mut units = format!("{:60}", "");
     let mut columns = String::from(":<60");
@@ -181,7 +182,8 @@ pub(super) fn table(measured: &[(Mode, Vec<Figure>)]) -> String {
     table.text()
 }
 
-/// Returns the table of baseline, now and their ratio, and what has grown or is missing, a line each.
+/// Returns the table of baseline, present figures and ratios, and a line for each figure that has
+/// grown or is missing.
 pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> (String, Vec<String>) {
     let columns = "instructions:<60|baseline:12|now:11|ratio:8|p99 was:12|p99 is:11|:0";
     let mut table = Table::new("", columns);
@@ -208,6 +210,7 @@ pub(super) fn comparison(now: &[Figure], baseline: &[Figure]) -> (String, Vec<St
         vec![was, is, format!("{ratio:.3}"), p99_was, p99_is, mark]
     });
     let is_gone = |before: &&Figure| !now.iter().any(|now| now.is_same(before));
+    // A figure that vanished could hide growth, so it counts as a complaint.
     for gone in baseline.iter().filter(is_gone) {
         let line = format!("{}, {}: not measured any more", heading(gone), name(gone));
         table.line(&line);

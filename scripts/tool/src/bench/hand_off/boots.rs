@@ -1,10 +1,9 @@
-//! The boots that measure: which app on how many cores, and what tells its figures.
+//! The boots that measure: the guest, its cores, and the reading of its figures.
 //!
-//! The workloads also run on more and more cores, and with more and more subtasks. With counted
-//! time all cores share one clock, which each instruction of any of them moves on. So a figure is
-//! the number of instructions that *all* cores have executed in between, waiting for a lock
-//! included; halted cores execute none. It is work, not time: what it says is how much more there
-//! is to do for each instance.
+//! The workloads also run with growing numbers of cores and of subtasks. With counted time all
+//! cores share one clock, which each instruction of any of them advances. So a figure is the number
+//! of instructions that *all* cores have executed in between, waiting for a lock included; halted
+//! cores execute none. It measures work, not time: how much more there is to do for each instance.
 
 use std::iter;
 use std::path::Path;
@@ -17,24 +16,24 @@ use crate::outcome::boot;
 use crate::output::Table;
 use crate::qemu::{Mode, Qemu};
 
-/// How long a boot may take in wall time.
+/// The limit of a boot in wall time.
 pub(super) const LIMIT: Duration = Duration::from_secs(300);
 
-/// The workloads when the cores vary, and the most subtasks among them.
+/// The workloads for the runs on several cores, and the most subtasks among them.
 pub(super) const WORKLOADS: &str = "part=workloads chain=64 branches=16 layered=1000";
 pub(super) const MOST_SUBTASKS: u64 = 1000;
 
-/// More cores than a host is sure to have: figures of so many say nothing of time.
+/// More cores than a host is sure to have: with so many, figures of time mean nothing.
 const MANY: u64 = 8;
 
-/// Which guest measures.
+/// The guest that measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// The app.
     Figures,
-    /// A guest of the tests, which is recorded, for that is what is measured.
+    /// A guest of the tests, recorded, for the cost of recording.
     Recorded,
-    /// The same guest, whose cores are divided.
+    /// The same guest with divided cores.
     Divided,
 }
 
@@ -47,7 +46,7 @@ pub(super) struct Boot {
     words: String,
 }
 
-/// Returns the boots that measure everything in a mode.
+/// Returns the boots of a complete measurement in a mode.
 pub(super) fn of_mode(mode: Mode) -> Vec<Boot> {
     let all = [
         (Kind::Figures, 1, "part=hand-off"),
@@ -58,21 +57,22 @@ pub(super) fn of_mode(mode: Mode) -> Vec<Boot> {
     ];
     let is_counted = mode == Mode::Deterministic;
     let boots = all.into_iter();
+    // Figures of time need a core of the host for each of the guest's.
     let boots = boots.filter(|&(_, cores, _)| is_counted || cores < MANY);
     boots
         .map(|(kind, cores, words)| Boot::new(kind, cores, MOST_SUBTASKS, words))
         .collect()
 }
 
-/// Returns the machine line that the tool prints.
+/// Returns the machine line for a figure.
 pub(super) fn machine_line(figure: &Figure, mode: Mode) -> String {
     let begun = Object::new().text("kind", "hand_off");
     figure.json(begun.text("mode", mode.name()))
 }
 
 impl Boot {
-    /// Describes a boot with DAGs of up to so many subtasks: each needs a stack, each core two,
-    /// and the kernel leaves a quarter of the memory for stacks.
+    /// Describes a boot with DAGs of up to `subtasks` subtasks. Each needs a stack, each core two,
+    /// and the kernel sets a quarter of the memory aside for stacks.
     pub(super) fn new(kind: Kind, cores: u64, subtasks: u64, words: impl Into<String>) -> Self {
         Self {
             kind,
@@ -82,14 +82,14 @@ impl Boot {
         }
     }
 
-    /// Returns the machine for this boot.
+    /// Returns the description of the guest.
     pub(super) fn qemu(&self, mode: Mode) -> Qemu {
         Qemu {
             mode,
             cores: self.cores,
             memory_mib: self.memory_mib,
             guest_words: format!("mode={mode} {}", self.words),
-            // Only what recording costs is wanted.
+            // The values themselves are not wanted, only the cost of recording them.
             records: (self.kind == Kind::Recorded).then(|| "/dev/null".into()),
             ..Qemu::default()
         }
@@ -143,10 +143,10 @@ const CORES_OF_A_CLUSTER: u64 = 4;
 /// The subtasks of each cluster's graph; all of them have stacks at one time.
 const OF_A_CLUSTER: u64 = 100;
 
-/// By how much an instance may cost more where there are more clusters, in per cent.
+/// The largest growth of an instance's cost with more clusters, in per cent.
 const MOST_GROWTH_PERCENT: u64 = 3;
 
-/// Counts what more cores, more subtasks and more clusters cost, and prints it.
+/// Counts and prints the cost of more cores, more subtasks and more clusters.
 ///
 /// # Errors
 ///
@@ -187,11 +187,11 @@ pub(super) fn measure_scale(image: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Makes sure that an instance costs hardly more where there are more clusters.
+/// Makes sure that an instance costs hardly more with more clusters.
 ///
 /// # Errors
 ///
-/// In words: it does, and how much.
+/// In words: it does, and by how much.
 fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
     let cost = |figures: &[Figure]| {
         let one = figures.iter().find(|figure| figure.figure == "instance")?;
@@ -200,6 +200,7 @@ fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
     let alone = rows.first().and_then(|(_, figures)| cost(figures));
     for (clusters, figures) in rows {
         if let (Some((is, per)), Some((was, of))) = (cost(figures), alone)
+            // Both medians times the other's steps, in 128 bits: exact, without a division.
             && u128::from(is) * u128::from(of) * 100
                 > u128::from(was) * u128::from(per) * u128::from(100 + MOST_GROWTH_PERCENT)
         {
@@ -214,7 +215,7 @@ fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
     Ok(())
 }
 
-/// Returns a table with a row for each size; workload `layered` is the one of that size.
+/// Returns a table with a row for each size; workload `layered` stands for the one of that size.
 fn table(what: &str, of: Columns, rows: &[(u64, Vec<Figure>)]) -> String {
     let of_figures = of.iter().map(|(_, _, heading)| format!("|{heading}:20"));
     let columns = format!("{what}:8") + &of_figures.collect::<String>();

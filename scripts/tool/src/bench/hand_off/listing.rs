@@ -1,10 +1,9 @@
 //! The instructions of one hop: from one subtask's call to its successor's.
 //!
-//! A chain of 64 empty bodies is booted with every instruction logged. The log is cut at
-//! the calls of subtasks' functions, which are where `SubtaskCode::run` of `fass` polls a future.
-//! A *hop* is what lies between two of them; told is the one whose length occurs most
-//! often. Each of its instructions belongs to a file of ours: that of the innermost of the functions
-//! that it was inlined from.
+//! A chain of 64 empty bodies is booted with every instruction logged. The log is cut at the calls
+//! of subtasks' functions, where `Body::run` of `fass` polls a future. A *hop* is the part between
+//! two of them; the one listed has the length that occurs most often. Each of its instructions
+//! belongs to a file of ours: that of the innermost of the functions that it was inlined from.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -17,7 +16,8 @@ use crate::places::Frame;
 use crate::qemu::{Ending, Mode};
 use crate::{files, protocol::Status, system};
 
-/// Boots, prints how many instructions each file has on the way, and writes all of them to a file.
+/// Boots, prints how many instructions each file contributes to a hop, and writes all of them to a
+/// file.
 ///
 /// # Errors
 ///
@@ -41,9 +41,9 @@ pub(super) fn list(image: &Path, file: &Path) -> Result<(), String> {
     files::write(file, listing)
 }
 
-/// Boots the image and returns the addresses of all instructions that it executes.
+/// Boots the image and returns the addresses of all executed instructions.
 fn executed(image: &Path) -> Result<Vec<u64>, String> {
-    // Few jobs, as a log is long.
+    // Few jobs, as every instruction is logged.
     let words = "part=workloads jobs=5 chain=64 branches=1 layered=3";
     let mut qemu = Boot::new(Kind::Figures, 1, 64, words).qemu(Mode::Deterministic);
     qemu.logs_instructions = true;
@@ -51,6 +51,7 @@ fn executed(image: &Path) -> Result<Vec<u64>, String> {
     let mut running = qemu.start(image, &serial)?;
     let log = running.log();
     let (ending, addresses) = std::thread::scope(|scope| {
+        // Read while the guest runs: a full pipe would stop it.
         let reader =
             scope.spawn(|| log.map_or_else(Vec::new, |log| addresses(BufReader::new(log))));
         let followed = running.follow(LIMIT, &mut |_| ());
@@ -60,12 +61,12 @@ fn executed(image: &Path) -> Result<Vec<u64>, String> {
         let (said, log) = (running.complaints(), serial.display());
         return Err(format!("{ending} {said}; its serial log is {log}"));
     }
-    // It is ours, and in the way of no one if it cannot be removed.
+    // The log is ours; one that cannot be removed harms nothing.
     let _ = fs::remove_file(&serial);
     Ok(addresses)
 }
 
-/// Reads QEMU's log, of which a line has the address between slashes, in 16 digits.
+/// Reads QEMU's log: each line has the address between slashes, in 16 digits.
 fn addresses(mut log: impl BufRead) -> Vec<u64> {
     let mut addresses = Vec::new();
     let mut line = Vec::new();
@@ -84,13 +85,13 @@ fn addresses(mut log: impl BufRead) -> Vec<u64> {
     addresses
 }
 
-/// Returns where subtasks' futures are polled: the one indirect call of `plan.rs` that was
-/// executed, whatever it is inlined into.
+/// Returns the address at which subtasks' futures are polled: the one indirect call of `plan.rs`
+/// that was executed, wherever it is inlined.
 fn the_call(calls: &Frames) -> Result<u64, String> {
     let is_poll = |frames: &Vec<Frame>| {
         let line = frames.first().map_or("", |frame| &frame.line);
         let is_run = |frame: &Frame| frame.line.contains("fass/src/") && frame.function == "run";
-        // The other one asks whether a function has a replacement.
+        // The other indirect call asks whether a function has a replacement.
         line.contains("plan.rs") && frames.iter().any(is_run)
     };
     let polls: Vec<u64> = (calls.iter().filter(|(_, frames)| is_poll(frames)))
@@ -105,7 +106,7 @@ fn the_call(calls: &Frames) -> Result<u64, String> {
     }
 }
 
-/// Returns the first hop of the length that occurs most often.
+/// Returns the first hop of the most frequent length.
 fn usual_hop(executed: &[u64], call: u64) -> Option<&[u64]> {
     let calls = (0..executed.len()).filter(|&at| executed[at] == call);
     let calls: Vec<usize> = calls.collect();
@@ -121,7 +122,7 @@ fn usual_hop(executed: &[u64], call: u64) -> Option<&[u64]> {
     hops.into_iter().find(|hop| hop.len() == usual)
 }
 
-/// Returns the line that an instruction is of, and its function.
+/// Returns the line and the function of an instruction.
 fn place<'f>(frames: &'f Frames, address: &u64) -> (&'f str, &'f str) {
     let frames = frames.get(address).map_or(&[][..], |frames| frames);
     code::own(frames).unwrap_or(("elsewhere", "?"))
@@ -142,7 +143,7 @@ fn table(hop: &[u64], frames: &Frames) -> String {
     counts.into_iter().map(row).collect()
 }
 
-/// Returns the hop, an instruction a line: address, text, and its innermost line of ours.
+/// Returns the hop, one instruction a line: address, text, and its innermost line of ours.
 fn listing(hop: &[u64], frames: &Frames, instructions: &BTreeMap<u64, String>) -> String {
     let line = |address: &u64| {
         let (line, function) = place(frames, address);

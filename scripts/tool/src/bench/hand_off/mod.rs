@@ -1,12 +1,11 @@
 //! The way from a completion to its successor's first instruction, measured.
 //!
-//! The app `hand-off` runs DAGs of empty bodies that stamp, and prints what lies
-//! between the stamps. In deterministic mode a nanosecond is an instruction, so
-//! the same figures come out of every run, and can be held against those that
-//! the repository keeps: `tests/baselines/hand-off.json`.
+//! The app `hand-off` runs DAGs of empty bodies that take time stamps, and prints the differences.
+//! In deterministic mode a nanosecond is an instruction, so every run gives the same figures, which
+//! can be compared with those in the repository: `tests/baselines/hand-off.json`.
 //!
-//! - `boots`: which app measures on how many cores, and what cores and subtasks cost;
-//! - `baseline`: what the figures were before, and the tables;
+//! - `boots`: the app and the number of cores of each boot, and the cost of cores and subtasks;
+//! - `baseline`: the earlier figures, and the tables;
 //! - `listing`: one hop, instruction by instruction.
 
 mod baseline;
@@ -48,22 +47,22 @@ Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
 ",
 };
 
-/// The measurement that is asked for.
+/// The measurement to make.
 #[derive(Debug)]
 struct Plan {
-    /// The one mode to measure in; else instructions and time.
+    /// The only mode to measure in; `None`: instructions and time.
     mode: Option<Mode>,
     /// The figures of the baseline, if they are to be compared.
     before: Option<Vec<Figure>>,
     saves: bool,
-    /// Instead, what cores and subtasks cost.
+    /// Whether the cost of cores and subtasks is counted instead.
     scale: bool,
-    /// Instead, the instructions of one hop, to be written there.
+    /// The file for the instructions of one hop, if these are listed instead.
     listing: Option<PathBuf>,
 }
 
 impl Plan {
-    /// Settles the plan.
+    /// Makes the plan from the options.
     ///
     /// # Errors
     ///
@@ -102,12 +101,12 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     by_plan(&TABLE, words, Plan::new, measure)
 }
 
-/// Measures as `--compare` does, and prints the table; rewrites the baseline if figures have
-/// grown and there is a `list` of rewritten files.
+/// Measures as `--compare` does, and prints the table. If figures have grown and there is a `list`
+/// of rewritten files, rewrites the baseline.
 ///
 /// # Errors
 ///
-/// In words: a guest failed, there is no baseline, or which figures have grown.
+/// In words: a guest failed, there is no baseline, or the figures that have grown.
 pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     install::ensure_qemu()?;
     let before = baseline::read()?;
@@ -122,7 +121,7 @@ pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     }
 }
 
-/// Measures and reports. Returns whether nothing has grown.
+/// Measures and reports. Returns whether no figure has grown.
 fn measure(plan: &Plan) -> Result<bool, String> {
     install::ensure_qemu()?;
     let image = &image::build("hand-off")?.path;
@@ -141,6 +140,7 @@ fn measure(plan: &Plan) -> Result<bool, String> {
         measured.push((mode, figures));
     }
     print!("{}", baseline::table(&measured));
+    // Instructions come first, if they were counted at all.
     let (_, first) = &measured[0];
     let mut is_good = true;
     if let Some(before) = &plan.before {
@@ -156,9 +156,10 @@ fn measure(plan: &Plan) -> Result<bool, String> {
     Ok(is_good)
 }
 
-/// Settles the modes: where none is named, instructions, and time as real as can be had.
+/// Chooses the modes: if none is named, counted instructions, and KVM or else threads for time.
 fn modes(named: Option<Mode>, image: &Path) -> Result<Vec<Mode>, String> {
     let timed = boots::of_mode(Mode::Kvm).into_iter();
+    // The largest machine: KVM must work for all boots.
     let machine = timed.max_by_key(|boot| boot.cores);
     let machine = machine.map_or_else(Default::default, |boot| boot.qemu(Mode::Kvm));
     let (mode, why) = probe::choose(named, Mode::Threads, &machine, image)?;
@@ -177,7 +178,7 @@ fn measure_mode(mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
     for (boot, over) in boots.into_iter().zip(0..) {
         progress.show(over);
         for figure in boot.measure(mode, image)? {
-            // What is counted afterwards stands with its workload.
+            // A figure that is counted in a later boot is put next to its workload.
             let end = figures.iter().rposition(|other| {
                 (other.cores, &other.workload) == (figure.cores, &figure.workload)
             });
@@ -192,7 +193,7 @@ fn measure_mode(mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
 mod tests {
     use super::{Plan, TABLE};
 
-    /// Command lines, and what is said of them. More are in `tests/commands/files.rs`.
+    /// Command lines, and their refusals. More are in `tests/it/files.rs`.
     const REFUSED: &str = "--compare --mode threads | leave `--mode` out
 --save-baseline --mode threads | `--save-baseline`
 --scale --compare | leave `--compare` out

@@ -1,11 +1,11 @@
 //! From a condition's raw times to metrics, and from samples to figures and files.
 //!
-//! The file of a condition begins with a comment that states everything the times depend on.
-//! A file whose first line differs is another condition's, and is measured anew.
+//! The file of a condition begins with a comment that states everything the times depend on. A file
+//! with another first line is another condition's, and is measured anew.
 //!
-//! *Publication* i of a topic is that of job i. The *last publication* of i is when
-//! all parallel subtasks have published it. What the metrics mean and which of them
-//! can be compared is told in `docs/evaluation.md`.
+//! *Publication* i of a topic is that of job i. The *last publication* of i is the time when all
+//! parallel subtasks have published it. `docs/evaluation.md` explains the metrics, and which of
+//! them can be compared.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -18,14 +18,14 @@ use crate::json::{Object, Value};
 use crate::output::{Table, shown};
 use crate::protocol::Transcript;
 
-/// The columns. `subtask` 0 is the source, 1 to N are the parallel ones, the next one is the join.
+/// The columns. `subtask` 0 is the source, 1 to N are the parallel ones, N + 1 is the join.
 const COLUMNS: &str = "what,subtask,index,ready_ns,start_ns,finish_ns,joined_indices";
 
 /// Returns the times that a guest has printed as CSV, under a first line `# {statement}`.
 ///
 /// # Errors
 ///
-/// In words: a line is not as it should be, or there are not so many jobs.
+/// In words: a line is malformed, or the number of jobs is wrong.
 pub(super) fn write(
     transcript: &Transcript,
     statement: &str,
@@ -44,6 +44,7 @@ pub(super) fn write(
             _ => line.number_at("subtask").ok_or_else(damaged)?,
         };
         let index = counts.entry(subtask).or_default();
+        // Batches are numbered, so that a lost line does not go unnoticed.
         if line.number_at("first") != Some(*index) {
             return Err(format!("a batch before serial line {number} is missing"));
         }
@@ -73,10 +74,11 @@ pub(super) fn write(
     }
 }
 
-/// Reads what [`write()`] wrote, if the statement is this one and nothing is damaged.
+/// Reads the output of [`write()`]; `None` if the statement differs or anything is damaged.
 pub(super) fn read(text: &str, statement: &str, subtasks: usize) -> Option<Samples> {
     let mut lines = text.lines();
     let is_its_own = lines.next()?.strip_prefix("# ")? == statement && lines.next()? == COLUMNS;
+    // Without its last line end the file was cut off.
     if !is_its_own || !text.ends_with('\n') {
         return None;
     }
@@ -116,8 +118,8 @@ pub(super) const PERIOD_NS: u64 = 25_000_000;
 /// The names of the metrics.
 pub(super) const METRICS: [&str; 4] = ["join_latency", "cover_delay", "join_to_start", "response"];
 
-/// The names of the counts: jobs released, joins of any kind that happened, those of values of one
-/// job and of several, joins that never happened (fewer than jobs), and jobs that no join covers.
+/// The names of the counts: jobs released; joins that happened; joins of values of one job and of
+/// several; joins that never happened (fewer than jobs); jobs that no join covers.
 pub(super) const COUNTS: [&str; 6] = [
     "jobs",
     "joins",
@@ -127,7 +129,7 @@ pub(super) const COUNTS: [&str; 6] = [
     "uncovered",
 ];
 
-/// What one condition, or several of one kind, amount to.
+/// The figures of one condition, or of several of one kind.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figures {
     /// In the order of [`COUNTS`].
@@ -156,6 +158,7 @@ impl Figures {
         });
         let response = covering.iter().enumerate().map(|(job, &join)| {
             let finish_ns = samples.joins[join].span.finish_ns;
+            // The nominal release of a job is its number times the period.
             (job, finish_ns.saturating_sub(job as u64 * PERIOD_NS))
         });
         let numbered = |values_ns: Vec<u64>| values_ns.into_iter().enumerate().collect();
@@ -178,7 +181,7 @@ impl Figures {
         }
     }
 
-    /// Adds another condition's figures of the same kind.
+    /// Adds the figures of another condition of the same kind.
     pub(super) fn add(&mut self, other: &Self) {
         for (own, others) in self.counts.iter_mut().zip(other.counts) {
             *own += others;
@@ -188,7 +191,7 @@ impl Figures {
         }
     }
 
-    /// Returns the distribution of a metric, by nearest rank as the guest's own.
+    /// Returns the distribution of a metric, by nearest rank like the guest's own.
     pub(super) fn distribution(&self, metric: usize) -> Distribution {
         let samples = self.samples[metric].iter();
         Distribution::new(samples.map(|(_, ns)| *ns))
@@ -211,7 +214,7 @@ impl Figures {
 /// The conditions measured so far, in the order of the plan.
 type Measured = [(Condition, Figures)];
 
-/// Returns each sample of each metric as a line.
+/// Returns each sample of each metric as a line of a table.
 pub(super) fn samples_csv(measured: &Measured) -> String {
     let mut text = String::from("policy,subtasks,seed,metric,index,value_ns\n");
     for (condition, figures) in measured {
@@ -229,8 +232,8 @@ pub(super) fn samples_csv(measured: &Measured) -> String {
     text
 }
 
-/// Returns the figures of each policy and N, seeds pooled, in the order of the plan: with its
-/// first condition. What is not measured yet is left out.
+/// Returns the pooled figures of all seeds for each policy and N, in the order of the plan, each
+/// with its first condition. Conditions not measured yet are left out.
 fn pooled(measured: &Measured) -> impl Iterator<Item = (Condition, Figures)> {
     let of = |condition: &Condition| (condition.subtasks, condition.policy);
     let alike = measured.chunk_by(move |(one, _), (other, _)| of(one) == of(other));
@@ -241,7 +244,7 @@ fn pooled(measured: &Measured) -> impl Iterator<Item = (Condition, Figures)> {
     })
 }
 
-/// Returns the summary, a line for each policy and N.
+/// Returns the summary, with a line for each policy and N.
 pub(super) fn summary_json(setting: &Setting<'_>, measured: &Measured) -> String {
     let plan = setting.plan;
     let results = pooled(measured).map(|(condition, figures)| result_json(condition, &figures));
@@ -284,7 +287,7 @@ fn result_json(condition: Condition, figures: &Figures) -> String {
     result.end()
 }
 
-/// Returns the figures of each policy and N as a table.
+/// Returns the table of the figures for each policy and N.
 pub(super) fn table(measured: &Measured) -> String {
     let columns = "N:2| joined by:<23|joins/job:9.3|one job:8|across:8|missing:9|\
                        latency:12|p99:12|cover:12|p99:12|response:12";

@@ -1,14 +1,13 @@
 //! The paper's evaluation: join latency by a DAG, by equal and by close stamps.
 //!
-//! A *condition* is what joins, the number N of parallel subtasks, and a seed. Each
-//! is one boot of the app `join-latency`, which prints the times of all executions
-//! and joins. They are kept as one file a condition, from which all else is
-//! computed: samples, summary, pictures, table. So nothing is lost if this is
-//! interrupted, and what is there already is not measured again, as long as it was
-//! measured under the same conditions (image, QEMU, all options).
+//! A *condition* is a policy that joins, the number N of parallel subtasks, and a seed. Each is one
+//! boot of the app `join-latency`, which prints the times of all executions and joins. They are
+//! kept as one file for each condition, from which everything else is computed: samples, summary,
+//! pictures, table. So an interruption loses nothing, and a file is not measured again as long as
+//! it was measured under the same conditions (image, QEMU, all options).
 //!
-//! - here: what is to be measured, and by what;
-//! - `figures`: from the guest's lines to figures, and what people and programs read of them.
+//! - here: the plan, the conditions and their boots;
+//! - `figures`: from the guest's lines to figures, and their output.
 
 mod figures;
 
@@ -38,7 +37,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Measures what is not there yet, and writes all results.
+/// Measures the missing conditions, and writes all results.
 fn measure_all(plan: &Plan) -> Result<(), String> {
     let (setting, why) = Setting::new(plan)?;
     let (conditions, jobs, cores) = (plan.conditions.len(), plan.jobs, plan.cores);
@@ -58,6 +57,7 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
         let statement = setting.statement(condition);
         let file = folder.join(format!("{}.csv", condition.file_stem()));
         let read = |text: String| figures::read(&text, &statement, condition.subtasks);
+        // A file of other conditions, or a damaged one, reads as none.
         let samples = match fs::read_to_string(&file).ok().and_then(read) {
             Some(samples) => samples,
             None => {
@@ -67,7 +67,7 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
             }
         };
         measured.push((*condition, Figures::of(&samples)));
-        // After each: an interruption leaves numbers for what was measured.
+        // After each condition: an interruption leaves figures for those measured so far.
         let summary = figures::summary_json(&setting, &measured);
         write_whole(&plan.out.join("summary.json"), &summary)?;
         write_whole(
@@ -88,6 +88,7 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
 fn write_whole(path: &Path, text: &str) -> Result<(), String> {
     let unfinished = path.with_extension("unfinished");
     files::write(&unfinished, text)?;
+    // A rename within one folder is atomic.
     let renamed = fs::rename(&unfinished, path);
     renamed.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }
@@ -136,7 +137,7 @@ exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command lin
 ",
 };
 
-/// Everything that all conditions have in common, and the conditions.
+/// The settings that all conditions share, and the conditions.
 #[derive(Clone, Debug)]
 struct Plan {
     out: PathBuf,
@@ -149,18 +150,18 @@ struct Plan {
     memory_mib: u64,
     /// Whether the conditions are programs of this computer.
     on_linux: bool,
-    /// The mode that was named; which one it is, the built image settles.
+    /// The named mode; `None`: the built image decides.
     named: Option<Mode>,
     /// Whether a deterministic condition is booted once only.
     once: bool,
 }
 
 impl Plan {
-    /// Settles the plan.
+    /// Makes the plan from the options.
     ///
     /// # Errors
     ///
-    /// What the options ask for cannot be: one line that says why.
+    /// One line with the reason: the options contradict each other.
     fn new(options: &Parsed) -> Result<Plan, String> {
         let on_linux = options.text("on") == Some("linux");
         let of_guests = options.given_of(&["mode", "deterministic", "once"]);
@@ -204,7 +205,7 @@ impl Plan {
             policies.iter().flat_map(of_policy)
         };
         let conditions = subtasks.iter().flat_map(of_size).collect();
-        // Source, join and parallel subtasks: none waits for a core.
+        // A core each for source, join and parallel subtasks, so that none waits for one.
         let cores = subtasks.iter().max().map_or(1, |most| *most as u64) + 2;
         let folder = match on_linux {
             true => "target/join-latency-on-linux",
@@ -218,7 +219,7 @@ impl Plan {
             jobs,
             queue: number("queue"),
             cores,
-            // The kernel records each instance, and the app its joins: half a KiB.
+            // The kernel records each instance, and the app its joins: half a KiB per job and core.
             memory_mib: 64 + (jobs * cores).div_ceil(2048),
             on_linux,
             named,
@@ -227,14 +228,14 @@ impl Plan {
     }
 }
 
-/// What makes the joins.
+/// The policy that joins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Policy {
-    /// The DAG's scheduler.
+    /// The scheduler of the DAG.
     Fass,
     /// Equal stamps.
     Exact,
-    /// Stamps at most this number of milliseconds apart.
+    /// Stamps at most this many milliseconds apart.
     Approximate(u64),
 }
 
@@ -259,11 +260,11 @@ impl Policy {
         let close = max_interval_ms.filter(|ms| (1..=1_000_000).contains(ms));
         let close = close.map(Policy::Approximate);
         let mut all = [Policy::Fass, Policy::Exact].into_iter().chain(close);
-        // `+7` would parse too, and be another name for the same.
+        // `+7` parses, too, and would be a second name for the same policy.
         all.find(|policy| policy.to_string() == name)
     }
 
-    /// Names it for people.
+    /// Returns its name for people.
     fn title(self) -> String {
         match self {
             Policy::Fass => "FasS (DAG)".into(),
@@ -283,7 +284,7 @@ impl fmt::Display for Policy {
     }
 }
 
-/// What one boot measures.
+/// The measurement of one boot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Condition {
     policy: Policy,
@@ -297,10 +298,10 @@ impl Condition {
         format!("{}-n{}-seed{}", self.policy, self.subtasks, self.seed)
     }
 
-    /// Returns its words of the guest's command line.
+    /// Returns its words for the guest.
     fn guest_words(&self, jobs: u64, queue: u64) -> String {
-        // Inputs of the parallel subtasks must hold their backlog, which grows
-        // slower than the jobs.
+        // Inputs of the parallel subtasks must hold their backlog, which grows more slowly than the
+        // jobs.
         let depth = jobs.clamp(1000, 100_000);
         let of_queues = format!("queue={queue} depth={depth}");
         let policy = match self.policy {
@@ -320,30 +321,30 @@ impl fmt::Display for Condition {
     }
 }
 
-/// How often a condition is booted at most in deterministic mode.
+/// The most boots of a condition in deterministic mode.
 const MOST_BOOTS: usize = 6;
 
-/// The machine that conditions are measured with, and versions of that, for the record.
+/// The machine for all conditions, and its versions, for the summary.
 #[derive(Debug)]
 struct Setting<'p> {
     plan: &'p Plan,
     /// The mode of the guests; `None`: programs of this computer.
     mode: Option<Mode>,
     image: PathBuf,
-    /// A checksum of the image: other code, other times.
+    /// A checksum of the image: other code gives other times.
     checksum: String,
     /// QEMU's version, or Linux's.
     version: String,
-    /// The commit, with a mark if the tree differs from it.
+    /// The commit, marked if the tree differs from it.
     commit: String,
 }
 
 impl<'p> Setting<'p> {
-    /// Builds what is to be run, settles the mode, and returns why it is that one.
+    /// Builds the program, settles the mode, and returns the reason for the mode.
     ///
     /// # Errors
     ///
-    /// In words: it cannot be built, or the mode that is named is of no use.
+    /// In words: it cannot be built, or the named mode does not work.
     fn new(plan: &'p Plan) -> Result<(Self, Option<String>), String> {
         let mut setting = Self {
             plan,
@@ -373,18 +374,18 @@ impl<'p> Setting<'p> {
         Ok((setting, why))
     }
 
-    /// Names what time means.
+    /// Returns the name of the meaning of time.
     fn mode_name(&self) -> &'static str {
         self.mode.map_or("linux", Mode::name)
     }
 
-    /// Says in one sentence what a time is worth.
+    /// Says in one sentence how far the times can be trusted.
     fn meaning(&self) -> &'static str {
         let on_linux = "real nanoseconds on real processors, whatever else this computer does";
         self.mode.map_or(on_linux, Mode::meaning)
     }
 
-    /// States everything that a condition's times depend on.
+    /// Returns a statement of everything that a condition's times depend on.
     fn statement(&self, condition: &Condition) -> String {
         let (version, checksum) = (&self.version, &self.checksum);
         let Some(mode) = self.mode else {
@@ -416,13 +417,14 @@ impl<'p> Setting<'p> {
         }
     }
 
-    /// Measures one condition, and returns its times: in deterministic mode until two boots agree,
-    /// or [`MOST_BOOTS`] have been tried; then it says so and returns those of the first.
+    /// Measures one condition, and returns its times. In deterministic mode it boots until two
+    /// boots agree, or [`MOST_BOOTS`] times; then it says so and returns the first boot's times.
     ///
-    /// Two boots agree as the kernel removes from counted time what depends on the host
-    /// (its `machine::counted_time`). That rests on how QEMU 7.2 works, so it is checked
+    /// Two boots agree because the kernel removes the host's influence from counted time (its
+    /// `machine::counted_time`). That depends on the implementation of QEMU 7.2, so it is checked
     /// wherever figures are made.
     fn measure(&self, condition: &Condition) -> Result<String, String> {
+        // Real times never repeat, so a second boot could not confirm them.
         let is_sure = self.plan.once || self.mode != Some(Mode::Deterministic);
         let mut seen = Vec::new();
         while seen.len() < MOST_BOOTS {
@@ -469,7 +471,7 @@ impl<'p> Setting<'p> {
     }
 }
 
-/// Returns the first line that a program says, if it is there and content.
+/// Returns the first line of a program's output; `unknown` if it fails.
 fn first_line(program: &str, words: &[&str]) -> String {
     let mut command = process::Command::new(program);
     let output = command

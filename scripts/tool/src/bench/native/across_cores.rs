@@ -1,14 +1,13 @@
-//! What takes two cores: a join across them, and two clusters of one core each.
+//! Workloads on two cores: a join across them, and two clusters of one core each.
 //!
-//! *The join*: from the last predecessor's return to the sink's start.
-//! Two branches compute for 2 us, each on its own core; then whichever returns last
-//! has the sink to start. The times are read by the bodies themselves, as their last
-//! and as their first act. What reading the clock costs is measured, too, and
-//! subtracted once: a stamp encloses half of it at either end.
+//! *The join*: from the last predecessor's return to the sink's start. Two branches compute for 2
+//! us, each on its own core; the core whose branch returns last starts the sink. The bodies
+//! themselves read the times, as their last and as their first act. The cost of reading the clock
+//! is measured, too, and subtracted once: each stamp encloses half of it.
 //!
-//! *The clusters*: each runs a graph of its own, as often as it can, next to one core alone. A
-//! *window* is some rounds of the first cluster; what the second one did within the same time
-//! counts, too. So nothing is counted of times at which only one of them had its processor.
+//! *The clusters*: each runs a graph of its own, as often as it can; one core alone is measured for
+//! comparison. A *window* is some rounds of the first cluster, and includes the work of the second
+//! one in the same time. So no time counts in which only one of them had its processor.
 
 use std::hint::{black_box, spin_loop};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -22,10 +21,10 @@ use super::{Figure, Graph, Rounds, Row, Tick, commit, empty, machine, nanosecond
 
 const WORKLOAD: &str = "join of 2 us";
 
-/// How long a branch computes.
+/// The computing time of a branch.
 const WORK_NS: u64 = 2_000;
 
-/// Measures `jobs` jobs, reading the clock, and what a message costs at least.
+/// Measures `jobs` jobs, the clock, and the least cost of a message between cores.
 pub(super) fn join(jobs: u64) -> Result<Vec<Row>, String> {
     let mut stamps = Stamps::default();
     let functions = [0, WORK_NS, WORK_NS, 0].map(|work_ns| body(work_ns, stamps.pen(jobs)));
@@ -40,7 +39,8 @@ pub(super) fn join(jobs: u64) -> Result<Vec<Row>, String> {
         let [Some(source), Some(one), Some(other), Some(sink)] = [0, 1, 2, 3].map(times) else {
             continue;
         };
-        // Side by side, so on two cores: the one that began later is not the source's.
+        // The branches overlap, so they ran on two cores: the later one was not started by the
+        // source's core.
         if one.0 < other.1 && other.0 < one.1 {
             joins.push(sink.0.saturating_sub(one.1.max(other.1) + reading_ns));
             starts.push(one.0.max(other.0).saturating_sub(source.1 + reading_ns));
@@ -65,7 +65,7 @@ pub(super) fn join(jobs: u64) -> Result<Vec<Row>, String> {
     ])
 }
 
-/// Returns a body that reads the clock until so much time has passed, and stamps its first and its
+/// Returns a body that computes for `work_ns` by reading the clock, and stamps its first and its
 /// last reading.
 fn body(work_ns: u64, mut pen: Pen) -> Tick {
     Box::new(move |_| {
@@ -82,8 +82,8 @@ fn body(work_ns: u64, mut pen: Pen) -> Tick {
     })
 }
 
-/// Measures what it takes to tell another core something: two threads write to one another's
-/// cache line in turn.
+/// Measures the cost of a message to another core: two threads write to each other's cache line in
+/// turn.
 fn transfer() -> Figure {
     const EXCHANGES: u64 = 200;
     const ROUNDS: u64 = 200;
@@ -92,6 +92,7 @@ fn transfer() -> Figure {
     struct Line(AtomicU64);
     impl Line {
         fn tell(&self, exchange: u64) {
+            // Release and Acquire, as a scheduler would publish a value with its message.
             self.0.store(exchange, Ordering::Release);
         }
 
@@ -123,7 +124,7 @@ fn transfer() -> Figure {
     Figure::new((2, "", "one cache line, one way"), 2 * EXCHANGES, rounds_ns)
 }
 
-/// Measures what reading the clock takes.
+/// Measures the cost of reading the clock.
 fn clock() -> Figure {
     const READINGS: u64 = 50;
     let readings_ns = (0..2_000).map(|_| {
@@ -136,20 +137,20 @@ fn clock() -> Figure {
     Figure::new((1, "", "reading the clock"), READINGS, readings_ns)
 }
 
-/// How often one and two clusters take turns, so that a change of the host's speed meets both.
+/// The number of turns of one and two clusters: a change of the host's speed meets both.
 const PASSES: usize = 6;
 
-/// About how many instances a round has: some 50 us, less than a host's time slice.
+/// The approximate number of instances of a round: some 50 us, less than a host's time slice.
 const INSTANCES_A_ROUND: u64 = 2_000;
 
-/// How many rounds a window has.
+/// The number of rounds of a window.
 const WINDOW: usize = 4;
 
 /// Rounds are counted in millionths.
 const PARTS: u64 = 1_000_000;
 
-/// Measures both, with so many windows each at least, adds the figures, and returns for each graph
-/// how many times the instances two clusters do.
+/// Measures both, with at least `windows` windows each, adds the figures to `rows`, and returns for
+/// each graph the throughput of two clusters relative to one core.
 pub(super) fn clusters(
     windows: usize,
     rows: &mut Vec<Row>,
@@ -182,7 +183,7 @@ fn jobs_a_round(graph: Graph) -> u64 {
     INSTANCES_A_ROUND.div_ceil(graph.instances() as u64)
 }
 
-/// Runs so many clusters, and returns what the instances of a window took.
+/// Runs `clusters` clusters, and returns the time of the instances of each window.
 fn pass(graph: Graph, windows: usize, clusters: u32) -> Result<Vec<u64>, String> {
     let jobs_a_round = jobs_a_round(graph);
     let rounds = (windows.div_ceil(PASSES) + 2 * WINDOW) as u64;
@@ -199,13 +200,13 @@ fn pass(graph: Graph, windows: usize, clusters: u32) -> Result<Vec<u64>, String>
     Ok(of_windows(&times_ns))
 }
 
-/// Returns in nanoseconds what the instances of [`WINDOW`] rounds took, by all clusters, in each
-/// window of the first one that lies within the others' times.
+/// Returns for each window of the first cluster that lies within the others' times, in nanoseconds,
+/// the time in which all clusters together did the instances of [`WINDOW`] rounds.
 fn of_windows(times_ns: &[Vec<u64>]) -> Vec<u64> {
     let [first, others @ ..] = times_ns else {
         return Vec::new();
     };
-    // The first ones warm up.
+    // The first windows warm up.
     let windows = first.windows(WINDOW + 1).skip(WINDOW);
     let of_window = |window: &[u64]| {
         let (from, to) = (window[0], window[WINDOW]);
@@ -218,8 +219,8 @@ fn of_windows(times_ns: &[Vec<u64>]) -> Vec<u64> {
     windows.filter_map(of_window).collect()
 }
 
-/// Returns how many rounds were over by an instant, in [`PARTS`] of one; `None` before the first
-/// one and after the last.
+/// Returns how many rounds were over at a time, in [`PARTS`] of one; `None` before the first and
+/// after the last.
 fn parts_by(times_ns: &[u64], at_ns: u64) -> Option<u64> {
     let next = times_ns.partition_point(|&time_ns| time_ns <= at_ns);
     let over = next.checked_sub(1)?;

@@ -1,17 +1,16 @@
-//! What the scheduler costs on the host's own processors.
+//! The cost of the scheduler on the host's own processors.
 //!
-//! The same engine that the kernel has, on threads of Linux that poll, with the
-//! graphs of `bench hand-off` with empty bodies, of which only the source does something: once a
-//! round it reads the clock. Nothing here is emulated, so the
-//! figures can be compared with those of libraries that run task graphs on threads.
+//! The kernel's engine runs on threads of Linux that poll, with the graphs of `bench hand-off` and
+//! empty bodies; only the source does something: once a round it reads the clock. Nothing is
+//! emulated, so the figures can be compared with those of libraries that run task graphs on
+//! threads.
 //!
-//! Other work on the host shows in them. Therefore each figure is measured in many
-//! short *rounds*, spread over several passes, and given as minimum, median and 99th
-//! percentile: the minimum is what the code costs, the others are what the host makes
-//! of it.
+//! Other work on the host affects them. Therefore each figure is measured in many short *rounds*,
+//! spread over several passes, and given as minimum, median and 99th percentile: the minimum is the
+//! cost of the code, the others include the host's disturbance.
 //!
-//! - here: rounds of jobs, back to back, and what one step of them takes;
-//! - `across_cores`: from the last return to the sink's start, and what two clusters do.
+//! - here: rounds of jobs, back to back, and the time of one step;
+//! - `across_cores`: from the last return to the sink's start, and the throughput of two clusters.
 
 mod across_cores;
 
@@ -61,10 +60,10 @@ Exit code: 0 measured; 1 a run did not complete its jobs; 2 the command line is 
 ",
 };
 
-/// The name of the joins across cores among the workloads.
+/// The name of the workload of joins across cores.
 const JOIN: &str = "join";
 
-/// The name of two clusters next to one core.
+/// The name of the workload of two clusters next to one core.
 const CLUSTERS: &str = "clusters";
 
 /// Runs `bench native` with the words after its name.
@@ -72,7 +71,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
     by_plan(&TABLE, words, Plan::read, measure)
 }
 
-/// What is to be measured.
+/// The plan of the measurement.
 struct Plan {
     rounds: usize,
     jobs: u64,
@@ -109,11 +108,12 @@ impl Plan {
     }
 }
 
-/// A figure in nanoseconds, and what runs the bodies under which policy.
+/// A figure in nanoseconds, and its runner and policy.
 type Row = (Figure, &'static str);
 
-/// Measures, and prints; returns that nothing has a limit.
+/// Measures and prints; true, as no figure has a limit.
 fn measure(plan: &Plan) -> Result<bool, String> {
+    // Two workers that poll on one processor would only wait for each other.
     if linux::processors() < 2 {
         return Err("this host has one processor for us; two are needed".into());
     }
@@ -190,18 +190,18 @@ fn machine_line((figure, runner): &Row) -> String {
         .end()
 }
 
-/// How often each runner gets its turn, so that a change of the host's speed meets all.
+/// The number of turns of each runner: a change of the host's speed meets them all.
 const PASSES: usize = 3;
 
-/// About how many instances a round has: some hundred microseconds.
+/// The approximate number of instances of a round: some hundred microseconds.
 const INSTANCES_A_ROUND: usize = 20_000;
 
-/// What runs the bodies.
+/// The way in which the bodies are run.
 #[derive(Clone, Copy)]
 enum Runner {
     /// A loop over the functions.
     Floor,
-    /// The scheduler, with functions of no values.
+    /// The scheduler, with functions without values.
     Closures(Policy),
     /// The scheduler, with a value on each edge, by static priority.
     Typed,
@@ -218,7 +218,7 @@ impl Runner {
     }
 }
 
-/// Returns how many passes [`measure`] makes.
+/// Returns the number of passes of [`measure`].
 fn passes(graphs: &[Graph], workers: &[u32]) -> u64 {
     let of_graph = |graph: &Graph| (PASSES * runners(*graph, workers).len()) as u64;
     graphs.iter().map(of_graph).sum()
@@ -266,9 +266,10 @@ fn jobs_a_round(graph: Graph) -> u64 {
     (INSTANCES_A_ROUND / graph.instances()) as u64
 }
 
-/// Runs the rounds, and some before to warm up, and returns what each took in nanoseconds.
+/// Runs the rounds, after some to warm up, and returns the time of each in nanoseconds.
 fn pass(graph: Graph, runner: Runner, workers: u32, rounds: usize) -> Result<Vec<u64>, String> {
     let jobs_a_round = jobs_a_round(graph);
+    // One job more: the last round needs an end.
     let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
     let marks = Rounds::default();
     let mut functions = empty(graph, &marks, jobs_a_round);
@@ -291,6 +292,7 @@ fn pass(graph: Graph, runner: Runner, workers: u32, rounds: usize) -> Result<Vec
     }
     let times_ns = marks.times_ns();
     let rounds_ns = times_ns.windows(2).map(|pair| pair[1] - pair[0]);
+    // The rounds at the beginning warm the caches up.
     Ok(rounds_ns.skip(times_ns.len() / 10).collect())
 }
 
@@ -300,9 +302,9 @@ struct Graph {
     name: &'static str,
     /// The shape of each DAG.
     shape: Shape,
-    /// How many DAGs there are: released at once, each with a deadline of its own.
+    /// The number of DAGs, released at once, each with a deadline of its own.
     dags: u16,
-    /// What a step is called, and how many a job of all DAGs has.
+    /// The name of a step, and the number of steps of a job of all DAGs.
     steps: (&'static str, u64),
 }
 
@@ -336,12 +338,12 @@ impl Graph {
         Self::new(name, Shape::ForkJoin(parallel), 1, ("per job", 1))
     }
 
-    /// Returns how many instances a job of each DAG has.
+    /// Returns the number of instances of one job of all DAGs.
     fn instances(self) -> usize {
         usize::from(self.dags) * self.shape.subtasks()
     }
 
-    /// Reports whether there is a form of it with a value on each edge.
+    /// Reports whether there is a form with a value on each edge.
     const fn has_values(self) -> bool {
         self.dags == 1 && !matches!(self.shape, Shape::Layered { .. })
     }
@@ -357,13 +359,13 @@ fn nanoseconds(time: Duration) -> u64 {
 struct Rounds(Arc<Mutex<Vec<u64>>>);
 
 impl Rounds {
-    /// Returns them.
+    /// Returns the times.
     fn times_ns(&self) -> Vec<u64> {
         let times_ns = self.0.lock();
         times_ns.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Returns what a source does: it reads the clock once in `jobs_a_round` jobs.
+    /// Returns the source's function, which reads the clock once in `jobs_a_round` jobs.
     fn source(&self, jobs_a_round: u64) -> impl FnMut() + Send + 'static {
         static EPOCH: LazyLock<Instant> = LazyLock::new(Instant::now);
         let rounds = self.clone();
@@ -379,18 +381,18 @@ impl Rounds {
     }
 }
 
-/// A period that no job needs, with which the releases are back to back.
+/// A period longer than any job, with which releases are back to back.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Takes so many cores of this host by threads that poll. Jobs follow one another as fast as they
-/// go, and nothing is written down. Only one thread of the program may measure at a time.
+/// Makes a machine of `workers` threads that poll. Jobs follow one another without a pause, and no
+/// events are recorded. Only one thread of the program may measure at a time.
 fn machine(policy: Policy, workers: u32) -> Result<Linux, String> {
     let linux = Linux::new(workers, Mechanism::Poll).map_err(|why| why.to_string())?;
     let linux = linux.with(|to| (to.scheduler.policy, to.most_events) = (policy, 0));
     Ok(linux.skipping_idle_time())
 }
 
-/// Runs what is committed, and makes sure that each DAG has completed so many jobs.
+/// Runs the committed DAGs, and makes sure that each has completed all jobs.
 fn run_jobs(linux: &Linux, jobs: u64) -> Result<(), String> {
     let run = linux.run().map_err(|why| why.to_string())?;
     let dags = (0..).map(DagId).take(run.task_set().dags().len());
@@ -401,10 +403,10 @@ fn run_jobs(linux: &Linux, jobs: u64) -> Result<(), String> {
     }
 }
 
-/// A function of no values.
+/// A function without values.
 type Tick = Box<dyn FnMut(u64) + Send>;
 
-/// Makes empty functions of a graph's DAGs, subtask by subtask; the first source counts rounds.
+/// Makes empty functions for a graph's DAGs, subtask by subtask; the first source counts rounds.
 fn empty(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Tick>> {
     let of_dag = |_| (0..graph.shape.subtasks()).map(|_| Box::new(|_| ()) as Tick);
     let mut all: Vec<Vec<Tick>> = (0..graph.dags).map(|dag| of_dag(dag).collect()).collect();
@@ -417,7 +419,7 @@ fn named(number: usize) -> SubtaskAttributes {
     SubtaskAttributes::named(&format!("s{number}"))
 }
 
-/// Commits DAGs without values, of a shape that is any graph; each of the clusters has such ones.
+/// Commits DAGs without values, of any shape; `clusters` has the functions of each cluster.
 fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
     let is_divided = clusters.len() > 1;
     let mut dags = Vec::new();
@@ -426,8 +428,8 @@ fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
             let dag = create_dag();
             dag.name(&format!("native{cluster}-{number}"));
             dag.jobs(jobs).in_flight(1).period(PERIOD);
-            // Deadlines in a shuffled order, of which no two are the same: 617 shares no
-            // divisor with 1,000.
+            // Deadlines in a shuffled order, no two the same: 617 has no divisor in common with
+            // 1,000.
             let earlier = number * 617 % u64::from(graph.dags);
             dag.relative_deadline(PERIOD - Duration::from_micros(earlier));
             if is_divided {
@@ -446,7 +448,7 @@ fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the graphs are right");
 }
 
-/// Commits a graph of one DAG with a value on each edge; its source does `tick`, too.
+/// Commits a graph of one DAG with a value on each edge; its source also calls `tick`.
 fn commit_typed(graph: Graph, jobs: u64, mut tick: impl FnMut() + Send + 'static) {
     let dag = create_dag();
     dag.name("typed").jobs(jobs).in_flight(1);
@@ -456,7 +458,7 @@ fn commit_typed(graph: Graph, jobs: u64, mut tick: impl FnMut() + Send + 'static
     };
     dag.register_periodic_subtask(source, vec!["t0"], PERIOD, named(0));
     let sink = graph.shape.subtasks() - 1;
-    // Each subtask writes the topic of its number.
+    // Each subtask writes the topic with its number.
     let topics: Vec<String> = (0..sink).map(|number| format!("t{number}")).collect();
     let is_chain = matches!(graph.shape, Shape::Chain(_));
     for number in 1..sink {
@@ -505,7 +507,7 @@ mod tests {
             assert_eq!(rows.len(), expected, "{}", graph.name);
         }
         let mut rows = Vec::new();
-        // On a host that never gives us both processors there is nothing to see.
+        // On a host that never gives us both processors there is nothing to measure.
         if linux::processors() > 1
             && let Ok(together) = across_cores::clusters(600, &mut rows)
         {

@@ -1,26 +1,24 @@
 //! From a graph with timers to DAGs of one rate each.
 //!
-//! In a multi-rate graph a *timer* (a subtask with a period of its own) starts by
-//! the clock, whatever stands before it; every other subtask starts when what
-//! stands before it has finished. A DAG of ours has one period. So the graph is
-//! split:
+//! In a multi-rate graph a *timer* (a subtask with a period of its own) starts by the clock,
+//! regardless of its predecessors; every other subtask starts when its predecessors have finished.
+//! A DAG of ours has one period. So the graph is split:
 //!
-//! - A subtask without timer belongs to the *slowest* rate among those before it:
-//!   a join of two rates has all its inputs renewed no more often than that.
-//! - An edge into a timer, or from another rate, orders nothing: its reader takes
-//!   the latest value that is there. It is left out, and told in a remark.
-//! - What remains connected is a DAG.
+//! - A subtask without a timer belongs to the *slowest* rate among its predecessors: a join of two
+//!   rates has all its inputs renewed no more often than that.
+//! - An edge into a timer, or from another rate, is no precedence: its reader takes the latest
+//!   value. It is left out, and reported in a remark.
+//! - Each connected part that remains is a DAG.
 //!
 //! So no subtask starts more or less often than its graph says, and the edges that
 //! remain are the precedences of the graph. A graph of one rate becomes one DAG
 //! with all its edges. (`docs/decisions/` has the alternatives.)
 //!
-//! Where times are missing: a source without timer gets the longest period of the
-//! graph, else its shortest end-to-end deadline, else the sum of all execution
-//! times. A DAG without deadline gets the smallest multiple of its period that is
-//! longer than its longest path, for no schedule can be faster than that. A sink has its own
-//! deadline, or the longest of its DAG's; that of a subtask with successors is one of its whole
-//! DAG.
+//! Missing times: a source without a timer gets the longest period of the graph, else its shortest
+//! end-to-end deadline, else the sum of all execution times. A DAG without a deadline gets the
+//! smallest multiple of its period that is longer than its longest path, as no schedule can be
+//! faster than that. A sink has its own deadline, or the longest of its DAG's; the deadline of a
+//! subtask with successors is one of its whole DAG.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -50,11 +48,11 @@ pub struct Subtask {
     pub period_ns: Option<u64>,
     /// Its timer's first release.
     pub offset_ns: u64,
-    /// By when it shall be complete, from the release of its DAG.
+    /// Its deadline, from the release of its DAG.
     pub deadline_ns: Option<u64>,
 }
 
-/// A period and an offset: the slower rate is the larger one.
+/// A period and an offset; the larger one is the slower rate.
 type Rate = (u64, u64);
 
 impl Graph {
@@ -87,6 +85,7 @@ impl Graph {
 ///
 /// The graph has a cycle, or a path that is too long for a deadline.
 pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> {
+    // First: without a cycle the orders below are complete.
     refuse_cycles(graph, name)?;
     let rates = rates(graph);
     let is_kept = |&(earlier, later, _): &(usize, usize, usize)| {
@@ -101,6 +100,7 @@ pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> 
     let mut has_input = vec![false; graph.subtasks.len()];
     let mut edges = vec![Vec::new(); parts.len()];
     for edge in graph.edges.iter().filter(|edge| is_kept(edge)) {
+        // A subtask without kept inputs is a source, and can name its DAG.
         has_input[edge.1] = true;
         edges[part_of[edge.1]].push(*edge);
     }
@@ -130,7 +130,7 @@ pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> 
     Ok(dags)
 }
 
-/// Returns each subtask's rate. The graph has no cycle.
+/// Returns the rate of each subtask of a graph without cycles.
 fn rates(graph: &Graph) -> Vec<Rate> {
     let periods = graph
         .subtasks
@@ -149,6 +149,7 @@ fn rates(graph: &Graph) -> Vec<Rate> {
         .or_else(|| deadlines.min())
         .unwrap_or_else(volume);
     let before = graph.before();
+    // Timers and sources have rates of their own; the others get theirs below.
     let mut rates: Vec<Option<Rate>> = (graph.subtasks.iter().zip(&before))
         .map(|(subtask, before)| match subtask.period_ns {
             Some(period_ns) => Some((period_ns, subtask.offset_ns)),
@@ -156,6 +157,7 @@ fn rates(graph: &Graph) -> Vec<Rate> {
             None => None,
         })
         .collect();
+    // In topological order the rates of all predecessors are known.
     for subtask in topological(graph) {
         if rates[subtask].is_none() {
             rates[subtask] = before[subtask].iter().filter_map(|&one| rates[one]).max();
@@ -167,7 +169,7 @@ fn rates(graph: &Graph) -> Vec<Rate> {
         .collect()
 }
 
-/// Returns the subtasks so that each comes after those before it.
+/// Returns the subtasks in topological order.
 fn topological(graph: &Graph) -> Vec<usize> {
     let mut after = vec![Vec::new(); graph.subtasks.len()];
     let mut waits_for = vec![0; graph.subtasks.len()];
@@ -190,8 +192,8 @@ fn topological(graph: &Graph) -> Vec<usize> {
     order
 }
 
-/// Returns the parts that the kept edges leave connected, each in the order of the
-/// file, the parts by their first subtask.
+/// Returns the connected parts of the kept edges, each in the order of the file, the parts by their
+/// first subtask.
 fn parts(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec<Vec<usize>> {
     let mut beside = vec![Vec::new(); graph.subtasks.len()];
     for &(earlier, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
@@ -204,6 +206,7 @@ fn parts(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec
         let mut part = Vec::new();
         let mut waiting = vec![first];
         while let Some(subtask) = waiting.pop() {
+            // A subtask may wait here several times, once for each neighbour.
             if !std::mem::replace(&mut is_taken[subtask], true) {
                 part.push(subtask);
                 waiting.extend(&beside[subtask]);
@@ -226,6 +229,7 @@ fn dag(
     name: String,
     path_ns: u64,
 ) -> Result<FileDag, Malformed> {
+    // The part is sorted, see `parts`.
     let position = |subtask: usize| part.binary_search(&subtask).ok();
     let subtasks = part.iter().map(|&subtask| &graph.subtasks[subtask]);
     let deadline_ns = |subtask: &usize| graph.subtasks[*subtask].deadline_ns;
@@ -246,6 +250,7 @@ fn dag(
         ..FileDag::default()
     };
     for (number, subtask) in part.iter().zip(subtasks) {
+        // Only a sink has a deadline of its own, and only one shorter than the DAG's says more.
         let is_shorter = |own_ns: &u64| !followed.contains(number) && Some(*own_ns) < of_dag_ns;
         spec.subtasks.push(SubtaskSpec {
             name: subtask.name.clone(),
@@ -265,6 +270,7 @@ fn dag(
         }
     }
     if spec.relative_deadline_ns.is_none() {
+        // One period more than the path fills, so that the deadline is longer than the path.
         let periods = (path_ns / period_ns.max(1)).checked_add(1);
         let deadline_ns = periods.and_then(|periods| period_ns.checked_mul(periods));
         spec.relative_deadline_ns = Some(deadline_ns.ok_or_else(|| Malformed {
@@ -282,7 +288,7 @@ fn dag(
     Ok(dag)
 }
 
-/// Returns for each subtask the longest path that ends with it, over the kept edges.
+/// Returns for each subtask the length of the longest path that ends with it, over the kept edges.
 fn earliest_ends_ns(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec<u64> {
     let mut after = vec![Vec::new(); graph.subtasks.len()];
     for &(earlier, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
@@ -298,7 +304,7 @@ fn earliest_ends_ns(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> b
     ends_ns
 }
 
-/// Checks the whole graph, timers and all, for cycles alone.
+/// Refuses cycles in the whole graph, including its timers.
 fn refuse_cycles(graph: &Graph, name: &str) -> Result<(), Vec<Malformed>> {
     let untimed = |subtask: &Subtask| SubtaskSpec {
         name: subtask.name.clone(),
@@ -307,6 +313,7 @@ fn refuse_cycles(graph: &Graph, name: &str) -> Result<(), Vec<Malformed>> {
     let whole = FileDag {
         spec: DagSpec {
             name: name.into(),
+            // Times that no check can refuse: only the cycles are wanted here.
             period_ns: Some(1),
             relative_deadline_ns: Some(1),
             subtasks: graph.subtasks.iter().map(untimed).collect(),

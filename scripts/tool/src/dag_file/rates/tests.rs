@@ -26,7 +26,7 @@ fn graph(subtasks: &str, edges: &str) -> Graph {
 
 #[test]
 fn a_graph_becomes_dags_of_one_rate_each() {
-    // Of each DAG: name, period in ms, subtasks, and how many edges it has and has not.
+    // For each DAG: name, period in ms, subtasks, and how many edges it has and has not.
     for (subtasks, edges, expected) in [
         // One rate is one DAG with all edges.
         ("a:10 b:10 c", "ac bc", "g 10 abc 2 0"),
@@ -38,7 +38,8 @@ fn a_graph_becomes_dags_of_one_rate_each() {
         ),
         // A timer in mid-chain begins a DAG of its own.
         ("a:10 b t:10 u", "ab bt tu", "g-a 10 ab 1 0, g-t 10 tu 1 1"),
-        // Without timer it is the longest period there is, or else all execution times.
+        // Without a timer it is the longest period of the graph, or else the sum of all execution
+        // times.
         ("a:7 b:9 c", "", "g-a 7 a 0 0, g-b 9 b 0 0, g-c 9 c 0 0"),
         ("a b c", "ab bc", "g 3 abc 2 0"),
     ] {
@@ -67,7 +68,8 @@ fn deadlines_are_those_of_the_graph_or_fit_the_longest_path() {
         // A longest path of 3 ms, a period of 2 ms.
         ("a:2 b c", "ab bc", "", "4"),
         ("a", "", "a5", "5"),
-        // Each sink has its own; that of a subtask with successors is one of all that follows.
+        // Each sink has its own deadline; that of a subtask with successors holds for all that
+        // follows.
         ("a:20 b c d", "ab ac ad", "b5 c9", "9 b5"),
         ("a:20 b c d", "ab ac ad", "b5 c9 a4", "4"),
     ] {

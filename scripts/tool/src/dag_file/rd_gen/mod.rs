@@ -1,23 +1,23 @@
-//! Reading what RD-Gen writes: a graph in networkx's node-link form, as YAML.
+//! Reading the files of RD-Gen: a graph in networkx's node-link form, as YAML.
 //!
 //! A node has an `id`, an `execution_time` and, if a timer drives it, a `period`
 //! and perhaps an `offset`; an `end_to_end_deadline` counts from the release of
 //! its chain. A link has `source` and `target`. Times are numbers without unit.
-//! How timers become DAGs is told in [`rates`](super::rates).
+//! [`rates`](super::rates) explains how timers become DAGs.
 //!
-//! There is no message that takes time here, so a link's `communication_time` is
-//! added to the execution time of its target, which reads the message.
+//! Messages take no time here, so a link's `communication_time` is added to the execution time of
+//! its target, which reads the message.
 
 use dag_file::{DagFile, Malformed, Set, is_name, no_name, quoted, repeated, time};
 
 use super::rates::{Graph, Subtask, split};
 use super::yaml::{Node, Value, parse};
 
-/// Reads a file into one set; `name` is what its DAGs are called after.
+/// Reads a file into one set, whose DAGs are named after `name`.
 ///
 /// # Errors
 ///
-/// Everything that is not as described, with its line.
+/// Every deviation from the form above, with its line.
 pub fn read(text: &str, name: &str, unit_ns: u64) -> Result<DagFile, Vec<Malformed>> {
     let graph = read_graph(text, unit_ns).map_err(|malformed| vec![malformed])?;
     let dags = split(&graph, name)?;
@@ -41,6 +41,7 @@ fn read_graph(text: &str, unit_ns: u64) -> Result<Graph, Malformed> {
         match key.as_str() {
             "nodes" => nodes = items(node, key)?,
             "links" | "edges" => {
+                // Versions of networkx differ in the key; both at once would be two lists.
                 if let Some(other) = listed.replace(key) {
                     let reason = format!("`{other}` and `{key}` both list the edges; keep one");
                     return Err(malformed(node.line, reason));
@@ -78,11 +79,12 @@ fn read_graph(text: &str, unit_ns: u64) -> Result<Graph, Malformed> {
     for link in links {
         read_link(link, &mut graph, unit_ns)?;
     }
+    // Only with all links: an offset is refused on nodes that have predecessors.
     check_whole(&graph)?;
     Ok(graph)
 }
 
-/// Refuses what only shows when all links are known.
+/// Refuses faults that show only when all links are known.
 fn check_whole(graph: &Graph) -> Result<(), Malformed> {
     let edges = &graph.edges;
     let name = |subtask: usize| quoted(&graph.subtasks[subtask].name);
@@ -96,6 +98,7 @@ fn check_whole(graph: &Graph) -> Result<(), Malformed> {
     }
     for &(_, target, _) in edges {
         let subtask = &graph.subtasks[target];
+        // With a period it is a timer, and starts by the clock with an offset.
         if subtask.offset_ns > 0 && subtask.period_ns.is_none() {
             let reason = format!(
                 "node {} has an `offset` and no `period`, and starts after those before it; give \
@@ -170,6 +173,7 @@ fn read_link(link: &Node, graph: &mut Graph, unit_ns: u64) -> Result<(), Malform
         let reason = "this link lacks its `source` or its `target`; give both";
         return Err(malformed(link.line, reason));
     };
+    // Checked: both times come from the file and may be of any size.
     let wcet_ns = graph.subtasks[target].wcet_ns.checked_add(communication_ns);
     graph.subtasks[target].wcet_ns = wcet_ns.ok_or_else(|| {
         let reason = "execution and communication together are more than 64 bits of nanoseconds";

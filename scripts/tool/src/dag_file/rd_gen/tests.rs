@@ -1,5 +1,5 @@
-//! Generated files are read, and broken ones refused. `tests/commands/dag_files.rs` has more of
-//! these, as a person sees them.
+//! Generated files are read, and broken ones refused. `tests/it/dag_files.rs` has more of these, as
+//! a person sees them.
 
 use super::read;
 use crate::system::workspace;
@@ -25,7 +25,7 @@ fn every_generated_file_is_read() {
         assert_eq!(edges + left_out, links, "{place}");
         let is_whole = (dags.len(), left_out) == (1, 0);
         assert!(is_whole || place.contains("chain_"), "{place}");
-        // What the app will read is what was imported; the remarks are comments.
+        // The file written for the app equals the imported one; the remarks are comments.
         let written = file.to_string();
         let lines = written.split_inclusive('\n');
         let lines: String = lines.filter(|line| !line.starts_with('#')).collect();
@@ -46,8 +46,8 @@ fn times_and_defaults_are_those_of_the_file() {
     );
 }
 
-/// What stands in a file, and what is said of it. `NODE` is a node called 0, of four lines with
-/// the `nodes:` above it, and `ONE` one called 1, of two.
+/// The content of a file, and the refusal. `NODE` is a node called 0, of four lines with the
+/// `nodes:` above it, and `ONE` one called 1, of two.
 const REFUSED: &str = r"directed: true\n | line 1: the file has no nodes
 directed: false\n | line 1: `directed` must be true, found `false`
 multigraph: true\n | line 1: `multigraph` must be false
@@ -75,7 +75,7 @@ fn a_refusal_names_line_offender_and_remedy() {
         let message = read(&text, "x", MS).unwrap_err()[0].to_string();
         assert!(message.contains(words), "{message}\n  not: {words}");
     }
-    // Of two DAGs, the first is called after the file and its first node.
+    // Of two DAGs, the first is named after the file and its first node.
     let text = "nodes:\n- id: 0\n  execution_time: 1\n  period: 9\n- id: 1\n  execution_time: 1\n  \
                 period: 7\n";
     let message = read(text, &"x".repeat(254), MS).unwrap_err()[0].to_string();

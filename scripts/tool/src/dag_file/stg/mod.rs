@@ -1,10 +1,11 @@
 //! Reading task graphs, as `apps/dag-file/examples/stg50.json` has them: Kasahara's Standard Task
 //! Graph Set.
 //!
-//! A graph has a `name`, the costs `c` of its vertices, and `edges`. Vertices without cost are the format's own entry and exit; they take no time and order
-//! nothing that the others do not, so they are left out. In the middle of a graph
-//! such a vertex would order others, and is refused. What else is stated, such as
-//! where the graphs come from and how long published schedules of them are, is not needed here.
+//! A graph has a `name`, the costs `c` of its vertices, and `edges`. Vertices without cost are the
+//! format's own entry and exit; they take no time and order nothing that the others do not, so they
+//! are left out. In the middle of a graph such a vertex would order others, and is refused. Other
+//! members, such as the origin of the graphs and the length of published schedules, are not needed
+//! here.
 //!
 //! A graph becomes a DAG of one job at a time: its period and its deadline are the
 //! sum of its costs.
@@ -18,18 +19,18 @@ use crate::options::did_you_mean;
 /// A task graph.
 struct TaskGraph {
     name: String,
-    /// The line on which it stands.
+    /// Its line in the file.
     line: usize,
     /// The cost of each vertex, in units of time.
     costs: Vec<u64>,
     edges: Vec<(usize, usize)>,
 }
 
-/// Reads a file into one set a graph, or the one that is named.
+/// Reads a file into one set for each graph, or only the graph that is named.
 ///
 /// # Errors
 ///
-/// Everything that is not as described, with its line.
+/// The first deviation from the form above, with its line.
 pub fn read(text: &str, graph: Option<&str>, unit_ns: u64) -> Result<DagFile, Malformed> {
     let mut graphs = read_graphs(text)?;
     if let Some(wanted) = graph {
@@ -55,7 +56,7 @@ pub fn read(text: &str, graph: Option<&str>, unit_ns: u64) -> Result<DagFile, Ma
     Ok(DagFile { sets })
 }
 
-/// Reads all graphs of a file, or says the first thing that is not as described, with its line.
+/// Reads all graphs of a file. The error is the first deviation from the form above, with its line.
 fn read_graphs(text: &str) -> Result<Vec<TaskGraph>, Malformed> {
     let (document, places) = parse_with_places(text, "graphs").map_err(|error| {
         let line = line_at(text, error.column.saturating_sub(1));
@@ -76,6 +77,7 @@ fn read_graphs(text: &str) -> Result<Vec<TaskGraph>, Malformed> {
     let (mut line, mut before) = (1, 0);
     let mut read: Vec<TaskGraph> = Vec::new();
     for (graph, place) in graphs.iter().zip(places) {
+        // Counted from the graph before: from the start each time it would be quadratic.
         line += line_at(&text[before..place], place - before) - 1;
         before = place;
         read.push(Graph { value: graph, line }.read(read.len())?);
@@ -93,20 +95,20 @@ fn read_graphs(text: &str) -> Result<Vec<TaskGraph>, Malformed> {
     }
 }
 
-/// Returns the line of a byte.
+/// Returns the line of a byte, counted from 1.
 fn line_at(text: &str, byte: usize) -> usize {
     let before = text.as_bytes().iter().take(byte);
     1 + before.filter(|byte| **byte == b'\n').count()
 }
 
-/// A graph as it stands in the file.
+/// A graph as JSON.
 struct Graph<'v> {
     value: &'v Value,
     line: usize,
 }
 
 impl Graph<'_> {
-    /// Reads the graph, which is the one of that number.
+    /// Reads the graph; `number` is its position in the list.
     fn read(&self, number: usize) -> Result<TaskGraph, Malformed> {
         let Value::Object(members) = self.value else {
             return Err(self.malformed(format!("graph {number} of the list is no object")));
@@ -119,6 +121,7 @@ impl Graph<'_> {
             return Err(self.malformed(no_name(name)));
         }
         for (key, _) in members {
+            // `optimal` and `check` are known, and not needed.
             if !["name", "c", "edges", "optimal", "check"].contains(&key.as_str()) {
                 let key = quoted(key);
                 let reason = format!("unknown key {key}; a graph has name, c, edges");
@@ -142,7 +145,7 @@ impl Graph<'_> {
         Malformed { line, reason }
     }
 
-    /// Returns a member that must be a list, if it is there.
+    /// Returns a member that must be a list; empty if it is missing.
     fn list(&self, name: &str, member: &str) -> Result<&[Value], Malformed> {
         match self.value.get(member) {
             None => Ok(&[]),
@@ -217,8 +220,9 @@ impl TaskGraph {
         }
     }
 
-    /// Makes a DAG of it, with units of so many nanoseconds, unless its times do not fit 64 bits.
+    /// Makes a DAG of it, with units of `unit_ns`; refused if its times exceed 64 bits.
     fn dag(&self, unit_ns: u64) -> Result<FileDag, Malformed> {
+        // In 128 bits, so that even the sum cannot overflow.
         let total: u128 = self.costs.iter().map(|cost| u128::from(*cost)).sum();
         let volume_ns = total.checked_mul(u128::from(unit_ns));
         let volume_ns = volume_ns.and_then(|ns| u64::try_from(ns).ok());
@@ -242,6 +246,7 @@ impl TaskGraph {
         };
         for (vertex, &cost) in self.costs.iter().enumerate() {
             positions.push((cost > 0).then_some(dag.subtasks.len()));
+            // An entry or an exit, see `check`.
             if cost == 0 {
                 continue;
             }

@@ -1,5 +1,5 @@
-//! Published graphs are read, and broken ones refused. `tests/commands/dag_files.rs` has more of
-//! these, as a person sees them.
+//! Published graphs are read, and broken ones refused. `tests/it/dag_files.rs` has more of these,
+//! as a person sees them.
 
 use super::{read, read_graphs};
 use crate::system::workspace;
@@ -31,7 +31,7 @@ fn the_published_graphs_are_read() {
     assert!(is_elsewhere && message.contains("this is no JSON"));
 }
 
-/// What stands in the list of graphs, `/` ending a line, and what is said of it.
+/// The content of the list of graphs, with `/` for a line's end, and the refusal.
 const REFUSED: &str = r#" | the file has no `graphs`
 {"name":"a","c":[-1]} | a cost is no whole number from 0 on
 /{"name":"a","c":[1],"edges":[[0,1]]} | line 2: graph `a`: an edge must be two vertices from 0 to 0
@@ -55,7 +55,7 @@ fn a_refusal_names_line_offender_and_remedy() {
         assert!(message.contains(words), "{message}\n  not: {words}");
     }
     assert!(refusal("", None, 1).contains("this is no JSON"));
-    // A sum that 64 bits do not hold, nor 128 if it is multiplied.
+    // A sum that exceeds 64 bits, and whose product with the unit exceeds 128.
     let costs = ["9223372036854775808"; 32].join(",");
     let text = format!("{{\"graphs\":[{{\"name\":\"a\",\"c\":[{costs}]}}]}}");
     assert!(refusal(&text, None, 1 << 60).contains("choose a shorter unit"));

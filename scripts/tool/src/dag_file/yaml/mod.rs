@@ -1,11 +1,10 @@
-//! The part of YAML that generators of DAGs write.
+//! A reader for the part of YAML that generators of DAGs write.
 //!
-//! Read are block mappings and block sequences, nested by indentation; scalars,
-//! plain or in quotes; the empty `{}` and `[]`; comments; and the marks `---` and
-//! `...` around the one document. Whatever else YAML has (anchors, aliases, tags,
-//! block scalars, filled flow collections, tabs) is refused with its line, as are
-//! keys that stand twice. Nothing is guessed: a scalar stays text, and a caller that
-//! wants a number reads one.
+//! It reads block mappings and block sequences, nested by indentation; scalars, plain or in quotes;
+//! the empty `{}` and `[]`; comments; and the marks `---` and `...` around the one document. The
+//! rest of YAML (anchors, aliases, tags, block scalars, filled flow collections, tabs) is refused
+//! with its line, as are repeated keys. Nothing is guessed: a scalar stays text, and a caller that
+//! wants a number parses it.
 
 use std::collections::HashSet;
 
@@ -14,7 +13,7 @@ use dag_file::{Malformed, quoted};
 /// The deepest nesting that is read.
 const DEEPEST: usize = 32;
 
-/// A value and where it begins.
+/// A value and its first line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Node {
     /// The line, counted from 1.
@@ -26,7 +25,7 @@ pub struct Node {
 /// A value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Value {
-    /// Text without its quotes; empty if nothing stands there.
+    /// Text without its quotes; empty if there is none.
     Scalar(String),
     /// A sequence.
     Sequence(Vec<Node>),
@@ -38,7 +37,7 @@ pub enum Value {
 ///
 /// # Errors
 ///
-/// The first place that is not as described above.
+/// The first deviation from the description above.
 pub fn parse(text: &str) -> Result<Node, Malformed> {
     let mut reader = Reader {
         lines: lines(text)?,
@@ -58,7 +57,7 @@ pub fn parse(text: &str) -> Result<Node, Malformed> {
     }
 }
 
-/// A line with something on it.
+/// A line that is not blank.
 #[derive(Clone, Copy, Debug)]
 struct Line<'t> {
     number: usize,
@@ -71,7 +70,7 @@ fn malformed(line: usize, reason: impl Into<String>) -> Malformed {
     Malformed { line, reason }
 }
 
-/// Takes comments, blank lines and the document's marks away.
+/// Returns the lines without comments, blank lines and the document's marks.
 fn lines(text: &str) -> Result<Vec<Line<'_>>, Malformed> {
     let mut lines: Vec<Line<'_>> = Vec::new();
     let mut has_ended = false;
@@ -116,7 +115,7 @@ fn without_comment(text: &str) -> &str {
         match quote {
             Some(open) if character == open && before != '\\' => quote = None,
             Some(_) => {}
-            // In the middle of a word an apostrophe is no quote.
+            // In the middle of a word an apostrophe opens no quote.
             None if matches!(character, '"' | '\'') && " :-".contains(before) => {
                 quote = Some(character);
             }
@@ -138,16 +137,17 @@ impl<'t> Reader<'t> {
         self.lines.get(self.next)
     }
 
-    /// Returns the next line if it is indented so far.
+    /// Returns the next line if it has this indentation.
     fn sibling(&self, indent: usize) -> Option<Line<'t>> {
         self.peek().filter(|line| line.indent == indent).copied()
     }
 
-    /// Reads the collection or scalar whose first line is the next one.
+    /// Reads the collection or scalar that begins with the next line.
     fn block(&mut self, indent: usize, depth: usize) -> Result<Node, Malformed> {
         let Some(line) = self.sibling(indent) else {
             return Err(malformed(1, "there is nothing to read"));
         };
+        // A recursion without a limit would overflow the stack on hostile input.
         if depth > DEEPEST {
             let reason = format!("this is nested more than {DEEPEST} levels deep");
             return Err(malformed(line.number, reason));
@@ -155,6 +155,7 @@ impl<'t> Reader<'t> {
         if is_item(line.text) {
             return self.sequence(indent, depth);
         }
+        // Only now: `- a: b` is an item, although it contains a key.
         if split_key(&line)?.is_some() {
             return self.mapping(indent, depth);
         }
@@ -172,7 +173,7 @@ impl<'t> Reader<'t> {
                 items.push(self.below(&line, indent + 1, depth)?);
                 continue;
             }
-            // What follows the dash is a block of its own, further in.
+            // The rest after the dash is a block of its own, indented further.
             let inner = indent + line.text.len() - rest.len();
             self.lines[self.next].indent = inner;
             self.lines[self.next].text = rest;
@@ -199,7 +200,7 @@ impl<'t> Reader<'t> {
             }
             self.next += 1;
             let node = if rest.is_empty() {
-                // The items of a sequence may stand right below their key.
+                // The items of a sequence may be as far in as their key.
                 let is_at_key = self.sibling(indent).is_some_and(|next| is_item(next.text));
                 self.below(&line, indent + usize::from(!is_at_key), depth)?
             } else {
@@ -213,7 +214,7 @@ impl<'t> Reader<'t> {
         })
     }
 
-    /// Reads what stands below `line`, at least so far in; nothing is empty.
+    /// Reads the block below `line`, indented by at least `least`; without one, an empty scalar.
     fn below(&mut self, line: &Line<'_>, least: usize, depth: usize) -> Result<Node, Malformed> {
         match self.peek().map(|next| next.indent) {
             Some(indent) if indent >= least => self.block(indent, depth + 1),
@@ -247,18 +248,19 @@ fn split_key<'t>(line: &Line<'t>) -> Result<Option<(String, &'t str)>, Malformed
     }
 }
 
-/// Returns where the quote closes that `text` begins with.
+/// Returns the position of the quote that closes the one at the beginning of `text`.
 fn closing_quote(text: &str) -> Option<usize> {
     let quote = text.chars().next()?;
     let mut is_escaped = false;
     text.char_indices().skip(1).find_map(|(at, character)| {
         let closes = character == quote && !is_escaped;
+        // Only double quotes know escapes; in single ones a backslash is itself.
         is_escaped = quote == '"' && character == '\\' && !is_escaped;
         closes.then_some(at)
     })
 }
 
-/// Reads what stands on one line.
+/// Reads a value that is on one line.
 fn scalar(line: &Line<'_>, text: &str) -> Result<Node, Malformed> {
     let value = match text {
         "{}" => Value::Mapping(Vec::new()),
@@ -273,6 +275,7 @@ fn scalar(line: &Line<'_>, text: &str) -> Result<Node, Malformed> {
 
 fn plain(line: usize, text: &str) -> Result<String, Malformed> {
     if !text.starts_with(['"', '\'']) {
+        // These begin a part of YAML that is not read here.
         let not_read = |character| "&*!|>{}[]%@`".contains(character);
         return if text.starts_with(not_read) {
             let shown = quoted(text);

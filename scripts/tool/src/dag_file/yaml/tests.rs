@@ -1,4 +1,4 @@
-//! What is read of YAML, and what is refused.
+//! Texts that the YAML reader accepts or refuses.
 
 use super::{Node, Value, parse};
 
@@ -54,7 +54,7 @@ empty:
     assert_eq!(read("a: it's # no\nb: c#d"), "{a=`it's`,b=`c#d`}");
 }
 
-/// What is refused, and why.
+/// Texts that are refused, and the reasons.
 const REFUSED: &str = r#"# nothing\n | line 1: the file is empty
 a: 1\na: 2\n | line 2: key `a` stands here twice
 a: 1\n  b: 2\n | line 2: this line's indentation fits nothing above

@@ -2,9 +2,9 @@
 //!
 //! A commit is a line `static 2` or `edf 1`, with the number of cores, and a line for each DAG:
 //! `fork T=100 D=90 O=10 flight=2: a/0 b/1 c/2/10 d/3; 0>1 0>2 1>3 2>3`, with `sporadic` after the
-//! name if it is; a subtask has its name, priority, and WCET if that is known. Events are lines as
-//! `24 start c1 0.0.2`: time in ns, word, core, and DAG, job and subtask if it is of one; a line `lost 2`
-//! before them is of events that are there no more.
+//! name if it is; a subtask has its name, its priority and, if known, its WCET. Events are lines
+//! such as `24 start c1 0.0.2`: time in ns, word, core, and DAG, job and subtask if it has one. A
+//! line `lost 2` before them states the number of earlier events that are lost.
 
 use recording::{Commit, CommittedDag, CommittedSubtask, Times, Writer};
 use sched_dag::journal::{Event, EventSubject};
@@ -74,7 +74,7 @@ fn dag(line: &str) -> CommittedDag {
     dag
 }
 
-/// Makes an event of its line.
+/// Makes an event from its line.
 pub(crate) fn event(line: &str) -> Event {
     let [time, word, core, of] = line.split(' ').collect::<Vec<_>>()[..] else {
         panic!("`{line}` is no event");
@@ -91,7 +91,7 @@ pub(crate) fn event(line: &str) -> Event {
     }
 }
 
-/// Makes a record of one run, with a text before it.
+/// Makes a record of one run, after a text.
 pub(crate) fn record_of(text: &str, commit: &Commit, events: &str) -> Vec<u8> {
     let mut record = Writer::begin(Vec::new());
     record.text(text);
@@ -117,7 +117,7 @@ pub(crate) fn record_of(text: &str, commit: &Commit, events: &str) -> Vec<u8> {
     record.end()
 }
 
-/// Makes the line by which bytes of a record are printed.
+/// Makes the line of a serial log with the bytes of a record.
 pub(crate) fn line_of(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let of_three = |three: &[u8]| {

@@ -1,4 +1,4 @@
-//! Records that are right, wrong, cut, and altered.
+//! Records that are correct, malformed, cut off, and altered.
 
 pub(crate) mod made;
 
@@ -34,7 +34,7 @@ fn a_good_record_is_read_as_a_file_and_in_lines() {
     assert_eq!(Record::read(b"hello\n").unwrap().runs.len(), 0);
 }
 
-/// A part of the good one, what is put in its place, and what is said.
+/// A part of the good record, its replacement, and the refusal.
 const WRONG: &str = "
 edf 2 | edf 0 | commit 0: it is for 0 cores; 1 to 64 are possible
 edf 2 | edf 4294967295 | commit 0: it is for 4294967295 cores; 1 to 64 are possible
@@ -67,7 +67,7 @@ fn whatever_is_wrong_is_named() {
     assert_eq!(said, "serial line 1: its bytes are not in base 64");
 }
 
-/// Lost are the oldest events, and those after the last ones that were sent.
+/// Lost events are the oldest, and those after the last ones that were sent.
 #[test]
 fn events_that_are_missing_are_counted_and_a_run_that_died_is_not_complete() {
     let mut record = Writer::begin(Vec::new());
@@ -82,7 +82,7 @@ fn events_that_are_missing_are_counted_and_a_run_that_died_is_not_complete() {
     let bytes = record.end();
     let ended = Record::read(&bytes).unwrap();
     assert_eq!((ended.runs[0].lost, ended.runs[0].complete), (7, true));
-    // Of a guest that was killed there is what came until then.
+    // The record of a guest that was killed has the part sent until then.
     let cut = Record::sent(&bytes[..bytes.len() - 1], "").unwrap();
     assert_eq!(cut.runs.len(), 1);
 }

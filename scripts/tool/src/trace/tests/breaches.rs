@@ -93,7 +93,7 @@ fn r2_an_instance_waits_for_its_predecessors_and_for_the_job_before() {
     assert_each(FORK, GOOD, rows);
 }
 
-/// The first row: not with `b`, but when core 0 has started that. The last one: `b` finishes at 49
+/// The first row: not with `b`, but when core 0 has started it. The last one: `b` finishes at 49
 /// and takes the lock after `c`, which finished at 50.
 #[test]
 fn r3_what_waits_for_a_finish_is_released_in_its_step() {
@@ -239,7 +239,7 @@ const PREEMPTED: &str = "
 99 completed c0 1.0
 ";
 
-/// A little too late is too late. The law's own tests tell what else R5 forbids and allows.
+/// The least excess is a breach. The law's own tests show what else R5 forbids and allows.
 #[test]
 fn r5_the_more_urgent_one_waits_within_the_bound() {
     let rows = "
@@ -274,7 +274,7 @@ const CHAIN: &str = "
 static 2
 chain T=100 D=100 O=0: a/0 b/1; 0>1";
 
-/// How `a` was started is lost.
+/// The start of `a` is lost.
 const REST: &str = "
 19 missed c0 0.7
 20 finish c1 0.0.0

@@ -12,7 +12,7 @@ use crate::made::{self, event, lines_of, record_of};
 use crate::record::Record;
 use crate::record::Run;
 
-/// How long one may wait in these traces.
+/// The longest wait allowed in these traces.
 const BOUND_NS: u64 = 5;
 
 /// Makes a run of a commit, and of events in the order of time.
@@ -24,12 +24,12 @@ pub(super) fn run_of(commit: &str, events: &str) -> Run {
     run
 }
 
-/// Changes a good trace, and asserts what that shows.
+/// Changes a good trace, and asserts the breaches of the changed one.
 ///
-/// A row `FROM -> TO` puts other lines, with `; ` between, in the place of the one that begins with
-/// FROM, or of all from that one on if FROM ends with `..`. A row `lost` or `complete` is what the
-/// run says of itself. A row `= BREACH` judges the trace so changed: it shows this breach, perhaps
-/// among others, or none if nothing stands behind `=`. The next row changes the good trace again.
+/// A row `FROM -> TO` replaces the line that begins with FROM, or all from that one on if FROM ends
+/// with `..`, by other lines, with `; ` between. A row `lost` or `complete` sets the run's own
+/// statement. A row `= BREACH` judges the changed trace: it shows this breach, perhaps among
+/// others, or none if nothing stands behind `=`. The next row changes the good trace again.
 fn assert_each(header: &str, good: &str, rows: &str) {
     let (mut run, mut lines) = (run_of(header, ""), lines_of(good));
     for row in lines_of(rows) {
@@ -56,7 +56,7 @@ fn assert_each(header: &str, good: &str, rows: &str) {
     }
 }
 
-/// Puts other lines in the place of one, which must be there once, or of all from it on.
+/// Replaces one line, which must occur once, or all from it on.
 fn change<'t>(lines: &mut Vec<&'t str>, from: &str, to: &'t str) {
     let (from, is_all) = match from.strip_suffix("..") {
         Some(from) => (from, true),

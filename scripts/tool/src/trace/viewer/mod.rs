@@ -1,4 +1,4 @@
-//! A run's trace for the eye: JSON that Perfetto's viewer opens.
+//! Traces of runs as pictures: JSON for Perfetto's viewer.
 //!
 //! The format is the Trace Event Format of Chrome's tracing, which
 //! <https://ui.perfetto.dev>, `chrome://tracing` and speedscope read. In its
@@ -9,31 +9,28 @@
 //! - a group `cores` with a track for each core: a slice is one uninterrupted
 //!   piece of an instance's execution, an instant a preemption, or the request
 //!   for one;
-//! - a group for each DAG: its releases, deadlines and misses as instants, a
-//!   slice for each job from its nominal release to its completion, and for each
-//!   subtask the slices of its instances from readiness to their end, with what
+//! - a group for each DAG: its releases, deadlines and misses as instants, a slice for each job
+//!   from its nominal release to its completion, and for each subtask the slices of its instances
+//!   from readiness to their end, with their executions inside;
 //!   they executed inside;
-//! - if the trace breaks a rule, a group `breaches` that says where.
+//! - if the trace breaks a rule, a group `breaches` with an instant for each breach.
 //!
-//! Flows lead along each edge of the graph from an instance's finish to the
-//! start of its successor in the same job, and from an instance's finish to the start of
-//! each one that samples its value; once between cores and once between subtasks, under two
-//! numbers.
+//! Flows lead along each edge of the graph from an instance's finish to the start of its successor
+//! in the same job, and from an instance's finish to the start of each one that samples its value.
+//! Each flow is drawn twice, between cores and between subtasks, under two numbers.
 //!
-//! It guarantees that slices of one track nest, and that each flow has both its
-//! ends. Each time is the trace's, in microseconds with three decimals. All runs
-//! begin at 0, side by side. Where events were lost, only what came after the
-//! last gap is shown.
+//! Slices of one track always nest, and each flow has both its ends. Each time is the trace's, in
+//! microseconds with three decimals. All runs begin at 0, side by side. Where events were lost,
+//! only the part after the last gap is shown.
 //!
 //! Jobs overlap, and slices of one track must not, so jobs lie on as many *lanes*
 //! as overlap at most. A subtask needs one track only: by R2 its instance of a job
 //! is not ready before the one of the job before has finished.
 //!
-//! Slices are written as a begin and an end (`B`, `E`) rather than as one event
-//! with a duration: viewers keep times in numbers of their own, and so two
-//! slices that touch at one nanosecond touch there, too. Each track's events are
-//! written in the order of time, and at one time in the order in which they were
-//! drawn, which viewers keep.
+//! Slices are written as a begin and an end (`B`, `E`) rather than as one event with a duration:
+//! viewers round times to numbers of their own, and so two slices that touch at one nanosecond also
+//! touch there. Each track's events are written in the order of time, and at equal times in the
+//! order in which they were drawn, which viewers keep.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -54,8 +51,7 @@ use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::output::briefly;
 use crate::record::{Run, bound};
 
-/// Returns runs as one text of JSON. Breaches are looked for with `bound_ns`, as
-/// [`check`] does.
+/// Converts runs to JSON. `bound_ns` is the tolerance for breaches, as of [`check`].
 #[must_use]
 pub fn convert(runs: &[Run], bound_ns: u64) -> String {
     let (mut output, mut next_flow) = (Output::default(), 0);
@@ -104,7 +100,7 @@ fn name_or(name: &str, number: u32) -> String {
     }
 }
 
-/// What a group's or a track's slices say of an instance.
+/// Returns the arguments that all slices of an instance have.
 fn instance_args(instance: Instance) -> Object {
     let Instance { dag, job, subtask } = instance;
     Object::new()
@@ -124,11 +120,13 @@ fn draw_piece(
     let history = &view.histories[&instance];
     let slice = history.slices[piece];
     track.begin(slice.from_ns, name, args);
+    // A first piece without a start continues one before the trace: no arrow leads into it.
     if piece == 0 && history.start_ns.is_some() {
         flows.into(instance).for_each(|flow| track.flow_in(flow));
     }
     let to_ns = slice.to_ns.unwrap_or(view.end_ns);
     track.advance(to_ns);
+    // An instance that was ended by a fault hands nothing on.
     if piece + 1 == history.slices.len() && history.finish_ns.is_some() {
         flows.out(instance).for_each(|flow| track.flow_out(flow));
     }
@@ -186,7 +184,7 @@ pub fn trace(words: &[OsString]) -> ExitCode {
     })
 }
 
-/// Converts the runs that the options ask for.
+/// Converts the runs that the options name.
 fn draw(options: &Parsed) -> Result<String, String> {
     let input = options.file("which file? name a serial log with a trace")?;
     files::check(&[input], &options.named(&["out"]))?;
@@ -207,12 +205,12 @@ fn draw(options: &Parsed) -> Result<String, String> {
         let run = runs.first().ok_or("the file has no run")?;
         return picture::draw(run, options.number("periods").unwrap_or(1));
     }
-    // The runs of a log are those of one boot.
+    // All runs of a file come from one boot, so one bound holds for all.
     let bound_ns = runs.first().map_or(0, |run| bound::of(run, options));
     Ok(convert(&runs, bound_ns))
 }
 
-/// A piece of an instance's execution, and which one of the instance's it is, counted from 0.
+/// A stretch of an instance's execution, and its number within the instance, from 0.
 struct Piece {
     instance: Instance,
     slice: Slice,
@@ -233,7 +231,7 @@ fn draw_cores(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Output)
     }
 }
 
-/// Returns all pieces in the order of time.
+/// Returns all stretches of execution in the order of time.
 fn pieces(view: &View<'_>) -> Vec<Piece> {
     let mut pieces = Vec::new();
     for (&instance, history) in &view.histories {
@@ -268,6 +266,7 @@ fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) {
         Some(_) if !is_last => "suspend",
         Some(_) if history.finish_ns.is_some() => "finish",
         Some(_) if history.dropped_ns.is_some() => "fault",
+        // The instance was suspended, and has not resumed when the trace ends.
         Some(_) => "suspend",
     };
     let args = instance_args(instance)
@@ -322,7 +321,7 @@ fn draw_dags(view: &View<'_>, prefix: &str, flows: &mut Flows, output: &mut Outp
     }
 }
 
-/// Draws what happens to jobs at one moment, and their deadlines.
+/// Draws the events of jobs, and their deadlines, as instants.
 fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
     let mut track = output.track(group, "releases, deadlines");
     let args = |job: u64| Object::new().number("job", job).end();
@@ -340,9 +339,10 @@ fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) 
         let name = format!("{what} #{}", event.job);
         track.instant(event.time_ns, &name, &args(event.job));
     }
+    // Of all jobs, also those whose deadline is no event of the trace.
     for (&(_, job), history) in jobs_of(view, dag) {
         let deadline_ns = view.deadline_ns(dag, job);
-        // A later one would only make the picture longer.
+        // A deadline after the trace would only make the picture longer.
         if history.released_ns.is_some() && deadline_ns <= view.end_ns {
             track.instant(deadline_ns, &format!("deadline #{job}"), &args(job));
         }
@@ -355,12 +355,14 @@ fn draw_jobs(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
     let mut lanes: Vec<Track> = Vec::new();
     let mut busy_until_ns: Vec<u64> = Vec::new();
     for (&(_, job), history) in jobs_of(view, dag) {
+        // Such as a skipped job, which has no duration.
         if history.released_ns.is_none() && history.completed_ns.is_none() {
             continue;
         }
         let nominal_ns = view.release_ns(dag, job);
         let end_ns = history.completed_ns;
         let to_ns = end_ns.unwrap_or(view.end_ns).max(nominal_ns);
+        // A lane that is free again is used before a new one is opened.
         let is_free = |until_ns: &u64| *until_ns <= nominal_ns;
         let lane = busy_until_ns.iter().position(is_free);
         let lane = lane.unwrap_or_else(|| {
@@ -447,26 +449,26 @@ fn jobs_of<'v>(
     view.jobs.range((dag, 0)..=(dag, u64::MAX))
 }
 
-/// An arrow, as it is drawn once.
+/// An arrow in one of its two drawings.
 #[derive(Clone, Copy, Debug)]
 struct Flow {
     number: u64,
-    /// Whether it is a sample, and no edge.
+    /// Whether it is a sample rather than an edge.
     is_sample: bool,
 }
 
 /// The arrows of a run.
 #[derive(Debug)]
 struct Flows {
-    /// By instance, those that leave it.
+    /// For each instance, the arrows that leave it.
     out: BTreeMap<Instance, Vec<u64>>,
-    /// By instance, those that lead to it.
+    /// For each instance, the arrows that lead to it.
     into: BTreeMap<Instance, Vec<u64>>,
     count: u64,
-    /// How many of them, the first ones, are edges.
+    /// The number of edges among them, which come first.
     edges: u64,
     first: u64,
-    /// What lies between the numbers of an arrow's two drawings, and the first.
+    /// The offset from the numbers of the first drawing to those of the second.
     shift: u64,
 }
 
@@ -482,6 +484,7 @@ impl Flows {
             shift: 0,
         };
         for (&later, history) in &view.histories {
+            // An instance that never started has no slice for the arrow's end.
             if history.start_ns.is_none() {
                 continue;
             }
@@ -508,7 +511,7 @@ impl Flows {
         self.count += 1;
     }
 
-    /// Goes on with the second drawing of all arrows.
+    /// Switches to the second drawing of all arrows.
     fn draw_again(&mut self) {
         self.shift = self.count;
     }
@@ -525,6 +528,7 @@ impl Flows {
 
     /// Returns the first number that no arrow has.
     const fn next(&self) -> u64 {
+        // Each arrow has a number in both drawings.
         self.first + 2 * self.count
     }
 
@@ -540,12 +544,12 @@ fn predecessors<'v>(view: &'v View<'_>, dag: DagId, subtask: SubtaskId) -> &'v [
     view.run.task_set.dag(dag).predecessors(subtask)
 }
 
-/// All that is shown.
+/// The JSON that is being written.
 #[derive(Debug, Default)]
 struct Output {
     events: String,
-    /// The last number given to a group or a track; no two share one, as viewers
-    /// mix up a process and a thread of the same number.
+    /// The last number given to a group or a track. No two share one, as viewers mix up a process
+    /// and a thread of the same number.
     last_id: u64,
 }
 
@@ -565,7 +569,7 @@ struct Track {
 }
 
 impl Output {
-    /// Adds a group below those that there are.
+    /// Adds a group below the present ones.
     fn group(&mut self, name: &str, label: &str) -> Group {
         self.last_id += 1;
         let id = self.last_id;
@@ -579,7 +583,7 @@ impl Output {
         Group(id)
     }
 
-    /// Begins a track below those that the group has.
+    /// Adds a track below those of the group.
     fn track(&mut self, group: Group, name: &str) -> Track {
         self.last_id += 1;
         let id = self.last_id;
@@ -595,13 +599,14 @@ impl Output {
         }
     }
 
-    /// Adds a track that has been drawn.
+    /// Writes a track that has been drawn.
     ///
     /// # Panics
     ///
-    /// If a slice of it was not ended.
+    /// Panics if a slice of it was not ended.
     fn add(&mut self, mut track: Track) {
         assert_eq!(track.open, 0, "each slice of a track is ended");
+        // Stable: at one time a slice must end before the next begins.
         track.drawn.sort_by_key(|(time_ns, _)| *time_ns);
         for (_, event) in track.drawn {
             self.push(&event);
@@ -634,8 +639,8 @@ impl Output {
 }
 
 impl Track {
-    /// Begins a slice, inside the one that is open if there is one. `args` is an
-    /// object of JSON. It does not begin before the last one has ended.
+    /// Begins a slice, inside the open one if there is one. `args` is a JSON object. It does not
+    /// begin before the last slice has ended.
     fn begin(&mut self, time_ns: u64, name: &str, args: &str) {
         self.latest_ns = self.latest_ns.max(time_ns);
         self.open += 1;
@@ -650,24 +655,24 @@ impl Track {
         self.draw('E', self.latest_ns, "");
     }
 
-    /// Draws a moment, at any time.
+    /// Draws an instant, at any time.
     fn instant(&mut self, time_ns: u64, name: &str, args: &str) {
         let rest = format!(",\"s\":\"t\",\"name\":{},\"args\":{args}", quoted(name));
         self.draw('i', time_ns, &rest);
     }
 
-    /// Lets a flow leave the slice that is open, at the time drawn last.
+    /// Draws the start of a flow at the open slice, at the time drawn last.
     fn flow_out(&mut self, flow: Flow) {
         self.draw('s', self.latest_ns, &described(flow));
     }
 
-    /// Lets a flow arrive at the slice that is open, at the time drawn last.
+    /// Draws the end of a flow at the open slice, at the time drawn last.
     fn flow_in(&mut self, flow: Flow) {
         let rest = format!("{},\"bp\":\"e\"", described(flow));
         self.draw('f', self.latest_ns, &rest);
     }
 
-    /// Sets the time of the flows to come.
+    /// Sets the time of the next flows.
     fn advance(&mut self, time_ns: u64) {
         self.latest_ns = self.latest_ns.max(time_ns);
     }
@@ -682,7 +687,7 @@ impl Track {
     }
 }
 
-/// The members that both ends of a flow have.
+/// Returns the members that both ends of a flow share.
 fn described(flow: Flow) -> String {
     let Flow { number, is_sample } = flow;
     let (name, category) = match is_sample {

@@ -1,4 +1,4 @@
-//! What is drawn of traces by hand, and of a real one.
+//! Drawings of handmade traces, and of a real one.
 
 use std::collections::BTreeMap;
 
@@ -70,10 +70,10 @@ struct Track<'v> {
     open: Vec<(&'v Value, f64)>,
 }
 
-/// Draws runs, and returns the drawing as lines: a group is `group: NAME`, a slice is
-/// `TRACK: NAME FROM..TO`, on a core with how it begins and ends; a moment is `TRACK: NAME AT`, an
-/// arrow `NAME: FROM > TO`. Fails unless each track goes on in the order of time, its slices nest,
-/// and each arrow has one end in a slice and one in another.
+/// Draws runs, and returns the drawing as lines: a group is `group: NAME`, a slice is `TRACK: NAME
+/// FROM..TO`, on a core also how it begins and ends; an instant is `TRACK: NAME AT`, an arrow
+/// `NAME: FROM > TO`. Fails unless each track goes on in the order of time, its slices nest, and
+/// each arrow has one end in a slice and one in another.
 fn drawn(runs: &[Run], bound_ns: u64) -> Vec<String> {
     let all = parse(&convert(runs, bound_ns)).expect("valid JSON");
     let (mut lines, mut ends) = (Vec::new(), BTreeMap::<u64, Vec<_>>::new());
@@ -129,7 +129,7 @@ fn drawn(runs: &[Run], bound_ns: u64) -> Vec<String> {
     lines
 }
 
-/// Draws a run, and asserts which lines of the drawing begin like this, in any order.
+/// Draws a run, and asserts which lines of the drawing begin with a text, in any order.
 fn assert_drawn(run: &Run, begin: &str, expected: &str) {
     let lines = drawn(std::slice::from_ref(run), 10);
     let found = lines.iter().filter_map(|line| line.strip_prefix(begin));
@@ -197,7 +197,7 @@ fn an_arrow_leads_along_each_edge_whose_ends_ran() {
 
 #[test]
 fn an_arrow_leads_from_a_value_to_each_instance_that_samples_it() {
-    // `b/x` samples what `a/s` writes.
+    // `b/x` samples the topic of `a/s`.
     let sampling = SampledEdge {
         writer: (DagId(0), SubtaskId(0)),
         reader: (DagId(1), SubtaskId(0)),
