@@ -47,7 +47,7 @@ fn what_is_committed_or_of_another_dag_cannot_be_changed() {
         [&dag, &other].map(|dag| dag.register_untyped_subtask(|_job| (), named("work")));
     let told = panic_message(|| _ = dag.precede(&here, &there));
     assert!(
-        told.starts_with("Untyped(0) is a subtask of another DAG"),
+        told.starts_with("UntypedSubtask(0) is a subtask of another DAG"),
         "{told}"
     );
 }

@@ -53,7 +53,7 @@ The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
 the reasons above it. Each part says when it ends how many seconds it took.
 
 With --bless the files that were rewritten stand there, too; `git diff` shows what
-has changed in them. EventKind cannot be rewritten still fails.
+has changed in them. What cannot be rewritten still fails.
 
 exit codes: 0 nothing failed; 1 something failed; 2 a refused command line, or
 a FILTER by which nothing has run

@@ -40,7 +40,7 @@ static TABLE: Command = Command {
         /// them to FILE. Needs objdump and addr2line (binutils).
         "listing": Takes::File("FILE");
     },
-    notes: "EventKind each row means stands in docs/performance.md.
+    notes: "What each row means stands in docs/performance.md.
 
 Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
 2 the command line is refused.
