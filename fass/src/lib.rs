@@ -32,25 +32,25 @@
 //!         frame += 1;
 //!         (frame,)
 //!     },
-//!     vec!["frame"],
+//!     ["frame"],
 //!     Duration::from_millis(25),
 //!     SubtaskAttributes::named("camera"),
 //! );
 //! dag.register_subtask(
 //!     |(frame,): (i32,)| (frame * 10,),
-//!     vec!["frame"],
-//!     vec!["edges"],
+//!     ["frame"],
+//!     ["edges"],
 //!     SubtaskAttributes::named("detect edges"),
 //! );
 //! dag.register_subtask(
 //!     |(frame,): (i32,)| (frame * 100,),
-//!     vec!["frame"],
-//!     vec!["colours"],
+//!     ["frame"],
+//!     ["colours"],
 //!     SubtaskAttributes::named("detect colours"),
 //! );
 //! dag.register_sink_subtask(
 //!     |(edges, colours): (i32, i32)| assert_eq!(edges * 10, colours), // always of one job
-//!     vec!["edges", "colours"],
+//!     ["edges", "colours"],
 //!     Duration::from_millis(25),
 //!     SubtaskAttributes::named("fuse"),
 //! );
@@ -116,6 +116,7 @@ pub use api::parameter::{Parameter, ParameterError, ParameterUse, ParameterValue
 pub use api::signal::{Raiser, Signal, SignalUse};
 pub use api::state::{State, StateRead, StateUpdate, StateValue};
 pub use api::subtask::{Subtask, UntypedSubtask};
+pub use api::topics::Topics;
 pub use api::uses::{ResettableUses, SubtaskBuilder, Uses};
 pub use api::wire::{Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions};
 pub use commit::answer::{ClusterPlacement, Commit, DagAnswer, EndToEnd, SinkAnswer, Verdict};

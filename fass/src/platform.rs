@@ -233,13 +233,13 @@ impl core::error::Error for LaunchError {}
 ///         fass::execute_for(Duration::from_millis(3), Occupation::Spin);
 ///         (fass::now_ns(),)
 ///     },
-///     vec!["time"],
+///     ["time"],
 ///     Duration::from_millis(10),
 ///     SubtaskAttributes::named("source"),
 /// );
 /// dag.register_sink_subtask(
 ///     |(time_ns,): (u64,)| assert_eq!(time_ns, 3_000_000),
-///     vec!["time"],
+///     ["time"],
 ///     Duration::from_millis(10),
 ///     SubtaskAttributes::named("sink"),
 /// );

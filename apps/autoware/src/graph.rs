@@ -229,7 +229,7 @@ impl Builder<'_> {
         self.transform(&dag, "EuclideanClusterDetector", "ObjectCollisionEstimator");
         dag.register_sink_subtask(
             |(_,): (Origin,)| (),
-            vec!["EuclideanIntersection"],
+            ["EuclideanIntersection"],
             LIDAR,
             Self::end("IntersectionOutput"),
         );
@@ -315,7 +315,7 @@ impl Builder<'_> {
                     place.store(job, Ordering::Relaxed);
                 }
             },
-            vec!["VehicleInterface"],
+            ["VehicleInterface"],
             LIDAR,
             Self::end("VehicleDBWSystem"),
         );

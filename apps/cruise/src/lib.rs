@@ -17,7 +17,6 @@
 
 extern crate alloc;
 
-use alloc::vec;
 use core::fmt::Write;
 use core::time::Duration;
 
@@ -87,7 +86,7 @@ pub fn build(wire: &Wire, releases: Releases, decode: Decoder, jobs: u64) -> [Da
         });
         (speed,)
     };
-    cruise.register_subtask(control, vec!["gap"], vec!["speed"], taking("control", 100));
+    cruise.register_subtask(control, ["gap"], ["speed"], taking("control", 100));
     let drive = |mut wire: Sender<'_>, (speed,): (i32,)| {
         // Sending never fails: what finds no room is lost, and counted.
         let _ = writeln!(wire, "speed {speed}");

@@ -1,6 +1,5 @@
 //! The DAGs, and what flows between them.
 
-use alloc::vec;
 use core::time::Duration;
 
 use common::random::Random;
@@ -142,12 +141,7 @@ impl Workload {
             believed = Some(estimate);
             (estimate,)
         };
-        dag.register_subtask(
-            estimate,
-            vec!["measured"],
-            vec!["estimate"],
-            taking("estimate"),
-        );
+        dag.register_subtask(estimate, ["measured"], ["estimate"], taking("estimate"));
 
         type Ahead<'a> = (Seen<'a, Fix>, Seen<'a, Vector>, Seen<'a, f64>);
         let control = move |(fix, goal, height): Ahead<'_>, (estimate,): (Estimate,)| {
@@ -228,7 +222,7 @@ impl Workload {
                 .writes(&["beacon"])
                 .register(slow);
         } else {
-            dag.register_subtask(make(), vec!["image"], vec!["beacon"], slow);
+            dag.register_subtask(make(), ["image"], ["beacon"], slow);
         }
 
         let flight = flight.clone();
@@ -248,12 +242,7 @@ impl Workload {
             }
             (fix.unwrap_or_default(),)
         };
-        dag.register_subtask(
-            locate,
-            vec!["beacon", "taken"],
-            vec!["fix"],
-            taking("locate"),
-        );
+        dag.register_subtask(locate, ["beacon", "taken"], ["fix"], taking("locate"));
     }
 
     fn register_command(self, dag: &Dag, views: &Views, landing: &Mode, flight: &Flight) -> Signal {

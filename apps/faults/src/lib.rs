@@ -97,7 +97,7 @@ pub fn restless(faults: u32) -> [Dag; 2] {
         attributes.budget(SHORT_PERIOD / 4)
     };
     let execute = |(_,): (u64,)| fass::execute_for(SHORT_PERIOD / 20, Occupation::Hold);
-    healthy.register_sink_subtask(execute, vec!["healthy"], SHORT_PERIOD, attributes(0));
+    healthy.register_sink_subtask(execute, ["healthy"], SHORT_PERIOD, attributes(0));
     let commit = |(job,): (u64,)| {
         let number = usize::try_from(job / 2).unwrap_or(0) % RECURRING.len();
         if job % 2 == 1 {
@@ -143,7 +143,7 @@ fn pipeline(
         next_job += 1;
         (job,)
     };
-    dag.register_periodic_subtask(read, vec![&input], PERIOD, attributes("read"));
+    dag.register_periodic_subtask(read, [input.as_str()], PERIOD, attributes("read"));
     let process = move |(job,): (u64,)| {
         fass::execute_for(EXECUTION, Occupation::Hold);
         if let Some(crime) = crime.filter(|_| job == FATAL_JOB) {
@@ -179,7 +179,7 @@ fn pipeline(
     }
     dag.register_sink_subtask(
         |(_,): (u64,)| (),
-        vec![&output],
+        [output.as_str()],
         PERIOD,
         attributes("store"),
     );

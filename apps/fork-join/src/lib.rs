@@ -20,7 +20,6 @@ mod sink;
 mod work;
 
 use alloc::format;
-use alloc::vec;
 use core::time::Duration;
 
 use fass::{Dag, SubtaskAttributes, create_dag};
@@ -99,7 +98,7 @@ impl Workload {
         let attributes = SubtaskAttributes::named("source")
             .wcet(WCET_OF_ENDS)
             .budget(BUDGET);
-        dag.register_periodic_subtask(source, vec!["job"], PERIOD, attributes);
+        dag.register_periodic_subtask(source, ["job"], PERIOD, attributes);
 
         for branch in 0..self.parallel {
             let mut times = ExecutionTimes::up_to(self.longest, self.seed, branch);
@@ -111,7 +110,7 @@ impl Workload {
             let attributes = SubtaskAttributes::named(&format!("parallel-{branch}"));
             let attributes = attributes.wcet(self.longest).budget(BUDGET);
             let output = format!("part-{branch}");
-            dag.register_subtask(execute, vec!["job"], vec![&output], attributes);
+            dag.register_subtask(execute, ["job"], [output.as_str()], attributes);
         }
 
         let joins = Joins::default();

@@ -61,6 +61,6 @@ pub fn build(recording: &Recording<'static>) -> Result<(Dag, Walk), Mismatch> {
         results.take(row, [upper, lower, product(conjugate(upper), lower)]);
         row += 1;
     };
-    dag.register_sink_subtask(knee, vec!["upper", "lower"], PERIOD, taking("knee"));
+    dag.register_sink_subtask(knee, ["upper", "lower"], PERIOD, taking("knee"));
     Ok((dag, walk))
 }

@@ -61,9 +61,9 @@ pub enum Mechanism {
 /// dag.jobs(3);
 /// let period = Duration::from_millis(2);
 /// let named = SubtaskAttributes::named;
-/// dag.register_periodic_subtask(|| (20u64,), vec!["number"], period, named("source"));
+/// dag.register_periodic_subtask(|| (20u64,), ["number"], period, named("source"));
 /// let sink = |(number,): (u64,)| assert_eq!(number, 20);
-/// dag.register_sink_subtask(sink, vec!["number"], period, named("sink"));
+/// dag.register_sink_subtask(sink, ["number"], period, named("sink"));
 /// finish_create_dags(&[dag.clone()]).unwrap();
 ///
 /// let run = machine.run().unwrap();

@@ -10,12 +10,12 @@
 //! Construction happens on one thread; a `Dag` cannot leave it.
 
 use alloc::rc::Rc;
-use alloc::vec::Vec;
 use core::cell::{RefCell, RefMut};
 use core::time::Duration;
 
 use sched_dag::{ClusterId, DagId, DagKey, OverrunPolicy, SubtaskOrder, TaskSet};
 
+use super::topics::{self, Topics};
 use crate::draft::DagDraft;
 use crate::draft::SubtaskAttributes;
 use crate::run::tuple::{VecToPubs, VecToSubs};
@@ -177,9 +177,9 @@ impl Dag {
     /// dag.name("brakes").demand_proof();
     /// let period = Duration::from_millis(10);
     /// let source = SubtaskAttributes::named("sense").wcet(Duration::from_millis(6));
-    /// dag.register_periodic_subtask(|| (1,), vec!["pedal"], period, source);
+    /// dag.register_periodic_subtask(|| (1,), ["pedal"], period, source);
     /// let sink = SubtaskAttributes::named("brake").wcet(Duration::from_millis(6));
-    /// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["pedal"], period, sink);
+    /// dag.register_sink_subtask(|(_,): (i32,)| (), ["pedal"], period, sink);
     ///
     /// let error = finish_create_dags(&[dag]).unwrap_err();
     /// assert_eq!(error.faults()[0].code(), "not_proven");
@@ -206,7 +206,7 @@ impl Dag {
     ///         count += 1; // a closure may keep state from job to job
     ///         (count,)
     ///     },
-    ///     vec!["count"],
+    ///     ["count"],
     ///     Duration::from_millis(10),
     ///     SubtaskAttributes::named("counter"),
     /// );
@@ -215,14 +215,16 @@ impl Dag {
     pub fn register_periodic_subtask<F, Ret>(
         &self,
         mut f: F,
-        output_topics: Vec<&str>,
+        output_topics: impl Topics,
         period: Duration,
         attributes: SubtaskAttributes,
     ) where
         F: FnMut() -> Ret + Send + 'static,
         Ret: VecToPubs,
     {
-        let source = self.subtask(move |()| f()).writes(&output_topics);
+        let source = self
+            .subtask(move |()| f())
+            .writes(topics::of_outputs::<Ret, _>(&output_topics));
         let subtask = source.register_labelled(attributes);
         self.open().set_period(period, subtask);
     }
@@ -238,8 +240,8 @@ impl Dag {
     ///
     /// create_dag().register_subtask(
     ///     |(left, right): (i32, i32)| (left + right, left * right),
-    ///     vec!["left", "right"],
-    ///     vec!["sum", "product"],
+    ///     ["left", "right"],
+    ///     ["sum", "product"],
     ///     SubtaskAttributes::named("combine"),
     /// );
     /// ```
@@ -251,8 +253,8 @@ impl Dag {
     /// # use fass::{SubtaskAttributes, create_dag};
     /// create_dag().register_subtask(
     ///     |left: i32, right: i32| (left + right,), // should be `|(left, right): (i32, i32)|`
-    ///     vec!["left", "right"],
-    ///     vec!["sum"],
+    ///     ["left", "right"],
+    ///     ["sum"],
     ///     SubtaskAttributes::named("combine"),
     /// );
     /// ```
@@ -260,8 +262,8 @@ impl Dag {
     pub fn register_subtask<F, Args, Ret>(
         &self,
         f: F,
-        input_topics: Vec<&str>,
-        output_topics: Vec<&str>,
+        input_topics: impl Topics,
+        output_topics: impl Topics,
         attributes: SubtaskAttributes,
     ) where
         F: FnMut(Args) -> Ret + Send + 'static,
@@ -269,8 +271,8 @@ impl Dag {
         Ret: VecToPubs,
     {
         self.subtask(f)
-            .reads(&input_topics)
-            .writes(&output_topics)
+            .reads(topics::of_inputs::<Args, _>(&input_topics))
+            .writes(topics::of_outputs::<Ret, _>(&output_topics))
             .register(attributes);
     }
 
@@ -287,7 +289,7 @@ impl Dag {
     ///
     /// create_dag().register_sink_subtask(
     ///     |(sum,): (i32,)| println!("{sum}"),
-    ///     vec!["sum"],
+    ///     ["sum"],
     ///     Duration::from_millis(10),
     ///     SubtaskAttributes::named("print"),
     /// );
@@ -296,7 +298,7 @@ impl Dag {
     pub fn register_sink_subtask<F, Args>(
         &self,
         f: F,
-        input_topics: Vec<&str>,
+        input_topics: impl Topics,
         relative_deadline: Duration,
         attributes: SubtaskAttributes,
     ) where
@@ -304,7 +306,7 @@ impl Dag {
         Args: VecToSubs,
     {
         self.subtask(f)
-            .reads(&input_topics)
+            .reads(topics::of_inputs::<Args, _>(&input_topics))
             .due(relative_deadline)
             .register(attributes);
     }
@@ -360,7 +362,7 @@ impl Dag {
 /// let dag = create_dag();
 /// dag.jobs(2).relative_deadline(Duration::from_millis(5));
 /// let tick = SubtaskAttributes::named("tick");
-/// dag.register_periodic_subtask(|| (), vec![], Duration::from_millis(5), tick);
+/// dag.register_periodic_subtask(|| (), [], Duration::from_millis(5), tick);
 /// finish_create_dags(&[dag.clone()]).unwrap();
 /// assert_eq!(machine.run().dag(&dag).statistics().completed, 2);
 /// ```

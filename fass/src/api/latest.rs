@@ -52,7 +52,7 @@ use crate::run::message::Message;
 ///     x += 1;
 ///     (x,)
 /// };
-/// localizer.register_periodic_subtask(step, vec!["pose"], fast, named("localize"));
+/// localizer.register_periodic_subtask(step, ["pose"], fast, named("localize"));
 /// let pose = localizer.latest::<u64>("pose");
 ///
 /// let planner = create_dag();

@@ -52,7 +52,7 @@ pub struct SwitchUse {
 ///
 /// let camera = create_dag();
 /// camera.name("camera").jobs(10).relative_deadline(ms(10));
-/// camera.register_periodic_subtask(|| (), vec![], ms(10), named("look"));
+/// camera.register_periodic_subtask(|| (), [], ms(10), named("look"));
 ///
 /// let motion = create_dag(); // every 50 ms
 /// motion.name("motion").jobs(2).relative_deadline(ms(50));
@@ -125,7 +125,7 @@ pub struct ShutdownUse(());
 ///     (distance,)
 /// };
 /// let named = SubtaskAttributes::named;
-/// drive.register_periodic_subtask(step, vec!["distance"], period, named("step"));
+/// drive.register_periodic_subtask(step, ["distance"], period, named("step"));
 /// drive
 ///     .using(shutting_down())
 ///     .subtask(|mut shutdown: Shutdown<'_>, (distance,): (i32,)| {

@@ -24,5 +24,6 @@ pub(crate) mod replaceable;
 pub(crate) mod signal;
 pub(crate) mod state;
 pub(crate) mod subtask;
+pub(crate) mod topics;
 pub(crate) mod uses;
 pub(crate) mod wire;

@@ -47,7 +47,7 @@ use super::uses::{Uses, sealed};
 ///     .register(SubtaskAttributes::named("measure"));
 /// dag.register_sink_subtask(
 ///     |(gain,): (f64,)| assert!((0.0..=2.0).contains(&gain)),
-///     vec!["gain"],
+///     ["gain"],
 ///     period,
 ///     SubtaskAttributes::named("control"),
 /// );

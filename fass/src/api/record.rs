@@ -59,10 +59,10 @@ impl Dag {
     ///         (input,)
     ///     };
     ///     let named = SubtaskAttributes::named;
-    ///     dag.register_periodic_subtask(source, vec!["count"], period, named("count"));
+    ///     dag.register_periodic_subtask(source, ["count"], period, named("count"));
     ///     let square = |(count,): (u32,)| (u64::from(count) * u64::from(count),);
-    ///     dag.register_subtask(square, vec!["count"], vec!["square"], named("square"));
-    ///     dag.register_sink_subtask(|_: (u64,)| (), vec!["square"], period, named("sink"));
+    ///     dag.register_subtask(square, ["count"], ["square"], named("square"));
+    ///     dag.register_sink_subtask(|_: (u64,)| (), ["square"], period, named("sink"));
     ///     finish_create_dags(&[dag]).unwrap();
     /// }
     ///

@@ -53,7 +53,7 @@ impl Dag {
     ///
     /// let mut steps = 0_u32..;
     /// let wheel = SubtaskAttributes::named("wheel");
-    /// dag.register_periodic_subtask(move || (steps.next().unwrap(),), vec!["step"], period, wheel);
+    /// dag.register_periodic_subtask(move || (steps.next().unwrap(),), ["step"], period, wheel);
     /// dag.using(distance.update())
     ///     .restarting(|| {
     ///         |distance: &mut u32, (step,): (u32,)| {
@@ -68,7 +68,7 @@ impl Dag {
     /// let sums = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
     /// let log = sums.clone();
     /// let show = move |(sum,): (u32,)| log.lock().unwrap().push(sum);
-    /// dag.register_sink_subtask(show, vec!["sum"], period, SubtaskAttributes::named("show"));
+    /// dag.register_sink_subtask(show, ["sum"], period, SubtaskAttributes::named("show"));
     /// finish_create_dags(&[dag]).unwrap();
     ///
     /// let report = machine.run();

@@ -49,7 +49,7 @@ use crate::run::effect::{GO, RequestKind, Wish};
 ///
 /// let vision = create_dag();
 /// vision.name("vision").jobs(20);
-/// vision.register_periodic_subtask(|| (1,), vec!["frame"], period, named("camera"));
+/// vision.register_periodic_subtask(|| (1,), ["frame"], period, named("camera"));
 /// vision
 ///     .using(obstacle.raising())
 ///     .subtask(|mut obstacle: Raiser<'_>, (frame,): (i32,)| {
@@ -192,7 +192,7 @@ impl Dag {
     /// steering.name("steering").jobs(10).relative_deadline(ms(10)).on_fault(&stop);
     /// let mut angles = vec![1, 2, 3].into_iter();
     /// let steer = move || _ = angles.next().unwrap(); // panics in job 3
-    /// steering.register_periodic_subtask(steer, vec![], ms(10), SubtaskAttributes::named("steer"));
+    /// steering.register_periodic_subtask(steer, [], ms(10), SubtaskAttributes::named("steer"));
     ///
     /// finish_create_dags(&[brakes, steering]).unwrap();
     /// let report = machine.run();

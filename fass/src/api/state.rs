@@ -75,7 +75,7 @@ impl<T: Send + Sync + 'static> StateValue for T {}
 /// let period = Duration::from_millis(10);
 /// let distance = dag.state("distance", 0_u32);
 ///
-/// dag.register_periodic_subtask(|| (5_u32,), vec!["step"], period, SubtaskAttributes::named("wheel"));
+/// dag.register_periodic_subtask(|| (5_u32,), ["step"], period, SubtaskAttributes::named("wheel"));
 /// dag.using(distance.update())
 ///     .subtask(|distance: &mut u32, (step,): (u32,)| {
 ///         *distance += step;
@@ -170,7 +170,7 @@ impl<T: StateValue> State<T> {
     ///     let distance = dag.state("distance", 0_u64);
     ///     distance.record();
     ///     let wheel = SubtaskAttributes::named("wheel");
-    ///     dag.register_periodic_subtask(|| (5_u32,), vec!["step"], period, wheel);
+    ///     dag.register_periodic_subtask(|| (5_u32,), ["step"], period, wheel);
     ///     let add = |distance: &mut u64, (step,): (u32,)| {
     ///         *distance += u64::from(step);
     ///         (*distance,)

@@ -67,8 +67,8 @@ use crate::run::latest::Staleness;
 /// # let machine = virtual_time::VirtualTime::new();
 /// let dag = create_dag();
 /// let period = Duration::from_millis(10);
-/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
-/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::named("sink"));
+/// dag.register_periodic_subtask(|| (1,), ["number"], period, SubtaskAttributes::named("source"));
+/// dag.register_sink_subtask(|(_,): (i32,)| (), ["number"], period, SubtaskAttributes::named("sink"));
 ///
 /// let commit = finish_create_dags(&[dag]).unwrap();
 /// for warning in commit.warnings() {
@@ -93,9 +93,9 @@ impl Commit {
     /// # let machine = virtual_time::VirtualTime::new();
     /// # let dag = create_dag();
     /// # let period = Duration::from_millis(10);
-    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
+    /// # dag.register_sink_subtask(|(_,): (i32,)| (), ["number"], period, SubtaskAttributes::default());
     /// let unmeasured = SubtaskAttributes::named("source").wcet(Duration::ZERO);
-    /// dag.register_periodic_subtask(|| (1,), vec!["number"], period, unmeasured);
+    /// dag.register_periodic_subtask(|| (1,), ["number"], period, unmeasured);
     /// let commit = finish_create_dags(&[dag]).unwrap();
     /// assert_eq!(commit.warnings()[0].code(), "zero_wcet");
     /// ```
@@ -119,8 +119,8 @@ impl Commit {
     /// # let machine = virtual_time::VirtualTime::new();
     /// # let dag = create_dag();
     /// # let period = Duration::from_millis(10);
-    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
-    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
+    /// # dag.register_sink_subtask(|(_,): (i32,)| (), ["number"], period, SubtaskAttributes::default());
+    /// # dag.register_periodic_subtask(|| (1,), ["number"], period, SubtaskAttributes::named("source"));
     /// let commit = finish_create_dags(&[dag]).unwrap();
     /// for answer in commit.answers() {
     ///     println!("{answer}");
@@ -153,8 +153,8 @@ impl Commit {
     /// # let dag = create_dag();
     /// # let period = Duration::from_millis(10);
     /// # let taking = |name, ms| SubtaskAttributes::named(name).wcet(Duration::from_millis(ms));
-    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, taking("sink", 3));
-    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, taking("source", 2));
+    /// # dag.register_sink_subtask(|(_,): (i32,)| (), ["number"], period, taking("sink", 3));
+    /// # dag.register_periodic_subtask(|| (1,), ["number"], period, taking("source", 2));
     /// let commit = finish_create_dags(&[dag]).unwrap();
     /// assert!(commit.witnesses().contains("bound 0 5000000 "));
     /// ```
@@ -183,8 +183,8 @@ impl Commit {
     /// # let machine = virtual_time::VirtualTime::new();
     /// # let (dag, period) = (create_dag(), Duration::from_millis(10));
     /// # dag.name("vision");
-    /// # dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::default());
-    /// # dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
+    /// # dag.register_sink_subtask(|(_,): (i32,)| (), ["number"], period, SubtaskAttributes::default());
+    /// # dag.register_periodic_subtask(|| (1,), ["number"], period, SubtaskAttributes::named("source"));
     /// let commit = finish_create_dags(&[dag]).unwrap(); // without WCETs
     /// assert_eq!(commit.first_unproven().unwrap().dag.name, "vision");
     /// ```
@@ -209,7 +209,7 @@ impl Commit {
 /// let taking = |name, time| SubtaskAttributes::named(name).wcet(ms(time));
 /// let camera = create_dag();
 /// camera.name("camera").jobs(100).relative_deadline(ms(30));
-/// camera.register_periodic_subtask(|| (1,), vec!["image"], ms(30), taking("expose", 5));
+/// camera.register_periodic_subtask(|| (1,), ["image"], ms(30), taking("expose", 5));
 /// let image = camera.latest::<i32>("image");
 /// let motor = create_dag();
 /// motor.name("motor").jobs(300).relative_deadline(ms(10));
@@ -320,8 +320,8 @@ impl Commit {
 /// let period = Duration::from_millis(10);
 /// let taking = |name, ms| SubtaskAttributes::named(name).wcet(Duration::from_millis(ms));
 /// dag.name("demo");
-/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, taking("source", 2));
-/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, taking("sink", 3));
+/// dag.register_periodic_subtask(|| (1,), ["number"], period, taking("source", 2));
+/// dag.register_sink_subtask(|(_,): (i32,)| (), ["number"], period, taking("sink", 3));
 ///
 /// let commit = finish_create_dags(&[dag]).unwrap();
 /// let answer = &commit.answers()[0];
@@ -379,9 +379,9 @@ pub struct ClusterPlacement {
 /// let taking = |name, time| SubtaskAttributes::named(name).wcet(ms(time));
 /// let dag = create_dag();
 /// dag.name("arm");
-/// dag.register_periodic_subtask(|| (1, 2), vec!["angle", "record"], ms(20), taking("plan", 1));
-/// dag.register_sink_subtask(|_: (i32,)| (), vec!["angle"], ms(4), taking("act", 2));
-/// dag.register_sink_subtask(|_: (i32,)| (), vec!["record"], ms(20), taking("log", 9));
+/// dag.register_periodic_subtask(|| (1, 2), ["angle", "record"], ms(20), taking("plan", 1));
+/// dag.register_sink_subtask(|_: (i32,)| (), ["angle"], ms(4), taking("act", 2));
+/// dag.register_sink_subtask(|_: (i32,)| (), ["record"], ms(20), taking("log", 9));
 ///
 /// let commit = finish_create_dags_with(&[dag], ConstructionPolicy::any_graph()).unwrap();
 /// let [act, log] = &commit.answers()[0].sinks[..] else { panic!("it has two") };

@@ -62,13 +62,13 @@ use tie::tie;
 /// dag.name("demo");
 /// dag.register_periodic_subtask(
 ///     || (1_i32,),
-///     vec!["number"],
+///     ["number"],
 ///     Duration::from_millis(10),
 ///     SubtaskAttributes::named("source"),
 /// );
 /// dag.register_sink_subtask(
 ///     |(number,): (u64,)| println!("{number}"), // not the type that is written
-///     vec!["number"],
+///     ["number"],
 ///     Duration::from_millis(10),
 ///     SubtaskAttributes::named("sink"),
 /// );

@@ -36,7 +36,7 @@ worded! {
     /// );
     /// dag.register_sink_subtask(
     ///     |(_,): (i32,)| (),
-    ///     vec!["numbers"],
+    ///     ["numbers"],
     ///     Duration::from_millis(10),
     ///     SubtaskAttributes::named("sink"),
     /// );
@@ -150,8 +150,8 @@ fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
 /// # let machine = virtual_time::VirtualTime::new();
 /// let dag = create_dag();
 /// let period = Duration::from_millis(10);
-/// dag.register_periodic_subtask(|| (1,), vec!["number"], period, SubtaskAttributes::named("source"));
-/// dag.register_sink_subtask(|(_,): (i32,)| (), vec!["number"], period, SubtaskAttributes::named("sink"));
+/// dag.register_periodic_subtask(|| (1,), ["number"], period, SubtaskAttributes::named("source"));
+/// dag.register_sink_subtask(|(_,): (i32,)| (), ["number"], period, SubtaskAttributes::named("sink"));
 ///
 /// let commit = finish_create_dags(&[dag]).unwrap();
 /// let Verdict::NotProven(unproven) = &commit.answers()[0].verdict else {

@@ -103,13 +103,13 @@ impl<T: Send + 'static> Message for Unique<T> {
 /// dag.jobs(2);
 /// dag.register_periodic_subtask(
 ///     || (Unique::new(Frame([7; 4096])),),
-///     vec!["frame"],
+///     ["frame"],
 ///     Duration::from_millis(10),
 ///     SubtaskAttributes::named("camera"),
 /// );
 /// dag.register_sink_subtask(
 ///     |(frame,): (Unique<Frame>,)| assert_eq!(frame.into_inner().0[0], 7),
-///     vec!["frame"],
+///     ["frame"],
 ///     Duration::from_millis(10),
 ///     SubtaskAttributes::named("store"),
 /// );

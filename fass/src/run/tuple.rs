@@ -150,6 +150,9 @@ pub trait MulSend {
     note = "every message must be `Clone + Send + 'static`, or a `fass::Unique`"
 )]
 pub trait VecToSubs: Sized + Send + 'static {
+    /// The number of elements, which is that of the input topics.
+    const ARITY: usize;
+
     /// The subscribers, one for each element.
     type Subs: MulRecv<Items = Self> + Send + Sync + 'static;
 
@@ -193,7 +196,7 @@ pub trait VecToSubs: Sized + Send + 'static {
 ///
 /// create_dag().register_periodic_subtask(
 ///     || 7, // should be `(7,)`
-///     vec!["number"],
+///     ["number"],
 ///     Duration::from_millis(10),
 ///     SubtaskAttributes::default(),
 /// );
@@ -205,6 +208,9 @@ pub trait VecToSubs: Sized + Send + 'static {
     note = "every message must be `Clone + Send + 'static`, or a `fass::Unique`"
 )]
 pub trait VecToPubs: Sized + Send + 'static {
+    /// The number of elements, which is that of the output topics.
+    const ARITY: usize;
+
     /// The publishers, one for each element.
     type Pubs: MulSend<Items = Self> + Send + Sync + 'static;
 
@@ -268,6 +274,12 @@ impl<T, F: FnMut() -> Poll<T> + Unpin> Future for AtTheGate<F> {
     }
 }
 
+/// Counts names.
+macro_rules! arity {
+    () => { 0 };
+    ($first:ident $($rest:ident)*) => { 1 + arity!($($rest)*) };
+}
+
 /// Implements the four traits for one arity.
 macro_rules! implement_arity {
     ($(($Item:ident $item:ident $end:ident))*) => {
@@ -324,6 +336,8 @@ macro_rules! implement_arity {
             impl<$($Item: Message),*> VecToSubs for ($($Item,)*) {
                 type Subs = Subscribers<($(Subscriber<$Item>,)*)>;
 
+                const ARITY: usize = arity!($($Item)*);
+
                 fn input_types() -> Vec<MessageType> {
                     Vec::from([$(MessageType::of::<$Item>()),*])
                 }
@@ -338,6 +352,8 @@ macro_rules! implement_arity {
 
             impl<$($Item: Message),*> VecToPubs for ($($Item,)*) {
                 type Pubs = Publishers<($(Publisher<$Item>,)*)>;
+
+                const ARITY: usize = arity!($($Item)*);
 
                 fn output_types() -> Vec<MessageType> {
                     Vec::from([$(MessageType::of::<$Item>()),*])

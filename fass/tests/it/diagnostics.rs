@@ -40,6 +40,24 @@ const CASES: &[Case] = &[
             "with one output topic that is `(i32,)`, comma included",
         ],
     ),
+    // as many topics as the tuple does not have
+    (
+        "fn main() { create_dag().register_periodic_subtask(|| (1, 2), [\"a\"], period(), named(\"f\")); }",
+        &["name one output topic for each element of the function's result"],
+    ),
+    (
+        "fn main() { create_dag().register_sink_subtask(|(_,): (i32,)| (), [\"a\", \"b\"], period(), named(\"f\")); }",
+        &["name one input topic for each element of the function's argument"],
+    ),
+    // a topic that is no list
+    (
+        "fn main() { create_dag().register_periodic_subtask(|| (1,), \"a\", period(), named(\"f\")); }",
+        &[
+            "`&str` is no list of topics",
+            "should be an array of names",
+            "a `Vec` of them is a list, too",
+        ],
+    ),
     // a message that cannot be cloned
     (
         "fn main() { create_dag().register_periodic_subtask(|| (NotClone,), vec![\"a\"], period(), named(\"f\")); }",
@@ -198,13 +216,14 @@ fn usable_library(directory: &Path) -> Option<PathBuf> {
     newest_first.find(|library| compile(faultless, library, directory).0)
 }
 
-/// Checks a program, and returns whether it compiles and what the compiler says.
+/// Compiles a program, up to what is checked for each use of a generic function, and returns
+/// whether that succeeds and what the compiler says.
 fn compile(code: &str, library: &Path, directory: &Path) -> (bool, String) {
     let source = directory.join("main.rs");
     fs::write(&source, format!("{PRELUDE}{code}\n")).expect("the directory is ours");
     let dependencies = library.parent().unwrap_or(Path::new("."));
     let output = Command::new(env::var_os("RUSTC").unwrap_or("rustc".into()))
-        .args(["--edition=2024", "--emit=metadata", "--color=never"])
+        .args(["--edition=2024", "--emit=obj", "--color=never"])
         .arg("--out-dir")
         .arg(directory)
         .arg("-L")

@@ -80,14 +80,14 @@ fn chain(subtasks: u32, jobs: u32, ends: &Arc<Mutex<Vec<Instant>>>) -> Dag {
         (1u64,)
     };
     let sink = subtasks - 1;
-    dag.register_periodic_subtask(source, vec!["t0"], period, named(0));
+    dag.register_periodic_subtask(source, ["t0"], period, named(0));
     for number in 1..sink {
         let (input, output) = (topic(number - 1), topic(number));
         let body = |(value,): (u64,)| (value + 1,);
-        dag.register_subtask(body, vec![&input], vec![&output], named(number));
+        dag.register_subtask(body, [input.as_str()], [output.as_str()], named(number));
     }
     let input = topic(sink - 1);
     let last = move |_: (u64,)| finish();
-    dag.register_sink_subtask(last, vec![&input], period, named(sink));
+    dag.register_sink_subtask(last, [input.as_str()], period, named(sink));
     dag
 }

@@ -43,15 +43,10 @@ pub(crate) fn run() -> Result<String, CommitError> {
         work(1);
         assert_eq!(edges * 10, colours, "both are of one frame");
     };
-    dag.register_periodic_subtask(camera, vec!["frame"], ms(25), taking("camera", 3));
-    dag.register_subtask(edges, vec!["frame"], vec!["edges"], taking("edges", 9));
-    dag.register_subtask(
-        colours,
-        vec!["frame"],
-        vec!["colours"],
-        taking("colours", 9),
-    );
-    dag.register_sink_subtask(fuse, vec!["edges", "colours"], ms(25), taking("fuse", 2));
+    dag.register_periodic_subtask(camera, ["frame"], ms(25), taking("camera", 3));
+    dag.register_subtask(edges, ["frame"], ["edges"], taking("edges", 9));
+    dag.register_subtask(colours, ["frame"], ["colours"], taking("colours", 9));
+    dag.register_sink_subtask(fuse, ["edges", "colours"], ms(25), taking("fuse", 2));
     let commit = fass::finish_create_dags(&[dag])?;
 
     let mut text = format!("{}\n", commit.answer("vision"));

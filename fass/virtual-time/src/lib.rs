@@ -81,13 +81,13 @@ pub use settings::Silent;
 ///         execute_for(Duration::from_millis(2), Occupation::Spin);
 ///         (1,)
 ///     },
-///     vec!["number"],
+///     ["number"],
 ///     period,
 ///     SubtaskAttributes::named("source"),
 /// );
 /// dag.register_sink_subtask(
 ///     |(_,): (i32,)| execute_for(Duration::from_millis(3), Occupation::Spin),
-///     vec!["number"],
+///     ["number"],
 ///     period,
 ///     SubtaskAttributes::named("sink"),
 /// );

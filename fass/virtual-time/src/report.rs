@@ -236,7 +236,7 @@ impl Report {
     /// let (dag, ms) = (create_dag(), Duration::from_millis);
     /// dag.name("clock").jobs(2).relative_deadline(ms(5));
     /// let tick = SubtaskAttributes::named("tick").wcet(ms(1));
-    /// dag.register_periodic_subtask(|| (), vec![], ms(10), tick);
+    /// dag.register_periodic_subtask(|| (), [], ms(10), tick);
     /// finish_create_dags(&[dag]).unwrap();
     ///
     /// let report = machine.run();

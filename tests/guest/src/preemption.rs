@@ -11,7 +11,6 @@
 use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
@@ -108,14 +107,14 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, work: &Arc<Work>) -> Dag {
         job += 1;
         (job,)
     };
-    dag.register_periodic_subtask(count, vec![&start], period, attributes("source"));
+    dag.register_periodic_subtask(count, [start.as_str()], period, attributes("source"));
     for part in &parts {
         let work = work.clone();
         let pass = move |(job,): (u64,)| {
             work.compute();
             (job,)
         };
-        dag.register_subtask(pass, vec![&start], vec![part], computing(part));
+        dag.register_subtask(pass, [start.as_str()], [part.as_str()], computing(part));
     }
     let work = work.clone();
     let join = move |(a, b, c): (u64, u64, u64)| {

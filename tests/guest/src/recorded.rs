@@ -86,14 +86,19 @@ pub(crate) fn long(machine: &Machine) -> Result<(), AppError> {
         ([job; 256],)
     };
     let attributes = |link: usize| SubtaskAttributes::named(&link.to_string());
-    dag.register_periodic_subtask(first, vec![&topics[0]], PERIOD, attributes(0));
+    dag.register_periodic_subtask(first, [topics[0].as_str()], PERIOD, attributes(0));
     for link in 1..LINKS {
         let pass = |(block,): (Block,)| (block.map(|word| word + 1),);
         let (from, to) = (&topics[link - 1], &topics[link]);
-        dag.register_subtask(pass, vec![from], vec![to], attributes(link));
+        dag.register_subtask(pass, [from.as_str()], [to.as_str()], attributes(link));
     }
     let last = |_: (Block,)| execute_for(2 * PERIOD, Occupation::Hold);
-    dag.register_sink_subtask(last, vec![&topics[LINKS - 1]], PERIOD, attributes(LINKS));
+    dag.register_sink_subtask(
+        last,
+        [topics[LINKS - 1].as_str()],
+        PERIOD,
+        attributes(LINKS),
+    );
     finish_create_dags(&[dag])?;
     let run = machine.run()?;
     match run.allocations() {

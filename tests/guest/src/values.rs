@@ -6,7 +6,6 @@
 
 use alloc::format;
 use alloc::string::String;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
@@ -80,11 +79,16 @@ fn build(jobs: u64) -> (Dag, Stamps) {
     let named = |number| SubtaskAttributes::named(&format!("s{number}"));
     let mut pen = stamps.pen(jobs);
     let source = move || (stamped([7; 8], &mut pen),);
-    dag.register_periodic_subtask(source, vec![&topics[0]], period, named(0));
+    dag.register_periodic_subtask(source, [topics[0].as_str()], period, named(0));
     for (number, ends) in (1..).zip(topics.windows(2)) {
         let mut pen = stamps.pen(jobs);
         let between = move |(value,): (Value,)| (stamped(value, &mut pen),);
-        dag.register_subtask(between, vec![&ends[0]], vec![&ends[1]], named(number));
+        dag.register_subtask(
+            between,
+            [ends[0].as_str()],
+            [ends[1].as_str()],
+            named(number),
+        );
         if is_recorded(number) {
             dag.record::<Value>(&ends[1]);
         }
@@ -93,7 +97,7 @@ fn build(jobs: u64) -> (Dag, Stamps) {
     let sink = move |(value,): (Value,)| {
         stamped(value, &mut pen);
     };
-    let last = vec![&*topics[SUBTASKS - 2]];
+    let last = [topics[SUBTASKS - 2].as_str()];
     dag.register_sink_subtask(sink, last, period, named(SUBTASKS - 1));
     (dag, stamps)
 }

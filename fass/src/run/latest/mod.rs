@@ -250,7 +250,7 @@ mod tests;
 /// let taking = |name, ms| SubtaskAttributes::named(name).wcet(Duration::from_millis(ms));
 /// let writer = create_dag();
 /// writer.name("writer").jobs(3).relative_deadline(period);
-/// writer.register_periodic_subtask(|| (1,), vec!["pose"], period, taking("localize", 2));
+/// writer.register_periodic_subtask(|| (1,), ["pose"], period, taking("localize", 2));
 /// let pose = writer.latest::<i32>("pose");
 /// let reader = create_dag();
 /// reader.name("reader").jobs(3).relative_deadline(period);

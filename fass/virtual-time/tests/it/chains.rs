@@ -55,7 +55,12 @@ fn draw(
         keep.add(origin);
         (origin,)
     };
-    dag.register_subtask(pass, vec![&into], vec![&out_of], taking("leave", wcet));
+    dag.register_subtask(
+        pass,
+        [into.as_str()],
+        [out_of.as_str()],
+        taking("leave", wcet),
+    );
     let latest = dag.latest(&out_of);
     (dag, latest)
 }

@@ -7,9 +7,6 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-extern crate alloc;
-
-use alloc::vec;
 use core::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
@@ -33,10 +30,10 @@ pub fn build(jobs: u64) -> Dag {
         }
         (distance,)
     };
-    dag.register_periodic_subtask(sense, vec!["distance"], PERIOD, taking("sense", 1));
-    dag.register_subtask(brake, vec!["distance"], vec!["force"], taking("brake", 3));
-    dag.register_subtask(steer, vec!["distance"], vec!["angle"], taking("steer", 4));
-    dag.register_sink_subtask(act, vec!["force", "angle"], PERIOD, taking("act", 1));
+    dag.register_periodic_subtask(sense, ["distance"], PERIOD, taking("sense", 1));
+    dag.register_subtask(brake, ["distance"], ["force"], taking("brake", 3));
+    dag.register_subtask(steer, ["distance"], ["angle"], taking("steer", 4));
+    dag.register_sink_subtask(act, ["force", "angle"], PERIOD, taking("act", 1));
     dag
 }
 

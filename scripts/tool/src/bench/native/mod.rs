@@ -464,7 +464,12 @@ fn commit_typed(graph: Graph, jobs: u64, mut tick: impl FnMut() + Send + 'static
     for number in 1..sink {
         let input = &topics[if is_chain { number - 1 } else { 0 }];
         let body = |(value,): (u64,)| (value,);
-        dag.register_subtask(body, vec![input], vec![&topics[number]], named(number));
+        dag.register_subtask(
+            body,
+            [input.as_str()],
+            [topics[number].as_str()],
+            named(number),
+        );
     }
     let last = if is_chain { sink - 1 } else { 1 };
     let inputs: Vec<&str> = topics[last..].iter().map(String::as_str).collect();
