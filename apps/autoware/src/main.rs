@@ -96,6 +96,7 @@ impl Bounds {
     }
 }
 
+#[allow(clippy::too_many_lines, reason = "a report, line by line")]
 fn report(run: &Run, latencies: &Latencies, bounds: Bounds, digest: u64) -> Result<(), AppError> {
     let dags = run.task_set().dags().iter();
     let statistics = dags.map(|dag| run.statistics(dag.name()));

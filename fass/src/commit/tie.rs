@@ -25,6 +25,10 @@ use crate::run::topic::DagWiring;
 static PLANS: AtomicU64 = AtomicU64::new(0);
 
 /// Turns verified DAGs into a plan, and closes their handles.
+#[allow(
+    clippy::too_many_lines,
+    reason = "ties parts that are all in hand only here"
+)]
 pub(crate) fn tie(
     drafts: &Drafts,
     task_set: Arc<TaskSet>,

@@ -56,6 +56,10 @@ pub(crate) trait AnyRecorded: AnyLatest {
     /// Numbers all recorded topics of a DAG, what its subtasks sample of such topics, and its
     /// recorded states, tells the platform, and adds their lines to those before. Returns what is
     /// put around subtasks for that.
+    #[allow(
+        clippy::too_many_lines,
+        reason = "gives numbers in one order, which a reader has to see whole"
+    )]
     fn open_all(&self, of: &OfDag<'_>, lines: &mut Vec<LineOf>) -> Vec<(usize, Around)> {
         let (dag, spec) = (of.dag, of.spec);
         if !(self.edge().crosses)() {

@@ -137,6 +137,7 @@ const FOREIGN: [(&str, &str); 12] = [
 
 /// Takes the words, and makes the machine that they describe. Returns what they say besides, and
 /// the app's file.
+#[allow(clippy::too_many_lines, reason = "one word after the other")]
 pub(crate) fn apply(
     app: &'static str,
     options: &CommandLine<'static>,

@@ -61,6 +61,10 @@ pub(super) fn beat(now_ns: u64) {
     }
 }
 
+#[allow(
+    clippy::too_many_lines,
+    reason = "the order in which a report is safe, whatever has failed"
+)]
 fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option<&Registers>) -> ! {
     interrupt_flag::disable();
     let core = this_core::is_ready().then(this_core::get);

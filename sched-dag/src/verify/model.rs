@@ -73,6 +73,7 @@ fn has_priorities(spec: &DagSpec) -> bool {
 }
 
 #[inline(never)]
+#[allow(clippy::too_many_lines, reason = "fills one structure, field by field")]
 fn build_dag(spec: &DagSpec, shape: PrecedenceGraph, priority_base: u32) -> Dag {
     let PrecedenceGraph {
         mut graph,

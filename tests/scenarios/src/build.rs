@@ -136,6 +136,7 @@ struct Building<'a> {
 }
 
 impl Building<'_> {
+    #[allow(clippy::too_many_lines, reason = "one arm for each use")]
     fn register<I: Inputs, O: Outputs>(&mut self, subtask: &SubtaskText, writes: bool) {
         let step = Step::new(self.text, subtask, self.calls);
         let inputs: Vec<&str> = subtask.after.iter().map(String::as_str).collect();

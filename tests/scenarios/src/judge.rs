@@ -49,6 +49,7 @@ impl Scenario {
     /// Holds what each DAG's counters say against each other, against the record, and against what
     /// functions have counted themselves, of a scenario without signals, modes and an asked end.
     /// Returns what does not hold, a line each.
+    #[allow(clippy::too_many_lines, reason = "a list of claims")]
     pub fn judge_accounts<'a>(
         &self,
         task_set: &TaskSet,

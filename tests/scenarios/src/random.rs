@@ -86,6 +86,10 @@ impl Scenario {
 }
 
 impl Round {
+    #[allow(
+        clippy::too_many_lines,
+        reason = "draws in an order on which each seed's round depends"
+    )]
     fn dag(&self, number: u64, size: u64, random: &mut Random) -> DagText {
         let urgency = random.index(PERIODS_MS.len());
         let period_ns = PERIODS_MS[urgency] * 1_000_000;

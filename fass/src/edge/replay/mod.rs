@@ -151,6 +151,7 @@ impl Replay {
     /// # Errors
     ///
     /// It is no whole and unaltered one, or there is no memory for the places of its values.
+    #[allow(clippy::too_many_lines, reason = "one arm for each kind of entry")]
     pub fn read(bytes: impl Into<Cow<'static, [u8]>>) -> Result<Self, Malformed> {
         let bytes = bytes.into();
         let recording = Recording::read(&bytes)?;

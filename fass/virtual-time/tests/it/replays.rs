@@ -87,6 +87,7 @@ fn build(seed: u64, salt: u64) -> Set {
 }
 
 /// Registers a subtask that does something at random, and remembers something, which is recorded.
+#[allow(clippy::too_many_lines, reason = "one arm for each use")]
 fn register(set: &Set, number: usize, inputs: [&str; 2], output: &str, random: &mut Random) {
     let (dag, names) = (&set.dags[number], [inputs[0], output]);
     dag.record::<u64>(output);
@@ -203,6 +204,10 @@ fn run(machine: &VirtualTime, set: &Set, raises: &[(usize, Duration)]) -> (Repor
 type Said = (&'static str, (u16, u16, u64), Vec<u8>);
 
 /// Runs a case, and returns how much of what there was.
+#[allow(
+    clippy::too_many_lines,
+    reason = "one case, from its set to the comparison"
+)]
 fn case(seed: u64) -> [usize; 6] {
     let mut later = 0;
     let mut random = Random::new(!seed);

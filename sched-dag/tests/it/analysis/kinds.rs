@@ -25,6 +25,10 @@ use crate::support::{Script, number};
 const WHOLE: u64 = 110;
 
 #[test]
+#[allow(
+    clippy::too_many_lines,
+    reason = "one walk over the seeds, with all that is counted on it"
+)]
 fn accepted_sets_keep_their_bounds() {
     let first = number("ANALYSIS_SEED", 1);
     let wanted = number("ANALYSIS_SETS", 0);

@@ -190,6 +190,10 @@ impl Prepared {
 /// # Errors
 ///
 /// In lines for people: the faults of the options or of the file.
+#[allow(
+    clippy::too_many_lines,
+    reason = "one option after the other, each with a refusal of its own"
+)]
 pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     // Without a file, an option that is about one is a mistake.
     let Some(path) = options.path("dag") else {
