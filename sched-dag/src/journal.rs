@@ -152,7 +152,7 @@ enum EventTarget {
 /// Makes the vocabulary of its table: to add an event is to add a row.
 macro_rules! events {
     ($($(#[$doc:meta])+ $name:ident = $word:literal, $object:ident;)+) => {
-        /// What has happened. Printed, and read, as its name in lower case.
+        /// The kind of an event. Printed, and read, as its name in lower case.
         ///
         /// ```
         /// use sched_dag::journal::EventKind;

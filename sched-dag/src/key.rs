@@ -1,10 +1,10 @@
-//! What a DAG or a subtask is asked for by after the commit: its name, its number, or a handle.
+//! Keys by which DAGs and subtasks are looked up after the commit: a name, a number, or a handle.
 
 use crate::ids::{DagId, SubtaskId};
 use crate::nearest::nearest_of;
 use crate::task_set::{Dag, Subtask, TaskSet};
 
-/// What names a DAG of a task set: a name, a [`DagId`], or a handle of the crate that built it.
+/// A key of a DAG of a task set: a name, a [`DagId`], or a handle of the crate that built it.
 ///
 /// ```
 /// use sched_dag::{CommitOptions, DagId, DagSpec, Policy, SubtaskSpec, verify};
@@ -31,7 +31,7 @@ pub trait DagKey {
     fn find_in(&self, task_set: &TaskSet) -> DagId;
 }
 
-/// What names a subtask of a DAG: a name, or a [`SubtaskId`].
+/// A key of a subtask of a DAG: a name, or a [`SubtaskId`].
 ///
 /// See [`DagKey`].
 pub trait SubtaskKey {

@@ -48,7 +48,7 @@
 //! T apart: the rules S1 to S4 stand in `scheduler/signals.rs`, their scenarios in
 //! `tests/scenarios/sharing.txt`. From its release on its job is a job like others.
 //!
-//! What happens to a release that finds as many jobs in flight as the DAG may
+//! The fate of a release that finds as many jobs in flight as the DAG may
 //! have is the DAG's [`OverrunPolicy`]; its scenarios are in `tests/scenarios/overrun.txt`.
 //!
 //! A DAG can be *ended* before its time, by an instance that [fails](Moment::fail)

@@ -1,4 +1,4 @@
-//! What functions ask of a run as a whole, and how it comes about.
+//! Requests of functions to a run as a whole, and how it comes about.
 //!
 //! A function may ask for more than values: that a sporadic DAG gets a signal, that a DAG rests
 //! or goes on, that another set of DAGs runs (M1 to M7, below), that the run ends. As all that a
@@ -78,7 +78,7 @@ use crate::task_set::TaskSet;
 
 pub use crate::request::{ModeEntry, Request};
 
-/// What a request comes to, in a scheduler.
+/// The change that a request makes in a scheduler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LifecycleChange {
     /// A DAG is paused (P1 to P5).
@@ -285,7 +285,7 @@ impl ModeTable {
     }
 }
 
-/// What an app states of its run's life, and how far that has come.
+/// The lifecycle that an app states for its run, and how far the run has come in it.
 #[derive(Clone, Debug, Default)]
 pub struct LifecyclePlan {
     /// The DAGs of the plan that requests may touch.
@@ -392,7 +392,7 @@ impl Lifecycle for LifecyclePlan {
     }
 }
 
-/// What is on its way to each cluster.
+/// Messages on their way to each cluster.
 #[derive(Debug)]
 pub struct Mailboxes {
     dags: Box<[DagMailbox]>,
@@ -401,7 +401,7 @@ pub struct Mailboxes {
     of_modes: ClusterId,
 }
 
-/// What waits for one DAG's cluster about that DAG.
+/// Messages to one DAG's cluster about that DAG.
 #[derive(Debug)]
 struct DagMailbox {
     cluster: ClusterId,
@@ -412,7 +412,7 @@ struct DagMailbox {
     end: AtomicU32,
 }
 
-/// What waits for a cluster about its whole.
+/// Messages to a cluster about all of its DAGs.
 #[derive(Debug, Default)]
 struct ClusterMailbox {
     /// [`NOTHING`], or a mode and how to enter it, as [`packed`].
@@ -426,7 +426,7 @@ const RESUME: u32 = 2;
 const CLOSE: u32 = 1;
 const STOP: u32 = 2;
 
-/// What serves the requests of each cluster.
+/// The lifecycle of each cluster, which serves its requests.
 pub type Parts = Vec<Option<Box<dyn Lifecycle>>>;
 
 /// Makes room for the letters of a run, and divides what serves its requests among its clusters.

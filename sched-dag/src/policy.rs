@@ -12,7 +12,7 @@ use core::time::Duration;
 
 use crate::worded::texts;
 
-/// What releases the jobs of a DAG.
+/// The source of a DAG's releases: a period, or signals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Activation {
     /// The clock: job k is released at O + kT.
@@ -58,7 +58,7 @@ impl Priority {
     }
 }
 
-/// What happens at a release that finds as many jobs in flight as the DAG may have.
+/// The policy for a release that finds as many jobs in flight as the DAG may have.
 ///
 /// With J jobs in flight allowed, the release of job k is *blocked* while job
 /// k - J, or an older one, is in flight: both would use the same slot of every
@@ -84,7 +84,7 @@ pub enum OverrunPolicy {
     Abort,
 }
 
-/// What a fault of an instance costs.
+/// The cost of a fault of an instance: the DAG, or its job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum OnFault {
     /// The DAG: it is ended.

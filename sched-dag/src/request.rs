@@ -22,8 +22,8 @@ pub enum Request {
     ShutDown,
     /// The run begins. No function asks for that, but a driver, before all else.
     Begin,
-    /// What waits may come about. A driver asks for that in each step until it has, before all
-    /// else.
+    /// Waiting requests may take effect. A driver asks for that in each step until they have,
+    /// before all else.
     GoOn,
     /// Nothing but a step. An engine asks for that, lest a completion take the short way.
     Step,

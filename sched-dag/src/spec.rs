@@ -1,4 +1,4 @@
-//! What an app states about its DAGs, before anything has been verified.
+//! Specifications of DAGs as an app states them, before anything has been verified.
 //!
 //! A spec may be wrong in every way; the verification finds out. Times are in
 //! nanoseconds from the start of scheduling.
@@ -16,7 +16,7 @@ use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
 pub struct DagSpec {
     /// The name that messages use; may be empty, then messages say `dag 0`.
     pub name: String,
-    /// What releases the jobs.
+    /// The source of the releases.
     pub activation: Activation,
     /// The time between two nominal releases, of a sporadic DAG the least time;
     /// `None` if no source states one.
@@ -28,9 +28,9 @@ pub struct DagSpec {
     /// The most jobs that may be in flight; `None`: enough for the deadline,
     /// `ceil(D / T)` jobs and one more.
     pub in_flight: Option<u32>,
-    /// What happens at a release beyond `in_flight`.
+    /// The policy for a release beyond `in_flight`.
     pub overrun: OverrunPolicy,
-    /// What a fault of an instance costs.
+    /// The cost of a fault of an instance.
     pub on_fault: OnFault,
     /// Whether the commit may fix an order of the subtasks.
     pub order: SubtaskOrder,
@@ -43,7 +43,7 @@ pub struct DagSpec {
     /// Precedence edges `(predecessor, successor)` by position in `subtasks`,
     /// besides those that follow from topics.
     pub edges: Vec<(usize, usize)>,
-    /// What subtasks share from job to job.
+    /// The states that subtasks share from job to job.
     pub states: Vec<StateSpec>,
     /// Topics whose latest value subtasks of any DAG read.
     pub latest: Vec<LatestSpec>,

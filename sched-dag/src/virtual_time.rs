@@ -64,7 +64,7 @@ use crate::task_set::TaskSet;
 pub struct VirtualTime<B: SubtaskBody = Instance> {
     clusters: Box<[ClusterRun<B>]>,
     now_ns: u64,
-    /// What fails at the present instant.
+    /// Instances that fail at the present instant.
     failing: Vec<(Instance, CoreId, B)>,
     lifecycle: Option<Box<dyn Lifecycle>>,
     has_begun: bool,
@@ -357,7 +357,7 @@ impl<B: SubtaskBody> fmt::Debug for VirtualTime<B> {
     }
 }
 
-/// What instances do and how long it takes them.
+/// The behaviour of instances, and how long each executes.
 pub trait Workload<B = Instance> {
     /// Returns the execution time of an instance in nanoseconds; 0 is allowed. Called once for
     /// each instance, at its start. `None`: the run is [stopped](RunOutcome::Stopped) at once.
@@ -458,7 +458,7 @@ impl SubtaskBody for Instance {
     fn replace(&mut self) {}
 }
 
-/// What runs by itself.
+/// A cluster: a scheduler with its bodies, which runs by itself.
 struct ClusterRun<B: SubtaskBody> {
     /// Parked is a body, behind the time that its instance has left.
     engine: Engine<B, (u64, B)>,

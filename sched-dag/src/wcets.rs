@@ -35,7 +35,7 @@ pub enum WcetSource {
 /// One line of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WcetRecord<'t> {
-    /// What was added to each longest call, in hundredths.
+    /// The margin that was added to each longest call, in per cent.
     Margin(u32),
     /// A DAG begins.
     Dag {

@@ -1,4 +1,4 @@
-//! What the other DAGs may execute while a job lasts, in the forms that the equations need.
+//! The work that other DAGs may execute while a job lasts, in the forms that the equations need.
 //!
 //! The equation with `j` chains counts interference on at most `m - j` cores. So a DAG has
 //! a [`InterferingWorkload`] for each number of cores up to those that a job of it can use. The clipped
@@ -24,7 +24,7 @@ pub enum InterferenceBound {
     Chains,
 }
 
-/// What of a DAG's graph enters equations, its own and those of others.
+/// The figures of a DAG's graph that enter equations, its own and those of others.
 #[derive(Clone, Debug)]
 pub(super) struct GraphSummary {
     /// The most cores that one job can use, at least 1 and at most all.
@@ -33,7 +33,7 @@ pub(super) struct GraphSummary {
     pub(super) covers: Vec<u64>,
     /// The work of some disjoint chains.
     chains: Vec<u64>,
-    /// What of it may block others, where subtasks keep their cores.
+    /// The longest executions, which may block others where subtasks keep their cores.
     pub(super) largest_ns: Vec<u64>,
     pub(super) unblocked: Blocking,
 }
@@ -51,7 +51,7 @@ impl GraphSummary {
     }
 }
 
-/// What may delay a DAG's work that is due at some time, for as long as it waits.
+/// All work that may delay a DAG's work that is due at some time, for as long as it waits.
 pub(super) struct DelaySources {
     /// The workloads of DAGs that may outrank it.
     pub(super) others: Vec<InterferingDag>,
@@ -70,7 +70,7 @@ pub(super) fn on_all_cores(others: &[InterferingDag], window_ns: u64) -> Workloa
 pub(super) struct InterferingDag {
     /// All of it, on at most 1, 2, .. cores.
     whole: Vec<InterferingWorkload>,
-    /// What its chains leave, likewise.
+    /// The work beyond its chains, likewise.
     rest: Vec<InterferingWorkload>,
     chains: Vec<InterferingWorkload>,
 }

@@ -6,7 +6,7 @@
 //! capacity tests about what those leave open; these give only the
 //! deadline as the bound, so they come last although they are the cheapest.
 //!
-//! What interferes with DAG `k` is decided for each pair of DAGs:
+//! The work that interferes with DAG `k` is decided for each pair of DAGs:
 //!
 //! - *Static priorities.* DAG `i` may outrank `k` if its most urgent subtask
 //!   wins over `k`'s least urgent one (equal priorities: the DAG committed

@@ -48,7 +48,7 @@ pub(super) fn alone(task: &Task, covers: &[u64], cores: u64) -> Option<u64> {
     Some(task.length_ns() + waiting)
 }
 
-/// What of one DAG enters its equations, with `j` from 0 to one less than the covers.
+/// The terms of one DAG in its equations, with `j` from 0 to one less than the covers.
 pub(super) struct MultiPathEquations<'a> {
     pub(super) task: &'a Task,
     pub(super) covers: &'a [u64],

@@ -29,7 +29,8 @@
 //! stretch in which the core is busy, every deadline is met. Of these `t` it looks at those that
 //! can be false (F. Zhang, A. Burns, IEEE Trans. Computers 58(9), 2009), from the last one down.
 //!
-//! What long steps keep the core for in the stretch (bursts, in `workload`) is added to both.
+//! The time for which long steps keep the core in the stretch (bursts, in `workload`) is added
+//! to both.
 //!
 //! Assumes: releases at least `T` apart; WCETs above 0. The order of equal priorities and
 //! deadlines is fixed. What is never preempted counts as if others preempted it, too.

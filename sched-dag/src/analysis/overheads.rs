@@ -1,4 +1,4 @@
-//! What the platform adds to execution times.
+//! Overheads: the time that the platform adds to executions.
 //!
 //! The tests know execution times only. Measured costs of the platform are
 //! charged to the WCET of each subtask, once an instance:

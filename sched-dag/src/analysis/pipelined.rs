@@ -57,13 +57,13 @@ pub(super) const OWN_STEPS: u64 = 256;
 /// needs more (`R > 1024 T`) is "not proven".
 const OVERLAP_LIMIT: u64 = 1024;
 
-/// What of a task enters its equation.
+/// The terms of a task in its equation.
 #[derive(Clone, Debug)]
 pub(super) struct PipelineTerms {
     period: u128,
     deadline: u128,
     volume: u128,
-    /// What of the volume may delay the chain in its last job.
+    /// The part of the volume that may delay the chain in its last job.
     last_volume: u128,
     length: u128,
     largest: u128,

@@ -44,7 +44,7 @@ pub(super) struct EquationSet<'a> {
     pub(super) known: Vec<Option<u64>>,
 }
 
-/// What is known about each DAG of a set.
+/// The bounds of one DAG of a set, as far as they are solved.
 #[derive(Debug)]
 pub(super) struct DagSolution {
     /// The response-time bound by DAG, `None` if not proven.

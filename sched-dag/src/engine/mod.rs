@@ -46,7 +46,7 @@ pub struct Engine<B: SubtaskBody, P> {
     pub cluster: ClusterId,
     /// The model.
     pub task_set: Arc<TaskSet>,
-    /// What is asked of the run, on its way to the scheduler.
+    /// Requests of the run on their way to the scheduler.
     pub requests: PendingRequests,
     /// The bodies whose functions faults have ended for good.
     pub lost: Vec<B>,
@@ -529,7 +529,7 @@ pub trait PlatformPort<B> {
     }
 }
 
-/// What a core does after a completion.
+/// The next action of a core after a completion.
 #[derive(Debug, PartialEq, Eq)]
 #[must_use]
 pub enum NextAction<B> {

@@ -45,7 +45,7 @@ pub struct Journal {
     oldest: usize,
     /// How many events are not there any more, or never were.
     lost: u64,
-    /// What is known of the lost ones, if there can be any.
+    /// Statistics of the lost ones, if there can be any.
     tally: Option<RunTally>,
     /// Whether each lost event is counted in the tally.
     is_complete: bool,

@@ -1,4 +1,4 @@
-//! What the platform's own work has cost in a run: two figures of its journal.
+//! The cost of the platform's own work in a run: two figures of its journal.
 //!
 //! An instance is *owed* a core as long as it should run by R5 and does not: from its
 //! readiness, or from the finish of what preempted it, until its first (or next)
@@ -16,7 +16,7 @@ use crate::ids::Instance;
 use crate::journal::{Event, EventKind};
 use crate::task_set::TaskSet;
 
-/// What was measured, in nanoseconds.
+/// Measured costs of the platform, in nanoseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeasuredCosts {
     /// How many instances were dispatched.

@@ -84,7 +84,7 @@ pub struct JobRecord {
     pub outcome: Option<JobOutcome>,
 }
 
-/// What is known of a journal besides its events, and how strictly it is judged.
+/// Options of the judge: whether a journal is whole and complete, and the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JudgeOptions {
     /// Whether no event is missing. Else the oldest ones are, and of what they may have

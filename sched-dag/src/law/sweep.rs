@@ -65,7 +65,7 @@ impl DispatchModel<'_> {
     }
 }
 
-/// What an instance is, for the dispatch.
+/// The state of an instance for the dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DispatchState {
     /// It is not ready yet, as far as is known.
@@ -80,7 +80,8 @@ pub enum DispatchState {
     Over,
 }
 
-/// What runs while another instance should.
+/// The reason for a breach: an instance that runs, or a core that idles, while another
+/// instance should run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DispatchFault {
     /// An instance, on this core.
@@ -100,7 +101,7 @@ pub enum DispatchBreach {
         since_ns: u64,
         /// For how long.
         length_ns: u64,
-        /// What was the case meanwhile.
+        /// The instance that ran meanwhile, or the core that idled.
         blame: DispatchFault,
     },
     /// An instance started and keeps its core, although another one went first.
@@ -118,7 +119,7 @@ pub enum DispatchBreach {
     },
 }
 
-/// What R5 tells about a run besides breaches.
+/// Waiting times that R5 tells about a run, besides breaches.
 #[derive(Clone, Debug, Default)]
 pub struct WaitCounts {
     /// The longest time for which an instance was owed a core.
@@ -153,7 +154,7 @@ pub(super) struct DispatchSweep<'m> {
     /// Became ready, or started, at this instant.
     fresh: Vec<Key>,
     started: Vec<(Key, CoreId, u64)>,
-    /// What has not started yet.
+    /// Keys of the instances that have not started yet.
     unstarted: BTreeSet<Key>,
     wrong: Vec<DispatchBreach>,
     waits: &'m mut WaitCounts,

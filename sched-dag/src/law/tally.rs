@@ -31,7 +31,7 @@ pub struct RunTally {
     subtasks: Box<[SubtaskTally]>,
 }
 
-/// What is asked about a DAG.
+/// Statistics of one DAG.
 #[derive(Clone, Debug)]
 pub struct DagTally {
     /// From the nominal release of a complete job to its last finish.
@@ -48,7 +48,7 @@ pub struct DagTally {
     instances: Box<[InstanceTimes]>,
 }
 
-/// What is asked about a subtask.
+/// Statistics of one subtask.
 #[derive(Clone, Debug)]
 pub struct SubtaskTally {
     /// From the last predecessor's finish to the start.

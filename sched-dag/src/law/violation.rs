@@ -1,4 +1,4 @@
-//! What can be wrong with a journal: the rules, and one row for each breach.
+//! Violations that a journal can show: the rules, and one row for each breach.
 //!
 //! A row has the code of a breach, the rule, when or by which event it shows, and the text:
 //! what happened, where, and why it must not be. Its documentation begins with the rule, and

@@ -32,7 +32,7 @@ enum BodyState<Body, Parked> {
     Lost,
 }
 
-/// What a core without a current instance does next.
+/// The next work of a core without a current instance.
 #[derive(Debug, PartialEq, Eq)]
 pub enum NextWork<Body, Parked> {
     /// Nothing is there for it to do.
@@ -50,7 +50,7 @@ pub struct Placement<Body, Parked> {
     seats: Box<[CoreSlot]>,
 }
 
-/// What one core has, and what it should have: [`NOTHING`], or a vertex.
+/// The vertex that one core has, and the one that it should have: [`NOTHING`], or a vertex.
 ///
 /// Not options, which would be two words each: a seat changes twice with each
 /// instance.

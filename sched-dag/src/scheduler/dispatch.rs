@@ -10,7 +10,7 @@
 //! core is named in more than one exchange, since each one brings in a larger
 //! key than the exchange before and a smaller one than it takes out.
 //!
-//! What this leaves is *settled*: no ready key is smaller than one that runs and
+//! It leaves a dispatch that is *settled*: no ready key is smaller than one that runs and
 //! may be preempted. Ends leave it so, since they only make cores idle; nothing
 //! but a newly ready instance can unsettle it. So without one the second step is
 //! not even looked at.
@@ -137,7 +137,7 @@ impl Scheduler {
     }
 }
 
-/// What comes of a completion by [`Scheduler::pass_on`].
+/// The result of a completion by [`Scheduler::pass_on`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[must_use = "the core has to carry it out"]
 pub enum HandOff {

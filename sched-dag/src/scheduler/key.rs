@@ -25,7 +25,7 @@
 use super::jobs::Job;
 use super::vertices::Vertex;
 
-/// What keys are made of.
+/// The parts of which keys are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum KeyOrder {
     /// Each subtask has a rank of its own.

@@ -35,7 +35,7 @@ pub struct EventLog {
     /// How many notices one event may come to; there is room for twice as many.
     most_at_once: usize,
     notices: Vec<DriverNotice>,
-    /// What has happened so far.
+    /// The events so far.
     pub journal: Journal,
 }
 

@@ -94,7 +94,7 @@ pub struct Scheduler {
     /// yet.
     ending: Vec<u32>,
     decisions: Vec<Decision>,
-    /// What is written down of each instant.
+    /// The log of each instant's events.
     pub log: EventLog,
 }
 

@@ -504,7 +504,7 @@ fn least<K: Ord + Copy>(entries: &[(K, usize)]) -> Option<(usize, (K, usize))> {
 /// Instances by the absolute deadline, then by the slot of the job, then by vertex.
 #[derive(Clone, Debug, Hash)]
 struct ByDeadline {
-    /// What comes before the vertex in the keys of the jobs that have ready instances, by slot.
+    /// The part before the vertex in the keys of the jobs that have ready instances, by slot.
     jobs: IndexedHeap<u128>,
     /// By slot.
     lines: Box<[JobQueue]>,

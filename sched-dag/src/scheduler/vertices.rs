@@ -29,7 +29,7 @@ use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
 use crate::policy::Preemption;
 use crate::task_set::TaskSet;
 
-/// What the next instance of a subtask does.
+/// The phase of a subtask's next instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum InstancePhase {
     /// It is not ready.
@@ -51,7 +51,7 @@ pub(super) struct Vertex {
     pub(super) progress: u64,
     /// The number of the job that it is doing.
     pub(super) job: u64,
-    /// What orders it under static priority: first the priority itself, later the
+    /// Its order under static priority: first the priority itself, later the
     /// [`ReadyQueue`](super::ready_queue::ReadyQueue)'s rank.
     pub(super) rank: u32,
     pub(super) dag: DagId,
@@ -61,7 +61,7 @@ pub(super) struct Vertex {
     /// Whether the end of its instance is told to its successors and to nobody else:
     /// it has some, its job is the only one in flight, and is not cut.
     pub(super) only_passes_on: bool,
-    /// What a counter begins with.
+    /// The initial value of a counter.
     initial: u32,
     /// Its counter, if it has one slot.
     counter: u32,

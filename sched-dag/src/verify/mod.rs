@@ -40,7 +40,7 @@ pub const MAX_ARITY: usize = 16;
 pub struct VerifiedDags {
     /// The model for the scheduler.
     pub task_set: TaskSet,
-    /// What the apps' authors may not have meant.
+    /// Oddities that the apps' authors may not have meant.
     pub warnings: Vec<Warning>,
 }
 
@@ -217,7 +217,7 @@ impl DagFindings<'_, '_> {
     }
 }
 
-/// What the verification is told besides the DAGs.
+/// Options of the verification.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CommitOptions {

@@ -46,7 +46,7 @@ use crate::order::{sort_by_key, sorted_by_key};
 use crate::spec::{DagSpec, LatestSpec, StateSpec, TopicPort};
 use crate::task_set::StatePrecedence;
 
-/// What the topics of one DAG say about its graph.
+/// The graph that the topics of one DAG make.
 #[derive(Clone, Default)]
 pub(super) struct TopicGraph<'a> {
     /// Edges `(predecessor, successor)`, perhaps repeated, never to oneself.

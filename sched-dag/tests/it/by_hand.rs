@@ -1,4 +1,4 @@
-//! What a test that drives the scheduler itself shows, and runs in virtual time do not: the ends of
+//! Cases that only a test that drives the scheduler itself shows: the ends of
 //! time and numbers that go on; what else happens at the instant at which a completion takes the
 //! short way, [`Scheduler::pass_on`](sched_dag::Scheduler::pass_on); and what drivers of a real
 //! machine may do: mistakes, clocks that go back, cores that are preferred. (That they come late, or

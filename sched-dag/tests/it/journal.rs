@@ -29,7 +29,7 @@ fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
     }
 }
 
-/// What the rules say of a run in virtual time that has gone on to its end.
+/// The options for a run in virtual time that has gone on to its end.
 const COMPLETE: JudgeOptions = JudgeOptions {
     is_complete: true,
     ..JudgeOptions::EXACT
@@ -77,7 +77,7 @@ fn the_latest_events_have_the_latest_jobs_whole() {
     assert!(kept > 100);
 }
 
-/// What must not be missing, whatever the run.
+/// Kinds of events that no run may lack.
 const NEEDED: [EventKind; 8] = [
     EventKind::Released,
     EventKind::Ready,

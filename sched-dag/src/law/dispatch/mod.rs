@@ -12,7 +12,7 @@ use crate::journal::{Event, EventKind};
 use crate::policy::{OnFault, SchedulerOptions};
 use crate::task_set::TaskSet;
 
-/// What a journal shows of R5.
+/// The findings about R5 in a journal.
 #[derive(Clone, Debug, Default)]
 pub struct DispatchReport {
     /// Every breach.

@@ -42,7 +42,7 @@ use crate::journal::{Event, EventKind};
 use crate::law::sweep::DispatchState;
 use crate::law::{Violation, latest};
 
-/// What is known of a job.
+/// The state of a job as the events so far tell it.
 #[derive(Default)]
 pub(super) struct JobState {
     /// The nominal release; `None` for a sporadic job until it is released.

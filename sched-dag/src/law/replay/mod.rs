@@ -40,7 +40,7 @@ use crate::policy::OnFault;
 use crate::task_set::TaskSet;
 use jobs::JobState;
 
-/// What a journal shows of R1 to R4, of lives and of cores.
+/// The findings about R1 to R4, lives of DAGs and cores in a journal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReplayVerdict {
     /// Every breach, in the order in which they were found.
@@ -135,7 +135,7 @@ struct DagReplay {
 struct CoreReplay {
     /// Counts its machine events.
     step: u64,
-    /// What it runs.
+    /// The instance that it runs.
     occupant: Option<Instance>,
 }
 
@@ -244,10 +244,10 @@ impl JournalReplay<'_> {
     }
 }
 
-/// What is known of an instance.
+/// The state of an instance as the events so far tell it.
 struct InstanceLife {
     stage: DispatchState,
-    /// What happened to it last, and when.
+    /// Its latest event, and when that was.
     last: Option<(EventKind, u64)>,
     ready: Option<StepTime>,
     finish: Option<StepTime>,

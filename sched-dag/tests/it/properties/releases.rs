@@ -1,4 +1,5 @@
-//! What the law does not judge, held against the rules: which jobs of a DAG are released, wait, are
+//! Releases, which the law does not judge, held against the rules: which jobs of a DAG are
+//! released, wait, are
 //! skipped or aborted, what is answered to requests and faults, and what is counted.
 //!
 //! The rules are those of overruns, P (pauses), C (closings), S (signals), E1 to E3, D1 and D2.
@@ -53,7 +54,7 @@ pub(crate) struct Releases {
     resumed_ns: u64,
     /// The jobs of the faults that were survived.
     survived: Vec<u64>,
-    /// What the scheduler has to answer to what has just been asked.
+    /// The answer that the scheduler owes to the latest request.
     owed: Option<EventKind>,
     counted: DagStatistics,
 }

@@ -22,7 +22,7 @@ use super::releases::{Releases, SAID};
 use crate::support::set::Set;
 use crate::support::{pass_on, scheduler};
 
-/// What happens at an instant before its releases.
+/// A step at an instant before its releases.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Step {
     Complete(Instance),
@@ -38,9 +38,9 @@ pub(crate) struct Walk<'s> {
     pub(crate) set: &'s Set,
     pub(crate) scheduler: Scheduler,
     pub(crate) now_ns: u64,
-    /// What each core executes.
+    /// The instance that each core executes.
     cores: Vec<Option<Instance>>,
-    /// What has lost its core.
+    /// Instances that have lost their core.
     preempted: Vec<Instance>,
     /// The idle cores; the last one has to be taken first.
     idle: Vec<CoreId>,

@@ -17,7 +17,7 @@ use sched_dag::{
 
 use super::{ask, kind, line, named, pass_on, scheduler, told};
 
-/// What is compared where the script has it only.
+/// Kinds of events that are compared only where the script has them.
 const QUIET: [&str; 9] = [
     "ready",
     "start",

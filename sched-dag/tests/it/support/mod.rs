@@ -1,4 +1,4 @@
-//! What the tests share: sets of DAGs, runs of them, and timelines to hold their journals against.
+//! Support of the tests: sets of DAGs, runs of them, and timelines to hold their journals against.
 //!
 //! A timeline is text, an instant a line: the time, and the events that are written down, by the
 //! journal's words. Only events of the kinds that the text has are compared. Cores are named by
