@@ -1,4 +1,4 @@
-//! What `fass` needs from the machine below, and how a machine offers it.
+//! The platform: the machine below `fass`, and how one offers itself.
 //!
 //! `fass` names no kernel. A platform (the kernel, or virtual time on the host)
 //! installs itself once, as a logger or an allocator does, before the app
@@ -323,7 +323,7 @@ fn missing() -> ! {
     panic!("no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`")
 }
 
-/// What tells the time: the platform, unless it has named something else.
+/// The clock: the platform's, unless it has named another one.
 static CLOCK: CurrentIndex<Clock> = CurrentIndex::new(&(ASK_THE_PLATFORM as Clock));
 
 /// Tells the time, as [`now_ns`] does.
@@ -445,7 +445,8 @@ pub struct RunConfig {
     pub clusters: CoreDivision,
     /// Whether the commit divides them ([`Platform::assign`]).
     pub assigns: bool,
-    /// The cost of the platform's own work for an instance at most, as measured on it. The commit adds
+    /// The cost of the platform's own work for an instance at most, as measured on it. The commit
+    /// adds
     /// it to each WCET before it answers about deadlines
     /// ([`Commit::answers`](crate::Commit::answers)); it changes nothing else. Without
     /// measurements, nothing is added: then WCETs have to include it.

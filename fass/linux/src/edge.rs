@@ -1,4 +1,4 @@
-//! What crosses the edge of runs: recorded into a file, or replayed.
+//! The edge of runs: what crosses it is recorded into a file, or replayed.
 //!
 //! The edge has a lock of its own, which is taken under a cluster's lock, and for a moment by a
 //! function that is told the time or a source that is replayed. A thread of no level sends what
@@ -38,11 +38,11 @@ pub(crate) static FILE: Mutex<Option<BootRecord<File>>> = Mutex::new(None);
 /// Whether it is written during a run, too, so that it is there if the program dies.
 pub(crate) static IS_LIVE: AtomicBool = AtomicBool::new(false);
 
-/// What is left to send of the latest run.
+/// The part of the latest run's recording that is still to be sent.
 pub(crate) static LEFT: Mutex<Outgoing> = Mutex::new(None);
 
 thread_local! {
-    /// What this thread runs.
+    /// The instance that this thread runs.
     static RUNNING: Cell<Option<Instance>> = const { Cell::new(None) };
 }
 

@@ -13,7 +13,8 @@
 //!
 //! # The policy
 //!
-//! `bpf/seats.bpf.c` is that policy. As this program sees it, it is a table of threads, in which one
+//! `bpf/seats.bpf.c` is that policy. As this program sees it, it is a table of threads, in which
+//! one
 //! that is higher comes before a lower one on the same processor.
 //!
 //! It is loaded by a person who may; this program then has it to its own end. Putting a
@@ -40,11 +41,11 @@ pub(crate) enum Levels {
     SchedExt(Seats),
 }
 
-/// What a thread is at its level for, the lower ones first.
+/// The role for which a thread has its level, the lower levels first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Role {
-    /// What it runs was ended: it is to delay nobody any more, in no other program either.
+    /// Its instance was ended: it is to delay nobody any more, in no other program either.
     Abandoned,
     /// It has lost its core.
     Demoted,
@@ -96,7 +97,7 @@ const NAME: &str = "fass_seats";
 const PLACE: &std::ffi::CStr = c"/sys/fs/bpf/fass_seats";
 /// How many threads it has a word for: no Linux numbers more.
 const THREADS: usize = 1 << 22;
-/// What Linux calls the numbering of threads that is not a container's.
+/// Linux's name of the numbering of threads that is not a container's.
 const FIRST_NUMBERING: &str = "pid:[4026531836]";
 
 /// The table, with a byte for each thread and then the number of the program that has it.

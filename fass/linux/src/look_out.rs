@@ -28,7 +28,7 @@ const PATIENCE_NS: u64 = 15_000;
 /// How long before an event the release thread looks whether a core has become idle.
 const EARLY_NS: u64 = 200_000;
 
-/// What those that look out share.
+/// State shared by the threads that look out.
 #[derive(Debug)]
 pub(crate) struct LookOut {
     /// When the scheduler has its next event, on the clock; `u64::MAX`: never, 0: all is over.

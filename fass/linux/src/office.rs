@@ -1,4 +1,4 @@
-//! What the clusters of a run share: where each is asked for something, and the end.
+//! State shared by the clusters of a run: where each is asked for something, and the end.
 //!
 //! A run whose cores are not divided is one cluster. Each has a [`Team`](crate::team::Team) of
 //! its own: a scheduler under a lock, workers, a release thread. What one wants of another it
@@ -21,7 +21,7 @@ use sched_dag::{ClusterId, DagId, TaskSet};
 use crate::level::Levels;
 use crate::sys;
 
-/// What all threads of a run share, of whatever cluster.
+/// State shared by all threads of a run, of whatever cluster.
 #[derive(Debug)]
 pub(crate) struct Office {
     /// The number of the plan that runs.

@@ -196,7 +196,7 @@ const STACK_BYTES: usize = 512 * 1024;
 /// Time between the start of a run and its first release.
 const LEAD_NS: u64 = 1_000_000;
 
-/// What the commits to come run on.
+/// The platform on which the next commits run.
 #[derive(Clone, Debug)]
 pub(crate) struct Threads {
     /// The terms of the commits to come.

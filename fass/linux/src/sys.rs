@@ -1,4 +1,4 @@
-//! What the standard library does not offer of Linux: the only `unsafe` code of the crate.
+//! Linux's system calls that the standard library lacks: the only `unsafe` code of the crate.
 //!
 //! The symbols are those of the C library, which the standard library links anyway. Each
 //! function checks what it gets back and is safe to call with any arguments.
@@ -211,7 +211,8 @@ pub(crate) fn pinned_table(place: &CStr, bytes: usize) -> io::Result<&'static [A
     // SAFETY: the kernel has just opened it for us, and nobody else has its number.
     let file = unsafe { OwnedFd::from_raw_fd(file) };
     let none = std::ptr::null_mut();
-    // SAFETY: the kernel chooses an address at which nothing is, and refuses more bytes than there are.
+    // SAFETY: the kernel chooses an address at which nothing is, and refuses more bytes than there
+    // are.
     let table = unsafe { mmap(none, bytes, READ_AND_WRITE, SHARED, file.as_raw_fd(), 0) };
     if table.addr() == usize::MAX {
         return Err(io::Error::last_os_error());
@@ -268,7 +269,7 @@ pub(crate) fn ask_to_end(process: u32) {
     unsafe { kill(process, SIGINT) };
 }
 
-/// What waits for something new in a file.
+/// A descriptor that waits for something new in a file.
 pub(crate) struct Arrivals(OwnedFd);
 
 impl Arrivals {

@@ -5,7 +5,8 @@
 //!
 //! # The release thread
 //!
-//! It is the clock of the scheduler; each cluster has one, on its own processors. It sleeps until the scheduler's next event, at an absolute time, so that releases keep
+//! It is the clock of the scheduler; each cluster has one, on its own processors. It sleeps until
+//! the scheduler's next event, at an absolute time, so that releases keep
 //! to the nominal grid whatever one of them was late by. Idle workers are to be there first
 //! (`look_out`); where all cores are busy it comes in time, and preempts. Others wake it earlier
 //! with a request, or if the next event has become an earlier one. It makes the step and calls
@@ -17,7 +18,8 @@
 //! Reading that clock is a system call, so no instance does it at its start: this thread
 //! looks often enough, as often as the shortest budget, and begins to count when it
 //! first sees the instance. So an instance ends after its budget, and no later than the
-//! shortest budget of all, and 20 us, after that. Its thread cannot be ended: it is demoted for good.
+//! shortest budget of all, and 20 us, after that. Its thread cannot be ended: it is demoted for
+//! good.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -383,7 +385,7 @@ fn message(panic: &(dyn std::any::Any + Send)) -> String {
     text.unwrap_or("a panic without a message").to_owned()
 }
 
-/// What was seen of an instance that has a budget.
+/// The latest look at an instance that has a budget.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
     /// The subtask and the job.
@@ -497,7 +499,8 @@ impl Team {
         }
     }
 
-    /// Settles when it looks next. A thread that makes the next event an earlier one writes that first
+    /// Settles when it looks next. A thread that makes the next event an earlier one writes that
+    /// first
     /// and then reads when we look; we do it the other way round, so one of us sees the other.
     fn settle_look(&self, budgets_ns: u64) -> u64 {
         loop {

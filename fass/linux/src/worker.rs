@@ -37,7 +37,7 @@ const RUNS: u32 = 1;
 /// It runs an instance that has lost its core.
 const DEMOTED: u32 = 2;
 
-/// What is shared of a worker.
+/// The part of a worker that other threads see.
 #[derive(Debug, Default)]
 pub(crate) struct Worker {
     thread: OnceLock<ThreadId>,

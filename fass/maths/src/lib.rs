@@ -34,7 +34,7 @@ pub use arcs::{acos, asin, atan, atan2};
 pub use root::sqrt;
 pub use turns::{LARGEST_ANGLE, cos, sin, sin_cos, tan};
 
-/// What is added to a number below 2^51 so that its last bit counts 1: the sum is rounded, and
+/// Added to a number below 2^51 it makes the last bit count 1: the sum is rounded, and
 /// its low bits are an integer.
 const ROUNDS: f64 = 6_755_399_441_055_744.0;
 

@@ -123,7 +123,7 @@ pub struct Decoder<'b> {
 pub struct Malformed {
     /// The offset of the first byte of what is wrong.
     pub offset: usize,
-    /// What was expected there.
+    /// The part that was expected there.
     pub expected: &'static str,
 }
 

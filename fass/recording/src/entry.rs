@@ -1,7 +1,8 @@
-//! What a recording says of itself, whose it is and what is in it; and what happened, one entry
+//! A recording's header, which tells whose it is and what is in it; and its entries, one entry
 //! after the other.
 //!
-//! Besides there is a commit of a run, its model as it was accepted and what was proven of it; and the
+//! Besides there is a commit of a run, its model as it was accepted and what was proven of it; and
+//! the
 //! statistics of all jobs of a run that has ended.
 
 use alloc::string::String;
@@ -12,7 +13,7 @@ use super::recordable::Recordable;
 use super::schema::Schema;
 
 crate::recordable! {
-    /// What stands at the start of a recording.
+    /// The start of a recording.
     ///
     /// See [`Writer`](crate::Writer).
     #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -21,7 +22,7 @@ crate::recordable! {
         pub app: String,
         /// The DAGs, in the order of their commit.
         pub dags: Vec<DagHeader>,
-        /// What values there are.
+        /// The channels of values.
         pub channels: Vec<Channel>,
     }
 
@@ -46,7 +47,7 @@ crate::recordable! {
         pub dag: u16,
         /// The number of the subtask that writes the values, or finds them.
         pub subtask: u16,
-        /// What the values are to the DAG.
+        /// The role of the values in the DAG.
         pub role: Role,
         /// The topic, or the state.
         pub topic: String,
@@ -98,7 +99,7 @@ macro_rules! kinds {
 }
 
 kinds! {
-    /// What values are to their DAG.
+    /// The role of values in their DAG.
     ///
     /// ```
     /// assert_eq!(recording::Role::Source.name(), "source");
@@ -118,7 +119,7 @@ kinds! {
         State = "state",
     }
 
-    /// What happened.
+    /// The kind of an entry.
     ///
     /// ```
     /// assert_eq!(recording::EntryKind::Value.name(), "value");

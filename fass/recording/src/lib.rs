@@ -1,6 +1,6 @@
-//! What crosses the edge of a run, as bytes: values with their schemas, and files of them.
+//! Recordings: values that cross the edge of a run, as bytes with schemas, and files of them.
 //!
-//! What a DAG of functions computes follows from what enters it. So a *recording*, that is a
+//! The results of a DAG of functions follow from what enters it. So a *recording*, that is a
 //! file of the values that sources returned, samples found, and of what became of jobs, is
 //! enough to compute every value again. This crate has what is needed to write values down:
 //!
@@ -37,7 +37,8 @@
 //!   is needed.
 //! - Reading any bytes gives a value or the offset of what is wrong. It does not panic, recurses
 //!   to a depth that the type fixes, and allocates at most [`MOST_GROWTH`] times the bytes that
-//!   it is given, for each level of that depth. Bytes that are accepted are those that the value would be written as.
+//!   it is given, for each level of that depth. Bytes that are accepted are those that the value
+//! would be written as.
 //! - Reading a file takes a time that its length bounds: a type in it has at most
 //!   [`MOST_WEIGHTLESS`] parts that take no bytes, so no value has many more parts than bytes.
 //!

@@ -1,4 +1,4 @@
-//! What a type looks like: names and types, so that values can be read without the type, and the
+//! Schemas of types: names and types, so that values can be read without the type, and the
 //! form in which people write that.
 
 use alloc::boxed::Box;
@@ -13,13 +13,13 @@ pub const MOST_DEPTH: usize = 16;
 /// each of its bytes, and reading it takes a time that its length bounds.
 pub const MOST_WEIGHTLESS: usize = 64;
 
-/// What is expected of a type that has more.
+/// The type expected in place of one that has more.
 pub(super) const WEIGHTLESS: &str = "a type with at most 64 parts that take no bytes";
 
-/// What is expected of a type that is nested more deeply.
+/// The type expected in place of one that is nested more deeply.
 pub(super) const DEEP: &str = "a type that is nested less deeply";
 
-/// What a type looks like. It is shown, and read by [`Schema::parse`], as a type of Rust but
+/// The form of a type. It is shown, and read by [`Schema::parse`], as a type of Rust but
 /// for `T?`, an `Option<T>`, `[T]`, a `Vec<T>`, and `text`, a `String`.
 ///
 /// ```
@@ -224,7 +224,7 @@ impl Schema {
     }
 }
 
-/// What is left of the text.
+/// The rest of the text.
 struct Rest<'t> {
     text: &'t str,
     whole: &'t str,

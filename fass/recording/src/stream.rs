@@ -46,7 +46,7 @@ pub(super) const TIMES: u8 = 8;
 /// The polynomial, its lowest power first.
 const POLYNOMIAL: u32 = 0xedb8_8320;
 
-/// What eight zero bits do to each value of the lowest byte.
+/// The effect of eight zero bits on each value of the lowest byte.
 static TABLE: [u32; 256] = table();
 
 const fn table() -> [u32; 256] {

@@ -3,7 +3,7 @@
 //! A [`Dag`] is a handle of a DAG under construction. Registering a subtask
 //! takes a function, the names of the topics it reads and writes, and its
 //! attributes; nothing else can be said about a subtask, and nothing runs.
-//! What is wrong is not reported here but at the commit, all at once
+//! Faults are not reported here but at the commit, all at once
 //! ([`finish_create_dags`](crate::finish_create_dags)). After the commit the
 //! handle is spent.
 //!
@@ -125,7 +125,7 @@ impl Dag {
     /// Puts the DAG into a cluster, on whose cores alone it runs; they are counted from 0.
     /// Where the machine's cores are divided, each DAG is to be in one.
     ///
-    /// What a DAG shares with another one, that is latest values and signals, may cross
+    /// Latest values and signals, which a DAG shares with others, may cross
     /// clusters.
     ///
     /// ```

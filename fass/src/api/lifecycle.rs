@@ -33,7 +33,7 @@ pub struct SwitchUse {
     target: Arc<RequestTarget>,
 }
 
-/// What a function pauses and resumes a DAG with.
+/// The handle by which a function pauses and resumes a DAG.
 ///
 /// A paused DAG releases no job: those that become due are skipped, and keep their numbers and
 /// their places on the grid. What is in flight when it is paused goes on to its end.
@@ -103,7 +103,8 @@ impl Switch<'_> {
 #[derive(Debug)]
 pub struct ShutdownUse(());
 
-/// What a function ends the run with, in order: nothing more is released, and what is in flight
+/// The handle by which a function ends the run, in order: nothing more is released, and what is in
+/// flight
 /// comes to its end.
 ///
 /// # Examples
@@ -296,7 +297,7 @@ pub struct Mode {
 #[derive(Debug)]
 pub struct ModeUse(Mode);
 
-/// What a function enters a mode with.
+/// The handle by which a function enters a mode.
 ///
 /// See [`Modes`].
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! What an app builds DAGs with: handles of DAGs, and of what subtasks use.
+//! The API that builds DAGs: handles of DAGs, and of what subtasks use.
 //!
 //! Everything said here is noted in a draft; nothing is judged before the commit, and
 //! nothing runs.

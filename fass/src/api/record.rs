@@ -33,7 +33,7 @@ const BEGIN: Begin = |wish, shows| {
 impl Dag {
     /// Records the values of a topic, where the platform records.
     ///
-    /// What a source writes is what a replay takes in place of calling it. So if one topic of a
+    /// A replay takes the values that a source wrote, in place of calling it. So if one topic of a
     /// source is recorded, the commit refuses the DAG unless all topics of its sources are, and
     /// all that its other subtasks sample. What another subtask writes is what a
     /// replay compares. What subtasks sample of the topic is recorded, too, and given to them in

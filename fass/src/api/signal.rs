@@ -26,7 +26,7 @@ use crate::platform;
 use crate::run::effect::RequestTarget;
 use crate::run::effect::{GO, RequestKind, Wish};
 
-/// What releases a sporadic DAG. Clones are handles of the same signal.
+/// A signal, which releases a sporadic DAG. Clones are handles of the same signal.
 ///
 /// # Examples
 ///
@@ -77,7 +77,7 @@ pub struct Signal {
 #[derive(Debug)]
 pub struct SignalUse(Signal);
 
-/// What a function raises a signal with. See [`Signal`].
+/// The handle by which a function raises a signal. See [`Signal`].
 #[derive(Debug)]
 pub struct Raiser<'a> {
     wish: &'a AtomicU8,

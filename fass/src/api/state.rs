@@ -41,7 +41,7 @@ use crate::run::cell::{ReadClaim, WriteClaim};
 use crate::run::line::KeptState;
 use crate::run::replaceable::{Reset, ResettableState};
 
-/// What can be a state: any type that several cores may use in turn.
+/// A value that can be a state: of any type that several cores may use in turn.
 ///
 /// Apps need not implement it; they meet it in [`Dag::state`].
 ///
@@ -155,7 +155,8 @@ impl<T: StateValue> State<T> {
     /// called that may change it in such a job. It does so if topics of the DAG are recorded
     /// ([`Dag::record`]), too; then a replay can begin there.
     ///
-    /// A value that a closure keeps for itself is not recorded, so what shall be is to be a state. A value
+    /// A value that a closure keeps for itself is not recorded, so what shall be is to be a state.
+    /// A value
     /// that takes more than 4 KiB, or twice the least of its type if that is more, is lost, as one
     /// of a topic is.
     ///

@@ -1,4 +1,4 @@
-//! What a subtask uses besides its inputs, stated at registration.
+//! Uses of a subtask besides its inputs, stated at registration.
 //!
 //! Values of the same job come along edges, as arguments. What comes from elsewhere
 //! is stated with [`Dag::using`]: a [`State`](crate::State) that subtasks of the DAG
@@ -24,7 +24,8 @@
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
 //!
-//! The methods of [`SubtaskBuilder`] are those of [`Dag`]. Each wraps the function in one that begins the
+//! The methods of [`SubtaskBuilder`] are those of [`Dag`]. Each wraps the function in one that
+//! begins the
 //! uses, lends them to the function for one call, and ends them.
 
 use alloc::sync::Arc;
@@ -61,12 +62,12 @@ pub(crate) mod sealed {
     note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()` and `parameter.reading()`"
 )]
 pub trait Uses: sealed::Sealed {
-    /// What the function gets.
+    /// The argument of the function.
     type Borrowed<'a>;
-    /// What the subtask keeps from its registration on.
+    /// The part that the subtask keeps from its registration on.
     #[doc(hidden)]
     type Held: Send + 'static;
-    /// What it has for the time of an instance.
+    /// The part that it has for the time of an instance.
     #[doc(hidden)]
     type Guard<'a>;
 

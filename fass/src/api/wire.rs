@@ -93,11 +93,11 @@ struct WireState {
     outgoing: Arc<WireOutput>,
     is_received: AtomicBool,
     is_sent_on: AtomicBool,
-    /// What its packets raise, if a sporadic DAG begins with them.
+    /// The signal that its packets raise, if a sporadic DAG begins with them.
     signal: SetOnce<Arc<RequestTarget>>,
 }
 
-/// What an app says about a wire.
+/// Options of a wire.
 ///
 /// ```
 /// use fass::{Framing, Wire, WireOptions};
@@ -129,7 +129,7 @@ impl Default for WireOptions {
     }
 }
 
-/// What has happened on a wire. Packets are counted when they are whole, bytes without what
+/// Counts of a wire. Packets are counted when they are whole, bytes without those that
 /// the framing adds.
 ///
 /// See [`Wire`].
@@ -316,18 +316,18 @@ pub struct Received<'a, T> {
     mark: usize,
 }
 
-/// What a packet says, and when it was whole.
+/// A received packet: its value, and when it was whole.
 ///
 /// See [`Wire`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packet<T> {
-    /// What the decoder has made of it.
+    /// The value that the decoder has made of its bytes.
     pub value: T,
     /// When its last byte came, on the clock of [`crate::now_ns`].
     pub received_ns: u64,
 }
 
-/// What a function sends with: bytes, or text by [`core::fmt::Write`].
+/// The handle by which a function sends: bytes, or text by [`core::fmt::Write`].
 ///
 /// See [`Wire`].
 #[derive(Debug)]
@@ -366,7 +366,7 @@ impl fmt::Write for Sender<'_> {
     }
 }
 
-/// What the subtask that receives keeps.
+/// The receiving end of a wire, which its subtask keeps.
 ///
 /// See [`Wire`].
 #[doc(hidden)]

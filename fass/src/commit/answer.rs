@@ -1,4 +1,4 @@
-//! What an accepted commit tells: warnings, answers about deadlines, and what proves them.
+//! Answers of an accepted commit: warnings, bounds against deadlines, and their proofs.
 //!
 //! Where WCETs are given, the commit asks `sched_dag::analysis` for the model
 //! that the platform will run: its policy, its preemption, its cores and its
@@ -307,7 +307,7 @@ impl Commit {
     }
 }
 
-/// What is known at commit about the deadlines of one DAG.
+/// The answer about the deadlines of one DAG.
 ///
 /// # Examples
 ///
@@ -340,9 +340,9 @@ pub struct DagAnswer {
     pub dag: DagLabel,
     /// Where it runs; `None` if the cores are not divided.
     pub cluster: Option<ClusterPlacement>,
-    /// What is known.
+    /// The verdict on the DAG.
     pub verdict: Verdict,
-    /// What is known of each sink, in the order of registration.
+    /// The answer about each sink, in the order of registration.
     pub sinks: Vec<SinkAnswer>,
     /// Where the overheads are from that each instance was charged.
     pub overheads: OverheadSource,
@@ -368,7 +368,7 @@ pub struct ClusterPlacement {
     pub why: Option<AssignmentReason>,
 }
 
-/// What is known at commit about the deadline of one sink.
+/// The answer about the deadline of one sink.
 ///
 /// ```
 /// use core::time::Duration;

@@ -1,4 +1,4 @@
-//! What has been registered of a DAG before its commit.
+//! Drafts: DAGs as registered before their commit.
 //!
 //! A draft accepts everything and remembers what it could not express as a
 //! [`DagSpec`]: durations that do not fit, topic lists that do not fit the
@@ -50,7 +50,7 @@ pub(crate) struct DagDraft {
     pub(crate) spec: DagSpec,
     /// One for each of `spec.subtasks`.
     pub(crate) make_bodies: Vec<MakeBody>,
-    /// What only this crate can find wrong.
+    /// Faults that only this crate can find.
     pub(crate) flaws: Vec<Flaw>,
     pub(crate) is_committed: bool,
     /// A source that states a period.
@@ -80,15 +80,15 @@ pub(crate) struct DagDraft {
     pub(crate) may_shut_down: bool,
     /// The modes that it is in, and those that its subtasks may enter.
     pub(crate) modes: Vec<checks::Modes>,
-    /// What finds their faults, if there are any.
+    /// The check that finds their faults, if there are modes.
     pub(crate) check_modes: Option<checks::Check>,
     /// The check of topics that are recorded, if there are any.
     pub(crate) check_recorded: Option<checks::Check>,
-    /// What makes that which serves requests, if it states something of that kind.
+    /// The maker of the lifecycle that serves requests, if it states some.
     pub(crate) lifecycle: Option<MakeLifecycle>,
-    /// What is to be told of the DAG's signal if it is sporadic: wires that its source receives on.
+    /// Listeners to the DAG's signal if it is sporadic: wires that its source receives on.
     pub(crate) receives: Vec<Box<dyn FnOnce(Arc<RequestTarget>)>>,
-    /// What completions of subtasks do beyond the DAG, latest values apart.
+    /// Effects of completions beyond the DAG, latest values apart.
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// The subtasks whose functions can be replaced.
     pub(crate) replaceable: Vec<usize>,
@@ -370,7 +370,7 @@ impl fmt::Debug for DagDraft {
     }
 }
 
-/// What an app states about a subtask beyond its function and its topics.
+/// Attributes of a subtask beyond its function and its topics.
 ///
 /// The paper leaves these to the scheduling algorithm; all of them are optional
 /// here, and the commit says when the chosen policy needs one that is missing.

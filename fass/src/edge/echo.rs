@@ -1,6 +1,7 @@
-//! What a person sees of a recorded topic while the run goes on: its latest value.
+//! The echo of a recorded topic: its latest value, for a person, while the run goes on.
 //!
-//! Of the topic that is watched, a completion copies the value into one room, and the next one takes its
+//! Of the topic that is watched, a completion copies the value into one room, and the next one
+//! takes its
 //! place: a person reads slower than a DAG writes. The console takes it out, and
 //! makes its text in its own time.
 

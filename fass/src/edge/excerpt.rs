@@ -1,6 +1,6 @@
 //! The beginning of a text, in memory that is there already.
 //!
-//! What a panic says is the app's: it may be megabytes, and there may be no memory
+//! The text of a panic is the app's: it may be megabytes, and there may be no memory
 //! left. A report shows as much of it as fits here, and counts the rest.
 
 use core::fmt::{self, Display, Write};

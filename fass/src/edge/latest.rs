@@ -4,7 +4,8 @@
 //! unless an instance fails; then a drain makes a recording of them, when the run is over. It is
 //! one that is cut, for some of its jobs may lack an input.
 //!
-//! This is what a crash leaves behind. A recording of a whole run needs memory or a way out for all of it. To compute a fault again,
+//! This is what a crash leaves behind. A recording of a whole run needs memory or a way out for
+//! all of it. To compute a fault again,
 //! the inputs of the last jobs mostly suffice: what sources returned and what subtasks sampled,
 //! of topics that are recorded, and what they found in recorded states. Each such channel has a
 //! place for each of so many jobs, made at the commit; a value takes the place of the one so many
@@ -29,13 +30,13 @@ use crate::run::plan::Plan;
 pub(super) struct RecentJobs {
     app: &'static str,
     jobs: u32,
-    /// What the next plan says of itself.
+    /// The header of the next plan.
     header: Header,
     /// From the launch on, if there is memory.
     kept: Option<PlanHistory>,
 }
 
-/// What is kept of a plan.
+/// The history that is kept of a plan.
 struct PlanHistory {
     header: Header,
     latest: LatestJobs,

@@ -1,4 +1,4 @@
-//! What crosses the edge of a run on a machine: written into a buffer, or taken from a recording.
+//! The edge of a run on a machine: values are written into a buffer, or taken from a recording.
 //!
 //! A *tape* takes what happens, from the core that completes, and makes places for values, into
 //! which instances write them: it allocates nothing and waits for nothing. The *drain* makes the
@@ -38,14 +38,14 @@ pub use kept::BootRecord;
 pub use recording::Sink;
 pub use replay::{Divergence, Replay, ReplayOutcome, job_of};
 
-/// What a platform is to do with what crosses.
+/// The mode of an edge: recording, replaying, or keeping the latest jobs.
 ///
 /// See [`Crossing`].
 #[derive(Clone, Copy, Debug)]
 pub enum EdgeMode {
     /// Record it.
     Record {
-        /// What is recorded, by its name.
+        /// The app that is recorded, by its name.
         app: &'static str,
         /// The room for what is not drained yet.
         bytes: usize,
@@ -61,14 +61,14 @@ pub enum EdgeMode {
     },
     /// Keep the inputs of the last jobs, and give them away if one fails.
     Latest {
-        /// What is recorded, by its name.
+        /// The app that is recorded, by its name.
         app: &'static str,
         /// How many jobs of each DAG.
         jobs: u32,
     },
 }
 
-/// What a replay needs of the platform.
+/// Functions of the platform that a replay needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReplayHost {
     /// Takes a signal from outside.
@@ -80,7 +80,7 @@ pub(crate) struct ReplayHost {
 pub type Begin =
     fn(Option<EdgeMode>, bool) -> (Option<Box<dyn Crossing>>, Option<Box<dyn Echoing>>);
 
-/// What a platform asks for in order to record or to replay; times are of the run. What does
+/// Calls of a platform that records or replays; times are of the run. A call that does
 /// not concern a replay, or a tape, does nothing there.
 ///
 /// ```
@@ -172,7 +172,7 @@ pub struct WatchedValue {
     /// How many bytes it has; `None`: more than there was room for.
     length: Option<usize>,
     schema: Arc<Schema>,
-    /// What makes its text, which only an image with a recorded topic has.
+    /// The function that makes its text, which only an image with a recorded topic has.
     write: fn(&Schema, &[u8], &mut fmt::Formatter<'_>) -> fmt::Result,
 }
 
@@ -193,7 +193,8 @@ impl WatchedValue {
 /// The file that what is recorded goes into.
 pub type Record = Stream<dyn Sink + Send>;
 
-/// What core 0 does of it when it has nothing else to do: it makes a file of what is recorded, and
+/// The part that core 0 does when it has nothing else to do: it makes a file of what is recorded,
+/// and
 /// allocates nothing but for the header; or it raises the signals of a replay.
 ///
 /// See [`Crossing`].
@@ -289,10 +290,10 @@ pub const fn recorded(what: EventKind) -> Option<recording::EntryKind> {
     }
 }
 
-/// What sends a recording, if anything does.
+/// The sender of a recording, if there is one.
 pub type Outgoing = Option<Box<dyn Drain>>;
 
-/// What crosses the edge of a platform's runs.
+/// The edge of a platform's runs.
 ///
 /// ```
 /// use fass::edge::{Edge, EdgeMode};
@@ -304,7 +305,7 @@ pub type Outgoing = Option<Box<dyn Drain>>;
 /// ```
 #[derive(Default)]
 pub struct Edge {
-    /// What the command line says.
+    /// The mode that the command line states.
     wish: Option<&'static EdgeMode>,
     /// Whether people can look at what crosses.
     shows: bool,
@@ -312,7 +313,7 @@ pub struct Edge {
     echo: Option<Box<dyn Echoing>>,
     /// Whether a plan has been launched with it, so that events are of interest.
     is_on: bool,
-    /// What sends the recording of the run to come.
+    /// The sender of the next run's recording.
     outgoing: Outgoing,
     /// Whether the jobs before a fault have been sent.
     has_sent_latest: bool,
@@ -389,7 +390,8 @@ impl Edge {
     }
 
     /// Makes a plan one that is recorded or replayed, if there is a wish, and begins a
-    /// recording in the file, if there is one. Reports whether that goes for the times, too, that functions are told.
+    /// recording in the file, if there is one. Reports whether that goes for the times, too, that
+    /// functions are told.
     ///
     /// # Errors
     ///

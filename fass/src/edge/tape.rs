@@ -1,4 +1,4 @@
-//! What happens at the edge, on its way into a file.
+//! The recorder: events at the edge, on their way into a file.
 //!
 //! Each channel has a place for its values, into which its subtask writes them; here comes only
 //! what else happens, and which values had no room there. If even these are too many, the tape
@@ -426,7 +426,7 @@ impl LostJobs {
     }
 }
 
-/// What is lost.
+/// Counts of what is lost.
 #[derive(Clone)]
 struct LossCounts {
     /// By channel.

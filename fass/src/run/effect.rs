@@ -1,4 +1,4 @@
-//! What an instance leaves outside its DAG, held back until it is complete.
+//! Effects of an instance outside its DAG, held back until it is complete.
 //!
 //! Values on edges need no holding back: their readers are started by the
 //! scheduler, and only after the completion. Latest values, signals and requests to the
@@ -41,7 +41,7 @@ pub(crate) trait Effect: Send {
     fn fail(&mut self, _failed_ns: u64) {}
 }
 
-/// What a platform does at a completion.
+/// The effect that a platform adds to a completion.
 impl Effect for Box<dyn FnMut() + Send> {
     fn happen(&mut self, _completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
         self();
@@ -89,7 +89,7 @@ pub(crate) const WHEN_IDLE: u8 = 2;
 /// A place for what an instance wishes, at first nothing; the last word counts.
 pub(crate) type Wish = Arc<AtomicU8>;
 
-/// What a wish is about.
+/// The kind of a request.
 pub(crate) enum RequestKind {
     Run,
     Signal(Arc<RequestTarget>),
@@ -97,7 +97,7 @@ pub(crate) enum RequestKind {
     Mode(ModeId),
 }
 
-/// What an instance may ask for.
+/// The requests that an instance may make.
 pub(crate) struct InstanceRequests {
     pub(crate) wish: Wish,
     pub(crate) of: RequestKind,

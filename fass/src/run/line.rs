@@ -20,7 +20,7 @@ use crate::run::cell::outbox::{Outbox, OutboxReader, outbox, words_of};
 /// The number of a channel while it has none.
 const NO_CHANNEL: u16 = u16::MAX;
 
-/// What those share who write a channel's values, publish them, or replay them.
+/// The state of a channel, shared by its writer, its publisher and a replay.
 pub(crate) struct ChannelState {
     number: AtomicU16,
     pub(super) edge: &'static TopicEdge,

@@ -2,7 +2,8 @@
 //!
 //! [`log!`](crate::log!) copies a *line* into a ring of fixed size, and goes on. Nothing is
 //! allocated, nobody is waited for, and no text is made: that is left to the platform, which
-//! [takes](LogLine::take) lines when it has nothing else to do. Where the ring is full, the new line
+//! [takes](LogLine::take) lines when it has nothing else to do. Where the ring is full, the new
+//! line
 //! is left out and counted.
 //!
 //! # What is guaranteed
@@ -50,9 +51,9 @@ pub enum Level {
     Error = 1,
     /// Something may not.
     Warn,
-    /// What goes on.
+    /// The course of events.
     Info,
-    /// What helps to find a mistake.
+    /// Details that help to find a mistake.
     Debug,
 }
 
@@ -62,7 +63,8 @@ static LEVEL: AtomicU8 = AtomicU8::new(Level::Info as u8);
 /// The lines that wait.
 static RING: [SharedCell<LogSlot>; PLACES] = [const { SharedCell::new(LogSlot::Empty) }; PLACES];
 
-/// A place for a line. Its representation has zeros where it is empty, which those of an `Option` are
+/// A place for a line. Its representation has zeros where it is empty, which those of an `Option`
+/// are
 /// not: so an image does not hold the ring.
 #[repr(u8)]
 #[expect(clippy::large_enum_variant, reason = "nothing is allocated")]
@@ -132,7 +134,8 @@ pub struct LogLine {
     /// Its text, without the fields.
     pub text: &'static str,
     fields: [Option<Field>; FIELDS],
-    /// What makes a value's text: code that a program which says nothing does not have.
+    /// The function that makes a value's text: code that a program which says nothing does not
+    /// have.
     write: fn(&Part<'static>, &mut Formatter<'_>) -> fmt::Result,
     /// The instance that has said it, if one has.
     pub instance: Option<Instance>,
@@ -222,7 +225,8 @@ impl LogLine {
     }
 }
 
-/// Goes round the places from `next` on, and moves it behind the first one that `fits`. Nobody waits:
+/// Goes round the places from `next` on, and moves it behind the first one that `fits`. Nobody
+/// waits:
 /// a place that somebody else uses is passed over.
 fn find<T>(next: &AtomicUsize, fits: impl Fn(&mut LogSlot) -> Option<T>) -> Option<T> {
     let first = next.load(Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! What may travel on a topic, and what happens when several subtasks read it.
+//! Messages: values that may travel on a topic, to one reader or to several.
 //!
 //! A *message* is the value that one job carries along one topic. With one
 //! reader it is moved, never copied. With several readers every reader but the
@@ -153,7 +153,7 @@ impl<T> DerefMut for Unique<T> {
     }
 }
 
-/// What the commit must know of a message's type.
+/// The type of a message, as the commit compares it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MessageType {
     id: TypeId,

@@ -1,4 +1,4 @@
-//! What runs: a body for each subtask, and the ways that values take between them.
+//! The running half: a body for each subtask, and the edges between them.
 //!
 //! A *body* holds the function with its ends of the topics; a *ring* is one edge, with a
 //! slot for each job in flight; an *effect* is what a completion does beyond the DAG.

@@ -1,4 +1,4 @@
-//! What a commit hands to the platform: the verified model and the bodies.
+//! Plans, which a commit hands to the platform: the verified model and the bodies.
 //!
 //! The platform's scheduler decides *which* instance runs *where* and *when*;
 //! it then calls [`SubtaskCode::run`] there. A body never decides anything.
@@ -47,7 +47,8 @@ pub struct Plan {
     /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
     /// scheduler.
     pub after_fault: Vec<Option<DagId>>,
-    /// What serves requests other than signals, if a function may make one or a DAG begins
+    /// The lifecycle that serves requests other than signals, if a function may make one or a DAG
+    /// begins
     /// paused. A platform that takes no such requests refuses the plan.
     pub lifecycle: Option<Box<dyn Lifecycle>>,
     /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
@@ -91,7 +92,7 @@ pub struct SubtaskCode {
     subtask: Box<dyn Subtask>,
     /// The job that it runs, or has panicked in; [`NO_JOB`] else.
     job: u64,
-    /// What its completions do beyond the DAG.
+    /// Effects of its completions beyond the DAG.
     effects: Vec<Box<dyn Effect>>,
 }
 
@@ -227,7 +228,8 @@ impl SubtaskCode {
     ///
     /// The caller does so once the instance is complete for it, at `completed_ns` on
     /// the clock of [`crate::now_ns`], and not for an instance that failed. It passes
-    /// the requests to the scheduler with the completion (`sched_dag::lifecycle` has what for). Does not wait, allocate or
+    /// the requests to the scheduler with the completion (`sched_dag::lifecycle` has what for).
+    /// Does not wait, allocate or
     /// run code of the app; a body that has no such effects returns at once.
     ///
     /// ```
@@ -342,7 +344,8 @@ impl SubtaskCode {
     /// [`run`](Self::run) makes the other function, if it has to be made.
     ///
     /// To be called once for a fault, before anything else of the DAG starts that was not started
-    /// then, and if the [`ReplacementCode`] is there. Takes a bounded time and runs no code of the app.
+    /// then, and if the [`ReplacementCode`] is there. Takes a bounded time and runs no code of the
+    /// app.
     ///
     /// ```
     /// fn survived(body: &mut fass::SubtaskCode) {
@@ -375,7 +378,7 @@ impl core::fmt::Debug for SubtaskCode {
     }
 }
 
-/// What runs the instances of one subtask, one after another (R2): the
+/// The runner of one subtask's instances, one after another (R2): the
 /// [body](engine::SubtaskBody) in a platform's `Engine`.
 ///
 /// ```

@@ -5,7 +5,8 @@
 //! the platform. In a replay the body of a source is another one, which asks the
 //! platform for the values of the job, and sends them.
 //!
-//! What a subtask samples of such a topic is written down when it looks, and goes to the platform when
+//! A sample that a subtask takes of such a topic is written down when it looks, and goes to the
+//! platform when
 //! the instance is complete, or has failed: without it nobody could compute its fault again.
 
 use alloc::boxed::Box;
@@ -211,7 +212,7 @@ fn writer(topic: &dyn AnyRecorded, spec: &DagSpec) -> (usize, Role) {
     (writer.map_or(0, |(number, _)| number), role)
 }
 
-/// What sends the recorded value of a job to a topic.
+/// Sends the recorded value of a job to a topic.
 type Replayed = Box<dyn FnMut(u64) + Send>;
 
 impl<T: Recordable> RecordedTopic<T> {

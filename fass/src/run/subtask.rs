@@ -23,7 +23,7 @@ use super::plan::{Subtask, SubtaskCode};
 use super::topic::{DagWiring, Publisher, Subscriber, Token};
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
-/// What the commit calls to make a registered subtask's body: with the DAG's
+/// Makes a registered subtask's body, at the commit: with the DAG's
 /// wiring and the subtask's number.
 pub(crate) type MakeBody = Box<dyn FnOnce(&mut DagWiring, usize) -> SubtaskCode>;
 

@@ -2,7 +2,8 @@
 //!
 //! A [`Publisher`] is the writing end of a topic and owns the writer of every
 //! edge that leaves it, one a reading port, and one of every subtask that samples
-//! the topic's latest value; if it is recorded, a *tap* looks at each value before; a [`Subscriber`] is one reading
+//! the topic's latest value; if it is recorded, a *tap* looks at each value before; a
+//! [`Subscriber`] is one reading
 //! port. At commit [`DagWiring`] hands out the ends: whichever end of an edge is
 //! asked for first makes the ring and leaves the other end for the one
 //! that asks second. All rings exist before the first release, so no job can be missed
@@ -68,12 +69,12 @@ enum PublisherKind<T> {
     Other(Box<dyn Relay<T>>),
 }
 
-/// What takes values on their way to a topic's readers.
+/// A relay of values on their way to a topic's readers.
 pub(super) trait Relay<T>: Send + Sync {
     fn send(&mut self, job: u64, value: T);
 }
 
-/// What puts something between a writer and its readers.
+/// A function that puts a relay between a writer and its readers.
 pub(super) type Wrap<T> = Option<Box<dyn FnOnce(Publisher<T>) -> Publisher<T>>>;
 
 /// Any number of readers.
@@ -164,7 +165,7 @@ fn no_free_slot(job: u64) -> ! {
     )
 }
 
-/// What an edge between untyped subtasks carries: that the predecessor's
+/// The message of an edge between untyped subtasks: that the predecessor's
 /// instance is complete.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Token;

@@ -1,8 +1,10 @@
 //! Bodies driven by hand: what a platform may do with them, and what it is told if it does
 //! anything else.
 //!
-//! A platform that keeps no rule runs bodies too early, twice, with any job, users of a state at once,
-//! a writer while its value is looked at; and completes what it likes, never, twice, or before it has
+//! A platform that keeps no rule runs bodies too early, twice, with any job, users of a state at
+//! once,
+//! a writer while its value is looked at; and completes what it likes, never, twice, or before it
+//! has
 //! run. It gets panics in plain words; values are never torn, mixed between jobs, or lost track of.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -191,7 +193,7 @@ impl Drop for Counted {
     }
 }
 
-/// What a wrong order is told, and nothing else.
+/// The complaints about a wrong order.
 const COMPLAINTS: [&str; 3] = [
     "is missing: the platform started",
     "finds no free slot: the platform cancelled",

@@ -1,4 +1,4 @@
-//! What the compiler says about a wrong shape: our sentences, not only its own.
+//! The compiler's errors about a wrong shape: our sentences, not only its own.
 //!
 //! Each case is compiled by the `rustc` in the path against the library that
 //! this very test was built with. Without one (no `rustc` in the path, or one of

@@ -1,4 +1,4 @@
-//! What large typed chains cost in virtual time: their commit, and an instance.
+//! The cost of large typed chains in virtual time: of their commit, and of an instance.
 //!
 //! Chains of 100 to 100,000 subtasks have a `u64` on each edge. Of the commit the whole is
 //! measured, from the registered functions to bodies that can run: verification, answer,

@@ -23,7 +23,7 @@ first job is shown in which a function panics, if one does.
 exit codes: 0 nothing differs; 1 something does, a function panics, or there is no such job;
 2 a refused command line or file";
 
-/// What the words of the command line say.
+/// The command line, parsed.
 struct Words {
     file: OsString,
     from: Option<(String, u64)>,
@@ -33,8 +33,10 @@ struct Words {
 }
 
 /// Replays the recording that the command line names, in the `main` of an app's example;
-/// `--until DAG/JOB` stops at a job and shows what its subtasks got and gave, `--from DAG/JOB` begins
-/// late, and `--help` says the rest. `commit` gets the file's bytes, builds the app's DAGs and commits them.
+/// `--until DAG/JOB` stops at a job and shows what its subtasks got and gave, `--from DAG/JOB`
+/// begins
+/// late, and `--help` says the rest. `commit` gets the file's bytes, builds the app's DAGs and
+/// commits them.
 ///
 /// ```no_run
 /// use std::process::ExitCode;

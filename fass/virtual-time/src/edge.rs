@@ -1,4 +1,4 @@
-//! What crosses the edge of a run: written down, or taken from a recording.
+//! The edge of a run: values are written down, or taken from a recording.
 //!
 //! A *replay* does not call sources that are recorded, and takes their values; it gives subtasks
 //! what they sampled and the time that they were told; signals come when they came. No job is
@@ -22,11 +22,11 @@ use crate::VirtualTime;
 /// The edge of one machine.
 #[derive(Debug, Default)]
 pub(crate) struct Edge {
-    /// What the recordings of this machine say of themselves.
+    /// The header of this machine's recordings.
     header: RefCell<Header>,
     /// The values so far, in the order in which they were complete.
     values: RefCell<Vec<Kept>>,
-    /// What the running instance is told that asks for the time, if that is noted.
+    /// Times that the running instance was told, if they are recorded.
     told: RefCell<Option<Told>>,
     /// The inputs of the last jobs, if not all is kept.
     latest: RefCell<Option<LatestJobs>>,

@@ -26,7 +26,7 @@ pub struct JobShown {
     pub unmet_fault: Option<Divergence>,
 }
 
-/// What a subtask got and gave in a job.
+/// The inputs and outputs of a subtask in a job.
 ///
 /// See [`VirtualTime::until`](crate::VirtualTime::until).
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,13 +37,13 @@ pub struct SubtaskShown {
     pub times: Option<InstanceRecord>,
     /// The message of its panic, if it ended by one.
     pub panic: Option<String>,
-    /// What it got: values of topics that it reads or samples, and times that it asked for.
+    /// Its inputs: values of topics that it reads or samples, and times that it asked for.
     pub takes: Vec<Passed>,
-    /// What it gave.
+    /// Its outputs.
     pub gives: Vec<Passed>,
 }
 
-/// What passed between subtasks.
+/// A value that passed between subtasks.
 ///
 /// See [`VirtualTime::until`](crate::VirtualTime::until).
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -45,25 +45,25 @@ use crate::report::{PanicRecord, Report};
 use crate::settings::Settings;
 use crate::{VirtualTime, nanoseconds};
 
-/// What one thread's virtual machine is and does: the time, what crosses the edge of the run, and
+/// One thread's virtual machine: the time, the edge of the run, and
 /// what is to come.
 #[derive(Default)]
 pub(crate) struct Machine {
     pub(crate) settings: RefCell<Settings>,
-    /// What is recorded and replayed.
+    /// The edge, which records and replays.
     pub(crate) edge: Edge,
     /// The wires that are connected, and what has been sent on each.
     connected: RefCell<Vec<(Wire, Vec<u8>)>>,
     /// The time that functions are told: the start of the instance and what it
     /// has executed.
     pub(crate) now_ns: Cell<u64>,
-    /// What the running function has executed; `None` outside functions.
+    /// The time that the running function has executed; `None` outside functions.
     pub(crate) executed_ns: Cell<Option<u64>>,
     /// The instance of the running function.
     pub(crate) running: Cell<Option<Instance>>,
     /// The lines of the log so far.
     pub(crate) logs: RefCell<Vec<LogLine>>,
-    /// What is to come, by time and in the order in which it was made.
+    /// Arrivals to come, by time and in the order in which they were made.
     arrivals: RefCell<BTreeMap<(u64, u64), Arrival>>,
     /// How much of that there has been.
     count: Cell<u64>,
@@ -682,7 +682,7 @@ pub enum RunError {
         job: u64,
         /// The panic's message.
         message: String,
-        /// What happened up to the panic.
+        /// The report of the run up to the panic.
         report: Box<Report>,
     },
     /// A job of a DAG was asked for that is not in the commit.

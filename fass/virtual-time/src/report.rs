@@ -1,4 +1,4 @@
-//! What a run leaves behind: of the whole, of each DAG, each job and each instance.
+//! Reports of runs: of the whole, of each DAG, each job and each instance.
 
 use std::collections::BTreeMap;
 use std::ops::Deref;
@@ -211,7 +211,7 @@ impl Report {
     }
 }
 
-/// What one DAG did in a run.
+/// The report of one DAG in a run.
 ///
 /// See [`Report::dag`].
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! What a machine is asked to be, by the builder's methods, before the commit; how long calls take
+//! Settings of a machine, by the builder's methods, before the commit; how long calls take
 //! that do not say, and what it suffers: interrupts that come late, and calls that fail.
 //!
 //! All of it follows from what was asked alone, so that a run can be repeated.
@@ -11,7 +11,7 @@ use sched_dag::{Dag, Instance, Subtask, TaskSet};
 
 use crate::{VirtualTime, nanoseconds};
 
-/// What a machine is asked to be.
+/// Settings of a machine.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Settings {
     /// The terms of the commits to come.

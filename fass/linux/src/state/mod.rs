@@ -1,4 +1,4 @@
-//! What is under the scheduler's lock, and one step of it.
+//! The state under the scheduler's lock, and one step of it.
 //!
 //! The scheduler decides at one instant what each core runs;
 //! [`Placement`](sched_dag::placement::Placement) keeps what
@@ -14,7 +14,8 @@
 //! where it ran last, and the journal must tell of a core that has one instance at a time:
 //!
 //! - Nothing is there yet: it goes on and ends.
-//! - There is one that may lose its core: that one loses it, for as long as the scheduler's step takes.
+//! - There is one that may lose its core: that one loses it, for as long as the scheduler's step
+//! takes.
 //! - There is one that keeps its core, or one that has returned and will say so as soon as it gets
 //!   the lock. That one has not lost anything, so the end is *left*: it is reported when that one
 //!   has ended, by the thread that reports that, or, if the scheduler gives the parked one a core
@@ -74,9 +75,9 @@ pub(crate) struct State {
     pinned: Box<[Option<CoreId>]>,
     /// By worker, when its instance last went on after it had lost its core, on the clock.
     resumed_ns: Box<[u64]>,
-    /// What a worker that reports an end has just taken the processor from.
+    /// The core and vertex from which a worker that reports an end has just taken the processor.
     interrupted: Option<(CoreId, Vertex)>,
-    /// What has finished after it had lost its core, and is not reported yet.
+    /// Instances that finished after they had lost their core, and are not reported yet.
     pub(crate) left: Vec<Left>,
     /// Workers without a core and without an instance.
     pub(crate) spare: Vec<Number>,
@@ -98,7 +99,7 @@ pub(crate) struct State {
 pub(crate) struct RunTime {
     /// Time 0 on the clock; `u64::MAX` until the run has begun.
     pub(crate) epoch_ns: u64,
-    /// What was skipped since, because nothing ran.
+    /// The time skipped since, because nothing ran.
     skipped_ns: u64,
 }
 

@@ -21,7 +21,7 @@ const DAGS: [&str; 3] = ["low", "urgent", "first"];
 /// A team whose threads are played by the test.
 struct Stage {
     team: Arc<Team>,
-    /// What runs, by its DAG's name, with the worker that runs it.
+    /// Running instances, by their DAG's name, with the worker that runs each.
     running: BTreeMap<&'static str, (Number, Box<SubtaskRunner>)>,
     /// By DAG, the worker that began with its job.
     began: BTreeMap<&'static str, Number>,

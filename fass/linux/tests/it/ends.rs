@@ -1,4 +1,4 @@
-//! What is left behind when the program ends, in whatever way; and what it needs to begin.
+//! Ends of the program, which leave nothing behind; and what it needs to begin.
 //!
 //! The program under test is this very test program, started anew with a part to play.
 

@@ -1,4 +1,4 @@
-//! What can happen to a run from within and from outside, and what goes on regardless.
+//! Lives of runs: what can happen to one from within and from outside, and what goes on regardless.
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;

@@ -8,7 +8,7 @@ use crate::support::{alone, mechanisms, ms};
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Mechanism;
 
-/// What one job after the other has computed.
+/// Results of one job after the other.
 type Results = Arc<Mutex<Vec<u64>>>;
 
 /// A DAG that counts in steps of `step`, and squares that.

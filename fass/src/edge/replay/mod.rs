@@ -1,4 +1,5 @@
-//! What a replay takes from a recording, and what it finds: values that differ, and faults that do not
+//! Replays: values that come from a recording, and findings: values that differ, and faults that
+//! do not
 //! come again.
 //!
 //! A function that fails because of its inputs fails again. What it remembers of jobs that are not
@@ -42,14 +43,14 @@ pub struct Replay {
     /// Whether it says nothing of what came after its last entry.
     is_cut: bool,
     passed: Arc<SkippedInstances>,
-    /// What instances were answered that asked for the time.
+    /// Times that instances were told when they asked.
     clock: BTreeMap<(u16, u16, u64), ToldTimes>,
     /// The releases, if the DAG is sporadic; those of skipped jobs, too, so that the jobs after
     /// them keep their numbers.
     signals: BTreeMap<DagId, VecDeque<u64>>,
     /// The first job of each DAG that a signal is recorded of.
     first_signals: BTreeMap<DagId, u64>,
-    /// What has no value.
+    /// Entries without a value.
     events: Vec<Entry<'static>>,
     /// The instances that have failed in the recorded run, and in this one not yet.
     faults: Vec<RecordedFault>,
@@ -61,7 +62,7 @@ pub struct Replay {
     begins: Vec<u64>,
     /// See [`ReplayOutcome`].
     lacking: Option<(String, u64)>,
-    /// What the plan says of itself.
+    /// The header of the plan.
     own: Header,
     /// For each channel of the plan that of the recording, if it has one.
     channels: Vec<Option<u16>>,
@@ -83,7 +84,7 @@ struct ToldTimes {
     taken: usize,
 }
 
-/// What a replay has found.
+/// The findings of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ReplayOutcome {
     /// How many values were compared.

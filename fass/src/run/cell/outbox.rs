@@ -31,7 +31,7 @@ const FREE: usize = 0;
 /// Somebody has the claim.
 const CLAIMED: usize = 1;
 
-/// What was to be staged has no room.
+/// There was no room to stage a record.
 const LOST: usize = 2;
 
 struct RecordRing {
@@ -262,7 +262,7 @@ mod tests {
 
     use super::*;
 
-    /// What the record of a job holds: as many bytes as there are, from the job's on.
+    /// Returns the record of a job: as many bytes as there are, from the job's on.
     fn bytes_of(job: u64) -> Vec<u8> {
         let [low, ..] = job.to_le_bytes();
         let all = (0..=u8::MAX).map(|number| low.wrapping_add(number));

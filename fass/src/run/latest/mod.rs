@@ -1,4 +1,4 @@
-//! What carries a latest value from its writer to a subtask that samples it.
+//! Latest values: slots that carry one from its writer to a subtask that samples it.
 //!
 //! Each sampling subtask has three slots for itself: one that the writer fills, one
 //! that the reader looks at, and one in the middle. The writer, when complete, swaps
@@ -104,7 +104,7 @@ pub(crate) trait Stage<T>: Send + Sync {
     fn stage(&mut self, job: u64, value: T);
 }
 
-/// What looks at the samples of one subtask, or gives them in a replay. It gets the reader's slot,
+/// A probe of the samples of one subtask, which it records or replays. It gets the reader's slot,
 /// a [`Slot<T>`] whose type it knows, so that a subtask whose samples are not recorded has next to
 /// no code for it.
 pub(crate) trait Probe: Send + Sync {

@@ -1,4 +1,4 @@
-//! What a wire is made of: a ring of packets on their way in, and one of bytes on their way out.
+//! The rings of a wire: one of packets on their way in, and one of bytes on their way out.
 //!
 //! A platform is the other side of each: it says what has arrived, and takes what is to go.
 //! Both rings are made before the commit, and nothing here allocates, waits or loops without
@@ -6,18 +6,21 @@
 //!
 //! # The way in
 //!
-//! Packets are put together where bytes arrive, and taken apart by the receiver. In the ring a packet is its length, its time, and its bytes. It is shown when it is whole,
+//! Packets are put together where bytes arrive, and taken apart by the receiver. In the ring a
+//! packet is its length, its time, and its bytes. It is shown when it is whole,
 //! so the receiver finds whole packets only. One that finds no room is lost, however much room
 //! there is when its end comes: the packets before it stay.
 //!
 //! # The way out
 //!
-//! What an instance sends goes when it is complete, whole or not at all. The function puts its bytes ahead in the ring; the completion shows them, which is one store
+//! The bytes that an instance sends go when it is complete, all or none. The function puts its
+//! bytes ahead in the ring; the completion shows them, which is one store
 //! however many they are. If one of them found no room, all that the instance sent is lost.
 //!
 //! # The ring
 //!
-//! Bytes go from one side that writes to one that reads, perhaps on another core. They are put *ahead* of what is written, in any number of steps, and are there for the
+//! Bytes go from one side that writes to one that reads, perhaps on another core. They are put
+//! *ahead* of what is written, in any number of steps, and are there for the
 //! reader when they are *shown*, all at once. Neither side ever waits. Each byte is an atomic
 //! word, so nothing here is `unsafe`; that the reader finds what was put follows from the
 //! `Release` store that shows it.
@@ -72,7 +75,7 @@ pub enum Framing {
     Chunks,
 }
 
-/// What stands before a packet's bytes in the ring: its length and its time.
+/// The header before a packet's bytes in the ring: its length and its time.
 const HEADER_BYTES: usize = 4 + 8;
 
 /// The way in of a wire.
@@ -300,7 +303,7 @@ impl WireOutput {
     }
 }
 
-/// What the sender's completion does.
+/// The effect of the sender's completion.
 pub(crate) struct SendCompletion(pub(crate) Arc<WireOutput>);
 
 impl Effect for SendCompletion {

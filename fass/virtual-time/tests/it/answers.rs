@@ -1,4 +1,4 @@
-//! What the commit answers about deadlines and clusters, and that runs keep to it.
+//! Answers of the commit about deadlines and clusters, and that runs keep to them.
 
 use std::time::Duration;
 

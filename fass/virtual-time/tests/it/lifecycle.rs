@@ -1,4 +1,4 @@
-//! What functions change of a run besides their outputs: switches, signals; and what they may not.
+//! Changes that functions make to a run besides outputs: switches, signals; and those they may not.
 
 use crate::support::{every, job_numbers, named, run, ticking, work};
 use fass::{Dag, Switch, create_dag};

@@ -200,7 +200,7 @@ fn run(machine: &VirtualTime, set: &Set, raises: &[(usize, Duration)]) -> (Repor
     (report, said)
 }
 
-/// What happened, to which place of a DAG in which job, and the value.
+/// An event, the place of a DAG and the job that it happened to, and the value.
 type Said = (&'static str, (u16, u16, u64), Vec<u8>);
 
 /// Runs a case, and returns how much of what there was.

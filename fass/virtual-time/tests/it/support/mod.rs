@@ -80,7 +80,7 @@ pub(crate) fn job_numbers(takes_ms: u64) -> impl FnMut() -> (u64,) + Send + 'sta
     }
 }
 
-/// What functions saw, kept for the test.
+/// Values that functions saw, kept for the test.
 #[derive(Clone, Debug)]
 pub(crate) struct Seen<T>(Arc<Mutex<Vec<T>>>);
 
