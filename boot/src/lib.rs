@@ -1,4 +1,4 @@
-//! What the machine tells the kernel at its start.
+//! Boot information: all that the machine tells the kernel at its start.
 //!
 //! A loader that speaks PVH (`qemu -kernel` does) or Multiboot2 (GRUB does) jumps to
 //! `pvh_entry` of the crate `boot-entry` in 32-bit mode, which enters 64-bit mode, has what
@@ -8,7 +8,7 @@
 //! Words: the *image* is the program as linked, the *boot processor* the one
 //! that the firmware started, an *application processor* any other.
 //!
-//! What holds at the handover: interrupts are off, SSE is on, memory up to
+//! The state at the handover: interrupts are off, SSE is on, memory up to
 //! 4 GiB is identity-mapped and writable, and the stack is part of the image and
 //! has no guard page. The kernel replaces tables and stack as soon as it can.
 //!
@@ -48,7 +48,7 @@ pub const MAX_MODULES: usize = 4;
 /// The most bytes of the loader's words that are kept.
 pub const MOST_COMMAND_LINE_BYTES: usize = 2048;
 
-/// What is known of the machine when the kernel takes over.
+/// Information about the machine when the kernel takes over.
 #[derive(Debug)]
 pub struct BootInfo {
     /// The words that the loader passed, without interpretation.
@@ -101,7 +101,7 @@ pub struct Module {
     pub end: u64,
 }
 
-/// What a loader has told is collected piece by piece. Nothing here can fail: a loader that
+/// The loader's information is collected piece by piece. Nothing here can fail: a loader that
 /// tells less leaves lists empty, and the kernel, which can print, says what it misses.
 impl BootInfo {
     /// Creates what is known without a loader's help: when Rust code began to run, in ticks

@@ -1,4 +1,4 @@
-//! What a Multiboot2 loader tells: a list of tags, as GRUB gives it under BIOS and UEFI.
+//! Information of a Multiboot2 loader: a list of tags, as GRUB gives it under BIOS and UEFI.
 //!
 //! The layout is that of the Multiboot2 specification 2.0, 3.6. The loader's list lies in
 //! memory that counts as free, so all that is wanted is copied here; of the ACPI root
@@ -91,7 +91,7 @@ fn read_screen(memory: &impl PhysicalMemory, at: u64) -> Option<Framebuffer> {
 }
 
 fn read_memory_map(memory: &impl PhysicalMemory, start: u64, end: u64, info: &mut BootInfo) {
-    /// What is read of an entry; later versions may have more.
+    /// The bytes that are read of an entry; later versions may have more.
     const KNOWN: u64 = 20;
     let entry_size = memory.u32(start).map_or(0, u64::from);
     if entry_size < KNOWN {

@@ -6,7 +6,7 @@
 
 use crate::physical::PhysicalMemory;
 
-/// What is known of a machine's end.
+/// The registers by which a machine is ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Power {
     /// How to power it off.

@@ -1,4 +1,4 @@
-//! What a PVH loader tells: Xen's `hvm_start_info`, version 0 or 1.
+//! Information of a PVH loader: Xen's `hvm_start_info`, version 0 or 1.
 //!
 //! The layout is that of Xen's public header `arch-x86/hvm/start_info.h`.
 

@@ -1,4 +1,4 @@
-//! What only the image itself can define: its entry, allocator, panic handler
+//! Definitions that only the image itself can have: its entry, allocator, panic handler
 //! and the few functions that compiled code calls without being asked, which are
 //! [`mod@boot::memory_functions`].
 //!

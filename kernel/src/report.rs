@@ -6,7 +6,8 @@
 //!
 //! # What a fault leaves
 //!
-//! What a function owned when a fault ended it is lost: no destructor of it is called. Whatever a
+//! All that a function owned when a fault ended it is lost: no destructor of it is called.
+//! Whatever a
 //! DAG's functions have allocated in the run, and is in use after all that belongs to the run was
 //! dropped, is either that, or was handed to somebody else, such as a `static`.
 

@@ -57,7 +57,7 @@ pub struct Segment<'i> {
     pub start: u64,
     /// The physical address after its last byte.
     pub end: u64,
-    /// What it begins with; the rest is 0.
+    /// Its first bytes; the rest is 0.
     pub bytes: &'i [u8],
 }
 

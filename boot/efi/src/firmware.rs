@@ -1,7 +1,8 @@
 //! As much of UEFI as it takes to get memory, to say a line, and to leave.
 //!
 //! The tables and calls are those of the UEFI specification 2.10, 4.3 (system table), 7.2
-//! (memory), 7.4.6 (leaving), 9.1 (the loaded application), 12.4 (text) and 12.9 (screen). Of a table the
+//! (memory), 7.4.6 (leaving), 9.1 (the loaded application), 12.4 (text) and 12.9 (screen). Of a
+//! table the
 //! fields up to the last one in use are listed.
 //!
 //! **Firmware invariant**: while the value [`Firmware`] lives the boot services are there, and
@@ -13,9 +14,9 @@ use core::ptr::null_mut;
 
 use boot_efi::list::Range;
 
-/// What a call returns; 0 is success.
+/// The result of a call; 0 is success.
 type Status = usize;
-/// What stands for something of the firmware's.
+/// A handle of one of the firmware's objects.
 pub(crate) type Handle = *mut c_void;
 /// The name of a protocol or a table: the bytes of a GUID, in two halves.
 type Guid = [u64; 2];
@@ -25,7 +26,7 @@ const NEW_ACPI: Guid = [0x11d3_e4f1_8868_e871, 0x8188_3cc7_8000_22bc];
 const GRAPHICS: Guid = [0x4a38_23dc_9042_a9de, 0x6a51_80d0_de7a_fb96];
 const OLD_ACPI: Guid = [0x11d3_2d88_eb9d_2d30, 0x4dc1_3f27_9000_169a];
 
-/// What the firmware starts an application with.
+/// The table with which the firmware starts an application.
 #[repr(C)]
 pub(crate) struct SystemTable {
     header: [u64; 3],
@@ -137,7 +138,7 @@ struct Descriptor {
     pages: u64,
 }
 
-/// What [`Firmware::leave`] has left: the memory map, in steps of `step` bytes.
+/// The memory map that [`Firmware::leave`] has left, in steps of `step` bytes.
 pub(crate) struct MemoryMap {
     start: *const u8,
     length: usize,

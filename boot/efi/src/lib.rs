@@ -1,4 +1,4 @@
-//! What brings an image into memory where a firmware has UEFI and nothing else: the parts of
+//! A loader of images where a firmware has UEFI and nothing else: the parts of
 //! it that only look at bytes.
 //!
 //! The *application* (`main.rs`) is a PE file that the firmware starts. The host tool makes

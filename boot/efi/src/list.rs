@@ -1,4 +1,4 @@
-//! What the application tells the image: the list of tags that a Multiboot2 loader gives.
+//! The list of tags by which the application informs the image, as a Multiboot2 loader does.
 //!
 //! [`boot::multiboot2`] reads it, and says which tags there are. What does not fit is
 //! counted and not written, so that it can be refused once, at the end.

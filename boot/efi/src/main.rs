@@ -17,10 +17,10 @@ use firmware::{Firmware, Handle, Place, SystemTable};
 
 boot::memory_functions!();
 
-/// What may come to the memory map while memory is taken and the firmware ends, in bytes.
+/// Room for growth of the memory map while memory is taken and the firmware ends, in bytes.
 const MAP_SLACK: usize = 4096;
 
-/// What the list of tags takes at most besides words and memory map, in bytes.
+/// The most bytes that the list of tags takes besides words and memory map.
 const TAGS: usize = 512;
 
 #[panic_handler]

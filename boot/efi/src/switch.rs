@@ -9,7 +9,7 @@ use core::arch::asm;
 /// The segments: none, 32-bit code, data.
 const SEGMENTS: [u64; 3] = [0, 0x00cf_9b00_0000_ffff, 0x00cf_9300_0000_ffff];
 
-/// What runs below 4 GiB, in 32-bit mode.
+/// The code that runs below 4 GiB, in 32-bit mode.
 const CODE: [u8; 21] = [
     0xb8, 0x10, 0, 0, 0, // mov eax, 0x10: the data segment
     0x8e, 0xd8, // mov ds, eax

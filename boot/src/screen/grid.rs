@@ -1,4 +1,4 @@
-//! What stands where on the screen, and what of it has yet to be drawn.
+//! The grid of the screen's cells, with those that are yet to be drawn.
 //!
 //! Bytes are put into cells; a cell that has another letter than what is drawn there is
 //! *open*. Putting a byte draws nothing. It is not for two cores at once; a core that does it

@@ -1,4 +1,4 @@
-//! What the interrupts of a core do: its timer's, and another core's wake-up.
+//! Handlers of a core's interrupts: its timer's, and another core's wake-up.
 
 use core::sync::atomic::Ordering;
 

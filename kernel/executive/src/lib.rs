@@ -1,4 +1,4 @@
-//! What executes jobs on processors: the kernel's lower half.
+//! The executive: the kernel's lower half, which executes jobs on processors.
 //!
 //! An app names `kernel`, never this. The two are crates of their own because they are
 //! compiled for different ends: what is here is on the way from a release to a completion,

@@ -1,4 +1,4 @@
-//! What an app sees and a person reads, on whatever platform the app runs.
+//! The front: what an app sees and a person reads, on whatever platform the app runs.
 //!
 //! Lines, the words of the command line, reports and verdicts are the same on the bare machine
 //! and on Linux, because they are made here, once. An app names `kernel`, never this.

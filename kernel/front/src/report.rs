@@ -56,7 +56,7 @@ pub fn print_counts(snapshot: &DagSnapshot, model: &Dag) {
     );
 }
 
-/// What of the machine's memory is in use while nothing runs.
+/// The memory of the machine in use while nothing runs.
 ///
 /// See `Machine::resources`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +70,7 @@ pub struct MemoryInUse {
     pub contexts_free: usize,
 }
 
-/// What of its memory a program needs.
+/// The memory that a program needs.
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryDemand {
     /// The bytes of the heap that are in use.

@@ -1,4 +1,4 @@
-//! What an app sees of the kernel, with Linux below it.
+//! The kernel as an app sees it, with Linux below it.
 //!
 //! An app's `main.rs` names `kernel`: the machine that it is lent, the words of its command
 //! line, what it prints, the run that it gets back. This crate offers the same by the same

@@ -1,6 +1,7 @@
-//! What Linux does for an app's machine: so many cores of this computer.
+//! Linux as the system below an app's machine: so many cores of this computer.
 //!
-//! While a run goes on, people see the log, and at the console a person at standard input talks with
+//! While a run goes on, people see the log, and at the console a person at standard input talks
+//! with
 //! the run.
 
 use std::cell::{Cell, RefCell};
@@ -35,7 +36,7 @@ pub type Machine = front::app::machine::Machine<LinuxSystem>;
 pub struct LinuxSystem {
     pub(crate) linux: Linux,
     pub(crate) wire: RefCell<Option<WireEnds>>,
-    /// What the app has asked for that Linux does not have.
+    /// The refusal of a request that Linux cannot serve.
     pub(crate) refusal: RefCell<Option<UsageError>>,
     /// The reasons that end a run before its time.
     pub(crate) signals: EndSignals,
@@ -246,7 +247,7 @@ pub(crate) fn memory_kib() -> u64 {
     number.unwrap_or(0)
 }
 
-/// What comes on standard input; the thread that reads it lasts as long as the program.
+/// Bytes of standard input; the thread that reads it lasts as long as the program.
 static INPUT: OnceLock<Mutex<Receiver<u8>>> = OnceLock::new();
 
 /// The run of this program.

@@ -1,4 +1,4 @@
-//! What the kernel does for an app's machine.
+//! The kernel as the system below an app's machine.
 
 use alloc::string::String;
 use core::cell::Cell;
@@ -30,7 +30,7 @@ pub type Machine = front::app::machine::Machine<BareMachine>;
 /// The kernel, as an app's machine knows it.
 #[derive(Debug)]
 pub struct BareMachine {
-    /// What people want to see, and say, during a run.
+    /// Options of what people see, and say, during a run.
     wishes: BackgroundOptions,
     /// Whether a person has ended the latest run.
     is_shut_down: Cell<bool>,

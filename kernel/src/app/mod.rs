@@ -1,4 +1,4 @@
-//! What the kernel does for an app: for its machine, and for what its instances may share and
+//! Services of the kernel for an app: for its machine, and for what its instances may share and
 //! wait for outside their DAGs.
 //!
 //! The machine as an app sees it is the front's, and the app is not trusted: what it says is

@@ -1,7 +1,9 @@
 //! From the handover by `boot` to the app's function, and its end.
 //!
-//! On the way stand the line of kind `boot`, which says what machine this is, and warnings of what in
-//! it harms real time. A hypervisor hides what the processor states of itself, so on one nothing is said of that but
+//! On the way stand the line of kind `boot`, which says what machine this is, and warnings of what
+//! in
+//! it harms real time. A hypervisor hides what the processor states of itself, so on one nothing
+//! is said of that but
 //! in the line.
 
 use alloc::borrow::Cow;
@@ -37,7 +39,7 @@ use crate::watch::{self, panic};
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), AppError>;
 
-/// What tells functions the time, unless that is recorded or replayed.
+/// The clock of functions, unless time is recorded or replayed.
 ///
 /// ```no_run
 /// // To be told the time though the run is recorded, and leave no trace of it there:
@@ -197,7 +199,7 @@ fn module_bytes(info: &'static BootInfo) -> Option<&'static [u8]> {
     Some(unsafe { core::slice::from_raw_parts(start, length) })
 }
 
-/// What the boot processor takes along to its own stack.
+/// The values that the boot processor takes along to its own stack.
 struct BootHandover {
     info: &'static BootInfo,
     name: &'static str,

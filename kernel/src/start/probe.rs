@@ -23,7 +23,7 @@ use executive::run::contexts;
 use front::app::ending::AppError;
 use front::json;
 
-/// What the machine layer calls in place of the scheduler's handlers.
+/// Handlers in place of the scheduler's.
 pub(crate) const HANDLERS: Handlers = Handlers {
     timer: pass_token_on,
     wake: take_token,
@@ -113,7 +113,7 @@ fn step() {
     STEPS.store(step + 1, Ordering::Release);
 }
 
-/// What every core but core 0 does.
+/// The work of every core but core 0: it halts.
 fn rest() -> Parked {
     loop {
         interrupt_flag::enable_and_halt();

@@ -5,29 +5,45 @@
 //! | `policy=static\|edf` | how ready instances are ordered | `static` |
 //! | `preemption=on\|off` | whether a started instance may lose its core | `on` |
 //! | `budget_factor=N` | budget of a subtask with a WCET only, in WCETs; 0: none | 10 |
-//! | `overheads_ns=S,D,I,R` | what a commit charges: context switch, dispatch, interrupt, and for each instance that becomes ready | 0,0,0,0 |
+//! | `overheads_ns=S,D,I,R` | what a commit charges: context switch, dispatch, interrupt, and for
+//! each instance that becomes ready | 0,0,0,0 |
 //! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
-//! | `keep=N` | the record of the boot is sent, to QEMU's debug port or in lines: commits, events, times, and what crosses the edge of the run, from a buffer of N KiB; 0: it is not | 0 |
+//! | `keep=N` | the record of the boot is sent, to QEMU's debug port or in lines: commits, events,
+//! times, and what crosses the edge of the run, from a buffer of N KiB; 0: it is not | 0 |
 //! | `record=N` | the same, and it is an error if no topic is recorded | 0 |
-//! | `events=off\|on` | if neither is given: commits, events and times are sent, when a run is over | `off` |
-//! | `latest=N` | if neither is given and there is a debug port: the inputs of each DAG's last N jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |
+//! | `events=off\|on` | if neither is given: commits, events and times are sent, when a run is
+//! over | `off` |
+//! | `latest=N` | if neither is given and there is a debug port: the inputs of each DAG's last N
+//! jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |
 //! | `replay=N` | the next N bytes of the loader's module are a recording, which is replayed | 0 |
-//! | `from=DAG/JOB` | the replay begins with that job, or with the last one before it of which all states are recorded | all jobs |
-//! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs, or a quarter of the free memory |
+//! | `from=DAG/JOB` | the replay begins with that job, or with the last one before it of which all
+//! states are recorded | all jobs |
+//! | `trace_events=N` | the most events that a run's journal keeps; 0: none | what the run needs,
+//! or a quarter of the free memory |
 //! | `bounds=judge\|observe` | whether a run fails that exceeds a proven bound | `judge` |
 //! | `log=off\|error\|warn\|info\|debug` | up to which level lines of the log are said | `info` |
-//! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner | `halt` |
-//! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or how much each subtask uses of its stack | `nothing` |
-//! | `console=off\|stop\|on\|echo` | whether a person can end a run by ctrl-C (`stop`), and talk to the kernel; `echo` sends back what is typed | `off` |
+//! | `idle=halt\|poll` | whether idle cores halt, or watch for work, which wakes them sooner |
+//! `halt` |
+//! | `measure=nothing\|interrupts\|stacks` | whether sections without interrupts are measured, or
+//! how much each subtask uses of its stack | `nothing` |
+//! | `console=off\|stop\|on\|echo` | whether a person can end a run by ctrl-C (`stop`), and talk
+//! to the kernel; `echo` sends back what is typed | `off` |
 //! | `status=N` | seconds between two lines that say how a run does; 0: none | 0 |
-//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is judged | |
-//! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see `probe` | `off` |
-//! | `end=halt\|off\|reset` | what the machine does after the verdict, if no host ends it; it holds from the start on | `halt` |
-//! | `clock=acpi-pm-timer\|hpet\|local-apic-1ghz\|pit` | by which clock time is measured at the start | the first of them that counts |
+//! | `mode=...` | the host's name for what time means; `deterministic`: timers settle and
+//! computing cores take turns, see `machine::counted_time` and `turns`; `threads`: no bound is
+//! judged | |
+//! | `probe=off\|on` | whether the image runs no app and only shows what its machine does, see
+//! `probe` | `off` |
+//! | `end=halt\|off\|reset` | what the machine does after the verdict, if no host ends it; it
+//! holds from the start on | `halt` |
+//! | `clock=acpi-pm-timer\|hpet\|local-apic-1ghz\|pit` | by which clock time is measured at the
+//! start | the first of them that counts |
 //! | `avx=on\|off` | whether functions can use AVX, where the processor has it | `on` |
-//! | `x2apic=off\|on` | whether local APICs are put into x2APIC mode; where the firmware has left them so, or an id asks for it, they are | `off` |
+//! | `x2apic=off\|on` | whether local APICs are put into x2APIC mode; where the firmware has left
+//! them so, or an id asks for it, they are | `off` |
 //! | `cores=0-3,6` | which processors become cores, by their numbers | all |
-//! | `smt=on\|off` | whether siblings, processors that share a physical core, all become cores | `on` |
+//! | `smt=on\|off` | whether siblings, processors that share a physical core, all become cores |
+//! `on` |
 //!
 //! # Which of the machine's processors become cores: the words `cores=` and `smt=`
 //!
@@ -46,12 +62,12 @@ use front::options::{CommandLine, UsageError, whole_number};
 
 use crate::watch::background::{BackgroundOptions, ConsoleEcho};
 
-/// What the words say about runs to come; all else is set where it belongs.
+/// The settings of runs to come that the command line states; all else is set where it belongs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RunSettings {
-    /// What they say everywhere.
+    /// The settings that all platforms share.
     pub(crate) chosen: RunTerms,
-    /// What else people want to see, and say.
+    /// Options of what people see, and say.
     pub(crate) wishes: BackgroundOptions,
 }
 

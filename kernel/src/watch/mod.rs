@@ -1,4 +1,4 @@
-//! What looks in on a run, and speaks when it cannot go on.
+//! Watchers of a run: they look in on it, and report when it cannot go on.
 //!
 //! `background` is what core 0 does for people meanwhile: progress, status, the console, and
 //! instances that keep the others waiting. `panic` ends a kernel that is broken. Nothing

@@ -22,7 +22,7 @@ const MEASURE_NS: u64 = 50_000_000;
 /// The same where instructions are counted, as there all clocks follow the one count.
 const MEASURE_COUNTED_NS: u64 = 5_000_000;
 
-/// What was found of the time stamp counter's rate.
+/// The rate of the time stamp counter, as calibrated.
 #[derive(Clone, Copy, Debug)]
 pub struct TscRate {
     /// The clock that it was measured by.
@@ -190,7 +190,7 @@ impl<'c> TickCounter<'c> {
 /// A clock that counts up to some number of bits, and then from 0 again.
 #[derive(Clone, Copy, Debug)]
 pub struct KnownClock {
-    /// What the `boot` line and the word `clock=` call it.
+    /// Its name in the `boot` line and in the word `clock=`.
     pub name: &'static str,
     /// The time from one count to the next, in femtoseconds.
     tick_fs: u64,

@@ -53,7 +53,7 @@ fn scale(value: u64, factor: u64) -> u64 {
     }
 }
 
-/// What each clock advanced by in the same time.
+/// The advance of each clock in the same time.
 pub(super) struct ElapsedTicks {
     pub(super) ns: u64,
     pub(super) counter: u64,

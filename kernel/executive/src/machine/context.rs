@@ -86,7 +86,8 @@ impl fmt::Display for Registers {
     }
 }
 
-/// What x87, SSE and AVX take of a save area: 512 bytes as `fxsave64` writes them, a header
+/// The bytes that x87, SSE and AVX take of a save area: 512 bytes as `fxsave64` writes them, a
+/// header
 /// of 64 that says which parts are there, and the upper halves (Intel SDM 1, 13.4).
 pub(super) const VECTOR_BYTES: usize = 832;
 

@@ -12,7 +12,7 @@
 //! comes some 9 ns late. Which of the two is first depends on the host, some
 //! 1 halt in 100,000 goes the other way, and everything that follows is shifted.
 //!
-//! What is late by less than [`GRACE_NS`] can be made equally late: a timer's
+//! Interrupts that are late by less than [`GRACE_NS`] can be made equally late: a timer's
 //! interrupt, before it does or looks at anything, waits until exactly that long
 //! after its time ([`settle`]). As a loop has a length, it could not wait for a
 //! nanosecond; it executes as many `nop`s as nanoseconds are left. And a core reads

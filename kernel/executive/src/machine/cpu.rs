@@ -182,7 +182,7 @@ pub unsafe fn set_page_table(root: u64) {
     unsafe { asm!("mov cr3, {}", in(reg) root) };
 }
 
-/// What the processor says of the time stamp counter (CPUID 0x15): the denominator and the
+/// Returns the processor's figures of the time stamp counter (CPUID 0x15): the denominator and the
 /// numerator of its ratio to a crystal, and the crystal's rate in Hz; each 0 if it is left out.
 pub fn counter_ratio() -> [u32; 3] {
     const LEAF: u32 = 0x15;

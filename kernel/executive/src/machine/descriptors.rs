@@ -120,7 +120,8 @@ pub(super) fn load_segments(task_state: *mut TaskState) {
 
 static INTERRUPT_TABLE: SetOnce<Box<[[u64; 2]; 256]>> = SetOnce::new();
 
-/// Loads the interrupt table for this core. From `stubs` on, 16 bytes each, lie those of exceptions,
+/// Loads the interrupt table for this core. From `stubs` on, 16 bytes each, lie those of
+/// exceptions,
 /// those of the vectors in use, and one for all others.
 pub(crate) fn load_interrupts(stubs: u64) {
     if INTERRUPT_TABLE.get().is_none() {
@@ -159,7 +160,7 @@ const fn gate(address: u64, vector: usize) -> [u64; 2] {
     [low, address >> 32]
 }
 
-/// What `lgdt` and `lidt` read.
+/// The operand of `lgdt` and `lidt`.
 #[repr(C, packed(2))]
 struct TablePointer {
     limit: u16,

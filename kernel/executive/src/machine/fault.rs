@@ -15,7 +15,7 @@ const MACHINE_CHECK: u64 = 18;
 /// An exception, in words and numbers.
 #[derive(Debug)]
 pub struct CpuException<'a> {
-    /// What happened, such as `page fault`.
+    /// Its name, such as `page fault`.
     pub name: &'static str,
     /// The registers at the faulting instruction.
     pub registers: &'a Registers,

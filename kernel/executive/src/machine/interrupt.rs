@@ -31,7 +31,7 @@ unsafe extern "C" {
     safe static interrupt_stubs: u8;
 }
 
-/// What the machine layer calls.
+/// Handlers of the layer above, which the machine layer calls.
 #[derive(Debug)]
 pub struct Handlers {
     /// The local timer has fired.
@@ -45,7 +45,7 @@ pub struct Handlers {
     /// The code that was running cannot go on. If the handler returns, it has
     /// exchanged the context.
     pub exception: fn(&CpuException<'_>, &mut Interrupted),
-    /// What a context that begins anew does; it returns, with interrupts
+    /// The work of a context that begins anew; it returns, with interrupts
     /// disabled, the context to leave it for.
     pub work: fn() -> Parked,
     /// Takes a context that this core has no use for.

@@ -138,7 +138,7 @@ pub fn id() -> u32 {
 
 const SOFTWARE_ENABLE: u32 = 1 << 8;
 
-/// What turns a local APIC on, with only its timer unmasked. The software enable comes
+/// The writes that turn a local APIC on, with only its timer unmasked. The software enable comes
 /// first: until then, and after an INIT, each entry of the local vector table stays masked,
 /// even if it is written (Intel SDM volume 3, 11.4.7.2).
 const TURN_ON: [(ApicRegister, u32); 7] = [

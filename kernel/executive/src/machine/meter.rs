@@ -1,9 +1,9 @@
-//! What a core notes of how long its interrupts stay disabled.
+//! Meters of how long each core's interrupts stay disabled.
 
 use core::panic::Location;
 use core::sync::atomic::{AtomicPtr, AtomicU64};
 
-/// What one core has measured, in ticks of the time stamp counter.
+/// The measurements of one core, in ticks of the time stamp counter.
 #[derive(Debug)]
 pub(super) struct CoreMeter {
     /// When the current section began; 0 if there is none.

@@ -1,4 +1,4 @@
-//! What cores tell each other by the non-maskable interrupt, which no core can put off.
+//! Messages between cores by the non-maskable interrupt, which no core can put off.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 

@@ -9,7 +9,7 @@ use core::ops::Range;
 /// The smallest page, in bytes.
 pub(crate) const PAGE: u64 = 4096;
 
-/// What may be done with a page.
+/// The access that a page allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PageAccess {
     /// Read only.

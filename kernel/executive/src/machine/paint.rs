@@ -8,7 +8,8 @@ use super::this_core;
 /// The paint.
 const PAINT: u64 = 0x5ac4_71ed_0f00_d1e5;
 
-/// What the code that paints may use itself of the stack that it is on, the red zone included.
+/// The bytes that the painting code may use itself of the stack that it is on, the red zone
+/// included.
 const OWN_BYTES: u64 = 1024;
 
 /// Returns how much of the running context's stack has been used since the last call, in bytes,

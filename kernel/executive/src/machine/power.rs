@@ -9,7 +9,7 @@ use front::app::ending::AppExit;
 
 use super::{cpu, non_maskable, port, serial, this_core};
 
-/// What to do after the verdict.
+/// The action after the verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PowerAction {
     /// Stay as it is, with all cores halted.
@@ -112,7 +112,8 @@ fn write_control(control: u16, value: u16) {
     unsafe { port::write_u16(control, value) };
 }
 
-/// Ends the run, and says how: QEMU exits with 33, 35 or 37. Without the debug exit device the machine ends as was settled
+/// Ends the run, and says how: QEMU exits with 33, 35 or 37. Without the debug exit device the
+/// machine ends as was settled
 /// ([`set_end`]), or stays halted: all its cores are, or one would look into why
 /// this one is silent.
 pub fn exit(told: AppExit) -> ! {

@@ -1,6 +1,6 @@
 //! Text on the screen that the loader has left, if it has.
 //!
-//! What goes to the serial port is put here, too. That writes a byte into a table; drawing is
+//! Output to the serial port is put here, too. That writes a byte into a table; drawing is
 //! another step, a cell at a time, which costs about what a byte costs at the serial port,
 //! and is left to those who send such bytes.
 

@@ -111,7 +111,7 @@ impl SerialPort {
     /// Takes a byte that has been received, if there is one.
     pub fn receive(&self) -> Option<u8> {
         const DATA_READY: u8 = 1 << 0;
-        /// What a port reads as that does not exist.
+        /// The value that a port without a device reads as.
         const ABSENT: u8 = 0xff;
         // SAFETY: reading the line status of this module's device.
         let status = unsafe { port::read_u8(self.base + 5) };

@@ -16,11 +16,11 @@ use super::descriptors::{self, TaskState};
 use super::meter::CoreMeter;
 use fass::SetOnce;
 
-/// What a core needs to begin: the tops of stacks, each with a guard page below,
+/// The stacks with which a core begins: their tops, each with a guard page below,
 /// and the context that it runs first.
 #[derive(Debug)]
 pub struct CoreStacks {
-    /// What the core does first.
+    /// The context that the core runs first.
     pub first_context: Parked,
     /// Runs interrupt handlers.
     pub handler: u64,
@@ -85,7 +85,8 @@ pub struct Core {
     pub(super) behind_ticks: AtomicU64,
     /// Whether it is an efficiency core.
     pub(super) is_efficient: AtomicBool,
-    /// What runs here, in two words that the layer above chooses; for reports of panics.
+    /// The instance that runs here, in two words that the layer above chooses; for reports of
+    /// panics.
     pub running: [AtomicU64; 2],
 }
 

@@ -9,7 +9,7 @@ use core::sync::atomic::Ordering;
 use super::this_core::{self, Core};
 use super::{clock, counted_time, interrupt_flag, local_apic};
 
-/// What an alarm is for; each core has one of each.
+/// The purpose of an alarm; each core has one of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alarm {
     /// The scheduler's next event.

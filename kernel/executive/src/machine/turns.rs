@@ -20,7 +20,7 @@
 //! - No turn begins while any core handles an interrupt or wakes others.
 //! - A core that has the turn and takes no interrupts keeps it for some milliseconds only.
 //!
-//! What follows: at any time all cores but one are soon through with a visit, and that one
+//! It follows that at any time all cores but one are soon through with a visit, and that one
 //! is after [`TURN_NS`] at the latest. Then all are visited before the next turn begins. So
 //! an interrupt, and the start of an instance, wait for little more than a turn, or two,
 //! however many cores compute; and each of n that compute gets an n-th of the clock.

@@ -4,7 +4,7 @@
 //! and its last completion nothing of the kernel's allocates, and the counters
 //! here are the proof.
 //!
-//! What an instance allocates is its DAG's, as the word says that the layer above notes of what
+//! Allocations of an instance are its DAG's, as the word says that the layer above notes of what
 //! runs ([`OWNER_BIT`]). So after a run it can be told what faults have left in use.
 //!
 //! An app's function may use up the heap all the same. So subtasks cannot have the

@@ -32,7 +32,7 @@ struct PhysicalMemory {
 
 static MEMORY: SpinLock<Option<PhysicalMemory>> = SpinLock::new(None);
 
-/// What [`initialize`] found and built.
+/// The layout of memory that [`initialize`] found and built.
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryLayout {
     /// The page table's root, to be loaded by every core.

@@ -35,7 +35,7 @@ use front::json;
 const MESSAGE_BYTES: usize = 400;
 const NAME_BYTES: usize = 60;
 
-/// What happened, as the report says it.
+/// A contained fault, as its report states it.
 struct ContainedFault<'a> {
     cause: &'a str,
     message: &'a dyn Display,

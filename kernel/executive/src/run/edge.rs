@@ -1,4 +1,4 @@
-//! What crosses the edge of a run: recorded for the host, or replayed.
+//! The edge of a run: values are recorded for the host, or replayed.
 //!
 //! All that is known of recordings is behind [`Crossing`](fass::edge::Crossing), which only an
 //! image with a recorded topic has. It is used under the scheduler's lock, or for a moment by a

@@ -1,4 +1,4 @@
-//! What each core does: run what the scheduler assigns to it, else halt.
+//! The worker of each core: it runs what the scheduler assigns to it, else it halts.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 

@@ -1,6 +1,6 @@
 //! Text on the serial line, without disturbing what is being measured.
 //!
-//! What is printed is made into text by the context that prints it, outside every
+//! Text is made by the context that prints it, outside every
 //! lock (`TextPieces`), and goes into a bounded buffer in pieces (`buffer`); the lock is
 //! held for the copy of one piece. Outside a run it is sent at once. During a run it
 //! stays in the buffer until an idle core sends it, byte by byte, so that no subtask
@@ -22,7 +22,7 @@
 //!
 //! # Text that waits to be sent: a ring of bytes that takes whole pieces or none
 //!
-//! What is cut in the middle is worse than what is missing: half a machine line
+//! A line cut in the middle is worse than a missing one: half a machine line
 //! would make a run a failure. So a piece that does not fit is refused as a whole.
 //!
 //! Two promises are kept here, because only the ring knows what came before:

@@ -1,4 +1,4 @@
-//! What goes in and out as text: the serial line, and machine lines.
+//! Text in and out: the serial line, and machine lines.
 //!
 //! `console` takes text without disturbing what is measured. Of the run, nothing is known here.
 

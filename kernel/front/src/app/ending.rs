@@ -18,7 +18,7 @@
 //!
 //! # Calls that took longer than their WCETs
 //!
-//! What is proven rests on the WCETs, so a WCET that does not hold is worth a line even
+//! A proof rests on the WCETs, so a WCET that does not hold is worth a line even
 //! where every bound has held. A call includes the kernel's own work for it; so a subtask
 //! is named only if its longest call is above its WCET by more than the commit has charged
 //! for that.

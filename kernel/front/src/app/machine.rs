@@ -1,7 +1,7 @@
 //! The machine as an app sees it, on whatever system it runs.
 //!
-//! What an app may ask of it, how a run is judged and what is told of it are the same everywhere.
-//! What a system does itself is in its [`System`], by which each crate that apps know as `kernel`
+//! Its methods, how a run is judged and what is told of it are the same everywhere.
+//! The part that differs is in its [`System`], by which each crate that apps know as `kernel`
 //! names its own `Machine`.
 //!
 //! # What a machine does for an app besides runs
@@ -27,7 +27,7 @@ use crate::shell::parameters::ParameterTable;
 use crate::shell::topics::TopicCommands;
 use crate::shell::{LiveRun, PARAMETERS, TOPICS};
 
-/// What an app's machine is made of: the bare machine, or Linux.
+/// The system below an app's machine: the bare machine, or Linux.
 ///
 /// See [`Machine`].
 pub trait System: Sized {
@@ -75,7 +75,8 @@ pub trait System: Sized {
         (0, 0)
     }
 
-    /// Returns what was wrong with a recording: why it could not be replayed, and what makes the app
+    /// Returns what was wrong with a recording: why it could not be replayed, and what makes the
+    /// app
     /// fail, if anything was.
     fn objections() -> [Option<String>; 2];
 
@@ -107,7 +108,7 @@ pub struct Machine<S> {
     pub(super) module: Cell<Option<&'static [u8]>>,
     /// Whether the app has asked for that.
     has_asked: Cell<bool>,
-    /// What bytes of input raise during a run.
+    /// The signal that bytes of input raise during a run.
     input: RefCell<Option<Signal>>,
     /// Whether what they were like makes the app fail.
     verdict: RunVerdict,
@@ -275,8 +276,10 @@ impl<S: System> Machine<S> {
     /// # Errors
     ///
     /// [`AppError::Failure`] if nothing has been committed since the last run.
-    /// [`AppError::Shutdown`] if a person has ended the run, at the console, by ctrl-C, or on Linux by
-    /// SIGTERM: then each DAG has ended the jobs that it had in flight and released no more. If that
+    /// [`AppError::Shutdown`] if a person has ended the run, at the console, by ctrl-C, or on
+    /// Linux by
+    /// SIGTERM: then each DAG has ended the jobs that it had in flight and released no more. If
+    /// that
     /// run broke a rule of the model, it is a failure instead.
     ///
     /// See [`Run`].
@@ -363,7 +366,8 @@ impl<S: System> Machine<S> {
     ///
     /// # Errors
     ///
-    /// [`AppError::Usage`] if there is no such port, or neither end is named; [`AppError::Failure`] if
+    /// [`AppError::Usage`] if there is no such port, or neither end is named;
+    /// [`AppError::Failure`] if
     /// it has a wire already.
     ///
     /// ```no_run
@@ -411,7 +415,8 @@ impl<S: System> Machine<S> {
 
     /// Lets people set parameters: at the console by `set NAME VALUE`, before the first run by the
     /// word `set=NAME=VALUE,...` of the command line, which `./scripts/run --set` and `--params`
-    /// make. To be called before [`CommandLine::finish`](crate::options::CommandLine::finish), which
+    /// make. To be called before [`CommandLine::finish`](crate::options::CommandLine::finish),
+    /// which
     /// otherwise refuses that word.
     ///
     /// # Errors

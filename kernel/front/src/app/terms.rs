@@ -15,7 +15,7 @@ const POLICIES: [(&str, Policy); 2] = [("static", Policy::StaticPriority), ("edf
 const PREEMPTIONS: [(&str, Preemption); 2] =
     [("on", Preemption::Enabled), ("off", Preemption::Disabled)];
 
-/// What these words say.
+/// The configuration of a run that the command line states.
 #[derive(Clone, Copy, Debug)]
 pub struct RunTerms {
     policy: Policy,

@@ -16,7 +16,7 @@ pub(super) struct LineEditor {
     complete: usize,
 }
 
-/// What a byte has come to.
+/// The effect of a typed byte.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum TypedByte<'a> {
     /// The line goes on.

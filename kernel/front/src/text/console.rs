@@ -2,7 +2,8 @@
 //!
 //! Text and machine lines are told apart: only [`json`](super::json) can print a line that begins
 //! with `{`. What is printed goes to the function of the platform that the program's entry names
-//! by [`output!`](crate::output). It is found when the program is linked: a pointer to it would cost
+//! by [`output!`](crate::output). It is found when the program is linked: a pointer to it would
+//! cost
 //! each image bytes, and each line a look.
 //!
 //! # From a value's `Display` to the bytes that are handed over
@@ -27,7 +28,8 @@ mod bound {
     }
 }
 
-/// Makes a function of the platform's, `fn(OutputKind, fmt::Arguments<'_>)`, the one that all text of
+/// Makes a function of the platform's, `fn(OutputKind, fmt::Arguments<'_>)`, the one that all text
+/// of
 /// the program goes to. To be called once in a program.
 #[macro_export]
 macro_rules! output {
@@ -56,7 +58,7 @@ pub(super) fn write_line(kind: OutputKind, line: &dyn fmt::Display) {
 
 /// Prints text: on the serial line of the machine, on the standard output of Linux.
 ///
-/// What is printed is made into text by the caller's context, so a `Display` that
+/// Text is made by the caller's context, so a `Display` that
 /// panics or takes long is the caller's own affair.
 #[macro_export]
 macro_rules! print {
@@ -81,7 +83,7 @@ mod output {
 /// The most bytes that are handed over at once.
 pub const LONGEST: usize = 1024;
 
-/// What is printed.
+/// The kind of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutputKind {
     /// Text for people.

@@ -1,4 +1,4 @@
-//! What core 0 does for people while a run goes on, when it has nothing else to do.
+//! The background: work of core 0 for people while a run goes on, when it has nothing else to do.
 //!
 //! It prints progress, what functions say in the log, and the status if the command line asks for
 //! it, and holds the console's conversation. All this is core 0's background, which is suspended
@@ -17,7 +17,8 @@
 //! # Bytes from the serial port where no conversation takes them
 //!
 //! They come as events, each of which raises the signal of a sporadic DAG; and one ends the run in
-//! order before its time. That byte is what ctrl-C is on a serial line (ETX in ASCII). With `console=stop` core 0's
+//! order before its time. That byte is what ctrl-C is on a serial line (ETX in ASCII). With
+//! `console=stop` core 0's
 //! heartbeat looks for it, four times a second, so it counts however busy the cores are.
 //!
 //! For events the port is looked at by core 0's background, each time that the core wakes up and
@@ -46,7 +47,7 @@ use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, Scheduler, TaskSet};
 use status::{RunProgress, StatusPrinter};
 
-/// What the command line says about the background.
+/// Options of the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BackgroundOptions {
     /// Whether there is a console, and whether it sends back what is typed.
@@ -91,7 +92,7 @@ pub(crate) static LINE: SetOnce<&'static dyn Line> = SetOnce::new();
 /// For how long the background may not run before the heartbeat helps out.
 const STARVED_NS: u64 = 200_000_000;
 
-/// What is done in slices, by the background or by the heartbeat.
+/// Work done in slices, by the background or by the heartbeat.
 #[derive(Debug)]
 struct SlicedWork {
     status: Option<StatusPrinter>,

@@ -46,7 +46,7 @@ const MOST_CORES: usize = 64;
 /// The most instances that are named in a run.
 const MOST_NAMED: usize = 16;
 
-/// What was seen in this run. It begins as zeros, which take no room in an image.
+/// The state of the watch in this run. It begins as zeros, which take no room in an image.
 #[derive(Debug)]
 struct StallWatch {
     /// Whether there is a run.
@@ -57,7 +57,7 @@ struct StallWatch {
     named: usize,
 }
 
-/// What a core was seen to run.
+/// The instance that a core was seen to run.
 #[derive(Clone, Copy, Debug)]
 struct SeenInstance {
     instance: Option<Instance>,
@@ -197,7 +197,7 @@ const _: () = assert!(
     "core 1 asks core 0 before it accuses it"
 );
 
-/// What is to be done about a core.
+/// The response to a core's silence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum StallResponse {
     None,

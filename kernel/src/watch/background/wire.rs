@@ -28,17 +28,17 @@ use front::report::tell_wire;
 /// The time between two looks at the port.
 pub(super) const PERIOD_NS: u64 = 1_000_000;
 
-/// What the port's FIFO holds.
+/// The capacity of the port's FIFO, in bytes.
 const FIFO_BYTES: usize = 16;
 
 struct WireConnection {
     wire: Wire,
     port: &'static SerialPort,
-    /// What arrives in each run, in place of what the port gets.
+    /// Bytes that arrive in each run, in place of those of the port.
     script: Option<&'static [u8]>,
 }
 
-/// What of the script is still to arrive in this run; `None` outside runs.
+/// The rest of the script, still to arrive in this run; `None` outside runs.
 static REST: SpinLock<Option<&'static [u8]>> = SpinLock::new(None);
 
 /// Connects the wire to the port, or its way in to the script.

@@ -1,6 +1,6 @@
 //! The clusters that the cores are divided into: what each has for itself.
 //!
-//! Whatever happens on a core takes its cluster's lock, steps its cluster's scheduler and
+//! Each event on a core takes its cluster's lock, steps its cluster's scheduler and
 //! writes into its cluster's journal; so the hot path of one cluster touches no word of
 //! another's. The first core of a cluster keeps its time.
 //!
@@ -16,7 +16,7 @@ use super::ClusterRun;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core::{self, Core};
 
-/// What a cluster has for itself, on cache lines of its own.
+/// The state of one cluster, on cache lines of its own.
 #[repr(align(128))]
 pub(super) struct ClusterState {
     pub(super) execution: SpinLock<Option<ClusterRun>>,

@@ -1,4 +1,4 @@
-//! What only divided cores need: an image without the feature `clusters` has none of it.
+//! The part that only divided cores need: an image without the feature `clusters` has none of it.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;

@@ -1,4 +1,4 @@
-//! Who has the runner of each subtask, so that a fault does not cost it.
+//! Loans of runners: where that of each subtask is, so that a fault does not lose it.
 //!
 //! A *loan* is what one uses a runner by. It moves between the runner's place and the core that
 //! runs an instance. If a fault ends that, the loan is somewhere on the stack of a context that

@@ -48,7 +48,7 @@ use step::RequestQueue;
 pub use step::{complete, fail, find_work, interrupt};
 pub use step::{raise, raise_in_interrupt};
 
-/// What a core is to do next.
+/// The next work of a core.
 pub enum CoreWork {
     /// Call the subtask's function for the instance.
     Run(RunnerLoan),
@@ -63,7 +63,7 @@ struct ClusterRun {
     engine: Engine<RunnerLoan, Parked>,
     loans: RunnerTable,
     cluster: &'static cluster::ClusterState,
-    /// What core 0 does when nothing is assigned to it, while something is.
+    /// The context of core 0 when nothing is assigned to it, while it is parked.
     background: Option<Parked>,
     /// When the next dispatch is due, on the clock, if it waits for further events
     /// of the instant in hand.

@@ -1,4 +1,4 @@
-//! What the rest of the kernel, and a person, may ask of a run, and change in it, while it goes on.
+//! Queries and changes of a run while it goes on, for the rest of the kernel and for a person.
 //!
 //! To be called by core 0's background. Each question and each change holds a
 //! cluster's lock for a bounded time; nothing is allocated.

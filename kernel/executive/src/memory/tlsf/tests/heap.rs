@@ -16,7 +16,7 @@ pub(super) struct TestHeap {
     regions: Vec<TestRegion>,
 }
 
-/// What a walk over the tiling found.
+/// The findings of a walk over the tiling.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct HeapWalk {
     pub(super) used_blocks: usize,

@@ -1,4 +1,4 @@
-//! What one or a few operations do, case by case, where random traces do not tell it:
+//! Cases of one or a few operations, where random traces do not show their effect:
 //! those tell that blocks merge, that every alignment is served and its slack returned,
 //! and that an exhausted heap recovers.
 
