@@ -1,6 +1,6 @@
 //! Booting in Bochs, the emulator that imitates a PC more strictly than QEMU does.
 //!
-//! What it judges that QEMU does not: a local APIC that is not enabled keeps its timer
+//! It judges what QEMU does not: a local APIC that is not enabled keeps its timer
 //! masked, processors come out of INIT with their caches off, and x2APIC, the counter's
 //! deadline timer and five-level paging are there, as on PCs of today. It is slow, and its
 //! clock is its own: a test may judge by counts and order alone.

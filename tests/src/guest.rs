@@ -10,7 +10,7 @@
 //! assert_eq!(outcome.transcript.of_kind("fork_join").count(), 3);
 //! ```
 //!
-//! Whatever goes wrong ends in a panic that shows the end of the serial log
+//! Any failure ends in a panic that shows the end of the serial log
 //! and where all of it lies. A good run's log is removed.
 
 use std::cell::RefCell;
@@ -47,7 +47,7 @@ pub struct Guest {
     altered: Option<Arc<Altered>>,
     words: Vec<String>,
     limit: Duration,
-    /// What to say at the console, each once a line with such a text has come.
+    /// The words to type at the console, each once a line with such a text has come.
     conversation: Vec<(String, String)>,
 }
 

@@ -1,4 +1,4 @@
-//! What the boot tests share, above the host tool's library: a [`Guest`] that a test
+//! Support of the boot tests, above the host tool's library: a [`Guest`] that a test
 //! describes and boots, [`said`] for what it says, [`stick`] for what it boots from as a PC does,
 //! [`bochs`], where it is not QEMU that boots it, [`markdown`] and
 //! [`fault_page`] for pages that are held to their word, and the tutorials, whose examples are

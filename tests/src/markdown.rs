@@ -10,7 +10,7 @@ use tool::system::workspace;
 /// A block of a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// What the opening fence says.
+    /// The text of the opening fence.
     pub info: String,
     /// Its lines, each with its newline.
     pub text: String,

@@ -1,4 +1,4 @@
-//! What a guest has said, as a test looks for it: what is not there ends in a panic that shows
+//! A guest's output, as a test looks for it: a missing line ends in a panic that shows
 //! the end of the log.
 
 use tool::Outcome;
@@ -6,7 +6,7 @@ use tool::protocol::{MachineLine, Transcript};
 use tool::record::Run;
 use tool::trace;
 
-/// What a run has to tell.
+/// Queries of a run's output.
 pub trait Said {
     /// Returns what it has said, taken apart.
     fn transcript(&self) -> &Transcript;
@@ -64,7 +64,7 @@ impl Said for Outcome {
     }
 }
 
-/// What a machine line has to tell.
+/// Queries of a machine line's members.
 pub trait Members {
     /// Returns the number at a path such as `join_latency_ns.max`.
     fn number(&self, path: &str) -> u64;

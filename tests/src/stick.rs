@@ -1,4 +1,4 @@
-//! What holds of every boot from a stick, whatever loads the image.
+//! Checks of every boot from a stick, whatever loads the image.
 
 use std::fs;
 

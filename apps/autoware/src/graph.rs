@@ -15,7 +15,7 @@ use crate::{WCET_OF_ENDS, Workload};
 /// The lidar job that a value goes back to, if any: what all topics carry.
 pub type Origin = Option<u64>;
 
-/// What a sampling function gets.
+/// The argument of a sampling function.
 type Sampled<'a> = Option<Sample<'a, Origin>>;
 
 /// The periods of the drivers and of the planner's timer.
@@ -34,7 +34,7 @@ pub struct System {
     pub acted_on: Arc<[AtomicU64]>,
 }
 
-/// What a recording has of each DAG: what its sources write, which is what a replay sends, then
+/// The topics that a recording has of each DAG: those of its sources, which a replay sends, then
 /// what other DAGs sample and what it comes to.
 const RECORDED: [&[&str]; 6] = [
     &[

@@ -7,18 +7,20 @@
 //!
 //! # From callbacks to DAGs
 //!
-//! What runs at one rate, started by one cause, is one DAG. An edge inside it is a
+//! Nodes that run at one rate, started by one cause, are one DAG. An edge inside it is a
 //! topic, and a node that fuses two of its topics is a join. Where an edge leads to
 //! another rate, or to a node with a timer of its own, the callbacks of ROS 2 leave
 //! the value in a member variable; here the reader samples the *latest value*.
 //!
 //! | DAG | period | subtasks | samples |
 //! |---|---|---|---|
-//! | `lidar` | 100 ms | the two lidar drivers to `ObjectCollisionEstimator`, `NDTLocalizer` and `IntersectionOutput`: 11 | `map`, `settings` |
+//! | `lidar` | 100 ms | the two lidar drivers to `ObjectCollisionEstimator`, `NDTLocalizer` and
+//! `IntersectionOutput`: 11 | `map`, `settings` |
 //! | `map` | 120 ms | `PointCloudMap`, `PointCloudMapLoader` | |
 //! | `settings` | 25 ms | `EuclideanClusterSettings` | |
 //! | `visualizer` | 60 ms | `Visualizer` | |
-//! | `route` | 100 ms | `Lanelet2Map`, `Lanelet2GlobalPlanner` to the two planners: 5 | `visualizer`, `lidar` |
+//! | `route` | 100 ms | `Lanelet2Map`, `Lanelet2GlobalPlanner` to the two planners: 5 |
+//! `visualizer`, `lidar` |
 //! | `behaviour` | 100 ms | `BehaviorPlanner` to `VehicleDBWSystem`: 4 | `lidar`, `route` |
 //!
 //! 19 edges are topics, 10 are samples. A node that fuses two rates runs, as a DAG
@@ -65,7 +67,7 @@ pub const WCET_OF_ENDS: Duration = Duration::from_micros(100);
 /// The number of subtasks.
 pub const SUBTASKS: usize = 24;
 
-/// What a run of the system is made of.
+/// The workload of a run of the system.
 #[derive(Clone, Copy, Debug)]
 pub struct Workload {
     /// The number of jobs of the lidars, which come every 100 ms; the other DAGs

@@ -65,7 +65,7 @@ fn workload(machine: &Machine) -> Result<Workload, AppError> {
     })
 }
 
-/// What the commit proves of the two latencies.
+/// The bounds that the commit proves of the two latencies.
 #[derive(Clone, Copy)]
 struct Bounds {
     hot_path_ns: Option<u64>,

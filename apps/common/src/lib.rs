@@ -1,4 +1,4 @@
-//! What several apps need and none of them owns.
+//! Parts that several apps need and none of them owns.
 //!
 //! - [`random`]: numbers that are the same for a seed, everywhere;
 //! - [`each_arity`]: one row for each number of values that a join can have.

@@ -32,10 +32,10 @@ const FRESH_NS: u64 = 50_000_000;
 const WANTED_CM: i32 = 2_000;
 const FASTEST_CM_S: i32 = 3_000;
 
-/// What a packet means: a gap in cm.
+/// The decoder of a packet: it holds a gap in cm.
 pub type Decoder = fn(&[u8]) -> Option<i32>;
 
-/// What releases a job of `cruise`.
+/// The source of `cruise`'s releases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Releases {
     /// The time.

@@ -1,4 +1,4 @@
-//! What the commit would refuse, told with the lines of the file.
+//! Faults that the commit would find, told with the lines of the file.
 //!
 //! The commit names DAGs and subtasks. The author of a file looks for a line, so
 //! each fault is given that of the edge, subtask or DAG that it is about.

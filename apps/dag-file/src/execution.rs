@@ -1,6 +1,6 @@
 //! How long an instance executes.
 //!
-//! What an instance draws follows from the seed, its set's position of the
+//! The time that an instance draws follows from the seed, its set's position of the
 //! subtask and its job alone. So two policies, or two numbers of cores, get the
 //! same load.
 
@@ -32,7 +32,7 @@ pub enum Execution {
 }
 
 impl Execution {
-    /// What [`parse`](Self::parse) reads, for messages.
+    /// The forms that [`parse`](Self::parse) reads, for messages.
     pub const FORMS: &'static str = "wcet, uniform:0.2..1 (fractions of the WCET) or samples";
 
     /// Reads `wcet`, `uniform:LO..HI` with fractions of the WCET, or `samples`.

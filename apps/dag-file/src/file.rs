@@ -1,4 +1,4 @@
-//! What a DAG file says.
+//! The contents of a DAG file.
 //!
 //! The DAGs themselves are specs of `sched-dag`. Next to each stands what only the
 //! file knows: the lines, for messages, and the samples of execution times.
@@ -32,16 +32,16 @@ pub struct FileDag {
     pub spec: DagSpec,
     /// The line that begins it, counted from 1.
     pub line: usize,
-    /// What else is known about each subtask, in the order of the spec.
+    /// More about each subtask, in the order of the spec.
     pub subtasks: Vec<FileSubtask>,
     /// The line of each edge, in the order of the spec.
     pub edge_lines: Vec<usize>,
-    /// What a reader of the file should know of the DAG, a sentence each; comments
+    /// Remarks about the DAG for a reader of the file, a sentence each; comments
     /// in our own format.
     pub remarks: Vec<String>,
 }
 
-/// What a file says about a subtask beyond its spec.
+/// The lines of a file about a subtask, beyond its spec.
 #[derive(Clone, Debug, Default)]
 pub struct FileSubtask {
     /// The line that states it, counted from 1.

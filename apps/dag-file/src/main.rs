@@ -34,7 +34,7 @@ const WORDS: [&str; 9] = [
     "deadlines",
 ];
 
-/// What the command line says besides how a set is run.
+/// Options of the command line besides how a set is run.
 struct Wishes {
     settings: Settings,
     /// Whether a deadline miss makes the run a failure.

@@ -1,4 +1,4 @@
-//! What a set's run has shown, DAG by DAG, next to what its commit had promised.
+//! The report of a set's run, DAG by DAG, next to the bounds of its commit.
 
 use alloc::format;
 use alloc::string::{String, ToString};

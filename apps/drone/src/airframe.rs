@@ -19,10 +19,10 @@ pub const MASS: f64 = 1.2;
 /// The moments of inertia, in kg m^2.
 pub const INERTIA: Vector = [0.012, 0.012, 0.02];
 
-/// What slows the airframe down, in 1/s.
+/// The drag of the airframe, in 1/s.
 const DRAG: f64 = 0.25;
 
-/// What the rotors do.
+/// The force of the rotors.
 #[derive(Clone, Copy, Debug)]
 pub struct Force {
     /// Along the body's upward axis, in N.
@@ -32,7 +32,7 @@ pub struct Force {
 }
 
 impl Force {
-    /// What holds the airframe up.
+    /// The force that holds the airframe up.
     pub const HOVER: Force = Force {
         thrust: MASS * GRAVITY,
         torque: [0.0; 3],
@@ -52,7 +52,7 @@ pub struct Pose {
     pub rates: Vector,
 }
 
-/// What the sensors on board measure, with noise.
+/// Measurements of the sensors on board, with noise.
 #[derive(Clone, Copy, Debug)]
 pub struct Measured {
     /// The gyroscopes, in rad/s.

@@ -10,7 +10,7 @@ use crate::airframe::{Force, INERTIA, MASS, Measured, Vector, turned};
 use crate::camera::Fix;
 use crate::{GRAVITY, SECONDS};
 
-/// What the loop believes.
+/// The state that the loop estimates.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Estimate {
     /// Roll, pitch and yaw.

@@ -49,7 +49,7 @@ const GROUND: f64 = 0.5;
 /// How far the drone comes down between two jobs of `descent`.
 const STEP: f64 = 0.075;
 
-/// What the battery has at first, in thrust and time; to hover takes 11.8 a second.
+/// The battery's charge at first, in thrust and time; to hover takes 11.8 a second.
 const CHARGE: f64 = 130.0;
 
 /// The drone's DAGs, and what is known of the flight when they have ended.
@@ -362,7 +362,7 @@ struct Views {
     height: Latest<f64>,
 }
 
-/// What an image was taken from, and what was believed then.
+/// The pose that an image was taken from, and the estimate at that time.
 type Taken = (Pose, Option<Estimate>);
 
 /// The latest value, if there has been one.

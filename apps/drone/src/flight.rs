@@ -1,4 +1,4 @@
-//! What is left to be said of a flight when it is over.
+//! The report of a flight when it is over.
 
 use alloc::sync::Arc;
 use core::fmt;

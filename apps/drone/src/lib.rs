@@ -52,7 +52,7 @@ pub(crate) const SECONDS: f64 = 0.001;
 /// The time between two frames: 30 in a second.
 pub const FRAME: Duration = Duration::from_micros(33_333);
 
-/// What a flight is made of.
+/// The workload of a flight.
 #[derive(Clone, Copy, Debug)]
 pub struct Workload {
     /// How long the flight takes, in seconds.
@@ -62,7 +62,7 @@ pub struct Workload {
     /// Whether each subtask takes its WCET besides what it computes: for virtual time, where
     /// computing takes none.
     pub takes_wcet: bool,
-    /// What `detect` takes longer than that, as it must not; zero in a sound flight.
+    /// The time that `detect` takes beyond that, as it must not; zero in a sound flight.
     pub delay: Duration,
     /// After how many frames `detect` panics; `None` in a sound flight.
     pub fault_at: Option<u64>,

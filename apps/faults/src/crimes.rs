@@ -1,4 +1,4 @@
-//! What no subtask may do, done on purpose: the machine must stop each.
+//! Crimes: acts that no subtask may do, done on purpose. The machine must stop each.
 //!
 //! If one of these returned, the protection that it is a test of would be
 //! missing; the caller can tell by [`Unpunished`].

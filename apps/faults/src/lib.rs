@@ -35,7 +35,7 @@ pub const BUDGET: Duration = Duration::from_millis(6);
 /// The job in which the doomed DAG commits its crime.
 pub const FATAL_JOB: u64 = 10;
 
-/// What the doomed DAG survives, unless it is ended.
+/// The faults that the doomed DAG survives, unless it is ended.
 const FAULT_LIMIT: FaultLimit = FaultLimit {
     faults: 1,
     window: 10,
@@ -45,7 +45,7 @@ const FAULT_LIMIT: FaultLimit = FaultLimit {
 /// The jobs of each DAG.
 pub const JOBS: u64 = 30;
 
-/// What becomes of the doomed DAG after its crime.
+/// The fate of the doomed DAG after its crime.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Policy {
     /// It is ended.

@@ -101,7 +101,7 @@ fn endure(machine: &Machine, times: u32) -> Result<(), AppError> {
     Ok(())
 }
 
-/// What a fault did beyond its own DAG.
+/// The effect of a fault beyond its own DAG.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Verdict {
     /// Nothing.

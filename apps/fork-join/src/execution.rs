@@ -1,6 +1,6 @@
 //! How execution times are spent: simulated, or by computing.
 //!
-//! What computes is to take as long as was drawn *with a core for itself*: the pace of one
+//! A computation is to take as long as was drawn *with a core for itself*: the pace of one
 //! core is measured before anything else runs. Next to others it may take longer, as where
 //! instructions are counted, or memory is shared.
 

@@ -1,4 +1,4 @@
-//! What a fork-join run shows: its latencies and its counts.
+//! Figures of a fork-join run: its latencies and its counts.
 
 use alloc::format;
 use alloc::string::String;

@@ -53,7 +53,7 @@ pub const MOST_IN_FLIGHT: u32 = 256;
 /// The most parallel subtasks: the sink's arguments are a tuple.
 pub const MOST_PARALLEL: usize = sched_dag::MAX_ARITY;
 
-/// What a fork-join run is made of.
+/// The workload of a fork-join run.
 #[derive(Clone, Copy, Debug)]
 pub struct Workload {
     /// The number N of parallel subtasks, 1 to [`MOST_PARALLEL`].

@@ -35,7 +35,7 @@ pub const DAG: &str = "gait";
 pub const TOPIC: &str = "sample";
 
 recording::recordable! {
-    /// What both sensors measure at one time.
+    /// The measurements of both sensors at one time.
     #[derive(Clone, Debug)]
     pub struct Sample {
         /// On the upper leg.
@@ -44,7 +44,7 @@ recording::recordable! {
         pub lower: Sensor,
     }
 
-    /// What a sensor measures, along its axes.
+    /// The measurements of a sensor, along its axes.
     #[derive(Clone, Debug)]
     pub struct Sensor {
         /// The acceleration, in m/s^2.

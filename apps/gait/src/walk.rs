@@ -1,4 +1,4 @@
-//! What a walk leaves behind: the orientations after each sample.
+//! The result of a walk: the orientations after each sample.
 
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -40,7 +40,8 @@ impl Walk {
         (self.rows()).map(|row| (2.0 * acos(row[8].abs().min(1.0))).to_degrees())
     }
 
-    /// Returns a hash of all bits (FNV-1a with 64 bits, over whole words): two walks with the same one
+    /// Returns a hash of all bits (FNV-1a with 64 bits, over whole words): two walks with the same
+    /// one
     /// are the same.
     #[must_use]
     pub fn digest(&self) -> u64 {

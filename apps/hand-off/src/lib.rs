@@ -214,7 +214,7 @@ pub struct Stamps {
     times: Vec<Arc<[AtomicU64]>>,
 }
 
-/// What one body writes its times with.
+/// A pen, by which one body writes its times.
 #[derive(Debug)]
 pub struct Pen {
     times: Arc<[AtomicU64]>,

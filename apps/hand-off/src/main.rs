@@ -71,7 +71,7 @@ fn wake_ups(machine: &Machine, plan: &Plan) -> Result<(), AppError> {
     branches.try_for_each(|&parallel| measure::wake_ups(machine, parallel))
 }
 
-/// What is to be measured.
+/// The measurements to be taken.
 struct Plan {
     part: Part,
     jobs: u64,

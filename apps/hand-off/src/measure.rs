@@ -6,7 +6,8 @@
 //! *Preemption*: from a release to the preemptor's first instruction, and back.
 //! A low subtask reads the clock all the time, and keeps the longest time between
 //! two readings of a job: that is when it was preempted. The preemptor stamps. The journal has the
-//! kernel's own times of request, suspension, start, finish and continuation, which no body can see.
+//! kernel's own times of request, suspension, start, finish and continuation, which no body can
+//! see.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -23,7 +24,7 @@ use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::InstanceRecord;
 use sched_dag::{CoreId, DagId, Instance, SubtaskId};
 
-/// What reading the clock costs, and what a stamp does.
+/// Measures the cost of reading the clock, and of a stamp.
 pub(crate) fn clock() {
     const READINGS: usize = 200;
     let mut readings = [0; READINGS];
@@ -100,7 +101,8 @@ fn emit_join(name: &str, all: &Measured) {
     all.emit(name, "ready_to_start", &ready, &started);
 }
 
-/// A fork and its join: how often the scheduler makes the sink ready. A system that wakes a sink for
+/// A fork and its join: how often the scheduler makes the sink ready. A system that wakes a sink
+/// for
 /// each of its inputs makes N wake-ups of a join of N.
 pub(crate) fn wake_ups(machine: &Machine, parallel: usize) -> Result<(), AppError> {
     const JOBS: u64 = 20;

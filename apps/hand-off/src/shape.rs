@@ -33,7 +33,7 @@ pub enum Shape {
     Layered {
         /// The number of subtasks, source and sink included; at least 3.
         subtasks: usize,
-        /// What the draws start from.
+        /// The state of the draws.
         seed: u64,
     },
 }

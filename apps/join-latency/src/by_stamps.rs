@@ -239,7 +239,7 @@ impl Experiment {
     }
 }
 
-/// What is published: a job's number, and a stamp.
+/// A published message: a job's number, and a stamp.
 type Message = Stamped<u64>;
 
 /// The callbacks of one group, with what they have seen so far.

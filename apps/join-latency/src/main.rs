@@ -184,7 +184,7 @@ fn span(times: &InstanceRecord) -> Option<Span> {
 /// How many executions or joins one line holds.
 const BATCH: usize = 32;
 
-/// What became of a condition.
+/// The outcome of a condition.
 pub(crate) struct Outcome {
     pub(crate) samples: Samples,
     /// Allocations while it ran.

@@ -198,7 +198,7 @@ pub struct ApproximateTime<M> {
     set: Vec<Stamped<M>>,
 }
 
-/// What a search remembers of its candidate. The candidate itself needs no place:
+/// The part of its candidate that a search remembers. The candidate itself needs no place:
 /// it is the fronts of all rings.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {

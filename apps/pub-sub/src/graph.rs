@@ -13,7 +13,7 @@
 //! [gives it back](Graph::give_back); meanwhile nobody else can. No lock is needed
 //! for that state, and when all is over [`Graph::into_callbacks`] returns it.
 //!
-//! What is ready is taken in this order, as in ROS 2: timers before subscriptions,
+//! Ready work is taken in this order, as in ROS 2: timers before subscriptions,
 //! each in the order of their registration. Also as in ROS 2, a timer that is served
 //! more than a period late skips what it has missed, and nothing makes the order
 //! fair: an earlier registration wins as long as it is ready. Unlike there, a worker
@@ -26,7 +26,8 @@
 //!
 //! Any number of workers share a graph under a lock, as in ROS 2's `MultiThreadedExecutor`. Each
 //! takes a ready callback out of it, executes it while the graph is free, gives it back, and waits
-//! when nothing is ready. A callback that publishes wakes all workers that wait; the first finds the
+//! when nothing is ready. A callback that publishes wakes all workers that wait; the first finds
+//! the
 //! message, the others wait again. (`apps/join-latency` has them.)
 
 use alloc::collections::VecDeque;
@@ -86,7 +87,7 @@ struct Subscription<M> {
     dropped: u64,
 }
 
-/// What a worker is to do.
+/// The next work of a worker.
 #[derive(Debug)]
 pub enum Next<M, C> {
     /// Call these callbacks and give them back.

@@ -22,7 +22,8 @@
 //! - [`ApproximateTime`], [`Parameters`], [`AgePenalty`]: close stamps make a set;
 //! - [`graph`]: topics, subscriptions and callbacks, and the workers that
 //!   execute them: what the synchronizers run in;
-//! - [`workload`]: the paper's workload under a policy, in virtual time, and what the joins of a run
+//! - [`workload`]: the paper's workload under a policy, in virtual time, and what the joins of a
+//! run
 //!   amount to.
 //!
 //! It guarantees that every message leaves at most once, that what is held is
@@ -99,5 +100,5 @@ pub trait Outlet<M> {
 
 /// A set: one message of each topic, in the order of the topics.
 ///
-/// What is not taken out of it is gone with it.
+/// Messages that are not taken out of it are gone with it.
 pub type Set<'a, M> = Drain<'a, Stamped<M>>;

@@ -8,16 +8,18 @@
 //! the source and the synchronizer itself cost nothing. So what is seen is what the
 //! policy does by its rules, which no implementation of it can better.
 //!
-//! Whatever has the same execution times has the same publications. The result
+//! The same execution times make the same publications. The result
 //! depends on nothing but the arguments.
 //!
-//! Some words for what the joins of a run amount to. *Index* i of a topic is its i-th publication, from 0; in the workload
+//! Some words for what the joins of a run amount to. *Index* i of a topic is its i-th publication,
+//! from 0; in the workload
 //! that is job i. The *last publication* of index i is when the last topic has
 //! published it: no join of job i can come sooner. A set is *same-index* if all its
 //! messages have one index, else *cross-index*. A set *covers* index i if all its
 //! messages have index i or a later one.
 //!
-//! A [`Record`] is plain times, taken by [`run`] or by a machine. What is computed from it is exact.
+//! A [`Record`] is plain times, taken by [`run`] or by a machine. What is computed from it is
+//! exact.
 //!
 //! The join latency as the paper defines it compares the i-th set with the last
 //! publication of index i. If sets are skipped, all later ones are compared with

@@ -59,7 +59,7 @@ pub struct Case {
     pub jobs: BTreeMap<(DagId, u64), JobTimes>,
 }
 
-/// What happened to an instance.
+/// The times of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstanceTimes {
     /// When it first executed.
@@ -70,7 +70,7 @@ pub struct InstanceTimes {
     pub preemptions: u64,
 }
 
-/// What happened to a job.
+/// The times of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JobTimes {
     /// When it was released.

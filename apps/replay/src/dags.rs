@@ -6,7 +6,8 @@
 //! unit, for the scheduler, the switch and the interrupt take time too; along a
 //! chain of instances that would add up until it is a unit. So, as WCETs do, the
 //! execution times *include* what the kernel took: each unit of execution lasts
-//! up to the end of a whole unit of time, the one in which it began. Only what the kernel takes while a unit of execution is under way, by
+//! up to the end of a whole unit of time, the one in which it began. Only what the kernel takes
+//! while a unit of execution is under way, by
 //! preempting and resuming it, makes that unit end later (or earlier, if it was
 //! suspended later than it was resumed).
 //!
@@ -40,7 +41,7 @@ pub struct Scale {
     pub guard_ns: u64,
 }
 
-/// What a core computes at the beginning of each unit of execution.
+/// The computation at the beginning of each unit of execution.
 #[derive(Clone, Copy, Debug)]
 pub struct Computing {
     /// How fast.

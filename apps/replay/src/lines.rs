@@ -5,7 +5,7 @@
 //! [`Malformed`] with the number of its line, so that a broken file is never
 //! taken for a failing implementation.
 //!
-//! What a commit would refuse of DAGs that a file describes is said in the words of a file, too:
+//! Faults of DAGs that a file describes are told in the words of the file, too:
 //! the commit speaks to an app's author, of attributes and registrations. A person with
 //! a file has keys and records, and is not told what follows from something else.
 
@@ -25,7 +25,7 @@ pub use crate::shown::quoted;
 /// The most cores that a machine has here.
 pub const MOST_CORES: u32 = 64;
 
-/// What is wrong with a reference file, and on which line, counted from 1.
+/// A fault of a reference file, with its line, counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Malformed {
     /// The line.

@@ -46,7 +46,7 @@ static SOAK: Command = Command {
         "round-ms": Takes::number(1..=10_000);
         /// Seed of all that is random.
         "seed": Takes::number(0..=u64::MAX), or "1";
-        /// What time means; see ./scripts/run --help.
+        /// The meaning of time; see ./scripts/run --help.
         "mode": Takes::OneOf(Mode::NAMES), or "deterministic";
         /// Microseconds for which an instance may wait for what it is owed; 50, and where time is
         /// real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).

@@ -1,4 +1,4 @@
-//! What brings down the kernel itself, done on purpose: it must end in a report.
+//! Crimes that bring down the kernel itself, on purpose: it must end in a report.
 
 use core::arch::asm;
 

@@ -28,7 +28,7 @@ const PERIODS_MS: [u64; 6] = [2, 3, 5, 7, 11, 13];
 /// core in all.
 const ROUNDS: u64 = 12;
 
-/// What each instance does.
+/// The work of each instance.
 struct Work {
     rounds: u64,
     diverged: AtomicU64,

@@ -15,7 +15,7 @@ use crate::kernel_crimes;
 
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// What is recorded of a link of [`long`]: 2 KiB.
+/// The value that is recorded of a link of [`long`]: 2 KiB.
 type Block = [u64; 256];
 
 /// The links of [`long`].

@@ -1,4 +1,4 @@
-//! What recording a value of 64 bytes costs, for `bench hand-off`.
+//! The cost of recording a value of 64 bytes, for `bench hand-off`.
 //!
 //! In a chain every other value is recorded. So hops with a recorded value and hops with one
 //! that is not alternate in one run, and differ in nothing else. It is measured here because an
@@ -17,7 +17,7 @@ use kernel::{AppError, Machine, json};
 /// The number of subtasks; the hop from number 1 is the first with a recorded value.
 const SUBTASKS: usize = 10;
 
-/// What the edges carry.
+/// The message of each edge.
 type Value = [u64; 8];
 
 /// Runs the chain, and prints hops of either kind, and the difference between one with a

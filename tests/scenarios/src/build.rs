@@ -69,7 +69,7 @@ macro_rules! inputs {
 
 inputs!(()(a)(a b)(a b c)(a b c d));
 
-/// What a subtask's functions do in a call; one follows another that has failed.
+/// The steps of a subtask's functions in a call; one follows another that has failed.
 struct Step {
     takes: Vec<Duration>,
     /// A budget is one of processor time, so it is exceeded only by what computes.
@@ -306,7 +306,7 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// What the commit refuses.
+    /// The faults for which the commit is refused.
     ///
     /// # Panics
     ///

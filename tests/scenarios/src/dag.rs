@@ -77,7 +77,7 @@ pub(crate) enum Replaced {
     ByFallback,
 }
 
-/// What a subtask uses besides its inputs.
+/// The use of a subtask besides its inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Use {
     #[default]

@@ -30,7 +30,8 @@
 //! | `mode NAME DAG DAG` | a mode, in which these DAGs run |
 //! | `dag NAME WORDS` | a DAG, see [`dag::DagText`] |
 //! | `  NAME TIMES WORDS` | a subtask of it, see [`dag::SubtaskText`] |
-//! | `TIME EVENT, EVENT` | what happens then, in virtual time. Only events of the kinds that are named somewhere in the scenario are compared; `core N` may be left out. |
+//! | `TIME EVENT, EVENT` | what happens then, in virtual time. Only events of the kinds that are
+//! named somewhere in the scenario are compared; `core N` may be left out. |
 //! | `never KIND` | no such event happens, in virtual time |
 //! | `DAG: COUNTER=N ...` | a DAG's statistics, in virtual time |
 //! | `everywhere DAG: COUNTER=N ...` | its statistics, on every platform |
@@ -53,7 +54,7 @@ use core::sync::atomic::AtomicU64;
 
 use dag::{DagText, Use};
 
-/// What the functions of a run do is in milliseconds.
+/// The unit of times in a scenario: a millisecond.
 pub const UNIT_NS: u64 = 1_000_000;
 
 /// The suite: each text with its name.
@@ -74,7 +75,7 @@ const BYSTANDER: &str = "bystander";
 /// A run as it is stated.
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    /// What it shows.
+    /// Its title: the rule that it shows.
     pub title: String,
     /// On how many cores it runs.
     pub cores: u32,
@@ -88,7 +89,7 @@ pub struct Scenario {
     pub modes: Vec<(String, Vec<String>)>,
     /// Its DAGs.
     pub dags: Vec<DagText>,
-    /// What happens in virtual time, an instant a line.
+    /// The events in virtual time, an instant a line.
     pub timeline: Vec<String>,
     /// Kinds of events that do not happen.
     pub never: Vec<String>,

@@ -1,4 +1,5 @@
-//! What safe code cannot do to others: use up what all share, keep the serial line, forge
+//! Attacks by safe code, which harm no others: it cannot use up what all share, keep the serial
+//! line, forge
 //! what a run is judged by, misuse a lock. The guest is the image `guest-tests`, which
 //! commits attacks next to a healthy DAG that must meet every deadline.
 

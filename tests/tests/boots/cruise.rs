@@ -12,10 +12,10 @@ use virtual_time::{Silent, VirtualTime};
 /// The jobs of each run.
 const JOBS: u64 = 30;
 
-/// What a radar says. The times are away from the releases.
+/// The output of a radar. The times are away from the releases.
 const INPUT: &str = include_str!("../../../apps/cruise/gaps.txt");
 
-/// What is sent in virtual time, and what the wire counts.
+/// Returns the bytes that are sent in virtual time, and the wire's counts.
 fn in_virtual_time(input: &str, releases: Releases) -> (Vec<u8>, WireCounts) {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);

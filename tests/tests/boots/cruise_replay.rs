@@ -13,7 +13,7 @@ use virtual_time::VirtualTime;
 /// The jobs of the DAG that keeps the run going.
 const JOBS: u64 = 30;
 
-/// What a radar says.
+/// The output of a radar.
 const INPUT: &str = include_str!("../../../apps/cruise/gaps.txt");
 
 fn guest() -> Guest {

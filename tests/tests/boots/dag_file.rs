@@ -159,8 +159,8 @@ fn dags_run_in_the_clusters_that_they_state_or_that_the_commit_finds() {
     is_refused(stated.as_bytes(), "jobs=1", why);
 }
 
-/// What is wrong in a file itself the tests of `dag-file` tell, and those of the kernel's options
-/// what is wrong in a word: here is what comes of it.
+/// Faults of a file are in the tests of `dag-file`, those of a word in the tests of the kernel's
+/// options: here is what comes of both.
 #[test]
 fn what_is_wrong_is_said_by_the_guest_with_its_line() {
     let cycle = GOOD.replace("end", "edge b -> a\nend");

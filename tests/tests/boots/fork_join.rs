@@ -76,7 +76,7 @@ fn two_deterministic_runs_print_the_same_bytes_and_another_seed_is_another_run()
     assert_ne!(responses(&first), responses(&other));
 }
 
-/// What else may be wrong in a word the tests of the kernel's options tell.
+/// Other faults of words are in the tests of the kernel's options.
 #[test]
 fn a_wrong_guest_command_line_ends_in_a_usage_error() {
     for (words, why) in [

@@ -1,4 +1,4 @@
-//! What the kernel does when things go wrong or come thick and fast. The
+//! The kernel when things go wrong or come thick and fast. The
 //! guest is the image `guest-tests`, which runs the test named by the word
 //! `test=NAME` on its command line.
 

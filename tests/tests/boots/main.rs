@@ -1,4 +1,4 @@
-//! What only a booted guest shows: the kernel, the apps, the media that a PC boots from.
+//! Tests that need a booted guest: the kernel, the apps, the media that a PC boots from.
 
 mod attacks;
 mod autoware;

@@ -90,7 +90,7 @@ fn boot(repository: &Path) -> String {
     cargo(repository, "run -- --cores 2 --mode deterministic")
 }
 
-/// What cargo says of the test that each new app has, when it passes.
+/// Cargo's line about the test that each new app has, when it passes.
 const PASSES: &str = "test every_job_is_in_time_and_within_its_bound ... ok";
 
 #[test]
@@ -286,7 +286,7 @@ use core::time::Duration;
 use fass::{Parameter, Policy, Preemption, SubtaskAttributes, Wire, create_dag, finish_create_dags};
 ";
 
-/// What `main` may do before it commits, in the place of asking for its options' end.
+/// Calls that `main` may make before it commits, in the place of asking for its options' end.
 const BEFORE: &str = r#"
     machine.configure(Policy::Edf, Preemption::Enabled);
     machine.offer_clusters()?;
@@ -309,7 +309,7 @@ const BEFORE: &str = r#"
     machine.spread(&dags);
 "#;
 
-/// What it may do in the place of a plain run.
+/// Calls that it may make in the place of a plain run.
 const RUN: &str = r#"
     machine.raise_on_input(&signal);
     println!("{} and {:?}", machine.has_console(), machine.clusters());

@@ -127,7 +127,7 @@ fn a_machine_is_powered_off_or_reset_as_its_tables_say() {
     }
 }
 
-/// What would be printed goes nowhere, at once. The absent port is never ready here, and two
+/// Output goes nowhere, at once. The absent port is never ready here, and two
 /// devices in its place show what is sent all the same: in counted time, without a wait.
 #[test]
 fn a_machine_without_a_serial_port_runs() {

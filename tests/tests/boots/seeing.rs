@@ -1,4 +1,4 @@
-//! What people see of a guest and say to it: a conversation at the console with a
+//! A person and a guest: a conversation at the console with a
 //! guest that runs until it is told to end, its status, and its graph.
 
 use harness::{Guest, Members, Said, lawful_runs};

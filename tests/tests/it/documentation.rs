@@ -29,7 +29,7 @@ const FILES: [&str; 8] = [
     "kernel/front/src/text/mod.rs",
 ];
 
-/// What is public for its own crate alone, because its module is not, or for the kernel,
+/// Items that are public for their own crate alone, because its module is not, or for the kernel,
 /// which does not pass it on.
 const INTERNAL: [&str; 17] = [
     "MessageType",

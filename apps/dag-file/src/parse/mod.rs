@@ -23,7 +23,7 @@ use keys::Keys;
 use crate::file::{DagFile, FileDag, FileSubtask, Set};
 use crate::time::{Time, parse_ns};
 
-/// What may stand where a record begins.
+/// The words that may stand where a record begins.
 const RECORDS: &str = "`set`, `dag`, `subtask`, `edge` or `end`";
 
 /// Reads a file.
@@ -103,7 +103,7 @@ fn next_record<'a>(lines: &mut Lines<'a>) -> Option<Line<'a>> {
     }
 }
 
-/// What has been read so far.
+/// The state of the reader: the file so far.
 #[derive(Default)]
 struct Reader<'a> {
     file: DagFile,

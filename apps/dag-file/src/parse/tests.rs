@@ -1,4 +1,4 @@
-//! What is read, and what is refused in which words.
+//! Files that are read, and files that are refused, with the words.
 
 use super::parse;
 

@@ -1,4 +1,4 @@
-//! What must hold of any trace, on random ones, of stamps that repeat and go backwards.
+//! Properties of any trace, checked on random ones, of stamps that repeat and go backwards.
 //! A failing test's last line of output is the seed that repeats it.
 
 use std::collections::HashSet;
@@ -11,7 +11,7 @@ use pub_sub::{
 
 const SEEDS: u64 = 300;
 
-/// What left at one arrival. A message is named by its position in the trace.
+/// The messages that left at one arrival. A message is named by its position in the trace.
 #[derive(Debug, Default)]
 struct Departures {
     sets: Vec<Vec<usize>>,

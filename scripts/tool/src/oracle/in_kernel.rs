@@ -69,7 +69,7 @@ static IN_KERNEL: Command = Command {
         "tolerance": Takes::number(1..=49);
         /// Whether execution is simulated, or cores also compute, for half of each unit in all.
         "work": Takes::OneOf(&["simulate", "compute"]), or "simulate";
-        /// What time means; see ./scripts/run --help.
+        /// The meaning of time; see ./scripts/run --help.
         "mode": Takes::OneOf(Mode::NAMES), or "deterministic";
         /// The board that QEMU imitates.
         "machine": Takes::OneOf(Machine::NAMES), or "microvm";

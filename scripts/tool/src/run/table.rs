@@ -84,7 +84,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "occupy": Takes::OneOf(&["hold", "spin"]);
         /// The one to take of a set of task graphs.
         "graph" in "--dag": Takes::Text("NAME");
-        /// What 1 is where a format has no units; 1ms.
+        /// The unit of numbers where a format has none; 1ms.
         "unit": Takes::Text("TIME");
         /// wcet (if nothing is said), uniform:0.2..1, samples.
         "execution": Takes::Text("MODEL");
@@ -112,7 +112,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "dot": Takes::File("FILE");
         /// The bounds' proof, for check-witness.
         "witness": Takes::File("FILE");
-        /// What calls take, as WCETs; docs/proving.md.
+        /// The times of calls, as WCETs; docs/proving.md.
         "observe" in "bounds": Takes::File("FILE");
         /// Per cent that a WCET is above it; 20.
         "margin": Takes::number(0..=1_000);

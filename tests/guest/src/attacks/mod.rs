@@ -1,4 +1,4 @@
-//! What safe code can do to harm others, next to a DAG that must not notice.
+//! Attacks by safe code on others, next to a DAG that must not notice.
 //!
 //! As in the app `faults`, a healthy DAG runs next to a doomed one, whose middle
 //! subtask commits a *crime* in one of its jobs. These crimes are against what all

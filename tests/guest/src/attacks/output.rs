@@ -74,7 +74,7 @@ pub(super) fn flood() -> Unpunished {
     Unpunished
 }
 
-/// What a run is judged by, as an app would print it to look better than it is.
+/// Lines by which a run is judged, as an app would print them to look better than it is.
 const FORGED: &str = r#"{"kind":"verdict","status":"success","forged":true}"#;
 
 /// Prints lines that are the kernel's to print, whole and in pieces, and damaged ones.

@@ -1,6 +1,6 @@
 //! Every fault that there is stands in `docs/errors.md` as the commit says it.
 //!
-//! What `fass` cannot be brought to say is found by `sched_dag::verify` itself, or
+//! A fault that `fass` cannot be brought to report is found by `sched_dag::verify` itself, or
 //! is a value of the fault where provoking it would take 2^32 DAGs.
 
 mod cases;

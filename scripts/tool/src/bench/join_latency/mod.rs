@@ -106,7 +106,7 @@ static TABLE: Command = Command {
         "jobs": Takes::number(1..=100_000), or "2000";
         /// Parallel subtasks N; a condition has two processors more than the largest.
         "subtasks": Takes::numbers(1..=16), or "2,4,6";
-        /// What joins: fass, exact, approximate-MS with the longest interval.
+        /// The policies: fass, exact, approximate-MS with the longest interval.
         "policies": Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
         /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
         /// every policy.
@@ -116,7 +116,7 @@ static TABLE: Command = Command {
         "on": Takes::OneOf(&["machine", "linux"]), or "machine";
         /// Queue size of the synchronizers.
         "queue": Takes::number(1..=100_000), or "1000";
-        /// What time means, see ./scripts/run --help; kvm where it works, else deterministic.
+        /// The meaning of time, see ./scripts/run --help; kvm where it works, else deterministic.
         "mode": Takes::OneOf(Mode::NAMES);
         /// The same as --mode deterministic.
         "deterministic": Takes::Nothing;
