@@ -6,10 +6,9 @@
 //!
 //! # What a fault leaves
 //!
-//! All that a function owned when a fault ended it is lost: no destructor of it is called.
-//! Whatever a
-//! DAG's functions have allocated in the run, and is in use after all that belongs to the run was
-//! dropped, is either that, or was handed to somebody else, such as a `static`.
+//! All that a function owned when a fault ended it is lost: no destructor of it is called. All
+//! that a DAG's functions have allocated in the run, and is in use after all that belongs to the
+//! run was dropped, is either that, or was handed to somebody else, such as a `static`.
 
 use alloc::vec;
 use core::fmt;

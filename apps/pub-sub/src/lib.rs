@@ -23,7 +23,7 @@
 //! - [`graph`]: topics, subscriptions and callbacks, and the workers that
 //!   execute them: what the synchronizers run in;
 //! - [`workload`]: the paper's workload under a policy, in virtual time, and what the joins of a
-//! run
+//!   run
 //!   amount to.
 //!
 //! It guarantees that every message leaves at most once, that what is held is

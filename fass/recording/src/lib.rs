@@ -38,7 +38,7 @@
 //! - Reading any bytes gives a value or the offset of what is wrong. It does not panic, recurses
 //!   to a depth that the type fixes, and allocates at most [`MOST_GROWTH`] times the bytes that
 //!   it is given, for each level of that depth. Bytes that are accepted are those that the value
-//! would be written as.
+//!   would be written as.
 //! - Reading a file takes a time that its length bounds: a type in it has at most
 //!   [`MOST_WEIGHTLESS`] parts that take no bytes, so no value has many more parts than bytes.
 //!

@@ -15,7 +15,7 @@
 //!
 //! - Nothing is there yet: it goes on and ends.
 //! - There is one that may lose its core: that one loses it, for as long as the scheduler's step
-//! takes.
+//!   takes.
 //! - There is one that keeps its core, or one that has returned and will say so as soon as it gets
 //!   the lock. That one has not lost anything, so the end is *left*: it is reported when that one
 //!   has ended, by the thread that reports that, or, if the scheduler gives the parked one a core
