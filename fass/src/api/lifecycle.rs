@@ -278,7 +278,7 @@ fn ask(draft: &mut DagDraft, subtask: usize, of: RequestKind) -> Wish {
 /// ```
 #[derive(Clone, Default)]
 pub struct Modes {
-    modes: checks::Modes,
+    modes: checks::ModeSets,
 }
 
 /// A mode. Clones are handles of the same one. Made by [`Modes::mode`].
@@ -286,7 +286,7 @@ pub struct Modes {
 /// See [`Modes`].
 #[derive(Clone)]
 pub struct Mode {
-    modes: checks::Modes,
+    modes: checks::ModeSets,
     number: ModeId,
 }
 

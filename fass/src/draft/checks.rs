@@ -142,7 +142,7 @@ pub(crate) struct ModeDraft {
 }
 
 /// The modes of one handle.
-pub(crate) type Modes = Rc<RefCell<Vec<ModeDraft>>>;
+pub(crate) type ModeSets = Rc<RefCell<Vec<ModeDraft>>>;
 
 /// All drafts of a commit.
 pub(crate) type Drafts = [Rc<RefCell<DagDraft>>];
@@ -219,8 +219,8 @@ pub(crate) fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
 }
 
 /// Returns the modes that a commit names, each handle once.
-fn of_commit(drafts: &Drafts) -> Vec<Modes> {
-    let mut found: Vec<Modes> = Vec::new();
+fn of_commit(drafts: &Drafts) -> Vec<ModeSets> {
+    let mut found: Vec<ModeSets> = Vec::new();
     for draft in drafts {
         for modes in &draft.borrow().modes {
             if !found.iter().any(|other| Rc::ptr_eq(other, modes)) {

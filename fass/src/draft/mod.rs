@@ -38,7 +38,7 @@ use fault::Fault;
 type MakeLifecycle = fn(&[Rc<RefCell<DagDraft>>]) -> Box<dyn Lifecycle>;
 
 /// Provides so many values of a state for after faults.
-pub(crate) type Reset = Box<dyn FnOnce(u32)>;
+pub(crate) type ProvideResets = Box<dyn FnOnce(u32)>;
 
 /// Something that is wrong with a registration: the fault that it is in a DAG of that label, which
 /// is known at the commit only.
@@ -79,7 +79,7 @@ pub(crate) struct DagDraft {
     /// Whether a subtask may end the run.
     pub(crate) may_shut_down: bool,
     /// The modes that it is in, and those that its subtasks may enter.
-    pub(crate) modes: Vec<checks::Modes>,
+    pub(crate) modes: Vec<checks::ModeSets>,
     /// The check that finds their faults, if there are modes.
     pub(crate) check_modes: Option<checks::Check>,
     /// The check of topics that are recorded, if there are any.
@@ -93,7 +93,7 @@ pub(crate) struct DagDraft {
     /// The subtasks whose functions can be replaced.
     pub(crate) replaceable: Vec<usize>,
     /// The states that are made anew after faults, and by what.
-    pub(crate) resets: Vec<(usize, Reset)>,
+    pub(crate) resets: Vec<(usize, ProvideResets)>,
     /// Which DAG it is, for others that send it signals, or pause it.
     pub(crate) target: Arc<RequestTarget>,
     /// The signal that is raised when a fault ends the DAG.

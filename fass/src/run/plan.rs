@@ -89,7 +89,7 @@ impl Plan {
 /// # is_send::<SubtaskCode>();
 /// ```
 pub struct SubtaskCode {
-    subtask: Box<dyn Subtask>,
+    subtask: Box<dyn PolledSubtask>,
     /// The job that it runs, or has panicked in; [`NO_JOB`] else.
     job: u64,
     /// Effects of its completions beyond the DAG.
@@ -100,7 +100,7 @@ pub struct SubtaskCode {
 const NO_JOB: u64 = u64::MAX;
 
 /// A subtask, as its body drives it.
-pub(crate) trait Subtask: Send {
+pub(crate) trait PolledSubtask: Send {
     /// Grants a job, and takes that turn to its end.
     fn take_turn(&mut self, job: u64);
 
@@ -122,11 +122,11 @@ pub(crate) trait Subtask: Send {
 
 /// A subtask whose jobs are looked at before their turns.
 struct JobPreview<F> {
-    subtask: Box<dyn Subtask>,
+    subtask: Box<dyn PolledSubtask>,
     look: F,
 }
 
-impl<F: FnMut(u64) -> bool + Send> Subtask for JobPreview<F> {
+impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
     fn take_turn(&mut self, job: u64) {
         match (self.look)(job) {
             true => self.subtask.take_turn(job),
@@ -177,7 +177,7 @@ impl Alternate for ReplacementCode {
 }
 
 impl SubtaskCode {
-    pub(crate) fn new(subtask: Box<dyn Subtask>) -> Self {
+    pub(crate) fn new(subtask: Box<dyn PolledSubtask>) -> Self {
         Self {
             subtask,
             job: NO_JOB,

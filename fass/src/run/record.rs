@@ -23,10 +23,10 @@ use sched_dag::wcets::graph_hash;
 use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
 
 use super::effect::Effect;
-use super::latest::{AnyLatest, LatestEntry, Probe, SharedLatest, Slot};
+use super::latest::{AnyLatest, LatestEntry, LatestSlot, Probe, SharedLatest};
 use super::line::{ChannelState, InstanceOutputs, KeptState, LineOf, TopicEdge};
 use super::message::{Message, MessageType};
-use super::plan::{Subtask, SubtaskCode};
+use super::plan::{PolledSubtask, SubtaskCode};
 use super::topic::{DagWiring, Ports, Publisher, Relay, Wrap};
 
 /// A recorded topic while DAGs are built.
@@ -288,7 +288,7 @@ impl<T: Message + Recordable> AnyRecorded for RecordedTopic<T> {
             of: PhantomData,
         });
         shared.set_probe(sampler, Arc::clone(&probe));
-        Some((probe, Sample::<T>::schema(), line))
+        Some((probe, FoundSample::<T>::schema(), line))
     }
 }
 
@@ -308,7 +308,7 @@ impl<T: Message + Recordable> Relay<T> for TopicTap<T> {
 /// A source that is not called.
 struct ReplayedSource(Vec<Replayed>);
 
-impl Subtask for ReplayedSource {
+impl PolledSubtask for ReplayedSource {
     fn take_turn(&mut self, job: u64) {
         self.0.iter_mut().for_each(|send| send(job));
     }
@@ -320,7 +320,7 @@ impl Subtask for ReplayedSource {
 }
 
 /// A sample as it is written down: its job, when that was complete, and the value.
-type Sample<T> = Option<(u64, u64, T)>;
+type FoundSample<T> = Option<(u64, u64, T)>;
 
 /// The probe of a subtask that samples values of this type.
 struct SampleProbe<T> {
@@ -339,10 +339,10 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
         let mut found = None;
         let job = self.job.load(Ordering::Relaxed);
         (self.line.edge.replay)(self.line.number(), job, &mut |bytes| {
-            found = Sample::<T>::from_bytes(bytes).ok();
+            found = FoundSample::<T>::from_bytes(bytes).ok();
         });
-        let slot = slot.downcast_ref::<Slot<T>>();
-        let Some((found, mut slot)) = found.zip(slot.and_then(Slot::change)) else {
+        let slot = slot.downcast_ref::<LatestSlot<T>>();
+        let Some((found, mut slot)) = found.zip(slot.and_then(LatestSlot::change)) else {
             return false;
         };
         *slot = found.map(|(job, completed_ns, value)| LatestEntry {
@@ -354,12 +354,12 @@ impl<T: Recordable + 'static> Probe for SampleProbe<T> {
     }
 
     fn look_at(&self, slot: &dyn Any) {
-        let slot = slot.downcast_ref::<Slot<T>>();
-        let Some(sample) = slot.and_then(Slot::look) else {
+        let slot = slot.downcast_ref::<LatestSlot<T>>();
+        let Some(sample) = slot.and_then(LatestSlot::look) else {
             return;
         };
         let job = self.job.load(Ordering::Relaxed);
-        self.line.stage::<Sample<T>>(job, |out| {
+        self.line.stage::<FoundSample<T>>(job, |out| {
             // As an `Option` of a tuple is written.
             sample.is_some().encode(out);
             if let Some(entry) = &*sample {

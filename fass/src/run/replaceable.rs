@@ -33,7 +33,7 @@ use sched_dag::engine::Alternate;
 
 use super::cell::{SetOnce, SharedCell, WriteClaim};
 use super::line::{AnyState, ChannelState};
-use super::plan::{ReplacementCode, Subtask, SubtaskCode};
+use super::plan::{PolledSubtask, ReplacementCode, SubtaskCode};
 use super::subtask::MakeBody;
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
@@ -182,7 +182,7 @@ impl<T> ReplaceableEnds<T> {
     }
 }
 
-impl<Args: VecToSubs, Ret: VecToPubs> Subtask for ReplaceableBody<Args, Ret> {
+impl<Args: VecToSubs, Ret: VecToPubs> PolledSubtask for ReplaceableBody<Args, Ret> {
     fn take_turn(&mut self, job: u64) {
         let context = &mut Context::from_waker(Waker::noop());
         let mut ends = self.ends.claim();

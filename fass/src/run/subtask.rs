@@ -19,7 +19,7 @@ use core::convert::Infallible;
 use core::pin::{Pin, pin};
 use core::task::{Context, Poll, Waker, ready};
 
-use super::plan::{Subtask, SubtaskCode};
+use super::plan::{PolledSubtask, SubtaskCode};
 use super::topic::{DagWiring, Publisher, Subscriber, Token};
 use super::tuple::{MulRecv, MulSend, VecToPubs, VecToSubs};
 
@@ -85,7 +85,7 @@ where
     }
 }
 
-impl<F, Subs: MulRecv, Pubs: MulSend> Subtask for PollLoop<F, Subs, Pubs>
+impl<F, Subs: MulRecv, Pubs: MulSend> PolledSubtask for PollLoop<F, Subs, Pubs>
 where
     F: FnMut(Subs::Items) -> Pubs::Items,
     Self: Send,
@@ -122,7 +122,7 @@ struct UntypedLoop<F> {
     after: Publisher<Token>,
 }
 
-impl<F: FnMut(u64) + Send> Subtask for UntypedLoop<F> {
+impl<F: FnMut(u64) + Send> PolledSubtask for UntypedLoop<F> {
     fn take_turn(&mut self, job: u64) {
         self.before.iter_mut().for_each(|edge| {
             edge.recv(job);

@@ -23,7 +23,7 @@ use super::task::Task;
 const STEPS: usize = 1 << 17;
 
 /// One chain: the subtasks of a path, each with whether the chain takes it.
-pub(super) type Chain = Vec<(usize, bool)>;
+pub(super) type CoverChain = Vec<(usize, bool)>;
 
 /// Returns the covers of 1, 2, .. chains: at most `most`, and no more than it takes to
 /// cover the volume.
@@ -87,7 +87,7 @@ fn sums(parts: &[u64]) -> Vec<u64> {
 }
 
 /// Returns the chains behind the `count`-th of the covers of at most `most` chains.
-pub(super) fn covering(task: &Task, most: usize, count: usize) -> Vec<Chain> {
+pub(super) fn covering(task: &Task, most: usize, count: usize) -> Vec<CoverChain> {
     if is_small(task, most.min(task.subtask_count())) {
         heaviest(task, count)
     } else {
@@ -96,7 +96,7 @@ pub(super) fn covering(task: &Task, most: usize, count: usize) -> Vec<Chain> {
 }
 
 /// Returns `count` disjoint chains of the most work, whatever the size of the graph.
-pub(super) fn heaviest(task: &Task, count: usize) -> Vec<Chain> {
+pub(super) fn heaviest(task: &Task, count: usize) -> Vec<CoverChain> {
     let mut flow = ChainFlow::none(task);
     for _ in 0..count {
         flow.augment();
@@ -106,14 +106,14 @@ pub(super) fn heaviest(task: &Task, count: usize) -> Vec<Chain> {
 
 /// Returns disjoint chains, each a longest path of what the earlier ones left: at most
 /// `most`, and fewer in a large graph.
-pub(super) fn peel(task: &Task, most: usize) -> Vec<Chain> {
+pub(super) fn peel(task: &Task, most: usize) -> Vec<CoverChain> {
     let steps = (task.subtask_count() + task.edge_count()).max(1);
     let mut weights = Vec::from(task.wcets_ns());
     let mut left = task.volume_ns();
     let mut chains = Vec::new();
     while left > 0 && chains.len() < most.min((STEPS / steps).max(2)) {
         let path = task.longest_path(&weights).into_iter();
-        let chain: Chain = path
+        let chain: CoverChain = path
             .map(|subtask| (subtask, core::mem::take(&mut weights[subtask]) > 0))
             .collect();
         left -= weight(task, &chain);
@@ -123,7 +123,7 @@ pub(super) fn peel(task: &Task, most: usize) -> Vec<Chain> {
 }
 
 /// Returns the work that a chain takes.
-pub(super) fn weight(task: &Task, chain: &Chain) -> u64 {
+pub(super) fn weight(task: &Task, chain: &CoverChain) -> u64 {
     let taken = chain.iter().filter(|(_, takes)| *takes);
     taken.map(|&(subtask, _)| task.wcets_ns()[subtask]).sum()
 }
@@ -276,7 +276,7 @@ impl<'a> ChainFlow<'a> {
     }
 
     /// Takes the flow apart into its chains.
-    fn into_chains(mut self) -> Vec<Chain> {
+    fn into_chains(mut self) -> Vec<CoverChain> {
         let through = self.taken.iter().zip(&self.passed);
         let mut begin: Vec<u32> = through.map(|(&t, &p)| u32::from(t) + p).collect();
         for v in 0..begin.len() {
@@ -287,7 +287,7 @@ impl<'a> ChainFlow<'a> {
         let mut chains = Vec::new();
         for (first, &count) in begin.iter().enumerate() {
             for _ in 0..count {
-                let mut chain = Chain::new();
+                let mut chain = CoverChain::new();
                 let mut at = Some(first);
                 while let Some(v) = at {
                     chain.push((v, core::mem::take(&mut self.taken[v])));

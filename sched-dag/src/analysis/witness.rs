@@ -50,7 +50,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{self, Write};
 
-use super::cover::{Chain, covering, heaviest, peel};
+use super::cover::{CoverChain, covering, heaviest, peel};
 use super::interference::{DelaySources, InterferingDag};
 use super::intra_task::each_path;
 use super::judge::{self, AnalysisInput, with_case};
@@ -207,7 +207,7 @@ impl WitnessText {
         self.chains("part", &peel(task, most(shape.parallelism)));
     }
 
-    fn chains(&mut self, word: &str, chains: &[Chain]) {
+    fn chains(&mut self, word: &str, chains: &[CoverChain]) {
         for chain in chains {
             let numbers = chain.iter().map(|&(subtask, takes)| {
                 let subtask = subtask as i128;

@@ -106,7 +106,7 @@ fn make(options: &Parsed) -> Result<String, Refusal> {
         (None, Some(_)) => usage("`--git` is for a repository; add its folder, `--out DIR`"),
         (None, None) => create(system::workspace(), name).map(|_| next_steps(name)),
         (Some(out), git) => {
-            let source = git.map_or(Source::Folder(system::workspace()), Source::Git);
+            let source = git.map_or(CrateSource::Folder(system::workspace()), CrateSource::Git);
             create_repository(out, name, source).map(|()| next_steps_there(out, source))
         }
     }
@@ -280,7 +280,7 @@ fn names(manifest: &str) -> impl Iterator<Item = String> {
 
 /// The source of a repository's crates, and of cargo's runner.
 #[derive(Clone, Copy, Debug)]
-pub enum Source<'a> {
+pub enum CrateSource<'a> {
     /// The root of a workspace in this file system.
     Folder(&'a Path),
     /// A git repository, by its URL; the runner is installed.
@@ -317,7 +317,7 @@ const OWN_FILES: [AppFile; 6] = [
 /// # Errors
 ///
 /// The name or the folder is refused, or a file cannot be written; nothing is left then.
-pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(), Refusal> {
+pub fn create_repository(out: &Path, name: &str, source: CrateSource<'_>) -> Result<(), Refusal> {
     check_word(name).map_err(Refusal::Usage)?;
     // Cargo could not tell the app from a dependency of the same name.
     if PACKAGES
@@ -332,18 +332,19 @@ pub fn create_repository(out: &Path, name: &str, source: Source<'_>) -> Result<(
     let shown = quoted(&out.to_string_lossy()).to_string();
     let changes = match source {
         // The URL goes into a TOML string as it is.
-        Source::Git(url) if url.contains(['"', '\\', '\n']) => {
+        CrateSource::Git(url) if url.contains(['"', '\\', '\n']) => {
             let line = format!("`--git {}`: no URL has such a character", quoted(url));
             return Err(Refusal::Usage(line));
         }
-        Source::Folder(root) => match root.to_str().filter(|root| !root.contains(['"', '\\'])) {
+        CrateSource::Folder(root) => match root.to_str().filter(|root| !root.contains(['"', '\\']))
+        {
             Some(root) => from_folder(root),
             None => {
                 let line = format!("{shown}: cargo cannot name the folder of these commands");
                 return Err(Refusal::Failure(line));
             }
         },
-        Source::Git(url) => from_git(url),
+        CrateSource::Git(url) => from_git(url),
     };
     let files = OWN_FILES.into_iter().chain(FILES.iter().copied());
     let taken = format!("`--out` {shown}: it is there already; name a folder to be made");
@@ -376,10 +377,10 @@ fn from_git(url: &str) -> Changes {
 }
 
 /// Returns the next steps in the repository.
-fn next_steps_there(out: &Path, source: Source<'_>) -> String {
+fn next_steps_there(out: &Path, source: CrateSource<'_>) -> String {
     let install = match source {
-        Source::Folder(_) => String::new(),
-        Source::Git(url) => {
+        CrateSource::Folder(_) => String::new(),
+        CrateSource::Git(url) => {
             format!("cargo install --locked --git {url} tool   # once: the runner, fass-tool\n")
         }
     };
@@ -399,7 +400,8 @@ git init                # docs/guide.md goes on from here
 #[cfg(test)]
 mod tests {
     use super::{
-        FILES, MANIFEST, PACKAGES, PLACEHOLDER, Source, check, create, create_repository, names,
+        CrateSource, FILES, MANIFEST, PACKAGES, PLACEHOLDER, check, create, create_repository,
+        names,
     };
     use crate::options::Refusal;
     use crate::system::workspace;
@@ -487,8 +489,8 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
     #[test]
     fn from_git_the_url_is_all_that_is_named_and_from_a_folder_nothing_is_installed() {
         let url = "https://example.org/kernel.git";
-        for source in [Source::Git(url), Source::Folder(workspace())] {
-            let is_git = matches!(source, Source::Git(_));
+        for source in [CrateSource::Git(url), CrateSource::Folder(workspace())] {
+            let is_git = matches!(source, CrateSource::Git(_));
             let out = std::env::temp_dir().join(format!("from-{is_git}-{}", std::process::id()));
             create_repository(&out, "brake-assist", source).unwrap();
             let places = [

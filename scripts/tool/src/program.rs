@@ -20,7 +20,7 @@ use crate::system;
 
 /// A program, and how it is run.
 #[derive(Clone, Copy, Debug)]
-pub struct Order<'a> {
+pub struct ProgramOrder<'a> {
     /// The program.
     pub program: &'a Path,
     /// Its words.
@@ -40,7 +40,7 @@ pub struct Order<'a> {
 /// # Errors
 ///
 /// In words: it could not be started, or the log could not be written or read.
-pub fn run(order: &Order<'_>, show: &mut impl FnMut(&str)) -> Result<Outcome, String> {
+pub fn run(order: &ProgramOrder<'_>, show: &mut impl FnMut(&str)) -> Result<Outcome, String> {
     run_for(order, show, ExitStatus::code)
 }
 
@@ -50,11 +50,11 @@ pub fn run(order: &Order<'_>, show: &mut impl FnMut(&str)) -> Result<Outcome, St
 ///
 /// As [`run`].
 pub fn run_for(
-    order: &Order<'_>,
+    order: &ProgramOrder<'_>,
     show: &mut impl FnMut(&str),
     code: impl FnOnce(&ExitStatus) -> Option<i32>,
 ) -> Result<Outcome, String> {
-    let &Order {
+    let &ProgramOrder {
         program,
         words,
         is_live,

@@ -89,10 +89,10 @@ pub fn soak(words: &[OsString]) -> ExitCode {
 }
 
 /// Makes the plan from the options.
-fn plan(options: &Parsed) -> Plan {
+fn plan(options: &Parsed) -> SoakPlan {
     let plan = match options.is_given("short") {
-        true => Plan::SHORT,
-        false => Plan::LONG,
+        true => SoakPlan::SHORT,
+        false => SoakPlan::LONG,
     };
     let number = |name, usual| options.number(name).unwrap_or(usual);
     let mode = options.text("mode").and_then(Mode::from_name);
@@ -110,7 +110,7 @@ fn plan(options: &Parsed) -> Plan {
         Mode::Kvm | Mode::Threads => 1,
     };
     let first = number("first", 0);
-    Plan {
+    SoakPlan {
         rounds: first..first + number("rounds", plan.rounds.end),
         round_ms: number("round-ms", plan.round_ms),
         seed: number("seed", plan.seed),
@@ -122,7 +122,7 @@ fn plan(options: &Parsed) -> Plan {
     }
 }
 
-fn conclude(report: &Report) -> ExitCode {
+fn conclude(report: &SoakReport) -> ExitCode {
     let list = |counts: &BTreeMap<String, u64>| {
         for (what, count) in counts {
             println!("{count:>10} {what}");
@@ -157,7 +157,7 @@ const SHOWN: usize = 5;
 
 /// The rounds to run, and their settings.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Plan {
+pub struct SoakPlan {
     /// The numbers of the rounds.
     pub rounds: Range<u64>,
     /// The guest time in which each run releases jobs, in milliseconds.
@@ -176,7 +176,7 @@ pub struct Plan {
 
 /// The result of a soak run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Report {
+pub struct SoakReport {
     /// The number of events of each kind.
     pub events: BTreeMap<String, u64>,
     /// The number of DAGs with each combination of policy, overrun policy, division of the cores,
@@ -192,9 +192,9 @@ pub struct Report {
     pub failed: u64,
 }
 
-impl Plan {
+impl SoakPlan {
     /// The rounds of the long form: a quarter of an hour.
-    pub const LONG: Plan = Plan {
+    pub const LONG: SoakPlan = SoakPlan {
         rounds: 0..84,
         round_ms: 5000,
         seed: 1,
@@ -205,7 +205,7 @@ impl Plan {
     };
 
     /// The rounds of the short form: some seconds, for a test.
-    pub const SHORT: Plan = Plan {
+    pub const SHORT: SoakPlan = SoakPlan {
         rounds: 0..16,
         round_ms: 500,
         ..Self::LONG
@@ -213,7 +213,7 @@ impl Plan {
 
     /// Returns the command that runs one round again.
     fn command(&self, round: u64) -> String {
-        let Plan {
+        let SoakPlan {
             round_ms,
             seed,
             cores,
@@ -235,7 +235,7 @@ impl Plan {
 /// # Errors
 ///
 /// In words: there is no QEMU or no image, or a guest could not be started.
-pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
+pub fn run(plan: &SoakPlan, mut show: impl FnMut(u64)) -> Result<SoakReport, String> {
     install::ensure_qemu()?;
     let image = image::build(GUEST)?;
     let qemu = Qemu {
@@ -246,7 +246,7 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
     };
     probe::choose(Some(plan.mode), plan.mode, &qemu, &image.path)?;
     let next = AtomicU64::new(plan.rounds.start);
-    let mut report = Report::default();
+    let mut report = SoakReport::default();
     let (send, receive) = mpsc::channel();
     thread::scope(|scope| {
         for _ in 0..plan.side_by_side.max(1) {
@@ -279,7 +279,7 @@ pub fn run(plan: &Plan, mut show: impl FnMut(u64)) -> Result<Report, String> {
     })
 }
 
-fn boot(plan: &Plan, qemu: &Qemu, image: &Path, round: u64) -> Result<Outcome, String> {
+fn boot(plan: &SoakPlan, qemu: &Qemu, image: &Path, round: u64) -> Result<Outcome, String> {
     // In real time the host's noise would exceed budgets, and rounds would fail.
     let budget_factor = match plan.mode {
         Mode::Deterministic => 10,
@@ -299,9 +299,9 @@ fn boot(plan: &Plan, qemu: &Qemu, image: &Path, round: u64) -> Result<Outcome, S
     outcome::boot(&qemu, image, &system::new_log("soak")?, limit, |_| {})
 }
 
-impl Report {
+impl SoakReport {
     /// Judges a round, and removes its log if nothing is wrong.
-    fn take(&mut self, plan: &Plan, round: u64, outcome: &Outcome) {
+    fn take(&mut self, plan: &SoakPlan, round: u64, outcome: &Outcome) {
         let mut wrong = Vec::from_iter(outcome.judge().err().map(|fault| fault.reason));
         let lines: Vec<_> = outcome.transcript.of_kind("scenario").collect();
         match read(&outcome.serial) {
@@ -384,7 +384,7 @@ mod tests {
         let again = plan(&SOAK.right(command.split_once(' ').expect("words").1));
         assert_eq!(
             again,
-            Plan {
+            SoakPlan {
                 rounds: 42..43,
                 ..drawn
             }

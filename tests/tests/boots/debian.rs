@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use tool::debian::{Guest, Order};
+use tool::debian::{Guest, GuestOrder};
 use tool::qemu::Mode;
 use tool::{image, program, system};
 
@@ -13,7 +13,7 @@ const LIMIT: Duration = Duration::from_secs(300);
 /// Runs those tests of a program there that have `only` in their names, with our policy, and returns what it has printed.
 fn run(test: &Path, only: &str) -> String {
     let log = system::new_log("debian-tests").expect("a folder for logs");
-    let order = Order {
+    let order = GuestOrder {
         program: test,
         words: &["--test-threads=1".into(), "--nocapture".into(), only.into()],
         with_policy: true,
@@ -22,7 +22,7 @@ fn run(test: &Path, only: &str) -> String {
         cores: 4,
     };
     let guest = Guest::new(&order, &log).expect("Debian's packages are had");
-    let order = program::Order {
+    let order = program::ProgramOrder {
         program: &guest.program,
         words: &guest.words,
         is_live: false,

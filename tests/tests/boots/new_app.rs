@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 use harness::guide::{documented_output, without_numbers};
 use harness::markdown::{blocks, page};
 use tool::golden::{Golden, excerpt};
-use tool::new_app::{self, Source};
+use tool::new_app::{self, CrateSource};
 use tool::system::{self, workspace};
 
 /// The guide's app.
@@ -42,7 +42,8 @@ fn ours() -> &'static Path {
 /// Makes an app in a repository of its own, and returns the folder.
 fn repository(folder: &str, name: &str) -> PathBuf {
     let out = ours().join(folder);
-    new_app::create_repository(&out, name, Source::Folder(workspace())).expect("the name is free");
+    new_app::create_repository(&out, name, CrateSource::Folder(workspace()))
+        .expect("the name is free");
     share_target(&out);
     out
 }

@@ -105,7 +105,7 @@ pub(crate) trait Stage<T>: Send + Sync {
 }
 
 /// A probe of the samples of one subtask, which it records or replays. It gets the reader's slot,
-/// a [`Slot<T>`] whose type it knows, so that a subtask whose samples are not recorded has next to
+/// a [`LatestSlot<T>`] whose type it knows, so that a subtask whose samples are not recorded has next to
 /// no code for it.
 pub(crate) trait Probe: Send + Sync {
     /// Notes the job whose instance runs.
@@ -120,11 +120,11 @@ pub(crate) trait Probe: Send + Sync {
 }
 
 /// A slot of a sampling subtask.
-pub(crate) type Slot<T> = SharedCell<Option<LatestEntry<T>>>;
+pub(crate) type LatestSlot<T> = SharedCell<Option<LatestEntry<T>>>;
 
 /// The slots of one sampling subtask.
 struct TripleBuffer<T> {
-    slots: [Slot<T>; 3],
+    slots: [LatestSlot<T>; 3],
     /// The slot in the middle, with [`FRESH`] if the reader has not had it.
     middle: AtomicU8,
     /// The writer's slot. Only the writer's body uses it, which is `&mut` there.

@@ -99,7 +99,7 @@ const POLICIES: [(Policy, &str); 2] = [(Policy::StaticPriority, "G-FP"), (Policy
 
 /// The number of sets proven under one policy.
 #[derive(Clone, Copy, Default)]
-struct Proven {
+struct ProvenSets {
     sets: u64,
     /// By Melani's form with the width refinement alone.
     melani: u64,
@@ -111,7 +111,7 @@ struct Proven {
     lost: u64,
 }
 
-impl Proven {
+impl ProvenSets {
     /// Counts a set.
     fn add(&mut self, specs: &[DagSpec], policy: Policy, cores: u32) {
         self.sets += 1;
@@ -153,7 +153,7 @@ impl Proven {
 }
 
 /// The number of proven sets, by policy.
-type ByPolicy = [Proven; POLICIES.len()];
+type ByPolicy = [ProvenSets; POLICIES.len()];
 
 /// Analyses sets, each on its cores.
 fn proofs(sets: impl Iterator<Item = (Vec<DagSpec>, u32)>) -> ByPolicy {
@@ -205,14 +205,15 @@ fn table(points: &[Point]) -> String {
     let title = "sets proven, in percent: before and with the multi-path bound\n";
     let mut table = Table::new(title, columns);
     for point in points {
-        let percent = |of: &Proven| [of.before, of.now].map(|count| 100.0 * ratio(count, of.sets));
+        let percent =
+            |of: &ProvenSets| [of.before, of.now].map(|count| 100.0 * ratio(count, of.sets));
         let [[fp, fp_now], [edf, edf_now]] = point.proven.each_ref().map(percent);
         let (load, sets) = (point.tenths as f64 / 10.0, point.proven[0].sets);
         table.row(&[&point.cores, &load, &sets, &fp, &fp_now, &edf, &edf_now]);
     }
     for same in points.chunk_by(|one, other| one.cores == other.cores) {
         for (position, (_, name)) in POLICIES.into_iter().enumerate() {
-            let of = |which: fn(&Proven) -> u64| -> u64 {
+            let of = |which: fn(&ProvenSets) -> u64| -> u64 {
                 same.iter()
                     .map(|point| which(&point.proven[position]))
                     .sum()

@@ -33,7 +33,7 @@ const MEMORY_MIB: u64 = 1024;
 
 /// A program to run in a guest.
 #[derive(Debug)]
-pub struct Order<'a> {
+pub struct GuestOrder<'a> {
     /// The program.
     pub program: &'a Path,
     /// Its words. A word that begins with `module=` names a file of this computer.
@@ -69,7 +69,7 @@ impl Guest {
     /// # Errors
     ///
     /// In words: something cannot be had, or the policy does not compile.
-    pub fn new(order: &Order<'_>, log: &Path) -> Result<Guest, String> {
+    pub fn new(order: &GuestOrder<'_>, log: &Path) -> Result<Guest, String> {
         install::ensure_qemu()?;
         let packages = Packages::get()?;
         let own = system::new_log("debian")?;
@@ -134,7 +134,7 @@ impl Guest {
     }
 }
 
-impl Order<'_> {
+impl GuestOrder<'_> {
     /// Lays out the guest's files in a folder.
     fn lay_out(&self, folder: &Path, packages: &Packages) -> Result<(), String> {
         let add = |name: &str, source: &Path| write(&folder.join(name), files::read_at(source)?);

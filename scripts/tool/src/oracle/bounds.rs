@@ -41,7 +41,7 @@ use super::older_bounds as older;
 
 /// One task set with the values expected of it.
 #[derive(Debug)]
-pub struct Case {
+pub struct BoundsCase {
     /// The case's name.
     pub name: String,
     cores: u32,
@@ -86,11 +86,11 @@ const FORMS: [[&[&str]; 2]; 2] = [
 /// # Errors
 ///
 /// [`Malformed`] for the first record that is not as described above.
-pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
+pub fn parse(text: &str) -> Result<Vec<BoundsCase>, Malformed> {
     cases(text, parse_case)
 }
 
-fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
+fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<BoundsCase, Malformed> {
     let [name, cores, count] = header.fixed()?;
     let (cores, count) = (header.cores(cores)?, header.at_least_one(count)?);
     let mut form = None;
@@ -106,7 +106,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
     let [_, of_set] = form.unwrap_or_default();
     let quantities = parse_quantities(lines, of_set, dags.len())?;
     lines.expect("end")?.exactly(0)?;
-    Ok(Case {
+    Ok(BoundsCase {
         name: name.to_owned(),
         cores,
         dags,
@@ -206,7 +206,7 @@ fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malf
 /// # Errors
 ///
 /// The first difference, in one line.
-pub fn check(case: &Case) -> Result<(), String> {
+pub fn check(case: &BoundsCase) -> Result<(), String> {
     for (index, (task, quantities)) in case.dags.iter().enumerate() {
         compare(quantities, |what| compute_of_dag(what, task))
             .map_err(|difference| format!("dag {index}: {difference}"))?;

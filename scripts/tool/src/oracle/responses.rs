@@ -123,7 +123,7 @@ impl Seen {
         let longest = task_set.dags().iter().map(|dag| dag.period_ns()).max();
         let until_ns = 12 * longest.unwrap_or(0);
         let mut lines = Vec::new();
-        for takes in [Takes::Most, Takes::Drawn] {
+        for takes in [DrawnTimes::Most, DrawnTimes::Drawn] {
             let machine = Machine {
                 scheduler: Scheduler::new(Arc::clone(&task_set), options),
                 cores: vec![None; options.cores as usize],
@@ -203,7 +203,7 @@ struct Costs {
 
 /// How long executions and overheads take, of their maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Takes {
+enum DrawnTimes {
     /// The maximum.
     Most,
     /// A drawn part of the maximum.
@@ -221,7 +221,7 @@ struct Machine<'r> {
     /// Each DAG's longest response.
     longest_ns: Vec<u64>,
     costs: Costs,
-    takes: Takes,
+    takes: DrawnTimes,
     random: &'r mut Random,
 }
 
@@ -327,8 +327,8 @@ impl Machine<'_> {
 
     fn draw(&mut self, most_ns: u64) -> u64 {
         match self.takes {
-            Takes::Most => most_ns,
-            Takes::Drawn => self.random.within(0..=most_ns),
+            DrawnTimes::Most => most_ns,
+            DrawnTimes::Drawn => self.random.within(0..=most_ns),
         }
     }
 }

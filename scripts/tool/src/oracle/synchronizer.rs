@@ -29,7 +29,7 @@ use replay::lines::{Line, Lines, Malformed, cases, quoted};
 
 /// One synchronizer with its arrivals and the expected output.
 #[derive(Debug)]
-pub struct Case {
+pub struct SynchronizerCase {
     /// The case's name.
     pub name: String,
     topics: usize,
@@ -65,11 +65,11 @@ const MOST_TOPICS: usize = 1024;
 /// # Errors
 ///
 /// [`Malformed`] for the first record that is not as described above.
-pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
+pub fn parse(text: &str) -> Result<Vec<SynchronizerCase>, Malformed> {
     cases(text, parse_case)
 }
 
-fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malformed> {
+fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<SynchronizerCase, Malformed> {
     let [name, policy, topics, queue_size] = header.fixed()?;
     let topics = header.number(topics)?;
     if !(1..=MOST_TOPICS).contains(&topics) {
@@ -97,7 +97,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
         let parameters = Parameters::new(topics, queue_size.min(most));
         parse_parameters(line.exactly(3 + topics)?, &line, parameters)
     };
-    Ok(Case {
+    Ok(SynchronizerCase {
         name: name.to_owned(),
         topics,
         queue_size: queue_size.min(most.get()),
@@ -188,7 +188,7 @@ fn parse_arrivals(lines: &mut Lines<'_>, topics: usize) -> Result<Vec<Arrival>, 
 /// # Errors
 ///
 /// The first difference in the order of arrivals, in one line.
-pub fn check(case: &Case) -> Result<(), String> {
+pub fn check(case: &SynchronizerCase) -> Result<(), String> {
     let mut synchronizer: Box<dyn Synchronizer<u64>> = match &case.approximate {
         None => Box::new(ExactTime::new(case.topics, case.queue_size)),
         Some(parameters) => Box::new(ApproximateTime::new(parameters.clone())),

@@ -121,14 +121,14 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
 
 /// The measured overheads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Measured(pub MeasuredCosts);
+pub struct MeasuredOverheads(pub MeasuredCosts);
 
 /// Measures the overheads in the runs of a guest: the largest of all runs.
 ///
 /// # Errors
 ///
 /// In words: the log has no trace, or a damaged one.
-pub fn measure(runs: &[Run]) -> Result<Measured, String> {
+pub fn measure(runs: &[Run]) -> Result<MeasuredOverheads, String> {
     let costs = runs.iter().map(of_run).reduce(|one, other| MeasuredCosts {
         dispatches: one.dispatches + other.dispatches,
         owed_ns: one.owed_ns.max(other.owed_ns),
@@ -136,7 +136,7 @@ pub fn measure(runs: &[Run]) -> Result<Measured, String> {
         late_ns: one.late_ns.max(other.late_ns),
     });
     costs
-        .map(Measured)
+        .map(MeasuredOverheads)
         .ok_or_else(|| "the guest has run nothing".into())
 }
 
@@ -150,7 +150,7 @@ fn of_run(run: &Run) -> MeasuredCosts {
     }
 }
 
-impl Measured {
+impl MeasuredOverheads {
     /// Returns the guest's word for the charged overheads, with a margin in per cent.
     #[must_use]
     pub fn word(&self, margin_percent: u64) -> String {

@@ -27,7 +27,7 @@ use crate::record::{self, Committed};
 
 /// One DAG of one commit.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct ProofRow {
     /// The file of the DAG, if there are several.
     file: Option<String>,
     commit: usize,
@@ -42,7 +42,7 @@ pub struct Row {
 /// # Errors
 ///
 /// In words: a DAG was committed and not run.
-pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<Row>, String> {
+pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<ProofRow>, String> {
     let mut rows = Vec::new();
     for commit in commits {
         for (number, dag) in (0..).map(DagId).zip(&commit.told.dags) {
@@ -52,7 +52,7 @@ pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<Row>, Strin
                 let (name, commit) = (&dag.name, commit.number);
                 format!("dag `{name}` of commit {commit} has not run")
             })?;
-            rows.push(Row {
+            rows.push(ProofRow {
                 file: None,
                 commit: commit.number,
                 dag: dag.name.clone(),
@@ -65,7 +65,7 @@ pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<Row>, Strin
     Ok(rows)
 }
 
-impl Row {
+impl ProofRow {
     /// Names the file of the DAG.
     #[must_use]
     pub fn of_file(self, name: &str) -> Self {
@@ -132,7 +132,7 @@ impl Row {
 
 /// Returns the table.
 #[must_use]
-pub fn table(rows: &[Row]) -> String {
+pub fn table(rows: &[ProofRow]) -> String {
     let names = rows.iter().map(|row| row.name().chars().count() + 1);
     let width = names.max().unwrap_or(0).max(20);
     let title = format!("\n{:1$}   where the bound is from:\n", "", width + 33);
@@ -165,7 +165,7 @@ pub(crate) fn ratio(permille: Option<u64>) -> String {
 
 /// Returns the number of proven DAGs, and of responses above their bounds.
 #[must_use]
-pub fn summary(rows: &[Row]) -> String {
+pub fn summary(rows: &[ProofRow]) -> String {
     let proven = rows.iter().filter(|row| row.bound_ns.is_some()).count();
     let above = rows.iter().filter(|row| row.exceeds()).count();
     let dags = rows.len();
@@ -174,7 +174,7 @@ pub fn summary(rows: &[Row]) -> String {
 
 /// Returns the complaint about a response above its bound, which makes the proof worthless.
 #[must_use]
-pub fn complaint(rows: &[Row]) -> Option<String> {
+pub fn complaint(rows: &[ProofRow]) -> Option<String> {
     let row = rows.iter().find(|row| row.exceeds())?;
     Some(format!(
         "dag `{}` of commit {} took {}, beyond its bound of {}; a WCET or an overhead is too small",

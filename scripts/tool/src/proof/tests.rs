@@ -8,7 +8,7 @@ use sched_dag::DagId;
 use sched_dag::law::MeasuredCosts;
 
 use super::observed::OfDag;
-use super::report::{Row, complaint, rows, summary, table};
+use super::report::{ProofRow, complaint, rows, summary, table};
 use super::{observed, report};
 use crate::made::{commit, record_of};
 use crate::record::Committed;
@@ -54,7 +54,7 @@ fn observed(longest_ns: &[u64]) -> Vec<OfDag> {
     all
 }
 
-fn rows_with(longest_ns: u64) -> Vec<Row> {
+fn rows_with(longest_ns: u64) -> Vec<ProofRow> {
     rows(record(9).proven().unwrap(), &observed(&[longest_ns])).unwrap()
 }
 

@@ -12,7 +12,7 @@ use super::screen::Screen;
 use super::{Booted, limit};
 
 use crate::dag_file::Prepared;
-use crate::debian::{Guest, Order};
+use crate::debian::{Guest, GuestOrder};
 use crate::image;
 use crate::options::{Parsed, Refusal};
 use crate::program;
@@ -133,7 +133,7 @@ pub(super) fn run_app(
     let mode = options.text("mode").and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let guest = is_in_guest(options).then(|| {
-        let order = Order {
+        let order = GuestOrder {
             program: &image,
             words: &words,
             with_policy: options.text("mechanism") == Some("sched_ext"),
@@ -158,7 +158,7 @@ pub(super) fn run_app(
         }
     };
     let limit = limit(options, dags);
-    let order = program::Order {
+    let order = program::ProgramOrder {
         program: &image,
         words: &words,
         is_live: handed::is_live(options) || options.is_given("console"),
@@ -171,7 +171,7 @@ pub(super) fn run_app(
         // The program to run is QEMU, without a terminal and with the time that Linux takes to
         // start.
         Some(guest) => {
-            let order = program::Order {
+            let order = program::ProgramOrder {
                 program: &guest.program,
                 words: &guest.words,
                 is_live: false,

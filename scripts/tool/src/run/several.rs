@@ -21,14 +21,14 @@ use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
-use crate::proof::observed::{self, Measured, OfDag};
+use crate::proof::observed::{self, MeasuredOverheads, OfDag};
 use crate::proof::report;
 use crate::protocol::Status;
 use crate::record::Record;
 use crate::system;
 
 /// The platform's overheads; an error in words if no trace was kept.
-type Measurement = Result<Measured, String>;
+type Measurement = Result<MeasuredOverheads, String>;
 
 /// Reports whether the options ask for an observed run.
 pub(super) fn is_asked_for(options: &Parsed) -> bool {
@@ -49,7 +49,7 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
             None => ExitCode::FAILURE,
         });
     }
-    let Some(Proven {
+    let Some(ProofRun {
         rows,
         code,
         is_well,
@@ -60,7 +60,7 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
     say(
         options,
         &report::table(&rows),
-        rows.iter().map(report::Row::line),
+        rows.iter().map(report::ProofRow::line),
     );
     match report::complaint(&rows) {
         // A failed run has been reported; a second message would hide the first.
@@ -94,7 +94,7 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
     say(
         options,
         &report::table(&rows),
-        rows.iter().map(report::Row::line),
+        rows.iter().map(report::ProofRow::line),
     );
     if !options.is_given("json") {
         let (count, summary) = (files.len(), report::summary(&rows));
@@ -107,15 +107,15 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
 }
 
 /// The second run of a proof.
-struct Proven {
-    rows: Vec<report::Row>,
+struct ProofRun {
+    rows: Vec<report::ProofRow>,
     code: ExitCode,
     is_well: bool,
 }
 
 /// Observes a run, commits with its measurements, and compares; `None` if the first run failed,
 /// which has been reported.
-fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
+fn prove(options: &Parsed) -> Result<Option<ProofRun>, Refusal> {
     let log = system::new_log("observed")?;
     // Without `--observe` the WCETs of the first run lie in a file of ours.
     let own = Temporary(Some(log.with_extension("wcets")));
@@ -133,7 +133,7 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
         Err(_) if !is_well => Vec::new(),
         Err(refusal) => return Err(refusal),
     };
-    Ok(Some(Proven {
+    Ok(Some(ProofRun {
         rows,
         code,
         is_well,
@@ -169,7 +169,7 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
     Ok(Some(next))
 }
 
-fn compare(booted: &Booted) -> Result<Vec<report::Row>, String> {
+fn compare(booted: &Booted) -> Result<Vec<report::ProofRow>, String> {
     let record = booted.outcome.record()?;
     let mut all = Vec::new();
     observed::add(&mut all, &record)?;

@@ -13,7 +13,7 @@ use std::fs;
 use std::mem;
 use std::path::Path;
 
-use super::{Source, none_of};
+use super::{SourceFile, none_of};
 use crate::golden::Golden;
 use crate::system::workspace;
 
@@ -24,10 +24,10 @@ const TABLE: &str = "tests/baselines/lines.txt";
 const ENDINGS: [&str; 5] = [".rs", ".s", ".c", ".py", ".sh"];
 
 /// Lines of code and of tests, by the row's name.
-type Rows = BTreeMap<String, [usize; 2]>;
+type LineCounts = BTreeMap<String, [usize; 2]>;
 
 /// Compares these files with the table; rewrites it if there is a `list` of rewritten files.
-pub(super) fn check(sources: &[Source], list: Option<&Path>) -> Result<(), String> {
+pub(super) fn check(sources: &[SourceFile], list: Option<&Path>) -> Result<(), String> {
     let table = fs::read_to_string(workspace().join(TABLE));
     let table = table.map_err(|error| format!("{TABLE}: {error}"))?;
     let there = count(sources);
@@ -38,7 +38,7 @@ pub(super) fn check(sources: &[Source], list: Option<&Path>) -> Result<(), Strin
     }
 }
 
-fn read(table: &str) -> Rows {
+fn read(table: &str) -> LineCounts {
     let row = |line: &str| {
         let words: Vec<&str> = line.split_whitespace().collect();
         let [name, code, tests] = words[..] else {
@@ -49,13 +49,13 @@ fn read(table: &str) -> Rows {
     table.lines().filter_map(row).collect()
 }
 
-fn write(rows: &Rows) -> String {
+fn write(rows: &LineCounts) -> String {
     let rows = rows.iter();
     let rows = rows.map(|(row, [code, tests])| format!("{row:20} {code:>7} {tests:>7}\n"));
     format!("{:20} {:>7} {:>7}\n", "crate", "code", "tests") + &rows.collect::<String>()
 }
 
-fn complaints(budgets: &Rows, there: &Rows) -> Vec<String> {
+fn complaints(budgets: &LineCounts, there: &LineCounts) -> Vec<String> {
     let mut complaints = Vec::new();
     for row in budgets.keys().chain(there.keys()).collect::<BTreeSet<_>>() {
         // A row on one side only: a crate is new, or gone.
@@ -77,9 +77,9 @@ fn complaints(budgets: &Rows, there: &Rows) -> Vec<String> {
     complaints
 }
 
-fn count(sources: &[Source]) -> Rows {
-    let mut rows = Rows::new();
-    for Source { name, text } in sources {
+fn count(sources: &[SourceFile]) -> LineCounts {
+    let mut rows = LineCounts::new();
+    for SourceFile { name, text } in sources {
         let path = Path::new(name);
         // Scripts of the shell in `scripts/` have no ending.
         let is_script = name.starts_with("scripts/") && path.extension().is_none();
@@ -168,7 +168,7 @@ pub(super) fn escape(name: &str, text: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Rows, complaints, escape, lines, read, write};
+    use super::{LineCounts, complaints, escape, lines, read, write};
 
     /// As it stands here, it must not end this module where they are counted.
     const SOURCE: &str = "
@@ -235,7 +235,7 @@ mod tests {
         assert_eq!(read(&written), there);
         let head = "crate                   code   tests\nfass ";
         assert!(written.starts_with(head), "{written}");
-        assert_eq!(read(""), Rows::new());
+        assert_eq!(read(""), LineCounts::new());
     }
 
     /// Files, their texts, in which `~` ends a line, and what escapes the count by them. So that

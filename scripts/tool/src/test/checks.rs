@@ -13,7 +13,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use super::{Plan, Source, Tally, Why, budgets, layers, none_of, packages};
+use super::{CheckFailure, SourceFile, Tally, TestPlan, budgets, layers, none_of, packages, words};
 use crate::bench::hand_off;
 use crate::image;
 use crate::probe;
@@ -26,9 +26,9 @@ use crate::system;
 const MOST_LINES: usize = 800;
 
 /// Runs the wanted checks, without those of cargo.
-pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
+pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally) {
     let blessed = plan.blessed.as_deref();
-    let mut run = |name: &str, check: &dyn Fn() -> Result<(), Why>| {
+    let mut run = |name: &str, check: &dyn Fn() -> Result<(), CheckFailure>| {
         if plan.wants(name) {
             tally.run(name, check);
         }
@@ -45,6 +45,12 @@ pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
     run("every source file opens with an essay", &|| {
         Ok(complain(sources, lacks_essay)?)
     });
+    run("no doc sentence begins with a question word", &|| {
+        Ok(complain(sources, words::asks)?)
+    });
+    run("types of a crate have names of their own", &|| {
+        Ok(words::check_names(sources)?)
+    });
     run("layers name only layers below them", &|| {
         Ok(layers::check(sources)?)
     });
@@ -60,7 +66,7 @@ pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
         &|| {
             let reader = recordings::independent_reader();
             // A missing reader is reported as skipped, not as a failure.
-            reader.map(drop).map_err(Why::Skipped)
+            reader.map(drop).map_err(CheckFailure::Skipped)
         },
     );
     // From here on the checks build images and boot guests.
@@ -74,17 +80,17 @@ pub(super) fn run_all(plan: &Plan, sources: &[Source], tally: &mut Tally) {
     run("a guest runs under KVM", &|| {
         let image = image::build("fork-join");
         let probed = image.and_then(|image| probe::kvm(&Qemu::default(), &image.path));
-        probed.map_err(Why::Skipped)
+        probed.map_err(CheckFailure::Skipped)
     });
 }
 
 /// Runs the checks that cargo makes, while other things run.
-pub(super) fn lint_all(plan: &Plan, sources: &[Source]) -> Tally {
+pub(super) fn lint_all(plan: &TestPlan, sources: &[SourceFile]) -> Tally {
     let mut tally = Tally::default();
     let mut run = |name: &str, words: &str, remedy: &str| {
         if plan.wants(name) {
             tally.run(name, || match plan.quick {
-                true => Err(Why::Skipped("left out by --quick".into())),
+                true => Err(CheckFailure::Skipped("left out by --quick".into())),
                 false => Ok(cargo(sources, words, remedy)?),
             });
         }
@@ -108,7 +114,7 @@ pub(super) fn lint_all(plan: &Plan, sources: &[Source]) -> Tally {
 }
 
 /// Runs cargo on the packages of these files; its output is printed only if it fails.
-fn cargo(sources: &[Source], words: &str, remedy: &str) -> Result<(), String> {
+fn cargo(sources: &[SourceFile], words: &str, remedy: &str) -> Result<(), String> {
     let mut command = system::cargo();
     let mut each = words.split(' ');
     command.args(each.next());
@@ -153,10 +159,10 @@ fn lacks_essay(name: &str, text: &str) -> Option<String> {
 
 /// Collects the fault of each file, with its name, on one line.
 fn complain(
-    sources: &[Source],
+    sources: &[SourceFile],
     fault: impl Fn(&str, &str) -> Option<String>,
 ) -> Result<(), String> {
-    let faults = sources.iter().filter_map(|Source { name, text }| {
+    let faults = sources.iter().filter_map(|SourceFile { name, text }| {
         let fault = fault(name, text)?;
         Some(format!("{name} {fault}"))
     });

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{Source, none_of};
+use super::{SourceFile, none_of};
 use crate::system::workspace;
 
 /// The page with the table, and the heading right above it.
@@ -25,7 +25,7 @@ const HEADING: &str = "## Layers inside the crates";
 /// A row of the table: the folder of a crate's sources, or one in it, and its layers from top to
 /// bottom.
 #[derive(Debug, PartialEq, Eq)]
-struct Row {
+struct LayerRow {
     src: String,
     layers: Vec<String>,
 }
@@ -34,14 +34,14 @@ struct Row {
 type Names = BTreeMap<PathBuf, BTreeSet<PathBuf>>;
 
 /// Checks the files of every crate in the table.
-pub(super) fn check(sources: &[Source]) -> Result<(), String> {
+pub(super) fn check(sources: &[SourceFile]) -> Result<(), String> {
     let page = fs::read_to_string(workspace().join(PAGE));
     let rows = rows(&page.map_err(|error| format!("{PAGE}: {error}"))?);
     if rows.is_empty() {
         return Err(format!("{PAGE} has no table below `{HEADING}`"));
     }
     let is_listed = |module: &PathBuf| rows.iter().any(|row| module.starts_with(&row.src));
-    let of_source = |source: &Source| {
+    let of_source = |source: &SourceFile| {
         let module = module(Path::new(&source.name)).filter(is_listed)?;
         Some((module, code(&source.text)))
     };
@@ -58,7 +58,7 @@ pub(super) fn check(sources: &[Source]) -> Result<(), String> {
 }
 
 /// Reads the rows of the table, such as ``| `fass/src` | `api`, `run` |``.
-fn rows(page: &str) -> Vec<Row> {
+fn rows(page: &str) -> Vec<LayerRow> {
     let section = page.split_once(HEADING).map_or("", |(_, after)| after);
     let section = section.split("\n## ").next().unwrap_or_default();
     let words = |cell: &str| -> Vec<String> {
@@ -71,7 +71,7 @@ fn rows(page: &str) -> Vec<Row> {
     let row = |line: &str| {
         let mut cells = line.strip_prefix('|')?.split('|');
         let src = words(cells.next()?).into_iter().next()?;
-        Some(Row {
+        Some(LayerRow {
             src,
             layers: words(cells.next()?),
         })
@@ -210,13 +210,13 @@ fn tokens(code: &str) -> impl Iterator<Item = &str> {
 }
 
 /// Returns the layer of a row that contains a module.
-fn layer(row: &Row, module: &Path) -> Option<String> {
+fn layer(row: &LayerRow, module: &Path) -> Option<String> {
     let first = module.strip_prefix(&row.src).ok()?.iter().next()?;
     Some(first.to_string_lossy().into())
 }
 
 /// Returns the layers that only the table or only the folder has.
-fn strangers(row: &Row, names: &Names) -> Vec<String> {
+fn strangers(row: &LayerRow, names: &Names) -> Vec<String> {
     let there: BTreeSet<String> = names.keys().filter_map(|it| layer(row, it)).collect();
     let listed: BTreeSet<String> = row.layers.iter().cloned().collect();
     let missing = there.difference(&listed).map(|layer| {
@@ -232,7 +232,7 @@ fn strangers(row: &Row, names: &Names) -> Vec<String> {
 }
 
 /// Returns the files that name a layer above their own.
-fn upward(row: &Row, names: &Names) -> impl Iterator<Item = String> {
+fn upward(row: &LayerRow, names: &Names) -> impl Iterator<Item = String> {
     let place = |module: &Path| {
         let layer = layer(row, module)?;
         row.layers.iter().position(|listed| *listed == layer)

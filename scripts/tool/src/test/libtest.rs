@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use super::{Plan, Tally, Why};
+use super::{CheckFailure, Tally, TestPlan};
 use crate::child::{Child, Waited, bound_to_us};
 use crate::golden;
 use crate::install::{self, Need};
@@ -49,7 +49,7 @@ pub(super) struct TestBinary {
 pub(super) type Compiled = (Vec<TestBinary>, Result<(), String>);
 
 /// Runs the tests of all packages.
-pub(super) fn run_all(plan: &Plan, (binaries, compiled): Compiled, tally: &mut Tally) {
+pub(super) fn run_all(plan: &TestPlan, (binaries, compiled): Compiled, tally: &mut Tally) {
     if let Err(why) = compiled {
         tally.run("all tests compile", || Err(why.into()));
     }
@@ -133,7 +133,7 @@ impl TestBinary {
 
     /// Returns the command for the wanted tests. As with cargo, tests run in their package's
     /// folder. A tool that they start must resolve paths from there, so `TOOL_CALLED_IN` is unset.
-    fn command(&self, plan: &Plan) -> Command {
+    fn command(&self, plan: &TestPlan) -> Command {
         let mut command = bound_to_us(&self.executable);
         command.current_dir(&self.folder).args(&plan.filter);
         command.env("CARGO_MANIFEST_DIR", &self.folder);
@@ -143,7 +143,7 @@ impl TestBinary {
 
     /// Lists the wanted tests; `None` if there are none. A program that cannot list them counts as
     /// having some.
-    fn wanted(&self, plan: &Plan) -> Option<String> {
+    fn wanted(&self, plan: &TestPlan) -> Option<String> {
         let mut listed = self.command(plan);
         listed.args(["--list", "--format=terse"]);
         match listed.stdin(Stdio::null()).stderr(Stdio::null()).output() {
@@ -169,7 +169,7 @@ fn lacking(tests: &str) -> Vec<(&'static str, String)> {
 }
 
 /// Returns the command for the examples in the documentation.
-fn doctests(plan: &Plan) -> Command {
+fn doctests(plan: &TestPlan) -> Command {
     let mut command = system::cargo();
     // The kernel on Linux shares sources with the kernel; their examples name the latter and are
     // tested there, and `--doc` ignores a library's wish not to test examples. `--quiet` reaches
@@ -181,8 +181,8 @@ fn doctests(plan: &Plan) -> Command {
 }
 
 /// Runs one command and counts the results in its output.
-fn run(plan: &Plan, name: &str, command: Command, tally: &mut Tally) {
-    let mut report = Report::default();
+fn run(plan: &TestPlan, name: &str, command: Command, tally: &mut Tally) {
+    let mut report = LibtestReport::default();
     let (waited, elapsed) = match follow(plan, command, &mut report) {
         Ok(ended) => ended,
         Err(why) => return tally.run(name, || Err(why.into())),
@@ -213,7 +213,7 @@ fn run(plan: &Plan, name: &str, command: Command, tally: &mut Tally) {
         println!("{}", report.output);
     }
     if let Some(why) = died {
-        tally.run(name, || Err(Why::Failed(why)));
+        tally.run(name, || Err(CheckFailure::Failed(why)));
     } else if report.passed > 0 || !failed.is_empty() {
         let (passed, failed, seconds) = (report.passed, failed.len(), elapsed.as_secs_f64());
         println!("{name}: {passed} passed, {failed} failed in {seconds:.1} s");
@@ -222,9 +222,9 @@ fn run(plan: &Plan, name: &str, command: Command, tally: &mut Tally) {
 
 /// Runs one command to its end, and reads its output line by line.
 fn follow(
-    plan: &Plan,
+    plan: &TestPlan,
     mut command: Command,
-    report: &mut Report,
+    report: &mut LibtestReport,
 ) -> Result<(Waited, Duration), String> {
     let log = system::new_log("test")?;
     let error = |error| format!("`{}`: {error}", log.display());
@@ -250,7 +250,7 @@ fn follow(
 
 /// The results in libtest's output.
 #[derive(Default)]
-struct Report {
+struct LibtestReport {
     output: String,
     passed: u64,
     /// The number of failures, and the names of those with a line of their own.
@@ -261,7 +261,7 @@ struct Report {
     has_result: bool,
 }
 
-impl Report {
+impl LibtestReport {
     fn take(&mut self, line: &str) {
         self.output += line;
         self.output.push('\n');
@@ -304,7 +304,7 @@ fn count(result: &str, word: &str) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Report, TestBinary};
+    use super::{LibtestReport, TestBinary};
     use crate::json::parse;
 
     const SAID: &str = "\
@@ -319,8 +319,8 @@ test result: FAILED. 1 passed; 1 failed; 2 ignored; 0 measured; 0 filtered out; 
 test result: ok. 40 passed; 0 failed; 0 ignored; 0 measured; 9 filtered out; finished in 0.00s
 ";
 
-    fn report(said: &str) -> Report {
-        let mut report = Report::default();
+    fn report(said: &str) -> LibtestReport {
+        let mut report = LibtestReport::default();
         said.lines().for_each(|line| report.take(line));
         assert_eq!(report.output, said);
         report

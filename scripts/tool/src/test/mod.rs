@@ -16,6 +16,7 @@ mod budgets;
 mod checks;
 mod layers;
 mod libtest;
+mod words;
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -61,7 +62,7 @@ a FILTER by which nothing has run
 };
 
 /// The tests to run.
-struct Plan {
+struct TestPlan {
     /// A part of the names of the wanted tests; `None`: all.
     filter: Option<String>,
     /// Leave out guests, images and lints.
@@ -74,7 +75,7 @@ struct Plan {
     blessed: Option<PathBuf>,
 }
 
-impl Plan {
+impl TestPlan {
     fn wants(&self, name: &str) -> bool {
         let filter = self.filter.as_deref();
         filter.is_none_or(|filter| name.contains(filter))
@@ -89,7 +90,7 @@ pub fn test(words: &[OsString]) -> ExitCode {
         checks::check()?;
         let list = options.is_given("bless");
         let list = list.then(|| system::new_log("blessed"));
-        let plan = Plan {
+        let plan = TestPlan {
             filter: options.positional().map(String::from),
             quick: options.is_given("quick"),
             verbose: options.is_given("verbose"),
@@ -151,7 +152,7 @@ fn complaint(filter: Option<&str>, tally: &Tally) -> Option<String> {
 
 /// Builds the images before the tests that boot them, so that the limits of these tests need not
 /// include a compiler. An image of the project's own must be small.
-fn build_images(plan: &Plan, sources: &[Source], tally: &mut Tally) {
+fn build_images(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally) {
     if plan.quick {
         return;
     }
@@ -179,16 +180,16 @@ fn build_image(app: &str, most: u64) -> Result<(), String> {
 
 /// The reason why a check has not passed.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Why {
+enum CheckFailure {
     /// It failed.
     Failed(String),
     /// It could not run.
     Skipped(String),
 }
 
-impl From<String> for Why {
-    fn from(why: String) -> Why {
-        Why::Failed(why)
+impl From<String> for CheckFailure {
+    fn from(why: String) -> CheckFailure {
+        CheckFailure::Failed(why)
     }
 }
 
@@ -202,33 +203,33 @@ fn none_of(faults: Vec<String>) -> Result<(), String> {
 
 /// A file: its name, relative to the workspace's root, and its text.
 #[derive(Debug, PartialEq, Eq)]
-struct Source {
+struct SourceFile {
     name: String,
     text: String,
 }
 
 /// Returns all files of the workspace, sorted, without the generated ones and without those of
 /// packages that are not the project's own.
-fn sources() -> Vec<Source> {
+fn sources() -> Vec<SourceFile> {
     below(system::workspace())
 }
 
 /// Returns the names of the packages whose files these are, sorted.
-fn packages(sources: &[Source]) -> Vec<String> {
+fn packages(sources: &[SourceFile]) -> Vec<String> {
     let manifests = sources.iter().filter(|it| it.name.ends_with("Cargo.toml"));
     let mut names: Vec<String> = manifests.filter_map(|it| package_name(&it.text)).collect();
     names.sort();
     names
 }
 
-fn below(root: &Path) -> Vec<Source> {
+fn below(root: &Path) -> Vec<SourceFile> {
     let files = system::files_below(root, |folder| {
         let manifest = fs::read_to_string(folder.join("Cargo.toml"));
         manifest.map_or(true, |text| {
             package_name(&text).is_none() || takes_lints(&text)
         })
     });
-    let source = |file: &Path| Source {
+    let source = |file: &Path| SourceFile {
         name: file
             .strip_prefix(root)
             .unwrap_or(file)
@@ -258,7 +259,7 @@ struct Tally {
 
 impl Tally {
     /// Runs a check, counts it, and prints its result and its time.
-    fn run(&mut self, name: &str, check: impl FnOnce() -> Result<(), Why>) {
+    fn run(&mut self, name: &str, check: impl FnOnce() -> Result<(), CheckFailure>) {
         let start = Instant::now();
         let result = check();
         let seconds = start.elapsed().as_secs_f64();
@@ -267,11 +268,11 @@ impl Tally {
                 println!("{name}: ok in {seconds:.1} s");
                 self.passed += 1;
             }
-            Err(Why::Failed(why)) => {
+            Err(CheckFailure::Failed(why)) => {
                 println!("{name}: FAILED: {why}");
                 self.fail(name, &why);
             }
-            Err(Why::Skipped(why)) => self.skip(name, &why),
+            Err(CheckFailure::Skipped(why)) => self.skip(name, &why),
         }
     }
 
@@ -342,7 +343,7 @@ impl fmt::Display for Tally {
 
 #[cfg(test)]
 mod tests {
-    use super::{Tally, Why, below, complaint, packages, sources};
+    use super::{CheckFailure, Tally, below, complaint, packages, sources};
     use std::fs;
 
     #[test]
@@ -393,7 +394,9 @@ mod tests {
         assert_eq!(tally.to_string(), "\n12 passed, 0 failed\n");
         tally.run("a check", || Ok(()));
         tally.run("a::b", || Err("left is not right\nmore".to_string().into()));
-        tally.run("c", || Err(Why::Skipped("there is no /dev/kvm".into())));
+        tally.run("c", || {
+            Err(CheckFailure::Skipped("there is no /dev/kvm".into()))
+        });
         tally.bless("b.md\na.md\nb.md\n");
         let expected = "\nskipped: c: there is no /dev/kvm\nfailed: a::b: left is not right\n\
                         blessed: a.md; read `git diff`\nblessed: b.md; read `git diff`\n\

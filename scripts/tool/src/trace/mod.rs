@@ -4,7 +4,7 @@
 //! [`sched_dag::law`], which judges all runs, within a stated *bound*, because a decision takes
 //! effect after an interrupt.
 //!
-//! This module has the subcommand `check-trace`; the [`Figures`], computed from a `View`, which
+//! This module has the subcommand `check-trace`; the [`RunFigures`], computed from a `View`, which
 //! puts a run in the order of time; the latencies of effects from DAG to DAG
 //! ([`sched_dag::chains`]); and [`viewer`], which draws a run instead of judging it. All files are
 //! read before the first run is judged, so that a damaged one does not hide behind the breaches of
@@ -62,7 +62,7 @@ pub struct Findings {
     /// The breaches by time.
     pub breaches: Vec<Violation>,
     /// The figures.
-    pub figures: Figures,
+    pub figures: RunFigures,
 }
 
 /// Reads the runs of the record in a log.
@@ -185,7 +185,7 @@ fn read_file(path: &Path) -> Result<Vec<Run>, String> {
 }
 
 /// Judges a run, prints the findings, and returns the number of breaches.
-fn judge(file: &str, run: &Run, chains: &[Measured], options: &Parsed) -> usize {
+fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> usize {
     let bound_ns = bound::of(run, options);
     let shown = options.number("show").unwrap_or(u64::MAX);
     let shown = usize::try_from(shown).unwrap_or(usize::MAX);
@@ -321,7 +321,7 @@ fn object(of: &Distribution) -> String {
 const SHOWN: usize = 8;
 
 /// The times of a chain in a run, and their bounds.
-struct Measured {
+struct MeasuredChain {
     names: Vec<String>,
     output_age: (Distribution, Result<u64, DagId>),
     data_age: (Distribution, Result<u64, DagId>),
@@ -333,7 +333,7 @@ struct Measured {
 /// # Errors
 ///
 /// In words: there is no such subtask, or no chain between the two.
-fn measure(run: &Run, options: &Parsed) -> Result<Vec<Measured>, String> {
+fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
     let samplings = &run.samplings;
     let ends = (options.text("from"), options.text("to"));
     let chains = match ends {
@@ -360,7 +360,7 @@ fn measure(run: &Run, options: &Parsed) -> Result<Vec<Measured>, String> {
         let reaction = chain.reaction_bound_ns(&run.task_set, bounds);
         let names = chain.names(&run.task_set).map(|name| name.to_string());
         // Reaction time and data age have the same bound.
-        Measured {
+        MeasuredChain {
             names: names.collect(),
             output_age: (
                 Distribution::new(times.output_age_ns),
@@ -394,7 +394,7 @@ fn place(run: &Run, option: &str, name: &str) -> Result<SubtaskRef, String> {
 }
 
 /// Returns the lines about chains for people.
-fn chain_table(run: &Run, chains: &[Measured], is_named: bool) -> String {
+fn chain_table(run: &Run, chains: &[MeasuredChain], is_named: bool) -> String {
     let mut text = String::new();
     let shown = if is_named { chains.len() } else { SHOWN };
     for chain in chains.iter().take(shown) {
@@ -429,7 +429,7 @@ fn chain_table(run: &Run, chains: &[Measured], is_named: bool) -> String {
 }
 
 /// Returns the machine line of kind `chain`.
-fn chain_line(file: &str, run: &Run, chain: &Measured) -> String {
+fn chain_line(file: &str, run: &Run, chain: &MeasuredChain) -> String {
     let bound = |of: &Result<u64, DagId>| of.map_or("null".into(), |ns| ns.to_string());
     Object::new()
         .text("kind", "chain")
@@ -446,7 +446,7 @@ fn chain_line(file: &str, run: &Run, chain: &Measured) -> String {
 
 /// The figures of one run. Times are in nanoseconds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Figures {
+pub struct RunFigures {
     /// The number of judged events.
     pub events: usize,
     /// The number of instances that started.
@@ -471,11 +471,11 @@ pub struct Figures {
 }
 
 /// Computes the figures of a run.
-fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: WaitCounts) -> Figures {
+fn compute(view: &View<'_>, finish_to_ready_max_ns: u64, waits: WaitCounts) -> RunFigures {
     let first_ns = view.events.first().map_or(0, |event| event.time_ns);
     let span_ns = view.end_ns.saturating_sub(first_ns);
     let histories = view.histories.values();
-    Figures {
+    RunFigures {
         events: view.events.len(),
         instances: histories.filter(|it| it.start_ns.is_some()).count(),
         preemptions: view.histories.values().map(|it| it.suspensions).sum(),

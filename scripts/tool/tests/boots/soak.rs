@@ -1,13 +1,13 @@
 //! The short form of `./scripts/soak`: random DAG sets with every kind of incident, and all checks.
 
-use tool::soak::{self, Plan};
+use tool::soak::{self, SoakPlan};
 
 #[test]
 fn random_sets_break_no_rule_and_leave_nothing_behind() {
-    let plan = Plan {
+    let plan = SoakPlan {
         round_ms: 250,
         side_by_side: 2,
-        ..Plan::SHORT
+        ..SoakPlan::SHORT
     };
     let report = soak::run(&plan, |_| {}).expect("the guests start");
     assert_eq!(report.failures, Vec::<String>::new());

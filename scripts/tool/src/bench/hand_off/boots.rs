@@ -115,9 +115,9 @@ impl Boot {
 }
 
 /// The workload, figure and heading of each column.
-type Columns = &'static [(&'static str, &'static str, &'static str)];
+type BootColumns = &'static [(&'static str, &'static str, &'static str)];
 
-const BY_CORES: Columns = &[
+const BY_CORES: BootColumns = &[
     ("chain-64", "hop", "chain-64 hop"),
     ("fork-join-16", "return_to_start", "fj-16 return->sink"),
     ("fork-join-16", "source_to_sink", "fj-16 source->sink"),
@@ -126,14 +126,14 @@ const BY_CORES: Columns = &[
     ("chain-64", "release_to_start", "release->start"),
 ];
 
-const BY_SUBTASKS: Columns = &[
+const BY_SUBTASKS: BootColumns = &[
     ("layered", "instance", "instance"),
     ("layered", "release_to_start", "release->start"),
     ("layered", "locks", "locks/instance"),
     ("layered", "commit", "commit/subtask"),
 ];
 
-const BY_CLUSTERS: Columns = &[
+const BY_CLUSTERS: BootColumns = &[
     ("layered-100", "instance", "layered instance"),
     ("layered-100", "locks", "locks/instance"),
 ];
@@ -216,7 +216,7 @@ fn check_clusters(rows: &[(u64, Vec<Figure>)]) -> Result<(), String> {
 }
 
 /// Returns a table with a row for each size; workload `layered` stands for the one of that size.
-fn table(what: &str, of: Columns, rows: &[(u64, Vec<Figure>)]) -> String {
+fn table(what: &str, of: BootColumns, rows: &[(u64, Vec<Figure>)]) -> String {
     let of_figures = of.iter().map(|(_, _, heading)| format!("|{heading}:20"));
     let columns = format!("{what}:8") + &of_figures.collect::<String>();
     let mut table = Table::new("", &columns);

@@ -49,7 +49,7 @@ Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
 
 /// The measurement to make.
 #[derive(Debug)]
-struct Plan {
+struct HandOffPlan {
     /// The only mode to measure in; `None`: instructions and time.
     mode: Option<Mode>,
     /// The figures of the baseline, if they are to be compared.
@@ -61,7 +61,7 @@ struct Plan {
     listing: Option<PathBuf>,
 }
 
-impl Plan {
+impl HandOffPlan {
     /// Makes the plan from the options.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ impl Plan {
 
 /// Runs `bench hand-off` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    by_plan(&TABLE, words, Plan::new, measure)
+    by_plan(&TABLE, words, HandOffPlan::new, measure)
 }
 
 /// Measures as `--compare` does, and prints the table. If figures have grown and there is a `list`
@@ -122,7 +122,7 @@ pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
 }
 
 /// Measures and reports. Returns whether no figure has grown.
-fn measure(plan: &Plan) -> Result<bool, String> {
+fn measure(plan: &HandOffPlan) -> Result<bool, String> {
     install::ensure_qemu()?;
     let image = &image::build("hand-off")?.path;
     if plan.scale {
@@ -191,7 +191,7 @@ fn measure_mode(mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Plan, TABLE};
+    use super::{HandOffPlan, TABLE};
 
     /// Command lines, and their refusals. More are in `tests/it/files.rs`.
     const REFUSED: &str = "--compare --mode threads | leave `--mode` out
@@ -205,11 +205,11 @@ mod tests {
     fn what_cannot_be_is_refused() {
         for row in REFUSED.lines() {
             let (line, words) = row.split_once(" | ").expect(row);
-            let refused = Plan::new(&TABLE.right(line)).expect_err(line);
+            let refused = HandOffPlan::new(&TABLE.right(line)).expect_err(line);
             assert!(refused.contains(words), "{refused}");
         }
         for line in ["--scale", "--listing /dev/null", "--compare --mode both"] {
-            assert!(Plan::new(&TABLE.right(line)).is_ok(), "{line}");
+            assert!(HandOffPlan::new(&TABLE.right(line)).is_ok(), "{line}");
         }
     }
 }

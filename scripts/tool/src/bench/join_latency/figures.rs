@@ -131,7 +131,7 @@ pub(super) const COUNTS: [&str; 6] = [
 
 /// The figures of one condition, or of several of one kind.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Figures {
+pub(super) struct ConditionFigures {
     /// In the order of [`COUNTS`].
     pub(super) counts: [usize; COUNTS.len()],
     /// The samples of each metric, as (index, nanoseconds), in the order of
@@ -139,7 +139,7 @@ pub(super) struct Figures {
     pub(super) samples: [Vec<(usize, u64)>; METRICS.len()],
 }
 
-impl Figures {
+impl ConditionFigures {
     /// Computes the figures of one condition.
     pub(super) fn of(samples: &Samples) -> Self {
         let record = samples.record();
@@ -212,10 +212,10 @@ impl Figures {
 }
 
 /// The conditions measured so far, in the order of the plan.
-type Measured = [(Condition, Figures)];
+type MeasuredConditions = [(Condition, ConditionFigures)];
 
 /// Returns each sample of each metric as a line of a table.
-pub(super) fn samples_csv(measured: &Measured) -> String {
+pub(super) fn samples_csv(measured: &MeasuredConditions) -> String {
     let mut text = String::from("policy,subtasks,seed,metric,index,value_ns\n");
     for (condition, figures) in measured {
         let (policy, subtasks, seed) = (condition.policy, condition.subtasks, condition.seed);
@@ -234,18 +234,18 @@ pub(super) fn samples_csv(measured: &Measured) -> String {
 
 /// Returns the pooled figures of all seeds for each policy and N, in the order of the plan, each
 /// with its first condition. Conditions not measured yet are left out.
-fn pooled(measured: &Measured) -> impl Iterator<Item = (Condition, Figures)> {
+fn pooled(measured: &MeasuredConditions) -> impl Iterator<Item = (Condition, ConditionFigures)> {
     let of = |condition: &Condition| (condition.subtasks, condition.policy);
     let alike = measured.chunk_by(move |(one, _), (other, _)| of(one) == of(other));
     alike.map(|seeds| {
-        let mut sum = Figures::default();
+        let mut sum = ConditionFigures::default();
         seeds.iter().for_each(|(_, figures)| sum.add(figures));
         (seeds[0].0, sum)
     })
 }
 
 /// Returns the summary, with a line for each policy and N.
-pub(super) fn summary_json(setting: &Setting<'_>, measured: &Measured) -> String {
+pub(super) fn summary_json(setting: &Setting<'_>, measured: &MeasuredConditions) -> String {
     let plan = setting.plan;
     let results = pooled(measured).map(|(condition, figures)| result_json(condition, &figures));
     let results = results.collect::<Vec<_>>().join(",\n");
@@ -266,7 +266,7 @@ pub(super) fn summary_json(setting: &Setting<'_>, measured: &Measured) -> String
     summary.end() + "\n"
 }
 
-fn result_json(condition: Condition, figures: &Figures) -> String {
+fn result_json(condition: Condition, figures: &ConditionFigures) -> String {
     let mut result = Object::new()
         .text("policy", &condition.policy.to_string())
         .number("subtasks", condition.subtasks as u64);
@@ -288,7 +288,7 @@ fn result_json(condition: Condition, figures: &Figures) -> String {
 }
 
 /// Returns the table of the figures for each policy and N.
-pub(super) fn table(measured: &Measured) -> String {
+pub(super) fn table(measured: &MeasuredConditions) -> String {
     let columns = "N:2| joined by:<23|joins/job:9.3|one job:8|across:8|missing:9|\
                        latency:12|p99:12|cover:12|p99:12|response:12";
     let mut table = Table::new("", columns);
@@ -371,7 +371,7 @@ mod tests {
 
     #[test]
     fn metrics_are_what_they_are_defined_to_be_and_pooled() {
-        let figures = Figures::of(&samples());
+        let figures = ConditionFigures::of(&samples());
         assert_eq!(figures.counts, [3, 1, 0, 1, 2, 1]);
         let third = 2 * PERIOD_NS + 10;
         let expected = [

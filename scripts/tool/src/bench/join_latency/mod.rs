@@ -24,21 +24,21 @@ use replay::shown::quoted;
 use super::frame::{by_plan, draw, judged};
 use crate::files;
 use crate::options::{Command, Parsed, Takes, options};
-use crate::program::Order;
+use crate::program::ProgramOrder;
 use crate::progress::Progress;
 use crate::qemu::{Mode, PROGRAM, Qemu};
 use crate::{image, install, outcome, probe, program, system};
-use figures::Figures;
+use figures::ConditionFigures;
 
 /// Runs `bench join-latency` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    by_plan(&TABLE, words, Plan::new, |plan| {
+    by_plan(&TABLE, words, JoinPlan::new, |plan| {
         measure_all(plan).map(|()| true)
     })
 }
 
 /// Measures the missing conditions, and writes all results.
-fn measure_all(plan: &Plan) -> Result<(), String> {
+fn measure_all(plan: &JoinPlan) -> Result<(), String> {
     let (setting, why) = Setting::new(plan)?;
     let (conditions, jobs, cores) = (plan.conditions.len(), plan.jobs, plan.cores);
     let (mode, version) = (setting.mode_name(), &setting.version);
@@ -66,7 +66,7 @@ fn measure_all(plan: &Plan) -> Result<(), String> {
                 read(text).ok_or_else(|| format!("{condition}: its times are damaged"))?
             }
         };
-        measured.push((*condition, Figures::of(&samples)));
+        measured.push((*condition, ConditionFigures::of(&samples)));
         // After each condition: an interruption leaves figures for those measured so far.
         let summary = figures::summary_json(&setting, &measured);
         write_whole(&plan.out.join("summary.json"), &summary)?;
@@ -139,7 +139,7 @@ exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command lin
 
 /// The settings that all conditions share, and the conditions.
 #[derive(Clone, Debug)]
-struct Plan {
+struct JoinPlan {
     out: PathBuf,
     /// For each N all policies, for each of them all seeds.
     conditions: Vec<Condition>,
@@ -156,13 +156,13 @@ struct Plan {
     once: bool,
 }
 
-impl Plan {
+impl JoinPlan {
     /// Makes the plan from the options.
     ///
     /// # Errors
     ///
     /// One line with the reason: the options contradict each other.
-    fn new(options: &Parsed) -> Result<Plan, String> {
+    fn new(options: &Parsed) -> Result<JoinPlan, String> {
         let on_linux = options.text("on") == Some("linux");
         let of_guests = options.given_of(&["mode", "deterministic", "once"]);
         if let Some(name) = of_guests.filter(|_| on_linux) {
@@ -212,7 +212,7 @@ impl Plan {
             false => "target/join-latency",
         };
         let jobs = number("jobs");
-        Ok(Plan {
+        Ok(JoinPlan {
             out: options.path("out").unwrap_or(Path::new(folder)).into(),
             conditions,
             seeds,
@@ -327,7 +327,7 @@ const MOST_BOOTS: usize = 6;
 /// The machine for all conditions, and its versions, for the summary.
 #[derive(Debug)]
 struct Setting<'p> {
-    plan: &'p Plan,
+    plan: &'p JoinPlan,
     /// The mode of the guests; `None`: programs of this computer.
     mode: Option<Mode>,
     image: PathBuf,
@@ -345,7 +345,7 @@ impl<'p> Setting<'p> {
     /// # Errors
     ///
     /// In words: it cannot be built, or the named mode does not work.
-    fn new(plan: &'p Plan) -> Result<(Self, Option<String>), String> {
+    fn new(plan: &'p JoinPlan) -> Result<(Self, Option<String>), String> {
         let mut setting = Self {
             plan,
             mode: None,
@@ -454,7 +454,7 @@ impl<'p> Setting<'p> {
             }
             let words = self.linux_words(condition);
             let words: Vec<OsString> = words.split(' ').map(OsString::from).collect();
-            let order = Order {
+            let order = ProgramOrder {
                 program: &self.image,
                 words: &words,
                 is_live: false,
@@ -488,8 +488,8 @@ fn first_line(program: &str, words: &[&str]) -> String {
 mod tests {
     use super::*;
 
-    fn plan(line: &str) -> Result<Plan, String> {
-        Plan::new(&TABLE.right(line))
+    fn plan(line: &str) -> Result<JoinPlan, String> {
+        JoinPlan::new(&TABLE.right(line))
     }
 
     #[test]

@@ -17,7 +17,9 @@ use std::time::Instant;
 use hand_off::{Pen, Stamps};
 use sched_dag::Policy;
 
-use super::{Figure, Graph, Rounds, Row, Tick, commit, empty, machine, nanoseconds, run_jobs};
+use super::{
+    Figure, MeasuredGraph, NativeRow, Rounds, Tick, commit, empty, machine, nanoseconds, run_jobs,
+};
 
 const WORKLOAD: &str = "join of 2 us";
 
@@ -25,11 +27,11 @@ const WORKLOAD: &str = "join of 2 us";
 const WORK_NS: u64 = 2_000;
 
 /// Measures `jobs` jobs, the clock, and the least cost of a message between cores.
-pub(super) fn join(jobs: u64) -> Result<Vec<Row>, String> {
+pub(super) fn join(jobs: u64) -> Result<Vec<NativeRow>, String> {
     let mut stamps = Stamps::default();
     let functions = [0, WORK_NS, WORK_NS, 0].map(|work_ns| body(work_ns, stamps.pen(jobs)));
     let machine = machine(Policy::StaticPriority, 2)?;
-    commit(Graph::JOIN, jobs, vec![vec![functions.into()]]);
+    commit(MeasuredGraph::JOIN, jobs, vec![vec![functions.into()]]);
     run_jobs(&machine, jobs).map_err(|why| format!("{WORKLOAD}: {why}"))?;
     let clock = clock();
     let reading_ns = clock.median / clock.per;
@@ -89,8 +91,8 @@ fn transfer() -> Figure {
     const ROUNDS: u64 = 200;
     /// A number in cache lines of its own.
     #[repr(align(128))]
-    struct Line(AtomicU64);
-    impl Line {
+    struct PaddedNumber(AtomicU64);
+    impl PaddedNumber {
         fn tell(&self, exchange: u64) {
             // Release and Acquire, as a scheduler would publish a value with its message.
             self.0.store(exchange, Ordering::Release);
@@ -102,7 +104,7 @@ fn transfer() -> Figure {
             }
         }
     }
-    let [there, back] = [0, 0].map(|none| Line(AtomicU64::new(none)));
+    let [there, back] = [0, 0].map(|none| PaddedNumber(AtomicU64::new(none)));
     let answer = || {
         for exchange in 1..=ROUNDS * EXCHANGES {
             there.wait_for(exchange);
@@ -153,10 +155,10 @@ const PARTS: u64 = 1_000_000;
 /// each graph the throughput of two clusters relative to one core.
 pub(super) fn clusters(
     windows: usize,
-    rows: &mut Vec<Row>,
+    rows: &mut Vec<NativeRow>,
 ) -> Result<Vec<(&'static str, f64)>, String> {
     let mut all = Vec::new();
-    for graph in [Graph::CHAIN, Graph::LAYERED] {
+    for graph in [MeasuredGraph::CHAIN, MeasuredGraph::LAYERED] {
         let mut samples = [Vec::new(), Vec::new()];
         for _ in 0..PASSES {
             for (clusters, samples) in (1..).zip(&mut samples) {
@@ -179,12 +181,12 @@ pub(super) fn clusters(
     Ok(all)
 }
 
-fn jobs_a_round(graph: Graph) -> u64 {
+fn jobs_a_round(graph: MeasuredGraph) -> u64 {
     INSTANCES_A_ROUND.div_ceil(graph.instances() as u64)
 }
 
 /// Runs `clusters` clusters, and returns the time of the instances of each window.
-fn pass(graph: Graph, windows: usize, clusters: u32) -> Result<Vec<u64>, String> {
+fn pass(graph: MeasuredGraph, windows: usize, clusters: u32) -> Result<Vec<u64>, String> {
     let jobs_a_round = jobs_a_round(graph);
     let rounds = (windows.div_ceil(PASSES) + 2 * WINDOW) as u64;
     let jobs = jobs_a_round * rounds + 1;

@@ -68,14 +68,14 @@ const CLUSTERS: &str = "clusters";
 
 /// Runs `bench native` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    by_plan(&TABLE, words, Plan::read, measure)
+    by_plan(&TABLE, words, NativePlan::read, measure)
 }
 
 /// The plan of the measurement.
-struct Plan {
+struct NativePlan {
     rounds: usize,
     jobs: u64,
-    graphs: Vec<Graph>,
+    graphs: Vec<MeasuredGraph>,
     with_join: bool,
     with_clusters: bool,
 }
@@ -83,10 +83,10 @@ struct Plan {
 /// The numbers of workers, each a thread with a processor of its own.
 const WORKERS: [u32; 2] = [1, 2];
 
-impl Plan {
+impl NativePlan {
     fn read(options: &Parsed) -> Result<Self, String> {
         options.check_distinct(&["only"])?;
-        let names = Graph::ALL.iter().map(|graph| graph.name);
+        let names = MeasuredGraph::ALL.iter().map(|graph| graph.name);
         let known: Vec<&str> = names.chain([JOIN, CLUSTERS]).collect();
         let chosen = options.text("only").map(|names| names.split(',').collect());
         let wanted: Vec<&str> = chosen.unwrap_or_else(|| known.clone());
@@ -97,11 +97,11 @@ impl Plan {
             ));
         }
         let number = |name| options.number(name).unwrap_or(0);
-        let is_wanted = |graph: &Graph| wanted.contains(&graph.name);
+        let is_wanted = |graph: &MeasuredGraph| wanted.contains(&graph.name);
         Ok(Self {
             rounds: usize::try_from(number("rounds")).unwrap_or(usize::MAX),
             jobs: number("jobs"),
-            graphs: Graph::ALL.into_iter().filter(is_wanted).collect(),
+            graphs: MeasuredGraph::ALL.into_iter().filter(is_wanted).collect(),
             with_join: wanted.contains(&JOIN),
             with_clusters: wanted.contains(&CLUSTERS),
         })
@@ -109,10 +109,10 @@ impl Plan {
 }
 
 /// A figure in nanoseconds, and its runner and policy.
-type Row = (Figure, &'static str);
+type NativeRow = (Figure, &'static str);
 
 /// Measures and prints; true, as no figure has a limit.
-fn measure(plan: &Plan) -> Result<bool, String> {
+fn measure(plan: &NativePlan) -> Result<bool, String> {
     // Two workers that poll on one processor would only wait for each other.
     if linux::processors() < 2 {
         return Err("this host has one processor for us; two are needed".into());
@@ -152,7 +152,7 @@ fn measure(plan: &Plan) -> Result<bool, String> {
     Ok(true)
 }
 
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[NativeRow]) -> String {
     let columns = ":<14|ns:<38|bodies, policy:<18|workers:8|min:10.1|median:10.1|p99:10.1";
     let mut table = Table::new("", columns);
     let mut before = "";
@@ -174,7 +174,7 @@ fn table(rows: &[Row]) -> String {
     table.text()
 }
 
-fn machine_line((figure, runner): &Row) -> String {
+fn machine_line((figure, runner): &NativeRow) -> String {
     let one = |ns| format!("{:.2}", figure.of_step(ns));
     Object::new()
         .text("kind", "bench")
@@ -219,18 +219,18 @@ impl Runner {
 }
 
 /// Returns the number of passes of [`measure`].
-fn passes(graphs: &[Graph], workers: &[u32]) -> u64 {
-    let of_graph = |graph: &Graph| (PASSES * runners(*graph, workers).len()) as u64;
+fn passes(graphs: &[MeasuredGraph], workers: &[u32]) -> u64 {
+    let of_graph = |graph: &MeasuredGraph| (PASSES * runners(*graph, workers).len()) as u64;
     graphs.iter().map(of_graph).sum()
 }
 
 /// Measures all runners, calling `show` after each pass.
 fn throughput(
-    graph: Graph,
+    graph: MeasuredGraph,
     workers: &[u32],
     rounds: usize,
     show: &mut impl FnMut(),
-) -> Result<Vec<Row>, String> {
+) -> Result<Vec<NativeRow>, String> {
     let runners = runners(graph, workers);
     let mut samples = vec![Vec::new(); runners.len()];
     for _ in 0..PASSES {
@@ -252,7 +252,7 @@ fn throughput(
     Ok(runners.iter().zip(samples).map(of_runner).collect())
 }
 
-fn runners(graph: Graph, workers: &[u32]) -> Vec<(Runner, u32)> {
+fn runners(graph: MeasuredGraph, workers: &[u32]) -> Vec<(Runner, u32)> {
     let mut runners = vec![(Runner::Floor, 1)];
     for &workers in workers {
         let policies = [Policy::StaticPriority, Policy::Edf];
@@ -262,12 +262,17 @@ fn runners(graph: Graph, workers: &[u32]) -> Vec<(Runner, u32)> {
     runners
 }
 
-fn jobs_a_round(graph: Graph) -> u64 {
+fn jobs_a_round(graph: MeasuredGraph) -> u64 {
     (INSTANCES_A_ROUND / graph.instances()) as u64
 }
 
 /// Runs the rounds, after some to warm up, and returns the time of each in nanoseconds.
-fn pass(graph: Graph, runner: Runner, workers: u32, rounds: usize) -> Result<Vec<u64>, String> {
+fn pass(
+    graph: MeasuredGraph,
+    runner: Runner,
+    workers: u32,
+    rounds: usize,
+) -> Result<Vec<u64>, String> {
     let jobs_a_round = jobs_a_round(graph);
     // One job more: the last round needs an end.
     let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
@@ -298,7 +303,7 @@ fn pass(graph: Graph, runner: Runner, workers: u32, rounds: usize) -> Result<Vec
 
 /// A graph that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Graph {
+struct MeasuredGraph {
     name: &'static str,
     /// The shape of each DAG.
     shape: Shape,
@@ -308,7 +313,7 @@ struct Graph {
     steps: (&'static str, u64),
 }
 
-impl Graph {
+impl MeasuredGraph {
     const CHAIN: Self = Self::new("chain-64", Shape::Chain(64), 1, ("per hop", 63));
     const LAYERED: Self = {
         let (subtasks, seed) = (1_000, 1);
@@ -407,7 +412,7 @@ fn run_jobs(linux: &Linux, jobs: u64) -> Result<(), String> {
 type Tick = Box<dyn FnMut(u64) + Send>;
 
 /// Makes empty functions for a graph's DAGs, subtask by subtask; the first source counts rounds.
-fn empty(graph: Graph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Tick>> {
+fn empty(graph: MeasuredGraph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Tick>> {
     let of_dag = |_| (0..graph.shape.subtasks()).map(|_| Box::new(|_| ()) as Tick);
     let mut all: Vec<Vec<Tick>> = (0..graph.dags).map(|dag| of_dag(dag).collect()).collect();
     let mut source = rounds.source(jobs_a_round);
@@ -420,7 +425,7 @@ fn named(number: usize) -> SubtaskAttributes {
 }
 
 /// Commits DAGs without values, of any shape; `clusters` has the functions of each cluster.
-fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
+fn commit(graph: MeasuredGraph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
     let is_divided = clusters.len() > 1;
     let mut dags = Vec::new();
     for (cluster, of_dags) in (0..).zip(clusters) {
@@ -449,7 +454,7 @@ fn commit(graph: Graph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
 }
 
 /// Commits a graph of one DAG with a value on each edge; its source also calls `tick`.
-fn commit_typed(graph: Graph, jobs: u64, mut tick: impl FnMut() + Send + 'static) {
+fn commit_typed(graph: MeasuredGraph, jobs: u64, mut tick: impl FnMut() + Send + 'static) {
     let dag = create_dag();
     dag.name("typed").jobs(jobs).in_flight(1);
     let source = move || {
@@ -490,14 +495,14 @@ fn commit_typed(graph: Graph, jobs: u64, mut tick: impl FnMut() + Send + 'static
 mod tests {
     use super::*;
 
-    fn plan(line: &str) -> Result<Plan, String> {
-        Plan::read(&TABLE.right(line))
+    fn plan(line: &str) -> Result<NativePlan, String> {
+        NativePlan::read(&TABLE.right(line))
     }
 
     #[test]
     fn workloads_are_chosen_by_name_and_unknown_ones_refused_with_those_there_are() {
         let chosen = plan("--only fork-join-2,chain-64").expect("right");
-        assert_eq!(chosen.graphs, [Graph::CHAIN, Graph::JOIN]);
+        assert_eq!(chosen.graphs, [MeasuredGraph::CHAIN, MeasuredGraph::JOIN]);
         assert!(!chosen.with_join && !chosen.with_clusters);
         let line = plan("--only chain-65").err().expect("refused");
         assert!(line.contains("called `chain-65`") && line.contains("chain-64, fork-join-2"));
@@ -506,7 +511,7 @@ mod tests {
     /// One test, since only one thread of a program may measure at a time.
     #[test]
     fn a_short_run_measures_every_graph_alone_and_in_clusters() {
-        for graph in Graph::ALL {
+        for graph in MeasuredGraph::ALL {
             let rows = throughput(graph, &[1], 3, &mut || {}).expect("it runs");
             let expected = 3 + usize::from(graph.has_values());
             assert_eq!(rows.len(), expected, "{}", graph.name);

@@ -27,7 +27,7 @@ use sched_dag::{CommitOptions, DagSpec, Policy, SubtaskSpec};
 
 /// A graph in which each subtask may have a timer.
 #[derive(Clone, Debug, Default)]
-pub struct Graph {
+pub struct RateGraph {
     /// The subtasks.
     pub subtasks: Vec<Subtask>,
     /// The edges, with their lines.
@@ -55,7 +55,7 @@ pub struct Subtask {
 /// A period and an offset; the larger one is the slower rate.
 type Rate = (u64, u64);
 
-impl Graph {
+impl RateGraph {
     /// Adds a subtask whose name is new.
     pub fn add(&mut self, subtask: Subtask) {
         let position = self.subtasks.len();
@@ -84,7 +84,7 @@ impl Graph {
 /// # Errors
 ///
 /// The graph has a cycle, or a path that is too long for a deadline.
-pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> {
+pub fn split(graph: &RateGraph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> {
     // First: without a cycle the orders below are complete.
     refuse_cycles(graph, name)?;
     let rates = rates(graph);
@@ -131,7 +131,7 @@ pub fn split(graph: &Graph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> 
 }
 
 /// Returns the rate of each subtask of a graph without cycles.
-fn rates(graph: &Graph) -> Vec<Rate> {
+fn rates(graph: &RateGraph) -> Vec<Rate> {
     let periods = graph
         .subtasks
         .iter()
@@ -170,7 +170,7 @@ fn rates(graph: &Graph) -> Vec<Rate> {
 }
 
 /// Returns the subtasks in topological order.
-fn topological(graph: &Graph) -> Vec<usize> {
+fn topological(graph: &RateGraph) -> Vec<usize> {
     let mut after = vec![Vec::new(); graph.subtasks.len()];
     let mut waits_for = vec![0; graph.subtasks.len()];
     for &(earlier, later, _) in &graph.edges {
@@ -194,7 +194,7 @@ fn topological(graph: &Graph) -> Vec<usize> {
 
 /// Returns the connected parts of the kept edges, each in the order of the file, the parts by their
 /// first subtask.
-fn parts(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec<Vec<usize>> {
+fn parts(graph: &RateGraph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec<Vec<usize>> {
     let mut beside = vec![Vec::new(); graph.subtasks.len()];
     for &(earlier, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
         beside[earlier].push(later);
@@ -222,7 +222,7 @@ fn parts(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec
 
 /// Makes a DAG of one part, whose longest path takes `path_ns`.
 fn dag(
-    graph: &Graph,
+    graph: &RateGraph,
     part: &[usize],
     edges: &[(usize, usize, usize)],
     (period_ns, offset_ns): Rate,
@@ -289,7 +289,10 @@ fn dag(
 }
 
 /// Returns for each subtask the length of the longest path that ends with it, over the kept edges.
-fn earliest_ends_ns(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec<u64> {
+fn earliest_ends_ns(
+    graph: &RateGraph,
+    is_kept: impl Fn(&(usize, usize, usize)) -> bool,
+) -> Vec<u64> {
     let mut after = vec![Vec::new(); graph.subtasks.len()];
     for &(earlier, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
         after[earlier].push(later);
@@ -305,7 +308,7 @@ fn earliest_ends_ns(graph: &Graph, is_kept: impl Fn(&(usize, usize, usize)) -> b
 }
 
 /// Refuses cycles in the whole graph, including its timers.
-fn refuse_cycles(graph: &Graph, name: &str) -> Result<(), Vec<Malformed>> {
+fn refuse_cycles(graph: &RateGraph, name: &str) -> Result<(), Vec<Malformed>> {
     let untimed = |subtask: &Subtask| SubtaskSpec {
         name: subtask.name.clone(),
         ..SubtaskSpec::default()

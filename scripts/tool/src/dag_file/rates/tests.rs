@@ -1,13 +1,13 @@
 //! Graphs of one rate and of several.
 
-use super::{Graph, Subtask, split};
+use super::{RateGraph, Subtask, split};
 
 const MS: u64 = 1_000_000;
 
 /// Makes a graph of subtasks of 1 ms, such as `a:10 b`, of which those with a period in ms are
 /// timers, and of edges between them, such as `ab`, on the lines from 10 on.
-fn graph(subtasks: &str, edges: &str) -> Graph {
-    let mut graph = Graph::default();
+fn graph(subtasks: &str, edges: &str) -> RateGraph {
+    let mut graph = RateGraph::default();
     for subtask in subtasks.split(' ') {
         let period_ms: Option<u64> = subtask.get(2..).map(|ms| ms.parse().unwrap());
         graph.add(Subtask {

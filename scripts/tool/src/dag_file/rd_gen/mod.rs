@@ -10,8 +10,8 @@
 
 use dag_file::{DagFile, Malformed, Set, is_name, no_name, quoted, repeated, time};
 
-use super::rates::{Graph, Subtask, split};
-use super::yaml::{Node, Value, parse};
+use super::rates::{RateGraph, Subtask, split};
+use super::yaml::{Node, YamlValue, parse};
 
 /// Reads a file into one set, whose DAGs are named after `name`.
 ///
@@ -32,7 +32,7 @@ fn malformed(line: usize, reason: impl Into<String>) -> Malformed {
     Malformed { line, reason }
 }
 
-fn read_graph(text: &str, unit_ns: u64) -> Result<Graph, Malformed> {
+fn read_graph(text: &str, unit_ns: u64) -> Result<RateGraph, Malformed> {
     let document = parse(text)?;
     let mut nodes: &[Node] = &[];
     let mut links: &[Node] = &[];
@@ -66,7 +66,7 @@ fn read_graph(text: &str, unit_ns: u64) -> Result<Graph, Malformed> {
         let reason = "the file has no nodes; a node-link document lists them under `nodes`";
         return Err(malformed(document.line, reason));
     }
-    let mut graph = Graph::default();
+    let mut graph = RateGraph::default();
     for node in nodes {
         let subtask = read_node(node, unit_ns)?;
         if let Some(first) = graph.position(&subtask.name) {
@@ -85,7 +85,7 @@ fn read_graph(text: &str, unit_ns: u64) -> Result<Graph, Malformed> {
 }
 
 /// Refuses faults that show only when all links are known.
-fn check_whole(graph: &Graph) -> Result<(), Malformed> {
+fn check_whole(graph: &RateGraph) -> Result<(), Malformed> {
     let edges = &graph.edges;
     let name = |subtask: usize| quoted(&graph.subtasks[subtask].name);
     if let Some((first, second)) = repeated(edges.iter().map(|&(from, to, _)| (from, to))) {
@@ -151,7 +151,7 @@ fn read_node(node: &Node, unit_ns: u64) -> Result<Subtask, Malformed> {
     Ok(subtask)
 }
 
-fn read_link(link: &Node, graph: &mut Graph, unit_ns: u64) -> Result<(), Malformed> {
+fn read_link(link: &Node, graph: &mut RateGraph, unit_ns: u64) -> Result<(), Malformed> {
     let (mut source, mut target, mut communication_ns) = (None, None, 0);
     for (key, value) in members(link, "a link")? {
         match key.as_str() {
@@ -183,7 +183,7 @@ fn read_link(link: &Node, graph: &mut Graph, unit_ns: u64) -> Result<(), Malform
     Ok(())
 }
 
-fn end(value: &Node, key: &str, graph: &Graph) -> Result<usize, Malformed> {
+fn end(value: &Node, key: &str, graph: &RateGraph) -> Result<usize, Malformed> {
     let id = text(value, key)?;
     graph.position(id).ok_or_else(|| {
         let reason = format!(
@@ -196,7 +196,7 @@ fn end(value: &Node, key: &str, graph: &Graph) -> Result<usize, Malformed> {
 
 fn members<'n>(node: &'n Node, what: &str) -> Result<&'n [(String, Node)], Malformed> {
     match &node.value {
-        Value::Mapping(members) => Ok(members),
+        YamlValue::Mapping(members) => Ok(members),
         _ => Err(malformed(
             node.line,
             format!("{what} must be a mapping of keys"),
@@ -206,14 +206,14 @@ fn members<'n>(node: &'n Node, what: &str) -> Result<&'n [(String, Node)], Malfo
 
 fn items<'n>(node: &'n Node, key: &str) -> Result<&'n [Node], Malformed> {
     match &node.value {
-        Value::Sequence(items) => Ok(items),
+        YamlValue::Sequence(items) => Ok(items),
         _ => Err(malformed(node.line, format!("`{key}` must be a sequence"))),
     }
 }
 
 fn text<'n>(node: &'n Node, key: &str) -> Result<&'n str, Malformed> {
     match &node.value {
-        Value::Scalar(text) if !text.is_empty() => Ok(text),
+        YamlValue::Scalar(text) if !text.is_empty() => Ok(text),
         _ => Err(malformed(
             node.line,
             format!("`{key}` must be a value on its line; give one"),

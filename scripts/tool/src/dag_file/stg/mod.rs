@@ -80,7 +80,7 @@ fn read_graphs(text: &str) -> Result<Vec<TaskGraph>, Malformed> {
         // Counted from the graph before: from the start each time it would be quadratic.
         line += line_at(&text[before..place], place - before) - 1;
         before = place;
-        read.push(Graph { value: graph, line }.read(read.len())?);
+        read.push(JsonGraph { value: graph, line }.read(read.len())?);
     }
     match repeated(read.iter().map(|graph| &graph.name)) {
         None => Ok(read),
@@ -102,12 +102,12 @@ fn line_at(text: &str, byte: usize) -> usize {
 }
 
 /// A graph as JSON.
-struct Graph<'v> {
+struct JsonGraph<'v> {
     value: &'v Value,
     line: usize,
 }
 
-impl Graph<'_> {
+impl JsonGraph<'_> {
     /// Reads the graph; `number` is its position in the list.
     fn read(&self, number: usize) -> Result<TaskGraph, Malformed> {
         let Value::Object(members) = self.value else {

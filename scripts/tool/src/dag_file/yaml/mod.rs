@@ -19,12 +19,12 @@ pub struct Node {
     /// The line, counted from 1.
     pub line: usize,
     /// The value.
-    pub value: Value,
+    pub value: YamlValue,
 }
 
 /// A value.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Value {
+pub enum YamlValue {
     /// Text without its quotes; empty if there is none.
     Scalar(String),
     /// A sequence.
@@ -59,7 +59,7 @@ pub fn parse(text: &str) -> Result<Node, Malformed> {
 
 /// A line that is not blank.
 #[derive(Clone, Copy, Debug)]
-struct Line<'t> {
+struct YamlLine<'t> {
     number: usize,
     indent: usize,
     text: &'t str,
@@ -71,8 +71,8 @@ fn malformed(line: usize, reason: impl Into<String>) -> Malformed {
 }
 
 /// Returns the lines without comments, blank lines and the document's marks.
-fn lines(text: &str) -> Result<Vec<Line<'_>>, Malformed> {
-    let mut lines: Vec<Line<'_>> = Vec::new();
+fn lines(text: &str) -> Result<Vec<YamlLine<'_>>, Malformed> {
+    let mut lines: Vec<YamlLine<'_>> = Vec::new();
     let mut has_ended = false;
     for (index, text) in text.lines().enumerate() {
         let number = index + 1;
@@ -95,7 +95,7 @@ fn lines(text: &str) -> Result<Vec<Line<'_>>, Malformed> {
             has_ended = true;
             continue;
         }
-        lines.push(Line {
+        lines.push(YamlLine {
             number,
             indent,
             text: content,
@@ -128,17 +128,17 @@ fn without_comment(text: &str) -> &str {
 }
 
 struct Reader<'t> {
-    lines: Vec<Line<'t>>,
+    lines: Vec<YamlLine<'t>>,
     next: usize,
 }
 
 impl<'t> Reader<'t> {
-    fn peek(&self) -> Option<&Line<'t>> {
+    fn peek(&self) -> Option<&YamlLine<'t>> {
         self.lines.get(self.next)
     }
 
     /// Returns the next line if it has this indentation.
-    fn sibling(&self, indent: usize) -> Option<Line<'t>> {
+    fn sibling(&self, indent: usize) -> Option<YamlLine<'t>> {
         self.peek().filter(|line| line.indent == indent).copied()
     }
 
@@ -181,7 +181,7 @@ impl<'t> Reader<'t> {
         }
         Ok(Node {
             line: first,
-            value: Value::Sequence(items),
+            value: YamlValue::Sequence(items),
         })
     }
 
@@ -210,12 +210,17 @@ impl<'t> Reader<'t> {
         }
         Ok(Node {
             line: first,
-            value: Value::Mapping(members),
+            value: YamlValue::Mapping(members),
         })
     }
 
     /// Reads the block below `line`, indented by at least `least`; without one, an empty scalar.
-    fn below(&mut self, line: &Line<'_>, least: usize, depth: usize) -> Result<Node, Malformed> {
+    fn below(
+        &mut self,
+        line: &YamlLine<'_>,
+        least: usize,
+        depth: usize,
+    ) -> Result<Node, Malformed> {
         match self.peek().map(|next| next.indent) {
             Some(indent) if indent >= least => self.block(indent, depth + 1),
             _ => scalar(line, ""),
@@ -228,7 +233,7 @@ fn is_item(text: &str) -> bool {
 }
 
 /// Splits `key: value`; the value may be empty.
-fn split_key<'t>(line: &Line<'t>) -> Result<Option<(String, &'t str)>, Malformed> {
+fn split_key<'t>(line: &YamlLine<'t>) -> Result<Option<(String, &'t str)>, Malformed> {
     let text = line.text;
     let end = if text.starts_with(['"', '\'']) {
         closing_quote(text).map(|end| end + 1)
@@ -243,7 +248,7 @@ fn split_key<'t>(line: &Line<'t>) -> Result<Option<(String, &'t str)>, Malformed
         return Ok(None);
     };
     match scalar(line, key)?.value {
-        Value::Scalar(key) => Ok(Some((key, rest.trim_start()))),
+        YamlValue::Scalar(key) => Ok(Some((key, rest.trim_start()))),
         _ => Err(malformed(line.number, "a collection cannot be a key")),
     }
 }
@@ -261,11 +266,11 @@ fn closing_quote(text: &str) -> Option<usize> {
 }
 
 /// Reads a value that is on one line.
-fn scalar(line: &Line<'_>, text: &str) -> Result<Node, Malformed> {
+fn scalar(line: &YamlLine<'_>, text: &str) -> Result<Node, Malformed> {
     let value = match text {
-        "{}" => Value::Mapping(Vec::new()),
-        "[]" => Value::Sequence(Vec::new()),
-        _ => Value::Scalar(plain(line.number, text)?),
+        "{}" => YamlValue::Mapping(Vec::new()),
+        "[]" => YamlValue::Sequence(Vec::new()),
+        _ => YamlValue::Scalar(plain(line.number, text)?),
     };
     Ok(Node {
         line: line.number,

@@ -1,16 +1,16 @@
 //! Texts that the YAML reader accepts or refuses.
 
-use super::{Node, Value, parse};
+use super::{Node, YamlValue, parse};
 
 /// Writes a value on one line, for comparing.
 fn flat(node: &Node) -> String {
     match &node.value {
-        Value::Scalar(text) => format!("`{text}`"),
-        Value::Sequence(items) => {
+        YamlValue::Scalar(text) => format!("`{text}`"),
+        YamlValue::Sequence(items) => {
             let items: Vec<String> = items.iter().map(flat).collect();
             format!("[{}]", items.join(","))
         }
-        Value::Mapping(members) => {
+        YamlValue::Mapping(members) => {
             let members = members
                 .iter()
                 .map(|(key, node)| format!("{key}={}", flat(node)));
@@ -69,7 +69,7 @@ a: 1\n---\nb: 2\n | line 2: a second document begins here"#;
 
 #[test]
 fn lines_are_known_and_what_is_not_read_is_refused_with_its_own() {
-    let Value::Mapping(members) = parse("a: 1\n\n# c\nb:\n- 2\n").unwrap().value else {
+    let YamlValue::Mapping(members) = parse("a: 1\n\n# c\nb:\n- 2\n").unwrap().value else {
         panic!("it is a mapping");
     };
     assert_eq!((members[0].1.line, members[1].1.line), (1, 5));
@@ -85,7 +85,7 @@ fn lines_are_known_and_what_is_not_read_is_refused_with_its_own() {
 fn very_many_keys_and_very_deep_dashes_are_read_quickly() {
     // Comparing each key with each, or copying the line at each dash, would take long.
     let keys: String = (0..100_000).map(|n| format!("k{n}: 0\n")).collect();
-    let Value::Mapping(members) = parse(&keys).unwrap().value else {
+    let YamlValue::Mapping(members) = parse(&keys).unwrap().value else {
         panic!("it is a mapping");
     };
     assert_eq!(members.len(), 100_000);

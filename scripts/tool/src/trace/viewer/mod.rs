@@ -115,7 +115,7 @@ fn draw_piece(
     (instance, piece): (Instance, usize),
     (name, args): (&str, &str),
     flows: &Flows,
-    track: &mut Track,
+    track: &mut TrackWriter,
 ) {
     let history = &view.histories[&instance];
     let slice = history.slices[piece];
@@ -246,7 +246,7 @@ fn pieces(view: &View<'_>) -> Vec<Piece> {
     pieces
 }
 
-fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) {
+fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut TrackWriter) {
     let &Piece {
         instance,
         slice,
@@ -277,7 +277,7 @@ fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut Track) {
     draw_piece(view, (instance, number), (&name, &args.end()), flows, track);
 }
 
-fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut Track) {
+fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut TrackWriter) {
     for event in &view.events {
         let what = match event.what {
             EventKind::Request => "preempt for",
@@ -352,7 +352,7 @@ fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) 
 
 /// Draws each job from its nominal release to its completion.
 fn draw_jobs(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
-    let mut lanes: Vec<Track> = Vec::new();
+    let mut lanes: Vec<TrackWriter> = Vec::new();
     let mut busy_until_ns: Vec<u64> = Vec::new();
     for (&(_, job), history) in jobs_of(view, dag) {
         // Such as a skipped job, which has no duration.
@@ -405,7 +405,13 @@ fn job_args(view: &View<'_>, dag: DagId, job: u64, history: &JobHistory) -> Stri
 }
 
 /// Draws a subtask's instances from readiness to their end.
-fn draw_subtask(view: &View<'_>, dag: DagId, subtask: SubtaskId, flows: &Flows, track: &mut Track) {
+fn draw_subtask(
+    view: &View<'_>,
+    dag: DagId,
+    subtask: SubtaskId,
+    flows: &Flows,
+    track: &mut TrackWriter,
+) {
     let of_dag = Instance {
         dag,
         job: 0,
@@ -559,7 +565,7 @@ struct Group(u64);
 
 /// A track that is being drawn.
 #[derive(Debug)]
-struct Track {
+struct TrackWriter {
     group: Group,
     id: u64,
     drawn: Vec<(u64, String)>,
@@ -584,13 +590,13 @@ impl Output {
     }
 
     /// Adds a track below those of the group.
-    fn track(&mut self, group: Group, name: &str) -> Track {
+    fn track(&mut self, group: Group, name: &str) -> TrackWriter {
         self.last_id += 1;
         let id = self.last_id;
         self.describe("thread_name", group.0, id, Object::new().text("name", name));
         let place = Object::new().number("sort_index", id);
         self.describe("thread_sort_index", group.0, id, place);
-        Track {
+        TrackWriter {
             group,
             id,
             drawn: Vec::new(),
@@ -604,7 +610,7 @@ impl Output {
     /// # Panics
     ///
     /// Panics if a slice of it was not ended.
-    fn add(&mut self, mut track: Track) {
+    fn add(&mut self, mut track: TrackWriter) {
         assert_eq!(track.open, 0, "each slice of a track is ended");
         // Stable: at one time a slice must end before the next begins.
         track.drawn.sort_by_key(|(time_ns, _)| *time_ns);
@@ -638,7 +644,7 @@ impl Output {
     }
 }
 
-impl Track {
+impl TrackWriter {
     /// Begins a slice, inside the open one if there is one. `args` is a JSON object. It does not
     /// begin before the last slice has ended.
     fn begin(&mut self, time_ns: u64, name: &str, args: &str) {
