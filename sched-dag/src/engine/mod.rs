@@ -74,6 +74,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let (vertices, cores) = (task_set.vertices(), scheduler.options().cores as usize);
         let of_dag = |dag: &Dag| dag.slots() * dag.subtasks().len();
         let instances: usize = task_set.dags().iter().map(of_dag).sum();
+        // The engine itself hears of cancelled instances, whose inputs it discards.
         let room = scheduler.hear(C::HEARS.iter().copied().chain([EventKind::Cancelled]));
         scheduler.log.journal = journal;
         Self {
@@ -92,6 +93,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
 
     /// Takes the body of a subtask, before the run.
     pub fn put(&mut self, vertex: Vertex, body: B) {
+        // Kept apart from the body, so that it can be asked while the body runs.
         self.alternates[vertex.index()] = body.alternate();
         self.placement.replace(vertex, body);
     }
@@ -129,6 +131,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.scheduler.log.here = here;
         let mut moment = self.scheduler.at(now_ns);
         happened(&mut moment);
+        // Requests after completions: a function asks by its completion, and it takes effect with
+        // it.
         if !self.requests.are_none() || port.has_letters() {
             self.serve(now_ns, port);
         }
@@ -139,6 +143,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     #[cold]
     #[inline(never)]
     fn serve(&mut self, now_ns: u64, port: &mut impl PlatformPort<B>) {
+        // Those for other clusters first, so that they are not served here.
         self.requests.give_away(|request| port.forward(request));
         let mut moment = self.scheduler.at(now_ns);
         if let Some(letters) = port.take_letters() {
@@ -151,6 +156,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     /// Ends the instant: what is due is released, and the cores are given what they should run.
     #[inline]
     pub fn decide(&mut self, now_ns: u64, port: &mut impl PlatformPort<B>) {
+        // As often as notices fill their room; each round the port takes them out.
         while !self.scheduler.at(now_ns).release_some() {
             self.act(port);
         }
@@ -177,9 +183,12 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         is_alone: bool,
         port: &mut C,
     ) -> NextAction<B> {
+        // Before the scheduler knows: a latest value is there when a successor of this instance
+        // starts.
         if body.has_effects() {
             body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         }
+        // Something else belongs to this instant, so the whole step has to be taken.
         if !is_alone || !self.requests.are_none() {
             let instance = self.scheduler.instance_of(vertex);
             self.placement.finish(core.index(), vertex, body);
@@ -187,6 +196,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         let (done, is_unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
         if let HandOff::To(next, decision) = done {
+            // Before the body goes back to its place.
             let from = body.subject();
             let exchanged = self.placement.exchange(core, vertex, body, next);
             if !is_unwritten {
@@ -204,6 +214,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             let log = &mut self.scheduler.log;
             let to = body.subject();
             let start = (EventKind::Start, port.start(core, &mut body), to);
+            // One entry instead of three: the times of finish and ready are the same.
             if is_unwritten {
                 let finish = (EventKind::Finish, finish_ns, from);
                 let ready = (EventKind::Ready, log.now_ns(), to);
@@ -215,9 +226,11 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         self.placement.finish(core.index(), vertex, body);
         self.act(port);
+        // More is to be decided: the caller begins the instant again, at the same time.
         if let HandOff::Open = done {
             return NextAction::Step(None);
         }
+        // A job's end may bring the next timer forward or back; the platform sets its alarm anew.
         let is_rescheduled = self.scheduler.log.take_job_event();
         NextAction::Look { is_rescheduled }
     }
@@ -274,6 +287,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         port: &mut impl PlatformPort<B>,
     ) -> FaultCost {
         let instance = self.scheduler.instance_of(vertex);
+        // Without its body the subtask cannot be made anew.
         let cost = match &body {
             Some(_) => self.cost_of_fault(vertex),
             None => FaultCost::Dag,
@@ -290,13 +304,16 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         let handler = self.after_fault.get(instance.dag.index()).copied();
         let handler = handler.flatten();
+        // A handler in another cluster gets its signal as a letter.
         let handler = handler.filter(|&dag| !port.forward(Request::Signal(dag)));
         self.tell(instant, port, |moment| {
+            // The end first: the handler's signal comes to a run in which the DAG is ended.
             moment.fail(instance);
             handler
                 .into_iter()
                 .for_each(|dag| moment.serve(Request::Signal(dag)));
         });
+        // Dropped after the run: its values may be large, and a destructor is the app's code.
         self.lost.extend(body);
         cost
     }
@@ -310,6 +327,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             let instance = self.scheduler.instance_of(*vertex);
             body.set_job(instance.job);
             let subject = body.subject();
+            // The port reads the clock as late as it can, right before the function is called.
             let start_ns = port.start(core, body);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
         }
@@ -360,13 +378,16 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     #[inline(never)]
     fn discard_late(&mut self) {
         self.undiscarded.retain(|&(vertex, job)| {
+            // A body that runs, or whose context is parked, still reads its inputs.
             if let Some(body) = self.placement.resting(vertex) {
                 body.discard(job);
                 return false;
             }
             let dag = self.scheduler.instance_of(vertex).dag;
+            // An ended DAG starts nothing any more, so its inputs are in nobody's way.
             !self.scheduler.is_ended(dag)
         });
+        // The short way would start the next instance without looking here.
         if !self.undiscarded.is_empty() {
             self.requests.keep(Request::Step);
         }
@@ -379,12 +400,14 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         for decision in decisions {
             let (core, instance) = (decision.core, decision.instance);
             port.retarget(core);
+            // The next decision names the same core, and what it gets instead.
             if decision.what == EventKind::Suspend {
                 self.placement.set_target(core, None);
                 preempted = Some(core);
             } else {
                 let vertex = self.task_set.vertex(instance);
                 self.placement.set_target(core, Some(vertex));
+                // Where an interrupt has to arrive first, the journal tells when it was asked for.
                 if C::SUSPENDS_LATER && preempted == Some(core) {
                     log.on_core(core, EventKind::Request, port.now_ns(), instance);
                 }

@@ -175,6 +175,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     pub fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
         *self.place(vertex) = BodyState::Suspended(context);
         let mut seats = (0..).map(CoreId).zip(&self.seats);
+        // The scheduler may have given it to another core before its context was known.
         seats.find_map(|(core, seat)| (seat.target == vertex).then_some(core))
     }
 
@@ -184,6 +185,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         let vertex = some(self.seats[core].target)?;
         let place = self.place(vertex);
         match core::mem::replace(place, BodyState::Running) {
+            // Only if that has arrived: the core that it left may still be saving its registers.
             BodyState::Suspended(context) => {
                 self.seats[core].current = vertex;
                 Some(context)
@@ -248,6 +250,8 @@ impl<Body, Parked> Placement<Body, Parked> {
     ) -> Option<Body> {
         self.put(finished, body);
         let started = self.start(core, next);
+        // The next instance is suspended, and its context may not be here yet: the core looks for
+        // it as any other.
         if started.is_none() {
             self.seats[core.index()] = CoreSlot {
                 current: NOTHING,

@@ -82,7 +82,9 @@ impl Scheduler {
     /// Fills `decisions`.
     #[inline]
     pub(super) fn decide(&mut self) {
+        // Decisions are those of one dispatch: a driver that missed the ones before has lost them.
         self.decisions.clear();
+        // First the idle cores: R5 preempts nobody while a core is idle.
         while self.cores.any_idle()
             && let Some(key) = self.ready.pop()
             && let Some(core) = self.cores.take_idle()
@@ -90,14 +92,19 @@ impl Scheduler {
             let decision = self.give(core, key);
             self.decisions.push(decision);
         }
+        // Nothing has become ready, so the order is settled, whatever cores became idle: the scan
+        // of all cores below is saved in every step that only ends instances.
         if core::mem::take(&mut self.fresh) & !OWED == 0 {
             return;
         }
+        // Each exchange brings in a larger key than the one before and takes out a smaller one, so
+        // this ends after as many rounds as there are cores.
         while let Some(ready) = self.ready.peek()
             && let Some((core, running)) = self.cores.largest_preemptible()
             && ready < running
             && let Some(key) = self.ready.pop()
         {
+            // Suspend stands before Start in the list: a driver frees the core before it fills it.
             self.preempt(core, running);
             let decision = self.give(core, key);
             self.decisions.push(decision);
@@ -109,6 +116,7 @@ impl Scheduler {
     pub(super) fn give(&mut self, core: CoreId, key: DispatchKey) -> Decision {
         let vertex = self.vertices.get_mut(key.vertex());
         let instance = vertex.present_instance();
+        // The phase still tells whether the instance has started: `Running` overwrites it below.
         let what = match vertex.phase {
             InstancePhase::Preempted => EventKind::Resume,
             _ => EventKind::Start,
@@ -133,6 +141,7 @@ impl Scheduler {
             core,
             instance,
         });
+        // With the key that it had: a preempted instance keeps its place in the order.
         self.ready.insert(running);
     }
 }
@@ -166,7 +175,11 @@ impl Scheduler {
     #[inline(always)]
     pub fn pass_on(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, bool) {
         let done = self.end_shortly(now_ns, core, vertex);
+        // Only now: where the core goes on with another instance, it never was in the stack of
+        // idle ones.
         if let HandOff::Idle = done.0 {
+            // Idle only now: where the core goes on with another instance, it never enters the
+            // stack of idle ones.
             self.cores.free(core);
         }
         done
@@ -186,15 +199,20 @@ impl Scheduler {
             self.finish(instance);
             return (HandOff::Open, false);
         }
+        // A deadline or a release that is due has to come first, by the whole step.
         let is_quiet = self.log.now_ns < self.quiet_until_ns;
         if ending.only_passes_on && is_quiet {
             let (fresh, next) = self.vertices.pass_on(vertex.0);
             match fresh {
+                // The end made nothing ready, so only what was in line before can take the core.
                 0 => {
                     self.write_finish(core, vertex, now_ns);
                     return (self.give_first(core), false);
                 }
+                // The most frequent case of a chain: the successor never enters the queue, and one
+                // entry of the journal tells finish, ready and start.
                 1 if self.ready.is_empty() => return self.pass(next, core),
+                // Several, or others in line: only their keys tell which is first.
                 _ => {
                     self.write_finish(core, vertex, now_ns);
                     self.line_up_successors(vertex.0);
@@ -204,10 +222,13 @@ impl Scheduler {
             self.write_finish(core, vertex, now_ns);
             self.end(vertex.0);
         }
+        // The core takes one of the new instances; a second one may concern another core. (The
+        // module says why one cannot.)
         let concerns_others = self.fresh > 1 && self.cores.count() > 1;
         if concerns_others || self.log.now_ns >= self.quiet_until_ns {
             return (self.leave_open(core, vertex), false);
         }
+        // The dispatch is made here: what is in line preempts nobody.
         self.fresh = 0;
         (self.give_first(core), false)
     }
@@ -224,9 +245,13 @@ impl Scheduler {
     /// Leaves the instant to be begun again, and the core idle.
     #[inline]
     fn leave_open(&mut self, core: CoreId, ended: Vertex) -> HandOff {
+        // The late sink has to be judged before another instance of its vertex hides how far it
+        // was.
         if self.log.now_ns >= self.quiet_until_ns {
             self.judge_ended(ended.0);
         }
+        // The core that became idle last is taken first, so the dispatch that follows gives it the
+        // first in line.
         self.cores.free(core);
         self.fresh |= OWED;
         HandOff::Open
@@ -328,6 +353,7 @@ impl CoreTable {
 
     /// Makes a core, if it is idle, the next one that is taken.
     pub(super) fn prefer(&mut self, core: CoreId) {
+        // From the top of the stack, where the core that a driver prefers mostly is.
         if let Some(place) = self.idle.iter().rposition(|&idle| idle == core) {
             self.idle[place..].rotate_left(1);
         }
@@ -354,6 +380,7 @@ impl CoreTable {
     fn largest_preemptible(&self) -> Option<(CoreId, DispatchKey)> {
         let mut largest = None;
         for (core, occupation) in (0..).map(CoreId).zip(&self.occupations) {
+            // Idle cores have the largest key of all, but may not be preempted, so they do not win.
             let is_larger = largest.is_none_or(|(_, key)| key < occupation.key);
             if occupation.may_be_preempted && is_larger {
                 largest = Some((core, occupation.key));

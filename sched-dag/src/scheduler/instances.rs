@@ -31,14 +31,19 @@ impl Scheduler {
         let number = self.vertex(instance).0;
         let vertex = self.vertices.get(number);
         let jobs = &self.dags[instance.dag.index()].jobs;
+        // A driver may name an instance of another job of the vertex, or one that has ended: that
+        // is its mistake, and must not end the wrong one.
         let in_flight = vertex.dag == instance.dag
             && vertex.progress < jobs.next
             && jobs.job(vertex.progress).number == instance.job;
         match vertex.phase {
             InstancePhase::Running(core) if in_flight => {
                 self.cores.free(core);
+                // The core is idle until a dispatch; the short way must not be taken before.
                 self.fresh |= OWED;
             }
+            // It lost its core in the scheduler's eyes, but finished before the machine took the
+            // core away.
             InstancePhase::Preempted if in_flight => {
                 let key = (self.ready).key(number, vertex, || jobs.job(vertex.progress));
                 self.ready.remove(key);
@@ -78,9 +83,12 @@ impl Scheduler {
     #[inline]
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64) {
         let state = &self.dags[dag.index()];
+        // In topological order each vertex is looked at after its predecessors, so none becomes
+        // ready behind the loop's back.
         for &subtask in self.task_set.dag(dag).topological_order() {
             let number = self.task_set.first_vertex(dag) + subtask.0;
             let vertex = self.vertices.get_mut(number);
+            // From now on an end has to ask whether its job is cut, which the short way does not.
             vertex.only_passes_on = false;
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
             if vertex.phase == InstancePhase::Ready && is_meant {
@@ -88,6 +96,8 @@ impl Scheduler {
                 self.ready.remove(self.ready.key(number, vertex, || job));
                 self.log.of(EventKind::Cancelled, vertex.instance(job));
                 vertex.phase = InstancePhase::Absent;
+                // Ended below, not here: an end makes further instances ready, which the loop must
+                // not meet half-way.
                 self.ending.push(number);
             }
         }
@@ -115,6 +125,7 @@ impl Scheduler {
     /// another instance in flight.
     #[inline]
     fn end_all(&mut self) {
+        // A stack in memory of its own, not recursion: a chain may be 100,000 subtasks long.
         while let Some(vertex) = self.ending.pop() {
             self.end_one(vertex);
         }
@@ -136,15 +147,20 @@ impl Scheduler {
         let ended = vertices.end(number);
         let (dag, sequence) = (ended.dag, ended.progress);
         let jobs = &mut dags[dag.index()].jobs;
+        // Read before `job_mut` borrows the jobs: whether a younger job is in flight, in which the
+        // vertex may already be awaited.
         let overlaps = sequence + 1 < jobs.next;
         let job = jobs.job_mut(sequence);
         let is_cut = job.cut.is_some();
         let successors = VertexTable::successors(&ended);
+        // Only sinks count: every other instance ends before some sink of its job.
         job.unfinished -= u32::from(successors.is_empty());
         let is_last = job.unfinished == 0;
         for place in successors {
             let next = vertices.successor(place);
             if let Some(successor) = vertices.arrive(next, sequence) {
+                // R3 holds in a cut job, too: edges are released, but the successors are cancelled
+                // instead of lined up.
                 if is_cut {
                     log.of(EventKind::Cancelled, successor.instance(job));
                     ending.push(next);
@@ -154,9 +170,11 @@ impl Scheduler {
                 }
             }
         }
+        // The other half of R2: the next job's instance may have waited for this one alone.
         if overlaps {
             self.go_on_to_next_job(number);
         }
+        // After the successors and the vertex's next instance: the job's slot is free only now.
         if is_last {
             self.end_job(dag, sequence, number);
         }
@@ -190,6 +208,7 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         debug_assert_eq!(sequence, state.jobs.oldest, "jobs end in their order");
         let job = *state.jobs.job(sequence);
+        // Its end makes the short way possible again, unless the DAG is ended for good.
         if job.cut.is_some() {
             if state.jobs.phase != DagPhase::Ended {
                 let first = self.task_set.first_vertex(dag) as usize;
@@ -206,6 +225,7 @@ impl Scheduler {
         let has_limit = self.task_set.dag(dag).jobs().is_some();
         self.log.jobs_ended += u64::from(has_limit);
         self.log.of_job(EventKind::Completed, dag, job.number, None);
+        // A release that was blocked by this job may be due now.
         self.set_timer(dag);
     }
 

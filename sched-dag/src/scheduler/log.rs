@@ -64,6 +64,7 @@ impl EventLog {
     ) -> usize {
         self.heard = kinds.into_iter().fold(0, |heard, what| heard | bit(what));
         self.most_at_once = most_at_once;
+        // Twice: a change may begin while there is just room for one more.
         self.notices.reserve_exact(2 * most_at_once);
         2 * most_at_once
     }
@@ -160,6 +161,7 @@ impl EventLog {
     #[cold]
     #[inline(never)]
     fn keep(&mut self, what: EventKind, subject: EventSubject, at_ns: Option<u64>) {
+        // Packed and unpacked, so that a notice is the very event that the journal has.
         let words = Event::words(self.now_ns, what, self.here, subject);
         let event = Event::unpack(words);
         (self.notices).extend(event.map(|event| DriverNotice { event, at_ns }));

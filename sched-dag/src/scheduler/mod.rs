@@ -136,6 +136,7 @@ impl Scheduler {
         mut options: SchedulerOptions,
         cluster: ClusterId,
     ) -> Self {
+        // The options are the machine's, the scheduler's only the cluster's part of them.
         options.cores = to_u32(task_set.cores_of(cluster, options.cores).len());
         assert!(
             options.cores > 0,
@@ -148,8 +149,11 @@ impl Scheduler {
             .iter()
             .map(|dag| {
                 let first_slot = to_u32(slots);
+                // Also those of other clusters' DAGs: so a slot's number is the same in all
+                // clusters' keys.
                 slots += dag.slots();
                 let mut jobs = JobTable::new(dag, first_slot);
+                // Ended from the beginning on, they never come into the timers or the queue.
                 if cluster != dag.cluster() {
                     jobs.end_all();
                 }

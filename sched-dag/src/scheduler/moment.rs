@@ -26,6 +26,7 @@ impl Scheduler {
             Request::Resume(dag) => self.resume(dag),
             Request::Close(dag) => self.close(dag),
             Request::Stop(dag) => self.stop(dag),
+            // These concern the run, not one DAG; the engine serves them.
             Request::Enter(..)
             | Request::ShutDown
             | Request::Begin
@@ -141,6 +142,8 @@ impl<'s> Moment<'s> {
     #[must_use = "the decisions are for the driver to carry out"]
     #[inline]
     pub fn dispatch(mut self) -> &'s [Decision] {
+        // Releases come after completions and ends of the instant, so that a slot that has just
+        // become free is found free, and before the dispatch, which must see them.
         while self.release_next() {}
         self.scheduler.decide();
         &self.scheduler.decisions
@@ -150,6 +153,7 @@ impl<'s> Moment<'s> {
     /// that is all. A driver that is late finds any number of releases due.
     #[inline]
     pub fn release_some(mut self) -> bool {
+        // Notices have a fixed amount of memory: the driver takes them out between two calls.
         while self.scheduler.log.has_room() {
             if !self.release_next() {
                 return true;
@@ -163,6 +167,8 @@ impl<'s> Moment<'s> {
     fn release_next(&mut self) -> bool {
         let now_ns = self.scheduler.log.now_ns;
         let next = self.scheduler.timers.peek();
+        // An event at this very instant is due: a deadline's event is one nanosecond after the
+        // deadline.
         let due = next.filter(|&(event_ns, _)| event_ns <= now_ns);
         if let Some((_, index)) = due {
             self.scheduler.serve(DagId(to_u32(index)));

@@ -51,6 +51,7 @@ impl Scheduler {
     pub(super) fn serve(&mut self, dag: DagId) {
         // Mostly what is due is a release, and the job before it has ended.
         if !self.dags[dag.index()].jobs.are_at_rest() {
+            // Deadlines before releases: a late job may be the one that blocks the next.
             self.judge(dag, None);
             self.release_waiting(dag);
         }
@@ -63,6 +64,7 @@ impl Scheduler {
                 self.judge(dag, None);
             }
         }
+        // Once for all that was due, not once a job.
         self.set_timer(dag);
     }
 
@@ -74,14 +76,18 @@ impl Scheduler {
             self.skip_oldest_waiting(dag);
             return;
         }
+        // Older waiting jobs first: jobs are released in the order of their numbers (rule 2).
         self.release_waiting(dag);
         if !self.is_waiting(dag, job) {
             return;
         }
         match self.task_set.dag(dag).overrun() {
+            // It waits as it is, by its number alone.
             OverrunPolicy::Queue => {}
             OverrunPolicy::Skip => self.skip_oldest_waiting(dag),
             OverrunPolicy::Abort => {
+                // The aborted job may have nothing that has started; then it has ended already,
+                // and there is room.
                 self.make_room(dag);
                 self.release_waiting(dag);
             }
@@ -114,6 +120,7 @@ impl Scheduler {
             let sequence = state.jobs.release_waiting(model);
             state.statistics.released += 1;
             let release_ns = state.jobs.job(sequence).release_ns;
+            // The grid does not tell a judge when a sporadic job was due; this event does.
             if is_sporadic {
                 self.log.due(dag, job, release_ns);
             }
@@ -125,6 +132,8 @@ impl Scheduler {
     #[inline]
     fn make_room(&mut self, dag: DagId) {
         let state = &mut self.dags[dag.index()];
+        // All in flight are cut already, so room is on its way: aborting more would cost jobs and
+        // bring nothing.
         let Some(sequence) = state.jobs.abort_oldest() else {
             self.skip_oldest_waiting(dag);
             return;

@@ -148,6 +148,7 @@ impl DagSnapshot {
     pub const fn word(&self) -> &'static str {
         match self.phase {
             DagPhase::Closed | DagPhase::Ended => "ended",
+            // Before paused: of a DAG that is over and paused nothing is left to be resumed.
             _ if self.is_over => "over",
             DagPhase::Paused => "stopped",
             DagPhase::Running => "running",
@@ -221,6 +222,7 @@ impl Scheduler {
         // What was late before the pause is a miss.
         self.judge(dag, None);
         let phase = &mut self.dags[dag.index()].jobs.phase;
+        // A second pause is no event, but still skips what has come to wait.
         if core::mem::replace(phase, DagPhase::Paused) != DagPhase::Paused {
             self.log.of_dag(EventKind::Off, dag);
         }
@@ -233,6 +235,8 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         if state.jobs.phase == DagPhase::Paused {
             state.jobs.phase = DagPhase::Running;
+            // A driver that is late may learn of a job of the pause only now; it is skipped by
+            // this time.
             state.resumed_ns = self.log.now_ns;
             self.log.of_dag(EventKind::On, dag);
         }
@@ -256,6 +260,7 @@ impl Scheduler {
         let vertex = self.take_off(instance, "fails");
         let dag = instance.dag;
         self.dags[dag.index()].statistics.faults += 1;
+        // Before the instance ends, so that no successor of it starts.
         self.stop(dag);
         // Only now its job may end, so that the job counts as cut short.
         self.end(vertex);
@@ -269,11 +274,13 @@ impl Scheduler {
         }
         self.judge(dag, None);
         let state = &mut self.dags[dag.index()];
+        // From here on no job is released, so what is in flight is all that can end.
         let (cut_short, dropped) = state.jobs.end_all();
         state.statistics.cut_short += cut_short;
         state.statistics.dropped += dropped;
         self.set_timer(dag);
         self.log.of_dag(EventKind::Stopped, dag);
+        // Last, when all jobs are cut: what is made ready by these ends is cancelled, too.
         self.cancel_ready(dag, u64::MAX);
     }
 
@@ -316,7 +323,9 @@ impl SurvivedFaults {
 
     /// Reports whether a fault in a job would be survived (D1).
     fn would_take(&self, job: u64) -> bool {
+        // Fewer than N were survived so far, so no window can hold N.
         let has_room = self.count < self.jobs.len();
+        // The N-th survived fault before this one; the ring holds N.
         let nth_before = self.jobs.get(self.oldest);
         let last_outside = job.checked_sub(self.window);
         let is_outside = |before| last_outside.is_some_and(|last| before <= last);
@@ -326,6 +335,7 @@ impl SurvivedFaults {
     /// Counts a fault in a job, if it is survived, and reports whether it is.
     fn take(&mut self, job: u64) -> bool {
         let is_survived = self.would_take(job);
+        // Overwrites the N-th before: faults older than that decide nothing any more.
         if is_survived && let Some(place) = self.jobs.get_mut(self.oldest) {
             *place = job;
             self.oldest = (self.oldest + 1) % self.jobs.len();
@@ -358,11 +368,14 @@ impl Scheduler {
         }
         let vertex = self.take_off(instance, "fails");
         self.judge(dag, None);
+        // Before the end, which moves the vertex on to its next job.
         let sequence = self.vertices.get(vertex).progress;
         let state = &mut self.dags[dag.index()];
         state.statistics.faults += 1;
         state.statistics.restarts += 1;
         self.log.of(EventKind::Restarted, instance);
+        // Not where the job was aborted before: its outcome stays, and its ready instances are
+        // cancelled already.
         if state.jobs.cut(sequence, JobOutcome::Failed) {
             state.statistics.failed += 1;
             self.cancel_ready(dag, sequence);

@@ -173,6 +173,8 @@ impl ReadyQueue {
     /// Puts an instance in line.
     #[inline]
     pub(super) fn insert(&mut self, key: DispatchKey) {
+        // Only an empty queue fills the front: with others in line it would have to be compared
+        // with them.
         if self.is_empty() {
             self.front = key;
         } else {
@@ -183,6 +185,8 @@ impl ReadyQueue {
     /// Compares with the front only: comparing with the rest costs as much as inserting.
     #[inline]
     fn insert_among_others(&mut self, key: DispatchKey) {
+        // Without a front the new one goes to the rest, though it may be the smallest: `pop` asks
+        // the rest then.
         let precedes_front = !self.front.is_none() && key < self.front;
         let behind = match precedes_front {
             true => core::mem::replace(&mut self.front, key),
@@ -208,6 +212,7 @@ impl ReadyQueue {
     /// Takes an instance out, which waits.
     #[inline]
     pub(super) fn remove(&mut self, key: DispatchKey) {
+        // Keys are unique, so equality finds the instance.
         if self.front == key {
             self.front = DispatchKey::NONE;
             return;
@@ -326,6 +331,7 @@ fn rank(vertices: &mut VertexTable, kind: KeyOrder) -> Vec<u32> {
     let mut last = None;
     for &number in &order {
         let vertex = vertices.get_mut(number);
+        // Under `Job` equals share a rank, and the job's number decides between them.
         let group = (vertex.rank, vertex.dag);
         if last.is_some_and(|last| kind == KeyOrder::Rank || last != group) {
             rank += 1;
@@ -345,6 +351,8 @@ fn rank_by_deadline(task_set: &TaskSet, vertices: &mut VertexTable) -> Vec<u64> 
         let of_dag = deadlines_ns(dag);
         for (subtask, attributes) in (0..).map(SubtaskId).zip(dag.subtasks()) {
             let own_ns = attributes.relative_deadline_ns();
+            // The longest deadline has the smallest rank: of two jobs with one absolute deadline
+            // the older one has the longer.
             let longer = of_dag.partition_point(|&longer_ns| longer_ns > own_ns);
             vertices.get_mut(first + subtask.0).rank = to_u32(of_ranks.len() + longer);
         }
@@ -422,10 +430,13 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         if position == ABSENT {
             return;
         }
+        // Before the last entry moves: the two may be the same.
         self.positions[item] = ABSENT;
         let Some(last) = self.entries.pop() else {
             return;
         };
+        // The last entry fills the gap; it may belong above or below. If it was the gap itself,
+        // nothing is left to do.
         if let Some((removed, _)) = self.entries.get(position) {
             match *removed < last.0 {
                 true => self.sink(position, last),
@@ -451,6 +462,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     /// Puts an entry where `position` is, or below; at once if nothing is below.
     #[inline]
     fn sink_if_above(&mut self, position: usize, entry: (K, usize)) {
+        // A leaf with a larger key stays a leaf.
         if BELOW * position + 1 < self.entries.len() {
             self.sink(position, entry);
         } else {
@@ -492,6 +504,7 @@ fn least<K: Ord + Copy>(entries: &[(K, usize)]) -> Option<(usize, (K, usize))> {
         };
         return Some((place, four[place]));
     }
+    // Fewer than four: the last group of the heap.
     let mut least = (0, *entries.first()?);
     for (place, &entry) in entries.iter().enumerate().skip(1) {
         if entry.0 < least.1.0 {
@@ -539,6 +552,7 @@ impl ByDeadline {
     pub(super) fn insert(&mut self, key: DispatchKey) {
         let slot = key.slot();
         let line = &mut self.lines[slot];
+        // The job's first ready instance brings the job into the heap; the others cost a bit each.
         if line.subtasks.is_empty() {
             self.jobs.set(slot, key.before_the_vertex());
         }

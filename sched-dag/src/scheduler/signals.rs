@@ -43,6 +43,7 @@ impl Scheduler {
         }
         let model = self.task_set.dag(dag);
         let state = &mut self.dags[dag.index()];
+        // Asked before the signal is taken, which may make this job due.
         let job = state.jobs.signal_job();
         let release_ns = state.jobs.signal(model, self.log.now_ns);
         state.statistics.signals += 1;

@@ -95,6 +95,7 @@ impl VertexTable {
         for (id, dag) in (0..).map(DagId).zip(task_set.dags()) {
             let first = task_set.first_vertex(id);
             for (subtask, attributes) in (0..).map(SubtaskId).zip(dag.subtasks()) {
+                // A source counts 1, for the release, which arrives as a predecessor would.
                 let initial = to_u32(dag.predecessors(subtask).len().max(1));
                 let from = to_u32(successors.len());
                 successors.extend(dag.successors(subtask).iter().map(|next| first + next.0));
@@ -114,6 +115,8 @@ impl VertexTable {
                     slot_mask: to_u32(dag.slots() - 1),
                     successors: [from, to_u32(successors.len())],
                 });
+                // One slot is the usual case; its counter lies in the vertex, without a second
+                // cache line.
                 if dag.slots() > 1 {
                     counters.extend((0..dag.slots()).map(|_| initial));
                 }
@@ -122,6 +125,7 @@ impl VertexTable {
         all.vertices = vertices.into_boxed_slice();
         all.successors = successors.into_boxed_slice();
         all.counters = counters.into_boxed_slice();
+        // No job is cut yet.
         all.allow_passing_on(0..all.vertices.len());
         all
     }
@@ -160,6 +164,7 @@ impl VertexTable {
         let ended = *own;
         own.phase = InstancePhase::Absent;
         own.progress += 1;
+        // Reset now, long before the slot's next job: so a release writes counters of sources only.
         *own.counter(&mut self.counters, ended.progress) = ended.initial;
         ended
     }
@@ -180,6 +185,7 @@ impl VertexTable {
             let next = &mut self.vertices[number as usize];
             next.counter -= 1;
             if next.counter == 0 {
+                // The vertex now does this job; its key is made of it.
                 next.job = job;
                 count += 1;
                 last = number;
@@ -220,6 +226,8 @@ impl VertexTable {
         let vertex = &mut self.vertices[vertex as usize];
         let counter = vertex.counter(&mut self.counters, sequence);
         *counter -= 1;
+        // Both parts of R2: all predecessors in this job, and the subtask's own instance of the
+        // job before.
         (*counter == 0 && vertex.progress == sequence).then_some(vertex)
     }
 
@@ -259,6 +267,7 @@ impl Vertex {
         if self.slot_mask == 0 {
             return &mut self.counter;
         }
+        // The number of slots is a power of two, so that a mask finds the counter.
         let slot = sequence & u64::from(self.slot_mask);
         #[allow(
             clippy::cast_possible_truncation,

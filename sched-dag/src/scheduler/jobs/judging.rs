@@ -57,6 +57,7 @@ impl Deadline {
     pub(in crate::scheduler) fn all(dag: &Dag) -> Box<[Self]> {
         let sinks = dag.sinks();
         let relative_ns = |sink: usize| dag.subtask(sinks[sink]).relative_deadline_ns();
+        // Ascending, so that a waiting job misses the first one first.
         let order = sorted_by_key(sinks.len(), relative_ns);
         let same = order.chunk_by(|one, other| relative_ns(*one) == relative_ns(*other));
         let deadline = |same: &[usize]| Self {
@@ -118,7 +119,9 @@ impl JobTable {
 
     #[inline(always)]
     fn unjudged(&self, dag: &Dag, at: usize, deadline: &Deadline) -> Option<UnjudgedJob> {
+        // Jobs that have ended were judged by their end.
         let first = deadline.judged.max(self.oldest);
+        // A cut job is never late, so the next one that is not cut is due for judgement.
         let mut uncut = (first..self.next).filter(|&sequence| self.job(sequence).cut.is_none());
         if let Some(sequence) = uncut.next() {
             let job = self.job(sequence);
@@ -129,6 +132,8 @@ impl JobTable {
                 deadline_ns: job.release_ns + deadline.relative_ns,
             });
         }
+        // All in flight are judged; of the waiting ones only numbers are known, in which order
+        // they will be released.
         let number = self.first_waiting.max(deadline.judged_waiting);
         (number < self.announced).then(|| UnjudgedJob {
             number,
@@ -142,6 +147,7 @@ impl JobTable {
     fn count_late(&mut self, unjudged: &UnjudgedJob, is_late: impl Fn(SubtaskId) -> bool) -> bool {
         let deadline = &mut self.deadlines[unjudged.deadline];
         match unjudged.sequence {
+            // Moves on before the sinks are looked at: each job is judged once by each deadline.
             Some(sequence) => deadline.judged = sequence + 1,
             None => deadline.judged_waiting = unjudged.number + 1,
         }
@@ -203,6 +209,7 @@ impl Scheduler {
         let first = self.task_set.first_vertex(dag);
         let state = &mut self.dags[dag.index()];
         while let Some(unjudged) = state.jobs.first_unjudged(model)
+            // A finish at the deadline itself is in time.
             && unjudged.deadline_ns < self.log.now_ns
         {
             let vertices = &self.vertices;
@@ -210,6 +217,7 @@ impl Scheduler {
                 Some(sequence) => is_unfinished(vertices, first + sink.0, sequence, ended),
                 None => true,
             };
+            // Sinks are counted by each deadline, the job once.
             if state.jobs.count_late(&unjudged, is_late) && state.jobs.note_miss(&unjudged) {
                 state.statistics.count_miss();
                 let deadline_ns = Some(unjudged.deadline_ns);
@@ -224,6 +232,7 @@ impl Scheduler {
         let ended = self.vertices.get(vertex);
         let (dag, subtask) = (ended.dag, ended.subtask);
         let sinks = self.task_set.dag(dag).sinks();
+        // With one sink the job ends with it, and the end of the job judges it.
         if sinks.len() > 1 && sinks.binary_search(&subtask).is_ok() {
             self.judge(dag, Some(vertex));
         }
@@ -234,5 +243,6 @@ impl Scheduler {
 #[inline]
 fn is_unfinished(vertices: &VertexTable, sink: u32, sequence: u64, ended: Option<u32>) -> bool {
     let has_just_ended = u64::from(ended == Some(sink));
+    // The end at this instant has moved the sink on by one, and counts as late.
     vertices.get(sink).progress - has_just_ended <= sequence
 }

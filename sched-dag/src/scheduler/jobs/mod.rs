@@ -89,6 +89,7 @@ impl JobTable {
             ..Job::default()
         });
         let subtasks = dag.topological_order().iter();
+        // Sinks and subtasks that nobody follows alike: the job ends with the last of them.
         let ends = subtasks.filter(|&&subtask| dag.successors(subtask).is_empty());
         Self {
             in_flight: slots.collect(),
@@ -135,6 +136,7 @@ impl JobTable {
     /// sporadic without a limit and has no signal.
     #[inline]
     pub(super) fn are_over(&self, dag: &Dag) -> bool {
+        // A sporadic DAG without a limit keeps no run going, unless a signal is pending.
         let none_ahead = match dag.jobs() {
             Some(jobs) => self.next_due >= jobs,
             None => dag.is_sporadic() && self.next_due_ns.is_none(),
@@ -158,9 +160,12 @@ impl JobTable {
             return None;
         }
         let earliest_ns = match self.next_due {
+            // The first job has none before it to keep its distance from.
             0 => dag.offset_ns(),
             _ => self.last_due_ns.checked_add(dag.period_ns())?,
         };
+        // Never earlier than one minimum inter-arrival time after the job before: the bound rests
+        // on that.
         let release_ns = now_ns.max(earliest_ns);
         let deadline_ns = release_ns.checked_add(dag.relative_deadline_ns())?;
         self.next_due_ns = (deadline_ns < u64::MAX).then_some(release_ns);
@@ -198,6 +203,8 @@ impl JobTable {
             return None;
         }
         let blocked =
+            // By numbers, not by how many are in flight: skipped jobs have used no slot, but their
+            // numbers count.
             self.oldest < self.next && number - self.job(self.oldest).number >= self.limit;
         (!blocked).then_some(number)
     }
@@ -230,6 +237,7 @@ impl JobTable {
         let release_ns = self.waiting_release_ns(dag, number);
         self.first_waiting += 1;
         self.next += 1;
+        // A job that waited beyond its deadline is a miss already, and must not be counted twice.
         let missed = self.deadlines[0].has_judged_waiting(number);
         for deadline in &mut self.deadlines {
             deadline.release(number, sequence);
@@ -281,6 +289,7 @@ impl JobTable {
     pub(super) fn cut(&mut self, sequence: u64, outcome: JobOutcome) -> bool {
         let cut = &mut self.job_mut(sequence).cut;
         let is_first = cut.is_none();
+        // The first cut decides the outcome.
         cut.get_or_insert(outcome);
         is_first
     }
@@ -304,11 +313,13 @@ impl JobTable {
     #[inline]
     pub(super) fn end_all(&mut self) -> (u64, u64) {
         let mut cut_short = 0;
+        // At most J jobs, a number that the commit has fixed.
         for sequence in self.oldest..self.next {
             cut_short += u64::from(self.cut(sequence, JobOutcome::DagEnded));
         }
         let dropped = self.waiting();
         self.close(DagPhase::Ended);
+        // What waited is dropped at once, however many there are: only numbers are kept.
         self.first_waiting = self.next_due;
         (cut_short, dropped)
     }
@@ -324,6 +335,7 @@ impl JobTable {
     /// is blocked is due at `now_ns`.
     #[inline]
     pub(super) fn next_event_ns(&self, dag: &Dag, now_ns: u64) -> Option<u64> {
+        // Not at its nominal time, which is past: it was blocked then.
         if self.releasable().is_some() {
             return Some(now_ns);
         }
