@@ -133,6 +133,7 @@ impl PendingRequests {
         let room = lifecycle.as_ref().map(|lifecycle| lifecycle.room());
         let (others, changes) = room.unwrap_or_default();
         let mut kept = Vec::with_capacity(dags.saturating_add(others).saturating_add(1));
+        // So that what is paused at first is paused in the very first step, before any release.
         kept.extend(lifecycle.as_ref().map(|_| Request::Begin));
         Self {
             kept,
@@ -143,6 +144,7 @@ impl PendingRequests {
 
     /// Keeps a request until the next step.
     pub fn keep(&mut self, request: Request) {
+        // Once is enough, and so the room is bounded: one place for each different request.
         if !self.kept.contains(&request) {
             self.kept.push(request);
         }
@@ -170,6 +172,8 @@ impl PendingRequests {
         moment: &mut Moment<'_>,
     ) {
         letters.take(cluster, |request| {
+            // Of a person's pause, say, the lifecycle has to know; a signal is the scheduler's
+            // alone.
             if self.lifecycle.is_some() && request.is_of_lifecycle() {
                 self.keep(request);
             } else {
@@ -196,6 +200,8 @@ impl PendingRequests {
                     LifecycleChange::Close(dag) => moment.serve(Request::Close(dag)),
                     LifecycleChange::Await(dag) if moment.in_flight(dag) == 0 => {}
                     LifecycleChange::Await(_) => {
+                        // What stands behind it in the list may not happen before the DAG has
+                        // ended its jobs.
                         waits = true;
                         break;
                     }
@@ -206,6 +212,7 @@ impl PendingRequests {
                 }
             }
         }
+        // Asked again in each step, until what it waits for has come.
         if waits {
             self.kept.push(Request::GoOn);
         }
@@ -260,10 +267,13 @@ impl ModeTable {
         if let Some(asked) = self.modes.get(mode.index()) {
             let leaving = || asked.leaving.iter().copied();
             changes.extend(leaving().map(LifecycleChange::Pause));
+            // Between pausing and resuming: the mode is entered when what leaves it has ended its
+            // jobs.
             if entry == ModeEntry::WhenIdle {
                 changes.extend(leaving().map(LifecycleChange::Await));
             }
             changes.extend(asked.joining.iter().copied().map(LifecycleChange::Resume));
+            // Last, so that a journal shows the mode after all that led to it.
             changes.push(LifecycleChange::Enter(mode));
             self.last = mode;
         }
@@ -342,7 +352,9 @@ impl Lifecycle for LifecyclePlan {
             Request::Pause(dag) if self.touches(dag) => changes.push(LifecycleChange::Pause(dag)),
             Request::Resume(dag) if self.touches(dag) => changes.push(LifecycleChange::Resume(dag)),
             Request::ShutDown => {
+                // From now on no mode resumes what is closed.
                 self.modes = ModeTable::default();
+                // Drained: later requests touch none of them.
                 changes.extend(self.dags.drain(..).map(LifecycleChange::Close));
             }
             // Of one DAG, and touching none of its own.

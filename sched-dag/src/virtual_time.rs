@@ -198,11 +198,14 @@ impl<B: SubtaskBody> VirtualTime<B> {
             });
             let scheduler_ns = interrupts.min();
             let request_ns = now.workload.next_request_ns();
+            // A request that was made for an earlier time comes now: time does not go back.
             let request_ns = request_ns.map(|request_ns| request_ns.max(self.now_ns));
+            // Whatever comes first; what comes at the same time is one instant.
             let events = [self.next_finish_ns(), scheduler_ns, request_ns];
             let Some(event_ns) = events.into_iter().flatten().min() else {
                 return RunOutcome::Finished;
             };
+            // Nothing is taken yet, so a later call goes on here.
             if event_ns > until_ns {
                 return RunOutcome::TimeReached;
             }
@@ -245,15 +248,19 @@ impl<B: SubtaskBody> VirtualTime<B> {
     /// Goes through one instant. That the run cannot go on is the error.
     fn step(&mut self, now: &mut VirtualInstant<'_, impl Workload<B>>) -> Result<(), RunOutcome> {
         self.now_ns = now.now_ns;
+        // The short way was all of the instant.
         if self.finish(now)? {
             return Ok(());
         }
         let mut failing = core::mem::take(&mut self.failing);
+        // In an order that does not depend on cores: D6 counts faults in the order in which they
+        // are told.
         failing.sort_unstable_by_key(|(instance, ..)| *instance);
         for (instance, core, body) in failing.drain(..) {
             let place = self.place(instance.dag);
             self.clusters[place].fail(core, body, now);
         }
+        // The list goes back for its memory.
         self.failing = failing;
         if !core::mem::replace(&mut self.has_begun, true) {
             self.serve(Request::Begin, now);
@@ -281,6 +288,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
                 let mut others_ns =
                     [self.next_finish_ns(), now.workload.next_request_ns()].into_iter();
                 let is_last = others_ns.all(|ns| ns.is_none_or(|ns| ns > now.now_ns));
+                // The short way is right only if this finish is all that happens at this instant.
                 let is_alone = core::mem::take(&mut is_first) && is_last && !self.waits;
                 let (cluster, instance) = (&mut self.clusters[place], body.subject().instance());
                 if now.workload.fails(instance) {
@@ -297,6 +305,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
     fn serve(&mut self, request: Request, now: &mut VirtualInstant<'_, impl Workload<B>>) {
         let mut changes = Vec::new();
         match (request, &mut self.lifecycle) {
+            // A signal concerns one DAG, and no lifecycle.
             (Request::Signal(dag), _) => _ = self.change(dag, request, now),
             (_, Some(lifecycle)) => lifecycle.serve(request, &mut changes),
             (_, None) => {}
@@ -335,6 +344,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
     ) -> Option<usize> {
         let place = self.place(dag);
         let cluster = &mut self.clusters[place];
+        // A request that changes nothing writes nothing.
         let before = cluster.engine.scheduler.log.journal.written();
         cluster.tell(now, |moment| moment.serve(request));
         let is_written = cluster.engine.scheduler.log.journal.written() > before;
@@ -344,6 +354,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
     /// Returns the place of the cluster that runs a DAG.
     fn place(&self, dag: DagId) -> usize {
         match &*self.clusters {
+            // Undivided cores are one cluster, whatever the DAGs state.
             [_] => 0,
             several => several[0].engine.task_set.dag(dag).cluster().index(),
         }

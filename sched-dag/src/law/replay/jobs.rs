@@ -97,6 +97,7 @@ impl JobState {
             _ => &mut self.completed,
         };
         let earlier = place.replace(moment)?;
+        // The first one counts for what follows: the second is the breach.
         *place = Some(earlier);
         let (event, before, before_ns) = (*event, event.what, earlier.time_ns);
         Some(match before {
@@ -121,6 +122,8 @@ impl DagReplay {
     fn forget_before(&mut self, job: u64) {
         while let Some(first) = self.jobs.first_entry()
             && *first.key() < job
+            // Only from the front: a job in the middle may still be asked for by the next job's
+            // instances.
             && first.get().completed.is_some()
         {
             self.forgotten = first.key() + 1;
@@ -164,6 +167,7 @@ impl JournalReplay<'_> {
             self.found.extend(found.into_iter().flatten());
             return;
         }
+        // A job is first due, and in flight only from its release on.
         let waiting = of_dag.waiting.entry(job).or_default();
         waiting.release_ns = release_ns;
         found[0] = waiting.note(&event, moment);
@@ -175,6 +179,7 @@ impl JournalReplay<'_> {
                 before_ns,
             });
         }
+        // R1: each of these events is at the nominal release or later.
         found[2] = release_ns
             .filter(|release_ns| event.time_ns < *release_ns)
             .map(|release_ns| Violation::BeforeRelease { event, release_ns });
@@ -193,6 +198,7 @@ impl JournalReplay<'_> {
         let Event { dag, job, .. } = event;
         let model = self.task_set.dag(dag);
         let of_dag = &self.dags[dag.index()];
+        // The order of the checks decides which breach is told: one release, one breach.
         if let Some((later, _)) = of_dag.latest.filter(|latest| latest.0 > job) {
             return Some(Violation::OutOfOrder { event, later });
         }
@@ -204,9 +210,11 @@ impl JournalReplay<'_> {
             return Some(Violation::TooMany { event, in_flight });
         }
         let Some(release_ns) = release_ns else {
+            // Where events are lost, the signal may be among them.
             return self.terms.is_whole.then_some(Violation::NotDue { event });
         };
         if model.is_sporadic() {
+            // From nominal release to nominal release, however late each was made.
             let before_ns = of_dag.latest.and_then(|(_, release_ns)| release_ns);
             let earliest_ns = before_ns.map_or(model.offset_ns(), |before_ns| {
                 before_ns.saturating_add(model.period_ns())
@@ -222,9 +230,11 @@ impl JournalReplay<'_> {
         }
         let was_queued = of_dag.waiting.get(&job)?.queued.is_some();
         let expected_ns = match was_queued {
+            // A queued job is released by the completion that makes room.
             true => of_dag.completed_ns,
             false => Some(release_ns),
         };
+        // On a machine interrupts are late, so only virtual time is held to the nanosecond.
         let is_late = self.is_exact() && self.terms.is_whole && expected_ns != Some(event.time_ns);
         is_late.then_some(match expected_ns {
             Some(expected_ns) => Violation::Unpunctual { event, expected_ns },
@@ -273,6 +283,8 @@ impl JournalReplay<'_> {
             self.found.push(again);
             return;
         }
+        // A deadline is judged when all is known: at the completion, or by a miss that comes after
+        // it.
         let is_judged = event.what != EventKind::Aborted && known.completed.is_some();
         let was_counted = known.released.is_some();
         if event.what == EventKind::Completed {
@@ -311,6 +323,7 @@ impl JournalReplay<'_> {
             let life = known.life(subtask);
             match life.and_then(InstanceLife::over) {
                 Some(over) if over.time_ns <= completed.time_ns => {
+                    // The latest end is what the completion has to follow.
                     if over.time_ns >= last_ns {
                         (last, last_ns) = (over, over.time_ns);
                     }
@@ -356,11 +369,13 @@ impl JournalReplay<'_> {
             Some(life.over()?.time_ns)
         };
         let end_ns = self.end_ns;
+        // All instances are over, and the completion is missing, if the latest was long enough ago.
         let over_ns = latest((0..self.subtasks(dag)).map(over_ns))
             .filter(|over_ns| !self.is_tolerable(*over_ns, end_ns));
         let unfinished = Violation::Unfinished { dag, job, end_ns };
         match over_ns {
             Some(over_ns) => Some(Violation::NeverCompleted { dag, job, over_ns }),
+            // A trace that was cut off may end in the middle of a job.
             None => self.terms.is_complete.then_some(unfinished),
         }
     }
@@ -404,6 +419,7 @@ impl JournalReplay<'_> {
             let late = late.max_by_key(|due| due.finish_ns)?;
             let finish_ns = late.finish_ns?;
             let may_be_lost = self.may_be_lost(&dues);
+            // A job that is cut before its deadline counts as that, and never as a miss (rule 4).
             let is_cut = known.cut.is_some() || of_dag.is_stopped;
             return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
                 dag,
@@ -446,6 +462,7 @@ impl JournalReplay<'_> {
                 deadline_ns: last.deadline_ns,
             });
         }
+        // The first instant after the deadline notices it.
         let is_late = self.is_exact() && missed.time_ns > deadline_ns + 1;
         is_late.then_some(Violation::MissedLate { event, deadline_ns })
     }
