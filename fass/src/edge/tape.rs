@@ -57,7 +57,10 @@ impl RunRecorder {
     /// Makes all places, each with the same part of the memory; `None`: there is too little.
     fn provide(&mut self, plan: &mut Plan) -> Option<()> {
         let channels = &self.header.channels;
+        // One part for each channel, and one for events.
         let words = self.bytes / 8 / (channels.len() + 1);
+        // Room for 64 events at least, however little memory is given: a run has more events than
+        // values.
         let (events, reader) = outbox(words.max(64 * words_of(EVENT_BYTES)))?;
         self.lines = mem::take(&mut plan.lines);
         let records = (self.lines.iter().zip(channels))
@@ -81,12 +84,15 @@ impl RunRecorder {
     fn put(&mut self, what: EntryKind, of: Instance, release_ns: Option<u64>, at_ns: u64) {
         let mut bytes = [0; EVENT_BYTES];
         let mut out = Encoder::new(&mut bytes);
+        // The commit has refused larger numbers of what is recorded.
         let (dag, subtask) = narrow(of).unwrap_or((u16::MAX, u16::MAX));
         (what, dag, subtask, release_ns).encode(&mut out);
         let length = out.finish().unwrap_or(EVENT_BYTES);
         if let Some(events) = &self.events
             && !events.put(of.job, at_ns, &bytes[..length])
         {
+            // A lost event cannot be told as a lost value is: a replay would miss a signal. So the
+            // recording ends here.
             self.lost.end(at_ns);
         }
     }
@@ -100,6 +106,7 @@ fn take(given: &[Option<Outbox>], lost: &LossCounts, value: &RecordedValue<'_>, 
     let is_put = (value.bytes.zip(outbox))
         .is_some_and(|(bytes, outbox)| outbox.put(value.job, value.completed_ns, bytes));
     if !is_put {
+        // A lost value is told by its job, and the recording goes on.
         lost.note(value, at_ns);
     }
 }
@@ -137,6 +144,7 @@ impl Crossing for RunRecorder {
 
     fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
         for of in self.lines.iter().filter(|of| of.is_found_by(instance)) {
+            // What the instance found before its fault is needed to compute the fault again.
             (of.line).end(clock_ns, |sample| {
                 take(&self.given, &self.lost, sample, at_ns);
             });
@@ -147,6 +155,7 @@ impl Crossing for RunRecorder {
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
         let number = u16::try_from(instance.dag.0);
         let mut channels = self.header.channels.iter();
+        // Only of DAGs that are recorded: the time told to others is no input of the replay.
         if channels.any(|channel| Ok(channel.dag) == number) {
             self.put(EntryKind::Clock, instance, None, at_ns);
         }
@@ -214,6 +223,7 @@ impl ReleaseTimes {
             None => Some(self.task_set.dags()[dag].grid_ns(job)),
             Some(place) => {
                 let (of, release_ns) = signals[place];
+                // The place may hold an older signal, if this one was never noted.
                 (of == job).then_some(release_ns)
             }
         }
@@ -261,6 +271,7 @@ impl OfTape {
         let values = (0..)
             .zip(&mut self.records)
             .filter_map(|(channel, records)| {
+                // Values are stamped by the clock, events by the run's time.
                 let at_ns = records.next()?.at_ns.saturating_sub(epoch_ns);
                 Some((at_ns, Some(channel)))
             });
@@ -275,6 +286,7 @@ impl OfTape {
     fn tell_lost(&mut self, channel: u16, next: Option<(u64, u64)>, to: &mut Record) {
         let dag = self.header.channels[usize::from(channel)].dag;
         let before = next.map(|(job, _)| job);
+        // Before the value that comes next, so that the file is in the order of jobs.
         while let Some((first, last)) = self.lost.values[usize::from(channel)].take(before) {
             for job in first..=last {
                 // What is told at the end only has no time of its own.
@@ -298,6 +310,7 @@ impl OfTape {
         if let Some(PublishedRecord { bytes, .. }) = records.next() {
             to.write(&self.releases.entry(EntryKind::Value, of, job, at_ns, bytes));
         }
+        // Only now may the writer use the place again.
         records.forget();
     }
 
@@ -306,6 +319,7 @@ impl OfTape {
         let Some(PublishedRecord { job, at_ns, bytes }) = self.events.next() else {
             return;
         };
+        // Read out before the place is given back.
         let event = Event::from_bytes(bytes);
         self.events.forget();
         let Ok((what, dag, place, known_ns)) = event else {
@@ -317,6 +331,7 @@ impl OfTape {
             _ => &[],
         };
         let entry = self.releases.entry(what, [dag, place], job, at_ns, value);
+        // A signal's release stands in no grid; the event itself has it.
         let release_ns = known_ns.unwrap_or(entry.release_ns);
         if what == EntryKind::Signal {
             self.releases.note(dag.into(), job, release_ns);
@@ -347,6 +362,7 @@ impl Drain for OfTape {
             return false;
         };
         match self.earliest() {
+            // What is left is younger than the gap, and would make a file with a hole.
             Some((at_ns, _)) if self.has_ended(at_ns) => return false,
             Some((at_ns, Some(channel))) => self.write_value(channel, at_ns, to),
             Some((_, None)) => self.write_event(to),
@@ -390,6 +406,8 @@ impl LostJobs {
     /// Notes a job, which is after those before; `false`: they are too many.
     fn note(&self, job: u64) -> bool {
         let written = self.written.load(Ordering::Relaxed);
+        // Pairs with the release store of `take`: the place of a run that was read may be written
+        // again.
         let read = self.read.load(Ordering::Acquire);
         // The run before goes on. Nobody reads it yet, for that takes a value of a later job, and
         // between that and this one there would be a job.
@@ -403,6 +421,7 @@ impl LostJobs {
         if written - read == MOST_RUNS {
             return false;
         }
+        // Relaxed suffices: the store to `written` below publishes both ends.
         for end in &self.runs[written % MOST_RUNS] {
             end.store(job, Ordering::Relaxed);
         }
@@ -418,9 +437,11 @@ impl LostJobs {
         }
         let ends = self.runs[read % MOST_RUNS].each_ref();
         let [first, last] = ends.map(|end| end.load(Ordering::Acquire));
+        // The run comes after the value in hand; it is told with a later one.
         if before.is_some_and(|before| first >= before) {
             return None;
         }
+        // After both loads, so that the writer cannot overwrite the run while it is read.
         self.read.store(read + 1, Ordering::Release);
         Some((first, last))
     }

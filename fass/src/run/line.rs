@@ -57,6 +57,7 @@ impl ChannelState {
     /// Notes whether the platform reads the values, which have at least so many bytes.
     pub(super) fn open(&self, is_read: bool, least_bytes: usize) {
         self.is_read.store(is_read, Ordering::Relaxed);
+        // Nobody drains it in the background, so one value at a time needs room.
         if !is_read && let Some((outbox, _)) = outbox(words_of(room_for(least_bytes))) {
             // The commit, which comes once, does this or the other.
             let _ = self.outbox.set(outbox);
@@ -82,6 +83,8 @@ impl ChannelState {
         // Half of it is in one piece, wherever the next value comes.
         let least = 2 * words_of(room_for(least_bytes)) + 1;
         let (outbox, reader) = outbox(words.max(least))?;
+        // The outbox that the writer stages into is in place already; this one is for what it
+        // gives.
         if !self.is_read.load(Ordering::Relaxed) {
             return Some((reader, Some(outbox)));
         }
@@ -93,6 +96,7 @@ impl ChannelState {
     #[inline(always)]
     pub(super) fn stage<T: Recordable>(&self, job: u64, write: impl Fn(&mut Encoder<'_>)) {
         if let Some(outbox) = self.outbox.get() {
+            // Computed by the compiler, not on the way of each value.
             let most = const { room_for(T::LEAST_BYTES) };
             outbox.stage(job, most, |bytes| {
                 let mut out = Encoder::new(bytes);
@@ -106,6 +110,8 @@ impl ChannelState {
     #[inline(always)]
     fn publish(&self, completed_ns: u64) {
         if let Some(outbox) = self.outbox.get()
+            // No room to publish: the value is given instead, and the platform decides what is
+            // lost.
             && !outbox.publish(completed_ns)
         {
             self.show(completed_ns, self.edge.record);

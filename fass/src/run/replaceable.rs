@@ -73,6 +73,7 @@ where
     }
 
     fn prepare(&mut self) {
+        // Here, where a fault still ends the DAG: `make` is the app's code, and may fail.
         self.present.get_or_insert_with(&mut self.make);
     }
 
@@ -82,6 +83,7 @@ where
     }
 
     fn lose(&mut self) {
+        // Not dropped: a fault may have left it half changed, and its destructor would run on that.
         mem::forget(self.present.take());
     }
 
@@ -115,6 +117,7 @@ where
     }
 
     fn lose(&mut self) {
+        // Not dropped, for the same reason.
         mem::forget(self.first.take());
     }
 
@@ -135,6 +138,7 @@ pub(crate) fn defer<Args: VecToSubs, Ret: VecToPubs>(
             <Args as VecToSubs>::gen_subs(wiring.ports(subtask)),
             <Ret as VecToPubs>::gen_pubs(wiring.ports(subtask)),
         ));
+        // A fault may come before the first call, so this is told from the beginning on.
         let next = AtomicU8::new(if restarts { ANEW } else { FALLBACK });
         let ends = Arc::new(ReplaceableEnds { both, next });
         SubtaskCode::new(Box::new(ReplaceableBody {
@@ -185,6 +189,8 @@ impl<T> ReplaceableEnds<T> {
 impl<Args: VecToSubs, Ret: VecToPubs> PolledSubtask for ReplaceableBody<Args, Ret> {
     fn take_turn(&mut self, job: u64) {
         let context = &mut Context::from_waker(Waker::noop());
+        // Claimed twice, for receiving and for sending, and not between: a fault of the function
+        // must find them free.
         let mut ends = self.ends.claim();
         // A fault in here ends the DAG: what makes functions may be half changed.
         let next = self.ends.next.load(Ordering::Relaxed);
@@ -194,6 +200,7 @@ impl<Args: VecToSubs, Ret: VecToPubs> PolledSubtask for ReplaceableBody<Args, Re
         ends.0.grant(job);
         ends.1.grant(job);
         let received = pin!(ends.0.recv_all()).poll(context);
+        // Before the function is called: it may never return.
         drop(ends);
         let Poll::Ready(args) = received else {
             return;
@@ -216,6 +223,7 @@ impl<Args: VecToSubs, Ret: VecToPubs> PolledSubtask for ReplaceableBody<Args, Re
 
     fn replace(&mut self) {
         self.alternatives.lose();
+        // A state that the failed function changed may be half changed, too.
         self.states.iter().for_each(|state| state.reset());
         if self.ends.is_fallback() {
             self.ends.next.store(NONE, Ordering::Relaxed);

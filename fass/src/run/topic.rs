@@ -87,6 +87,7 @@ struct FanOut<T> {
 
 impl<T: Message> Publisher<T> {
     fn new(mut writers: Vec<Writer<T>>, stages: Box<[Box<dyn Stage<T>>]>) -> Self {
+        // The usual case, one reader, pays for no indirect call.
         if stages.is_empty()
             && writers.len() == 1
             && let Some(writer) = writers.pop()
@@ -127,7 +128,9 @@ impl<T: Message> Relay<T> for FanOut<T> {
                 stage.stage(job, clone);
             }
         };
+        // The value itself goes to the last reader, so one reader costs no clone.
         if let Some((last, others)) = self.writers.split_last_mut() {
+            // Before the value is moved away.
             self.stages.iter_mut().for_each(stage);
             for writer in others {
                 if let Some(clone) = value.for_another_reader() {
@@ -202,6 +205,7 @@ impl DagWiring {
             topics.extend(subtask.inputs.iter().map(|port| &port.topic));
             edges_of_inputs.push((first..topics.len()).collect());
         }
+        // A stable sort: readers of one topic stay in the order of their registration.
         let by_topic = sorted_by_key(topics.len(), |edge| topics[edge]).into_iter();
         let edges_by_topic = by_topic.map(|edge| (topics[edge].clone(), edge)).collect();
         let outputs = spec
@@ -259,6 +263,7 @@ impl DagWiring {
         let of_topic = self.stages.iter_mut().filter(|(of, _)| of == topic);
         let mut wrap = None;
         for (_, any) in of_topic {
+            // A latest value, or a tap of a recorded topic: only the type tells which.
             if let Some(stages) = any.downcast_mut::<Vec<Box<dyn Stage<T>>>>() {
                 found.append(stages);
             } else if let Some(found) = any.downcast_mut::<Wrap<T>>() {
@@ -321,6 +326,7 @@ impl Ports<'_> {
         let topic = &self.wiring.outputs[self.subtask][self.next].clone();
         self.next += 1;
         let all = &self.wiring.edges_by_topic;
+        // The edges of a topic lie together, as they are sorted by it.
         let first = all.partition_point(|(other, _)| other < topic);
         let of_topic = all[first..].iter().take_while(|(other, _)| other == topic);
         let edges: Vec<usize> = of_topic.map(|(_, edge)| *edge).collect();

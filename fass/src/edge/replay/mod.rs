@@ -161,6 +161,8 @@ impl Replay {
             offset: bytes.len(),
             expected: "fewer entries, for whose places there is memory",
         };
+        // Counted in a first pass, so that a damaged or huge file is refused before its values are
+        // placed.
         let is_value = |entry: &Entry<'_>| entry.what == EntryKind::Value;
         let count = recording.entries().filter(is_value).count();
         let mut replay = Self {
@@ -170,6 +172,7 @@ impl Replay {
             computed: Vec::with_capacity(4096),
             ..Self::default()
         };
+        // The count comes from a file: memory for it is asked for, and may be refused.
         (replay.values.try_reserve_exact(count)).map_err(no_memory)?;
         (replay.is_compared.try_reserve_exact(count)).map_err(no_memory)?;
         let mut cuts = Vec::new();
@@ -191,6 +194,7 @@ impl Replay {
             }
             match what {
                 EntryKind::Value => {
+                    // A range instead of a slice: the bytes are moved into the replay below.
                     let start = value.as_ptr().addr() - bytes.as_ptr().addr();
                     (replay.values).push(((place, job), start..start + value.len()));
                     replay.is_compared.push(false);
@@ -198,6 +202,7 @@ impl Replay {
                 EntryKind::Cut => cuts.push((dag, place, job)),
                 EntryKind::Fault => replay.faults.push(RecordedFault::new(dag, place, job)),
                 EntryKind::Signal | EntryKind::Skip => {
+                    // A skipped job was due by a signal as much as a released one.
                     replay.first_signals.entry(id).or_insert(job);
                     let of_dag = replay.signals.entry(id).or_default();
                     of_dag.push_back(entry.release_ns);
@@ -208,11 +213,13 @@ impl Replay {
                     told.times.extend(Vec::<u64>::from_bytes(value)?);
                 }
                 EntryKind::Lost if role(place) == Role::Source => {
+                    // A source whose value is lost cannot be replayed; the first such job is named.
                     replay.lost.get_or_insert((place, job));
                 }
                 EntryKind::Restart | EntryKind::Lost => {}
             }
         }
+        // By channel and job, as a run looks them up by halving.
         replay.values.sort_unstable_by_key(|(of, _)| *of);
         cuts.sort_unstable();
         let passed = SkippedInstances {
@@ -245,6 +252,7 @@ impl Replay {
         let (dag, subtask) = narrow(instance)?;
         let told = self.clock.get_mut(&(dag, subtask, instance.job))?;
         let time_ns = told.times.get(told.taken).copied();
+        // Also beyond the last: an instance that asks more often than it did gets no time twice.
         told.taken += 1;
         time_ns
     }
@@ -288,11 +296,13 @@ impl Replay {
         let Some(found) = self.find(value.channel, value.job) else {
             return;
         };
+        // Counted once, however often the value comes.
         if !core::mem::replace(&mut self.is_compared[found], true) {
             self.compared += 1;
         }
         let place = self.values[found].1.clone();
         let bytes = value.bytes.unwrap_or_default();
+        // Only the first divergence is kept: those that follow from it would hide it.
         if self.bytes[place.clone()] != *bytes && self.divergence.is_none() {
             self.computed.extend_from_slice(bytes);
             self.divergence = Some((value.channel, value.job, place));
@@ -322,6 +332,7 @@ impl Replay {
         let missing = all.filter_map(|(((place, job), range), is_compared)| {
             let mut of_run = self.channels.iter().zip(&self.own.channels);
             let (_, channel) = of_run.find(|(recorded, _)| **recorded == Some(*place))?;
+            // States and samples may rightly be missing: a job that was cut has none.
             let is_missing = channel.role == Role::Result && !is_compared;
             is_missing.then_some((*job, channel, range))
         });
@@ -351,11 +362,13 @@ impl Replay {
 
     /// Cuts all that waits for an instance in its job.
     pub fn cut_behind(&mut self, instance: Instance, task_set: &TaskSet) {
+        // The recorded fault has come again, so it is no longer missed.
         self.meet_fault(instance);
         let Instance { dag, subtask, job } = instance;
         let mut behind = task_set.dag(dag).successors(subtask).to_vec();
         while let Some(subtask) = behind.pop() {
             let instance = Instance { dag, subtask, job };
+            // Each instance once: two paths to it must not walk on from it twice.
             if Arc::make_mut(&mut self.passed).cut(instance) {
                 behind.extend(task_set.dag(dag).successors(subtask));
             }
@@ -391,6 +404,7 @@ impl SkippedInstances {
             return false;
         };
         let cut = (dag, subtask, instance.job);
+        // The list stays sorted, so that each lookup on the hot path halves it.
         let place = self.cuts.binary_search(&cut);
         place.map_err(|place| self.cuts.insert(place, cut)).is_err()
     }
@@ -402,6 +416,7 @@ impl SkippedInstances {
         };
         let job = instance.job;
         self.is_of(dag)
+            // Of a job that is not recorded at all no function is called: its inputs are unknown.
             && (self.jobs.binary_search(&(dag, job)).is_err()
                 || self.cuts.binary_search(&(dag, subtask, job)).is_ok())
     }

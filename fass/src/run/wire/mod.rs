@@ -112,6 +112,7 @@ impl WireInput {
     /// Makes one with room for the longest packet at least.
     pub(crate) fn new(framing: Framing, longest: usize, room_bytes: usize) -> Self {
         let longest = match framing {
+            // A fixed length is the longest packet, whatever the options say.
             Framing::Fixed(bytes) => bytes,
             _ => longest,
         };
@@ -158,6 +159,7 @@ impl WireInput {
     fn divide<'b>(&self, open: &mut OpenPacket, bytes: &'b [u8]) -> (&'b [u8], &'b [u8], bool) {
         let end = match self.framing {
             Framing::Chunks => return (bytes, &[], true),
+            // One byte at a time: the two bytes of the length may arrive apart.
             Framing::LengthFirst if open.prefix < 2 => {
                 open.prefix += 1;
                 open.announced = open.announced << 8 | usize::from(bytes[0]);
@@ -165,6 +167,7 @@ impl WireInput {
             }
             Framing::LengthFirst | Framing::Fixed(_) => {
                 let length = match self.framing {
+                    // A packet of 0 bytes would end before each byte, without end.
                     Framing::Fixed(length) => length.max(1),
                     _ => open.announced,
                 };
@@ -183,6 +186,8 @@ impl WireInput {
     /// Puts bytes of the packet into the ring, if it can still be shown.
     fn put(&self, open: &mut OpenPacket, part: &[u8]) {
         let seen = open.seen.saturating_add(part.len());
+        // What is too long is counted to its end, and not stored: the next packet must begin at
+        // the right byte.
         if seen <= self.longest && !part.is_empty() {
             open.is_lost |= !self.ring.put(HEADER_BYTES + open.seen, part);
         }
@@ -202,6 +207,7 @@ impl WireInput {
         if is_line && self.ring.ahead(HEADER_BYTES + seen - 1) == b'\r' {
             seen -= 1;
         }
+        // An empty line is no packet.
         if seen == 0 {
             return false;
         }
@@ -212,6 +218,7 @@ impl WireInput {
         }
         // Its bytes lie beyond, so there is room for these.
         let length = u32::try_from(seen).unwrap_or(u32::MAX).to_le_bytes();
+        // The header last, in front of bytes that are there: nothing is shown before all of it is.
         self.ring.put(0, &length);
         self.ring.put(length.len(), &now_ns.to_le_bytes());
         self.ring.show(HEADER_BYTES + seen);
@@ -227,6 +234,7 @@ impl WireInput {
 
     /// Takes the oldest packet before the mark: its bytes, in front of the buffer, and its time.
     pub(crate) fn take<'b>(&self, mark: usize, buffer: &'b mut [u8]) -> Option<(&'b [u8], u64)> {
+        // Up to the mark only: what comes while the instance runs is for a later one.
         if self.ring.waiting(mark) == 0 {
             return None;
         }
@@ -279,6 +287,8 @@ impl WireOutput {
     /// Puts bytes behind what the instance has sent already.
     pub(crate) fn stage(&self, bytes: &[u8]) {
         let staged = self.staged.load(Ordering::Relaxed);
+        // Once a byte has found no room, none is put any more: a packet with a hole is worse than
+        // none.
         if self.is_lost.load(Ordering::Relaxed) || !self.ring.put(staged, bytes) {
             self.is_lost.store(true, Ordering::Relaxed);
         }
