@@ -36,6 +36,7 @@ pub(crate) fn check_dag(
 /// Adds each use of something of a DAG that is not in the commit.
 fn check_others(drafts: &Drafts, draft: &DagDraft, label: &DagLabel, faults: &mut Vec<Fault>) {
     for (subtask, latest, _) in &draft.samples {
+        // The value's DAG has to be in this very commit, or nobody ever writes it.
         if writer_of(drafts, latest).is_none() {
             faults.push(Fault::LatestNotCommitted {
                 dag: label.clone(),
@@ -69,6 +70,7 @@ fn check_replaceable(draft: &DagDraft, label: &DagLabel, faults: &mut Vec<Fault>
     let dag = label.clone();
     let drops_jobs = draft.spec.on_fault != OnFault::EndDag;
     match draft.replaceable.first() {
+        // It would be made anew after a fault that ends the DAG.
         Some(&subtask) if !drops_jobs => faults.push(Fault::ReplacedInVain {
             dag,
             subtask: draft.label(subtask),
@@ -79,6 +81,8 @@ fn check_replaceable(draft: &DagDraft, label: &DagLabel, faults: &mut Vec<Fault>
     for (position, state) in draft.spec.states.iter().enumerate() {
         let mut users = state.users.iter().map(|user| user.subtask);
         if let Some(subtask) = users.find(|user| draft.replaceable.contains(user))
+            // A fault may leave the state half changed, so somebody has to say what it begins with
+            // again.
             && draft.resets.iter().all(|(state, _)| *state != position)
         {
             faults.push(Fault::StateWithoutReset {
@@ -97,6 +101,7 @@ fn check_inputs(draft: &DagDraft, dag: &DagLabel, faults: &mut Vec<Fault>) {
         let label = draft.label(*subtask);
         let is_same =
             |(first, other): &&(usize, String)| other == takes && is_source(draft, *first);
+        // A replay gives sources their values; what others take from outside it could not repeat.
         if !is_source(draft, *subtask) {
             let text = format!(
                 "{label} of {dag} is no source and {takes}; let the source do that, and send it \
@@ -127,6 +132,8 @@ fn is_source(draft: &DagDraft, subtask: usize) -> bool {
 pub(crate) fn check_all(drafts: &Drafts, faults: &mut Vec<Fault>) {
     let checks: [fn(&DagDraft) -> Option<Check>; 2] = [|of| of.check_modes, |of| of.check_recorded];
     for pick in checks {
+        // A function pointer in the draft, so that an image without modes or recordings has no
+        // code of them.
         if let Some(check) = drafts.iter().find_map(|draft| pick(&draft.borrow())) {
             check(drafts, faults);
         }
@@ -163,6 +170,7 @@ pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
 pub(crate) fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
     let mut add = |code, text| faults.push(Fault::Worded { code, text });
     let found = of_commit(drafts);
+    // Two sets of modes would switch the same DAGs without knowing of each other.
     if found.len() > 1 {
         let text = "the commit has modes of more than one `Modes`; make all of them by one";
         add("several_sets_of_modes", text.into());
@@ -200,6 +208,7 @@ pub(crate) fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
         // What brings about a safe state is on wherever the DAG is that may need it.
         let handler = draft.on_fault.as_ref();
         let handler = handler.and_then(|target| dag_of(drafts, target));
+        // A handler in no mode is never paused by one.
         let Some(handler) = handler.filter(|&handler| in_some(handler)) else {
             continue;
         };
@@ -223,6 +232,7 @@ fn of_commit(drafts: &Drafts) -> Vec<ModeSets> {
     let mut found: Vec<ModeSets> = Vec::new();
     for draft in drafts {
         for modes in &draft.borrow().modes {
+            // Each set once, however many DAGs name it.
             if !found.iter().any(|other| Rc::ptr_eq(other, modes)) {
                 found.push(Rc::clone(modes));
             }
@@ -233,6 +243,7 @@ fn of_commit(drafts: &Drafts) -> Vec<ModeSets> {
 
 /// Returns the place of a DAG in the commit.
 fn place(drafts: &Drafts, dag: &Weak<RefCell<DagDraft>>) -> Option<usize> {
+    // By identity: names may be the same.
     let is_it = |draft: &Rc<_>| core::ptr::eq(Rc::as_ptr(draft), dag.as_ptr());
     drafts.iter().position(is_it)
 }

@@ -113,6 +113,7 @@ struct UnstatedType;
 impl DagDraft {
     /// Takes what was registered, for the commit, and leaves what handles may still ask for.
     pub(crate) fn close(&mut self) -> Self {
+        // What stays answers for the handle: its name in complaints, and where its signals go.
         let committed = Self {
             spec: DagSpec {
                 name: self.spec.name.clone(),
@@ -137,6 +138,7 @@ impl DagDraft {
         let (outputs, output_types) = ends.outputs;
         self.make_bodies.push(body);
         let subtask = self.next_label(&attributes);
+        // Noted, not reported: a commit tells all faults of all DAGs at once.
         if input_types.len() != inputs.len() {
             let subtask = subtask.clone();
             let (expected, given) = (input_types.len(), inputs.len());
@@ -181,6 +183,8 @@ impl DagDraft {
     /// Returns what the attributes say of a subtask, without its ports.
     fn specify(&mut self, subtask: &SubtaskLabel, attributes: SubtaskAttributes) -> SubtaskSpec {
         let wcet = attributes.wcet;
+        // A duration that does not fit into nanoseconds becomes a fault of the commit, not a panic
+        // here.
         let wcet_ns = wcet.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
         let budget = attributes.budget;
         let budget_ns = budget.and_then(|budget| self.convert(budget, Some(subtask), "budget"));
@@ -216,6 +220,7 @@ impl DagDraft {
     /// Makes the DAG sporadic, which it cannot be if a source states a period.
     pub(crate) fn set_sporadic(&mut self, min_inter_arrival: Duration) {
         self.spec.activation = Activation::Sporadic;
+        // The analysis takes the minimum inter-arrival time for the period.
         self.replace_period(min_inter_arrival);
         if let Some(subtask) = self.periodic_source.clone() {
             self.flaws
@@ -241,6 +246,7 @@ impl DagDraft {
         let Some(period_ns) = self.convert(period, Some(&subtask), "period") else {
             return;
         };
+        // The first source sets it; a second one that differs is a fault.
         let first_ns = *self.spec.period_ns.get_or_insert(period_ns);
         if first_ns != period_ns {
             self.flaws.push(Box::new(move |dag| Fault::PeriodsDiffer {
@@ -260,6 +266,7 @@ impl DagDraft {
             return;
         };
         self.spec.subtasks[sink.id.index()].relative_deadline_ns = Some(deadline_ns);
+        // Without a deadline of its own the DAG has that of its latest sink.
         if !self.states_deadline {
             let longest_ns = self.spec.relative_deadline_ns.max(Some(deadline_ns));
             self.spec.relative_deadline_ns = longest_ns;
@@ -299,6 +306,7 @@ impl DagDraft {
         let unknown = MessageType::of::<UnstatedType>().id();
         let ports = (self.spec.subtasks.iter())
             .flat_map(|subtask| subtask.inputs.iter().chain(&subtask.outputs));
+        // The usual case borrows the spec as it is.
         if ports.clone().all(|port| port.type_id != unknown) {
             return spec;
         }
@@ -309,6 +317,8 @@ impl DagDraft {
             .collect();
         for subtask in &mut spec.to_mut().subtasks {
             for port in subtask.inputs.iter_mut().chain(&mut subtask.outputs) {
+                // A list of the wrong length has no types; those of the other ends keep it from
+                // being reported twice.
                 if port.type_id == unknown
                     && let Some(other_end) = known.iter().find(|other| other.topic == port.topic)
                 {
@@ -350,6 +360,7 @@ impl DagDraft {
 /// Pairs topics with types; all types are unknown if the numbers differ, since
 /// it cannot be told which one is missing.
 fn ports(topics: &[&str], types: &[MessageType]) -> Vec<TopicPort> {
+    // Which topic has which type is not known if the counts differ.
     let fits = topics.len() == types.len();
     (topics.iter().enumerate())
         .map(|(index, topic)| {

@@ -67,6 +67,7 @@ impl Crossing for RecentJobs {
     fn launch(&mut self, plan: &mut Plan) -> Result<(), String> {
         let mut header = mem::take(&mut self.header);
         name(&mut header, self.app, &plan.task_set);
+        // A replay begins at one of these jobs, so the states before each have to be known.
         plan.keep_states_of(self.jobs);
         // Without memory the app runs as if nothing was kept, for nobody has asked for it.
         let latest = LatestJobs::new(&header.channels, self.jobs);
@@ -106,18 +107,21 @@ impl Crossing for RecentJobs {
             for of in kept.lines.iter().filter(|of| of.is_found_by(instance)) {
                 of.line.show(at_ns, |sample| kept.latest.take(sample));
             }
+            // From now on the jobs up to the fault stay, whatever comes after them.
             kept.latest.hold(instance.dag.index(), instance.job);
             if kept
                 .faults
                 .iter()
                 .all(|(other, _)| other.dag != instance.dag)
             {
+                // One fault for each DAG: it is the first that has to be computed again.
                 kept.faults.push((instance, at_ns));
             }
         }
     }
 
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
+        // A run without a fault leaves no file: nobody has asked for one.
         let kept = self.kept.take_if(|kept| !kept.faults.is_empty())?;
         Some(Box::new(OfLatest(kept)))
     }
@@ -142,6 +146,7 @@ impl Drain for OfLatest {
         let dags = (0_u16..).zip(releases.task_set.dags());
         for (dag, _) in dags.filter(|(_, model)| model.is_sporadic()) {
             for job in latest.jobs(dag.into()) {
+                // A job without a noted signal never was due.
                 if let Some(release_ns) = releases.of(dag.into(), job) {
                     write(EntryKind::Signal, [dag, 0], job, release_ns, &[]);
                 }
@@ -229,6 +234,7 @@ impl LatestJobs {
         for channel in channels {
             let count = match channel.role {
                 Role::Source | Role::Sample | Role::State => count,
+                // A replay computes results itself.
                 Role::Result => 0,
             };
             let room = room_for(channel.schema.least_bytes());

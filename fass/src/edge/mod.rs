@@ -254,6 +254,7 @@ pub(crate) fn begin_echo() -> Box<dyn Echoing> {
 /// Adds the recorded topics of a DAG to a header.
 pub fn open(header: &mut Header, dag: DagId, graph: u64, channels: &[Channel]) {
     let dags = header.dags.len().max(dag.index() + 1);
+    // DAGs that record nothing have an empty header: numbers are those of the plan.
     header.dags.resize(dags, DagHeader::default());
     header.dags[dag.index()].graph = graph;
     header.channels.extend_from_slice(channels);
@@ -286,6 +287,7 @@ pub const fn recorded(what: EventKind) -> Option<recording::EntryKind> {
         EventKind::Cancelled => Some(recording::EntryKind::Cut),
         EventKind::Restarted => Some(recording::EntryKind::Restart),
         EventKind::Ended => Some(recording::EntryKind::Fault),
+        // All else follows from these when the functions are called again.
         _ => None,
     }
 }

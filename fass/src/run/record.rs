@@ -63,6 +63,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
     )]
     fn open_all(&self, of: &OfDag<'_>, lines: &mut Vec<LineOf>) -> Vec<(usize, Around)> {
         let (dag, spec) = (of.dag, of.spec);
+        // Nobody records or replays: no channel is opened, and no value is copied.
         if !(self.edge().crosses)() {
             return Vec::new();
         }
@@ -89,6 +90,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
         let has_results = (self.edge().has_results)();
         for topic in of.recorded {
             let (subtask, role) = writer(&**topic, spec);
+            // Where nobody compares results, only inputs are kept.
             if has_results || role != Role::Result {
                 open(subtask, role, topic.topic(), topic.line(), None);
             }
@@ -96,6 +98,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
         let mut around = Vec::new();
         for sample in of.samples {
             let latest = &*sample.latest;
+            // A topic of another type, or one that is not recorded, has no probe.
             if let Some((probe, schema, line)) = sample.of.probe(latest, sample.sampler) {
                 let way = (schema, Arc::clone(&line));
                 open(sample.subtask, Role::Sample, latest.topic(), way, None);
@@ -111,6 +114,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
             };
             // The users take turns in that order.
             let mut subtasks = of.order.iter().map(|subtask| subtask.index());
+            // The first user that changes it sees it as the job before has left it.
             if let Some(subtask) = subtasks.find(changes) {
                 let line = Arc::new(ChannelState::new(self.edge()));
                 let way = (of_state.state.schema(), Arc::clone(&line));
@@ -126,6 +130,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
                 around.push((subtask, looking(found, look)));
             }
         }
+        // One call for each DAG, so that the platform sees all its channels together.
         if !channels.is_empty() {
             let is_read = (self.edge().open)(dag, graph_hash(spec), &channels);
             for (of, channel) in lines[first..].iter().zip(&channels) {
@@ -300,6 +305,7 @@ struct TopicTap<T> {
 
 impl<T: Message + Recordable> Relay<T> for TopicTap<T> {
     fn send(&mut self, job: u64, value: T) {
+        // Before the value is moved to its readers.
         self.line.stage::<T>(job, |out| value.encode(out));
         self.to.send(job, value);
     }
@@ -332,6 +338,7 @@ struct SampleProbe<T> {
 
 impl<T: Recordable + 'static> Probe for SampleProbe<T> {
     fn begin(&self, job: u64) {
+        // One instance of the subtask at a time (R2), so this needs no order.
         self.job.store(job, Ordering::Relaxed);
     }
 

@@ -31,6 +31,7 @@ impl Replay {
                     recorded.name
                 ));
             };
+            // In their order, as recordings know DAGs by number.
             if recorded.name != dag.name {
                 return Err(format!(
                     "the recording's dag {number} is `{}`, and here it is `{}`; {remedy}",
@@ -45,6 +46,7 @@ impl Replay {
                 ));
             }
         }
+        // Sources first: without them nothing can be computed.
         self.check_sources(own)?;
         self.own = own.clone();
         for channel in &own.channels {
@@ -75,6 +77,7 @@ impl Replay {
                 found => self.channels.push(found.map(|(number, _)| number)),
             }
         }
+        // After all comparisons: what follows trusts the header.
         self.find_inputs(task_set);
         self.find_begins(task_set)?;
         self.name_faults(task_set);
@@ -103,6 +106,7 @@ impl Replay {
             let has_sources = || with(Role::Source).any(|source| source.dag == channel.dag);
             match channel.role {
                 Role::Source => true,
+                // A DAG whose sources only sample is released with what they found.
                 Role::Sample => is_source(channel) && !has_sources(),
                 Role::Result | Role::State => false,
             }
@@ -122,6 +126,7 @@ impl Replay {
         let mut jobs: Vec<(u16, u64)> = of_inputs
             .map(|((place, job), _)| (dag_of(*place), *job))
             .collect();
+        // Sorted for the lookups of the run, which halve the list.
         jobs.sort_unstable();
         if self.is_cut {
             // Of its last jobs there may be a value of one source, and none of another one.
@@ -145,6 +150,7 @@ impl Replay {
     fn check_sources(&self, own: &Header) -> Result<(), String> {
         let mut sources = (self.header.channels.iter()).filter(|other| other.role == Role::Source);
         let is_here = |source: &Channel| own.channels.iter().any(|own| is_same(own, source));
+        // Recorded then and not now: the source would be called, and compute something else.
         if let Some(Channel { topic, .. }) = sources.find(|source| !is_here(source)) {
             return Err(format!(
                 "topic `{topic}` of a source is in the recording, and is not recorded here; add \
@@ -201,6 +207,7 @@ impl Replay {
             let of = of.ok_or_else(|| {
                 format!("the recording has no inputs of a dag `{name}` to begin with")
             })?;
+            // The latest job up to the wanted one before which all states are known.
             let begin = self.latest(of, |other| other <= job);
             let at_ns = self.release_ns(task_set, of, begin);
             for dag in ids.clone() {
@@ -209,6 +216,8 @@ impl Replay {
                 }
                 self.begins[usize::from(dag)] = match dag == of {
                     true => begin,
+                    // The other DAGs begin where they were at that time, so that what they sample
+                    // of each other fits.
                     false => self.latest(dag, |job| self.release_ns(task_set, dag, job) <= at_ns),
                 };
             }
@@ -243,6 +252,7 @@ impl Replay {
             events.filter(|event| (event.dag, event.what) == (dag, EntryKind::Restart));
         self.channels_of_states(dag).next().is_some()
             && self.is_whole(dag, job)
+            // After a restart, a subtask's own memory is not that of the beginning.
             && restarts.all(|event| event.job >= job)
     }
 
@@ -301,6 +311,7 @@ impl Replay {
         let begin = |dag: u16| self.begins[usize::from(dag)];
         let is_too_late = |(dag, job): &(u16, u64)| {
             let release_ns = task_set.dag(id(*dag)).grid_ns(*job);
+            // A damaged file may name a job that a replay would reach in years.
             job.saturating_sub(begin(*dag)) >= MOST_JOBS || release_ns > u64::MAX / 2
         };
         match of_values.chain(of_signals).find(is_too_late) {
@@ -335,6 +346,7 @@ impl Replay {
             let (begin, model) = (begins[dag.index()], task_set.dag(*dag));
             let first = self.first_signals.get(dag).copied().unwrap_or(0);
             let before = usize::try_from(begin.saturating_sub(first)).unwrap_or(usize::MAX);
+            // Signals of jobs before the beginning are spent.
             signals.drain(..before.min(signals.len()));
             for job in (begin..first).rev() {
                 signals.push_front(model.grid_ns(job));
@@ -365,6 +377,7 @@ impl Replay {
             if let Some(end) = end {
                 task_set.replay(dag, begin..end);
                 if let Some(lifecycle) = &mut plan.lifecycle {
+                    // Pauses and modes are in the recording, as skipped jobs.
                     lifecycle.leave_alone(dag);
                 }
             }
@@ -375,6 +388,7 @@ impl Replay {
     /// Returns the job behind a DAG's last one, if its inputs are recorded.
     fn end_of(&self, dag: DagId) -> Option<u64> {
         let dag = u16::try_from(dag.0).ok().filter(|_| self.is_of(dag))?;
+        // The list is sorted, so the last one found is the last job with inputs.
         let of_dag = self.passed.jobs.iter().rev().find(|(of, _)| *of == dag);
         Some(of_dag.map_or(1, |(_, last)| last.saturating_add(1)))
     }
