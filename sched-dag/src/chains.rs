@@ -189,6 +189,8 @@ fn sum(
     segments.iter().try_fold(0, |sum: u64, segment| {
         let model = task_set.dag(segment.dag);
         let response_ns = responses_ns.get(segment.dag.index()).copied().flatten();
+        // Of a sporadic DAG nobody knows when the next job comes, so nothing bounds the way
+        // through it.
         let response_ns = response_ns.filter(|_| !model.is_sporadic());
         let of_dag = model
             .period_ns()
@@ -199,6 +201,7 @@ fn sum(
 
 /// Returns the position of what has this name, or else the number that is written there.
 fn number_of<'n>(names: impl Iterator<Item = &'n str> + Clone, wanted: &str) -> Option<u32> {
+    // Names first: a name may be a number.
     let named = (0..).zip(names.clone()).find(|(_, name)| *name == wanted);
     let number = || {
         wanted
@@ -239,6 +242,7 @@ impl Chain {
         for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
             for &source in model.sources() {
                 let place = (dag, source);
+                // A source that samples goes on with another DAG's chain; it begins none.
                 if samplings.iter().all(|sampling| sampling.reader != place) {
                     search.go_on_from(place, &|search, exit| {
                         !search.path.is_empty()
@@ -295,6 +299,7 @@ impl<'t> ChainSearch<'t> {
     /// Finds the chains that go on from a subtask. It calls itself at most once for each DAG.
     fn go_on_from(&mut self, (dag, entry): SubtaskRef, is_end: &dyn Fn(&Self, SubtaskRef) -> bool) {
         for exit in self.reached_from((dag, entry)) {
+            // The number of paths may grow exponentially with the DAGs.
             if self.found.len() >= MOST {
                 return;
             }
@@ -306,6 +311,7 @@ impl<'t> ChainSearch<'t> {
             self.path.push(segment);
             for at in 0..self.samplings.len() {
                 let SampledEdge { writer, reader } = self.samplings[at];
+                // DAGs may sample each other in a circle, which a chain passes once.
                 let is_new = self.path.iter().all(|passed| passed.dag != reader.0);
                 if writer == (dag, exit) && is_new {
                     self.go_on_from(reader, is_end);
@@ -363,6 +369,8 @@ impl Chain {
             let model = task_set.dag(segment.dag);
             let last = releases.0.keys().rfind(|(dag, _)| *dag == segment.dag);
             match last {
+                // Beyond the last release the sampled values only grow older, which says nothing
+                // about the chain.
                 Some((_, job)) if !model.is_sporadic() => model.grid_ns(job.saturating_add(1)),
                 _ => u64::MAX,
             }
@@ -385,6 +393,8 @@ impl Chain {
             let release_ns = |job| releases.0.get(&(first.dag, job)).copied();
             let Some((origin, release_ns)) = origin.and_then(|job| Some((job, release_ns(job)?)))
             else {
+                // The origin may be among lost events; a difference across the gap would mean
+                // nothing.
                 before = None;
                 continue;
             };
@@ -392,6 +402,7 @@ impl Chain {
             latencies.output_age_ns.push(since(release_ns));
             if let Some((before, before_ns)) = before {
                 latencies.data_age_ns.push(since(before_ns));
+                // Inputs between two origins reach no output earlier than this one.
                 let missed = releases
                     .0
                     .range((first.dag, before)..(first.dag, origin.max(before)));

@@ -281,6 +281,7 @@ impl Commit {
         let of_sample = |sample: &Staleness| {
             let (writer, reader) = (sample.writer_dag.id, sample.reader_dag.id);
             let topics = self.task_set.dag(writer).topics();
+            // A writer that was not committed has no topic; the commit has told that already.
             let topic = topics.iter().find(|topic| topic.name == sample.topic)?;
             Some(SampledEdge {
                 writer: (writer, topic.writer),
@@ -293,6 +294,7 @@ impl Commit {
     fn with_bounds(&self, chains: Vec<Chain>) -> Vec<EndToEnd> {
         let responses_ns = &self.answers.proven.bounds_ns;
         let of_chain = |chain: Chain| {
+            // One unproven DAG on the way leaves the chain without a bound.
             let time = |ns: Result<u64, DagId>| ns.ok().map(Duration::from_nanos);
             let names = chain.names(&self.task_set).map(|name| name.to_string());
             let names: Vec<String> = names.collect();
@@ -483,6 +485,7 @@ impl CommitAnswers {
             };
             let cluster = task_set.dag(dag).cluster();
             DagAnswer {
+                // On undivided cores there is nothing to tell.
                 cluster: task_set.is_divided().then(|| ClusterPlacement {
                     cluster,
                     cores: task_set.cores_of(cluster, settings.cores),
@@ -555,6 +558,7 @@ impl fmt::Display for DagAnswer {
             WcetSource::Observed { margin_percent } => Some(margin_percent),
             _ => None,
         });
+        // All observed WCETs of a commit have one margin: it is one file's.
         if let Some(margin) = observed.clone().next() {
             let (count, all) = (observed.count(), self.wcets.len());
             write!(

@@ -35,7 +35,9 @@ pub(crate) fn tie(
     answers: &CommitAnswers,
     staleness: Arc<Vec<Staleness>>,
 ) -> Plan {
+    // Not 0, so that a signal of no plan is told from one of the first.
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
+    // Out of all drafts before the first is closed: samples cross DAGs.
     let recorded = (drafts.iter()).map(|draft| core::mem::take(&mut draft.borrow_mut().recorded));
     let recorded: Vec<Vec<Rc<dyn AnyRecorded>>> = recorded.collect();
     let any = recorded.iter().flatten().next();
@@ -55,11 +57,13 @@ pub(crate) fn tie(
     .map(|(((id, draft), verified), of_dag)| {
         let draft = draft.borrow_mut().close();
         let (spec, latest) = (draft.spec, draft.latest);
+        // From now on a handle that the app has kept names this DAG of this plan.
         draft.target.set(number, id);
         if spec.activation == Activation::Sporadic {
             let tell = |tell: Box<dyn FnOnce(_)>| tell(Arc::clone(&draft.target));
             draft.receives.into_iter().for_each(tell);
         }
+        // Channels are numbered before bodies are made: a tap is made only of an open channel.
         let around = any.map(|any| {
             let of_dag = OfDag {
                 dag: id,
@@ -92,6 +96,7 @@ pub(crate) fn tie(
             .enumerate()
             .map(make)
             .collect();
+        // In the order of registration, which is that in which a completion carries them out.
         for (subtask, effect) in draft.effects {
             bodies[subtask].add_effects([effect]);
         }
@@ -103,6 +108,7 @@ pub(crate) fn tie(
                 bodies[writer].add_effects(latest.effects());
             }
         }
+        // Last, so that what is put around a body is around all that it does.
         if let (Some(any), Some(around)) = (any, around) {
             any.attach(around, &mut bodies);
         }

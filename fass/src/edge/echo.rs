@@ -48,6 +48,7 @@ impl TopicEcho {
 
 impl Echoing for TopicEcho {
     fn open(&mut self, channels: &[Channel]) {
+        // The first DAG of another commit: the channels are numbered anew.
         if core::mem::take(&mut self.is_launched) {
             self.topics.clear();
             self.watch(None);
@@ -67,8 +68,10 @@ impl Echoing for TopicEcho {
 
     fn record(&mut self, value: &RecordedValue<'_>) {
         if self.watched == Some(value.channel) {
+            // The value before was not looked at in time.
             self.left_out += u64::from(self.kept.is_some());
             let length = value.bytes.and_then(|bytes| {
+                // A value that does not fit is told by its job alone.
                 let room = self.room.get_mut(..bytes.len())?;
                 room.copy_from_slice(bytes);
                 Some(bytes.len())
@@ -84,6 +87,7 @@ impl Echoing for TopicEcho {
         };
         let place = self.topics.iter().position(named);
         self.watched = place.and_then(|place| u16::try_from(place).ok());
+        // Another topic begins without a value.
         (self.kept, self.left_out) = (None, 0);
         self.watched.is_some()
     }

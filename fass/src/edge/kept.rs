@@ -83,10 +83,13 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
     pub fn take_events(&mut self, mut look: impl FnMut(usize, &mut dyn FnMut(&Journal))) -> bool {
         let mut are_there = false;
         for (cluster, taken) in (0_u16..).zip(&mut self.taken) {
+            // Copied out by a few at a time, so that the scheduler's lock is held for a bounded
+            // time only.
             let (mut words, mut count, mut before) = ([[0; 3]; AT_ONCE], 0, *taken);
             look(cluster.into(), &mut |journal| {
                 (before, count) = journal.copy_from(*taken, &mut words);
             });
+            // `before` is beyond `taken` where the journal has lost events.
             *taken = before + count as u64;
             if count > 0 {
                 self.stream.events(cluster, before, &words[..count]);
@@ -105,19 +108,23 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
         }
         let journal = run.journal();
         let clusters = self.taken.len();
+        // Nothing was taken while it ran: a finished run has one journal for all clusters.
         if self.taken.iter().all(|taken| *taken == 0) {
             self.expect(1);
             while self.take_events(|_, take| take(journal)) {}
         }
         self.stream.times(&times(run, &self.taken));
+        // The next run of the same commit begins at its first event.
         self.expect(clusters);
     }
 
     /// Adds the rest of what is recorded. Returns how complete it is, if it is recorded.
     pub fn end_recording(&mut self, mut outgoing: Outgoing) -> Option<RecordingState> {
         let drain = outgoing.as_mut()?;
+        // The run is over, so this comes to an end.
         while drain.step(Some(&mut self.stream)) {}
         let drained = drain.end(&mut self.stream)?;
+        // One run that is cut makes the whole file one.
         self.is_cut |= drained.is_cut;
         Some(drained)
     }

@@ -99,6 +99,7 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
         reasons: vec![None; dags.len()],
         first_failing: None,
     };
+    // Clusters share no core: each is a set of its own.
     for cluster in task_set.clusters() {
         let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
         let own: Vec<usize> = own.collect();
@@ -115,6 +116,7 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
             |case, reasons| {
                 let mut verdict = case.verdict();
                 bound(case, &mut verdict, &mut answer.sinks_ns);
+                // A missing WCET comes before all that follows from it.
                 let first = first_unknown(&own, reasons).or(verdict.first_failing);
                 *first_failing = first_failing.or(first);
                 for (position, &dag) in case.members.iter().enumerate() {
@@ -173,6 +175,7 @@ impl<'a> AnalysisInput<'a> {
         relation: RankRelation,
         settings: &'a AnalysisSettings,
     ) -> Self {
+        // Most urgent first: then a DAG's interference is mostly solved when its turn comes.
         let order = sorted_by_key(members.len(), |dag| match settings.policy {
             Policy::StaticPriority => u64::from(relation.ranks(dag)[0].0),
             Policy::Edf => tasks[dag].relative_deadline_ns(),
@@ -209,6 +212,8 @@ impl<'a> AnalysisInput<'a> {
             .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
             .collect();
         let demand = || are_in_time(self).then_some(SchedulabilityTest::Demand);
+        // Tests that vouch for the whole set, but give no response times, are asked last: their
+        // bound is the deadline.
         if bounds.iter().any(Option::is_none)
             && let Some(test) = self.vouching_test().or_else(demand)
         {
@@ -226,6 +231,7 @@ impl<'a> AnalysisInput<'a> {
             })
             .collect();
         let mut first = solution.first_failing.map(|(dag, _)| dag);
+        // A certain reason helps an author more than "no bound was found".
         if reasons.iter().any(Option::is_some) {
             for (dag, reason) in self.certain().into_iter().rev() {
                 if bounds[dag].is_none() {
@@ -249,6 +255,7 @@ impl<'a> AnalysisInput<'a> {
 
     /// Reports whether a DAG has all cores whenever it needs them.
     fn is_alone(&self, dag: usize) -> bool {
+        // Another DAG that is not analysed may still keep a core.
         let blocked = self.relation.preemption != PreemptionMix::All && !self.is_only_one;
         let mut others = 0..self.members.len();
         !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
@@ -270,7 +277,9 @@ impl<'a> AnalysisInput<'a> {
         let covers = &self.set.shapes[dag].covers;
         let others = multi_path::alone(task, covers, cores.into())?;
         let limit = task.relative_deadline_ns().min(task.period_ns());
+        // Taken only where it is tighter than the multi-path bound.
         let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
+        // Long steps of the scheduler are in no equation of this test, so they are added to it.
         let bound = bound.and_then(|bound_ns| self.set.bursts.after(bound_ns));
         bound.filter(|&bound_ns| bound_ns <= limit)
     }
@@ -286,6 +295,7 @@ impl<'a> AnalysisInput<'a> {
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
         }
         self.set.known = match (self.settings.cores, self.settings.policy) {
+            // On one core the classical response-time equation is the tighter one.
             (1, Policy::StaticPriority) => responses(self),
             _ => {
                 let dags = 0..self.members.len();
@@ -301,6 +311,7 @@ impl<'a> AnalysisInput<'a> {
                 1 => SchedulabilityTest::OneCore,
                 _ => SchedulabilityTest::IntraTask,
             }
+        // Only the equation for several jobs in flight gives a bound beyond the period.
         } else if bound_ns > self.tasks[dag].period_ns() {
             SchedulabilityTest::Pipelined
         } else if self.is_alone(dag) {
@@ -319,6 +330,7 @@ impl<'a> AnalysisInput<'a> {
     /// Returns the utilisation test that accepts the whole set, if one does.
     fn vouching_test(&self) -> Option<SchedulabilityTest> {
         let (tasks, cores) = (self.tasks, self.settings.cores);
+        // These tests know neither blocking, nor sinks' own deadlines, nor overheads that grow.
         let applies = self.relation.preemption == PreemptionMix::All
             && !self.relation.ranks_sinks
             && self.set.bursts.are_none();
@@ -329,6 +341,8 @@ impl<'a> AnalysisInput<'a> {
             Policy::Edf => (gedf_capacity(tasks, cores), bonifaci_edf(tasks, cores)),
             Policy::StaticPriority => {
                 let pairs = || self.order.windows(2).map(|pair| (pair[0], pair[1]));
+                // Ranges of priorities overlap, so the order of the DAGs is none of the two that
+                // the tests know.
                 if pairs().any(|(first, second)| self.relation.may_outrank(second, first)) {
                     return None;
                 }
@@ -357,6 +371,8 @@ impl<'a> AnalysisInput<'a> {
             },
             BoundFailure::Own(SolverFailure::Limit) => NotProvenReason::Limit,
             BoundFailure::Own(SolverFailure::BeyondDeadline)
+                // A job may wait for room until its deadline has passed, however fast the others
+                // are.
                 if room < u128::from(task.relative_deadline_ns()) =>
             {
                 NotProvenReason::InFlightTooFew { in_flight }
@@ -376,9 +392,11 @@ impl<'a> AnalysisInput<'a> {
         let hopeless = |&dag: &usize| {
             let task = self.tasks[dag];
             let length_ns = task.length_ns();
+            // Even on endless cores with nothing else to do.
             if length_ns > task.relative_deadline_ns() {
                 return Some((dag, NotProvenReason::LengthBeyondDeadline { length_ns }));
             }
+            // A sporadic DAG may get no signals at all, so an overload is not certain.
             if !self.must_keep_up(dag) {
                 return None;
             }
@@ -396,6 +414,7 @@ impl<'a> AnalysisInput<'a> {
             let Some(sum) = Ratio::sum(used.iter().copied()) else {
                 break;
             };
+            // The DAGs so far need more than all cores: the least urgent of them cannot keep up.
             if !sum.at_most(cores, 1) {
                 if certain.iter().all(|&(hopeless, _)| hopeless != dag) {
                     certain.push((dag, NotProvenReason::Overload));
@@ -437,6 +456,7 @@ fn analysable(
     let (mut known, mut unknown): (Vec<usize>, Vec<usize>) =
         own.iter().partition(|&&dag| reasons[dag].is_none());
     let mut seen = 0;
+    // Until nothing more follows: what is delayed by an unknown DAG is unknown, too.
     while let Some(&other) = unknown.get(seen) {
         seen += 1;
         known.retain(|&dag| {
@@ -508,6 +528,7 @@ impl RankRelation {
     pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
         other != dag
             && match (self.policy, self.preemption) {
+                // Under EDF any job may have the earlier deadline.
                 (Policy::Edf, _) | (_, PreemptionMix::Some) => true,
                 (Policy::StaticPriority, _) => self.ranks(other)[0] < self.ranks(dag)[1],
             }

@@ -99,8 +99,10 @@ impl<'a> EquationSet<'a> {
             first_failing: None,
             failures: alloc::vec![None; self.tasks.len()],
         };
+        // However the set is built, the commit ends: what is not solved in time is not proven.
         let mut steps = EvaluationBudget::of(self.tasks.len());
         let mut is_done = false;
+        // Upwards from the least responses: the least fixed point of all equations together.
         while !is_done {
             is_done = true;
             for &dag in order {
@@ -109,9 +111,12 @@ impl<'a> EquationSet<'a> {
                     let delays = self.delays_of_job(dag, &solution.responses, &may_outrank);
                     self.visit(dag, delays, &mut solution, &mut steps);
                 }
+                // A response that has grown may delay all others, so everything is looked at again.
                 is_done &= solution.responses[dag] == before;
             }
         }
+        // The budget is spent on the way up. From the deadlines down each round is a bound, so the
+        // last whole one can be had.
         if let Some((_, SolverFailure::Limit)) = solution.first_failing
             && let Some(coarse) = self.down_from_deadlines(&may_outrank)
         {
@@ -154,6 +159,8 @@ impl<'a> EquationSet<'a> {
         let (equations, figures) = (self.equations(dag), &self.figures[dag]);
         steps.spend(dag, |steps| {
             match equations.solve(delays, start_ns, steps) {
+                // Where jobs may overlap, the equation for several jobs in flight may still find a
+                // bound.
                 Err(SolverFailure::BeyondDeadline) if equations.limit_ns < figures.limit_ns() => {
                     figures.solve(delays, start_ns, steps)
                 }
@@ -203,6 +210,7 @@ impl<'a> EquationSet<'a> {
                 self.respond(dag, &delays, 0, &mut steps).ok()
             });
             match lower.collect::<Option<Vec<u64>>>() {
+                // The bounds of the last whole round hold; a tighter one was not found in time.
                 None if has_round => return Some(bounds),
                 None => return None,
                 Some(lower) if lower == bounds => return Some(bounds),
@@ -240,9 +248,12 @@ impl<'a> EquationSet<'a> {
         for other in (0..self.tasks.len()).filter(|&other| other != dag) {
             let outranks = may_outrank(other, dag);
             if outranks {
+                // Without the other's response its carry-in is unknown, and so is this bound.
                 let response = responses[other].ok_or(other)?;
                 others.push(self.other(other, response, limit_ns));
             }
+            // What outranks is in the interference already, except under EDF, where a later job of
+            // it may block.
             if self.keep_cores && (limit_ns.is_some() || !outranks) {
                 blocking_ns.extend_from_slice(&self.shapes[other].largest_ns);
             }
@@ -290,8 +301,10 @@ impl EvaluationBudget {
     /// Lets a DAG take steps from those that it may.
     pub(super) fn spend<T>(&mut self, dag: usize, work: impl FnOnce(&mut u64) -> T) -> T {
         let own = self.own[dag];
+        // Each DAG has steps of its own, so that one with slow equations leaves the others theirs.
         let mut left = self.shared + own;
         let result = work(&mut left);
+        // The shared ones are spent first.
         self.own[dag] = left.min(own);
         self.shared = left - self.own[dag];
         result

@@ -50,6 +50,8 @@ impl DispatchModel<'_> {
             Policy::StaticPriority => model.subtask(subtask).priority().0.into(),
             Policy::Edf => {
                 let due_ns = self.due_ns.get(&(dag, job)).copied();
+                // A sporadic job whose signal is lost has the least urgent key: it is blamed for
+                // nothing.
                 let release_ns = model.release_ns(job, due_ns.unwrap_or(u64::MAX));
                 release_ns.saturating_add(model.subtask(subtask).relative_deadline_ns())
             }
@@ -188,6 +190,8 @@ impl<'m> DispatchSweep<'m> {
 
     /// Judges what has been the case up to an instant; one that is past counts as now.
     pub(super) fn go_on_to(&mut self, until_ns: u64) {
+        // Only a stretch of time is settled: within an instant the order of events says nothing
+        // about the dispatch.
         if until_ns > self.now_ns {
             self.settle(until_ns);
             self.now_ns = until_ns;
@@ -206,6 +210,7 @@ impl<'m> DispatchSweep<'m> {
 
     /// The waiting instances of a DAG are owed nothing any more.
     pub(super) fn stop(&mut self, dag: DagId) {
+        // E3: what has not started never will; what has started may go on.
         self.waiting.retain(|(_, instance), _| instance.dag != dag);
         self.stopped.insert(dag);
     }
@@ -217,12 +222,14 @@ impl<'m> DispatchSweep<'m> {
         let since = (self.now_ns, self.events);
         self.waiting.remove(&key);
         self.running.remove(&key);
+        // A driver may take a started instance of an ended DAG away for good (E4).
         let is_owed_nothing = self.stopped.contains(&key.1.dag);
         let is_first = self.unstarted.remove(&key);
         match stage {
             DispatchState::Ready | DispatchState::Suspended if is_owed_nothing => {}
             DispatchState::Ready => {
                 self.waiting.insert(key, since);
+                // Remembered, since a non-preemptive instance is judged at its start only.
                 self.unstarted.insert(key);
                 self.fresh.push(key);
             }
@@ -241,6 +248,7 @@ impl<'m> DispatchSweep<'m> {
 
     /// Judges what is the case from now until then.
     fn settle(&mut self, until_ns: u64) {
+        // A core that has not been seen yet may not be there: only seen ones count.
         let idle = self.known_cores.saturating_sub(self.running.len());
         for place in 0..self.started.len() {
             let wrong = self.out_of_turn(self.started[place], idle);
@@ -256,6 +264,8 @@ impl<'m> DispatchSweep<'m> {
         }
         for (rank, key) in should_run.iter().enumerate() {
             let since_ns = self.owed.get(key).map_or(self.now_ns, |owed| owed.since_ns);
+            // The first look beyond the bound decides; finding a culprit costs a walk over all
+            // cores.
             let has_blame = self.owed.get(key).is_some_and(|owed| owed.blame.is_some());
             let exceeds = since_ns.saturating_add(self.bound_ns) < until_ns;
             let blame = (exceeds && !has_blame).then(|| self.blame(rank < idle));
@@ -276,6 +286,7 @@ impl<'m> DispatchSweep<'m> {
         let (mut free, mut owed) = (self.known_cores, Vec::new());
         let mut movable = Vec::new();
         for key in self.running.keys() {
+            // It has its core whatever waits, so the others share those that are left.
             if self.model.keeps_its_core(key.1) {
                 free = free.saturating_sub(1);
             } else {
@@ -286,6 +297,7 @@ impl<'m> DispatchSweep<'m> {
         let mut waiting = self.waiting.keys().copied().peekable();
         for _ in 0..free {
             match (waiting.peek(), movable.peek()) {
+                // One that runs and goes first has its core by right.
                 (Some(waits), Some(runs)) if runs < waits => {
                     movable.next();
                 }
@@ -304,6 +316,7 @@ impl<'m> DispatchSweep<'m> {
         let mut running = self.running.iter().rev();
         let movable = running.find(|(key, _)| !self.model.keeps_its_core(key.1));
         match movable {
+            // The least urgent one is blamed: it is the one that a dispatch would have preempted.
             Some((key, core)) if !is_idle => DispatchFault::Runs(key.1, *core),
             _ => {
                 let is_busy = |core: &CoreId| self.running.values().any(|busy| busy == core);
@@ -319,6 +332,7 @@ impl<'m> DispatchSweep<'m> {
         let length_ns = self.now_ns.saturating_sub(owed.since_ns);
         self.waits.longest_owed_ns = self.waits.longest_owed_ns.max(length_ns);
         let mut started = self.started.iter();
+        // Started, and not overtaken: only then is the time that of a wake-up alone.
         if owed.finds_idle_core && started.any(|(started, ..)| *started == key) {
             self.waits.ready_to_start_ns.push(length_ns);
         }

@@ -43,12 +43,14 @@ pub(super) fn check(
 ) -> PrecedenceGraph {
     let page = &mut findings.of(dag);
     let spec = page.spec;
+    // Edges without topics, and those of topics: from here on they are alike.
     add_plain_edges(&mut topology.edges, page);
     let mut graph = Graph::new(spec.subtasks.len(), &topology.edges);
     check_connection(&graph, policy, page);
     check_sources(&graph, policy, page);
     check_sinks(&graph, policy, &topology.unread, page);
     check_deadlines(&graph, page);
+    // One cycle for each knot: every edge that breaks it has to be found by the author anyway.
     if !graph.is_acyclic() {
         for cycle in shortest_cycles(&graph) {
             let hops = labels(page, &cycle);
@@ -102,6 +104,7 @@ fn check_connection(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFin
         return;
     }
     let (part_of, parts) = graph.parts();
+    // Subtask 0 is in part 0, so any other part lacks a way to it.
     if let Some(other) = part_of.iter().position(|&part| part != 0) {
         let (one, other) = (page.subtask(0), page.subtask(other));
         page.fault(|dag| DagFault::NotConnected {
@@ -118,8 +121,10 @@ fn check_connection(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFin
 fn check_sources(graph: &Graph, policy: ConstructionPolicy, page: &mut DagFindings<'_, '_>) {
     let subtasks = &page.spec.subtasks;
     let is_source = |subtask: &SubtaskId| subtasks[subtask.index()].inputs.is_empty();
+    // A subtask whose input nobody writes is no source; that fault is told by its topic.
     let sources = graph.sources.iter().copied().filter(is_source);
     let sources = labels(page, &sources.collect::<Vec<_>>());
+    // An empty DAG has a fault of its own.
     if sources.is_empty() && !subtasks.is_empty() {
         page.fault(|dag| DagFault::NoSource { dag });
     } else if sources.len() > 1 && policy.sources == CountLimit::One {
@@ -143,6 +148,7 @@ fn check_sinks(
     for &(writer, _) in unread {
         writes_unread[writer] = true;
     }
+    // An end that writes what nobody reads is perhaps no sink, but misspelt.
     let silent = ends.iter().filter(|end| !writes_unread[end.index()]);
     let silent: Vec<SubtaskId> = silent.copied().collect();
     let wants_one = policy.sinks == CountLimit::One;
@@ -158,6 +164,7 @@ fn check_sinks(
         page.fault(|dag| DagFault::SeveralSinks { dag, sinks });
     }
 
+    // The only end may write something that nobody reads; it is still the sink.
     let accepted = !wants_one || (silent.is_empty() && ends.len() == 1);
     for &(writer, topic) in unread {
         let is_end = ends.binary_search(&SubtaskId(to_u32(writer))).is_ok();
@@ -210,6 +217,7 @@ const NONE: u32 = u32::MAX;
 
 /// Returns one cycle for each knot, each from its smallest subtask on.
 fn shortest_cycles(graph: &Graph) -> Vec<Vec<SubtaskId>> {
+    // A cycle lies within one strongly connected part, so each is searched by itself.
     let knots = knots(graph);
     let mut knot_of = vec![NONE; graph.len()];
     for (number, knot) in knots.iter().enumerate() {
@@ -249,6 +257,8 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
         path.push((root, 0));
         while let Some(&mut (subtask, ref mut tried)) = path.last_mut() {
             let index = subtask.index();
+            // Tarjan's algorithm (SIAM Journal on Computing 1, 1972), with a path of its own
+            // instead of recursion: a graph may be 100,000 subtasks deep.
             if *tried == 0 {
                 number[index] = next_number;
                 lowest[index] = next_number;
@@ -267,9 +277,11 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
                 continue;
             }
             path.pop();
+            // What a recursion would do when it returns.
             if let Some(&(before, _)) = path.last() {
                 lowest[before.index()] = lowest[before.index()].min(lowest[index]);
             }
+            // The root of a part: all that is still open above it belongs to it.
             if lowest[index] == number[index] {
                 let mut knot = Vec::new();
                 while let Some(member) = open.pop() {
@@ -279,6 +291,7 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
                         break;
                     }
                 }
+                // A single subtask with an edge to itself was refused before.
                 if knot.len() > 1 {
                     knots.push(sorted(&knot));
                 }
@@ -313,12 +326,14 @@ impl CycleSearch<'_> {
             if below == 2 || (self.budget == 0 && best.is_some()) {
                 break;
             }
+            // Only a shorter one is looked for, which cuts the search off early.
             if let Some(cycle) = self.shortest_through(root, below) {
                 best = Some(cycle);
             }
         }
         let mut cycle = best?;
         let smallest = (0..cycle.len()).min_by_key(|&position| cycle[position])?;
+        // So that the same cycle is told the same way, wherever the search began.
         cycle.rotate_left(smallest);
         Some(cycle)
     }
@@ -329,10 +344,13 @@ impl CycleSearch<'_> {
         self.queue.push_back((root, 1));
         self.found_by[root.index()] = root.0;
         while let Some((subtask, hops)) = self.queue.pop_front() {
+            // Breadth first: from here on all ways are as long.
             if hops >= below {
                 return None;
             }
             for &successor in self.graph.successors.of(subtask) {
+                // A large graph gets a cycle that may not be the shortest, rather than no answer
+                // in time.
                 self.budget = self.budget.saturating_sub(1);
                 if successor == root {
                     return Some(self.way_back(subtask, root));

@@ -82,6 +82,8 @@ impl<'a> TopicEnds<'a> {
                 TopicSide::Output => &mut self.writers,
                 TopicSide::Input => &mut self.readers,
             };
+            // A topic that stands twice at a subtask is a fault of its own, and one end for the
+            // other checks.
             if side.last().is_none_or(|last| last.subtask != end.subtask) {
                 side.push(*end);
             }
@@ -102,6 +104,7 @@ pub(super) fn check<'a>(
         let first = ends[0];
         let of_dags = || ends.chunk_by(|one, other| one.dag == other.dag);
         let is_shared = ends.iter().any(|end| end.dag != first.dag);
+        // Told once, at the first DAG, with all that name it.
         if is_shared {
             let dags = of_dags().map(|ends| findings.label(ends[0].dag)).collect();
             let topic = first.port.topic.clone();
@@ -120,6 +123,7 @@ pub(super) fn check<'a>(
         let page = &mut findings.of(dag);
         for latest in &page.spec.latest {
             let unread = &mut topology.unread;
+            // Those who sample it read it.
             unread.retain(|&(_, topic)| topic != latest.port.topic);
             check_latest(latest, page);
         }
@@ -150,6 +154,7 @@ fn ends_by_topic<'a>(specs: &[&'a DagSpec]) -> Vec<TopicEnd<'a>> {
             }
         }
     }
+    // Stable: within a topic the order stays that of DAGs and subtasks.
     let order = sorted_by_key(ends.len(), |end| ends[end].topic);
     order.into_iter().map(|end| ends[end]).collect()
 }
@@ -177,6 +182,7 @@ fn check_topic<'a>(
         });
     }
     match (writers.first(), readers.first()) {
+        // Perhaps a sink that writes for nobody; the shape tells.
         (Some(writer), None) if !is_shared => topology.unread.push((writer.subtask, &port.topic)),
         (None, Some(_)) if !is_shared => {
             for reader in readers {
@@ -230,6 +236,7 @@ fn report_mismatches(
     page: &mut DagFindings<'_, '_>,
 ) {
     let spec = page.spec;
+    // Against the first end only: of n ends that differ n - 1 are told, not n times n.
     let with_first_writer = readers.iter().map(|reader| (&writers[0], reader));
     let with_first_reader = writers.iter().skip(1).map(|writer| (writer, &readers[0]));
     for (writer, reader) in with_first_writer.chain(with_first_reader) {
@@ -363,7 +370,9 @@ fn check_users(stated: &StateSpec, page: &mut DagFindings<'_, '_>) {
             });
         }
     }
+    // After the repeated ones are told.
     users.dedup();
+    // Without a stated number the commit takes 1.
     if let Some(in_flight @ 2..) = spec.in_flight
         && is_shared(stated)
     {
@@ -387,6 +396,8 @@ pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence>
     for state in spec.states.iter().filter(|state| is_shared(state)) {
         let place_of = |user: usize| place.get(state.users[user].subtask).copied();
         let users = sorted_by_key(state.users.len(), place_of);
+        // In the order in which a topological walk meets them, so that no edge that is added
+        // closes a cycle.
         let users: Vec<_> = users.iter().map(|&user| state.users[user]).collect();
         let mut add = |earlier: usize, later: usize| {
             precedences.push(StatePrecedence {

@@ -181,6 +181,8 @@ impl<T: Send + Sync> Stage<T> for Arc<TripleBuffer<T>> {
 
 impl<T: Send + Sync> Effect for Arc<TripleBuffer<T>> {
     fn happen(&mut self, completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
+        // An instance that failed, or sends nothing, has staged no value: the older one stays the
+        // latest.
         if !self.staged.load(Ordering::Relaxed) {
             return;
         }
@@ -191,7 +193,10 @@ impl<T: Send + Sync> Effect for Arc<TripleBuffer<T>> {
             }
         });
         let back = self.back.load(Ordering::Relaxed);
+        // Release: the reader that takes the slot sees the value. Acquire: the slot that comes
+        // back is no longer read.
         let middle = self.middle.swap(back | FRESH, Ordering::AcqRel);
+        // Only the writer reads it.
         self.back.store(middle & SLOT, Ordering::Relaxed);
     }
 }
@@ -213,13 +218,17 @@ impl<T: 'static> Sampler<T> {
         let Self { triple, front } = self;
         let probe = triple.probe.get();
         let slot = &triple.slots[usize::from(*front)];
+        // In a replay the recorded sample takes the place of what the writer has shown.
         if probe.is_none_or(|probe| !probe.replay(slot))
             && triple.middle.load(Ordering::Relaxed) & FRESH != 0
         {
+            // The reader's own slot goes to the middle, so that the writer never waits for a
+            // reader.
             *front = triple.middle.swap(*front, Ordering::AcqRel) & SLOT;
         }
         let slot = &triple.slots[usize::from(*front)];
         if let Some(probe) = probe {
+            // After the exchange: what is recorded is what the function gets.
             probe.look_at(slot);
         }
         match slot.look() {
