@@ -35,7 +35,7 @@ pub(crate) fn tie(
     answers: &CommitAnswers,
     staleness: Arc<Vec<Staleness>>,
 ) -> Plan {
-    // Not 0, so that a signal of no plan is told from one of the first.
+    // Counted from 1, so that 0 is no plan's number.
     let number = PLANS.fetch_add(1, Ordering::Relaxed) + 1;
     // Out of all drafts before the first is closed: samples cross DAGs.
     let recorded = (drafts.iter()).map(|draft| core::mem::take(&mut draft.borrow_mut().recorded));

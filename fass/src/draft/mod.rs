@@ -280,6 +280,7 @@ impl DagDraft {
             wish: Arc::clone(&wish),
             of,
         };
+        // A wish becomes a request by the completion (R3), and by nothing else.
         self.effects.push((subtask, Box::new(asked)));
         wish
     }
@@ -322,6 +323,8 @@ impl DagDraft {
                 if port.type_id == unknown
                     && let Some(other_end) = known.iter().find(|other| other.topic == port.topic)
                 {
+                    // One end with a known type is enough; two that differ are a fault of their
+                    // own.
                     port.clone_from(other_end);
                 }
             }

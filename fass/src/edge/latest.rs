@@ -152,6 +152,7 @@ impl Drain for OfLatest {
                 }
             }
         }
+        // Values after signals, as a replay needs the release of a job before its inputs.
         for value in latest.values() {
             let dag = header.channels[usize::from(value.channel)].dag;
             let what = value.bytes.map_or(EntryKind::Lost, |_| EntryKind::Value);

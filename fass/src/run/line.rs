@@ -216,6 +216,7 @@ impl KeptState {
 
     /// Has it written down every so many jobs, if that is more often.
     pub(crate) fn keep_every(&self, jobs: u32) {
+        // Two may ask for it; the more frequent one serves both.
         self.every.fetch_min(jobs.max(1), Ordering::Relaxed);
     }
 }

@@ -267,6 +267,7 @@ impl DagWiring {
             if let Some(stages) = any.downcast_mut::<Vec<Box<dyn Stage<T>>>>() {
                 found.append(stages);
             } else if let Some(found) = any.downcast_mut::<Wrap<T>>() {
+                // The tap of a recorded topic stands before all readers, so there is one.
                 wrap = found.take();
             }
         }

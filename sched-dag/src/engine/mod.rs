@@ -76,6 +76,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let instances: usize = task_set.dags().iter().map(of_dag).sum();
         // The engine itself hears of cancelled instances, whose inputs it discards.
         let room = scheduler.hear(C::HEARS.iter().copied().chain([EventKind::Cancelled]));
+        // The journal comes from the platform, which knows how much memory there is.
         scheduler.log.journal = journal;
         Self {
             placement: Placement::empty(vertices, cores),

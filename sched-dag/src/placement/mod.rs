@@ -125,6 +125,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         let place = self.place(vertex);
         match core::mem::replace(place, BodyState::Lost) {
             BodyState::Resting(body) => Some(body),
+            // The place was emptied to look into it, and gets back what it had.
             other => {
                 *place = other;
                 None
@@ -208,6 +209,7 @@ impl<Body, Parked> Placement<Body, Parked> {
             BodyState::Suspended(context) => NextWork::Continue(context),
             // The core that still has it will say when it no longer has.
             BodyState::Running => return NextWork::Nothing,
+            // The subtask of an ended DAG: nothing of it is to run.
             BodyState::Lost => {
                 *place = BodyState::Lost;
                 return NextWork::Nothing;

@@ -77,6 +77,7 @@ impl<'s> Moment<'s> {
         self.scheduler
             .log
             .on_this(EventKind::Ended, self.told_ns, instance);
+        // After the event: a journal shows a cause before what follows from it.
         self.scheduler.fail(instance);
     }
 

@@ -250,6 +250,7 @@ impl Scheduler {
         }
         self.judge(dag, None);
         self.dags[dag.index()].jobs.close(DagPhase::Closed);
+        // Before the skips, which follow from it.
         self.log.of_dag(EventKind::Closed, dag);
         self.skip_waiting(dag);
     }

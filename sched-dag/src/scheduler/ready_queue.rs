@@ -102,10 +102,12 @@ impl ReadyQueue {
                 ..Self::of(KeyOrder::SinkDeadline, in_any_order(vertices.len()))
             };
         }
+        // Then no key needs its job: the whole order is known at the commit.
         if task_set.dags().iter().all(has_ranks) {
             let order = rank(vertices, KeyOrder::Rank);
             return Self::of(KeyOrder::Rank, ranked(&order));
         }
+        // The rank stands for (priority, DAG), so that the job's number can follow it in the key.
         rank(vertices, KeyOrder::Job);
         Self::of(KeyOrder::Job, in_any_order(vertices.len()))
     }
@@ -273,6 +275,7 @@ impl QueueStorage {
         match self {
             Self::Word { ranks, vertices } => {
                 let rank = ranks.trailing_zeros();
+                // Clears the lowest bit that is set, which is the first in line.
                 *ranks &= ranks.wrapping_sub(1);
                 DispatchKey::of_rank(rank, vertices[rank as usize])
             }
@@ -298,6 +301,7 @@ impl QueueStorage {
 fn ranked(order: &[u32]) -> QueueStorage {
     let keys = (0u32..).zip(order);
     match order.len() {
+        // Ranks 0 to 63 are the bits of one word.
         0..=64 => QueueStorage::Word {
             ranks: 0,
             vertices: order.into(),

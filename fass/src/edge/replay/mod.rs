@@ -210,6 +210,7 @@ impl Replay {
                 EntryKind::Clock => {
                     // The machine writes each answer by itself.
                     let told = replay.clock.entry((dag, place, job)).or_default();
+                    // In the order of the file, which is that of the questions.
                     told.times.extend(Vec::<u64>::from_bytes(value)?);
                 }
                 EntryKind::Lost if role(place) == Role::Source => {

@@ -178,6 +178,7 @@ impl WireInput {
             Framing::Until(end) => end,
         };
         match bytes.iter().position(|byte| *byte == end) {
+            // The delimiter belongs to neither part.
             Some(at) => (&bytes[..at], &bytes[at + 1..], true),
             None => (bytes, &[], false),
         }
@@ -244,6 +245,7 @@ impl WireInput {
         let length = u32::from_le_bytes(length) as usize;
         let bytes = buffer.get_mut(..length)?;
         self.ring.peek(HEADER_BYTES, bytes);
+        // Copied out, so the device may use the room again.
         self.ring.drop(HEADER_BYTES + length);
         Some((bytes, u64::from_le_bytes(time_ns)))
     }
@@ -326,6 +328,7 @@ impl Effect for SendCompletion {
             outgoing.ring.show(staged);
             outgoing.sent.add(staged);
         }
+        // The next instance begins with nothing staged.
         outgoing.begin();
     }
 }

@@ -217,6 +217,7 @@ impl JobTable {
             .next_due_ns
             .filter(|&release_ns| release_ns <= now_ns)?;
         let number = self.next_due;
+        // The next sporadic job keeps its distance from this one.
         self.last_due_ns = release_ns;
         self.next_due += 1;
         self.next_due_ns = due_ns(dag, self.next_due);
@@ -242,6 +243,7 @@ impl JobTable {
         for deadline in &mut self.deadlines {
             deadline.release(number, sequence);
         }
+        // The job is complete when as many sinks have ended (R4).
         let unfinished = self.ends;
         let job = self.job_mut(sequence);
         *job = Job {
