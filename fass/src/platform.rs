@@ -349,10 +349,10 @@ pub fn now_ns() -> u64 {
     CLOCK.get()()
 }
 
-/// Has functions told the time by that from now on, in place of by [`Platform::now_ns`].
+/// Replaces the clock behind [`now_ns`], which is [`Platform::now_ns`] at first.
 ///
-/// For platforms: one that writes down what functions were told has a way to do so, and all
-/// others a shorter one.
+/// For platforms: one that records the time that functions are told sets a clock that does so, and
+/// all others one that takes fewer instructions.
 ///
 /// # Examples
 ///
@@ -525,7 +525,7 @@ impl RunConfig {
         (self.clusters, self.assigns) = (CoreDivision::Undivided, true);
     }
 
-    /// Returns what the analysis of a commit reckons with.
+    /// Returns the settings for the analysis of a commit.
     pub(crate) fn settings(&self) -> AnalysisSettings {
         let SchedulerOptions {
             policy,

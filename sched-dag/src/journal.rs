@@ -230,7 +230,7 @@ events! {
 pub struct UnknownWord;
 
 impl EventKind {
-    /// Returns what has a number; the inverse of `as u8`.
+    /// Returns the kind with a number; the inverse of `as u8`.
     #[must_use]
     pub fn from_number(number: u8) -> Option<Self> {
         EVENTS.get(usize::from(number)).map(|(what, ..)| *what)

@@ -16,12 +16,14 @@
 //! - **L4, the beginning.** A DAG may be paused from time 0 on, before its first release.
 //! - **L5, the end.** A shutdown closes every DAG (C1 to C5) at one instant, so the run is over
 //!   when nothing is in flight any more. Of what is asked for later nothing comes.
-//! - **L6, replays.** What came of a request to a DAG whose inputs are recorded is in the recording:
+//! - **L6, replays.** What came of a request to a DAG whose inputs are recorded is in the
+//! recording:
 //!   the jobs that were skipped. In a replay requests do not touch such a DAG.
 //!
 //! Where clusters have no instant in common, requests cross them as [`Mailboxes`].
 //!
-//! A driver has [`PendingRequests`], which keeps them from a completion to the scheduler's step, and
+//! A driver has [`PendingRequests`], which keeps them from a completion to the scheduler's step,
+//! and
 //! the plan's [`Lifecycle`], which serves all but signals. It is behind a trait so that an
 //! image none of whose functions asks for such a thing has no code for it.
 //!
@@ -57,7 +59,8 @@
 //!
 //! Each cluster serves the requests that concern its DAGs, with its own part of what the app has
 //! stated. A request of a completion goes where it concerns something: a signal, a pause and a
-//! resumption to the cluster of the DAG, a mode to that of the modes' DAGs, which are all in one, and
+//! resumption to the cluster of the DAG, a mode to that of the modes' DAGs, which are all in one,
+//! and
 //! a shutdown to all. To another cluster it is a *letter*, which counts in the step in which that
 //! takes it, before its releases. Leaving one never waits, and the room is taken at commit:
 //!
@@ -105,7 +108,8 @@ pub trait Lifecycle: fmt::Debug + Send {
     /// Returns the DAGs that are in some mode.
     fn dags_of_modes(&self) -> Vec<DagId>;
 
-    /// Returns what serves the requests that concern the DAGs of one cluster, before the run; the
+    /// Returns the lifecycle of one cluster, which serves requests about its DAGs, before the run;
+    /// the
     /// modes are left to one cluster.
     fn part(&self, is_here: &dyn Fn(DagId) -> bool, has_modes: bool) -> Box<dyn Lifecycle>;
 
@@ -279,7 +283,8 @@ impl ModeTable {
         }
     }
 
-    /// Asks once more for the mode that waits, and leaves paused DAGs to a person until it is there.
+    /// Asks once more for the mode that waits, and leaves paused DAGs to a person until it is
+    /// there.
     fn go_on(&mut self, changes: &mut Vec<LifecycleChange>) {
         if let Some(asked) = self.modes.get(self.last.index()) {
             changes.extend(asked.leaving.iter().copied().map(LifecycleChange::Await));

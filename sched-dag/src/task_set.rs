@@ -238,13 +238,13 @@ impl Dag {
         (self.in_flight as usize).next_power_of_two()
     }
 
-    /// Returns what happens at a release beyond [`in_flight`](Self::in_flight).
+    /// Returns the policy for a release beyond [`in_flight`](Self::in_flight).
     #[must_use]
     pub const fn overrun(&self) -> OverrunPolicy {
         self.overrun
     }
 
-    /// Returns what a fault of an instance costs.
+    /// Returns the cost of a fault of an instance.
     #[must_use]
     pub const fn on_fault(&self) -> OnFault {
         self.on_fault

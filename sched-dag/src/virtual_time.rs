@@ -166,7 +166,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
         run
     }
 
-    /// Returns what was written down so far, of all clusters.
+    /// Returns the events so far, of all clusters.
     #[must_use]
     pub fn events(&self) -> Vec<Event> {
         self.run_so_far().journal().events().collect()

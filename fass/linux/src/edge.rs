@@ -88,7 +88,7 @@ static TOLD: Clock = || {
     get().tell_time(RUNNING.get(), clock_ns, of_run(clock_ns))
 };
 
-/// Makes a plan one that is recorded or replayed, if that is wished.
+/// Sets recording or replay of a plan up, if it was asked for.
 pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     let mut edge = get();
     let mut file = unpoisoned(&FILE);

@@ -200,7 +200,7 @@ impl dyn Tunable + '_ {
         fmt::from_fn(|f| self.write(f))
     }
 
-    /// Returns what to say of a text that it cannot be set to. Nothing is allocated.
+    /// Returns the complaint about a text that it cannot be set to. Nothing is allocated.
     ///
     /// See [`Tunable`].
     #[must_use]

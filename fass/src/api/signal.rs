@@ -134,7 +134,7 @@ impl Signal {
         platform::expect_installed().raise(plan, dag);
     }
 
-    /// Returns what [`Platform::raise`](crate::Platform::raise) is told: the number
+    /// Returns the arguments of [`Platform::raise`](crate::Platform::raise): the number
     /// of the plan and the DAG. `None` before the commit.
     ///
     /// For platforms that raise signals by themselves.

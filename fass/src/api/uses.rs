@@ -108,7 +108,7 @@ pub trait Uses: sealed::Sealed {
     note = "let another subtask sample the latest value or raise the signal, and send along an edge"
 )]
 pub trait ResettableUses: Uses {
-    /// Returns what another function of the subtask keeps.
+    /// Returns the part that another function of the subtask keeps.
     #[doc(hidden)]
     fn another(held: &Self::Held) -> Self::Held;
 

@@ -231,7 +231,7 @@ impl Wire {
         &self.shared.name
     }
 
-    /// Returns what has happened on the wire so far.
+    /// Returns the counts of the wire so far.
     ///
     /// See [`Wire`].
     #[must_use]

@@ -85,7 +85,7 @@ pub struct Commit {
 }
 
 impl Commit {
-    /// Returns what the commit accepted although its author may not have meant it.
+    /// Returns the warnings: oddities that the commit accepted.
     ///
     /// ```
     /// # use core::time::Duration;
@@ -131,7 +131,7 @@ impl Commit {
         &self.answers.of_dags
     }
 
-    /// Returns what is known of one DAG's response times, by its name or its handle.
+    /// Returns the answer about one DAG, by its name or its handle.
     ///
     /// # Panics
     ///
@@ -144,7 +144,7 @@ impl Commit {
         &self.answers.of_dags[self.task_set.find(dag).index()]
     }
 
-    /// Returns what proves the bounds, for `./scripts/check-witness` to compute again.
+    /// Returns the witnesses of the bounds, for `./scripts/check-witness` to compute again.
     ///
     /// ```
     /// # use core::time::Duration;

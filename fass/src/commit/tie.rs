@@ -128,7 +128,7 @@ pub(crate) fn tie(
     }
 }
 
-/// Returns what a DAG's subtasks sample of recorded topics.
+/// Returns the samples of recorded topics that a DAG's subtasks take.
 fn samples(
     drafts: &Drafts,
     draft: &DagDraft,

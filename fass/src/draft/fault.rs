@@ -306,7 +306,7 @@ impl CommitError {
         &self.faults
     }
 
-    /// Returns what would not have refused the commit but deserves a look.
+    /// Returns the warnings, which alone would not have refused the commit.
     ///
     /// ```
     /// # let machine = virtual_time::VirtualTime::new();

@@ -180,7 +180,7 @@ impl DagDraft {
         subtask.id.index()
     }
 
-    /// Returns what the attributes say of a subtask, without its ports.
+    /// Returns the spec of a subtask by its attributes, without its ports.
     fn specify(&mut self, subtask: &SubtaskLabel, attributes: SubtaskAttributes) -> SubtaskSpec {
         let wcet = attributes.wcet;
         // A duration that does not fit into nanoseconds becomes a fault of the commit, not a panic

@@ -315,7 +315,7 @@ impl LatestJobs {
         job.saturating_add(self.jobs.into()) >= end
     }
 
-    /// Returns what is kept, channel by channel, and of each job by job.
+    /// Returns the kept values, channel by channel, and of each job by job.
     ///
     /// See [`LatestJobs`].
     pub fn values(&self) -> impl Iterator<Item = RecordedValue<'_>> {

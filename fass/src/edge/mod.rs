@@ -116,7 +116,7 @@ pub trait Crossing: Send {
         let _ = (instance, at_ns, clock_ns);
     }
 
-    /// Returns what an instance is told that asks for the time, `clock_ns` on the clock of
+    /// Returns the time for an instance that asks for it, `clock_ns` on the clock of
     /// [`crate::now_ns`] and `at_ns` on the time of the run.
     fn tell_time(&mut self, instance: Instance, clock_ns: u64, at_ns: u64) -> u64 {
         let _ = (instance, at_ns);
@@ -128,11 +128,11 @@ pub trait Crossing: Send {
         let _ = (channel, job, take);
     }
 
-    /// Returns what core 0 has to do; the first time only. Of the last jobs there is a file when
+    /// Returns the work of core 0; the first time only. Of the last jobs there is a file when
     /// one has failed.
     fn drain(&mut self) -> Option<Box<dyn Drain>>;
 
-    /// Returns what a replay has found; if the run is over, also a value that it has not computed.
+    /// Returns the findings of a replay; if the run is over, also a value that it has not computed.
     fn outcome(&self, is_over: bool) -> Option<ReplayOutcome> {
         let _ = is_over;
         None
@@ -278,7 +278,7 @@ pub const HEARS: &[EventKind] = &[
     EventKind::Restarted,
 ];
 
-/// Returns what a recording says of an event, if it says anything.
+/// Returns the kind of entry that records an event, if one does.
 #[must_use]
 pub const fn recorded(what: EventKind) -> Option<recording::EntryKind> {
     match what {
@@ -391,9 +391,8 @@ impl Edge {
         is_read && self.echo.is_none()
     }
 
-    /// Makes a plan one that is recorded or replayed, if there is a wish, and begins a
-    /// recording in the file, if there is one. Reports whether that goes for the times, too, that
-    /// functions are told.
+    /// Sets recording or replay of a plan up, if it was asked for, and begins a recording in the
+    /// file, if there is one. Returns whether the time that functions are told is recorded, too.
     ///
     /// # Errors
     ///
@@ -435,8 +434,8 @@ impl Edge {
         Ok(is_asked_for)
     }
 
-    /// Tells an instance the time, and has it written down; or tells what the recording says that
-    /// it was. Times are the clock's and the run's.
+    /// Returns the time and records it, or returns the recorded one. `clock_ns` is the clock's
+    /// time, `at_ns` the run's.
     pub fn tell_time(&mut self, instance: Option<Instance>, clock_ns: u64, at_ns: u64) -> u64 {
         match (&mut self.crossing, instance) {
             (Some(crossing), Some(instance)) => crossing.tell_time(instance, clock_ns, at_ns),
@@ -453,7 +452,7 @@ impl Edge {
         outgoing
     }
 
-    /// Ends a run. Returns what a replay has found; if the run `is_over`, also a value that it has
+    /// Ends a run. Returns the findings of a replay; if the run `is_over`, also a value that it has
     /// not computed.
     pub fn end_run(&mut self, is_over: bool) -> Option<ReplayOutcome> {
         if !self.is_replay() {

@@ -64,7 +64,7 @@ impl ChannelState {
         }
     }
 
-    /// Returns what the writer's completion does.
+    /// Returns the effect of the writer's completion.
     pub(super) fn effect(self: &Arc<Self>) -> Box<dyn Effect> {
         match self.is_read.load(Ordering::Relaxed) {
             true => Box::new(ReaderPublish(Arc::clone(self))),
@@ -72,9 +72,9 @@ impl ChannelState {
         }
     }
 
-    /// Returns what reads the values, which have at least so many bytes, from a place of so many
-    /// words, or more where that would hold too few of them; `None`: there is no memory. If values
-    /// are given, also what whoever takes them puts them into.
+    /// Makes a reader of values of at least `least_bytes` bytes, with room for `words` words, or
+    /// more where that would hold too few values. `None`: out of memory. If the platform is given
+    /// each value in place of reading it, returns the outbox into which it puts them, too.
     pub(crate) fn reader(
         &self,
         words: usize,

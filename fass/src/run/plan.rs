@@ -107,7 +107,7 @@ pub(crate) trait PolledSubtask: Send {
     /// Gives up what has arrived for a job that the subtask will not run.
     fn discard(&mut self, job: u64);
 
-    /// Returns what would go on where a fault ends the function.
+    /// Returns the function that would go on where a fault ends this one.
     fn replacement(&self) -> Option<ReplacementCode> {
         None
     }
@@ -331,7 +331,7 @@ impl SubtaskCode {
         self.subtask.discard(job);
     }
 
-    /// Returns what would replace the function after a fault; `None`: its faults end the DAG.
+    /// Returns the replacement of the function after a fault; `None`: its faults end the DAG.
     ///
     /// See [`ReplacementCode`].
     #[must_use]

@@ -43,7 +43,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
     /// Returns the type of its values, and their way.
     fn line(&self) -> (Schema, Arc<ChannelState>);
 
-    /// Returns what sends recorded values, in the place of the writer's next output port.
+    /// Returns a sender of recorded values, in the place of the writer's next output port.
     fn replayed(&self, ports: &mut Ports<'_>) -> Replayed;
 
     /// Sets a probe for samples of the topic, and returns it, with the type of the samples and

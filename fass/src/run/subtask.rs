@@ -55,9 +55,9 @@ where
     }
 }
 
-/// The figure's loop, one turn a poll: what it would keep from one poll to the next
-/// is only where it waits, and it waits in one place. Written so, a turn does not
-/// begin with finding out where it was, nor end with a look at the closed gate.
+/// The loop of the paper's figure, one iteration a poll. It waits in one place, so no state has to
+/// be kept between polls: an iteration neither begins with finding out where it was, nor ends with
+/// a look at the closed gate.
 struct PollLoop<F, Subs, Pubs> {
     f: F,
     subs: Subs,

@@ -1,7 +1,8 @@
 //! The work that other DAGs may execute while a job lasts, in the forms that the equations need.
 //!
 //! The equation with `j` chains counts interference on at most `m - j` cores. So a DAG has
-//! a [`InterferingWorkload`] for each number of cores up to those that a job of it can use. The clipped
+//! a [`InterferingWorkload`] for each number of cores up to those that a job of it can use. The
+//! clipped
 //! form asks for the work in some part of the window only, all together as long as the job
 //! waits: there no core executes more than that time, and neither does a chain of the
 //! other DAG, which is on one core at a time.
@@ -59,7 +60,7 @@ pub(super) struct DelaySources {
     pub(super) bursts: WorkloadBursts,
 }
 
-/// Returns what DAGs may execute on all cores within a window.
+/// Returns the work that DAGs may execute on all cores within a window.
 pub(super) fn on_all_cores(others: &[InterferingDag], window_ns: u64) -> WorkloadSegment {
     let pieces = others.iter();
     let pieces = pieces.map(|other| other.on_all_cores().at(window_ns));

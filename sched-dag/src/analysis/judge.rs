@@ -624,14 +624,14 @@ pub(super) fn are_in_time(case: &AnalysisInput<'_>) -> bool {
     applies && (0..case.tasks.len()).all(fit) && demand(&all_dues(case), &case.set.bursts).is_some()
 }
 
-/// Returns what is due of all DAGs.
+/// Returns the demands of all DAGs.
 pub(super) fn all_dues(case: &AnalysisInput<'_>) -> Vec<DueDemand> {
     (0..case.tasks.len())
         .flat_map(|dag| dues(case, dag))
         .collect()
 }
 
-/// Returns what is due of a DAG, by deadlines.
+/// Returns the demands of a DAG, by deadlines.
 fn dues(case: &AnalysisInput<'_>, dag: usize) -> Vec<DueDemand> {
     let (task, subtasks) = (case.tasks[dag], case.dag(dag).subtasks());
     let mut dues: Vec<DueDemand> = Vec::new();

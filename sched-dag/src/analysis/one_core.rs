@@ -89,7 +89,7 @@ pub(super) struct DagDemand {
 }
 
 impl DagDemand {
-    /// Returns what jobs execute that are released within a window, or at its begin.
+    /// Returns the work of jobs that are released within a window, or at its beginning.
     fn released(&self, window: u128) -> u128 {
         let jobs = window.max(1).div_ceil(self.period_ns.into());
         jobs.saturating_mul(self.volume_ns.into())
@@ -170,7 +170,7 @@ impl<'a> ResponseEquation<'a> {
         Some(windows)
     }
 
-    /// Returns what is executed in a window, until the job `back` places later is complete.
+    /// Returns the work in a window, until the job `back` places later is complete.
     fn busy(&self, back: u128, window: u128) -> u128 {
         let others = self
             .others
@@ -183,7 +183,7 @@ impl<'a> ResponseEquation<'a> {
             .saturating_add(self.bursts.during(window))
     }
 
-    /// Returns what of that is the DAG's own.
+    /// Returns the DAG's own part of that.
     pub(super) fn own_work(&self, back: u128, window: u128) -> u128 {
         let first = (back + 1).saturating_mul(self.own.volume_ns.into());
         if self.own.younger_may_win() {
@@ -299,7 +299,7 @@ impl Blocking {
         last.map_or(0, |last| self.largest[last])
     }
 
-    /// Returns what may block on `cores - j` cores; if not `is_clipped`, in the window.
+    /// Returns the blocking on `cores - j` cores; if not `is_clipped`, in the window.
     pub(super) fn during(&self, cores: usize, j: usize, is_clipped: bool) -> u128 {
         if j == 0 && !is_clipped {
             return self.along_a_chain(cores, 0);
@@ -308,7 +308,7 @@ impl Blocking {
         self.sum(cores - j).saturating_add(again)
     }
 
-    /// Returns what may block a critical chain that crosses `back` releases.
+    /// Returns the blocking of a critical chain that crosses `back` releases.
     pub(super) fn along_a_chain(&self, cores: usize, back: u128) -> u128 {
         let again = (self.path + back).saturating_sub(1);
         let again = again.saturating_mul(self.sum(cores - 1));

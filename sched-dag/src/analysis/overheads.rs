@@ -51,7 +51,7 @@ pub enum OverheadSource {
 }
 
 impl Overheads {
-    /// Returns what to charge for costs that were measured, with a margin in hundredths.
+    /// Returns the charges for costs that were measured, with a margin in per cent.
     ///
     /// - As *dispatch*, the lateness of an instance's release and once the longest time owed:
     ///   that passes before its own first instruction.
@@ -81,7 +81,7 @@ impl Overheads {
         }
     }
 
-    /// Returns what each instance is charged, or `None` if that overflows.
+    /// Returns the charge of each instance, or `None` if that overflows.
     #[must_use]
     pub fn of_an_instance_ns(&self, preemption: Preemption) -> Option<u64> {
         let switches = self.context_switch_ns.checked_mul(2)?;

@@ -17,11 +17,13 @@
 //! follows from the chain: it goes back over `j` releases only if its part over
 //! `j - 1` of them can last until the next release, `X_(j-1) > j T`.
 //!
-//! The terms: `W_i`, the [`InterferingWorkload`](super::workload::InterferingWorkload) of each DAG that may
+//! The terms: `W_i`, the [`InterferingWorkload`](super::workload::InterferingWorkload) of each DAG
+//! that may
 //! outrank this one; `own`, what still older jobs may run in the window,
 //! `sum over l >= 1, l T < R of min(volume, p (R - l T))`, twice that if
 //! younger jobs may win over older ones; `blocking`, lower-ranked work that
-//! cannot be preempted; to it all `m` cores add what long steps keep them for (`bursts`). While `X_0 <= T` only `j = 0` is left and `own` is 0:
+//! cannot be preempted; to it all `m` cores add what long steps keep them for (`bursts`). While
+//! `X_0 <= T` only `j = 0` is left and `own` is 0:
 //! then this is the equation of Melani et al. 2015, and `multi_path` has better ones.
 //!
 //! Traps, both found in an earlier form:
@@ -239,7 +241,7 @@ impl PipelineTerms {
         self.length + back * self.largest
     }
 
-    /// Returns what the cores execute at most while a chain over `back` releases waits.
+    /// Returns the most that the cores execute while a chain over `back` releases waits.
     pub(super) fn busy(
         &self,
         back: u128,

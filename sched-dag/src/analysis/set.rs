@@ -16,7 +16,8 @@
 //! A DAG that fails takes those with it that it may outrank, since their
 //! workloads would rest on a bound that does not exist; others keep theirs.
 //!
-//! [`multi_path_fp`] and [`multi_path_edf`] take or refuse a set at once, as the literature compares
+//! [`multi_path_fp`] and [`multi_path_edf`] take or refuse a set at once, as the literature
+//! compares
 //! tests; a commit asks [`answer()`](super::answer()), which judges each DAG on its own account.
 
 use alloc::vec::Vec;
@@ -181,7 +182,7 @@ impl<'a> EquationSet<'a> {
         }
     }
 
-    /// Returns what is known, or the bound of a job alone, below which no solution lies: from
+    /// Returns the known bound, or that of a job alone, below which no solution lies: from
     /// there on the workloads only grow.
     fn start(&self, dag: usize) -> Option<u64> {
         let alone = || alone(self.tasks[dag], &self.shapes[dag].covers, self.cores.into());
@@ -220,7 +221,7 @@ impl<'a> EquationSet<'a> {
         }
     }
 
-    /// Returns what may delay the jobs of a DAG, as [`delays`](Self::delays) does.
+    /// Returns the sources of delay of a DAG's jobs, as [`delays`](Self::delays) does.
     pub(super) fn delays_of_job(
         &self,
         dag: usize,
@@ -231,7 +232,7 @@ impl<'a> EquationSet<'a> {
         self.delays(dag, deadline_ns, responses, may_outrank)
     }
 
-    /// Returns what may delay work of a DAG that is due at a relative deadline, its job or
+    /// Returns the sources of delay of a DAG's work that is due at a relative deadline, its job or
     /// one sink of it; or the first DAG that may outrank it and has no bound.
     ///
     /// A DAG that may outrank this one counts with its jobs that are due by then, where that

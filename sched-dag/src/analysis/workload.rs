@@ -27,7 +27,8 @@
 //! The paper has `p = m`. A smaller `p`, as the width of the DAG or the cores that
 //! count, is a refinement of our own: the worst case packs each job into a rectangle
 //! as wide as the job can be. The same holds for a part of a DAG, such as a chain,
-//! whose volume is its own and for which `p = 1`. It needs jobs that do not overlap, `R <= T`. Jobs that do are dealt out in turn
+//! whose volume is its own and for which `p = 1`. It needs jobs that do not overlap, `R <= T`.
+//! Jobs that do are dealt out in turn
 //! to `k = ceil(R / T)` *lanes*: within a lane the period is `k T >= R`, so
 //! nothing overlaps, and the DAG's workload is at most `k` times a lane's, and
 //! at most `min(m, k p) L`.
@@ -44,7 +45,8 @@
 //! `E(L) = sum over all DAGs on them of ((L + late + carry) / T + 1) burst` (floor)
 //!
 //! with two bursts a job: `ready` for each source, with `carry = 0`, and `ready` for all that
-//! one completion makes ready beyond [`WIDE`], with `carry = D`, until which jobs complete. Steps follow one another, and each loss counts in one of them. A release that waits
+//! one completion makes ready beyond [`WIDE`], with `carry = D`, until which jobs complete. Steps
+//! follow one another, and each loss counts in one of them. A release that waits
 //! for steps before its own is late, at most by `late = charge + E(late)` with `late = 0` on
 //! the right.
 //!
@@ -149,7 +151,7 @@ impl InterferingWorkload {
         }
     }
 
-    /// Returns what all cores that the jobs use could execute in a time.
+    /// Returns the work that all cores of the jobs could execute in a time.
     pub(super) fn over(&self, time_ns: u64) -> WorkloadSegment {
         WorkloadSegment {
             value: self.cap * u128::from(time_ns),
@@ -165,7 +167,7 @@ impl InterferingWorkload {
         self.packed(area - self.volume)
     }
 
-    /// Returns what of an area is executed that has one job a period, packed to its beginning.
+    /// Returns the executed part of an area that has one job a period, packed to its beginning.
     fn packed(&self, area: u128) -> WorkloadSegment {
         let pitch = self.parallelism * self.period;
         let (jobs, rest) = (area / pitch, area % pitch);
@@ -324,7 +326,7 @@ impl WorkloadBursts {
         takes.fold(0, u128::saturating_add)
     }
 
-    /// Returns what so many cores lose in a window.
+    /// Returns the time that so many cores lose in a window.
     pub(super) fn on(&self, cores: usize, window_ns: u64) -> WorkloadSegment {
         let time = u128::from(window_ns) + u128::from(self.late_ns);
         let spans = self.repeated.iter();

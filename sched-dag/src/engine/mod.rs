@@ -2,17 +2,21 @@
 //! of them, in the steps that every platform takes.
 //!
 //! A platform holds the engine under one lock, or alone. It says when it is, starts a body on a
-//! core, and reaches other clusters, by its [`PlatformPort`]; what runs the instances of a subtask is a
-//! [`SubtaskBody`]. An event is one call: [`complete`](Engine::complete), [`fail`](Engine::fail), or
+//! core, and reaches other clusters, by its [`PlatformPort`]; what runs the instances of a subtask
+//! is a
+//! [`SubtaskBody`]. An event is one call: [`complete`](Engine::complete), [`fail`](Engine::fail),
+//! or
 //! [`step`](Engine::step) for all else. Then the platform brings the cores that the step
-//! [concerns](PlatformPort::retarget) to what they should run: [`next`](Engine::next) gives a core its next
+//! [concerns](PlatformPort::retarget) to what they should run: [`next`](Engine::next) gives a core
+//! its next
 //! instance, [`suspend`](Engine::suspend) takes one away.
 //!
 //! # What is guaranteed
 //!
 //! - What a fault costs, what requests come to and who runs next is decided here, for all
 //!   platforms alike.
-//! - The journal is in the order in which things were decided. A [start](PlatformPort::start) is written
+//! - The journal is in the order in which things were decided. A [start](PlatformPort::start) is
+//! written
 //!   before the function begins.
 //! - After [`Engine::new`] nothing is allocated here, and no step is unbounded but by the releases
 //!   and deadlines that have passed since the last one.
@@ -168,7 +172,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.scheduler.log.take_job_event();
     }
 
-    /// Returns what the latest step has decided. A core is named at most twice.
+    /// Returns the decisions of the latest step. A core is named at most twice.
     pub fn decisions(&self) -> &[Decision] {
         self.scheduler.decisions()
     }
@@ -251,7 +255,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.step((now_ns, core), port, |moment| moment.complete(instance));
     }
 
-    /// Returns what a fault of the vertex' instance costs if it comes now.
+    /// Returns the cost of a fault of the vertex' instance if it comes now.
     #[must_use]
     pub fn cost_of_fault(&self, vertex: Vertex) -> FaultCost {
         let instance = self.scheduler.instance_of(vertex);
@@ -373,7 +377,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.discard_late();
     }
 
-    /// Discards the inputs of cancelled instances as soon as their bodies rest: before the places of
+    /// Discards the inputs of cancelled instances as soon as their bodies rest: before the places
+    /// of
     /// these inputs are used again, as jobs end in their order.
     #[cold]
     #[inline(never)]
@@ -439,7 +444,7 @@ pub trait SubtaskBody {
     /// of the clock which functions read.
     fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request));
 
-    /// Returns what takes over if a fault ends the function.
+    /// Returns the alternate that takes over if a fault ends the function.
     fn alternate(&self) -> Option<Self::Alternate>;
 
     /// Makes it go on with that, after a fault.

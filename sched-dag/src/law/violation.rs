@@ -334,7 +334,7 @@ const fn shown_ns(wrong: &DispatchBreach) -> u64 {
     }
 }
 
-/// Returns what an awaited instance is to that of an event, and when and where it is over.
+/// Returns the relation of an awaited instance to that of an event, and when and where it is over.
 pub(super) fn comes(event: &Event, awaited: Instance, over: Option<(u64, CoreId)>) -> impl Display {
     fmt::from_fn(move |f| {
         f.write_str(match awaited.job == event.job {
@@ -356,7 +356,7 @@ pub(super) fn over(over_ns: Option<u64>) -> impl Display {
     })
 }
 
-/// Returns what an instance at a stage does.
+/// Returns the words for an instance at a stage.
 pub(super) fn does(stage: DispatchState) -> impl Display {
     fmt::from_fn(move |f| match stage {
         DispatchState::Absent => f.write_str("never was ready"),

@@ -101,7 +101,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     fn put(&mut self, vertex: Vertex, body: Body) {
         let running = core::mem::replace(self.place(vertex), BodyState::Resting(body));
         debug_assert!(matches!(running, BodyState::Running));
-        // It holds nothing, which the compiler need not find out each time.
+        // `Running` holds nothing: this skips the check whether there is something to drop.
         core::mem::forget(running);
     }
 

@@ -85,13 +85,13 @@ impl DispatchKey {
         low(self.0)
     }
 
-    /// Returns what the order `Rank` has made it of before the vertex.
+    /// Returns the rank, under the order `Rank`.
     #[inline]
     pub(super) const fn rank(self) -> usize {
         low(self.0 >> 96) as usize
     }
 
-    /// Returns what comes before the vertex.
+    /// Returns the part before the vertex.
     #[inline]
     pub(super) const fn before_the_vertex(self) -> u128 {
         self.0 >> 32

@@ -197,7 +197,8 @@ impl Scheduler {
         Moment::new(self, now_ns)
     }
 
-    /// Has events of these kinds kept as [notices](EventLog::has_notices), and returns how many there is
+    /// Has events of these kinds kept as [notices](EventLog::has_notices), and returns how many
+    /// there is
     /// room for.
     pub fn hear(&mut self, kinds: impl IntoIterator<Item = EventKind>) -> usize {
         // At one instant a DAG's end may skip and cancel all that it has, and a change of mode
@@ -208,13 +209,13 @@ impl Scheduler {
         self.log.hear(kinds, most.unwrap_or(0) + others)
     }
 
-    /// Returns what the latest dispatch has decided.
+    /// Returns the decisions of the latest dispatch.
     #[inline]
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions
     }
 
-    /// Returns what the latest dispatch has decided, and where to write down what comes of it.
+    /// Returns the decisions of the latest dispatch, and the log for what follows from them.
     #[inline]
     pub fn decided(&mut self) -> (&[Decision], &mut EventLog) {
         (&self.decisions, &mut self.log)
@@ -229,7 +230,7 @@ impl Scheduler {
         self.timers.peek().map(|(event_ns, _)| event_ns)
     }
 
-    /// Returns what a core executes.
+    /// Returns the instance that a core executes.
     ///
     /// # Panics
     ///
@@ -277,7 +278,8 @@ impl Scheduler {
         self.dags[dag.index()].jobs.is_closed()
     }
 
-    /// Reports whether a DAG was ended by [`Moment::fail`] or [a request](crate::lifecycle::Request::Stop).
+    /// Reports whether a DAG was ended by [`Moment::fail`] or [a
+    /// request](crate::lifecycle::Request::Stop).
     /// Instances of it that had started before may still run.
     ///
     /// # Panics

@@ -99,7 +99,7 @@ pub(super) const fn ns(ns: u64) -> Duration {
     Duration::from_nanos(ns)
 }
 
-/// Returns what stands before the remedy: whether another topic was meant.
+/// Returns the text before the remedy: whether another topic was meant.
 pub(super) fn question(meant: Option<&String>) -> impl Display {
     fmt::from_fn(move |f| match meant {
         Some(topic) => write!(f, "did you mean `{topic}`? If not, "),

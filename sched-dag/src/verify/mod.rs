@@ -92,7 +92,7 @@ impl RejectedDags {
         &self.faults
     }
 
-    /// Returns what else the apps' authors may not have meant.
+    /// Returns the warnings: oddities that the apps' authors may not have meant.
     #[must_use]
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings

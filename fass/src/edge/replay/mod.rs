@@ -240,7 +240,7 @@ impl Replay {
         u16::try_from(dag.0).is_ok_and(|dag| self.passed.is_of(dag))
     }
 
-    /// Returns what the time was for an instance, whenever it asked.
+    /// Returns the times that an instance was told, in the order in which it asked.
     #[must_use]
     pub fn clock(&self, instance: Instance) -> Option<&[u64]> {
         let (dag, subtask) = narrow(instance)?;
@@ -258,7 +258,7 @@ impl Replay {
         time_ns
     }
 
-    /// Returns what is recorded of the DAGs besides values.
+    /// Returns the recorded events of the DAGs: all entries but values.
     pub fn events(&self) -> impl Iterator<Item = Entry<'_>> {
         (self.events.iter().copied()).filter(|entry| self.passed.is_of(entry.dag))
     }
@@ -310,7 +310,7 @@ impl Replay {
         }
     }
 
-    /// Returns what was found so far; if the run is over, also a value that it has not computed.
+    /// Returns the findings so far; if the run is over, also a value that it has not computed.
     #[must_use]
     pub fn outcome(&self, is_over: bool) -> ReplayOutcome {
         let differs = self.divergence.as_ref().map(|(channel, job, place)| {
@@ -634,7 +634,7 @@ impl SignalTimes {
         self.0.iter().filter(is_due).map(|(dag, _)| *dag)
     }
 
-    /// Returns what raises them, if there are any.
+    /// Returns the replayer that raises them, if there are any.
     fn raiser(&self, host: ReplayHost) -> Option<Box<dyn Drain>> {
         let raiser = SignalReplayer {
             signals: self.clone(),

@@ -101,7 +101,7 @@ impl Outbox {
             let read = records.read.load(Ordering::Acquire);
             let mut words = records.words.get(place..).unwrap_or_default();
             if place < read {
-                // It never ends where the reader is, for that would be: nothing is there.
+                // `place == read` would mean empty, so it is never filled up to the reader.
                 words = words.get(..read - 1 - place).unwrap_or_default();
             }
             let needed = match words {

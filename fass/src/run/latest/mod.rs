@@ -66,7 +66,7 @@ pub(crate) trait AnyLatest: Any {
     /// writer and all others, a [`Wrap<T>`](super::topic::Wrap).
     fn stages(&self) -> Box<dyn Any>;
 
-    /// Returns what the writer's completion does.
+    /// Returns the effects of the writer's completion.
     fn effects(&self) -> Vec<Box<dyn Effect>>;
 }
 
@@ -105,7 +105,8 @@ pub(crate) trait Stage<T>: Send + Sync {
 }
 
 /// A probe of the samples of one subtask, which it records or replays. It gets the reader's slot,
-/// a [`LatestSlot<T>`] whose type it knows, so that a subtask whose samples are not recorded has next to
+/// a [`LatestSlot<T>`] whose type it knows, so that a subtask whose samples are not recorded has
+/// next to
 /// no code for it.
 pub(crate) trait Probe: Send + Sync {
     /// Notes the job whose instance runs.
@@ -239,7 +240,7 @@ impl<T: 'static> Sampler<T> {
 }
 
 impl<T> SampledSlot<'_, T> {
-    /// Returns what is in the slot; nothing before the writer's first completion.
+    /// Returns the entry in the slot; `None` before the writer's first completion.
     pub(crate) fn entry(&self) -> Option<&LatestEntry<T>> {
         self.0.as_ref()
     }

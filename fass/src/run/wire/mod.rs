@@ -228,7 +228,7 @@ impl WireInput {
         true
     }
 
-    /// Returns what tells the packets that are there from those that come later.
+    /// Returns a mark between the packets that are there and those that come later.
     pub(crate) fn mark(&self) -> usize {
         self.ring.written()
     }

@@ -101,8 +101,7 @@ pub fn come(core: &Core) {
     }
 }
 
-/// Lets those first that have just got something to compute: in what a core does besides.
-/// Interrupts are enabled.
+/// Yields to cores that were just given an instance. For background work; interrupts are enabled.
 pub fn give_way() {
     if is_enabled() {
         // One visit for all others: one that has been woken becomes fresh in it.

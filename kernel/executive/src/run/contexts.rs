@@ -63,8 +63,8 @@ pub fn stack_bytes(task_set: &TaskSet) -> u64 {
         .next_multiple_of(4096)
 }
 
-/// Makes sure that all stacks have so many bytes, which the first call settles; returns how many
-/// they have. No core runs anything of a DAG.
+/// Grows all stacks to so many bytes; only the first call has an effect. Returns how many they
+/// have. To be called while no core runs anything of a DAG.
 #[inline(never)]
 pub fn settle(bytes: u64) -> Result<u64, MapError> {
     let settled = STOCK.lock().stack_bytes;

@@ -104,7 +104,7 @@ pub fn dispatch_violations(
     judge_dispatch(task_set, options, terms, events).violations
 }
 
-/// Returns what must have been the case before the first event: which cores were busy,
+/// Returns the state that must have been before the first event: which cores were busy,
 /// or idle with something else's end to come, and what each instance was.
 fn before(
     cores: Range<u32>,
@@ -127,7 +127,7 @@ fn before(
     (busy.collect(), first_of_instance)
 }
 
-/// Returns what was on a core of another cluster, or lost a core that it keeps.
+/// Returns the instances on a core of another cluster, or that lost a core that they keep.
 fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
     let found = events.filter_map(|event| {
         if event.what.is_of_machine() && !model.cores.contains(&event.core.0) {

@@ -69,12 +69,12 @@ impl JobState {
         }
     }
 
-    /// Returns what is known of an instance.
+    /// Returns the life of an instance, as far as it is known.
     pub(super) fn life(&self, subtask: SubtaskId) -> Option<&InstanceLife> {
         self.lives.get(subtask.index())?.as_ref()
     }
 
-    /// Returns what is known of an instance, whose life begins at a stage if nothing is.
+    /// Returns the life of an instance, which begins at a stage if none is known.
     pub(super) fn life_from(
         &mut self,
         subtask: SubtaskId,
@@ -394,7 +394,7 @@ impl SinkDeadline {
 }
 
 impl JournalReplay<'_> {
-    /// Returns what is due of a job; `None` if it is not known since when.
+    /// Returns the deadlines of a job's sinks; `None` if its release is not known.
     fn dues(&self, dag: DagId, known: &JobState) -> Option<Vec<SinkDeadline>> {
         let release_ns = known.release_ns?;
         let model = self.task_set.dag(dag);

@@ -312,7 +312,7 @@ fn is_allowed(stage: DispatchState, event: &Event) -> bool {
     }
 }
 
-/// Returns what an instance is after an event.
+/// Returns the state of an instance after an event.
 pub(super) const fn stage_after(event: &Event) -> DispatchState {
     match event.what {
         EventKind::Ready => DispatchState::Ready,
@@ -322,7 +322,7 @@ pub(super) const fn stage_after(event: &Event) -> DispatchState {
     }
 }
 
-/// Returns what an instance must have been before its first known event.
+/// Returns the state that an instance must have had before its first known event.
 pub(super) const fn stage_before(event: &Event) -> DispatchState {
     match event.what {
         EventKind::Start => DispatchState::Ready,

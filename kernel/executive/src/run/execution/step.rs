@@ -66,7 +66,7 @@ impl ClusterRun {
     ) {
         let core = here();
         let has_letters = self.cluster().may_have_letters();
-        // Nothing that they bring about was before they came.
+        // Effects of messages are not dated before their arrival.
         let now_ns = if has_letters { clock::now_ns() } else { now_ns };
         let instant_ns = since_epoch(now_ns);
         let (engine, mut port) = self.parts(woken);
@@ -166,7 +166,7 @@ impl ClusterRun {
         let is_background = core.context().is_background();
         let leaves_background = is_background && self.engine.placement.is_wanted(here);
         if !self.engine.placement.must_suspend(here) && !leaves_background {
-            // One that rests has no background, unless it is core 0: it is to look for work.
+            // Idle cores other than 0 have no background context to leave: wake them.
             if MAY_DIVIDE && self.engine.placement.is_wanted(here) {
                 core.wake.store(true, Ordering::Relaxed);
             }
