@@ -114,9 +114,10 @@ fn a_dag_that_uses_up_the_heap_in_small_pieces_ends_alone() {
             let [told] = &told[..] else {
                 panic!("not one fault: {told:?}");
             };
-            let line = told.lines().find(|line| line.contains(attack));
+            // The allocator's code that is inlined into it may bear its name, too.
             let place = ", tests/guest/src/attacks/heap.rs:";
-            assert!(line.is_some_and(|line| line.contains(place)), "{told}");
+            let mut of_attack = told.lines().filter(|line| line.contains(attack));
+            assert!(of_attack.any(|line| line.contains(place)), "{told}");
         }
     }
 }
