@@ -17,8 +17,7 @@
 //! - **L5, the end.** A shutdown closes every DAG (C1 to C5) at one instant, so the run is over
 //!   when nothing is in flight any more. Of what is asked for later nothing comes.
 //! - **L6, replays.** What came of a request to a DAG whose inputs are recorded is in the
-//!   recording:
-//!   the jobs that were skipped. In a replay requests do not touch such a DAG.
+//!   recording: the jobs that were skipped. In a replay requests do not touch such a DAG.
 //!
 //! Where clusters have no instant in common, requests cross them as [`Mailboxes`].
 //!

@@ -16,8 +16,7 @@
 //! - What a fault costs, what requests come to and who runs next is decided here, for all
 //!   platforms alike.
 //! - The journal is in the order in which things were decided. A [start](PlatformPort::start) is
-//!   written
-//!   before the function begins.
+//!   written before the function begins.
 //! - After [`Engine::new`] nothing is allocated here, and no step is unbounded but by the releases
 //!   and deadlines that have passed since the last one.
 
