@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use sched_dag::chains::SampledEdge;
 use sched_dag::{DagId, SubtaskId};
 
+use super::super::picture;
 use super::super::tests::run_of;
 use super::convert;
 use crate::json::{Value, parse};
@@ -226,4 +227,28 @@ fn runs_stand_side_by_side_and_share_no_number() {
     assert_eq!(two.len(), 2 * one.len());
     let is_of_cores = |line: &&String| *line == "group: run 0 cores";
     assert_eq!(two.iter().filter(is_of_cores).count(), 2);
+}
+
+#[test]
+fn a_picture_shows_what_cores_executed_and_each_job_with_its_deadline() {
+    let svg = picture::draw(&diamond(), 1).expect("it has jobs");
+    let count = |part: &str| svg.matches(part).count();
+    // The page, five boxes, five executions in six pieces, three of job 1, two complete jobs.
+    assert_eq!(count("<rect"), 1 + 5 + 6 + 3 + 2, "{svg}");
+    // An arrow for each edge.
+    assert_eq!(count("<path"), 4);
+    for label in ["WCET", ">bound"] {
+        assert_eq!(count(label), 0, "none is stated");
+    }
+    for label in [
+        ">deadline 1.5 us<",
+        ">deadline 100 ns<",
+        ">core 0<",
+        ">core 1<",
+        ">core 2<",
+    ] {
+        assert_eq!(count(label), usize::from(label != ">core 2<"), "{label}");
+    }
+    let why = picture::draw(&run_of(HEADER, ""), 1).expect_err("no event is there");
+    assert!(why.contains("keeps no job"), "{why}");
 }
