@@ -99,7 +99,6 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
         reasons: vec![None; dags.len()],
         first_failing: None,
     };
-    // Clusters share no core: each is a set of its own.
     for cluster in task_set.clusters() {
         let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
         let own: Vec<usize> = own.collect();
@@ -116,7 +115,6 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
             |case, reasons| {
                 let mut verdict = case.verdict();
                 bound(case, &mut verdict, &mut answer.sinks_ns);
-                // A missing WCET comes before all that follows from it.
                 let first = first_unknown(&own, reasons).or(verdict.first_failing);
                 *first_failing = first_failing.or(first);
                 for (position, &dag) in case.members.iter().enumerate() {
@@ -175,7 +173,6 @@ impl<'a> AnalysisInput<'a> {
         relation: RankRelation,
         settings: &'a AnalysisSettings,
     ) -> Self {
-        // Most urgent first: then a DAG's interference is mostly solved when its turn comes.
         let order = sorted_by_key(members.len(), |dag| match settings.policy {
             Policy::StaticPriority => u64::from(relation.ranks(dag)[0].0),
             Policy::Edf => tasks[dag].relative_deadline_ns(),
@@ -231,7 +228,6 @@ impl<'a> AnalysisInput<'a> {
             })
             .collect();
         let mut first = solution.first_failing.map(|(dag, _)| dag);
-        // A certain reason helps an author more than "no bound was found".
         if reasons.iter().any(Option::is_some) {
             for (dag, reason) in self.certain().into_iter().rev() {
                 if bounds[dag].is_none() {
@@ -255,7 +251,6 @@ impl<'a> AnalysisInput<'a> {
 
     /// Reports whether a DAG has all cores whenever it needs them.
     fn is_alone(&self, dag: usize) -> bool {
-        // Another DAG that is not analysed may still keep a core.
         let blocked = self.relation.preemption != PreemptionMix::All && !self.is_only_one;
         let mut others = 0..self.members.len();
         !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
@@ -277,7 +272,6 @@ impl<'a> AnalysisInput<'a> {
         let covers = &self.set.shapes[dag].covers;
         let others = multi_path::alone(task, covers, cores.into())?;
         let limit = task.relative_deadline_ns().min(task.period_ns());
-        // Taken only where it is tighter than the multi-path bound.
         let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
         // Long steps of the scheduler are in no equation of this test, so they are added to it.
         let bound = bound.and_then(|bound_ns| self.set.bursts.after(bound_ns));
@@ -295,7 +289,6 @@ impl<'a> AnalysisInput<'a> {
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
         }
         self.set.known = match (self.settings.cores, self.settings.policy) {
-            // On one core the classical response-time equation is the tighter one.
             (1, Policy::StaticPriority) => responses(self),
             _ => {
                 let dags = 0..self.members.len();
@@ -311,7 +304,6 @@ impl<'a> AnalysisInput<'a> {
                 1 => SchedulabilityTest::OneCore,
                 _ => SchedulabilityTest::IntraTask,
             }
-        // Only the equation for several jobs in flight gives a bound beyond the period.
         } else if bound_ns > self.tasks[dag].period_ns() {
             SchedulabilityTest::Pipelined
         } else if self.is_alone(dag) {
@@ -392,7 +384,6 @@ impl<'a> AnalysisInput<'a> {
         let hopeless = |&dag: &usize| {
             let task = self.tasks[dag];
             let length_ns = task.length_ns();
-            // Even on endless cores with nothing else to do.
             if length_ns > task.relative_deadline_ns() {
                 return Some((dag, NotProvenReason::LengthBeyondDeadline { length_ns }));
             }
@@ -528,7 +519,6 @@ impl RankRelation {
     pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
         other != dag
             && match (self.policy, self.preemption) {
-                // Under EDF any job may have the earlier deadline.
                 (Policy::Edf, _) | (_, PreemptionMix::Some) => true,
                 (Policy::StaticPriority, _) => self.ranks(other)[0] < self.ranks(dag)[1],
             }
