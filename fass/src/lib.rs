@@ -60,25 +60,32 @@
 //! assert_eq!(report.jobs.len(), 3);
 //! ```
 //!
+//! # Where things are
+//!
+//! The root has what every app needs, and the paper's names. What subtasks share beyond their
+//! edges is in [`shared`], what a commit answers in [`commit`], what functions say in [`log`](mod@log); a
+//! machine below offers itself by [`platform`], and records and replays by [`edge`].
+//!
 //! # What is guaranteed
 //!
 //! - A function runs when all values of its job have arrived, and gets exactly
 //!   those: every value carries its job's number and is found by it.
 //! - Nothing a function returns is seen before it has returned, and then all of
 //!   it at once. Sending never waits.
-//! - What functions share otherwise is stated and typed: a [`State`] within a DAG, a
-//!   [`Latest`] value between DAGs, a [`Signal`] that releases one. The commit turns
-//!   it into precedence, bounded staleness, or a minimum distance of releases.
-//! - What a function may change of the run is stated, too: which DAGs rest ([`Switch`]), and
-//!   when it ends ([`Shutdown`]).
-//! - What comes from outside and goes there while DAGs run passes a [`Wire`], or is a
-//!   [`Parameter`].
+//! - What functions share otherwise is stated and typed: a [`State`](shared::State) within a DAG,
+//!   a [`Latest`](shared::Latest) value between DAGs, a [`Signal`](shared::Signal) that releases
+//!   one. The commit turns it into precedence, bounded staleness, or a minimum distance of
+//!   releases.
+//! - What a function may change of the run is stated, too: which DAGs are paused
+//!   ([`Switch`](shared::Switch)), and when it ends ([`Shutdown`](shared::Shutdown)).
+//! - What comes from outside and goes there while DAGs run passes a [`Wire`](shared::Wire), or is
+//!   a [`Parameter`](shared::Parameter).
 //! - After the commit the crate allocates nothing and takes no lock. Edges do no
 //!   locked read-modify-write; states and latest values do one or two a use. (What
 //!   functions and their messages' `clone` do is theirs.)
 //! - [`finish_create_dags`] reports everything that is wrong at once. Where
 //!   WCETs are given, it also says by when each DAG's jobs are complete, or that
-//!   it cannot prove it ([`Commit::answers`]).
+//!   it cannot prove it ([`Commit::answers`](commit::Commit::answers)).
 //!
 //! # What is not
 //!
@@ -88,12 +95,12 @@
 //!
 //! # How it is built
 //!
-//! Top to bottom: [`Dag`] takes registrations; the commit verifies them with
-//! `sched-dag` and makes of each function a [`SubtaskCode`], one future that is polled
-//! once for each instance; the [`Platform`] gets the [`Plan`] and runs bodies
-//! when its scheduler says so. Values travel in rings that have a slot for each
-//! job that may be in flight. The crate names no kernel and needs only `alloc`;
-//! its `unsafe` is in `run/cell/mod.rs`.
+//! Top to bottom: [`Dag`] takes registrations; the commit verifies them with `sched-dag` and makes
+//! of each function a [`SubtaskCode`](platform::SubtaskCode), one future that is polled once for
+//! each instance; the [`Platform`](platform::Platform) gets the [`Plan`](platform::Plan) and runs
+//! bodies when its scheduler says so. Values travel in rings that have a slot for each job that may
+//! be in flight. The crate names no kernel and needs only `alloc`; its `unsafe` is in
+//! `run/cell/mod.rs`.
 //!
 //! `docs/paper-map.md` relates the paper's figures 3 and 4 to this code.
 #![cfg_attr(not(test), no_std)]
@@ -101,49 +108,21 @@
 extern crate alloc;
 
 mod api;
-mod commit;
+pub mod commit;
 mod draft;
 pub mod edge;
-mod platform;
+pub mod platform;
 mod run;
+pub mod shared;
 
 pub use api::dag::{Dag, create_dag};
-pub use api::latest::{Latest, LatestUse, Sample};
-pub use api::lifecycle::{
-    Mode, ModeSwitch, ModeUse, Modes, Shutdown, ShutdownUse, Switch, SwitchUse, shutting_down,
-};
-pub use api::parameter::{Parameter, ParameterError, ParameterUse, ParameterValue, Tunable};
-pub use api::signal::{Raiser, Signal, SignalUse};
-pub use api::state::{State, StateRead, StateUpdate, StateValue};
 pub use api::subtask::{Subtask, UntypedSubtask};
 pub use api::topics::Topics;
-pub use api::uses::{ResettableUses, SubtaskBuilder, Uses};
-pub use api::wire::{Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions};
-pub use commit::answer::{ClusterPlacement, Commit, DagAnswer, EndToEnd, SinkAnswer, Verdict};
-pub use commit::{assign_clusters, finish_create_dags, finish_create_dags_with};
+pub use commit::finish::finish_create_dags;
 pub use draft::SubtaskAttributes;
-pub use draft::fault::{CommitError, Fault, UnprovenDag};
-pub use edge::latest::LatestJobs;
-#[doc(hidden)]
-pub use platform::say;
-pub use platform::{
-    AlreadyInstalled, Clock, LaunchError, Occupation, Platform, RunConfig, execute_for, install,
-    now_ns, set_clock,
-};
-pub use recording::Channel;
-pub use run::cell::SetOnce;
-pub use run::latest::Staleness;
-pub use run::line::RecordedValue;
+pub use platform::clock::{Occupation, execute_for, now_ns};
 pub use run::log;
 pub use run::message::{Message, MessageType, Unique};
-pub use run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
-pub use run::wire::Framing;
-pub use sched_dag::analysis::{NotProvenReason, OverheadSource, Overheads, SchedulabilityTest};
-pub use sched_dag::lifecycle::Request;
-pub use sched_dag::wcets::{WcetFault, WcetSource};
-pub use sched_dag::{
-    AssignmentReason, ClusterId, ConstructionPolicy, CoreDivision, CountLimit, FaultLimit,
-    OverrunPolicy, Policy, Preemption, SubtaskOrder, Warning,
-};
+pub use sched_dag::{FaultLimit, OverrunPolicy, Policy, Preemption, SubtaskOrder};

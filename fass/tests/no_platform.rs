@@ -4,7 +4,8 @@
 use core::time::Duration;
 use std::panic::catch_unwind;
 
-use fass::{Fault, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::commit::Fault;
+use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 
 #[test]
 fn a_commit_without_platform_says_so_together_with_all_other_faults() {

@@ -4,10 +4,11 @@
 
 use std::time::Duration;
 
-use fass::{CommitError, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::commit::CommitError;
+use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use harness::fault_page::{self, documented_faults};
 
-fn no_platform() -> Result<fass::Commit, CommitError> {
+fn no_platform() -> Result<fass::commit::Commit, CommitError> {
     // No `VirtualTime::new()` before this.
     let dag = create_dag();
     let period = Duration::from_millis(10);

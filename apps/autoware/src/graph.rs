@@ -7,7 +7,8 @@ use core::cell::Cell;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{Dag, Latest, Sample, SubtaskAttributes, create_dag};
+use fass::shared::{Latest, Sample};
+use fass::{Dag, SubtaskAttributes, create_dag};
 
 use crate::crunch::Crunch;
 use crate::{WCET_OF_ENDS, Workload};

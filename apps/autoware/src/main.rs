@@ -9,7 +9,8 @@ use alloc::format;
 use core::time::Duration;
 
 use autoware::{Latencies, SUBTASKS, Workload};
-use fass::{Commit, ConstructionPolicy, CountLimit, Occupation, finish_create_dags_with};
+use fass::Occupation;
+use fass::commit::{Commit, ConstructionPolicy, CountLimit, finish_create_dags_with};
 use kernel::report::{Distribution, Ns};
 use kernel::{AppError, Machine, Run, json, println};
 

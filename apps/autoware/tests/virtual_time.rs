@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use autoware::{Latencies, SUBTASKS, Workload};
-use fass::{ConstructionPolicy, CountLimit, Occupation, Policy, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, CountLimit, finish_create_dags_with};
+use fass::{Occupation, Policy};
 use virtual_time::VirtualTime;
 
 fn workload(jobs: u64, least_percent: u64) -> Workload {
@@ -72,7 +73,7 @@ fn latencies_stay_below_what_the_commit_promises() {
             // What the events tell of the chain is what the values have told, and so its bound.
             let from = "lidar/FrontLidarDriver";
             let ways = commit.chains_between(from, "behaviour/VehicleDBWSystem");
-            let by = |way: &&fass::EndToEnd| {
+            let by = |way: &&fass::commit::EndToEnd| {
                 let names = way.to_string();
                 names.contains("ObjectCollisionEstimator") && !names.contains("route/")
             };

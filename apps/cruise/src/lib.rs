@@ -20,7 +20,8 @@ extern crate alloc;
 use core::fmt::Write;
 use core::time::Duration;
 
-use fass::{Dag, Received, Sender, SubtaskAttributes, Wire, create_dag};
+use fass::shared::{Received, Sender, Wire};
+use fass::{Dag, SubtaskAttributes, create_dag};
 
 /// The time between two jobs, or the least time.
 pub const PERIOD: Duration = Duration::from_millis(10);

@@ -8,7 +8,8 @@ extern crate alloc;
 use alloc::format;
 
 use cruise::{Releases, build, careful, trusting};
-use fass::{Wire, finish_create_dags};
+use fass::finish_create_dags;
+use fass::shared::Wire;
 use kernel::{AppError, Machine, println};
 
 kernel::entry!(main);

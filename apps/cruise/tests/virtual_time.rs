@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use cruise::{Releases, build, careful, trusting};
-use fass::{Wire, finish_create_dags};
+use fass::finish_create_dags;
+use fass::shared::Wire;
 use virtual_time::{Silent, VirtualTime};
 
 const fn ms(ms: u64) -> Duration {

@@ -118,7 +118,7 @@ fn build_dag(
 mod tests {
     use super::*;
     use crate::parse::parse;
-    use fass::{ConstructionPolicy, finish_create_dags_with};
+    use fass::commit::{ConstructionPolicy, finish_create_dags_with};
     use virtual_time::VirtualTime;
 
     /// A fork and a join, and a pair without any edge.

@@ -12,7 +12,8 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
 use dag_file::{DagFile, Execution, Length, Settings, build, check, parse};
-use fass::{ConstructionPolicy, Occupation, finish_create_dags_with};
+use fass::Occupation;
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use kernel::options::UsageError;
 use kernel::{AppError, Machine, println};
 use sched_dag::{CommitOptions, Policy};

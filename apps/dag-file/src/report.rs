@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use dag_file::Set;
-use fass::{DagAnswer, SinkAnswer, Verdict};
+use fass::commit::{DagAnswer, SinkAnswer, Verdict};
 use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
 use sched_dag::law::Violation;

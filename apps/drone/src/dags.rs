@@ -3,10 +3,10 @@
 use core::time::Duration;
 
 use common::random::Random;
-use fass::{
-    Dag, FaultLimit, Latest, Mode, ModeSwitch, Modes, Occupation, OverrunPolicy, Parameter,
-};
-use fass::{Raiser, Sample, Signal, SubtaskAttributes, create_dag, execute_for};
+use fass::shared::{Latest, Mode, ModeSwitch, Modes, Parameter};
+use fass::shared::{Raiser, Sample, Signal};
+use fass::{Dag, FaultLimit, Occupation, OverrunPolicy};
+use fass::{SubtaskAttributes, create_dag, execute_for};
 use maths::{acos, sqrt};
 
 use crate::airframe::{Airframe, Force, Measured, Pose, Vector, rotation};

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use drone::{FRAME, Workload};
-use fass::{Parameter, Policy, finish_create_dags};
+use fass::shared::Parameter;
+use fass::{Policy, finish_create_dags};
 use virtual_time::{EventKind, Report, VirtualTime};
 
 const WORKLOAD: Workload = Workload {

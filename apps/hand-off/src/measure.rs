@@ -13,10 +13,8 @@ use alloc::format;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::{
-    ConstructionPolicy, Dag, Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags,
-    finish_create_dags_with,
-};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use fass::{Dag, Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags};
 use hand_off::{Pen, Shape, Stamping, Stamps, Workload, build};
 use kernel::report::Distribution;
 use kernel::{AppError, Machine, Run, json};

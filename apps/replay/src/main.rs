@@ -17,7 +17,7 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::{ConstructionPolicy, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fork_join::Pace;
 use kernel::{AppError, Machine, json, println};
 use replay::{Case, Computing, Epoch, Scale, build, parse};

@@ -11,8 +11,9 @@ use std::sync::{Arc, Barrier, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use fass::edge::RecordedValue;
 use fass::edge::{BootRecord, Drain, Edge, Outgoing, Sink};
-use fass::{Clock, LaunchError, Plan, RecordedValue, RunConfig};
+use fass::platform::{Clock, LaunchError, Plan, RunConfig};
 use sched_dag::engine::Run;
 use sched_dag::{DriverNotice, Instance};
 
@@ -94,7 +95,7 @@ pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     let mut file = unpoisoned(&FILE);
     let launched = edge.launch(plan, file.as_mut().map(BootRecord::file));
     if launched.map_err(LaunchError::new)? {
-        fass::set_clock(&TOLD);
+        fass::platform::set_clock(&TOLD);
     }
     IS_ON.store(edge.is_on(), Ordering::Relaxed);
     Ok(())

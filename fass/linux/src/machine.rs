@@ -14,8 +14,10 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use std::{fmt, fs};
 
+use fass::Preemption;
 use fass::edge::{BootRecord, EdgeMode, RecordingState, ReplayOutcome};
-use fass::{Platform as _, Preemption, RunConfig, Signal, Wire};
+use fass::platform::{Platform as _, RunConfig};
+use fass::shared::{Signal, Wire};
 
 use crate::control::{self, Control};
 use crate::edge::{self, FILE, File, IS_LIVE, LEFT, unpoisoned};
@@ -177,7 +179,7 @@ impl Linux {
         }
         static IS_OURS: OnceLock<bool> = OnceLock::new();
         assert!(
-            IS_OURS.get_or_init(|| fass::install(&HOST).is_ok()),
+            IS_OURS.get_or_init(|| fass::platform::install(&HOST).is_ok()),
             "another platform is installed; `Linux` must be the program's only one"
         );
         let cores = u32::try_from(processors.len()).unwrap_or(u32::MAX);
@@ -522,7 +524,8 @@ impl Linux {
     ///
     /// ```
     /// use std::time::Duration;
-    /// use fass::{Received, SubtaskAttributes, Wire, create_dag, finish_create_dags};
+    /// use fass::shared::{Received, Wire};
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
     /// use linux::{Linux, Mechanism};
     ///
     /// let machine = Linux::new(1, Mechanism::Normal).expect("one processor is there");

@@ -8,11 +8,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use fass::Occupation;
 use fass::edge::{Begin, BootRecord};
+use fass::edge::{Channel, RecordedValue};
 use fass::log::LogLine;
-use fass::{
-    Channel, LaunchError, Occupation, Plan, Platform, RecordedValue, RunConfig, SubtaskRunner,
-};
+use fass::platform::{LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
 use sched_dag::engine::{self, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, PendingRequests, Request};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
@@ -64,7 +64,7 @@ impl Platform for Host {
     }
 
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-        fass::assign_clusters(self, task_set)
+        fass::commit::assign_clusters(self, task_set)
     }
 
     #[inline]

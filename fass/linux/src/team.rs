@@ -26,7 +26,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use fass::SubtaskRunner;
+use fass::platform::SubtaskRunner;
 use sched_dag::engine::{NextAction, PlatformPort as _};
 use sched_dag::{ClusterId, CoreId, Vertex};
 

@@ -166,7 +166,7 @@ impl Dag {
     ///
     /// That needs the WCETs of all its subtasks, and of all DAGs that may delay
     /// it. Other DAGs of the commit need no proof of their own. Without the
-    /// demand the commit only answers; see [`Commit::answers`](crate::Commit::answers).
+    /// demand the commit only answers; see [`Commit::answers`](crate::commit::Commit::answers).
     ///
     /// ```
     /// use core::time::Duration;
@@ -280,7 +280,7 @@ impl Dag {
     /// `relative_deadline` after the release. The job is complete with its last sink.
     ///
     /// `input_topics` names one topic for each element of `Args`. If a DAG has several
-    /// sinks ([`finish_create_dags_with`](crate::finish_create_dags_with)), each has its
+    /// sinks ([`finish_create_dags_with`](crate::commit::finish_create_dags_with)), each has its
     /// own deadline.
     ///
     /// ```

@@ -16,7 +16,7 @@
 //!   again. During an instance its sample does not change.
 //! - *Visible staleness.* A [`Sample`] says of which job it is and when that was
 //!   complete. How old it can be follows from the writer's bound
-//!   ([`Commit::staleness`](crate::Commit::staleness)).
+//!   ([`Commit::staleness`](crate::commit::Commit::staleness)).
 //!
 //! # What is not
 //!
@@ -38,7 +38,8 @@ use crate::run::message::Message;
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{Sample, SubtaskAttributes, create_dag, finish_create_dags};
+/// use fass::shared::Sample;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::VirtualTime;
 ///
 /// let machine = VirtualTime::new();
@@ -85,7 +86,7 @@ pub struct LatestUse<T>(Latest<T>);
 /// of its writer. `None` in its place: none has been complete yet.
 ///
 /// ```
-/// use fass::Sample;
+/// use fass::shared::Sample;
 ///
 /// fn speed(pose: Option<Sample<'_, f64>>) -> f64 {
 ///     match pose {

@@ -44,7 +44,8 @@ pub struct SwitchUse {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{SubtaskAttributes, Switch, create_dag, finish_create_dags};
+/// use fass::shared::Switch;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::VirtualTime;
 ///
 /// let machine = VirtualTime::new();
@@ -113,7 +114,8 @@ pub struct ShutdownUse(());
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{Shutdown, SubtaskAttributes, create_dag, finish_create_dags, shutting_down};
+/// use fass::shared::{Shutdown, shutting_down};
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::VirtualTime;
 ///
 /// let machine = VirtualTime::new();
@@ -239,7 +241,8 @@ fn ask(draft: &mut DagDraft, subtask: usize, of: RequestKind) -> Wish {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{ModeSwitch, Modes, SubtaskAttributes, create_dag, finish_create_dags};
+/// use fass::shared::{ModeSwitch, Modes};
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::VirtualTime;
 ///
 /// let machine = VirtualTime::new();

@@ -1,6 +1,6 @@
 //! Parameters: numbers that a person, a file or a test sets while DAGs run.
 //!
-//! A parameter is like a [latest value](crate::Latest) that is written from outside. It has a
+//! A parameter is like a [latest value](crate::shared::Latest) that is written from outside. It has a
 //! name, a type and a range. A *source* reads it when it starts, and sends it along edges to
 //! the subtasks that need it. So a job has one value, whatever happens meanwhile.
 //!
@@ -32,7 +32,8 @@ use super::uses::{Uses, sealed};
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
+/// use fass::shared::Parameter;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::VirtualTime;
 ///
 /// let machine = VirtualTime::new();
@@ -97,7 +98,7 @@ impl core::error::Error for ParameterError {}
 /// `f32`.
 ///
 /// ```
-/// fn name<T: fass::ParameterValue>(_: T) -> &'static str {
+/// fn name<T: fass::shared::ParameterValue>(_: T) -> &'static str {
 ///     T::NAME
 /// }
 /// assert_eq!(name(0.5), "f64");
@@ -152,7 +153,7 @@ fn narrowed(bits: u64) -> f32 {
 /// A parameter of whatever type, for a platform that lets people set it.
 ///
 /// ```
-/// use fass::{Parameter, Tunable};
+/// use fass::shared::{Parameter, Tunable};
 ///
 /// let all: [&dyn Tunable; 2] = [
 ///     &Parameter::new("gain", 0.5, 0.0..=2.0),

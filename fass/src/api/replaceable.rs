@@ -131,7 +131,7 @@ impl Dag {
 // The bound is each method's own, so that the compiler says our sentence where it is not met.
 impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
     /// Works like [`Dag::restarting`]. The states that the subtask uses are reset, too, to
-    /// what is given by [`State::reset_to`](crate::State::reset_to).
+    /// what is given by [`State::reset_to`](crate::shared::State::reset_to).
     ///
     /// See [`Dag::restarting`].
     #[track_caller]

@@ -34,7 +34,8 @@ use crate::run::effect::{GO, RequestKind, Wish};
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{Raiser, SubtaskAttributes, create_dag, finish_create_dags};
+/// use fass::shared::Raiser;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::VirtualTime;
 ///
 /// let machine = VirtualTime::new();
@@ -134,7 +135,7 @@ impl Signal {
         platform::expect_installed().raise(plan, dag);
     }
 
-    /// Returns the arguments of [`Platform::raise`](crate::Platform::raise): the number
+    /// Returns the arguments of [`Platform::raise`](crate::platform::Platform::raise): the number
     /// of the plan and the DAG. `None` before the commit.
     ///
     /// For platforms that raise signals by themselves.

@@ -24,7 +24,7 @@
 //! - Jobs do not overlap as in a pipeline. Where they must, let one subtask own the
 //!   state and send what others need along an edge.
 //! - A state does not leave its DAG. Between DAGs there is the [latest
-//!   value](crate::Latest).
+//!   value](crate::shared::Latest).
 
 use alloc::boxed::Box;
 use alloc::rc::Rc;
@@ -46,7 +46,7 @@ use crate::run::replaceable::{Reset, ResettableState};
 /// Apps need not implement it; they meet it in [`Dag::state`].
 ///
 /// ```
-/// fn is_state<T: fass::StateValue>() {}
+/// fn is_state<T: fass::shared::StateValue>() {}
 /// is_state::<Vec<f64>>();
 /// ```
 #[diagnostic::on_unimplemented(

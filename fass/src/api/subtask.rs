@@ -39,7 +39,7 @@ use crate::run::tuple::{VecToPubs, VecToSubs};
 /// A subtask whose function is known, to be registered by [`register`](Self::register).
 ///
 /// Made by [`Dag::subtask`], [`Dag::source`], [`Dag::restarting`] and [`Dag::falling_back`], and
-/// those of [`SubtaskBuilder`](crate::SubtaskBuilder).
+/// those of [`SubtaskBuilder`](crate::shared::SubtaskBuilder).
 ///
 /// ```
 /// use core::time::Duration;

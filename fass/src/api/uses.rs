@@ -1,25 +1,25 @@
 //! Uses of a subtask besides its inputs, stated at registration.
 //!
 //! Values of the same job come along edges, as arguments. What comes from elsewhere
-//! is stated with [`Dag::using`]: a [`State`](crate::State) that subtasks of the DAG
-//! share, the [latest value](crate::Latest) of a topic of any DAG, a
-//! [signal](crate::Signal) that the subtask may raise, a [wire](crate::Wire) for bytes, a
-//! [parameter](crate::Parameter) that is set from outside, a DAG that it may
-//! [pause](crate::Switch), a [mode](crate::Modes) that it may enter, the [end](crate::Shutdown) of
+//! is stated with [`Dag::using`]: a [`State`](crate::shared::State) that subtasks of the DAG
+//! share, the [latest value](crate::shared::Latest) of a topic of any DAG, a
+//! [signal](crate::shared::Signal) that the subtask may raise, a [wire](crate::shared::Wire) for bytes, a
+//! [parameter](crate::shared::Parameter) that is set from outside, a DAG that it may
+//! [pause](crate::shared::Switch), a [mode](crate::shared::Modes) that it may enter, the [end](crate::shared::Shutdown) of
 //! the run. The function then gets what it uses as its *first* argument, in front of the inputs:
 //!
 //! | use | first argument | theory |
 //! |---|---|---|
-//! | [`State::update`](crate::State::update) | `&mut T` | precedence |
-//! | [`State::read`](crate::State::read) | `&T` | precedence |
-//! | [`Latest::sample`](crate::Latest::sample) | `Option<Sample<T>>` | bounded staleness |
-//! | [`Signal::raising`](crate::Signal::raising) | `Raiser` | sporadic release |
+//! | [`State::update`](crate::shared::State::update) | `&mut T` | precedence |
+//! | [`State::read`](crate::shared::State::read) | `&T` | precedence |
+//! | [`Latest::sample`](crate::shared::Latest::sample) | `Option<Sample<T>>` | bounded staleness |
+//! | [`Signal::raising`](crate::shared::Signal::raising) | `Raiser` | sporadic release |
 //! | [`Dag::switching`] | `Switch` | pauses (P1 to P5) |
-//! | [`Mode::entering`](crate::Mode::entering) | `ModeSwitch` | modes (M1 to M7) |
-//! | [`shutting_down`](crate::shutting_down) | `Shutdown` | the end (C1 to C5) |
-//! | [`Wire::receiving`](crate::Wire::receiving) | `Received<T>` | input |
-//! | [`Wire::sending`](crate::Wire::sending) | `Sender` | output |
-//! | [`Parameter::reading`](crate::Parameter::reading) | `T` | input |
+//! | [`Mode::entering`](crate::shared::Mode::entering) | `ModeSwitch` | modes (M1 to M7) |
+//! | [`shutting_down`](crate::shared::shutting_down) | `Shutdown` | the end (C1 to C5) |
+//! | [`Wire::receiving`](crate::shared::Wire::receiving) | `Received<T>` | input |
+//! | [`Wire::sending`](crate::shared::Wire::sending) | `Sender` | output |
+//! | [`Parameter::reading`](crate::shared::Parameter::reading) | `T` | input |
 //!
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
@@ -47,7 +47,8 @@ pub(crate) mod sealed {
 /// Apps do not call its methods; they meet the trait in [`Dag::using`].
 ///
 /// ```
-/// use fass::{State, Uses, create_dag};
+/// use fass::shared::{State, Uses};
+/// use fass::create_dag;
 ///
 /// fn first_argument<U: Uses>(_: &U) -> &'static str {
 ///     std::any::type_name::<U::Borrowed<'_>>()
@@ -94,10 +95,11 @@ pub trait Uses: sealed::Sealed {
 /// reset, or a tuple of such.
 ///
 /// Apps do not call its methods; they meet the trait in
-/// [`SubtaskBuilder::restarting`](crate::SubtaskBuilder::restarting).
+/// [`SubtaskBuilder::restarting`](crate::shared::SubtaskBuilder::restarting).
 ///
 /// ```
-/// use fass::{ResettableUses, create_dag};
+/// use fass::shared::ResettableUses;
+/// use fass::create_dag;
 ///
 /// fn can_be_reset(_: &impl ResettableUses) {}
 /// can_be_reset(&create_dag().state("pose", 0.0).update());
@@ -207,7 +209,7 @@ implement_tuple!((A a a_guard)(B b b_guard)(C c c_guard)(D d d_guard)(E e e_guar
 /// Its methods are those of [`Dag`], for functions that get what they use as their
 /// first argument.
 ///
-/// See [`State`](crate::State).
+/// See [`State`](crate::shared::State).
 #[derive(Debug)]
 #[must_use = "register a subtask with it"]
 pub struct SubtaskBuilder<'d, U> {
@@ -218,8 +220,8 @@ pub struct SubtaskBuilder<'d, U> {
 impl Dag {
     /// Begins the registration of a subtask that uses something besides its inputs.
     ///
-    /// See [`Uses`] for what there is, and [`State`](crate::State),
-    /// [`Latest`](crate::Latest) and [`Signal`](crate::Signal) for examples.
+    /// See [`Uses`] for what there is, and [`State`](crate::shared::State),
+    /// [`Latest`](crate::shared::Latest) and [`Signal`](crate::shared::Signal) for examples.
     ///
     /// # Panics
     ///
@@ -250,7 +252,7 @@ impl<'d, U: Uses> SubtaskBuilder<'d, U> {
 
     /// Works like [`Dag::subtask`].
     ///
-    /// See [`State`](crate::State).
+    /// See [`State`](crate::shared::State).
     #[track_caller]
     pub fn subtask<F, Args, Ret>(self, mut f: F) -> Subtask<'d>
     where

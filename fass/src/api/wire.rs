@@ -49,7 +49,8 @@ use crate::run::wire::{Framing, SendCompletion, WireInput, WireOutput};
 /// ```
 /// use core::fmt::Write;
 /// use core::time::Duration;
-/// use fass::{Received, Sender, SubtaskAttributes, Wire, create_dag, finish_create_dags};
+/// use fass::shared::{Received, Sender, Wire};
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 /// use virtual_time::VirtualTime;
 ///
 /// fn number(line: &[u8]) -> Option<u32> {
@@ -100,7 +101,7 @@ struct WireState {
 /// Options of a wire.
 ///
 /// ```
-/// use fass::{Framing, Wire, WireOptions};
+/// use fass::shared::{Framing, Wire, WireOptions};
 ///
 /// let gps = Wire::with("gps", WireOptions { longest_bytes: 82, ..WireOptions::default() });
 /// let framing = Framing::Until(0); // as COBS has it
@@ -251,7 +252,7 @@ impl Wire {
     }
 
     /// Takes bytes that have arrived at `now_ns`, on the clock of [`crate::now_ns`]. Returns
-    /// what [`Platform::raise`](crate::Platform::raise) is to be told, if a packet is whole
+    /// what [`Platform::raise`](crate::platform::Platform::raise) is to be told, if a packet is whole
     /// and a sporadic DAG receives it.
     ///
     /// For platforms, which have one place that calls this. It may be an interrupt handler.

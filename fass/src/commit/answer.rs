@@ -109,7 +109,7 @@ impl Commit {
     ///
     /// Bounds hold for the platform's policy, preemption and cores, with its
     /// measured overheads added to the WCETs
-    /// ([`RunConfig::overheads`](crate::RunConfig::overheads)), and as long as no
+    /// ([`RunConfig::overheads`](crate::platform::RunConfig::overheads)), and as long as no
     /// instance executes for longer than its WCET. A DAG that is *not proven*
     /// may meet its deadlines all the same.
     ///
@@ -166,7 +166,7 @@ impl Commit {
     /// Returns for each subtask that samples a latest value, in the order of the
     /// commit, how old that value can be; see [`Staleness`].
     ///
-    /// See [`Latest`](crate::Latest) for an example.
+    /// See [`Latest`](crate::shared::Latest) for an example.
     #[must_use]
     pub fn staleness(&self) -> &[Staleness] {
         &self.staleness
@@ -202,7 +202,8 @@ impl Commit {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{Sample, SubtaskAttributes, create_dag, finish_create_dags};
+/// use fass::shared::Sample;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 ///
 /// # let machine = virtual_time::VirtualTime::new().silent(virtual_time::Silent::Wcet);
 /// let ms = Duration::from_millis;
@@ -315,7 +316,8 @@ impl Commit {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{SubtaskAttributes, Verdict, create_dag, finish_create_dags};
+/// use fass::commit::Verdict;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 ///
 /// # let machine = virtual_time::VirtualTime::new();
 /// let dag = create_dag();
@@ -355,7 +357,7 @@ pub struct DagAnswer {
 /// The cluster of a DAG.
 ///
 /// ```
-/// use fass::{ClusterId, ClusterPlacement};
+/// use fass::commit::{ClusterId, ClusterPlacement};
 ///
 /// let placement = ClusterPlacement { cluster: ClusterId(1), cores: 1..3, why: None };
 /// assert_eq!(placement.to_string(), "in cluster 1, on 2 cores from core 1 on");
@@ -374,7 +376,8 @@ pub struct ClusterPlacement {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{ConstructionPolicy, SubtaskAttributes, create_dag, finish_create_dags_with};
+/// use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+/// use fass::{SubtaskAttributes, create_dag};
 ///
 /// # let machine = virtual_time::VirtualTime::new().policy(fass::Policy::Edf);
 /// let ms = Duration::from_millis;
@@ -405,7 +408,7 @@ pub struct SinkAnswer {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{SchedulabilityTest, Verdict};
+/// use fass::commit::{SchedulabilityTest, Verdict};
 ///
 /// let bound = Duration::from_millis(5);
 /// let verdict = Verdict::Proven { bound, test: SchedulabilityTest::Edf };
@@ -441,7 +444,7 @@ impl Verdict {
     ///
     /// ```
     /// use core::time::Duration;
-    /// use fass::{SchedulabilityTest, Verdict};
+    /// use fass::commit::{SchedulabilityTest, Verdict};
     ///
     /// let bound = Duration::from_millis(5);
     /// assert_eq!(Verdict::Proven { bound, test: SchedulabilityTest::Edf }.unproven(), None);

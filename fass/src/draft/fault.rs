@@ -23,7 +23,8 @@ worded! {
     ///
     /// ```
     /// use core::time::Duration;
-    /// use fass::{Fault, SubtaskAttributes, create_dag, finish_create_dags};
+    /// use fass::commit::Fault;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
     ///
     /// # let machine = virtual_time::VirtualTime::new();
     /// let dag = create_dag();
@@ -145,7 +146,8 @@ fn part(subtask: &Option<SubtaskLabel>) -> impl Display {
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{SubtaskAttributes, Verdict, create_dag, finish_create_dags};
+/// use fass::commit::Verdict;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 ///
 /// # let machine = virtual_time::VirtualTime::new();
 /// let dag = create_dag();
@@ -176,7 +178,7 @@ impl UnprovenDag {
     /// Returns the reason, by which a program may decide.
     ///
     /// ```
-    /// use fass::{NotProvenReason, UnprovenDag};
+    /// use fass::commit::{NotProvenReason, UnprovenDag};
     ///
     /// fn is_worth_another_core(unproven: &UnprovenDag) -> bool {
     ///     matches!(unproven.reason(), NotProvenReason::NoBound | NotProvenReason::Overload)
@@ -191,7 +193,7 @@ impl UnprovenDag {
     /// WCET, rather than merely not being proven to be met.
     ///
     /// ```
-    /// use fass::{DagAnswer, UnprovenDag};
+    /// use fass::commit::{DagAnswer, UnprovenDag};
     ///
     /// fn is_hopeless(answer: &DagAnswer) -> bool {
     ///     answer.verdict.unproven().is_some_and(UnprovenDag::is_certain)

@@ -180,7 +180,7 @@ impl Drain for OfLatest {
 /// nothing but when it is made.
 ///
 /// ```
-/// use fass::{LatestJobs, RecordedValue};
+/// use fass::edge::{LatestJobs, RecordedValue};
 /// use recording::{Channel, Recordable, Role};
 ///
 /// let (dag, subtask, role, topic) = (0, 0, Role::Source, "turns".into());

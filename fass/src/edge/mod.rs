@@ -6,7 +6,7 @@
 //! are computed. An *echo* keeps the latest value of a topic for people to look at. If none of
 //! these is asked for, the inputs of the last jobs may be kept, for the case that one fails.
 //!
-//! A platform reaches all this by what [`Platform::open_channels`](crate::Platform::open_channels)
+//! A platform reaches all this by what [`Platform::open_channels`](crate::platform::Platform::open_channels)
 //! gives it, so that an image in which no topic is recorded has none of this code.
 //!
 //! The [`Edge`] of a platform's runs knows what is wished of it, and has what carries that out. A
@@ -26,17 +26,19 @@ use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use core::fmt;
 
-use recording::{Channel, DagHeader, Header, Schema, Stream};
+use recording::{DagHeader, Header, Schema, Stream};
 use sched_dag::journal::EventKind;
 use sched_dag::{DagId, DriverNotice, Instance, TaskSet};
 
-use crate::run::line::RecordedValue;
 use crate::run::plan::Plan;
 
 pub use excerpt::Excerpt;
 pub use kept::BootRecord;
-pub use recording::Sink;
+pub use latest::LatestJobs;
+pub use recording::{Channel, Sink};
 pub use replay::{Divergence, Replay, ReplayOutcome, job_of};
+
+pub use crate::run::line::RecordedValue;
 
 /// The mode of an edge: recording, replaying, or keeping the latest jobs.
 ///

@@ -4,7 +4,7 @@
 //! scheduler, and only after the completion. Latest values, signals and requests to the
 //! run as a whole have readers that do not wait for it. So the function only *prepares*
 //! them, and the platform publishes them when it reports the completion
-//! ([`SubtaskCode::complete`](crate::SubtaskCode::complete)): the completion boundary (R3) holds
+//! ([`SubtaskCode::complete`](crate::platform::SubtaskCode::complete)): the completion boundary (R3) holds
 //! for them as it does for edges, also in virtual time, where a function has run
 //! long before its instance is complete.
 

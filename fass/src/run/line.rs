@@ -251,7 +251,7 @@ const ROOM: usize = 4096;
 /// A value that a recorded topic gives to the platform, when its writer's instance is complete.
 ///
 /// ```
-/// fn show(value: &fass::RecordedValue<'_>) {
+/// fn show(value: &fass::edge::RecordedValue<'_>) {
 ///     match value.bytes {
 ///         Some(bytes) => println!("channel {}, job {}: {bytes:?}", value.channel, value.job),
 ///         None => println!("channel {}, job {} is lost", value.channel, value.job),
@@ -260,7 +260,7 @@ const ROOM: usize = 4096;
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedValue<'v> {
-    /// The number of the channel ([`Platform::open_channels`](crate::Platform::open_channels)).
+    /// The number of the channel ([`Platform::open_channels`](crate::platform::Platform::open_channels)).
     pub channel: u16,
     /// The job.
     pub job: u64,

@@ -20,11 +20,11 @@ use super::line::LineOf;
 ///
 /// # Examples
 ///
-/// A platform receives it in [`Platform::launch`](crate::Platform::launch) and
+/// A platform receives it in [`Platform::launch`](crate::platform::Platform::launch) and
 /// finds a subtask's body at its ids:
 ///
 /// ```
-/// use fass::{SubtaskCode, Plan};
+/// use fass::platform::{Plan, SubtaskCode};
 /// use sched_dag::Instance;
 ///
 /// fn body_of(plan: &mut Plan, instance: Instance) -> &mut SubtaskCode {
@@ -37,11 +37,11 @@ pub struct Plan {
     pub task_set: Arc<TaskSet>,
     /// The plan's number, never 0, different from that of every other plan of the
     /// program. Signals know their plan by it
-    /// ([`Platform::raise`](crate::Platform::raise)).
+    /// ([`Platform::raise`](crate::platform::Platform::raise)).
     pub number: u64,
     /// The subtasks' bodies: `bodies[dag][subtask]`, in the order of the model.
     pub bodies: Vec<Vec<SubtaskCode>>,
-    /// The response times that the commit has proven ([`Commit::answers`](crate::Commit::answers)).
+    /// The response times that the commit has proven ([`Commit::answers`](crate::commit::Commit::answers)).
     pub proven: ProvenBounds,
     /// By DAG, the one that gets a signal when a fault ends it
     /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
@@ -51,7 +51,7 @@ pub struct Plan {
     /// begins
     /// paused. A platform that takes no such requests refuses the plan.
     pub lifecycle: Option<Box<dyn Lifecycle>>,
-    /// The samples of latest values ([`Commit::staleness`](crate::Commit::staleness)): what
+    /// The samples of latest values ([`Commit::staleness`](crate::commit::Commit::staleness)): what
     /// passes between DAGs, for platforms that show it.
     pub staleness: Arc<Vec<Staleness>>,
     /// The ways of recorded values, by channel.
@@ -62,7 +62,7 @@ impl Plan {
     /// Has recorded states written down twice in so many jobs at least, for a platform that keeps
     /// no more than what enters these.
     ///
-    /// See [`LatestJobs`](crate::LatestJobs).
+    /// See [`LatestJobs`](crate::edge::LatestJobs).
     pub fn keep_states_of(&self, jobs: u32) {
         let states = self.lines.iter().filter_map(|of| of.state.as_ref());
         states.for_each(|state| state.keep_every(jobs / 2));
@@ -77,7 +77,7 @@ impl Plan {
 /// # Examples
 ///
 /// ```
-/// use fass::SubtaskCode;
+/// use fass::platform::SubtaskCode;
 ///
 /// /// A platform that runs one instance after another.
 /// fn run_in_turn(bodies: &mut [SubtaskCode], job: u64) {
@@ -155,11 +155,11 @@ impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
 /// also while the body runs.
 ///
 /// ```
-/// use fass::SubtaskCode;
+/// use fass::platform::SubtaskCode;
 /// use sched_dag::engine::{Alternate, ProvenBounds};
 ///
 /// fn is_survived(body: &SubtaskCode) -> bool {
-///     body.replacement().is_some_and(|next: fass::ReplacementCode| next.is_there())
+///     body.replacement().is_some_and(|next: fass::platform::ReplacementCode| next.is_there())
 /// }
 /// ```
 #[derive(Clone)]
@@ -208,7 +208,7 @@ impl SubtaskCode {
     ///   were not [discarded](Self::discard).
     ///
     /// ```
-    /// fn start(body: &mut fass::SubtaskCode, instance: sched_dag::Instance) {
+    /// fn start(body: &mut fass::platform::SubtaskCode, instance: sched_dag::Instance) {
     ///     body.run(instance.job); // then report the completion
     /// }
     /// ```
@@ -233,7 +233,7 @@ impl SubtaskCode {
     /// run code of the app; a body that has no such effects returns at once.
     ///
     /// ```
-    /// fn completed(body: &mut fass::SubtaskCode, now_ns: u64) {
+    /// fn completed(body: &mut fass::platform::SubtaskCode, now_ns: u64) {
     ///     body.complete(now_ns, &mut |request| println!("{request:?}"));
     /// }
     /// ```
@@ -258,7 +258,7 @@ impl SubtaskCode {
     /// failed; else nobody could compute its fault again.
     ///
     /// ```
-    /// fn failed(body: &mut fass::SubtaskCode) {
+    /// fn failed(body: &mut fass::platform::SubtaskCode) {
     ///     body.failed(fass::now_ns());
     /// }
     /// ```
@@ -279,7 +279,7 @@ impl SubtaskCode {
     /// effect it must be short: it keeps the platform from deciding anything meanwhile.
     ///
     /// ```
-    /// fn counted(body: &mut fass::SubtaskCode, count: &'static std::sync::atomic::AtomicU64) {
+    /// fn counted(body: &mut fass::platform::SubtaskCode, count: &'static std::sync::atomic::AtomicU64) {
     ///     use std::sync::atomic::Ordering::Relaxed;
     ///     body.on_completion(Box::new(|| drop(count.fetch_add(1, Relaxed))));
     /// }
@@ -300,7 +300,7 @@ impl SubtaskCode {
     /// platform to which a clock is dear need not read it for the others.
     ///
     /// ```
-    /// fn completed(body: &mut fass::SubtaskCode, ask: &mut dyn FnMut(fass::Request)) {
+    /// fn completed(body: &mut fass::platform::SubtaskCode, ask: &mut dyn FnMut(fass::platform::Request)) {
     ///     if body.has_effects() {
     ///         body.complete(fass::now_ns(), ask);
     ///     }
@@ -323,7 +323,7 @@ impl SubtaskCode {
     /// the bodies.
     ///
     /// ```
-    /// fn cancelled(body: &mut fass::SubtaskCode, instance: sched_dag::Instance) {
+    /// fn cancelled(body: &mut fass::platform::SubtaskCode, instance: sched_dag::Instance) {
     ///     body.discard(instance.job);
     /// }
     /// ```
@@ -348,7 +348,7 @@ impl SubtaskCode {
     /// app.
     ///
     /// ```
-    /// fn survived(body: &mut fass::SubtaskCode) {
+    /// fn survived(body: &mut fass::platform::SubtaskCode) {
     ///     body.replace(); // and run the next job
     /// }
     /// ```
@@ -361,8 +361,8 @@ impl SubtaskCode {
     /// unwinding: all but what the app's function owns.
     ///
     /// ```
-    /// fn ended(lost: Vec<fass::SubtaskCode>) {
-    ///     lost.into_iter().for_each(fass::SubtaskCode::forget);
+    /// fn ended(lost: Vec<fass::platform::SubtaskCode>) {
+    ///     lost.into_iter().for_each(fass::platform::SubtaskCode::forget);
     /// }
     /// ```
     pub fn forget(self) {
@@ -382,7 +382,7 @@ impl core::fmt::Debug for SubtaskCode {
 /// [body](engine::SubtaskBody) in a platform's `Engine`.
 ///
 /// ```
-/// use fass::{Plan, SubtaskRunner};
+/// use fass::platform::{Plan, SubtaskRunner};
 ///
 /// /// A platform that runs the first job of all DAGs.
 /// fn run_once(plan: Plan) {

@@ -16,7 +16,7 @@
 //! traits for each arity. Apps never call these traits; they meet them in the
 //! bounds of [`Dag::register_subtask`](crate::Dag::register_subtask) and in the
 //! compiler's messages, which speak our words. The futures exist only inside a
-//! [`SubtaskCode`](crate::SubtaskCode).
+//! [`SubtaskCode`](crate::platform::SubtaskCode).
 
 use alloc::vec::Vec;
 use core::future::ready;

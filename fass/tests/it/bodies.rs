@@ -14,7 +14,8 @@ use std::thread;
 
 use crate::support::{PERIOD, Shared, commit, inside, named, panic_message, run_job};
 use common::random::Random;
-use fass::{Dag, Plan, SubtaskCode, Unique, create_dag};
+use fass::platform::{Plan, SubtaskCode};
+use fass::{Dag, Unique, create_dag};
 
 #[test]
 fn a_platform_that_keeps_no_order_is_told() {

@@ -5,7 +5,8 @@ use core::time::Duration;
 use std::slice;
 
 use crate::support::{PERIOD, named, panic_message};
-use fass::{ConstructionPolicy, CountLimit, Dag, create_dag, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, CountLimit, finish_create_dags_with};
+use fass::{Dag, create_dag};
 
 /// Commits DAGs that are refused for these reasons: the beginnings of all lines.
 #[track_caller]

@@ -113,7 +113,7 @@ const CASES: &[Case] = &[
     ),
     // a function that can be replaced, of a subtask that samples a latest value
     (
-        "fn main() { let dag = create_dag(); let pose = dag.latest::<u32>(\"pose\"); dag.using(pose.sample()).restarting(|| |_: Option<fass::Sample<'_, u32>>, (_,): (u32,)| ()); }",
+        "fn main() { let dag = create_dag(); let pose = dag.latest::<u32>(\"pose\"); dag.using(pose.sample()).restarting(|| |_: Option<fass::shared::Sample<'_, u32>>, (_,): (u32,)| ()); }",
         &[
             "a subtask that uses `LatestUse<u32>` cannot be replaced after a fault",
             "let another subtask sample the latest value or raise the signal, and send along an edge",

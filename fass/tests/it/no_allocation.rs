@@ -12,9 +12,9 @@ use std::sync::Arc;
 
 use crate::support::{commit, run_job};
 use counting::allocated;
-use fass::{
-    Raiser, Received, Request, Sample, Sender, SubtaskAttributes, Unique, Wire, create_dag,
-};
+use fass::platform::Request;
+use fass::shared::{Raiser, Received, Sample, Sender, Wire};
+use fass::{SubtaskAttributes, Unique, create_dag};
 use sched_dag::DagId;
 
 const TOPICS: [&str; 16] = [

@@ -7,7 +7,8 @@
 
 use std::time::Duration;
 
-use fass::{CommitError, Occupation, SubtaskAttributes, create_dag, execute_for};
+use fass::commit::CommitError;
+use fass::{Occupation, SubtaskAttributes, create_dag, execute_for};
 use virtual_time::VirtualTime;
 
 fn main() -> Result<(), CommitError> {

@@ -9,7 +9,8 @@
 use std::cell::RefCell;
 
 use fass::edge::{self, Replay};
-use fass::{LatestJobs, Plan, RecordedValue, RunConfig};
+use fass::edge::{LatestJobs, RecordedValue};
+use fass::platform::{Plan, RunConfig};
 use recording::{Channel, Entry, EntryKind, Header, Malformed};
 use sched_dag::engine::Run;
 use sched_dag::journal::{self, Event};
@@ -101,11 +102,11 @@ impl VirtualTime {
 
     /// Has the replay begin as late as may be, so that this job is computed of what was recorded:
     /// with the last job up to it of which all states of its DAG are
-    /// ([`State::record`](fass::State::record)), or, of a DAG without recorded states, with the job
+    /// ([`State::record`](fass::shared::State::record)), or, of a DAG without recorded states, with the job
     /// itself. Other DAGs begin with what they did then. To be called before the commit, which is
     /// refused if no inputs of such a DAG are recorded.
     ///
-    /// See [`State::record`](fass::State::record) for an example.
+    /// See [`State::record`](fass::shared::State::record) for an example.
     #[must_use = "the machine itself is returned"]
     pub fn from(self, dag: &str, job: u64) -> Self {
         let edge = &self.machine.edge;

@@ -42,7 +42,9 @@ mod settings;
 use std::rc::Rc;
 use std::time::Duration;
 
-use fass::{Overheads, Policy, Preemption, Signal};
+use fass::commit::Overheads;
+use fass::shared::Signal;
+use fass::{Policy, Preemption};
 pub use recording::Malformed;
 pub use sched_dag::law::{Rule, Violation};
 pub use sched_dag::{
@@ -151,7 +153,7 @@ impl VirtualTime {
     }
 
     /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
-    /// others share clusters of one core each. All subtasks need WCETs. See [`fass::ClusterPlacement`].
+    /// others share clusters of one core each. All subtasks need WCETs. See [`fass::commit::ClusterPlacement`].
     #[must_use = "the machine itself is returned"]
     pub fn assign_clusters(self) -> Self {
         self.set(|settings| settings.terms.divide_by_commit())

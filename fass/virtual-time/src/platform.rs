@@ -25,11 +25,12 @@ use std::rc::{Rc, Weak};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
+use fass::Occupation;
+use fass::edge::RecordedValue;
 use fass::edge::{Begin, Replay};
 use fass::log::{Level, LogLine, set_level};
-use fass::{
-    LaunchError, Occupation, Plan, Platform, RecordedValue, RunConfig, SubtaskRunner, Wire,
-};
+use fass::platform::{LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
+use fass::shared::Wire;
 use recording::Channel;
 use sched_dag::engine::{Alternate, FaultCost};
 use sched_dag::journal::EventKind;
@@ -94,7 +95,7 @@ enum Arrival {
 pub(crate) fn make_current() -> Rc<Machine> {
     static IS_OURS: OnceLock<bool> = OnceLock::new();
     assert!(
-        IS_OURS.get_or_init(|| fass::install(&HostPlatform).is_ok()),
+        IS_OURS.get_or_init(|| fass::platform::install(&HostPlatform).is_ok()),
         "another platform is installed; virtual time must be the program's only platform"
     );
     set_level(Some(Level::Debug));
@@ -257,7 +258,7 @@ impl Platform for HostPlatform {
     }
 
     fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-        fass::assign_clusters(self, task_set)
+        fass::commit::assign_clusters(self, task_set)
     }
 
     fn now_ns(&self) -> u64 {

@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use common::random::{nth, scale};
-use fass::RunConfig;
+use fass::platform::RunConfig;
 use sched_dag::{Dag, Instance, Subtask, TaskSet};
 
 use crate::{VirtualTime, nanoseconds};

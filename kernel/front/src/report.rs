@@ -7,7 +7,7 @@ use core::iter;
 
 use fass::edge::{RecordingState, ReplayOutcome, Sink};
 use fass::log::LogLine;
-use fass::{Wire, WireCounts};
+use fass::shared::{Wire, WireCounts};
 use sched_dag::{Dag, DagId, DagSnapshot, TaskSet};
 
 use crate::text::json;

@@ -14,7 +14,8 @@ use std::thread;
 use std::time::Duration;
 
 use fass::edge::WatchedValue;
-use fass::{RunConfig, Signal, Wire};
+use fass::platform::RunConfig;
+use fass::shared::{Signal, Wire};
 use front::app::ending::AppError;
 use front::app::machine::{Divisible, System};
 use front::json;

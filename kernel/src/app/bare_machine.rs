@@ -6,7 +6,8 @@ use core::fmt;
 use core::panic::Location;
 use core::time::Duration;
 
-use fass::{Platform, RunConfig, Signal, Wire};
+use fass::platform::{Platform, RunConfig};
+use fass::shared::{Signal, Wire};
 
 use super::calibration;
 use crate::options::{CommandLine, UsageError};

@@ -14,10 +14,9 @@ use alloc::format;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::{
-    ConstructionPolicy, Dag, Occupation, OverheadSource, Overheads, Platform, SubtaskAttributes,
-    UntypedSubtask, create_dag, execute_for, finish_create_dags_with,
-};
+use fass::commit::{ConstructionPolicy, OverheadSource, Overheads, finish_create_dags_with};
+use fass::platform::Platform;
+use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag, execute_for};
 use sched_dag::law::MeasuredCosts;
 
 use executive::machine::clock;

@@ -43,9 +43,9 @@ pub(crate) type App = fn(&Machine) -> Result<(), AppError>;
 ///
 /// ```no_run
 /// // To be told the time though the run is recorded, and leave no trace of it there:
-/// fass::set_clock(&kernel::CLOCK);
+/// fass::platform::set_clock(&kernel::CLOCK);
 /// ```
-pub static CLOCK: fass::Clock = clock::now_ns;
+pub static CLOCK: fass::platform::Clock = clock::now_ns;
 
 /// The last processor that can be reached without x2APIC; the next id means all of them.
 const LAST_SHORT_ID: u32 = 254;
@@ -234,8 +234,8 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
         heartbeat::set_heartbeats(0);
     }
     // A second installation would come from a second boot, which there is not.
-    let _ = fass::install(&KERNEL);
-    fass::set_clock(&CLOCK);
+    let _ = fass::platform::install(&KERNEL);
+    fass::platform::set_clock(&CLOCK);
     announce(info, name, layout.total_bytes, &rate);
     end(if *probes {
         probe::run()

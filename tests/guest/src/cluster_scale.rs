@@ -7,7 +7,7 @@ use alloc::format;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use fass::{ConstructionPolicy, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use hand_off::{Shape, Stamping, Stamps, Workload, build};
 use kernel::{AppError, Machine};
 

@@ -7,7 +7,8 @@
 use alloc::vec;
 use core::time::Duration;
 
-use fass::{Dag, Occupation, Parameter, create_dag, execute_for, finish_create_dags};
+use fass::shared::Parameter;
+use fass::{Dag, Occupation, create_dag, execute_for, finish_create_dags};
 use kernel::{AppError, Machine, json};
 
 use crate::single::{named, single};

@@ -28,7 +28,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let (dag, stamps) = build(jobs);
     finish_create_dags(&[dag])?;
     // The stamps are not to be recorded.
-    fass::set_clock(&kernel::CLOCK);
+    fass::platform::set_clock(&kernel::CLOCK);
     let run = machine.run()?;
     if let Some(violation) = run.violations().next() {
         return Err(AppError::Failure(format!("{violation}")));

@@ -11,11 +11,9 @@ use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use core::time::Duration;
 
-use fass::{
-    Commit, CommitError, ConstructionPolicy, Dag, Latest, Mode, Modes, Occupation, Signal, State,
-    SubtaskAttributes, Uses, VecToPubs, VecToSubs, create_dag, execute_for,
-    finish_create_dags_with, shutting_down,
-};
+use fass::commit::{Commit, CommitError, ConstructionPolicy, finish_create_dags_with};
+use fass::shared::{Latest, Mode, Modes, Signal, State, Uses, shutting_down};
+use fass::{Dag, Occupation, SubtaskAttributes, VecToPubs, VecToSubs, create_dag, execute_for};
 
 use crate::dag::{DagText, Replaced, SubtaskText, Use};
 use crate::{Calls, Scenario};

@@ -5,7 +5,8 @@ use alloc::vec::Vec;
 use alloc::{format, vec};
 use core::time::Duration;
 
-use fass::{FaultLimit, OverrunPolicy, SubtaskOrder};
+use fass::SubtaskOrder;
+use fass::{FaultLimit, OverrunPolicy};
 
 use crate::number;
 

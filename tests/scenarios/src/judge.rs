@@ -6,7 +6,8 @@ use alloc::{format, vec};
 
 use core::sync::atomic::Ordering::Relaxed;
 
-use fass::{Commit, CommitError, OverrunPolicy};
+use fass::OverrunPolicy;
+use fass::commit::{Commit, CommitError};
 use sched_dag::engine::Run;
 use sched_dag::law::RunRecord;
 use sched_dag::{DagId, DagStatistics, JobOutcome, TaskSet};
@@ -215,7 +216,7 @@ impl Scenario {
     pub fn judge_commit(&self, commit: Result<Commit, CommitError>) -> Option<Vec<String>> {
         let refusal = commit.err();
         let faults = refusal.iter().flat_map(CommitError::faults);
-        let codes: Vec<&str> = faults.map(fass::Fault::code).collect();
+        let codes: Vec<&str> = faults.map(fass::commit::Fault::code).collect();
         match &refusal {
             _ if codes != self.refused => {
                 Some(vec![format!("the commit is refused for {codes:?}")])

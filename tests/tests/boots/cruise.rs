@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use cruise::{Releases, build, careful};
-use fass::{Wire, WireCounts, finish_create_dags};
+use fass::finish_create_dags;
+use fass::shared::{Wire, WireCounts};
 use harness::Guest;
 use tool::protocol::Status;
 use tool::{Machine, Outcome, wire_script};

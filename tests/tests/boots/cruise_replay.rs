@@ -4,7 +4,8 @@ use std::fs;
 use std::time::Duration;
 
 use cruise::{Releases, build, careful};
-use fass::{Wire, finish_create_dags};
+use fass::finish_create_dags;
+use fass::shared::Wire;
 use harness::Guest;
 use recording::{EntryKind, Recording};
 use tool::{recordings, system};

@@ -284,7 +284,8 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
 /// The names that these need.
 const USES: &str = r"
 use core::time::Duration;
-use fass::{Parameter, Policy, Preemption, SubtaskAttributes, Wire, create_dag, finish_create_dags};
+use fass::shared::{Parameter, Wire};
+use fass::{Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags};
 ";
 
 /// Calls that `main` may make before it commits, in the place of asking for its options' end.

@@ -10,11 +10,12 @@ use std::path::PathBuf;
 use tool::system::workspace;
 
 /// Files with items that apps use: all of a folder, or these.
-const FOLDERS: [&str; 6] = [
+const FOLDERS: [&str; 7] = [
     "fass/src",
     "fass/src/api",
     "fass/src/commit",
     "fass/src/draft",
+    "fass/src/platform",
     "fass/src/run",
     "fass/virtual-time/src",
 ];

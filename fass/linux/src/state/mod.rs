@@ -24,7 +24,7 @@
 
 use std::sync::Arc;
 
-use fass::SubtaskRunner;
+use fass::platform::SubtaskRunner;
 use sched_dag::engine::{Engine, FaultCost, PlatformPort};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Mailboxes, PendingRequests, Request};

@@ -13,7 +13,7 @@ use crate::platform::HOST;
 use crate::state::Number;
 use crate::team::Team;
 use crate::{Linux, Mechanism, sys};
-use fass::SubtaskRunner;
+use fass::platform::SubtaskRunner;
 
 /// `low` is read, then thought about; `urgent` preempts that; `first` precedes both.
 const DAGS: [&str; 3] = ["low", "urgent", "first"];

@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::thread;
 
 use crate::support::{alone, alone_on, breaches, chain, mechanisms, ms};
-use fass::{Parameter, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::shared::Parameter;
+use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use linux::{Control, Linux, Mechanism};
 
 #[test]

@@ -6,9 +6,8 @@ use std::thread;
 use std::time::Duration;
 
 use crate::support::{alone, mechanisms, ms};
-use fass::{
-    Dag, Received, Sender, SubtaskAttributes, Wire, WireOptions, create_dag, finish_create_dags,
-};
+use fass::shared::{Received, Sender, Wire, WireOptions};
+use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Mechanism;
 
 fn number(line: &[u8]) -> Option<u64> {

@@ -345,7 +345,7 @@ const SET: u8 = 2;
 /// A value that is set at most once and then read by everybody.
 ///
 /// ```
-/// static PLACE: fass::SetOnce<u32> = fass::SetOnce::new();
+/// static PLACE: fass::platform::SetOnce<u32> = fass::platform::SetOnce::new();
 /// assert_eq!(PLACE.get(), None);
 /// assert!(PLACE.set(1) && !PLACE.set(2));
 /// assert_eq!(PLACE.get(), Some(&1));

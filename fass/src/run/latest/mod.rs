@@ -253,7 +253,8 @@ mod tests;
 ///
 /// ```
 /// use core::time::Duration;
-/// use fass::{Sample, SubtaskAttributes, create_dag, finish_create_dags};
+/// use fass::shared::Sample;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 ///
 /// # let machine = virtual_time::VirtualTime::new();
 /// let period = Duration::from_millis(10);

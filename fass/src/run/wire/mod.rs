@@ -53,12 +53,12 @@ impl EventCounter {
     }
 }
 
-/// Where a packet ends in the bytes that arrive on a [`Wire`](crate::Wire).
+/// Where a packet ends in the bytes that arrive on a [`Wire`](crate::shared::Wire).
 ///
 /// This much is known to the code that takes bytes from a device, and so it has no code of
 /// the app's. What the packet means is the app's: its decoder gets each.
 ///
-/// See [`WireOptions`](crate::WireOptions).
+/// See [`WireOptions`](crate::shared::WireOptions).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Framing {
     /// With a line feed, which is not in the packet; nor is a carriage return before it. An

@@ -8,8 +8,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::sync::OnceLock;
 
-use fass::{ConstructionPolicy, Dag, LaunchError, Occupation, Plan, Platform, Policy, SubtaskCode};
-use fass::{Preemption, RunConfig, SubtaskAttributes};
+use fass::commit::ConstructionPolicy;
+use fass::platform::RunConfig;
+use fass::platform::{LaunchError, Plan, Platform, SubtaskCode};
+use fass::{Dag, Occupation, Policy};
+use fass::{Preemption, SubtaskAttributes};
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 
@@ -45,7 +48,7 @@ impl Platform for Keeper {
 /// Installs the platform, unless another test of the program already has.
 pub(crate) fn install() {
     static IS_OURS: OnceLock<bool> = OnceLock::new();
-    assert!(IS_OURS.get_or_init(|| fass::install(&Keeper).is_ok()));
+    assert!(IS_OURS.get_or_init(|| fass::platform::install(&Keeper).is_ok()));
 }
 
 pub(crate) fn named(name: &str) -> SubtaskAttributes {
@@ -63,7 +66,8 @@ pub(crate) fn panic_message(action: impl FnOnce()) -> String {
 /// Commits DAGs of any graph that must be faultless, and returns their plan.
 pub(crate) fn commit(dags: &[Dag]) -> Plan {
     install();
-    if let Err(error) = fass::finish_create_dags_with(dags, ConstructionPolicy::any_graph()) {
+    if let Err(error) = fass::commit::finish_create_dags_with(dags, ConstructionPolicy::any_graph())
+    {
         panic!("{error}");
     }
     take()

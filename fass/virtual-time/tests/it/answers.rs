@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use crate::support::{every, ms, named, taking, ticking, work};
-use fass::{
-    Commit, ConstructionPolicy, Dag, DagAnswer, Fault, OverheadSource, Overheads, Policy,
-    Preemption, create_dag, finish_create_dags, finish_create_dags_with,
+use fass::commit::{
+    Commit, ConstructionPolicy, DagAnswer, Fault, OverheadSource, Overheads,
+    finish_create_dags_with,
 };
+use fass::{Dag, Policy, Preemption, create_dag, finish_create_dags};
 use virtual_time::{Report, VirtualTime};
 
 /// A chain of two subtasks that execute for their WCETs, of one priority; all in milliseconds.

@@ -5,7 +5,9 @@
 
 use crate::support::{Seen, every, ms, taking, work};
 use common::random::Random;
-use fass::{ConstructionPolicy, Dag, EndToEnd, Latest, Policy, Sample, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, EndToEnd, finish_create_dags_with};
+use fass::shared::{Latest, Sample};
+use fass::{Dag, Policy};
 use virtual_time::{InstanceRecord, Report, VirtualTime};
 
 /// The job of the first DAG that a value goes back to.

@@ -2,7 +2,8 @@
 //! when, the scenarios tell.)
 
 use crate::support::{Seen, every, job_numbers, ms, named, run, ticking, work};
-use fass::{Dag, FaultLimit, Sample, Unique, create_dag, finish_create_dags};
+use fass::shared::Sample;
+use fass::{Dag, FaultLimit, Unique, create_dag, finish_create_dags};
 use virtual_time::VirtualTime;
 
 /// At most one fault within three jobs.

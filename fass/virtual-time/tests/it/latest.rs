@@ -1,7 +1,8 @@
 //! Latest values between DAGs, in virtual time.
 
 use crate::support::{Seen, every, job_numbers, ms, named, run, taking};
-use fass::{Dag, Latest, Sample, Unique, finish_create_dags};
+use fass::shared::{Latest, Sample};
+use fass::{Dag, Unique, finish_create_dags};
 use virtual_time::VirtualTime;
 
 /// Offers job numbers as `count`, every `period`, each after 4 ms of work.

@@ -1,7 +1,8 @@
 //! Changes that functions make to a run besides outputs: switches, signals; and those they may not.
 
 use crate::support::{every, job_numbers, named, run, ticking, work};
-use fass::{Dag, Switch, create_dag};
+use fass::shared::Switch;
+use fass::{Dag, create_dag};
 use virtual_time::{EventKind, VirtualTime};
 
 /// A DAG of one subtask that asks for something of another DAG in each job, every 20 ms.

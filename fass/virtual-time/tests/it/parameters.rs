@@ -2,7 +2,7 @@
 //! (Who may read them, the page of errors tells.)
 
 use crate::support::{Seen, every, ms, named, taking, work};
-use fass::{Parameter, Tunable};
+use fass::shared::{Parameter, Tunable};
 use virtual_time::VirtualTime;
 
 /// Commits a DAG of 5 jobs every 10 ms, whose source reads the parameter, works for 4 ms and sends

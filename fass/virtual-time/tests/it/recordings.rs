@@ -5,7 +5,8 @@
 use std::ops::AddAssign;
 
 use crate::support::{commit, every, job_numbers, ms, named, run, ticking};
-use fass::{Dag, Raiser, Sample, State, create_dag, finish_create_dags};
+use fass::shared::{Raiser, Sample, State};
+use fass::{Dag, create_dag, finish_create_dags};
 use recording::{Channel, Entry, EntryKind, Recording, Role, Writer, to_bytes};
 use virtual_time::{JobShown, Passed, Report, RunError, SubtaskShown, Value, VirtualTime};
 

@@ -9,9 +9,10 @@ use std::time::Duration;
 
 use crate::support::{ms, named};
 use common::random::{Random, nth};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use fass::shared::{Raiser, Sample, Signal, Uses};
 use fass::{
-    ConstructionPolicy, Dag, FaultLimit, Occupation, OverrunPolicy, Policy, Preemption, Raiser,
-    Sample, Signal, Uses, create_dag, execute_for, finish_create_dags_with,
+    Dag, FaultLimit, Occupation, OverrunPolicy, Policy, Preemption, create_dag, execute_for,
 };
 use recording::{Entry, EntryKind, Recording, Role};
 use virtual_time::{PanicRecord, Report, VirtualTime};

@@ -4,9 +4,8 @@ use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::support::{commit, every, job_numbers, ms, named, taking};
-use fass::{
-    Dag, Framing, Packet, Received, Sender, Wire, WireOptions, create_dag, finish_create_dags,
-};
+use fass::shared::{Framing, Packet, Received, Sender, Wire, WireOptions};
+use fass::{Dag, create_dag, finish_create_dags};
 use virtual_time::{Silent, VirtualTime};
 
 fn number(packet: &[u8]) -> Option<u32> {

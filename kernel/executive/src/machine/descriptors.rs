@@ -6,7 +6,7 @@ use core::arch::asm;
 use alloc::boxed::Box;
 
 use super::vector::{OTHER, TIMER};
-use fass::SetOnce;
+use fass::platform::SetOnce;
 
 /// The code segment's selector.
 pub(super) const CODE: u16 = 0x08;

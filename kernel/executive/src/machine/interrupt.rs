@@ -15,7 +15,7 @@ use super::{
     cpu, descriptors, interrupt_flag, interrupts_off, local_apic, non_maskable, this_core, timer,
     turns, vector,
 };
-use fass::SetOnce;
+use fass::platform::SetOnce;
 
 global_asm!(
     include_str!("interrupt.s"),

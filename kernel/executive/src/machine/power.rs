@@ -4,7 +4,7 @@
 use core::sync::atomic::{AtomicU8, Ordering};
 
 use boot::power::{Off, Power, Register};
-use fass::SetOnce;
+use fass::platform::SetOnce;
 use front::app::ending::AppExit;
 
 use super::{cpu, non_maskable, port, serial, this_core};

@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use boot::Framebuffer;
 use boot::screen::{Grid, Screen};
 
-use fass::SetOnce;
+use fass::platform::SetOnce;
 
 static GRID: Grid = Grid::new();
 static SCREEN: SetOnce<Screen> = SetOnce::new();

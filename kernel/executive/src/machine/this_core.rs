@@ -14,7 +14,7 @@ use super::context::{Context, Parked, Registers};
 use super::cpu;
 use super::descriptors::{self, TaskState};
 use super::meter::CoreMeter;
-use fass::SetOnce;
+use fass::platform::SetOnce;
 
 /// The stacks with which a core begins: their tops, each with a guard page below,
 /// and the context that it runs first.

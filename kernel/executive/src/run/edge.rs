@@ -9,8 +9,9 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use fass::edge::RecordedValue;
 use fass::edge::{Edge, EdgeMode, Record};
-use fass::{LaunchError, Plan, RecordedValue};
+use fass::platform::{LaunchError, Plan};
 use sched_dag::{DriverNotice, Instance};
 
 use crate::machine::debug_port;

@@ -3,9 +3,11 @@
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
+use fass::Occupation;
 use fass::edge::{Begin, BootRecord};
+use fass::edge::{Channel, RecordedValue};
 use fass::log::LogLine;
-use fass::{Channel, Clock, LaunchError, Occupation, Plan, Platform, RecordedValue, RunConfig};
+use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig};
 use sched_dag::DagId;
 
 use super::{edge, execution, occupation, record, stacks};
@@ -68,7 +70,7 @@ impl Platform for Kernel {
 
     #[cfg(feature = "clusters")]
     fn assign(&self, task_set: &mut sched_dag::TaskSet) -> Result<(), LaunchError> {
-        fass::assign_clusters(self, task_set)
+        fass::commit::assign_clusters(self, task_set)
     }
 
     fn now_ns(&self) -> u64 {
@@ -134,7 +136,7 @@ impl Platform for Kernel {
                 Ok(launched)
             });
             if launched? {
-                fass::set_clock(&TOLD);
+                fass::platform::set_clock(&TOLD);
             }
             stacks::watch(&mut plan);
         }

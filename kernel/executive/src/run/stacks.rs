@@ -7,7 +7,7 @@
 use alloc::boxed::Box;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use fass::Plan;
+use fass::platform::Plan;
 
 use crate::machine::paint;
 use crate::machine::spinlock::SpinLock;

@@ -29,7 +29,7 @@ use core::cell::{Cell, RefCell};
 use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::{CommitError, Overheads};
+use fass::commit::{CommitError, Overheads};
 use sched_dag::engine::Run;
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
 

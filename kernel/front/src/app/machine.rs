@@ -16,7 +16,10 @@ use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
-use fass::{CoreDivision, Dag, Policy, Preemption, RunConfig, Signal, Tunable, Wire};
+use fass::commit::CoreDivision;
+use fass::platform::RunConfig;
+use fass::shared::{Signal, Tunable, Wire};
+use fass::{Dag, Policy, Preemption};
 use sched_dag::engine::Run;
 
 use super::ending::AppError;
@@ -371,7 +374,8 @@ impl<S: System> Machine<S> {
     /// it has a wire already.
     ///
     /// ```no_run
-    /// use fass::{Received, SubtaskAttributes, Wire, create_dag, finish_create_dags};
+    /// use fass::shared::{Received, Wire};
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
     ///
     /// fn listen(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
     ///     let wire = Wire::new("keys");
@@ -425,7 +429,7 @@ impl<S: System> Machine<S> {
     /// range; [`AppError::Failure`] if two have one name, or it was called before.
     ///
     /// ```no_run
-    /// use fass::Parameter;
+    /// use fass::shared::Parameter;
     ///
     /// fn gain(machine: &kernel::Machine) -> Result<Parameter<f64>, kernel::AppError> {
     ///     let gain = Parameter::new("gain", 0.5, 0.0..=2.0);

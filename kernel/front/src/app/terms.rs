@@ -3,10 +3,12 @@
 
 use alloc::format;
 
+use fass::commit::Overheads;
 use fass::edge::job_of;
 use fass::log::Level::{Debug, Error, Info, Warn};
 use fass::log::{Level, set_level};
-use fass::{Overheads, Policy, Preemption, RunConfig};
+use fass::platform::RunConfig;
+use fass::{Policy, Preemption};
 
 use crate::options::{CommandLine, UsageError};
 

@@ -18,8 +18,8 @@ use core::fmt::{self, Display};
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::SetOnce;
 use fass::edge::WatchedValue;
+use fass::platform::SetOnce;
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, DagSnapshot, Scheduler, TaskSet};

@@ -7,7 +7,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt::{self, Display};
 
-use fass::Tunable;
+use fass::shared::Tunable;
 use sched_dag::nearest_of;
 
 use super::{Commands, Refuse};

@@ -72,8 +72,9 @@ impl LiveRun for NoRun {
 
 #[test]
 fn what_is_typed_is_asked_of_the_run_and_no_function_is_told_the_time_for_it() {
-    static TOLD: fass::Clock = || panic!("it is told to the function that is interrupted");
-    fass::set_clock(&TOLD);
+    static TOLD: fass::platform::Clock =
+        || panic!("it is told to the function that is interrupted");
+    fass::platform::set_clock(&TOLD);
     TOPICS.set(Box::leak(Box::new(TopicCommands::<NoRun>::new())));
     let typed =
         b"stop lidar\nstart 0\nstop radar\necho points\necho off\nhz points\n\x03shutdown\n";

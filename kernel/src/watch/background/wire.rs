@@ -13,7 +13,7 @@
 use alloc::boxed::Box;
 use alloc::format;
 
-use fass::Wire;
+use fass::shared::Wire;
 
 use super::{LINE, Line};
 use crate::options::UsageError;

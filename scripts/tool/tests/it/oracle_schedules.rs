@@ -1,6 +1,6 @@
 //! The scheduler against reference schedules, and the refusal of broken files.
 
-use fass::{ConstructionPolicy, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use replay::{Epoch, Scale, build};
 use tool::oracle::schedules::{Case, Deviation, check, compare, parse};
 use virtual_time::VirtualTime;

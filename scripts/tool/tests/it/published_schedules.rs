@@ -4,7 +4,8 @@
 use std::fs;
 
 use dag_file::{Execution, Length, Set, Settings, build};
-use fass::{ConstructionPolicy, Occupation, Policy, Preemption, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use fass::{Occupation, Policy, Preemption};
 use tool::dag_file::stg;
 use tool::json::{self, Value};
 use tool::system::workspace;

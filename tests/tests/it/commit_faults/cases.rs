@@ -5,10 +5,8 @@
 
 use std::time::Duration;
 
-use fass::{
-    Dag, FaultLimit, Latest, Modes, Parameter, Sample, SubtaskAttributes, Unique, Uses, create_dag,
-    finish_create_dags,
-};
+use fass::shared::{Latest, Modes, Parameter, Sample, Uses};
+use fass::{Dag, FaultLimit, SubtaskAttributes, Unique, create_dag, finish_create_dags};
 
 /// A fault's name and what builds the DAGs with that fault.
 type Case = (&'static str, fn() -> Vec<Dag>);

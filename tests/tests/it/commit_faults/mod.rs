@@ -19,38 +19,38 @@ use sched_dag::{
 };
 use tool::golden::Golden;
 
-fn not_launched() -> fass::CommitError {
+fn not_launched() -> fass::commit::CommitError {
     let machine = virtual_time::VirtualTime::new();
     finish_create_dags(&[starting("first")]).expect("the first plan is taken");
     refused(machine, starting("second")) // a machine takes one plan
 }
 
-fn wcets_refused() -> fass::CommitError {
+fn wcets_refused() -> fass::commit::CommitError {
     let observed = "margin 20\ndag 1 lidar\nwcet 1200000 0 start\nend\n";
     let machine = virtual_time::VirtualTime::new().wcets(observed);
     refused(machine, starting("lidar")) // another graph has that hash
 }
 
-fn cluster_without_cores() -> fass::CommitError {
+fn cluster_without_cores() -> fass::commit::CommitError {
     let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[2, 0]);
     let dag = starting("lidar");
     dag.cluster(0);
     refused(machine, dag) // nothing can run in cluster 1
 }
 
-fn clusters_beyond_cores() -> fass::CommitError {
+fn clusters_beyond_cores() -> fass::commit::CommitError {
     let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[1, 2]);
     let dag = starting("lidar");
     dag.cluster(0);
     refused(machine, dag) // there are no 3 cores
 }
 
-fn no_cluster() -> fass::CommitError {
+fn no_cluster() -> fass::commit::CommitError {
     let machine = virtual_time::VirtualTime::new().cores(2).clusters(&[1, 1]);
     refused(machine, starting("lidar")) // it could run in either
 }
 
-fn not_assigned() -> fass::CommitError {
+fn not_assigned() -> fass::commit::CommitError {
     let machine = virtual_time::VirtualTime::new().cores(2).assign_clusters();
     let dag = fass::create_dag();
     dag.name("lidar").period(PERIOD).relative_deadline(PERIOD);
@@ -70,9 +70,9 @@ fn starting(name: &str) -> fass::Dag {
 }
 
 /// Commits a DAG for a machine that refuses it.
-fn refused(_machine: virtual_time::VirtualTime, dag: fass::Dag) -> fass::CommitError {
-    let any_graph = fass::ConstructionPolicy::any_graph();
-    fass::finish_create_dags_with(&[dag], any_graph).expect_err("there is a fault")
+fn refused(_machine: virtual_time::VirtualTime, dag: fass::Dag) -> fass::commit::CommitError {
+    let any_graph = fass::commit::ConstructionPolicy::any_graph();
+    fass::commit::finish_create_dags_with(&[dag], any_graph).expect_err("there is a fault")
 }
 
 fn no_cores() -> Vec<DagFault> {
@@ -180,7 +180,7 @@ fn every_fault_is_found_and_said_as_documented() {
 #[test]
 fn every_kind_of_fault_has_an_entry() {
     let documented: BTreeSet<String> = documented_faults().into_keys().collect();
-    let tables = [sched_dag::DagFault::CODES, fass::Fault::CODES];
+    let tables = [sched_dag::DagFault::CODES, fass::commit::Fault::CODES];
     let mut codes: BTreeSet<String> = tables.concat().into_iter().map(String::from).collect();
     // Others are named where they are found.
     let others = sources(&["fass/src/draft/checks.rs"]);

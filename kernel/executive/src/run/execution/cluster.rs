@@ -9,7 +9,7 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 
-use fass::SetOnce;
+use fass::platform::SetOnce;
 use sched_dag::CoreId;
 
 use super::ClusterRun;

@@ -5,7 +5,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 use core::sync::atomic::Ordering;
 
-use fass::LaunchError;
+use fass::platform::LaunchError;
 use sched_dag::lifecycle::{self, Lifecycle, Parts};
 use sched_dag::{DagId, TaskSet};
 

@@ -6,7 +6,7 @@
 use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
-use fass::Request;
+use fass::platform::Request;
 use sched_dag::{ClusterId, lifecycle};
 
 use super::cluster::{CoreSet, FIRST_SEAT, nth};

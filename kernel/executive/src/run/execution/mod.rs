@@ -25,7 +25,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use fass::{LaunchError, Plan, RunConfig};
+use fass::platform::{LaunchError, Plan, RunConfig};
 use sched_dag::engine::{Engine, ProvenBounds, Run};
 use sched_dag::lifecycle::PendingRequests;
 use sched_dag::{Dag, Journal, Scheduler, TaskSet};

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use core::ops::{Deref, DerefMut};
 use core::sync::atomic::Ordering;
 
-use fass::{LaunchError, SubtaskCode};
+use fass::platform::{LaunchError, SubtaskCode};
 use sched_dag::engine::{PlatformPort, SubtaskBody as _};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{self, Request};
@@ -94,12 +94,12 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     }
 }
 
-/// A subtask's [runner](fass::SubtaskRunner), and what running an instance of it takes here.
+/// A subtask's [runner](fass::platform::SubtaskRunner), and what running an instance of it takes here.
 ///
 /// There is one for each subtask, as a subtask has one started instance at a time
 /// (R2). Between its place and the core that runs it moves a [`RunnerLoan`].
 pub struct CoreRunner {
-    pub(super) inner: fass::SubtaskRunner,
+    pub(super) inner: fass::platform::SubtaskRunner,
     cluster: &'static ClusterState,
     /// The time that an instance may execute for, `u64::MAX` if there is no limit.
     pub(super) budget_ns: u64,
@@ -117,17 +117,17 @@ impl CoreRunner {
 }
 
 impl Deref for CoreRunner {
-    type Target = fass::SubtaskRunner;
+    type Target = fass::platform::SubtaskRunner;
 
     #[inline]
-    fn deref(&self) -> &fass::SubtaskRunner {
+    fn deref(&self) -> &fass::platform::SubtaskRunner {
         &self.inner
     }
 }
 
 impl DerefMut for CoreRunner {
     #[inline]
-    fn deref_mut(&mut self) -> &mut fass::SubtaskRunner {
+    fn deref_mut(&mut self) -> &mut fass::platform::SubtaskRunner {
         &mut self.inner
     }
 }
@@ -138,7 +138,7 @@ pub(super) fn runners(
     bodies: Vec<Vec<SubtaskCode>>,
     budget_factor: u64,
 ) -> impl Iterator<Item = CoreRunner> {
-    fass::SubtaskRunner::all(task_set, bodies).map(move |inner| {
+    fass::platform::SubtaskRunner::all(task_set, bodies).map(move |inner| {
         let dag = task_set.dag(inner.instance.dag);
         let subtask = dag.subtask(inner.instance.subtask);
         CoreRunner {

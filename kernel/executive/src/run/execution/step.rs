@@ -16,7 +16,7 @@
 
 use core::sync::atomic::Ordering;
 
-use fass::{Plan, Request};
+use fass::platform::{Plan, Request};
 use sched_dag::engine::{Engine, NextAction};
 use sched_dag::journal::{EventKind, EventSubject};
 use sched_dag::placement::NextWork;

@@ -19,10 +19,8 @@ use std::process::ExitCode;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use fass::{
-    ConstructionPolicy, Policy, SubtaskAttributes, create_dag, finish_create_dags,
-    finish_create_dags_with,
-};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use fass::{Policy, SubtaskAttributes, create_dag, finish_create_dags};
 use hand_off::Shape;
 use linux::{Linux, Mechanism};
 use replay::shown::quoted;

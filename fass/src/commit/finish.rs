@@ -1,0 +1,291 @@
+//! The commit: from drafts to a running plan, or to all that is wrong with them.
+//!
+//! Five steps, each of which either goes through for all DAGs or stops there:
+//!
+//! 1. *Verify.* Every fault of every DAG is collected, ours and the model's. If
+//!    there is one, nothing has happened; the handles are as they were.
+//! 2. *Assign.* Where the platform leaves that to the commit, the cores are divided among the
+//!    DAGs. The order of subtasks is fixed in DAGs that allow it, where that proves more.
+//! 3. *Answer.* The response times are bounded where that can be done, for the
+//!    model that the platform will run. A lacking proof that was demanded ends
+//!    the commit as a fault does.
+//! 4. *Tie.* Edges get their rings, functions become bodies. This cannot fail.
+//! 5. *Launch.* The platform takes the plan.
+
+use alloc::format;
+use alloc::rc::Rc;
+use alloc::string::ToString;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use sched_dag::analysis::{self, NotAssigned};
+use sched_dag::{
+    CommitOptions, ConstructionPolicy, CountLimit, DagId, DagLabel, Policy, TaskSet, VerifiedDags,
+    Warning, sorted_by_key, wcets,
+};
+
+use super::answer::{Commit, CommitAnswers, staleness};
+use super::tie::tie;
+use crate::api::dag::Dag;
+use crate::draft::checks::{self, Drafts};
+use crate::draft::fault::{CommitError, Fault};
+use crate::platform;
+use crate::platform::{LaunchError, Platform};
+
+/// Verifies DAGs and hands them to the installed platform, which schedules them.
+///
+/// It ends construction: the DAGs can no longer be changed. They are verified
+/// for the platform's policy and cores, with the paper's construction policy:
+/// one source, one sink, one writer a topic.
+///
+/// It also answers about deadlines where WCETs are given; see
+/// [`Commit::answers`].
+///
+/// # Errors
+///
+/// A [`CommitError`] with *every* fault of every DAG. Nothing runs then, and the
+/// handles can still be added to and committed again, with one exception: after
+/// [`Fault::NotLaunched`] the functions are gone with the refused plan, and the
+/// DAGs must be built anew.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// dag.name("demo");
+/// dag.register_periodic_subtask(
+///     || (1_i32,),
+///     ["number"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("source"),
+/// );
+/// dag.register_sink_subtask(
+///     |(number,): (u64,)| println!("{number}"), // not the type that is written
+///     ["number"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("sink"),
+/// );
+/// let error = finish_create_dags(&[dag.clone()]).unwrap_err();
+/// assert_eq!(error.faults()[0].code(), "type_mismatch");
+/// ```
+pub fn finish_create_dags(dags: &[Dag]) -> Result<Commit, CommitError> {
+    finish_create_dags_with(dags, ConstructionPolicy::paper())
+}
+
+/// Works like [`finish_create_dags`] for other shapes of graph: with several
+/// sources or sinks, or of several parts. Nothing else changes.
+///
+/// A topic has one writer whatever `construction` says: an input is one value a job,
+/// and which of two it were would depend on the schedule.
+///
+/// All sources of a job become ready at its release; a job is complete when all
+/// its sinks are.
+///
+/// # Errors
+///
+/// As [`finish_create_dags`], except for the shapes that `construction` allows.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::commit::{ConstructionPolicy, CountLimit, finish_create_dags_with};
+/// use fass::{SubtaskAttributes, create_dag};
+///
+/// # let machine = virtual_time::VirtualTime::new();
+/// let dag = create_dag();
+/// let period = Duration::from_millis(10);
+/// dag.jobs(2).period(period).relative_deadline(period);
+/// let subtasks = [(); 3].map(|()| dag.register_untyped_subtask(|_| (), SubtaskAttributes::default()));
+/// dag.precede(&subtasks[0], &subtasks[2]).precede(&subtasks[1], &subtasks[2]);
+///
+/// let construction = ConstructionPolicy {
+///     sources: CountLimit::Several,
+///     ..ConstructionPolicy::paper()
+/// };
+/// finish_create_dags_with(&[dag], construction).unwrap();
+/// ```
+pub fn finish_create_dags_with(
+    dags: &[Dag],
+    construction: ConstructionPolicy,
+) -> Result<Commit, CommitError> {
+    let construction = ConstructionPolicy {
+        writers: CountLimit::One,
+        ..construction
+    };
+    let drafts: Vec<_> = dags.iter().map(|dag| Rc::clone(&dag.draft)).collect();
+    let with = |policy, cores| CommitOptions::new(policy, cores).with_construction(construction);
+    let Some(platform) = platform::installed() else {
+        // What else is wrong does not depend on the platform, except for the
+        // attributes; under EDF none is needed.
+        let mut error = match verify(&drafts, with(Policy::Edf, 1), None) {
+            Ok(accepted) => CommitError {
+                faults: Vec::new(),
+                warnings: accepted.warnings,
+            },
+            Err(error) => error,
+        };
+        error.faults.insert(0, Fault::NoPlatform);
+        return Err(error);
+    };
+    let terms = platform.terms();
+    let options = with(terms.scheduler.policy, terms.scheduler.cores);
+    let options = options.with_clusters(terms.clusters.clone());
+    let VerifiedDags {
+        mut task_set,
+        mut warnings,
+    } = verify(&drafts, options, terms.wcets.as_deref())?;
+    if terms.assigns
+        && let Err(error) = platform.assign(&mut task_set)
+    {
+        return Err(CommitError::of(Fault::NotAssigned(error), warnings));
+    }
+    analysis::fix_orders(&mut task_set, &terms.settings());
+    let answers = CommitAnswers::new(&task_set, &terms);
+    let certain = answers.certain_misses();
+    warnings.extend(certain.map(|(dag, reason)| Warning::CertainMiss { dag, reason }));
+    let faults = lacking_proofs(&drafts, &answers);
+    if !faults.is_empty() {
+        return Err(CommitError { faults, warnings });
+    }
+    let staleness = Arc::new(staleness(&drafts, &task_set, &answers.of_dags));
+    let task_set = Arc::new(task_set);
+    let plan = tie(
+        &drafts,
+        Arc::clone(&task_set),
+        &answers,
+        Arc::clone(&staleness),
+    );
+    match platform.launch(plan) {
+        Ok(()) => Ok(Commit {
+            warnings,
+            answers,
+            staleness,
+            task_set,
+        }),
+        Err(error) => Err(CommitError::of(Fault::NotLaunched(error), warnings)),
+    }
+}
+
+/// Returns a fault for each DAG that demands a proof and has none.
+fn lacking_proofs(drafts: &Drafts, answers: &CommitAnswers) -> Vec<Fault> {
+    let demanding =
+        (drafts.iter().zip(&answers.of_dags)).filter(|(draft, _)| draft.borrow().demands_proof);
+    let lacking = demanding.filter_map(|(_, answer)| {
+        Some(Fault::NotProven {
+            dag: answer.dag.clone(),
+            unproven: answer.verdict.unproven()?.clone(),
+        })
+    });
+    lacking.collect()
+}
+
+/// Reports for each DAG whether it stands in the list before, too.
+fn repeated(drafts: &Drafts) -> Vec<bool> {
+    let address = |number: usize| Rc::as_ptr(&drafts[number]);
+    let mut is_repeated = alloc::vec![false; drafts.len()];
+    for pair in sorted_by_key(drafts.len(), address).windows(2) {
+        is_repeated[pair[1]] = address(pair[0]) == address(pair[1]);
+    }
+    is_repeated
+}
+
+/// Verifies all DAGs, and collects the faults of both crates.
+fn verify(
+    drafts: &Drafts,
+    options: CommitOptions,
+    observed: Option<&str>,
+) -> Result<VerifiedDags, CommitError> {
+    let mut faults = Vec::new();
+    let open: Vec<_> = drafts.iter().map(|draft| draft.borrow()).collect();
+    let mut specs = Vec::with_capacity(drafts.len());
+    for ((number, draft), is_repeated) in open.iter().enumerate().zip(repeated(drafts)) {
+        let label = DagLabel {
+            id: DagId(u32::try_from(number).unwrap_or(u32::MAX)),
+            name: draft.spec.name.clone(),
+        };
+        if is_repeated {
+            faults.push(Fault::GivenTwice { dag: label });
+            continue;
+        }
+        if draft.is_committed {
+            faults.push(Fault::AlreadyCommitted { dag: label });
+            continue;
+        }
+        let mut spec = draft.spec_with_known_types();
+        if specs.len() < number && spec.name.is_empty() {
+            // DAGs were left out before it, so the model counts differently.
+            spec.to_mut().name = number.to_string();
+        }
+        let label = DagLabel {
+            id: DagId(u32::try_from(specs.len()).unwrap_or(u32::MAX)),
+            name: spec.name.clone(),
+        };
+        faults.extend(draft.flaws.iter().map(|flaw| flaw(label.clone())));
+        if let Some(Err(fault)) = observed.map(|file| wcets::apply(file, spec.to_mut())) {
+            let dag = label.clone();
+            faults.push(Fault::WcetsRefused { dag, fault });
+        }
+        checks::check_dag(drafts, draft, &label, &mut faults);
+        specs.push(spec);
+    }
+    checks::check_all(drafts, &mut faults);
+    // A commit of nothing but repeated DAGs has been told what is wrong.
+    if specs.is_empty() && !faults.is_empty() {
+        let warnings = Vec::new();
+        return Err(CommitError { faults, warnings });
+    }
+    match sched_dag::verify(&specs, &options) {
+        Ok(verified) if faults.is_empty() => Ok(verified),
+        Ok(VerifiedDags { warnings, .. }) => Err(CommitError { faults, warnings }),
+        Err(rejected) => {
+            let (mut news, warnings) = rejected.into_parts();
+            news.retain(|fault| !is_consequence(fault, &faults));
+            faults.extend(news.into_iter().map(Fault::Model));
+            Err(CommitError { faults, warnings })
+        }
+    }
+}
+
+/// Reports whether a fault of the model only repeats one of ours: a period or a
+/// deadline is missing because it was too long to be noted.
+fn is_consequence(fault: &sched_dag::DagFault, ours: &[Fault]) -> bool {
+    let (label, missing) = match fault {
+        sched_dag::DagFault::MissingPeriod { dag } => (dag, "period"),
+        sched_dag::DagFault::MissingDeadline { dag } => (dag, "relative deadline"),
+        _ => return false,
+    };
+    ours.iter().any(|fault| {
+        matches!(fault, Fault::DurationTooLong { dag, what, .. } if dag == label && *what == missing)
+    })
+}
+
+/// Divides a platform's cores for a task set, as [`sched_dag::analysis::assign()`] does: what
+/// [`Platform::assign`] is to do, if the commit may.
+///
+/// # Errors
+///
+/// In words: which DAG gets no cores, and why.
+///
+/// ```
+/// use fass::commit::assign_clusters;
+/// use fass::platform::{LaunchError, Platform};
+/// use sched_dag::TaskSet;
+///
+/// /// The `assign` of a platform that always leaves it to the commit.
+/// fn assign(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+///     assign_clusters(platform, task_set)
+/// }
+/// ```
+pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+    analysis::assign(task_set, &platform.terms().settings()).map_err(
+        |NotAssigned { dag, reason }| {
+            let dag = task_set.label(dag);
+            LaunchError::new(format!("{dag} gets no cores: {reason}"))
+        },
+    )
+}

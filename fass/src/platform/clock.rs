@@ -1,0 +1,112 @@
+//! Time, as functions are told it and spend it.
+
+use core::time::Duration;
+
+use super::expect_installed;
+use crate::run::cell::CurrentIndex;
+
+/// How a subtask occupies its core in [`execute_for`].
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Occupation, execute_for};
+///
+/// /// A subtask that stands for 3 ms of work.
+/// fn detect((frame,): (u32,)) -> (u32,) {
+///     execute_for(Duration::from_millis(3), Occupation::Hold);
+///     (frame,)
+/// }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Occupation {
+    /// The processor computes until the time is over.
+    Spin,
+    /// The processor halts until the time is over, while the scheduler sees the
+    /// instance run. More busy cores can then be studied than the host has.
+    Hold,
+}
+
+/// Executes for `duration` on the calling instance's core, inside a subtask.
+///
+/// Stands for computation that an app does not have yet, or whose time is what
+/// is being studied. Preempted time does not count. In virtual time it is the
+/// only thing that takes time.
+///
+/// # Panics
+///
+/// If no platform is installed.
+///
+/// # Examples
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::{Occupation, SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let dag = create_dag();
+/// dag.jobs(1);
+/// dag.register_periodic_subtask(
+///     || {
+///         fass::execute_for(Duration::from_millis(3), Occupation::Spin);
+///         (fass::now_ns(),)
+///     },
+///     ["time"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("source"),
+/// );
+/// dag.register_sink_subtask(
+///     |(time_ns,): (u64,)| assert_eq!(time_ns, 3_000_000),
+///     ["time"],
+///     Duration::from_millis(10),
+///     SubtaskAttributes::named("sink"),
+/// );
+/// finish_create_dags(&[dag]).unwrap();
+/// machine.run();
+/// ```
+pub fn execute_for(duration: Duration, how: Occupation) {
+    expect_installed().execute_for(duration, how);
+}
+
+/// The clock: the platform's, unless it has named another one.
+static CLOCK: CurrentIndex<Clock> = CurrentIndex::new(&(ASK_THE_PLATFORM as Clock));
+
+/// Tells the time, as [`now_ns`] does.
+pub type Clock = fn() -> u64;
+
+const ASK_THE_PLATFORM: Clock = || expect_installed().now_ns();
+
+/// Returns the platform's time in nanoseconds.
+///
+/// # Panics
+///
+/// If no platform is installed.
+///
+/// # Examples
+///
+/// ```
+/// let machine = virtual_time::VirtualTime::new();
+/// assert_eq!(fass::now_ns(), 0);
+/// ```
+#[inline]
+#[must_use]
+pub fn now_ns() -> u64 {
+    CLOCK.get()()
+}
+
+/// Replaces the clock behind [`now_ns`], which is [`Platform::now_ns`](super::Platform::now_ns) at first.
+///
+/// For platforms: one that records the time that functions are told sets a clock that does so, and
+/// all others one that takes fewer instructions.
+///
+/// # Examples
+///
+/// ```standalone_crate
+/// static HALF_PAST: fass::platform::Clock = || 30;
+///
+/// fass::platform::set_clock(&HALF_PAST);
+/// assert_eq!(fass::now_ns(), 30);
+/// ```
+pub fn set_clock(clock: &'static Clock) {
+    CLOCK.set(clock);
+}

@@ -1,0 +1,263 @@
+//! The platform: the machine below `fass`, and how one offers itself.
+//!
+//! `fass` names no kernel. A platform (the kernel, or virtual time on the host)
+//! installs itself once, as a logger or an allocator does, before the app
+//! commits its DAGs. The commit asks it for the policy and the cores to verify
+//! against, and leaves the [`Plan`] with it.
+
+pub(crate) mod clock;
+mod run_config;
+
+use alloc::string::String;
+use core::fmt;
+use core::time::Duration;
+
+use recording::Channel;
+use sched_dag::{DagId, TaskSet};
+
+use crate::Occupation;
+use crate::edge::Begin;
+use crate::run::line::RecordedValue;
+use crate::run::log::LogLine;
+
+pub use clock::{Clock, set_clock};
+pub use run_config::RunConfig;
+pub use sched_dag::lifecycle::Request;
+
+pub use crate::run::cell::SetOnce;
+pub use crate::run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
+
+/// A machine that schedules committed DAGs.
+///
+/// # Examples
+///
+/// The smallest platform, which accepts a plan and runs one job of it:
+///
+/// ```standalone_crate
+/// use core::time::Duration;
+/// use fass::platform::{LaunchError, Plan, Platform, RunConfig};
+/// use fass::Occupation;
+///
+/// struct OneJob;
+///
+/// impl Platform for OneJob {
+///     fn terms(&self) -> RunConfig {
+///         RunConfig::of_cores(1)
+///     }
+///     fn now_ns(&self) -> u64 {
+///         0
+///     }
+///     fn execute_for(&self, _: Duration, _: Occupation) {}
+///     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
+///         for (dag, bodies) in plan.task_set.dags().iter().zip(&mut plan.bodies) {
+///             for subtask in dag.topological_order() {
+///                 bodies[subtask.index()].run(0);
+///             }
+///         }
+///         Ok(())
+///     }
+/// }
+///
+/// fass::platform::install(&OneJob).unwrap();
+/// assert_eq!(fass::now_ns(), 0);
+/// ```
+pub trait Platform: Sync {
+    /// Returns on what terms DAGs run: a commit verifies and answers by these.
+    fn terms(&self) -> RunConfig;
+
+    /// Divides the cores for these DAGs, by [`assign_clusters`](crate::commit::assign_clusters), if the
+    /// terms leave that to the commit; a platform whose terms never do does not define this. (So
+    /// an image that never divides its cores has none of that code.)
+    ///
+    /// # Errors
+    ///
+    /// If a DAG gets no cores.
+    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
+        let _ = task_set;
+        Ok(())
+    }
+
+    /// Returns the time since the platform's start, in nanoseconds.
+    fn now_ns(&self) -> u64;
+
+    /// Occupies the calling instance's core for `duration` of execution time.
+    fn execute_for(&self, duration: Duration, how: Occupation);
+
+    /// Takes a signal to a sporadic DAG of the plan with a number, from outside all
+    /// subtasks ([`Signal::raise`](crate::shared::Signal::raise)); does nothing if that plan
+    /// is not, or no longer, there.
+    ///
+    /// # Panics
+    ///
+    /// If called by a subtask's function. A platform that does not define this
+    /// panics in any case: then only subtasks raise signals.
+    #[track_caller]
+    fn raise(&self, plan: u64, dag: DagId) {
+        let _ = (plan, dag);
+        panic!("this platform takes no signals from outside; raise them in subtasks");
+    }
+
+    /// Reports whether the plan to come shall be recorded or replayed. If it shall not, recorded
+    /// topics ([`Dag::record`](crate::Dag::record)) cost nothing.
+    fn crosses(&self) -> bool {
+        false
+    }
+
+    /// Reports whether recorded topics matter that other subtasks than sources write: a replay
+    /// compares their values, and computes them if they are not there.
+    fn results_cross(&self) -> bool {
+        true
+    }
+
+    /// Takes the recorded topics of a DAG and the hash of its names and edges, before the plan
+    /// comes. Channels are numbered over all DAGs, in the order of the calls. `begin` is for
+    /// platforms that have no memory of their own for what crosses. Reports what
+    /// [`Crossing::open`](crate::edge::Crossing::open) does, or else `false`: then values come by
+    /// [`record`](Self::record).
+    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
+        let _ = (dag, graph, channels, begin);
+        false
+    }
+
+    /// Takes a value of a recorded topic, at the completion of its writer, or what a subtask had
+    /// sampled of one, at the end of that instance; without a
+    /// definition it is forgotten. Must not wait.
+    fn record(&self, value: &RecordedValue<'_>) {
+        let _ = value;
+    }
+
+    /// Reports whether the plan to come shall take the values of recorded sources from
+    /// [`replay`](Self::replay), in place of calling them.
+    fn replays(&self) -> bool {
+        false
+    }
+
+    /// Lends the recorded value of a channel and a job to `take`, if there is one.
+    fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
+        let _ = (channel, job, take);
+    }
+
+    /// Takes a line of the [log](mod@crate::log) from the function that runs here. Adds which
+    /// instance that is, if it is one, and the time of the run, and [keeps](LogLine::keep) it for
+    /// what shows it later; without a definition it is forgotten. Must not wait.
+    fn log(&self, line: LogLine) {
+        let _ = line;
+    }
+
+    /// Takes a plan over. Its first release is the platform's to time.
+    ///
+    /// # Errors
+    ///
+    /// If the platform cannot schedule the plan. Nothing of it has run then.
+    fn launch(&self, plan: Plan) -> Result<(), LaunchError>;
+}
+
+/// Why a platform did not take a plan, or found no cores for a DAG.
+///
+/// # Examples
+///
+/// ```
+/// let error = fass::platform::LaunchError::new("640 KiB of memory are free, the plan needs 700 KiB; \
+///     register fewer subtasks or give the machine more memory");
+/// assert!(error.to_string().starts_with("640 KiB"));
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LaunchError {
+    message: String,
+}
+
+impl LaunchError {
+    /// States the reason: fact, offender, remedy.
+    ///
+    /// ```
+    /// let error = fass::platform::LaunchError::new("a plan runs already; wait for its end");
+    /// assert_eq!(error.to_string(), "a plan runs already; wait for its end");
+    /// ```
+    #[must_use]
+    pub fn new(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+        }
+    }
+}
+
+impl fmt::Display for LaunchError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl core::error::Error for LaunchError {}
+
+static PLATFORM: SetOnce<&'static dyn Platform> = SetOnce::new();
+
+/// A platform is installed already; the earlier one stays.
+///
+/// # Examples
+///
+/// ```
+/// assert!(fass::platform::AlreadyInstalled.to_string().contains("already installed"));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AlreadyInstalled;
+
+impl fmt::Display for AlreadyInstalled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a platform is already installed; install one platform, once, at start")
+    }
+}
+
+impl core::error::Error for AlreadyInstalled {}
+
+/// Installs the platform, once, for the whole program.
+///
+/// # Errors
+///
+/// [`AlreadyInstalled`] from the second call on.
+///
+/// # Examples
+///
+/// Apps do not call it; the kernel's entry or `VirtualTime` does. See
+/// [`Platform`] for a platform of one's own.
+///
+/// ```standalone_crate
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new(); // installs itself
+/// assert_eq!(fass::now_ns(), 0);
+/// ```
+pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> {
+    if PLATFORM.set(platform) {
+        Ok(())
+    } else {
+        Err(AlreadyInstalled)
+    }
+}
+
+/// Returns the installed platform, if there is one.
+#[inline]
+pub(crate) fn installed() -> Option<&'static dyn Platform> {
+    PLATFORM.get().copied()
+}
+
+#[inline]
+pub(crate) fn expect_installed() -> &'static dyn Platform {
+    match installed() {
+        Some(platform) => platform,
+        None => missing(),
+    }
+}
+
+/// Gives a value to the platform. It looks for the platform itself: a function that is called for
+/// that is, in a crate compiled for size, as long again.
+pub(crate) fn record(value: &RecordedValue<'_>) {
+    match PLATFORM.get() {
+        Some(platform) => platform.record(value),
+        None => missing(),
+    }
+}
+
+#[cold]
+fn missing() -> ! {
+    panic!("no platform is installed; boot the kernel, or make a `virtual_time::VirtualTime`")
+}
