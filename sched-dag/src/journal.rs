@@ -207,9 +207,9 @@ events! {
     /// A sporadic DAG's job that is being released was due: the event's time is the
     /// nominal release, which no grid tells.
     Due = "due", Job;
-    /// A DAG starts no further instance, because of a fault or a stop. The event's job
+    /// A DAG starts no further instance, because of a fault or an end request. The event's job
     /// is 0 and means nothing.
-    Stopped = "stopped", Dag;
+    DagEnded = "dag_ended", Dag;
     /// The instance was ended by a fault, which has cut its job, and its subtask goes on
     /// with another function.
     Restarted = "restarted", Instance;

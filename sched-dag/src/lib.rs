@@ -52,7 +52,7 @@
 //! have is the DAG's [`OverrunPolicy`]; its scenarios are in `tests/scenarios/overrun.txt`.
 //!
 //! A DAG can be *ended* before its time, by an instance that [fails](Moment::fail)
-//! or by a [stop](lifecycle::Request::Stop): it starts nothing any more, and the others are
+//! or by a [request](lifecycle::Request::End): it starts nothing any more, and the others are
 //! scheduled on. The rules E1 to E8 for that stand in `scheduler/phase.rs`,
 //! their scenarios in `tests/scenarios/ending.txt`; those for a fault that costs only its job, D1 to D7,
 //! in `scheduler/phase.rs` and `tests/scenarios/faults.txt`.

@@ -65,7 +65,7 @@
 //!
 //! - Signals are counted, so each is one.
 //! - Of a pause and a resumption of one DAG that wait, the later one counts, and so it is of modes;
-//!   a stop counts more than a closing.
+//!   an end counts more than a closing.
 //! - What is taken in one step is served in this order: DAG by DAG, the mode, the end.
 
 use alloc::boxed::Box;
@@ -366,7 +366,7 @@ impl Lifecycle for LifecyclePlan {
             | Request::Resume(_)
             | Request::Signal(_)
             | Request::Close(_)
-            | Request::Stop(_)
+            | Request::End(_)
             | Request::Step => {}
         }
     }
@@ -424,7 +424,7 @@ struct DagMailbox {
     signals: AtomicU32,
     /// [`NOTHING`], [`PAUSE`] or [`RESUME`].
     change: AtomicU32,
-    /// [`NOTHING`], [`CLOSE`] or [`STOP`].
+    /// [`NOTHING`], [`CLOSE`] or [`END`].
     end: AtomicU32,
 }
 
@@ -440,7 +440,7 @@ const NOTHING: u32 = 0;
 const PAUSE: u32 = 1;
 const RESUME: u32 = 2;
 const CLOSE: u32 = 1;
-const STOP: u32 = 2;
+const END: u32 = 2;
 
 /// The lifecycle of each cluster, which serves its requests.
 pub type Parts = Vec<Option<Box<dyn Lifecycle>>>;
@@ -500,7 +500,7 @@ impl Mailboxes {
             | Request::Pause(dag)
             | Request::Resume(dag)
             | Request::Close(dag)
-            | Request::Stop(dag) => self.dags[dag.index()].cluster,
+            | Request::End(dag) => self.dags[dag.index()].cluster,
             Request::Enter(..) => self.of_modes,
             Request::ShutDown => {
                 for (cluster, to) in (0..).map(ClusterId).zip(&self.clusters) {
@@ -523,7 +523,7 @@ impl Mailboxes {
             Request::Pause(dag) => of(dag).change.store(PAUSE, Ordering::Release),
             Request::Resume(dag) => of(dag).change.store(RESUME, Ordering::Release),
             Request::Close(dag) => _ = of(dag).end.fetch_max(CLOSE, Ordering::Release),
-            Request::Stop(dag) => of(dag).end.store(STOP, Ordering::Release),
+            Request::End(dag) => of(dag).end.store(END, Ordering::Release),
             Request::Enter(mode, entry) => {
                 let place = &self.clusters[to.index()].mode;
                 place.store(packed(mode, entry), Ordering::Release);
@@ -549,7 +549,7 @@ impl Mailboxes {
             (0..signals).for_each(|_| take(Request::Signal(dag)));
             match to.end.swap(NOTHING, Ordering::Acquire) {
                 CLOSE => take(Request::Close(dag)),
-                STOP => take(Request::Stop(dag)),
+                END => take(Request::End(dag)),
                 _ => {}
             }
         }
@@ -627,7 +627,7 @@ mod tests {
             let leaves = is_away || request == Request::ShutDown;
             assert_eq!(sent, vec![there; usize::from(leaves)], "{request:?}");
         }
-        for request in [Request::Stop(DagId(2)), Request::Close(DagId(2))] {
+        for request in [Request::End(DagId(2)), Request::Close(DagId(2))] {
             assert!(letters.send(None, request, |cluster| assert_eq!(cluster, there)));
         }
         let mut taken = Vec::new();
@@ -636,7 +636,7 @@ mod tests {
             Request::Signal(DagId(1)),
             Request::Signal(DagId(1)),
             Request::Resume(DagId(2)),
-            Request::Stop(DagId(2)),
+            Request::End(DagId(2)),
             modes[1],
             Request::ShutDown,
         ];

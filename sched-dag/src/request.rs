@@ -15,7 +15,7 @@ pub enum Request {
     /// A DAG releases no further job, and what is in flight goes on. Asked from outside only.
     Close(DagId),
     /// A DAG is ended: nothing of it starts any more. Asked from outside only.
-    Stop(DagId),
+    End(DagId),
     /// Another set of DAGs runs.
     Enter(ModeId, ModeEntry),
     /// The run ends: no DAG releases a further job.
@@ -36,7 +36,7 @@ impl Request {
     pub const fn is_of_lifecycle(self) -> bool {
         !matches!(
             self,
-            Self::Signal(_) | Self::Close(_) | Self::Stop(_) | Self::Step
+            Self::Signal(_) | Self::Close(_) | Self::End(_) | Self::Step
         )
     }
 }

@@ -394,7 +394,7 @@ pub trait Workload<B = Instance> {
         let _ = (instance, fault);
     }
 
-    /// A job is released, skipped or completed, or a DAG stopped.
+    /// A job is released, skipped or completed, or a DAG ended.
     fn hear(&mut self, notice: &DriverNotice) {
         let _ = notice;
     }
@@ -489,7 +489,7 @@ impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
     const HEARS: &'static [EventKind] = &[
         EventKind::Released,
         EventKind::Skipped,
-        EventKind::Stopped,
+        EventKind::DagEnded,
         EventKind::Completed,
     ];
     const SUSPENDS_LATER: bool = false;

@@ -35,7 +35,7 @@ use crate::{edge, sys};
 /// let control = machine.control().unwrap();
 /// std::thread::spawn(move || {
 ///     std::thread::sleep(Duration::from_millis(20));
-///     control.stop("endless");
+///     control.end("endless");
 /// });
 /// let run = machine.run().unwrap();
 /// assert_eq!(run.violations().count(), 0);
@@ -105,8 +105,8 @@ impl Control {
     ///
     /// If there is no such DAG.
     #[track_caller]
-    pub fn stop(&self, dag: impl DagKey) {
-        self.change(dag, Request::Stop);
+    pub fn end(&self, dag: impl DagKey) {
+        self.change(dag, Request::End);
     }
 
     /// Makes a change to a DAG.

@@ -1,5 +1,5 @@
 //! Random scenarios, with all that a run has to bear: preemption, overload, panics, exceeded
-//! budgets, cores that are divided, and a thread that pauses, resumes and stops DAGs meanwhile.
+//! budgets, cores that are divided, and a thread that pauses, resumes and ends DAGs meanwhile.
 //! All rules hold in each run, and in the end the program has the threads and files that it
 //! began with.
 //!
@@ -71,14 +71,14 @@ fn run(machine: &Linux, seed: u64, random: &mut Random) -> Run {
     run
 }
 
-/// Pauses, resumes and stops DAGs for a while.
+/// Pauses, resumes and ends DAGs for a while.
 fn meddle(control: Control, last: u32, mut random: Random) -> JoinHandle<()> {
     thread::spawn(move || {
         for _ in 0..random.within(0..=7) {
             thread::sleep(ms(random.within(1..=20)));
             let dag = DagId(random.within(0..=last));
             match random.within(0..=9) {
-                0 => control.stop(dag),
+                0 => control.end(dag),
                 1..5 => control.pause(dag),
                 _ => control.resume(dag),
             }

@@ -617,7 +617,7 @@ impl Workload<SubtaskRunner> for Calls {
         let ended = match event.what {
             EventKind::Released => None,
             // All jobs of it.
-            EventKind::Stopped => Some(u64::MAX),
+            EventKind::DagEnded => Some(u64::MAX),
             _ => Some(event.job),
         };
         self.has_arrived |=

@@ -25,14 +25,14 @@ impl RunRecord {
     ) -> Option<Self> {
         let jobs = jobs(task_set, is_whole, events.clone());
         let mut record = Self::with_jobs(task_set, |dag| jobs[dag.index()].clone())?;
-        let mut stopped_ns = vec![None; jobs.len()];
+        let mut ended_ns = vec![None; jobs.len()];
         let mut due_ns = vec![0; jobs.len()];
         for event in events {
             let index = event.dag.index();
             match event.what {
                 EventKind::Due => due_ns[index] = event.time_ns,
-                EventKind::Stopped => {
-                    stopped_ns[index].get_or_insert(event.time_ns);
+                EventKind::DagEnded => {
+                    ended_ns[index].get_or_insert(event.time_ns);
                 }
                 what if what.is_of_dag() => {}
                 _ => match event.instance() {
@@ -45,25 +45,25 @@ impl RunRecord {
                     None => {
                         let model = task_set.dag(event.dag);
                         let release_ns = model.release_ns(event.job, due_ns[index]);
-                        record.note_job(&event, release_ns, stopped_ns[index]);
+                        record.note_job(&event, release_ns, ended_ns[index]);
                     }
                 },
             }
         }
-        // What was in flight at a stop is cut by it.
-        for (dag, stopped_ns) in (0..).map(DagId).zip(stopped_ns) {
+        // What was in flight at the end of its DAG is cut by it.
+        for (dag, ended_ns) in (0..).map(DagId).zip(ended_ns) {
             for job in &mut record.dags[dag.index()].jobs {
                 let was_in_flight = job.release_ns.is_some()
                     && matches!(job.outcome, None | Some(JobOutcome::DagEnded));
                 if was_in_flight {
-                    job.cut_ns = job.cut_ns.or(stopped_ns);
+                    job.cut_ns = job.cut_ns.or(ended_ns);
                 }
             }
         }
         Some(record)
     }
 
-    fn note_job(&mut self, event: &Event, release_ns: u64, stopped_ns: Option<u64>) {
+    fn note_job(&mut self, event: &Event, release_ns: u64, ended_ns: Option<u64>) {
         let Some(job) = self.job_mut(event.dag, event.job) else {
             return;
         };
@@ -77,7 +77,7 @@ impl RunRecord {
             EventKind::Missed => job.missed_ns = Some(time_ns),
             EventKind::Completed => {
                 job.ended_ns = Some(time_ns);
-                job.outcome = Some(match (job.cut_ns, stopped_ns, job.missed_ns) {
+                job.outcome = Some(match (job.cut_ns, ended_ns, job.missed_ns) {
                     (Some(_), _, _) if job.has_failed => JobOutcome::Failed,
                     (Some(_), _, _) => JobOutcome::Aborted,
                     (None, Some(_), _) => JobOutcome::DagEnded,

@@ -151,7 +151,7 @@ pub(super) struct DispatchSweep<'m> {
     /// Since when each waits, and since which event.
     waiting: BTreeMap<Key, (u64, u64)>,
     running: BTreeMap<Key, CoreId>,
-    stopped: BTreeSet<DagId>,
+    ended_dags: BTreeSet<DagId>,
     owed: BTreeMap<Key, OwedDispatch>,
     /// Became ready, or started, at this instant.
     fresh: Vec<Key>,
@@ -178,7 +178,7 @@ impl<'m> DispatchSweep<'m> {
             events: 0,
             waiting: BTreeMap::new(),
             running: BTreeMap::new(),
-            stopped: BTreeSet::new(),
+            ended_dags: BTreeSet::new(),
             owed: BTreeMap::new(),
             fresh: Vec::new(),
             started: Vec::new(),
@@ -209,10 +209,10 @@ impl<'m> DispatchSweep<'m> {
     }
 
     /// The waiting instances of a DAG are owed nothing any more.
-    pub(super) fn stop(&mut self, dag: DagId) {
+    pub(super) fn end_dag(&mut self, dag: DagId) {
         // E3: what has not started never will; what has started may go on.
         self.waiting.retain(|(_, instance), _| instance.dag != dag);
-        self.stopped.insert(dag);
+        self.ended_dags.insert(dag);
     }
 
     /// An instance enters a stage.
@@ -223,7 +223,7 @@ impl<'m> DispatchSweep<'m> {
         self.waiting.remove(&key);
         self.running.remove(&key);
         // A driver may take a started instance of an ended DAG away for good (E4).
-        let is_owed_nothing = self.stopped.contains(&key.1.dag);
+        let is_owed_nothing = self.ended_dags.contains(&key.1.dag);
         let is_first = self.unstarted.remove(&key);
         match stage {
             DispatchState::Ready | DispatchState::Suspended if is_owed_nothing => {}

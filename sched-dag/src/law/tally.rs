@@ -182,7 +182,7 @@ impl RunTally {
                 dag.begin(event, release_ns, model.subtasks().len());
                 return;
             }
-            EventKind::Stopped => {
+            EventKind::DagEnded => {
                 for job in &mut dag.open {
                     job.is_cut = true;
                 }

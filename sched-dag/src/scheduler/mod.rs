@@ -10,7 +10,7 @@
 //! dispatch that sees both. The types force this order:
 //!
 //! 1. [`Scheduler::at`] begins the instant and gives a [`Moment`], which takes
-//!    completions, signals to sporadic DAGs, and faults and stops;
+//!    completions, signals to sporadic DAGs, and faults and requests to end;
 //! 2. [`Moment::dispatch`] ends it: it releases what is due, then gives the [`Decision`]s.
 //!
 //! A driver calls them when a subtask has returned, and at the latest at
@@ -279,7 +279,7 @@ impl Scheduler {
     }
 
     /// Reports whether a DAG was ended by [`Moment::fail`] or [a
-    /// request](crate::lifecycle::Request::Stop).
+    /// request](crate::lifecycle::Request::End).
     /// Instances of it that had started before may still run.
     ///
     /// # Panics

@@ -25,7 +25,7 @@ impl Scheduler {
             Request::Pause(dag) => self.pause(dag),
             Request::Resume(dag) => self.resume(dag),
             Request::Close(dag) => self.close(dag),
-            Request::Stop(dag) => self.stop(dag),
+            Request::End(dag) => self.end_dag(dag),
             // These concern the run, not one DAG; the engine serves them.
             Request::Enter(..)
             | Request::ShutDown

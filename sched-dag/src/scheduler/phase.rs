@@ -24,7 +24,7 @@
 //!
 //! # Closing: its last jobs come to their end
 //!
-//! This is how a machine is stopped in order: nothing more begins, and what has begun is
+//! This is how a machine is shut down in order: nothing more begins, and what has begun is
 //! finished.
 //!
 //! - **C1, no release.** A closed DAG releases no job any more, at the very instant of the
@@ -35,16 +35,16 @@
 //! - **C3, in flight.** What was released goes on as ever, to its end, and may be late.
 //! - **C4, over.** The DAG is over when nothing of it is in flight. Signals to it are dropped,
 //!   and counted.
-//! - **C5, finality.** It is neither paused nor resumed any more. A fault, or a stop, ends it
+//! - **C5, finality.** It is neither paused nor resumed any more. A fault, or a request, ends it
 //!   as any other (E1 to E8).
 //!
 //! To the other rules a closing is nothing new: it is a limit of jobs that is there already.
 //!
-//! # Ending: by a fault of one of its instances, or a stop
+//! # Ending: by a fault of one of its instances, or a request
 //!
 //! An instance *fails* when a fault has ended it: its function will never
 //! return. A DAG is *ended* by the first instance of it that fails, unless
-//! that costs the job only (see below), or by a *stop*, which needs no fault; it
+//! that costs the job only (see below), or by a *request*, which needs no fault; it
 //! stays ended. It is *over* when nothing of it is in flight or to come.
 //!
 //! - **E1, failure.** A failing instance has started. It ends at that instant:
@@ -123,7 +123,7 @@ pub enum DagPhase {
     Paused,
     /// It releases no further job, and what is in flight goes on to its end (C1 to C5).
     Closed,
-    /// A fault or a stop has ended it: nothing of it starts any more (E1 to E8).
+    /// A fault or a request has ended it: nothing of it starts any more (E1 to E8).
     Ended,
 }
 
@@ -150,7 +150,7 @@ impl DagSnapshot {
             DagPhase::Closed | DagPhase::Ended => "ended",
             // Before paused: of a DAG that is over and paused nothing is left to be resumed.
             _ if self.is_over => "over",
-            DagPhase::Paused => "stopped",
+            DagPhase::Paused => "paused",
             DagPhase::Running => "running",
         }
     }
@@ -262,14 +262,14 @@ impl Scheduler {
         let dag = instance.dag;
         self.dags[dag.index()].statistics.faults += 1;
         // Before the instance ends, so that no successor of it starts.
-        self.stop(dag);
+        self.end_dag(dag);
         // Only now its job may end, so that the job counts as cut short.
         self.end(vertex);
     }
 
     /// Ends a DAG.
     #[inline]
-    pub(super) fn stop(&mut self, dag: DagId) {
+    pub(super) fn end_dag(&mut self, dag: DagId) {
         if self.is_ended(dag) {
             return;
         }
@@ -280,7 +280,7 @@ impl Scheduler {
         state.statistics.cut_short += cut_short;
         state.statistics.dropped += dropped;
         self.set_timer(dag);
-        self.log.of_dag(EventKind::Stopped, dag);
+        self.log.of_dag(EventKind::DagEnded, dag);
         // Last, when all jobs are cut: what is made ready by these ends is cancelled, too.
         self.cancel_ready(dag, u64::MAX);
     }

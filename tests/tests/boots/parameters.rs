@@ -14,7 +14,7 @@ fn a_person_sets_what_the_next_jobs_find() {
         (said, "set gain"),
         (said, "help"),
         (said, "hlep"),
-        (said, "stop nothing"),
+        (said, "pause nothing"),
         (said, "stats +1"),
         (said, "shutdown"),
     ];

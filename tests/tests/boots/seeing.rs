@@ -32,27 +32,27 @@ fn answers(outcome: &Outcome) -> Vec<(&str, bool)> {
 }
 
 #[test]
-fn a_dag_is_stopped_started_and_the_machine_shut_down() {
+fn a_dag_is_paused_resumed_and_the_machine_shut_down() {
     talk(endless());
 }
 
 #[test]
-fn a_dag_of_one_cluster_is_stopped_and_started_and_the_other_goes_on() {
+fn a_dag_of_one_cluster_is_paused_and_resumed_and_the_other_goes_on() {
     talk(endless().word("clusters=1,1"));
 }
 
-/// Stops and starts one of two endless DAGs, and ends both.
+/// Pauses and resumes one of two endless DAGs, and ends both.
 fn talk(guest: Guest) {
     let begin = [
         ("\"kind\":\"boot\"", "help"),
         (SAID, "dags"),
-        (SAID, "stop left"),
+        (SAID, "pause left"),
     ];
     let mut conversation = begin.to_vec();
     conversation.extend(PAUSE);
     conversation.push((SAID, "stats"));
     conversation.extend(PAUSE);
-    conversation.extend([(SAID, "stats"), (SAID, "start 0")]);
+    conversation.extend([(SAID, "stats"), (SAID, "resume 0")]);
     conversation.extend(PAUSE);
     conversation.extend([(SAID, "stats left"), (SAID, "shutdown")]);
     let outcome = guest.conversation(&conversation).succeed();
@@ -62,9 +62,9 @@ fn talk(guest: Guest) {
         panic!("{} lines of `left`\n{}", left.len(), outcome.tail());
     };
     listed.reads([("state", "running")]);
-    for stopped in [first, second] {
-        stopped.reads([("state", "stopped")]);
-        stopped.has([("in_flight", 0)]);
+    for paused in [first, second] {
+        paused.reads([("state", "paused")]);
+        paused.has([("in_flight", 0)]);
     }
     assert_eq!(first.number("released"), second.number("released"));
     assert!(first.number("skips") < second.number("skips"));
@@ -85,9 +85,9 @@ fn a_trace_that_was_off_for_a_while_holds_what_came_after() {
     conversation.extend(PAUSE);
     conversation.push((SAID, "trace off"));
     conversation.extend(PAUSE);
-    conversation.extend([(SAID, "trace on"), (SAID, "stop left")]);
+    conversation.extend([(SAID, "trace on"), (SAID, "pause left")]);
     conversation.extend(PAUSE);
-    conversation.extend([(SAID, "start left"), (SAID, "help"), (SAID, "shutdown")]);
+    conversation.extend([(SAID, "resume left"), (SAID, "help"), (SAID, "shutdown")]);
     // In real time only the order is judged, not how long anybody waits.
     for (guest, bound_ns) in [
         (endless(), 1_000_000_000),
@@ -109,7 +109,7 @@ fn a_person_is_heard_and_told_under_overload() {
     let conversation = [
         ("\"kind\":\"status\"", "help"),
         (SAID, "stats"),
-        (SAID, "stop fork-join"),
+        (SAID, "pause fork-join"),
         (SAID, "shutdown"),
     ];
     let guest = Guest::new("fork-join").word("jobs=0 subtasks=2 status=1");

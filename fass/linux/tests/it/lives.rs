@@ -110,7 +110,7 @@ fn a_dag_is_paused_resumed_and_stopped_from_outside() {
             thread::sleep(ms(20));
             control.resume("endless");
             wait_for(3);
-            control.stop("endless");
+            control.end("endless");
         });
         let run = alone.machine.run().unwrap();
         assert_eq!(run.violations().count(), 0);

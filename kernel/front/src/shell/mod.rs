@@ -44,10 +44,13 @@ const HELP: [(&str, &str); 8] = [
     ("dags", "list the DAGs"),
     ("stats [DAG]", "show the counts of a DAG, or of all"),
     (
-        "stop DAG",
+        "pause DAG",
         "release no more jobs of it; those in flight finish",
     ),
-    ("start DAG", "release its jobs again, from the next one due"),
+    (
+        "resume DAG",
+        "release its jobs again, from the next one due",
+    ),
     ("trace off", "forget the events so far and record no more"),
     ("trace on", "record events from now on"),
     (
@@ -254,14 +257,14 @@ fn answer<R: LiveRun>(line: &str, task_set: &TaskSet, refuse: Refuse<'_>) -> Opt
         ("dags", "") => return list(task_set, rest, describe, refuse),
         ("stats", _) => return list(task_set, rest, report::print_counts, refuse),
         ("trace", "on" | "off") => record::<R>(rest == "on", task_set, refuse),
-        ("stop" | "start", "") => {
+        ("pause" | "resume", "") => {
             wants("the name or the number of a DAG; `dags` lists them", refuse)
         }
-        ("stop", dag) => {
+        ("pause", dag) => {
             let what = "releases no more jobs";
             change::<R>(task_set, dag, Request::Pause, what, refuse);
         }
-        ("start", dag) => change::<R>(task_set, dag, Request::Resume, "releases jobs", refuse),
+        ("resume", dag) => change::<R>(task_set, dag, Request::Resume, "releases jobs", refuse),
         ("shutdown", "") => shut_down::<R>(),
         ("help" | "dags" | "shutdown", _) => wants("nothing after it", refuse),
         ("trace", _) => wants("`on` or `off`", refuse),

@@ -77,7 +77,7 @@ fn what_is_typed_is_asked_of_the_run_and_no_function_is_told_the_time_for_it() {
     fass::platform::set_clock(&TOLD);
     TOPICS.set(Box::leak(Box::new(TopicCommands::<NoRun>::new())));
     let typed =
-        b"stop lidar\nstart 0\nstop radar\necho points\necho off\nhz points\n\x03shutdown\n";
+        b"pause lidar\nresume 0\npause radar\necho points\necho off\nhz points\n\x03shutdown\n";
     TYPED.with_borrow_mut(|bytes| bytes.extend(typed));
     let mut session = ShellSession::<NoRun>::new(false);
     while session.slice() {}
@@ -120,8 +120,8 @@ fn what_is_no_command_is_told_the_commands() {
         ("trace", "`trace` wants `on` or `off`"),
         ("help me", "`help` wants nothing after it"),
         (
-            "stop",
-            "`stop` wants the name or the number of a DAG; `dags` lists them",
+            "pause",
+            "`pause` wants the name or the number of a DAG; `dags` lists them",
         ),
         (
             "stats left eye",
@@ -132,7 +132,7 @@ fn what_is_no_command_is_told_the_commands() {
     }
     assert_eq!(
         no_command("stpo", core::iter::empty).to_string(),
-        "`stpo` is no command; there are help, dags, stats [DAG], stop DAG, start DAG, \
+        "`stpo` is no command; there are help, dags, stats [DAG], pause DAG, resume DAG, \
          trace off, trace on, shutdown"
     );
     assert!(refusal("stpo lidar").is_some_and(|why| why.starts_with("`stpo` is no command")));

@@ -78,8 +78,8 @@ fn of_cluster(
         let is_new = event.what.is_of_machine() && known.insert(event.core);
         sweep.known_cores += usize::from(is_new);
         let ends_its_dag = model.task_set.dag(event.dag).on_fault() == OnFault::EndDag;
-        if event.what == EventKind::Stopped || event.what == EventKind::Ended && ends_its_dag {
-            sweep.stop(event.dag);
+        if event.what == EventKind::DagEnded || event.what == EventKind::Ended && ends_its_dag {
+            sweep.end_dag(event.dag);
         }
         if let Some(instance) = event
             .instance()

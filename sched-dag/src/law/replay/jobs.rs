@@ -330,7 +330,7 @@ impl JournalReplay<'_> {
                     has_cause |= is_same_step(over);
                 }
                 // Of an ended DAG, an instance may be taken away for good.
-                _ if of_dag.is_stopped => return None,
+                _ if of_dag.is_ended => return None,
                 None if known.is_partial && life.is_none() => return None,
                 late => {
                     let awaited = Instance { dag, job, subtask };
@@ -361,7 +361,7 @@ impl JournalReplay<'_> {
     pub(super) fn never_completed(&self, dag: DagId, job: u64) -> Option<Violation> {
         let of_dag = &self.dags[dag.index()];
         let known = of_dag.jobs.get(&job)?;
-        if known.completed.is_some() || known.released.is_none() || of_dag.is_stopped {
+        if known.completed.is_some() || known.released.is_none() || of_dag.is_ended {
             return None;
         }
         let over_ns = |subtask| {
@@ -420,7 +420,7 @@ impl JournalReplay<'_> {
             let finish_ns = late.finish_ns?;
             let may_be_lost = self.may_be_lost(&dues);
             // A job that is cut before its deadline counts as that, and never as a miss (rule 4).
-            let is_cut = known.cut.is_some() || of_dag.is_stopped;
+            let is_cut = known.cut.is_some() || of_dag.is_ended;
             return (!may_be_lost && !is_cut).then_some(Violation::NotMissed {
                 dag,
                 job,
@@ -489,7 +489,7 @@ impl JournalReplay<'_> {
         let unfinished = dues.iter().filter(|due| due.finish_ns.is_none());
         let deadline_ns = unfinished.map(|due| due.deadline_ns).min()?;
         let has_passed = !self.is_tolerable(deadline_ns, self.end_ns);
-        let is_missing = has_passed && !of_dag.is_stopped && !self.may_be_lost(&dues);
+        let is_missing = has_passed && !of_dag.is_ended && !self.may_be_lost(&dues);
         is_missing.then_some(Violation::NeverMissed {
             dag,
             job,
@@ -566,7 +566,7 @@ impl JournalReplay<'_> {
             InstanceCondition {
                 awaited: Some(Instance { dag, job, subtask }),
                 held: life.and_then(super::InstanceLife::over),
-                may_be_lost: life.is_none() && (known.is_partial || of_dag.is_stopped),
+                may_be_lost: life.is_none() && (known.is_partial || of_dag.is_ended),
             }
         });
         let of_release = predecessors.is_empty().then(|| InstanceCondition {
@@ -630,7 +630,7 @@ impl JournalReplay<'_> {
     pub(super) fn never_ready(&self, instance: Instance) -> Option<Violation> {
         let of_dag = &self.dags[instance.dag.index()];
         let job = of_dag.jobs.get(&instance.job)?;
-        let is_cut = job.cut.is_some() || of_dag.is_stopped;
+        let is_cut = job.cut.is_some() || of_dag.is_ended;
         if is_cut || job.life(instance.subtask).is_some() {
             return None;
         }

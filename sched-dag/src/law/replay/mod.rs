@@ -124,7 +124,7 @@ struct DagReplay {
     latest: Option<(u64, Option<u64>)>,
     /// When a job was complete last.
     completed_ns: Option<u64>,
-    is_stopped: bool,
+    is_ended: bool,
     /// Whether it is paused or closed, and so releases nothing.
     is_off: bool,
     /// The jobs of the faults after which it went on.
@@ -162,7 +162,7 @@ impl JournalReplay<'_> {
         self.end_ns = self.end_ns.max(event.time_ns);
         match event.what {
             EventKind::Due => self.dag(event.dag).due = Some((event.job, event.time_ns)),
-            EventKind::Stopped => self.dag(event.dag).is_stopped = true,
+            EventKind::DagEnded => self.dag(event.dag).is_ended = true,
             EventKind::Off | EventKind::Closed => self.dag(event.dag).is_off = true,
             EventKind::On => self.dag(event.dag).is_off = false,
             EventKind::Signalled | EventKind::Dropped | EventKind::Request | EventKind::Entered => {
@@ -305,7 +305,7 @@ fn is_allowed(stage: DispatchState, event: &Event) -> bool {
         (DispatchState::Absent, EventKind::Ready | EventKind::Cancelled)
         | (DispatchState::Ready, EventKind::Start | EventKind::Cancelled)
         | (DispatchState::Suspended, EventKind::Resume)
-        // Whichever core finds the fault, or stops the DAG, ends the instance.
+        // Whichever core finds the fault, or ends the DAG, ends the instance.
         | (DispatchState::Running(_) | DispatchState::Suspended, EventKind::Ended) => true,
         (DispatchState::Running(core), EventKind::Suspend | EventKind::Finish) => core == event.core,
         _ => false,
@@ -345,8 +345,8 @@ impl JournalReplay<'_> {
         let is_known = self.find_job(event);
         let ends_its_dag = self.task_set.dag(instance.dag).on_fault() == OnFault::EndDag;
         let of_dag = self.dag(instance.dag);
-        of_dag.is_stopped |= event.what == EventKind::Ended && ends_its_dag;
-        let is_stopped = of_dag.is_stopped;
+        of_dag.is_ended |= event.what == EventKind::Ended && ends_its_dag;
+        let is_ended = of_dag.is_ended;
         let Some(job) = of_dag.jobs.get_mut(&instance.job).filter(|_| is_known) else {
             return;
         };
@@ -357,7 +357,7 @@ impl JournalReplay<'_> {
         if event.what == EventKind::Restarted {
             job.cut.get_or_insert(moment);
         }
-        let is_uncut = job.cut.is_none() && !is_stopped && !job.is_partial;
+        let is_uncut = job.cut.is_none() && !is_ended && !job.is_partial;
         let life = job.life_from(instance.subtask, first);
         let ready_ns = life.ready.map(|ready| ready.time_ns);
         let out_of_turn = life.note(event, moment);

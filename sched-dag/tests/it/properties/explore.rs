@@ -2,7 +2,7 @@
 //!
 //! From the first state on each step that a driver may take is taken: time goes on, at once or past
 //! what was due; of the instances that have started one or two complete or fail, on their core or
-//! after they have lost it; a DAG is stopped, closed, paused or resumed, or gets a signal.
+//! after they have lost it; a DAG is ended, closed, paused or resumed, or gets a signal.
 
 use std::collections::HashSet;
 
@@ -79,7 +79,7 @@ fn steps(walk: &Walk<'_>, may_disturb: bool) -> Vec<Vec<Step>> {
     if may_disturb {
         for dag in (0..).map(DagId).take(walk.set.specs.len()) {
             let requests = [
-                Request::Stop(dag),
+                Request::End(dag),
                 Request::Close(dag),
                 match walk.is_paused(dag) {
                     true => Request::Resume(dag),

@@ -96,7 +96,7 @@ fn steps(walk: &Walk<'_>, random: &mut Random, is_late: bool, is_calm: bool) -> 
             continue;
         }
         let request = match kind {
-            70 => Some(Request::Stop(dag)),
+            70 => Some(Request::End(dag)),
             71 => Some(Request::Close(dag)),
             72..78 => Some(Request::Pause(dag)),
             78..88 => Some(Request::Resume(dag)),

@@ -22,7 +22,7 @@ pub(crate) const SAID: [EventKind; 13] = [
     EventKind::Aborted,
     EventKind::Missed,
     EventKind::Completed,
-    EventKind::Stopped,
+    EventKind::DagEnded,
     EventKind::Off,
     EventKind::On,
     EventKind::Closed,
@@ -108,7 +108,7 @@ impl Releases {
         self.counted.faults += 1;
         self.ask(match survives && is_replaceable {
             true => EventKind::Restarted,
-            false => EventKind::Stopped,
+            false => EventKind::DagEnded,
         });
     }
 
@@ -148,7 +148,7 @@ impl Releases {
                 }
                 return ended.number == job;
             }
-            EventKind::Stopped => {
+            EventKind::DagEnded => {
                 self.phase = DagPhase::Ended;
                 counted.cut_short += self.in_flight.iter().filter(|it| !it.is_cut).count() as u64;
                 self.uncut().for_each(|it| it.is_cut = true);

@@ -2,7 +2,7 @@
 //!
 //! Here happens what a driver in virtual time does not meet: several dispatches at one time, a
 //! driver that comes late, ends of instances that have lost their core meanwhile, ends of several in
-//! any order, faults, stops, pauses and closings at any time. The journal is judged by the law
+//! any order, faults, ends, pauses and closings at any time. The journal is judged by the law
 //! ([`Walk::judged`]); what that does not judge, by [`Releases`] after each instant.
 //!
 //! Each end that is the last thing of an instant is told by [`Scheduler::pass_on`], and the long way
@@ -152,7 +152,7 @@ impl<'s> Walk<'s> {
                     Request::Pause(dag) => (dag, EventKind::Off),
                     Request::Resume(dag) => (dag, EventKind::On),
                     Request::Close(dag) => (dag, EventKind::Closed),
-                    Request::Stop(dag) => (dag, EventKind::Stopped),
+                    Request::End(dag) => (dag, EventKind::DagEnded),
                     Request::Signal(dag) => (dag, EventKind::Signalled),
                     _ => unreachable!("it is not asked of a scheduler"),
                 };

@@ -6,7 +6,7 @@
 //!
 //! `finish`, `fail` and `replace` end an instance, by default that on core 0; `hand` tells a
 //! finish by a short way, on behalf of core 0, or of another after `to`: then `done=` says what
-//! it comes to, and the instant ends with it. `pause`, `resume`, `close`, `stop` and
+//! it comes to, and the instant ends with it. `pause`, `resume`, `close`, `end` and
 //! `signal` are for a DAG, by default DAG 0; `prefer` is for a core. With `open` the
 //! instant ends without a dispatch.
 
@@ -112,7 +112,7 @@ impl Hand {
                 "pause" => moment.serve(Request::Pause(DagId(id))),
                 "resume" => moment.serve(Request::Resume(DagId(id))),
                 "close" => moment.serve(Request::Close(DagId(id))),
-                "stop" => moment.serve(Request::Stop(DagId(id))),
+                "end" => moment.serve(Request::End(DagId(id))),
                 "signal" => moment.serve(Request::Signal(DagId(id))),
                 "prefer" => moment.prefer(CoreId(id)),
                 "open" => return,

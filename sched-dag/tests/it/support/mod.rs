@@ -264,7 +264,7 @@ pub(crate) fn told<'a>(events: impl IntoIterator<Item = &'a Event>) -> Vec<(u64,
         if what == EventKind::Missed {
             outcomes.entry((dag, job)).or_insert(JobOutcome::Missed);
         }
-        if what == EventKind::Stopped {
+        if what == EventKind::DagEnded {
             stopped.push(dag);
         }
         let cut = known.filter(|known| *known != JobOutcome::Missed);

@@ -21,7 +21,7 @@ fn random_sets_break_no_rule_and_leave_nothing_behind() {
         ("suspend", 1000),
         ("ended", 10),
         ("restarted", 5),
-        ("stopped", 5),
+        ("dag_ended", 5),
         ("off", 10),
         ("on", 10),
     ];
