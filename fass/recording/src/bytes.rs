@@ -35,16 +35,12 @@ pub struct Full {
 
 impl<'b> Encoder<'b> {
     /// Begins at the start of a buffer.
-    ///
-    /// See [`Encoder`].
     #[inline]
     pub const fn new(buffer: &'b mut [u8]) -> Self {
         Self { buffer, written: 0 }
     }
 
     /// Writes bytes as they are.
-    ///
-    /// See [`Encoder`].
     #[inline]
     pub fn put(&mut self, bytes: &[u8]) {
         if let Some(places) = self.places(bytes.len()) {
@@ -75,8 +71,6 @@ impl<'b> Encoder<'b> {
     /// # Errors
     ///
     /// [`Full`] if not all fitted: then what is in the buffer is of no use.
-    ///
-    /// See [`Encoder`].
     #[inline]
     pub const fn finish(self) -> Result<usize, Full> {
         match self.written <= self.buffer.len() {
@@ -129,8 +123,6 @@ pub struct Malformed {
 
 impl<'b> Decoder<'b> {
     /// Begins at the start of these bytes.
-    ///
-    /// See [`Decoder`].
     #[must_use]
     pub const fn new(bytes: &'b [u8]) -> Self {
         Self { bytes, offset: 0 }

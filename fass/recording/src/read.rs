@@ -168,8 +168,6 @@ pub struct Events<'b> {
 
 impl<'b> Events<'b> {
     /// Returns the words of each event.
-    ///
-    /// See [`Events`].
     pub fn words(&self) -> impl Iterator<Item = [u64; 3]> + use<'b> {
         let words = self.words.iter();
         words.map(|bytes| {

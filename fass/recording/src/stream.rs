@@ -84,16 +84,12 @@ pub struct Crc(u32);
 
 impl Crc {
     /// Begins with no byte.
-    ///
-    /// See [`Crc`].
     #[must_use]
     pub const fn new() -> Self {
         Self(u32::MAX)
     }
 
     /// Takes more bytes in.
-    ///
-    /// See [`Crc`].
     pub fn update(&mut self, bytes: &[u8]) {
         self.0 = bytes.iter().fold(self.0, |crc, &byte| {
             let [low, ..] = crc.to_le_bytes();
@@ -102,8 +98,6 @@ impl Crc {
     }
 
     /// Returns the checksum of all bytes so far.
-    ///
-    /// See [`Crc`].
     #[must_use]
     pub const fn value(self) -> u32 {
         !self.0
@@ -203,8 +197,6 @@ const EVENTS_HEAD: usize = 10;
 
 impl Writer {
     /// Begins a recording.
-    ///
-    /// See [`Writer`].
     #[must_use]
     pub fn new(header: &Header) -> Self {
         let mut writer = Self::begin(Vec::new());
@@ -215,8 +207,6 @@ impl Writer {
 
 impl<S: Sink> Stream<S> {
     /// Begins a recording.
-    ///
-    /// See [`Stream`].
     pub fn begin(to: S) -> Self {
         let mut stream = Self::behind(Crc::new(), (0, 0), to);
         stream.put(&MAGIC);
@@ -235,8 +225,6 @@ impl<S: Sink> Stream<S> {
     }
 
     /// Lends what takes the bytes.
-    ///
-    /// See [`Stream`].
     pub const fn sink(&mut self) -> &mut S {
         &mut self.to
     }
@@ -251,8 +239,6 @@ impl<S: Sink> Stream<S> {
     }
 
     /// Ends a recording that says nothing of what happened after its last entry.
-    ///
-    /// See [`Stream`].
     pub fn cut(mut self) -> S {
         self.finish(CUT);
         self.to
@@ -261,8 +247,6 @@ impl<S: Sink> Stream<S> {
 
 impl<S: Sink + ?Sized> Stream<S> {
     /// Says what the recording is of; once, before the first entry.
-    ///
-    /// See [`Stream`].
     pub fn header(&mut self, header: &Header) {
         self.whole(HEADER, &[&to_bytes(header)]);
     }
@@ -335,16 +319,12 @@ impl<S: Sink + ?Sized> Stream<S> {
     }
 
     /// Returns the number of entries so far.
-    ///
-    /// See [`Stream`].
     #[must_use]
     pub const fn entries(&self) -> u64 {
         self.entries
     }
 
     /// Returns how many of these are of what was lost.
-    ///
-    /// See [`Stream`].
     #[must_use]
     pub const fn lost(&self) -> u64 {
         self.lost

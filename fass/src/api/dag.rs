@@ -61,10 +61,6 @@ pub struct Dag {
 
 impl Dag {
     /// Names the DAG, for reports and error messages.
-    ///
-    /// ```
-    /// fass::create_dag().name("perception");
-    /// ```
     #[track_caller]
     pub fn name(&self, name: &str) -> &Self {
         self.open().spec.name = name.into();
@@ -73,11 +69,6 @@ impl Dag {
 
     /// Sets the time of the first release after the start of scheduling;
     /// without it, 0.
-    ///
-    /// ```
-    /// use core::time::Duration;
-    /// fass::create_dag().offset(Duration::from_millis(5));
-    /// ```
     #[track_caller]
     pub fn offset(&self, offset: Duration) -> &Self {
         self.open().set_offset(offset);
@@ -88,10 +79,6 @@ impl Dag {
     ///
     /// It is also the number of slots of every edge. Without it the commit
     /// takes enough for the relative deadline.
-    ///
-    /// ```
-    /// fass::create_dag().in_flight(2); // a pipeline of two jobs
-    /// ```
     #[track_caller]
     pub fn in_flight(&self, jobs: u32) -> &Self {
         self.open().spec.in_flight = Some(jobs);
@@ -100,10 +87,6 @@ impl Dag {
 
     /// Sets what happens at a release that finds the most jobs in flight;
     /// without it the release queues.
-    ///
-    /// ```
-    /// fass::create_dag().overrun(fass::OverrunPolicy::Skip);
-    /// ```
     #[track_caller]
     pub fn overrun(&self, policy: OverrunPolicy) -> &Self {
         self.open().spec.overrun = policy;
@@ -112,10 +95,6 @@ impl Dag {
 
     /// Lets the commit fix the order in which subtasks use the cores, where that proves a
     /// shorter response time.
-    ///
-    /// ```
-    /// fass::create_dag().order(fass::SubtaskOrder::Fixed);
-    /// ```
     #[track_caller]
     pub fn order(&self, order: SubtaskOrder) -> &Self {
         self.open().spec.order = order;
@@ -151,10 +130,6 @@ impl Dag {
 
     /// Sets the number of jobs to release, after which the DAG is finished;
     /// without it the DAG runs without end.
-    ///
-    /// ```
-    /// fass::create_dag().jobs(100);
-    /// ```
     #[track_caller]
     pub fn jobs(&self, jobs: u64) -> &Self {
         self.open().spec.jobs = Some(jobs);
@@ -313,11 +288,6 @@ impl Dag {
 
     /// Sets the time between two releases, for a DAG of untyped subtasks. (A
     /// typed source states it itself.)
-    ///
-    /// ```
-    /// use core::time::Duration;
-    /// fass::create_dag().period(Duration::from_millis(10));
-    /// ```
     #[track_caller]
     pub fn period(&self, period: Duration) -> &Self {
         self.open().replace_period(period);
@@ -327,11 +297,6 @@ impl Dag {
     /// Sets the time after its release by which a job shall be complete, for a
     /// DAG of untyped subtasks. It is the deadline of each sink that states none. (A
     /// typed sink states its own, which may be shorter.)
-    ///
-    /// ```
-    /// use core::time::Duration;
-    /// fass::create_dag().relative_deadline(Duration::from_millis(10));
-    /// ```
     #[track_caller]
     pub fn relative_deadline(&self, relative_deadline: Duration) -> &Self {
         self.open().set_dag_deadline(relative_deadline);

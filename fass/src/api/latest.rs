@@ -107,8 +107,6 @@ pub struct Sample<'a, T> {
 
 impl<T> Sample<'_, T> {
     /// Returns the time since the writer was complete, in nanoseconds.
-    ///
-    /// See [`Sample`].
     #[must_use]
     pub fn age_ns(&self) -> u64 {
         crate::now_ns().saturating_sub(self.completed_ns)
@@ -125,8 +123,6 @@ impl<T> Copy for Sample<'_, T> {}
 
 impl<T: Message + Sync> Latest<T> {
     /// Returns the use of a subtask that samples the value.
-    ///
-    /// See [`Latest`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn sample(&self) -> LatestUse<T> {
         let shared = Rc::clone(&self.shared);

@@ -82,16 +82,12 @@ pub struct Switch<'a> {
 impl Switch<'_> {
     /// Pauses the DAG when this instance is complete. In place of a resumption that the same
     /// instance has asked for.
-    ///
-    /// See [`Switch`].
     pub fn pause(&mut self) {
         self.wish.store(STOP, Ordering::Relaxed);
     }
 
     /// Resumes the DAG when this instance is complete. In place of a pause that the same
     /// instance has asked for.
-    ///
-    /// See [`Switch`].
     pub fn resume(&mut self) {
         self.wish.store(GO, Ordering::Relaxed);
     }
@@ -149,8 +145,6 @@ pub struct Shutdown<'a> {
 
 impl Shutdown<'_> {
     /// Ends the run when this instance is complete. It cannot be taken back.
-    ///
-    /// See [`Shutdown`].
     pub fn request(&mut self) {
         self.wish.store(STOP, Ordering::Relaxed);
     }
@@ -328,8 +322,6 @@ impl ModeSwitch<'_> {
 
 impl Modes {
     /// Makes a handle without modes. A commit has those of one handle.
-    ///
-    /// See [`Modes`].
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -341,8 +333,6 @@ impl Modes {
     /// # Panics
     ///
     /// If one of the DAGs is committed.
-    ///
-    /// See [`Modes`].
     #[track_caller]
     pub fn mode(&self, name: &str, dags: &[&Dag]) -> Mode {
         let mut named = Vec::with_capacity(dags.len());

@@ -221,8 +221,6 @@ impl<T: ParameterValue> Parameter<T> {
     ///
     /// If that is not within the range, or the name is empty or has a blank, `=` or `,` in it, so
     /// that nobody could type it.
-    ///
-    /// See [`Parameter`].
     #[must_use]
     #[track_caller]
     pub fn new(name: &str, initial: T, range: RangeInclusive<T>) -> Self {
@@ -246,8 +244,6 @@ impl<T: ParameterValue> Parameter<T> {
     }
 
     /// Returns the value for the jobs to come.
-    ///
-    /// See [`Parameter`].
     #[must_use]
     pub fn value(&self) -> T {
         T::from_bits(self.0.bits.load(Ordering::Relaxed))
@@ -258,8 +254,6 @@ impl<T: ParameterValue> Parameter<T> {
     /// # Errors
     ///
     /// If it is not within the range; then nothing has changed.
-    ///
-    /// See [`Parameter`].
     pub fn set(&self, value: T) -> Result<(), ParameterError> {
         if self.store(value) {
             return Ok(());
@@ -272,8 +266,6 @@ impl<T: ParameterValue> Parameter<T> {
     }
 
     /// Returns the use of a source that reads it.
-    ///
-    /// See [`Parameter`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn reading(&self) -> ParameterUse<T> {
         ParameterUse(self.clone())

@@ -97,8 +97,6 @@ impl Signal {
     /// Returns the use of a subtask that may raise the signal.
     ///
     /// The commit must have the signal's DAG, too.
-    ///
-    /// See [`Signal`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn raising(&self) -> SignalUse {
         SignalUse(self.clone())
@@ -160,11 +158,6 @@ impl Dag {
     ///
     /// See [`Signal`]. Without a limit of [`jobs`](Self::jobs) the DAG keeps no run going: the run
     /// ends when all others have ended.
-    ///
-    /// ```
-    /// use core::time::Duration;
-    /// let button = fass::create_dag().sporadic(Duration::from_millis(50));
-    /// ```
     #[track_caller]
     pub fn sporadic(&self, min_inter_arrival: Duration) -> Signal {
         self.open().set_sporadic(min_inter_arrival);

@@ -115,8 +115,6 @@ pub struct StateRead<T>(State<T>);
 
 impl<T: StateValue> State<T> {
     /// Returns the use of a subtask that may change the state.
-    ///
-    /// See [`State`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn update(&self) -> StateUpdate<T> {
         StateUpdate(self.clone())
@@ -124,8 +122,6 @@ impl<T: StateValue> State<T> {
 
     /// Returns the use of a subtask that only reads the state. Readers between two
     /// updates may run at the same time.
-    ///
-    /// See [`State`].
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn read(&self) -> StateRead<T> {
         StateRead(self.clone())
@@ -250,11 +246,6 @@ impl Dag {
     ///
     /// A subtask uses it by [`using`](Self::using). See [`State`] for what is
     /// guaranteed.
-    ///
-    /// ```
-    /// let dag = fass::create_dag();
-    /// let pose = dag.state("pose", (0.0, 0.0));
-    /// ```
     #[track_caller]
     #[must_use = "a state that no subtask uses is a fault at commit"]
     pub fn state<T: StateValue>(&self, name: &str, initial: T) -> State<T> {

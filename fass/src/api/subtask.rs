@@ -121,8 +121,6 @@ impl<'d> Subtask<'d> {
     }
 
     /// Names the topics of its inputs, one for each element of the function's argument.
-    ///
-    /// See [`Subtask`].
     pub fn reads(self, topics: &'d [&'d str]) -> Self {
         Self {
             reads: topics,
@@ -131,8 +129,6 @@ impl<'d> Subtask<'d> {
     }
 
     /// Names the topics of its outputs, one for each element that the function returns.
-    ///
-    /// See [`Subtask`].
     pub fn writes(self, topics: &'d [&'d str]) -> Self {
         Self {
             writes: topics,
@@ -142,8 +138,6 @@ impl<'d> Subtask<'d> {
 
     /// States the time after a release by which it shall have finished, as a sink, where that is
     /// not its DAG's [`relative_deadline`](Dag::relative_deadline).
-    ///
-    /// See [`Subtask`].
     pub fn due(self, relative_deadline: Duration) -> Self {
         Self {
             due: Some(relative_deadline),

@@ -154,8 +154,6 @@ pub struct WireCounts {
 
 impl Wire {
     /// Makes a wire whose packets are lines, with a name for reports.
-    ///
-    /// See [`Wire`].
     #[must_use]
     pub fn new(name: &str) -> Self {
         Self::with(name, WireOptions::default())
@@ -225,16 +223,12 @@ impl Wire {
     }
 
     /// Returns the wire's name.
-    ///
-    /// See [`Wire`].
     #[must_use]
     pub fn name(&self) -> &str {
         &self.shared.name
     }
 
     /// Returns the counts of the wire so far.
-    ///
-    /// See [`Wire`].
     #[must_use]
     pub fn counts(&self) -> WireCounts {
         let WireState {
@@ -256,8 +250,6 @@ impl Wire {
     /// and a sporadic DAG receives it.
     ///
     /// For platforms, which have one place that calls this. It may be an interrupt handler.
-    ///
-    /// See [`Wire`].
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
         let is_whole = self.shared.incoming.arrive(bytes, now_ns);
         let signal = self.shared.signal.get().filter(|_| is_whole)?;
@@ -267,8 +259,6 @@ impl Wire {
     /// Reports whether there is a byte that is to go.
     ///
     /// For platforms.
-    ///
-    /// See [`Wire`].
     #[must_use]
     pub fn has_bytes_to_go(&self) -> bool {
         !self.shared.outgoing.is_empty()
@@ -277,8 +267,6 @@ impl Wire {
     /// Takes the next byte that is to go, if there is one.
     ///
     /// For platforms, which have one place that calls this.
-    ///
-    /// See [`Wire`].
     #[must_use]
     pub fn depart(&self) -> Option<u8> {
         self.shared.outgoing.take()

@@ -430,8 +430,6 @@ pub enum Verdict {
 
 impl Verdict {
     /// Returns the bound, if there is one.
-    ///
-    /// See [`Verdict`].
     #[must_use]
     pub const fn bound(&self) -> Option<Duration> {
         match self {

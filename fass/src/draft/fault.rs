@@ -176,14 +176,6 @@ pub struct UnprovenDag {
 
 impl UnprovenDag {
     /// Returns the reason, by which a program may decide.
-    ///
-    /// ```
-    /// use fass::commit::{NotProvenReason, UnprovenDag};
-    ///
-    /// fn is_worth_another_core(unproven: &UnprovenDag) -> bool {
-    ///     matches!(unproven.reason(), NotProvenReason::NoBound | NotProvenReason::Overload)
-    /// }
-    /// ```
     #[must_use]
     pub const fn reason(&self) -> NotProvenReason {
         self.reason
@@ -191,14 +183,6 @@ impl UnprovenDag {
 
     /// Reports whether deadlines will be missed when every instance takes its
     /// WCET, rather than merely not being proven to be met.
-    ///
-    /// ```
-    /// use fass::commit::{DagAnswer, UnprovenDag};
-    ///
-    /// fn is_hopeless(answer: &DagAnswer) -> bool {
-    ///     answer.verdict.unproven().is_some_and(UnprovenDag::is_certain)
-    /// }
-    /// ```
     #[must_use]
     pub const fn is_certain(&self) -> bool {
         self.reason.is_certain()

@@ -417,10 +417,6 @@ impl SubtaskAttributes {
     /// Names are unique within a DAG. Without a name
     /// ([`default`](Self::default)) messages say `subtask 2`, counting from 0
     /// in the order of registration.
-    ///
-    /// ```
-    /// let attributes = fass::SubtaskAttributes::named("fuse");
-    /// ```
     pub fn named(name: &str) -> Self {
         Self {
             name: name.into(),
@@ -432,10 +428,6 @@ impl SubtaskAttributes {
     ///
     /// Used under [`Policy::StaticPriority`](crate::Policy::StaticPriority).
     /// Without it the commit derives one from the graph.
-    ///
-    /// ```
-    /// let urgent = fass::SubtaskAttributes::named("brake").priority(0);
-    /// ```
     pub fn priority(mut self, priority: u32) -> Self {
         self.priority = Some(priority);
         self
@@ -445,11 +437,6 @@ impl SubtaskAttributes {
     /// executes, preemption not counted.
     ///
     /// At most `u64::MAX` nanoseconds; a longer one is a fault at commit.
-    ///
-    /// ```
-    /// use core::time::Duration;
-    /// let attributes = fass::SubtaskAttributes::named("fuse").wcet(Duration::from_millis(2));
-    /// ```
     pub fn wcet(mut self, wcet: Duration) -> Self {
         self.wcet = Some(wcet);
         self
@@ -461,11 +448,6 @@ impl SubtaskAttributes {
     /// Without it the platform may enforce a multiple of the
     /// [WCET](Self::wcet). At most `u64::MAX` nanoseconds; a longer one is a
     /// fault at commit. Virtual time does not enforce budgets.
-    ///
-    /// ```
-    /// use core::time::Duration;
-    /// let attributes = fass::SubtaskAttributes::named("plan").budget(Duration::from_millis(5));
-    /// ```
     pub fn budget(mut self, budget: Duration) -> Self {
         self.budget = Some(budget);
         self
@@ -474,10 +456,6 @@ impl SubtaskAttributes {
     /// Sets the stack that the subtask needs, in bytes, from 16 KiB to 1 MiB; another number is
     /// a fault at commit. Without it the kernel gives 64 KiB. The stacks of a commit are all as
     /// large as the largest; `measure=stacks` says how much of them each subtask uses.
-    ///
-    /// ```
-    /// let attributes = fass::SubtaskAttributes::named("plan").stack_bytes(256 << 10);
-    /// ```
     pub fn stack_bytes(mut self, bytes: u64) -> Self {
         self.stack_bytes = Some(bytes);
         self
@@ -485,10 +463,6 @@ impl SubtaskAttributes {
 
     /// States that a started instance keeps its core until it finishes, although the
     /// platform preempts others.
-    ///
-    /// ```
-    /// let attributes = fass::SubtaskAttributes::named("log").non_preemptive();
-    /// ```
     pub fn non_preemptive(mut self) -> Self {
         self.non_preemptive = true;
         self

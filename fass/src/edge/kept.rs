@@ -46,8 +46,6 @@ pub struct BootRecord<S> {
 
 impl<S: Sink + Send + 'static> BootRecord<S> {
     /// Begins a record.
-    ///
-    /// See [`BootRecord`].
     pub fn new(to: S) -> Self {
         Self {
             stream: Stream::begin(to),
@@ -130,8 +128,6 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
     }
 
     /// Ends the record, and returns what has taken it.
-    ///
-    /// See [`BootRecord`].
     pub fn end(self) -> S {
         match self.is_cut {
             true => self.stream.cut(),

@@ -226,8 +226,6 @@ struct ChannelHistory {
 
 impl LatestJobs {
     /// Makes room for the inputs of so many jobs; `None`: there is no memory.
-    ///
-    /// See [`LatestJobs`].
     #[must_use]
     pub fn new(channels: &[Channel], jobs: u32) -> Option<Self> {
         let count = usize::try_from(jobs).unwrap_or(usize::MAX);
@@ -257,8 +255,6 @@ impl LatestJobs {
     }
 
     /// Takes a value, if it is an input.
-    ///
-    /// See [`LatestJobs`].
     pub fn take(&mut self, value: &RecordedValue<'_>) {
         let Some(places) = self.places.get_mut(usize::from(value.channel)) else {
             return;
@@ -281,8 +277,6 @@ impl LatestJobs {
 
     /// Holds what is kept of a DAG, one job of which has failed: later jobs take no place of
     /// those before. What is held already stays.
-    ///
-    /// See [`LatestJobs`].
     pub fn hold(&mut self, dag: usize, job: u64) {
         if let Some(last @ &mut u64::MAX) = self.last.get_mut(dag) {
             *last = job;
@@ -290,16 +284,12 @@ impl LatestJobs {
     }
 
     /// Reports whether an input of a job would be kept: it is not behind one that has failed.
-    ///
-    /// See [`LatestJobs`].
     #[must_use]
     pub fn is_of_interest(&self, dag: usize, job: u64) -> bool {
         self.last.get(dag).is_some_and(|last| job <= *last)
     }
 
     /// Returns the last jobs of a DAG.
-    ///
-    /// See [`LatestJobs`].
     #[must_use]
     pub fn jobs(&self, dag: usize) -> Range<u64> {
         let end = self.ends.get(dag).copied().unwrap_or(0);
@@ -307,8 +297,6 @@ impl LatestJobs {
     }
 
     /// Reports whether a job is among the last ones of its DAG.
-    ///
-    /// See [`LatestJobs`].
     #[must_use]
     pub fn has(&self, dag: usize, job: u64) -> bool {
         let end = self.ends.get(dag).copied().unwrap_or(0);
@@ -316,8 +304,6 @@ impl LatestJobs {
     }
 
     /// Returns the kept values, channel by channel, and of each job by job.
-    ///
-    /// See [`LatestJobs`].
     pub fn values(&self) -> impl Iterator<Item = RecordedValue<'_>> {
         (0_u16..).zip(&self.places).flat_map(|(channel, places)| {
             self.jobs(places.dag).filter_map(move |job| {

@@ -65,8 +65,6 @@ pub struct RunConfig {
 impl RunConfig {
     /// Makes terms of so many cores: they are not divided, static priorities and preemption rule,
     /// nothing is charged, and there are no budgets but stated ones.
-    ///
-    /// See [`RunConfig`].
     #[must_use]
     pub const fn of_cores(cores: u32) -> Self {
         Self {
@@ -92,8 +90,6 @@ impl RunConfig {
 
     /// Divides the cores into clusters of so many each, from core 0 on; no number: they are not
     /// divided. Each cluster schedules its own DAGs.
-    ///
-    /// See [`RunConfig`].
     pub fn divide(&mut self, sizes: &[u32]) {
         self.assigns = false;
         self.clusters = match sizes {
@@ -105,8 +101,6 @@ impl RunConfig {
     /// Lets the commit divide the cores: a DAG that needs several gets a cluster of its own, the
     /// others share clusters of one core each. All subtasks need WCETs. See
     /// [`ClusterPlacement`](crate::commit::ClusterPlacement).
-    ///
-    /// See [`RunConfig`].
     pub fn divide_by_commit(&mut self) {
         (self.clusters, self.assigns) = (CoreDivision::Undivided, true);
     }

@@ -157,8 +157,6 @@ pub fn set_level(most: Option<Level>) {
 
 impl Level {
     /// Reports whether lines of this level are said.
-    ///
-    /// See [`Level`].
     #[inline]
     #[must_use]
     pub fn is_on(self) -> bool {
@@ -166,8 +164,6 @@ impl Level {
     }
 
     /// Returns its name in lines and on the command line.
-    ///
-    /// See [`Level`].
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -221,8 +217,6 @@ impl LogLine {
     }
 
     /// Has it wait until it is taken, for platforms ([`Platform::log`](crate::platform::Platform::log)).
-    ///
-    /// See [`LogLine`].
     pub fn keep(self) {
         let fill = |place: &mut LogSlot| {
             matches!(place, LogSlot::Empty).then(|| *place = LogSlot::Full(self))
@@ -252,8 +246,6 @@ impl LogLine {
     }
 
     /// Returns the keys and the values of its fields; these are JSON.
-    ///
-    /// See [`LogLine`].
     pub fn fields(&self) -> impl Iterator<Item = (&'static str, impl Display)> {
         let fields = self.fields.iter().flatten();
         fields.map(|(key, value)| (*key, fmt::from_fn(|f| (self.write)(value, f))))
@@ -261,8 +253,6 @@ impl LogLine {
 
     /// Returns the names of its DAG and its subtask, and the instance, if it is of one of these
     /// DAGs.
-    ///
-    /// See [`LogLine`].
     #[must_use]
     pub fn names<'t>(&self, task_set: Option<&'t TaskSet>) -> Option<(&'t str, &'t str, Instance)> {
         let instance = self.instance?;

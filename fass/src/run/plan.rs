@@ -206,12 +206,6 @@ impl SubtaskCode {
     /// - If an input of `job` is missing, because a predecessor is not complete.
     /// - If an output finds no free slot, because a cancelled instance's inputs
     ///   were not [discarded](Self::discard).
-    ///
-    /// ```
-    /// fn start(body: &mut fass::platform::SubtaskCode, instance: sched_dag::Instance) {
-    ///     body.run(instance.job); // then report the completion
-    /// }
-    /// ```
     pub fn run(&mut self, job: u64) {
         assert!(
             self.job == NO_JOB,
@@ -231,12 +225,6 @@ impl SubtaskCode {
     /// the requests to the scheduler with the completion (`sched_dag::lifecycle` has what for).
     /// Does not wait, allocate or
     /// run code of the app; a body that has no such effects returns at once.
-    ///
-    /// ```
-    /// fn completed(body: &mut fass::platform::SubtaskCode, now_ns: u64) {
-    ///     body.complete(now_ns, &mut |request| println!("{request:?}"));
-    /// }
-    /// ```
     #[inline]
     pub fn complete(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
         // Mostly there is one, for which a loop would take longer than what it does.
@@ -256,12 +244,6 @@ impl SubtaskCode {
 
     /// Gives the platform what an instance had sampled, if that is recorded, although it
     /// failed; else nobody could compute its fault again.
-    ///
-    /// ```
-    /// fn failed(body: &mut fass::platform::SubtaskCode) {
-    ///     body.failed(fass::now_ns());
-    /// }
-    /// ```
     pub fn failed(&mut self, failed_ns: u64) {
         for effect in &mut self.effects {
             effect.fail(failed_ns);
@@ -277,13 +259,6 @@ impl SubtaskCode {
 
     /// Has something done at each completion, after what the subtask itself prepared. As an
     /// effect it must be short: it keeps the platform from deciding anything meanwhile.
-    ///
-    /// ```
-    /// fn counted(body: &mut fass::platform::SubtaskCode, count: &'static std::sync::atomic::AtomicU64) {
-    ///     use std::sync::atomic::Ordering::Relaxed;
-    ///     body.on_completion(Box::new(|| drop(count.fetch_add(1, Relaxed))));
-    /// }
-    /// ```
     pub fn on_completion(&mut self, act: Box<dyn FnMut() + Send>) {
         self.effects.push(Box::new(act));
     }
@@ -298,14 +273,6 @@ impl SubtaskCode {
 
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a
     /// platform to which a clock is dear need not read it for the others.
-    ///
-    /// ```
-    /// fn completed(body: &mut fass::platform::SubtaskCode, ask: &mut dyn FnMut(fass::platform::Request)) {
-    ///     if body.has_effects() {
-    ///         body.complete(fass::now_ns(), ask);
-    ///     }
-    /// }
-    /// ```
     #[must_use]
     pub fn has_effects(&self) -> bool {
         !self.effects.is_empty()
@@ -321,12 +288,6 @@ impl SubtaskCode {
     /// may be called by a scheduler in mid-step: a value is not dropped here, but
     /// by the predecessor that next needs its slot, in [`run`](Self::run), or with
     /// the bodies.
-    ///
-    /// ```
-    /// fn cancelled(body: &mut fass::platform::SubtaskCode, instance: sched_dag::Instance) {
-    ///     body.discard(instance.job);
-    /// }
-    /// ```
     pub fn discard(&mut self, job: u64) {
         self.subtask.discard(job);
     }
@@ -346,12 +307,6 @@ impl SubtaskCode {
     /// To be called once for a fault, before anything else of the DAG starts that was not started
     /// then, and if the [`ReplacementCode`] is there. Takes a bounded time and runs no code of the
     /// app.
-    ///
-    /// ```
-    /// fn survived(body: &mut fass::platform::SubtaskCode) {
-    ///     body.replace(); // and run the next job
-    /// }
-    /// ```
     pub fn replace(&mut self) {
         self.subtask.replace();
         self.job = NO_JOB;
@@ -359,12 +314,6 @@ impl SubtaskCode {
 
     /// Gives back the memory of a body that a fault has ended in mid-function, without
     /// unwinding: all but what the app's function owns.
-    ///
-    /// ```
-    /// fn ended(lost: Vec<fass::platform::SubtaskCode>) {
-    ///     lost.into_iter().for_each(fass::platform::SubtaskCode::forget);
-    /// }
-    /// ```
     pub fn forget(self) {
         self.subtask.forget();
     }
@@ -405,8 +354,6 @@ pub struct SubtaskRunner {
 
 impl SubtaskRunner {
     /// Makes one of each body of a plan, in the order of the vertices.
-    ///
-    /// See [`SubtaskRunner`].
     pub fn all(task_set: &TaskSet, bodies: Vec<Vec<SubtaskCode>>) -> impl Iterator<Item = Self> {
         let of_dags = (0..).map(DagId).zip(bodies);
         of_dags.flat_map(move |(dag, of_dag)| {
@@ -425,8 +372,6 @@ impl SubtaskRunner {
     }
 
     /// Calls the function for the instance. It panics where [`SubtaskCode::run`] does.
-    ///
-    /// See [`SubtaskRunner`].
     #[inline]
     pub fn run(&mut self) {
         self.body.run(self.instance.job);

@@ -52,31 +52,13 @@ pub trait MulRecv {
     ///
     /// When polled, if an input is missing: the platform granted an instance
     /// whose predecessors were not complete.
-    ///
-    /// ```
-    /// async fn receive<Subs: fass::MulRecv>(subs: &mut Subs) -> Subs::Items {
-    ///     subs.recv_all().await
-    /// }
-    /// ```
     fn recv_all(&mut self) -> impl Future<Output = Self::Items> + Send;
 
     /// Grants an instance: the next `recv_all` returns the inputs of `job`, once.
-    ///
-    /// ```
-    /// fn granted<Subs: fass::MulRecv>(subs: &mut Subs, job: u64) {
-    ///     subs.grant(job);
-    /// }
-    /// ```
     fn grant(&mut self, job: u64);
 
     /// Gives up the inputs of `job` that have arrived, which no instance will take.
     /// Runs no code of the app and waits for nothing.
-    ///
-    /// ```
-    /// fn cancelled<Subs: fass::MulRecv>(subs: &mut Subs, job: u64) {
-    ///     subs.discard_all(job);
-    /// }
-    /// ```
     fn discard_all(&mut self, job: u64);
 }
 
@@ -106,21 +88,9 @@ pub trait MulSend {
     ///
     /// If no slot is free: the platform did not discard the inputs
     /// of a cancelled instance.
-    ///
-    /// ```
-    /// async fn send<Pubs: fass::MulSend>(pubs: &mut Pubs, items: Pubs::Items) {
-    ///     pubs.send_all(items).await;
-    /// }
-    /// ```
     fn send_all(&mut self, items: Self::Items) -> impl Future<Output = ()> + Send;
 
     /// Grants an instance: the next `send_all` is of `job`.
-    ///
-    /// ```
-    /// fn granted<Pubs: fass::MulSend>(pubs: &mut Pubs, job: u64) {
-    ///     pubs.grant(job);
-    /// }
-    /// ```
     fn grant(&mut self, job: u64);
 }
 
@@ -165,14 +135,6 @@ pub trait VecToSubs: Sized + Send + 'static {
     fn input_types() -> Vec<MessageType>;
 
     /// Generates the subscribers from a subtask's ports. Called by the commit.
-    ///
-    /// ```
-    /// use fass::{MulRecv, Ports, VecToSubs};
-    ///
-    /// fn subs(ports: Ports<'_>) -> impl MulRecv<Items = (i32, u8)> {
-    ///     <(i32, u8)>::gen_subs(ports)
-    /// }
-    /// ```
     fn gen_subs(ports: Ports<'_>) -> Self::Subs;
 }
 
@@ -223,23 +185,12 @@ pub trait VecToPubs: Sized + Send + 'static {
     fn output_types() -> Vec<MessageType>;
 
     /// Generates the publishers from a subtask's ports. Called by the commit.
-    ///
-    /// ```
-    /// use fass::{MulSend, Ports, VecToPubs};
-    ///
-    /// fn pubs(ports: Ports<'_>) -> impl MulSend<Items = (i32, u8)> {
-    ///     <(i32, u8)>::gen_pubs(ports)
-    /// }
-    /// ```
     fn gen_pubs(ports: Ports<'_>) -> Self::Pubs;
 }
 
 /// The subscribers of a subtask: a tuple of [`Subscriber`]s behind the gate.
 ///
-/// ```
-/// fn receives<S: fass::MulRecv<Items = (i32,)>>() {}
-/// receives::<fass::Subscribers<(fass::Subscriber<i32>,)>>();
-/// ```
+/// See [`MulRecv`].
 pub struct Subscribers<Ends> {
     /// The job that is granted and not yet begun: the *gate* is open for it.
     granted: Option<u64>,
@@ -248,10 +199,7 @@ pub struct Subscribers<Ends> {
 
 /// The publishers of a subtask: a tuple of [`Publisher`]s.
 ///
-/// ```
-/// fn sends<P: fass::MulSend<Items = (i32,)>>() {}
-/// sends::<fass::Publishers<(fass::Publisher<i32>,)>>();
-/// ```
+/// See [`MulSend`].
 pub struct Publishers<Ends> {
     /// The job that was granted last.
     job: u64,

@@ -124,8 +124,6 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If the program has installed another platform.
-    ///
-    /// See [`VirtualTime`].
     #[must_use = "dropping the machine removes it from the thread"]
     #[allow(clippy::new_without_default, reason = "it installs a platform")]
     pub fn new() -> Self {
@@ -284,8 +282,6 @@ impl VirtualTime {
     /// # Panics
     ///
     /// If [`try_run`](Self::try_run) gives an error, with its message.
-    ///
-    /// See [`VirtualTime`].
     pub fn run(&self) -> Report {
         let report = self.try_run().unwrap_or_else(|error| panic!("{error}"));
         if let Some(warning) = report.warning() {

@@ -120,8 +120,6 @@ impl Report {
     }
 
     /// Returns the record of one instance, if it became ready.
-    ///
-    /// See [`Report`].
     #[must_use]
     pub fn instance(&self, instance: Instance) -> Option<&InstanceRecord> {
         (self.instances.iter()).find(|record| record.instance == instance)
@@ -152,8 +150,6 @@ impl Report {
     ///
     /// After a panic ([`RunError::Panicked`](crate::RunError::Panicked)) the
     /// last instant is incomplete, and may seem to break them.
-    ///
-    /// See [`Report`].
     #[must_use]
     pub fn violations(&self) -> Vec<Violation> {
         // A test that has changed times may have put them out of order.
@@ -173,8 +169,6 @@ impl Report {
     /// is stopped has no job.
     ///
     /// For tests that compare whole sequences in words.
-    ///
-    /// See [`Report`].
     #[must_use]
     pub fn event_lines(&self) -> Vec<String> {
         self.events.iter().map(|event| self.line(event)).collect()

@@ -97,8 +97,6 @@ impl<'a> CommandLine<'a> {
     /// # Errors
     ///
     /// If a word is not of the form `key=value`, or a key occurs twice.
-    ///
-    /// See [`CommandLine`].
     pub fn parse(line: &'a str) -> Result<Self, UsageError> {
         let mut words = Vec::<OptionWord<'a>>::new();
         for word in line.split_whitespace() {
@@ -156,8 +154,6 @@ impl<'a> CommandLine<'a> {
     /// # Errors
     ///
     /// If one of them is not a whole number within `allowed`.
-    ///
-    /// See [`CommandLine`].
     pub fn numbers(
         &self,
         key: &str,
@@ -184,8 +180,6 @@ impl<'a> CommandLine<'a> {
     /// # Panics
     ///
     /// If there are no choices.
-    ///
-    /// See [`CommandLine`].
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<T, UsageError> {
         let name = |place: usize| choices.get(place).map(|(name, _)| *name);
         Ok(choices[self.chosen(key, &name)?].1)

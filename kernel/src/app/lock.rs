@@ -62,8 +62,6 @@ pub struct Lock<T>(ContextLock<T>);
 
 impl<T> Lock<T> {
     /// Makes a lock that is free.
-    ///
-    /// See [`Lock`].
     #[must_use]
     pub const fn new(data: T) -> Self {
         Self(ContextLock::new(data))
@@ -75,8 +73,6 @@ impl<T> Lock<T> {
     ///
     /// If the caller is in a section of this lock already, or a fault has ended an
     /// instance that was.
-    ///
-    /// See [`Lock`].
     #[track_caller]
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
         match self.0.with(section) {
@@ -117,8 +113,6 @@ pub struct Event {
 
 impl Event {
     /// Makes an event that has not happened.
-    ///
-    /// See [`Event`].
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -128,16 +122,12 @@ impl Event {
     }
 
     /// Returns how often the event has happened.
-    ///
-    /// See [`Event`].
     #[must_use]
     pub fn version(&self) -> u64 {
         self.version.load(Ordering::SeqCst)
     }
 
     /// Raises the version: all that wait go on.
-    ///
-    /// See [`Event`].
     pub fn notify(&self) {
         self.version.fetch_add(1, Ordering::SeqCst);
         for (word, first) in self.waiting.iter().zip((0..).step_by(64)) {
@@ -161,8 +151,6 @@ impl Event {
     /// notifier changes the version before it takes the bits: one of them sees the
     /// other (both orders are sequentially consistent). If it is the notifier, its
     /// interrupt comes after interrupts were disabled here, and so ends the halt.
-    ///
-    /// See [`Event`].
     pub fn wait(&self, seen: u64, until_ns: u64) {
         loop {
             interrupt_flag::disable();

@@ -86,8 +86,6 @@ impl DagCounts {
 
 impl Run {
     /// Takes it out of an engine that has come to its end, on so many cores in all.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub fn of<B: SubtaskBody, P>(
         engine: &mut Engine<B, P>,
@@ -124,8 +122,6 @@ impl Run {
     }
 
     /// Takes over what the engine of another cluster has of the same run.
-    ///
-    /// See [`Run`].
     pub fn absorb<B: SubtaskBody, P>(&mut self, other: &mut Engine<B, P>) {
         let journal = core::mem::replace(&mut other.scheduler.log.journal, Journal::none());
         self.add(other, journal);
@@ -143,16 +139,12 @@ impl Run {
     }
 
     /// Adds what the platform has counted.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub fn with_counts(self, counts: RunCounts) -> Self {
         Self { counts, ..self }
     }
 
     /// Returns the model that was run.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub const fn task_set(&self) -> &Arc<TaskSet> {
         &self.task_set
@@ -166,8 +158,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no memory for it.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub fn record(&self) -> &RunRecord {
         self.record.get_or_init(|| {
@@ -183,8 +173,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG, or no memory for the times.
-    ///
-    /// See [`Run`].
     #[track_caller]
     pub fn response_times_ns(&self, dag: impl DagKey) -> impl Iterator<Item = u64> {
         let (dag, record) = (self.task_set.find(dag), self.record());
@@ -197,15 +185,6 @@ impl Run {
     /// Returns the statistics of all jobs and instances, those included whose events made way for
     /// later ones; `None` if some were not recorded, because of `trace_events=0` or the console's
     /// `trace off`.
-    ///
-    /// ```no_run
-    /// /// The response time that one job in a thousand of a DAG exceeds.
-    /// fn tail_ns(run: &sched_dag::engine::Run, dag: &str) -> Option<u64> {
-    ///     let dag = run.task_set().find(dag);
-    ///     let response_time = &run.times()?.dag(dag).response_time;
-    ///     Some(response_time.distribution().per_mille(999))
-    /// }
-    /// ```
     #[must_use]
     pub fn times(&self) -> Option<&RunTally> {
         let tally = || self.journal.statistics(&self.task_set, FINEST);
@@ -213,16 +192,12 @@ impl Run {
     }
 
     /// Returns counts and maxima of all times, as [`times`](Self::times) does, in less memory.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub fn coarse_times(&self) -> Option<RunTally> {
         self.journal.statistics(&self.task_set, 0)
     }
 
     /// Returns the journal: what has happened, in its order.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub const fn journal(&self) -> &Journal {
         &self.journal
@@ -230,8 +205,6 @@ impl Run {
 
     /// Returns the instant from which releases count, in nanoseconds on the clock that functions
     /// read.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub const fn epoch_ns(&self) -> u64 {
         self.counts.epoch_ns
@@ -242,8 +215,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG.
-    ///
-    /// See [`Run`].
     #[must_use]
     #[track_caller]
     pub fn statistics(&self, dag: impl DagKey) -> &DagStatistics {
@@ -255,8 +226,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG.
-    ///
-    /// See [`Run`].
     #[must_use]
     #[track_caller]
     pub fn snapshot(&self, dag: impl DagKey) -> &DagSnapshot {
@@ -269,8 +238,6 @@ impl Run {
     /// # Panics
     ///
     /// If there is no such DAG, or the subtask is no sink of it.
-    ///
-    /// See [`Run`].
     #[must_use]
     #[track_caller]
     pub fn sink_misses(&self, dag: impl DagKey, sink: impl SubtaskKey) -> u64 {
@@ -281,16 +248,12 @@ impl Run {
     }
 
     /// Returns how the scheduler was told to work.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub const fn options(&self) -> SchedulerOptions {
         self.options
     }
 
     /// Returns the response time that the commit has proven of a DAG, if it has.
-    ///
-    /// See [`Run`].
     #[must_use]
     #[track_caller]
     pub fn bound_ns(&self, dag: impl DagKey) -> Option<u64> {
@@ -298,8 +261,6 @@ impl Run {
     }
 
     /// Returns the response time that the commit has proven of a sink, if it has.
-    ///
-    /// See [`Run`].
     #[must_use]
     #[track_caller]
     pub fn sink_bound_ns(&self, dag: impl DagKey, sink: impl SubtaskKey) -> Option<u64> {
@@ -321,8 +282,6 @@ impl Run {
     /// Returns every breach of the model's rules R1 to R4, and whether each instance had one life
     /// and each core one instance at a time. However long something takes is right, for that is
     /// the machine's affair.
-    ///
-    /// See [`Run`].
     #[inline(never)]
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
         let found = law::violations(&self.task_set, self.terms(u64::MAX), self.journal.events());
@@ -331,8 +290,6 @@ impl Run {
 
     /// Returns every breach of R5 (did the right instances run?) that lasts for longer than
     /// `bound_ns`: a decision takes effect when a core has changed over. `None` if events are lost.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub fn dispatch_violations(&self, bound_ns: u64) -> Option<Vec<Violation>> {
         let (task_set, events) = (&self.task_set, self.journal.events());
@@ -350,8 +307,6 @@ impl Run {
 
     /// Measures a chain that crosses DAGs, one of those of the commit: how old its outputs are,
     /// and how long it takes to react; of the latest jobs if events are lost.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub fn latencies(&self, chain: &Chain) -> ChainLatencies {
         chain.latencies(&self.task_set, self.journal.events())
@@ -359,8 +314,6 @@ impl Run {
 
     /// Returns how often anything allocated memory between the start of the run and its last
     /// completion.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub const fn allocations(&self) -> u64 {
         self.counts.allocations
@@ -368,8 +321,6 @@ impl Run {
 
     /// Returns how often the schedulers' locks were taken between the start of the run and its
     /// last completion, modulo 2^32; 0 where nobody counts.
-    ///
-    /// See [`Run`].
     #[must_use]
     pub const fn lock_acquisitions(&self) -> u32 {
         self.counts.lock_acquisitions

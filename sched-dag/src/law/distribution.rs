@@ -40,8 +40,6 @@ pub struct Distribution {
 
 impl Distribution {
     /// Orders the samples.
-    ///
-    /// See [`Distribution`].
     #[must_use]
     pub fn new(samples_ns: impl IntoIterator<Item = u64>) -> Self {
         let samples = samples_ns.into_iter().map(|ns| (ns, 1));
@@ -88,8 +86,6 @@ impl Distribution {
     }
 
     /// Returns the number of samples.
-    ///
-    /// See [`Distribution`].
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
@@ -130,32 +126,24 @@ impl Distribution {
     }
 
     /// Returns the smallest sample, or 0.
-    ///
-    /// See [`Distribution`].
     #[must_use]
     pub fn min(&self) -> u64 {
         self.min_ns.unwrap_or(0)
     }
 
     /// Returns the middle sample, or 0.
-    ///
-    /// See [`Distribution`].
     #[must_use]
     pub fn median(&self) -> u64 {
         self.per_mille(500)
     }
 
     /// Returns the sample that 99 per cent do not exceed, or 0.
-    ///
-    /// See [`Distribution`].
     #[must_use]
     pub fn p99(&self) -> u64 {
         self.per_mille(990)
     }
 
     /// Returns the largest sample, or 0.
-    ///
-    /// See [`Distribution`].
     #[must_use]
     pub fn max(&self) -> u64 {
         self.values.last().map_or(0, |(ns, _)| *ns)
@@ -193,8 +181,6 @@ impl Histogram {
     /// # Panics
     ///
     /// If `bits` is more than 16.
-    ///
-    /// See [`Histogram`].
     #[must_use]
     pub fn new(bits: u32) -> Self {
         Self {
@@ -207,8 +193,6 @@ impl Histogram {
     }
 
     /// Returns the bytes that one takes.
-    ///
-    /// See [`Histogram`].
     #[must_use]
     pub const fn size_of(bits: u32) -> usize {
         size_of::<Self>() + Self::buckets(bits) * size_of::<u32>()
@@ -223,8 +207,6 @@ impl Histogram {
     }
 
     /// Counts a value.
-    ///
-    /// See [`Histogram`].
     pub fn add(&mut self, value: u64) {
         let bucket = self.bucket(value);
         self.counts[bucket] = self.counts[bucket].saturating_add(1);
@@ -251,8 +233,6 @@ impl Histogram {
 
     /// Returns the distribution. Its values are the largest ones of the buckets that are not
     /// empty, the last of them the maximum.
-    ///
-    /// See [`Histogram`].
     #[must_use]
     pub fn distribution(&self) -> Distribution {
         let counts = self.counts.iter().copied().enumerate();

@@ -1,5 +1,5 @@
-//! Every item of the crates that apps use has an example, or names the item whose
-//! example shows it.
+//! Every type, trait and free function of the crates that apps use has an example, or names the
+//! item whose example shows it. A method is shown by the example of its type.
 //!
 //! That there is documentation at all, the compiler demands (`missing_docs`); that
 //! examples compile, and run where the host can run them, rustdoc does.
@@ -32,24 +32,12 @@ const FILES: [&str; 8] = [
 
 /// Items that are public for their own crate alone, because its module is not, or for the kernel,
 /// which does not pass it on.
-const INTERNAL: [&str; 17] = [
+const INTERNAL: [&str; 5] = [
     "MessageType",
-    "SharedCell",
-    "WriteClaim",
-    "ReadClaim",
-    "Sampler",
-    "SampledSlot",
-    "Sealed",
     "ResettableState",
     "Reset",
     "report",
-    "write_line",
     "whole_number",
-    "has_pending",
-    "send_pending_byte",
-    "send_what_goes_at_once",
-    "defer",
-    "resume",
 ];
 
 /// The words that begin an item that can have an example.
@@ -77,7 +65,8 @@ fn items(source: &str) -> (usize, Vec<String>) {
     let (mut found, mut bare) = (0, Vec::new());
     let mut documentation = String::new();
     let mut in_attribute = false;
-    for line in source.lines().map(str::trim_start) {
+    for written in source.lines() {
+        let line = written.trim_start();
         if line == "mod tests {" {
             break;
         }
@@ -97,7 +86,7 @@ fn items(source: &str) -> (usize, Vec<String>) {
         if line.starts_with("#[") {
             continue;
         }
-        let rest = ITEMS.iter().find_map(|item| line.strip_prefix(item));
+        let rest = ITEMS.iter().find_map(|item| written.strip_prefix(item));
         let name = rest.and_then(|rest| {
             rest.split(|c: char| !c.is_alphanumeric() && c != '_')
                 .next()
@@ -124,7 +113,7 @@ fn every_item_that_apps_use_has_an_example() {
         let place = file.strip_prefix(workspace()).unwrap_or(&file).display();
         bare.extend(without.iter().map(|name| format!("{place}: {name}")));
     }
-    assert!(found > 150, "only {found} items were found");
+    assert!(found > 100, "only {found} items were found");
     assert!(bare.is_empty(), "without example: {bare:#?}");
 }
 
@@ -132,6 +121,6 @@ fn every_item_that_apps_use_has_an_example() {
 fn an_item_without_example_is_found() {
     let source = "/// A.\npub struct A;\n\n/// B. See [`A`].\n#[must_use]\npub fn b() {}\n\n\
                   /// ```\n/// ```\n#[diagnostic::on_unimplemented(\n    message = \"x\",\n)]\n\
-                  pub trait C {}\n\npub fn d() {}\n";
+                  pub trait C {}\n\npub fn d() {}\n\nimpl A {\n    pub fn e() {}\n}\n";
     assert_eq!(items(source), (4, vec!["A".to_string(), "d".to_string()]));
 }

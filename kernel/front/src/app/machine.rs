@@ -120,8 +120,6 @@ pub struct Machine<S> {
 impl<S: System> Machine<S> {
     /// Lends `app` the machine that a system makes, and returns how the app ends. `module` is the
     /// app's file.
-    ///
-    /// See [`Machine`].
     #[doc(hidden)]
     pub fn serve(
         system: S,
@@ -163,12 +161,6 @@ impl<S: System> Machine<S> {
     /// that the word `module=` names, if there is one. The loader's is not copied: memory and the
     /// boot's time are the same for files of any size. If there is one and the app never asks for
     /// it, a line says so at the end.
-    ///
-    /// ```no_run
-    /// fn size(machine: &kernel::Machine) -> usize {
-    ///     machine.module().map_or(0, <[u8]>::len)
-    /// }
-    /// ```
     #[must_use]
     pub fn module(&self) -> Option<&'static [u8]> {
         self.has_asked.set(true);
@@ -177,20 +169,12 @@ impl<S: System> Machine<S> {
 
     /// Reports whether a person can talk to the kernel during a run (`console=on`), and
     /// so end one that would not end by itself.
-    ///
-    /// ```no_run
-    /// fn least_jobs(machine: &kernel::Machine) -> u64 {
-    ///     u64::from(!machine.has_console()) // 0 is without end
-    /// }
-    /// ```
     #[must_use]
     pub fn has_console(&self) -> bool {
         self.system.has_console()
     }
 
     /// Returns the number of cores that run subtasks.
-    ///
-    /// See [`Machine`].
     #[must_use]
     pub fn cores(&self) -> u32 {
         self.system.terms().scheduler.cores
@@ -228,12 +212,6 @@ impl<S: System> Machine<S> {
     /// the model would not. To compare the machine with the model, they have to
     /// be taken together again. The price is that every decision comes `window`
     /// later. On Linux the next run is refused, unless `window` is 0.
-    ///
-    /// ```no_run
-    /// fn compare_with_model(machine: &kernel::Machine) {
-    ///     machine.set_coincidence(core::time::Duration::from_micros(10));
-    /// }
-    /// ```
     pub fn set_coincidence(&self, window: Duration) {
         self.system.set_coincidence(window);
     }
@@ -259,13 +237,6 @@ impl<S: System> Machine<S> {
     /// Leaves it to the app to judge response times beyond their proven bounds. Unless
     /// it says so, at any time before its function returns, one in any of its runs makes
     /// it fail (neither in the tool's mode `threads` nor on Linux). A line says so in any case.
-    ///
-    /// ```no_run
-    /// fn measures_wcets(machine: &kernel::Machine) -> Result<(), kernel::AppError> {
-    ///     machine.accept_exceeded_bounds(); // those stated are guesses
-    ///     machine.run().map(drop)
-    /// }
-    /// ```
     pub fn accept_exceeded_bounds(&self) {
         self.verdict.accept_exceeded_bounds();
     }
@@ -296,13 +267,6 @@ impl<S: System> Machine<S> {
     /// # Errors
     ///
     /// As [`run`](Self::run).
-    ///
-    /// ```no_run
-    /// /// Sets the first release to a second from now.
-    /// fn later(machine: &kernel::Machine) -> Result<kernel::Run, kernel::AppError> {
-    ///     machine.run_from(fass::now_ns() + 1_000_000_000)
-    /// }
-    /// ```
     pub fn run_from(&self, epoch_ns: u64) -> Result<Run, AppError> {
         self.run_when(Some(epoch_ns))
     }
@@ -514,8 +478,6 @@ impl<S: System> Machine<S> {
     }
 
     /// Prints how much memory the run has needed, as a `memory` machine line.
-    ///
-    /// See [`Machine`].
     pub fn report_memory(&self) {
         S::memory().report();
     }
@@ -531,13 +493,6 @@ impl<S: Divisible> Machine<S> {
     /// Divides the cores, from core 0 on, into clusters of so many each in the commits to come;
     /// no number: they are not divided. Each cluster schedules its own DAGs
     /// ([`fass::Dag::cluster`]).
-    ///
-    /// ```no_run
-    /// fn keep_brakes_apart(machine: &kernel::Machine) {
-    ///     let others = machine.cores() - 1;
-    ///     machine.divide(&[1, others]); // cluster 0 is core 0
-    /// }
-    /// ```
     pub fn divide(&self, sizes: &[u32]) {
         self.system.change(|terms| terms.divide(sizes));
     }
@@ -591,12 +546,6 @@ impl<S: Divisible> Machine<S> {
     }
 
     /// Returns how the cores are divided, unless the commit is to find that.
-    ///
-    /// ```no_run
-    /// fn are_divided(machine: &kernel::Machine) -> bool {
-    ///     !machine.clusters().sizes().is_empty()
-    /// }
-    /// ```
     #[must_use]
     pub fn clusters(&self) -> CoreDivision {
         self.system.terms().clusters

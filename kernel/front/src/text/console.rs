@@ -43,10 +43,6 @@ macro_rules! output {
 
 /// Writes text. What one call writes stays together, up to 1 KiB of it. A line that begins with
 /// `{` gets a blank before it. For [`print!`](crate::print).
-///
-/// ```no_run
-/// kernel::println!("{} jobs", 3); // calls it
-/// ```
 pub fn write(text: fmt::Arguments<'_>) {
     bound::front_output(OutputKind::Text, text);
 }

@@ -38,29 +38,21 @@ pub struct JsonObject<'a, 'f> {
 
 impl JsonObject<'_, '_> {
     /// Writes a field with a whole number.
-    ///
-    /// See [`JsonObject`].
     pub fn number(&mut self, name: &str, value: impl Into<u64>) -> &mut Self {
         self.whole(name, value.into())
     }
 
     /// Writes a field with a truth value.
-    ///
-    /// See [`JsonObject`].
     pub fn flag(&mut self, name: &str, value: bool) -> &mut Self {
         self.shown(name, &value)
     }
 
     /// Writes a field with text.
-    ///
-    /// See [`JsonObject`].
     pub fn text(&mut self, name: &str, value: impl Display) -> &mut Self {
         self.quoted(name, &value)
     }
 
     /// Writes a field with an object.
-    ///
-    /// See [`JsonObject`].
     pub fn object(&mut self, name: &str, fields: impl Fn(&mut JsonObject<'_, '_>)) -> &mut Self {
         self.shown(name, &JsonFields(&fields))
     }
@@ -90,8 +82,6 @@ impl JsonObject<'_, '_> {
     }
 
     /// Writes a field with a list of values, each of which is JSON already.
-    ///
-    /// See [`JsonObject`].
     pub fn list(
         &mut self,
         name: &str,
