@@ -13,7 +13,7 @@
 //! reads, its result tuple what it writes, one *topic* for each element. One
 //! execution of a subtask, for one job, is an *instance*. A *source* reads
 //! nothing and is started by the release, a *sink* writes nothing. `docs/glossary.md` has
-//! all words.
+//! the words that are our own.
 //!
 //! # A first DAG
 //!

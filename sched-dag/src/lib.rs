@@ -16,7 +16,7 @@
 //! gives cores to ready instances: it *starts* them, or *resumes* those that
 //! were *preempted*. An instance *finishes* when its function has returned, and
 //! a job is *complete* when all its instances have finished; until then, from
-//! its release on, it is *in flight*. `docs/glossary.md` has all words.
+//! its release on, it is *in flight*. `docs/glossary.md` has our own words.
 //!
 //! # The rules
 //!
