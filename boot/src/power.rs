@@ -2,7 +2,7 @@
 //!
 //! The FADT names registers (ACPI specification 6.5, 5.2.9), and the object `_S5_` of the DSDT
 //! what to write to be off (7.4.2). That object is found by its bytes, without an interpreter:
-//! it is a package of small constants. What is missing or malformed is as good as absent.
+//! it is a package of small constants. Missing or malformed parts count as absent.
 
 use crate::physical::PhysicalMemory;
 

@@ -62,9 +62,10 @@
 //!
 //! # Where things are
 //!
-//! The root has what every app needs, and the paper's names. What subtasks share beyond their
-//! edges is in [`shared`], what a commit answers in [`commit`], what functions say in [`log`](mod@log); a
-//! machine below offers itself by [`platform`], and records and replays by [`edge`].
+//! The root has what every app needs, and the paper's names. The values that subtasks share beyond
+//! their edges are in [`shared`], a commit's answers in [`commit`], what functions say in
+//! [`log`](mod@log); a machine below offers itself by [`platform`], and records and replays by
+//! [`edge`].
 //!
 //! # What is guaranteed
 //!

@@ -38,10 +38,10 @@
 //!
 //! # Rooms, from top to bottom
 //!
-//! `entry` and `start` bring an image up, `app` is what an app sees of the kernel. `watch` looks
-//! in on a run, and [`report`] tells of it afterwards; [`options`] reads the words of the command
-//! line. What executes jobs is below, in a crate of its own, `executive`: cores, interrupts,
-//! memory, the drivers of the scheduler, and output ([`console`], [`json`]).
+//! `entry` and `start` bring an image up, `app` is what an app sees of the kernel. `watch` looks in
+//! on a run, and [`report`] tells of it afterwards; [`options`] reads the words of the command
+//! line. The part that executes jobs is below, in a crate of its own, `executive`: cores,
+//! interrupts, memory, the drivers of the scheduler, and output ([`console`], [`json`]).
 //! `docs/architecture.md` has the table that the tests hold this to.
 
 #![cfg_attr(not(test), no_std)]
@@ -99,7 +99,7 @@ pub fn set_heartbeat(period: core::time::Duration) {
 /// not given.
 ///
 /// A function that uses it bears `#[target_feature(enable = "avx")]`, and its caller has
-/// asked. What else it names, such as `avx2`, is asked of the processor
+/// asked. Any other feature, such as `avx2`, is asked of the processor
 /// (`core::arch::x86_64::__cpuid`) besides; its state is AVX's.
 ///
 /// ```no_run

@@ -2,7 +2,7 @@
 //! functions have left in the heap and used of their stacks.
 //!
 //! All of it is computed from the journal. Nothing here is called while a run goes on, but
-//! `latest`, by a panic. What knows no machine is the front's.
+//! `latest`, by a panic. Reports that know no machine are the front's.
 //!
 //! # What a fault leaves
 //!

@@ -1,6 +1,6 @@
 //! The driver in virtual time: a [`Scheduler`] run without a machine, or one for each cluster.
 //!
-//! Time jumps from event to event. What the cores do comes from a
+//! Time jumps from event to event. The work of the cores comes from a
 //! [`Workload`], which is asked once for each instance, at its start, how long
 //! it executes; it may run the function of the instance's [body](SubtaskBody) to find out.
 //!
@@ -24,19 +24,13 @@
 //!     CommitOptions, DagId, DagSpec, Policy, Preemption, SchedulerOptions, SubtaskSpec, verify,
 //! };
 //!
-//! let dag = DagSpec {
-//!     period_ns: Some(100),
-//!     relative_deadline_ns: Some(50),
-//!     jobs: Some(3),
-//!     subtasks: vec![SubtaskSpec::default(), SubtaskSpec::default()],
-//!     edges: vec![(0, 1)],
-//!     ..DagSpec::default()
-//! };
-//! let verified = verify(&[dag], &CommitOptions::new(Policy::Edf, 1)).expect("the DAG is right");
-//! let options = SchedulerOptions { policy: Policy::Edf, preemption: Preemption::Enabled, cores: 1 };
-//! let mut run = VirtualTime::new(&Arc::new(verified.task_set), options);
-//! assert_eq!(run.run(&mut ExecutionTimes(|_instance| 20)), RunOutcome::Finished);
-//! assert_eq!(run.now_ns(), 240);
+//! let dag = DagSpec { period_ns: Some(100), relative_deadline_ns: Some(50), jobs: Some(3),
+//! subtasks: vec![SubtaskSpec::default(), SubtaskSpec::default()], edges: vec![(0, 1)],
+//! ..DagSpec::default() }; let verified = verify(&[dag], &CommitOptions::new(Policy::Edf,
+//! 1)).expect("the DAG is right"); let options = SchedulerOptions { policy: Policy::Edf,
+//! preemption: Preemption::Enabled, cores: 1 }; let mut run =
+//! VirtualTime::new(&Arc::new(verified.task_set), options); assert_eq!(run.run(&mut
+//! ExecutionTimes(|_instance| 20)), RunOutcome::Finished); assert_eq!(run.now_ns(), 240);
 //! assert_eq!(run.scheduler_of(DagId(0)).statistics(DagId(0)).misses, 0);
 //! ```
 //!

@@ -2,7 +2,7 @@
 //!
 //! Two DAGs run at once. The *healthy* one has a deadline that it meets with
 //! ease. The *doomed* one does the same work until its job [`FATAL_JOB`], in
-//! which its middle subtask commits a crime. What is shown is how many jobs of
+//! which its middle subtask commits a crime. It shows how many jobs of
 //! the healthy DAG met their deadlines before, while and after that happened, and what
 //! it cost the doomed DAG, under each [`Policy`].
 //!

@@ -18,7 +18,7 @@
 //! messages have one index, else *cross-index*. A set *covers* index i if all its
 //! messages have index i or a later one.
 //!
-//! A [`Record`] is plain times, taken by [`run`] or by a machine. What is computed from it is
+//! A [`Record`] is plain times, taken by [`run`] or by a machine. Figures computed from it are
 //! exact.
 //!
 //! The join latency as the paper defines it compares the i-th set with the last

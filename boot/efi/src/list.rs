@@ -1,6 +1,6 @@
 //! The list of tags by which the application informs the image, as a Multiboot2 loader does.
 //!
-//! [`boot::multiboot2`] reads it, and says which tags there are. What does not fit is
+//! [`boot::multiboot2`] reads it, and says which tags there are. A tag that does not fit is
 //! counted and not written, so that it can be refused once, at the end.
 
 use boot::multiboot2::tag;
@@ -24,7 +24,7 @@ pub struct Range {
 }
 
 impl<'b> List<'b> {
-    /// Begins a list. What it is written to begins at a multiple of 8.
+    /// Begins a list. Its memory begins at a multiple of 8.
     pub fn new(bytes: &'b mut [u8]) -> Self {
         let mut list = Self { bytes, length: 0 };
         list.put(&[0; 8]);

@@ -1,7 +1,7 @@
 //! The application: what the firmware starts.
 //!
 //! It reserves the memory where the image belongs before it writes there, takes some below
-//! 4 GiB for what the image is told, leaves the firmware and enters the image. What fails is
+//! 4 GiB for what the image is told, leaves the firmware and enters the image. A failure is
 //! said on the firmware's console, in one line.
 
 #![no_std]

@@ -38,7 +38,7 @@ impl Screen {
     ///
     /// # Safety
     ///
-    /// 1. What is drawn later goes to memory that is mapped, and nobody else's.
+    /// 1. Later drawing goes to memory that is mapped, and nobody else's.
     /// 2. A row's pixels fit into the pitch.
     #[must_use]
     pub unsafe fn new(buffer: Framebuffer) -> Self {

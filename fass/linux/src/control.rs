@@ -1,8 +1,8 @@
 //! The handle of a run: what changes it while it goes on, from any thread, and shows it to people.
 //!
-//! SIGINT, which ctrl-C sends, and SIGTERM are signals by which a person, or a service manager, asks a
-//! program to end. While they are caught they kill nobody and are counted, so that what goes on can end
-//! in order.
+//! SIGINT, which ctrl-C sends, and SIGTERM are signals by which a person, or a service manager,
+//! asks a program to end. While they are caught they kill nobody and are counted, so that what goes
+//! on can end in order.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier, PoisonError, RwLock};
@@ -18,7 +18,7 @@ use crate::sys::Catch;
 use crate::team::Team;
 use crate::{edge, sys};
 
-/// The handle of a committed run. What it asks for is done by the release thread of the DAG's
+/// The handle of a committed run. Its requests are carried out by the release thread of the DAG's
 /// cluster, at once; after the run it does nothing.
 ///
 /// ```
@@ -195,7 +195,7 @@ impl Control {
     }
 
     /// Starts a thread that waits for something outside, again and again while there is a run and
-    /// `look` wants more. What it allocates it has when this returns.
+    /// `look` wants more. It has allocated all it needs when this returns.
     fn watch(self, name: &str, look: impl Fn(&Self) -> bool + Send + 'static) -> io::Result<()> {
         let has_begun = Arc::new(Barrier::new(2));
         let begun = Arc::clone(&has_begun);

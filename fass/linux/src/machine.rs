@@ -31,7 +31,7 @@ use crate::worker::Worker;
 /// How the scheduler's decisions are carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mechanism {
-    /// By levels of SCHED_FIFO. What should run comes before all normal programs, and
+    /// By levels of SCHED_FIFO. Workers come before all normal programs, and
     /// is preempted by what the scheduler puts before it.
     Fifo,
     /// By our policy of `sched_ext`, the paper's way: the same order, put by a store and not
@@ -360,7 +360,7 @@ const ROOM_BYTES: usize = 8 << 20;
 
 impl Linux {
     /// Keeps a record of the commits and runs to come, with the values that are recorded, by the
-    /// name of an app. What is there is written while a run goes on, too.
+    /// name of an app. The file grows while a run goes on.
     ///
     /// ```no_run
     /// use std::fs::File;

@@ -124,7 +124,7 @@ pub(crate) fn confine(thread: ThreadId, processors: &[u32]) -> io::Result<()> {
     checked(result)
 }
 
-/// Puts a thread of this program at a level of SCHED_FIFO. What it starts is not there.
+/// Puts a thread of this program at a level of SCHED_FIFO. Threads that it starts are not there.
 pub(crate) fn set_level(thread: ThreadId, level: i32) -> io::Result<()> {
     const FIFO: i32 = 1;
     const RESET_ON_FORK: i32 = 0x4000_0000;

@@ -1,9 +1,9 @@
 //! Sine, cosine and tangent.
 //!
-//! The argument is reduced by multiples of a quarter turn, held in three parts of which the
-//! first two have zeros at their ends, so that their multiples are exact (W. J. Cody and W.
-//! Waite, Software Manual for the Elementary Functions, 1980). What is left, at most an eighth of
-//! a turn, comes with the rest that it is rounded by. There nine terms of the Taylor series are enough.
+//! The argument is reduced by multiples of a quarter turn, held in three parts of which the first
+//! two have zeros at their ends, so that their multiples are exact (W. J. Cody and W. Waite,
+//! Software Manual for the Elementary Functions, 1980). The rest, at most an eighth of a turn,
+//! comes with the rest that it is rounded by. There nine terms of the Taylor series are enough.
 
 use core::f64::consts::FRAC_2_PI;
 

@@ -36,7 +36,7 @@ pub struct SwitchUse {
 /// The handle by which a function pauses and resumes a DAG.
 ///
 /// A paused DAG releases no job: those that become due are skipped, and keep their numbers and
-/// their places on the grid. What is in flight when it is paused goes on to its end.
+/// their places on the grid. Jobs in flight when it is paused go on to their end.
 ///
 /// # Examples
 ///

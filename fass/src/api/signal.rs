@@ -164,10 +164,10 @@ impl Dag {
         self.signal()
     }
 
-    /// Has a signal raised when a fault ends the DAG: a panic, an exception, an exceeded
-    /// budget. What the signal releases brings the system into a safe state; as a DAG it has its
-    /// place in the schedule, and a bound. It is released in the step that ends the DAG, and
-    /// should sample nothing that the ended DAG would have to renew.
+    /// Has a signal raised when a fault ends the DAG: a panic, an exception, an exceeded budget.
+    /// The DAG that the signal releases brings the system into a safe state; as a DAG it has its
+    /// place in the schedule, and a bound. It is released in the step that ends the DAG, and should
+    /// sample nothing that the ended DAG would have to renew.
     ///
     /// ```
     /// use core::time::Duration;

@@ -1,12 +1,13 @@
 //! Uses of a subtask besides its inputs, stated at registration.
 //!
-//! Values of the same job come along edges, as arguments. What comes from elsewhere
-//! is stated with [`Dag::using`]: a [`State`](crate::shared::State) that subtasks of the DAG
-//! share, the [latest value](crate::shared::Latest) of a topic of any DAG, a
-//! [signal](crate::shared::Signal) that the subtask may raise, a [wire](crate::shared::Wire) for bytes, a
+//! Values of the same job come along edges, as arguments. Values from elsewhere are stated with
+//! [`Dag::using`]: a [`State`](crate::shared::State) that subtasks of the DAG share, the [latest
+//! value](crate::shared::Latest) of a topic of any DAG, a [signal](crate::shared::Signal) that the
+//! subtask may raise, a [wire](crate::shared::Wire) for bytes, a
 //! [parameter](crate::shared::Parameter) that is set from outside, a DAG that it may
-//! [pause](crate::shared::Switch), a [mode](crate::shared::Modes) that it may enter, the [end](crate::shared::Shutdown) of
-//! the run. The function then gets what it uses as its *first* argument, in front of the inputs:
+//! [pause](crate::shared::Switch), a [mode](crate::shared::Modes) that it may enter, the
+//! [end](crate::shared::Shutdown) of the run. The function then gets what it uses as its *first*
+//! argument, in front of the inputs:
 //!
 //! | use | first argument | theory |
 //! |---|---|---|

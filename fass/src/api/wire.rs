@@ -15,7 +15,7 @@
 //!   of jobs. Of an instance that fails nothing goes.
 //! - Nobody waits: not the device for the receiver, nor the sender for the device. What finds
 //!   no room is lost, as a whole packet, or all that an instance has sent, and the newest: what
-//!   was there stays. What is lost is counted ([`Wire::counts`]).
+//!   was there stays. Losses are counted ([`Wire::counts`]).
 //! - The decoder runs in the receiver's instance. If it panics, that is contained as if
 //!   the function had.
 //!

@@ -192,7 +192,7 @@ impl Silent {
 
 impl VirtualTime {
     /// Sets how long a call takes whose function does not say so by `fass::execute_for`: its
-    /// WCET, unless this says otherwise. What executes counts from the call's start, so
+    /// WCET, unless this says otherwise. Execution counts from the call's start, so
     /// `fass::now_ns` in the function does not show it.
     ///
     /// See [`Silent`].

@@ -296,7 +296,7 @@ fn by_number(platform: &Platform) -> impl Iterator<Item = u32> {
     core::iter::once(own).chain(ids.filter(move |id| *id != own))
 }
 
-/// Returns the APIC ids of the processors that become cores. What is wrong in the words is refused
+/// Returns the APIC ids of the processors that become cores. Faults in the words are refused
 /// later.
 fn selected(info: &BootInfo, platform: &Platform) -> Vec<u32> {
     let is_right = |list: &&str| settings::check(list, by_number(platform).count()).is_ok();

@@ -33,7 +33,7 @@
 //! to both.
 //!
 //! Assumes: releases at least `T` apart; WCETs above 0. The order of equal priorities and
-//! deadlines is fixed. What is never preempted counts as if others preempted it, too.
+//! deadlines is fixed. A subtask that is never preempted counts as if others preempted it, too.
 //!
 //! # Subtasks that keep their core once started ("limited preemption")
 //!

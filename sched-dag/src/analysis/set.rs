@@ -236,7 +236,7 @@ impl<'a> EquationSet<'a> {
     /// one sink of it; or the first DAG that may outrank it and has no bound.
     ///
     /// A DAG that may outrank this one counts with its jobs that are due by then, where that
-    /// is a limit, and else in full. What does not count in full may block.
+    /// is a limit, and else in full. A DAG that does not count in full may block.
     pub(super) fn delays(
         &self,
         dag: usize,

@@ -322,8 +322,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         cost
     }
 
-    /// Finds what a core without an instance does next. What it is to start has started; that it
-    /// resumes an instance is [written down](Self::note) by whoever knows when.
+    /// Finds what a core without an instance does next. An instance that it is to start has
+    /// started; that it resumes an instance is [written down](Self::note) by whoever knows when.
     #[inline]
     pub fn next(&mut self, core: CoreId, port: &mut impl PlatformPort<B>) -> NextWork<B, P> {
         let mut next = self.placement.next(core.index());

@@ -6,7 +6,7 @@
 //! between two instances: the interrupt, the scheduler's step, the journal, the hand-off to
 //! another core, the switch of contexts, the alarm of a budget. So the longest time for which
 //! one was owed a core is what each of these moments costs at most, however its parts share
-//! it. What comes before a readiness is the release's *lateness*, from the nominal to the
+//! it. The time before a readiness is the release's *lateness*, from the nominal to the
 //! actual release.
 
 use alloc::vec::Vec;

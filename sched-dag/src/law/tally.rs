@@ -1,7 +1,7 @@
 //! Statistics of a run of any length, in memory that is taken before it begins.
 //!
 //! A [`RunTally`] takes the events of a journal in their order, each once, and forgets
-//! each job with its end. What it keeps is a [`Histogram`] of each time that is asked
+//! each job with its end. It keeps a [`Histogram`] of each time that is asked
 //! about, and the times of the jobs in flight.
 //!
 //! - *Response time*, of a DAG's jobs: from the nominal release to the last finish. If a

@@ -56,7 +56,7 @@ impl EventCounter {
 /// Where a packet ends in the bytes that arrive on a [`Wire`](crate::shared::Wire).
 ///
 /// This much is known to the code that takes bytes from a device, and so it has no code of
-/// the app's. What the packet means is the app's: its decoder gets each.
+/// the app's. The meaning of a packet is the app's: its decoder gets each.
 ///
 /// See [`WireOptions`](crate::shared::WireOptions).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -34,7 +34,7 @@
 //! All this is off unless [`enable`] is called, and of no use where an instruction
 //! does not take a nanosecond. Where a timer's interrupt waits for its turn because
 //! other cores compute, not all cores had halted, and the clock has not jumped: nothing
-//! is done then. What it cannot hide: of two cores whose timers end at the same time, or
+//! is done then. It cannot hide that, of two cores whose timers end at the same time, or
 //! within some 100 ns, the one is first with which QEMU goes on, and that is the host's
 //! choice in the rare cases above. So no several cores should wait for one time.
 

@@ -1,7 +1,7 @@
 //! How deep a stack has been used, by paint.
 //!
 //! A stack's *paint* is a word that code does not write by chance, in every place below what is
-//! in use. What lies between the lowest place without paint and the top has been used.
+//! in use. The part between the lowest place without paint and the top has been used.
 
 use super::this_core;
 

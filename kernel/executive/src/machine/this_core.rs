@@ -223,7 +223,7 @@ pub(super) unsafe fn exchange_context(next: Parked) -> Parked {
     unsafe { Parked::from_context(last) }
 }
 
-/// Leaves the context that runs, for good, for `next`. What was left becomes
+/// Leaves the context that runs, for good, for `next`. The context left becomes
 /// this core's spare context.
 ///
 /// # Safety

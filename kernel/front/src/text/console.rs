@@ -1,7 +1,7 @@
 //! The way of text to the platform's output.
 //!
 //! Text and machine lines are told apart: only [`json`](super::json) can print a line that begins
-//! with `{`. What is printed goes to the function of the platform that the program's entry names
+//! with `{`. Printed text goes to the function of the platform that the program's entry names
 //! by [`output!`](crate::output). It is found when the program is linked: a pointer to it would
 //! cost
 //! each image bytes, and each line a look.
@@ -10,7 +10,7 @@
 //!
 //! An app's `Display` may take long, print, or panic. So text is made outside every
 //! lock, in a buffer on the stack of the context that prints, with interrupts as they
-//! are there: all of it is then that context's own affair. What is full goes on as a
+//! are there: all of it is then that context's own affair. A line that is full goes on as a
 //! *piece*. Up to [`LONGEST`] bytes are one piece, and stay together.
 
 use core::fmt;
@@ -41,7 +41,7 @@ macro_rules! output {
     };
 }
 
-/// Writes text. What one call writes stays together, up to 1 KiB of it. A line that begins with
+/// Writes text. The text of one call stays together, up to 1 KiB of it. A line that begins with
 /// `{` gets a blank before it. For [`print!`](crate::print).
 pub fn write(text: fmt::Arguments<'_>) {
     bound::front_output(OutputKind::Text, text);

@@ -22,7 +22,7 @@
 //! heartbeat looks for it, four times a second, so it counts however busy the cores are.
 //!
 //! For events the port is looked at by core 0's background, each time that the core wakes up and
-//! has nothing else to do, and at least every [`PERIOD_NS`] if it is idle. What the byte is does
+//! has nothing else to do, and at least every [`PERIOD_NS`] if it is idle. The byte itself does
 //! not matter, but for the one that ends the run. How fast the bytes come does not either: the
 //! DAG's minimum inter-arrival time is enforced by the scheduler.
 //!

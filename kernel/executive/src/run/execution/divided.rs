@@ -67,7 +67,7 @@ fn among_several(dag: DagId) -> &'static ClusterState {
     nth(dag.map_or(0, |dag| dag.cluster().index()))
 }
 
-/// Reports whether all jobs of the run have ended. What each cluster says of itself is a sign
+/// Reports whether all jobs of the run have ended. Each cluster's word about itself is a sign
 /// only: while one is looked at, a letter from it may make another go on. So all are then
 /// looked at once more while none of them can do anything.
 pub fn is_finished() -> bool {
