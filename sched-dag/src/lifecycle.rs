@@ -457,6 +457,7 @@ pub fn divide(
     let cluster_of = |dag: DagId| task_set.dag(dag).cluster();
     let in_modes = lifecycle.map_or_else(Vec::new, Lifecycle::dags_of_modes);
     let mut of_modes = in_modes.into_iter().map(cluster_of);
+    // A change of modes pauses and resumes in one step, which is one cluster's.
     let first = of_modes.next().unwrap_or_default();
     if of_modes.any(|other| other != first) {
         return Err(
@@ -540,6 +541,7 @@ impl Mailboxes {
             if to.cluster != cluster {
                 continue;
             }
+            // Taken and emptied in one access: what comes afterwards is of the next step.
             match to.change.swap(NOTHING, Ordering::Acquire) {
                 PAUSE => take(Request::Pause(dag)),
                 RESUME => take(Request::Resume(dag)),

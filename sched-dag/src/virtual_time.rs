@@ -494,6 +494,7 @@ impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
 
     fn start(&mut self, _: CoreId, body: &mut B) -> u64 {
         let execution_ns = self.workload.execute(body, self.now_ns);
+        // Nothing can be returned from here; the loop looks at it when the step is over.
         self.begun_ns = execution_ns.ok_or(RunOutcome::Stopped);
         self.now_ns
     }

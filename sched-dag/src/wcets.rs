@@ -138,6 +138,7 @@ pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
                 name,
             } if is_own => {
                 let found = spec.subtasks.get_mut(subtask);
+                // The hash is of names, too, so another name here means that the file was edited.
                 let found = found.filter(|subtask| subtask.name == name);
                 let problem = UNKNOWN;
                 let found = found.ok_or(WcetFault { line, problem })?;

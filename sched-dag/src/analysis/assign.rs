@@ -98,10 +98,13 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
     let mut light = Vec::new();
     for (dag, task) in tasks.iter().enumerate() {
         let (volume_ns, within_ns) = density(task);
+        // One core is enough for it, so it may share one; those are packed when it is known what
+        // the heavy ones leave.
         if volume_ns <= within_ns {
             light.push(dag);
             continue;
         }
+        // No number of cores shortens the longest path, so this is told apart from a lack of them.
         let length_ns = task.length_ns();
         if length_ns > within_ns {
             let reason = AssignmentFailure::TooLong {
@@ -117,6 +120,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
             multi_path(task, count).is_some_and(|ns| ns <= within_ns)
                 || fixed().is_some_and(|(_, length_ns)| length_ns <= within_ns)
         };
+        // The least number that proves it, since light DAGs share what is left.
         let Some(count) = (1..=left).find(is_enough) else {
             let (dag, reason) = (DagId(to_u32(dag)), AssignmentFailure::TooHeavy { left });
             return Err(NotAssigned { dag, reason });

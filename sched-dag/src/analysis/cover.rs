@@ -277,6 +277,7 @@ impl<'a> ChainFlow<'a> {
 
     /// Takes the flow apart into its chains.
     fn into_chains(mut self) -> Vec<CoverChain> {
+        // As many chains begin at a subtask as lead through it and do not come along an edge.
         let through = self.taken.iter().zip(&self.passed);
         let mut begin: Vec<u32> = through.map(|(&t, &p)| u32::from(t) + p).collect();
         for v in 0..begin.len() {
@@ -290,6 +291,7 @@ impl<'a> ChainFlow<'a> {
                 let mut chain = CoverChain::new();
                 let mut at = Some(first);
                 while let Some(v) = at {
+                    // A subtask is covered by one chain; the others only pass through it.
                     chain.push((v, core::mem::take(&mut self.taken[v])));
                     let next = self
                         .task

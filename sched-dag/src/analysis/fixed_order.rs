@@ -50,6 +50,7 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &AnalysisSettings) {
         let before = free.take().unwrap_or_else(|| answer(task_set, settings));
         task_set.exchange(dag, &mut precedence);
         let after = answer(task_set, settings);
+        // The answer is kept for the next DAG: an analysis of all is the dear part of this loop.
         if is_better(dag, &after, &before) {
             free = Some(after);
         } else {

@@ -57,6 +57,7 @@ pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
             let row = &interfering[v * words..(v + 1) * words];
             union.iter_mut().zip(row).for_each(|(all, row)| *all |= row);
         }
+        // A path's own subtasks are in its length already.
         path.iter().for_each(|&v| remove(&mut union, v));
         let beside = (0..count).filter(|&v| contains(&union, v));
         let beside: u64 = beside.map(|v| wcets[v]).sum();

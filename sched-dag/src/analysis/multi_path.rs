@@ -116,6 +116,7 @@ impl MultiPathEquations<'_> {
         for other in others {
             other.add_to(times, self.clip, self.cores, &mut plain, &mut clipped);
         }
+        // Alone, or without a clip, both forms are one.
         let has_clipped = !others.is_empty() && self.clip != InterferenceBound::Window;
         let sums = plain.into_iter().zip(clipped).enumerate();
         sums.flat_map(move |(j, (plain, clipped))| {

@@ -182,6 +182,7 @@ impl RunTally {
                 dag.begin(event, release_ns, model.subtasks().len());
                 return;
             }
+            // Times of a job that was cut say nothing about those of whole ones.
             EventKind::DagEnded => {
                 for job in &mut dag.open {
                     job.is_cut = true;
@@ -282,6 +283,7 @@ impl DagTally {
                 statistics.execution_time.add(executed_ns);
                 let wcet_ns = model.subtask(instance.subtask).wcet_ns();
                 statistics.beyond_wcet += u64::from(wcet_ns.is_some_and(|wcet| executed_ns > wcet));
+                // The latest of its predecessors counts, and which that is the next finish may change.
                 for next in model.successors(instance.subtask) {
                     let join_ns = &mut instances[next.index()].join_ns;
                     *join_ns = event.time_ns.max(*join_ns);

@@ -155,6 +155,7 @@ fn check_subtasks(page: &mut DagFindings<'_, '_>) {
     for (index, stated) in spec.subtasks.iter().enumerate() {
         let subtask = || SubtaskLabel::new(spec, index);
         check_sink_deadline(page, index);
+        // A sink may have a shorter deadline of its own; a longer one is a fault of its own.
         let deadlines_ns = [stated.relative_deadline_ns, spec.relative_deadline_ns];
         match (stated.wcet_ns, deadlines_ns.into_iter().flatten().min()) {
             (Some(0), _) => page.warn(|dag| Warning::ZeroWcet {

@@ -53,6 +53,7 @@ fn priority_bases(findings: &mut VerifyFindings<'_>) -> Vec<u32> {
     let mut order: Vec<usize> = (0..specs.len())
         .filter(|&dag| !has_priorities(specs[dag]))
         .collect();
+    // Deadline monotonic; a stable sort, so that equal deadlines keep the order of the commit.
     sort_by_key(&mut order, |dag| specs[dag].relative_deadline_ns);
     let mut bases = alloc::vec![0; specs.len()];
     for dag in order {

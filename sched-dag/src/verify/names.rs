@@ -74,6 +74,7 @@ impl<'a> Interner<'a> {
 /// Adds to the first faults which topic was probably meant.
 #[inline(never)]
 pub(super) fn suggest(specs: &[&DagSpec], faults: &mut [DagFault]) {
+    // Faults that no message tells need no advice.
     for index in 0..faults.len().min(MOST_FAULTS) {
         let found = match &faults[index] {
             DagFault::UnwrittenTopic {

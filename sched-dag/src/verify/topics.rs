@@ -308,6 +308,7 @@ fn check_latest(latest: &LatestSpec, page: &mut DagFindings<'_, '_>) {
         return;
     }
     let inputs = subtasks.flat_map(|subtask| subtask.inputs.iter().filter(is_here));
+    // Whoever samples reads, too, and a value that is moved has one reader.
     let readers = inputs.count() + latest.samplers;
     if readers > 1 && !written.can_fan_out {
         page.fault(|dag| DagFault::LatestOfMoved {

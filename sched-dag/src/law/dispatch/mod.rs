@@ -69,6 +69,7 @@ fn of_cluster(
         false => before(cores, events.clone()),
     };
     let mut sweep = DispatchSweep::new(model, terms.tolerance_ns, first_ns, waits);
+    // A core that no event has named yet may have run anything, so nothing is held against it.
     sweep.known_cores = known.len();
     for (instance, stage) in before {
         sweep.enter(instance, stage);
@@ -77,6 +78,7 @@ fn of_cluster(
         sweep.go_on_to(event.time_ns);
         let is_new = event.what.is_of_machine() && known.insert(event.core);
         sweep.known_cores += usize::from(is_new);
+        // An instance's end is the DAG's too, unless the DAG survives faults.
         let ends_its_dag = model.task_set.dag(event.dag).on_fault() == OnFault::EndDag;
         if event.what == EventKind::DagEnded || event.what == EventKind::Ended && ends_its_dag {
             sweep.end_dag(event.dag);

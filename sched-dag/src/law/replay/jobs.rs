@@ -517,6 +517,7 @@ impl JournalReplay<'_> {
         let too_early = self.before_join(event, instance);
         let is_early = too_early.is_some();
         self.found.extend(too_early);
+        // One breach is told once: what follows from a wrong readiness is no news.
         if is_early || event.what != EventKind::Ready {
             return;
         }
@@ -560,6 +561,7 @@ impl JournalReplay<'_> {
                 may_be_lost: life.is_none() && is_partial,
             }
         });
+        // Not job - 1: a skipped job has no instances, so the order is that of released ones.
         let precursor = of_dag.jobs.range(..job).next_back();
         let of_precursor = precursor.map(|(&job, known)| {
             let life = known.life(subtask);
