@@ -122,7 +122,7 @@ pub struct Chain {
 impl Chain {
     /// Finds a subtask that is named as `dag/subtask`, each part by its name or its number.
     #[must_use]
-    pub fn place(task_set: &TaskSet, name: &str) -> Option<SubtaskRef> {
+    pub fn find(task_set: &TaskSet, name: &str) -> Option<SubtaskRef> {
         // Names may have a `/` in them.
         let splits = name
             .match_indices('/')

@@ -60,7 +60,7 @@ impl AdjacencyList {
         }
     }
 
-    pub(crate) fn of(&self, subtask: SubtaskId) -> &[SubtaskId] {
+    pub(crate) fn neighbours(&self, subtask: SubtaskId) -> &[SubtaskId] {
         &self.neighbours[self.range(subtask.index())]
     }
 
@@ -76,12 +76,12 @@ impl AdjacencyList {
 
     /// Returns each subtask with each of its neighbours.
     pub(crate) fn edges(&self) -> Vec<(u32, u32)> {
-        let of = |from| self.of(from).iter().map(move |to| (from.0, to.0));
+        let of = |from| self.neighbours(from).iter().map(move |to| (from.0, to.0));
         self.subtasks().flat_map(of).collect()
     }
 
     fn without_neighbours(&self) -> Box<[SubtaskId]> {
-        let is_end = |subtask: &SubtaskId| self.of(*subtask).is_empty();
+        let is_end = |subtask: &SubtaskId| self.neighbours(*subtask).is_empty();
         self.subtasks().filter(is_end).collect()
     }
 }
@@ -114,7 +114,7 @@ impl Graph {
         let mut next = 0;
         while let Some(&subtask) = order.get(next) {
             next += 1;
-            for &successor in self.successors.of(subtask) {
+            for &successor in self.successors.neighbours(subtask) {
                 missing[successor.index()] -= 1;
                 if missing[successor.index()] == 0 {
                     order.push(successor);
@@ -141,7 +141,7 @@ impl Graph {
 
     /// Returns for each subtask how many predecessors it has.
     pub(crate) fn predecessor_counts(&self) -> Vec<usize> {
-        let count = |subtask| self.predecessors.of(subtask).len();
+        let count = |subtask| self.predecessors.neighbours(subtask).len();
         self.subtasks().map(count).collect()
     }
 
@@ -150,7 +150,7 @@ impl Graph {
     pub(crate) fn levels(&self, weights: &[u64]) -> Vec<u64> {
         let mut levels = vec![0_u64; weights.len()];
         for &subtask in self.topological_order.iter().rev() {
-            let successors = self.successors.of(subtask).iter();
+            let successors = self.successors.neighbours(subtask).iter();
             let rest = successors.map(|next| levels[next.index()]).max();
             levels[subtask.index()] = weights[subtask.index()] + rest.unwrap_or(0);
         }
@@ -171,8 +171,8 @@ impl Graph {
             part_of[first.index()] = to_u32(parts);
             pending.push(first);
             while let Some(subtask) = pending.pop() {
-                let predecessors = self.predecessors.of(subtask).iter();
-                for &neighbour in predecessors.chain(self.successors.of(subtask)) {
+                let predecessors = self.predecessors.neighbours(subtask).iter();
+                for &neighbour in predecessors.chain(self.successors.neighbours(subtask)) {
                     if part_of[neighbour.index()] == UNSEEN {
                         part_of[neighbour.index()] = to_u32(parts);
                         pending.push(neighbour);

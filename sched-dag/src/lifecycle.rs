@@ -174,7 +174,7 @@ impl PendingRequests {
         cluster: ClusterId,
         moment: &mut Moment<'_>,
     ) {
-        letters.take(cluster, |request| {
+        letters.take_all(cluster, |request| {
             // Of a person's pause, say, the lifecycle has to know; a signal is the scheduler's
             // alone.
             if self.lifecycle.is_some() && request.is_of_lifecycle() {
@@ -536,7 +536,7 @@ impl Mailboxes {
     }
 
     /// Takes all that waits for a cluster.
-    pub fn take(&self, cluster: ClusterId, mut take: impl FnMut(Request)) {
+    pub fn take_all(&self, cluster: ClusterId, mut take: impl FnMut(Request)) {
         for (dag, to) in (0..).map(DagId).zip(&self.dags) {
             if to.cluster != cluster {
                 continue;
@@ -633,7 +633,7 @@ mod tests {
             assert!(letters.send(None, request, |cluster| assert_eq!(cluster, there)));
         }
         let mut taken = Vec::new();
-        letters.take(there, |request| taken.push(request));
+        letters.take_all(there, |request| taken.push(request));
         let expected = [
             Request::Signal(DagId(1)),
             Request::Signal(DagId(1)),
@@ -643,8 +643,8 @@ mod tests {
             Request::ShutDown,
         ];
         assert_eq!(taken, expected);
-        letters.take(there, |request| panic!("{request:?} was taken"));
-        letters.take(here, |request| panic!("{request:?} is of another cluster"));
+        letters.take_all(there, |request| panic!("{request:?} was taken"));
+        letters.take_all(here, |request| panic!("{request:?} is of another cluster"));
     }
 
     #[test]

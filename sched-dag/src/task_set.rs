@@ -294,13 +294,13 @@ impl Dag {
     /// Returns the direct predecessors of a subtask, each once, ascending.
     #[must_use]
     pub fn predecessors(&self, subtask: SubtaskId) -> &[SubtaskId] {
-        self.graph.predecessors.of(subtask)
+        self.graph.predecessors.neighbours(subtask)
     }
 
     /// Returns the direct successors of a subtask, each once, ascending.
     #[must_use]
     pub fn successors(&self, subtask: SubtaskId) -> &[SubtaskId] {
-        self.graph.successors.of(subtask)
+        self.graph.successors.neighbours(subtask)
     }
 
     /// Returns the topics, in the order of their writers. Edges that were stated

@@ -125,7 +125,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
         };
         for body in bodies {
             let instance = body.subject().instance();
-            let engine = &mut this.clusters[this.place(instance.dag)].engine;
+            let engine = &mut this.clusters[this.cluster_index(instance.dag)].engine;
             engine.put(engine.task_set.vertex(instance), body);
         }
         this
@@ -224,7 +224,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
     /// If there is no such DAG.
     #[must_use]
     pub fn scheduler_of(&self, dag: DagId) -> &Scheduler {
-        &self.clusters[self.place(dag)].engine.scheduler
+        &self.clusters[self.cluster_index(dag)].engine.scheduler
     }
 
     /// Reports whether every DAG is over.
@@ -251,7 +251,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
         // are told.
         failing.sort_unstable_by_key(|(instance, ..)| *instance);
         for (instance, core, body) in failing.drain(..) {
-            let place = self.place(instance.dag);
+            let place = self.cluster_index(instance.dag);
             self.clusters[place].fail(core, body, now);
         }
         // The list goes back for its memory.
@@ -336,7 +336,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
         request: Request,
         now: &mut VirtualInstant<'_, impl Workload<B>>,
     ) -> Option<usize> {
-        let place = self.place(dag);
+        let place = self.cluster_index(dag);
         let cluster = &mut self.clusters[place];
         // A request that changes nothing writes nothing.
         let before = cluster.engine.scheduler.log.journal.written();
@@ -346,7 +346,7 @@ impl<B: SubtaskBody> VirtualTime<B> {
     }
 
     /// Returns the place of the cluster that runs a DAG.
-    fn place(&self, dag: DagId) -> usize {
+    fn cluster_index(&self, dag: DagId) -> usize {
         match &*self.clusters {
             // Undivided cores are one cluster, whatever the DAGs state.
             [_] => 0,

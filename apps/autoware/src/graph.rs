@@ -135,7 +135,7 @@ impl Builder<'_> {
         (SubtaskAttributes::named(name).wcet(wcet), crunch)
     }
 
-    fn end(name: &str) -> SubtaskAttributes {
+    fn end_attributes(name: &str) -> SubtaskAttributes {
         SubtaskAttributes::named(name).wcet(WCET_OF_ENDS)
     }
 
@@ -146,7 +146,12 @@ impl Builder<'_> {
         period: Duration,
         mut origin: impl FnMut() -> Origin + Send + 'static,
     ) {
-        dag.register_periodic_subtask(move || (origin(),), vec![name], period, Self::end(name));
+        dag.register_periodic_subtask(
+            move || (origin(),),
+            vec![name],
+            period,
+            Self::end_attributes(name),
+        );
     }
 
     /// Registers a transform: one input, one piece of work, one output.
@@ -232,7 +237,7 @@ impl Builder<'_> {
             |(_,): (Origin,)| (),
             ["EuclideanIntersection"],
             LIDAR,
-            Self::end("IntersectionOutput"),
+            Self::end_attributes("IntersectionOutput"),
         );
         let obstacles = dag.latest("ObjectCollisionEstimator");
         let pose = dag.latest("NDTLocalizer");
@@ -318,7 +323,7 @@ impl Builder<'_> {
             },
             ["VehicleInterface"],
             LIDAR,
-            Self::end("VehicleDBWSystem"),
+            Self::end_attributes("VehicleDBWSystem"),
         );
         (dag, acted_on)
     }

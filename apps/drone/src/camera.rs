@@ -54,7 +54,7 @@ pub fn capture(pose: &Pose) -> Image {
     let column = CENTRE.0 + FOCAL * (x / -z) as f32;
     let row = CENTRE.1 + FOCAL * (y / -z) as f32;
     for (index, pixel) in (0_u16..).zip(image.iter_mut()) {
-        let (x, y) = place(index);
+        let (x, y) = column_and_row(index);
         let distance = ((x - column) * (x - column) + (y - row) * (y - row)) / 2.0;
         *pixel = (200.0 / ((1.0 + distance) * (1.0 + distance))) as u8;
     }
@@ -67,7 +67,7 @@ pub fn detect(image: &Image) -> Option<(f32, f32)> {
     let (mut sum, mut columns, mut rows) = (0.0_f32, 0.0_f32, 0.0_f32);
     for (index, pixel) in (0_u16..).zip(image) {
         if *pixel >= THRESHOLD {
-            let (x, y) = place(index);
+            let (x, y) = column_and_row(index);
             let weight = f32::from(*pixel);
             sum += weight;
             columns += weight * (x - CENTRE.0);
@@ -78,7 +78,7 @@ pub fn detect(image: &Image) -> Option<(f32, f32)> {
 }
 
 /// The column and row of a pixel.
-fn place(index: u16) -> (f32, f32) {
+fn column_and_row(index: u16) -> (f32, f32) {
     (f32::from(index % SIZE.0), f32::from(index / SIZE.0))
 }
 

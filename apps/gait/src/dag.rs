@@ -58,7 +58,7 @@ pub fn build(recording: &Recording<'static>) -> Result<(Dag, Walk), Mismatch> {
 
     let (results, mut row) = (walk.clone(), 0);
     let knee = move |(upper, lower): (Quaternion, Quaternion)| {
-        results.take(row, [upper, lower, product(conjugate(upper), lower)]);
+        results.store(row, [upper, lower, product(conjugate(upper), lower)]);
         row += 1;
     };
     dag.register_sink_subtask(knee, ["upper", "lower"], PERIOD, taking("knee"));

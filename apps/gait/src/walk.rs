@@ -22,7 +22,7 @@ impl Walk {
     }
 
     /// Takes a row; one for which there is no room is left out.
-    pub(crate) fn take(&self, row: usize, parts: [Quaternion; 3]) {
+    pub(crate) fn store(&self, row: usize, parts: [Quaternion; 3]) {
         let places = self.0.chunks_exact(OF_A_ROW).nth(row).unwrap_or_default();
         for (place, number) in places.iter().zip(parts.as_flattened()) {
             place.store(number.to_bits(), Relaxed);

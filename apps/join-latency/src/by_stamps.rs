@@ -57,7 +57,7 @@ fn workers(cores: u32, shared: &Arc<Cores>) -> Dag {
         .period(FOREVER)
         .relative_deadline(FOREVER);
     let own = Arc::clone(shared);
-    let begin = move |_| own.begin();
+    let begin = move |_| own.set_epoch();
     let source = dag.register_untyped_subtask(begin, SubtaskAttributes::named("begin"));
     let workers: Vec<UntypedSubtask> = (0..cores)
         .map(|_| {
@@ -90,7 +90,7 @@ struct Cores {
 
 impl Cores {
     /// Sets the epoch, a little ahead so that all workers are there.
-    fn begin(&self) {
+    fn set_epoch(&self) {
         const LEAD_NS: u64 = 1_000_000;
         self.epoch_ns
             .store(fass::now_ns() + LEAD_NS, Ordering::Relaxed);

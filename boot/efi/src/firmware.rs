@@ -220,7 +220,7 @@ impl Firmware {
 
     /// Takes pages for at least `bytes`, which become ordinary memory when the firmware is left.
     /// They may be executed.
-    pub(crate) fn take(&self, place: Place, address: u64, bytes: u64) -> Option<*mut u8> {
+    pub(crate) fn allocate_pages(&self, place: Place, address: u64, bytes: u64) -> Option<*mut u8> {
         const APPLICATION_CODE: u32 = 1;
         let mut address = address;
         let pages = usize::try_from(bytes.div_ceil(4096)).ok()?;

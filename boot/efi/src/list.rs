@@ -81,7 +81,7 @@ impl<'b> List<'b> {
 
     /// Ends the list, and reports whether all of it is there.
     #[must_use]
-    pub fn end(mut self) -> bool {
+    pub fn finish(mut self) -> bool {
         self.tag(tag::END, &[]);
         self.put_size(0, 0);
         self.length <= self.bytes.len()
@@ -150,7 +150,7 @@ mod tests {
         let mut machine = Machine(vec![0xff; 2048]);
         let mut list = List::new(&mut machine.0);
         write(&mut list);
-        assert!(list.end());
+        assert!(list.finish());
         let mut info = BootInfo::new(0);
         multiboot2::read(&machine, 0, &mut info);
         assert_eq!(info.command_line(), Ok("jobs=3 k=\u{e4}"));
@@ -175,7 +175,7 @@ mod tests {
             let mut bytes = vec![0; length];
             let mut list = List::new(&mut bytes);
             write(&mut list);
-            list.end()
+            list.finish()
         };
         let least = (0..2048).find(|length| fits(*length)).unwrap();
         assert!(least > 40 * 24 && (least..2048).all(fits), "{least}");

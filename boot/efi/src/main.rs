@@ -50,8 +50,8 @@ extern "efiapi" fn efi_main(handle: Handle, system: *const SystemTable) -> ! {
         .next_multiple_of(4096);
     let low_bytes = module_at.saturating_add(module.len());
     const HIGHEST: u64 = (1 << 32) - 1;
-    let low = firmware.take(Place::Below, HIGHEST, low_bytes as u64);
-    let buffer = firmware.take(Place::Anywhere, 0, map_bytes as u64);
+    let low = firmware.allocate_pages(Place::Below, HIGHEST, low_bytes as u64);
+    let buffer = firmware.allocate_pages(Place::Anywhere, 0, map_bytes as u64);
     let (Some(low), Some(buffer)) = (low, buffer) else {
         firmware.fail("not enough memory below 4 GiB for the memory map and the file: give less");
     };
@@ -81,7 +81,7 @@ extern "efiapi" fn efi_main(handle: Handle, system: *const SystemTable) -> ! {
         }
     };
     list.memory_map(map.ranges());
-    let _ = list.end();
+    let _ = list.finish();
     // SAFETY: 1. `leave` has succeeded. 2. `load` has laid out the image. 3. The page was taken
     // below 4 GiB, as code.
     unsafe { switch::enter(low, address(list_at), entry) }
@@ -93,7 +93,7 @@ fn load(firmware: &Firmware, image: &[u8]) {
     let end = file::segments(image).map(|part| part.end).max();
     let (start, end) = (start.unwrap_or(0) / 4096 * 4096, end.unwrap_or(0));
     if firmware
-        .take(Place::At, start, end.saturating_sub(start))
+        .allocate_pages(Place::At, start, end.saturating_sub(start))
         .is_none()
     {
         firmware.fail("the memory where the image belongs, from 2 MiB on, is not free: use an ISO");

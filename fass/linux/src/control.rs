@@ -225,16 +225,16 @@ impl EndSignals {
     /// Has all of them counted from now on.
     #[must_use = "they are caught as long as the value lives"]
     pub fn catch() -> Self {
-        Self::begin(Catch::All)
+        Self::new(Catch::All)
     }
 
     /// Has the first one counted. The next one ends the program, as it usually does.
     #[must_use = "it is caught as long as the value lives"]
     pub fn catch_first() -> Self {
-        Self::begin(Catch::First)
+        Self::new(Catch::First)
     }
 
-    fn begin(catch: Catch) -> Self {
+    fn new(catch: Catch) -> Self {
         sys::ENDS_ASKED.store(0, Ordering::Relaxed);
         sys::catch_ends(catch);
         Self(())

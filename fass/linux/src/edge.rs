@@ -196,7 +196,7 @@ pub(crate) fn end_run(run: &Run) {
 
 impl Sending {
     /// Leaves the rest to who ends the recording.
-    pub(crate) fn end(self) {
+    pub(crate) fn leave(self) {
         self.is_over.store(true, Ordering::Release);
         *unpoisoned(&LEFT) = self.thread.join().unwrap_or(None);
     }

@@ -112,7 +112,7 @@ impl Seats {
     /// # Errors
     ///
     /// Fact and remedy, in a line.
-    pub(crate) fn take() -> Result<Self, String> {
+    pub(crate) fn acquire() -> Result<Self, String> {
         let read = |name: &str| {
             let text = fs::read_to_string(format!("/sys/kernel/sched_ext/{name}"));
             text.map(|text| text.trim().to_owned())

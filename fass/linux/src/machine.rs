@@ -169,7 +169,7 @@ impl Linux {
                 Err(why) => found.push(no_privilege(USUAL_TOP, &why)),
             },
             Mechanism::SchedExt => {
-                levels = Some(Levels::SchedExt(Seats::take().map_err(StartError)?));
+                levels = Some(Levels::SchedExt(Seats::acquire().map_err(StartError)?));
             }
             Mechanism::Normal | Mechanism::Poll => {}
         }
@@ -436,7 +436,7 @@ impl Linux {
         let Some(file) = unpoisoned(&FILE).take() else {
             return Ok(());
         };
-        let mut file = file.end();
+        let mut file = file.finish();
         file.flush();
         file.failure.map_or(Ok(()), Err)
     }

@@ -275,12 +275,12 @@ pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
     office.wait_until_over();
     let allocations = (threads.allocations)() - allocations;
     releases.into_iter().for_each(join);
-    sending.into_iter().for_each(Sending::end);
+    sending.into_iter().for_each(Sending::leave);
     let mut states: Vec<_> = teams.iter().map(|team| team.lock()).collect();
     let abandoned: Vec<Vec<Number>> = states.iter().map(|state| state.abandoned.clone()).collect();
     let mut parts = states.iter_mut().map(|state| &mut state.engine);
     let first = parts.next().expect("there is a cluster at least");
-    let mut run = engine::Run::of(first, launched.proven, threads.terms.scheduler.cores);
+    let mut run = engine::Run::from_engine(first, launched.proven, threads.terms.scheduler.cores);
     // Nobody writes any more: those that were abandoned see that they were.
     parts.for_each(|other| run.absorb(other));
     let mut counts = Counts::default();

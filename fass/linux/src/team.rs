@@ -125,7 +125,7 @@ impl Team {
     pub(crate) fn work(self: Arc<Self>, me: Number) {
         OWN.set(Some((Arc::clone(&self), me)));
         let worker = &self.workers[me];
-        worker.begin();
+        worker.register_thread();
         worker.bring(self.levels, Role::Run);
         sys::make_timers_exact();
         let mut lead = Lead::default();

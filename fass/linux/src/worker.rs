@@ -66,7 +66,7 @@ impl Worker {
     }
 
     /// Says which thread it is. To be called by that thread, first of all.
-    pub(crate) fn begin(&self) {
+    pub(crate) fn register_thread(&self) {
         let _ = self.thread.set(sys::thread());
     }
 
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn what_has_just_ended_is_not_demoted() {
         let worker = Worker::default();
-        worker.begin();
+        worker.register_thread();
         worker.run();
         assert!(worker.demote(None, Role::Demoted));
         assert!(!worker.demote(None, Role::Demoted), "it is demoted already");

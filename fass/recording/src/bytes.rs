@@ -198,9 +198,9 @@ impl<'b> Decoder<'b> {
     ///
     /// ```
     /// let input = recording::Decoder::new(&[1]);
-    /// assert_eq!(input.end().unwrap_err().expected, "the end of the value");
+    /// assert_eq!(input.expect_end().unwrap_err().expected, "the end of the value");
     /// ```
-    pub fn end(&self) -> Result<(), Malformed> {
+    pub fn expect_end(&self) -> Result<(), Malformed> {
         match self.remaining() {
             0 => Ok(()),
             _ => Err(self.expected("the end of the value")),

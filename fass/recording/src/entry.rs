@@ -231,7 +231,7 @@ impl<'v> Entry<'v> {
             | EntryKind::Fault => Ok(()),
         };
         checked
-            .and_then(|()| rest.end())
+            .and_then(|()| rest.expect_end())
             .map_err(|malformed| malformed.behind(VALUE))
     }
 }

@@ -84,7 +84,7 @@ pub trait Recordable: Sized {
         const { assert!(Self::DEPTH <= MOST_DEPTH, "the type is nested too deeply") };
         let mut input = Decoder::new(bytes);
         let value = Self::decode(&mut input)?;
-        input.end().map(|()| value)
+        input.expect_end().map(|()| value)
     }
 }
 

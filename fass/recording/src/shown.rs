@@ -181,7 +181,7 @@ pub fn write_json(schema: &Schema, bytes: &[u8], out: &mut dyn Write) -> Result<
         follows = !matches!(part, Part::Open(_) | Part::Field(_));
         let _ = write!(out, "{part}");
     })?;
-    input.end()
+    input.expect_end()
 }
 
 /// A part by itself is shown as JSON.
@@ -253,7 +253,7 @@ impl fmt::Display for Shown<'_> {
         let Self { schema, bytes } = *self;
         let mut input = Decoder::new(bytes);
         let walked = schema.walk(&mut input, &mut |_| ());
-        match walked.and_then(|()| input.end()) {
+        match walked.and_then(|()| input.expect_end()) {
             Ok(()) => write_json(schema, bytes, f).map_err(|_| fmt::Error),
             Err(_) => write!(f, "bytes {bytes:?}"),
         }

@@ -26,7 +26,7 @@ const BEGIN: Begin = |wish, shows| {
         raise: |plan, dag| expect_installed().raise(plan, dag),
         now_ns: || expect_installed().now_ns(),
     };
-    let crossing = wish.map(|wish| edge::begin(wish, host));
+    let crossing = wish.map(|wish| edge::new_crossing(wish, host));
     (crossing, shows.then(edge::begin_echo))
 };
 

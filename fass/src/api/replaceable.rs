@@ -83,7 +83,7 @@ impl Dag {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        Subtask::of(
+        Subtask::with_replacement(
             self,
             Box::new(RemadeFunction {
                 make,
@@ -117,7 +117,7 @@ impl Dag {
         Args: VecToSubs,
         Ret: VecToPubs,
     {
-        Subtask::of(
+        Subtask::with_replacement(
             self,
             Box::new(FallbackPair {
                 first: Some(first),
@@ -146,7 +146,7 @@ impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
         let (dag, mut held) = self.hold();
         let states = U::states(&held);
         let call = move |f: &mut F, args| f(U::borrow(&mut U::enter(&mut held)), args);
-        Subtask::of(
+        Subtask::with_replacement(
             dag,
             Box::new(RemadeFunction {
                 make,
@@ -188,7 +188,7 @@ impl<'d, U: Uses + 'static> SubtaskBuilder<'d, U> {
         let states = U::states(&held);
         let second = wrap::<U, _, _, _>(U::another(&held), second);
         let first = Some(wrap::<U, _, _, _>(held, first));
-        Subtask::of(dag, Box::new(FallbackPair { first, second }), states)
+        Subtask::with_replacement(dag, Box::new(FallbackPair { first, second }), states)
     }
 }
 
@@ -207,7 +207,7 @@ where
 
 impl<'d> Subtask<'d> {
     /// Begins with functions of which one replaces the other.
-    fn of<Args: VecToSubs, Ret: VecToPubs>(
+    fn with_replacement<Args: VecToSubs, Ret: VecToPubs>(
         dag: &'d Dag,
         alternatives: Box<dyn Alternatives<Args, Ret>>,
         states: Vec<Arc<dyn Reset>>,

@@ -269,7 +269,7 @@ impl Wire {
     /// For platforms, which have one place that calls this.
     #[must_use]
     pub fn depart(&self) -> Option<u8> {
-        self.shared.outgoing.take()
+        self.shared.outgoing.take_byte()
     }
 }
 
@@ -330,7 +330,7 @@ impl<T> Iterator for Received<'_, T> {
         let incoming = &wire.shared.incoming;
         // Each turn takes a packet, and there are no more than up to the mark.
         loop {
-            let (bytes, received_ns) = incoming.take(self.mark, room)?;
+            let (bytes, received_ns) = incoming.take_packet(self.mark, room)?;
             if let Some(value) = decode(bytes) {
                 return Some(Packet { value, received_ns });
             }
@@ -414,7 +414,7 @@ impl Uses for SendUse {
     }
 
     fn enter(held: &mut Self::Held) -> Self::Guard<'_> {
-        held.shared.outgoing.begin();
+        held.shared.outgoing.discard_staged();
         held
     }
 

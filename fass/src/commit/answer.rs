@@ -270,7 +270,7 @@ impl Commit {
     /// See [`EndToEnd`].
     #[must_use]
     pub fn chains_between(&self, from: &str, to: &str) -> Vec<EndToEnd> {
-        let [Some(from), Some(to)] = [from, to].map(|name| Chain::place(&self.task_set, name))
+        let [Some(from), Some(to)] = [from, to].map(|name| Chain::find(&self.task_set, name))
         else {
             return Vec::new();
         };

@@ -161,7 +161,7 @@ pub(crate) type Check = fn(&Drafts, &mut Vec<Fault>);
 pub(crate) fn dags_of_modes(drafts: &Drafts) -> Vec<Vec<DagId>> {
     let found = of_commit(drafts);
     let modes = found.first().map(|modes| modes.borrow());
-    let id = |(dag, _): &(Weak<_>, _)| (0..).map(DagId).nth(place(drafts, dag)?);
+    let id = |(dag, _): &(Weak<_>, _)| (0..).map(DagId).nth(dag_index(drafts, dag)?);
     let dags = |mode: &ModeDraft| mode.dags.iter().filter_map(id).collect();
     modes.map_or(Vec::new(), |modes| modes.iter().map(dags).collect())
 }
@@ -183,7 +183,7 @@ pub(crate) fn check_modes(drafts: &Drafts, faults: &mut Vec<Fault>) {
                 let text = format!("two modes are called `{name}`; give each a name of its own");
                 add("duplicate_mode", text);
             }
-            let unknown = (mode.dags.iter()).filter(|(dag, _)| place(drafts, dag).is_none());
+            let unknown = (mode.dags.iter()).filter(|(dag, _)| dag_index(drafts, dag).is_none());
             for (_, dag) in unknown {
                 let text = format!(
                     "mode `{name}` has dag `{dag}`, which is not in the commit; commit all dags of \
@@ -242,7 +242,7 @@ fn of_commit(drafts: &Drafts) -> Vec<ModeSets> {
 }
 
 /// Returns the place of a DAG in the commit.
-fn place(drafts: &Drafts, dag: &Weak<RefCell<DagDraft>>) -> Option<usize> {
+fn dag_index(drafts: &Drafts, dag: &Weak<RefCell<DagDraft>>) -> Option<usize> {
     // By identity: names may be the same.
     let is_it = |draft: &Rc<_>| core::ptr::eq(Rc::as_ptr(draft), dag.as_ptr());
     drafts.iter().position(is_it)

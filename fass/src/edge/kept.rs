@@ -34,7 +34,7 @@ const MOST_CLUSTERS: usize = 64;
 /// use fass::edge::BootRecord;
 ///
 /// let kept = BootRecord::new(Vec::new());
-/// assert!(recording::Recording::read(&kept.end()).is_ok());
+/// assert!(recording::Recording::read(&kept.finish()).is_ok());
 /// ```
 #[derive(Clone, Debug)]
 pub struct BootRecord<S> {
@@ -121,14 +121,14 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
         let drain = outgoing.as_mut()?;
         // The run is over, so this comes to an end.
         while drain.step(Some(&mut self.stream)) {}
-        let drained = drain.end(&mut self.stream)?;
+        let drained = drain.send_losses(&mut self.stream)?;
         // One run that is cut makes the whole file one.
         self.is_cut |= drained.is_cut;
         Some(drained)
     }
 
     /// Ends the record, and returns what has taken it.
-    pub fn end(self) -> S {
+    pub fn finish(self) -> S {
         match self.is_cut {
             true => self.stream.cut(),
             false => self.stream.end(),

@@ -83,7 +83,7 @@ impl Crossing for RecentJobs {
 
     fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64) {
         if let Some(kept) = &mut self.kept {
-            kept.latest.take(&RecordedValue {
+            kept.latest.store(&RecordedValue {
                 completed_ns: at_ns,
                 ..*value
             });
@@ -105,7 +105,7 @@ impl Crossing for RecentJobs {
     fn failed(&mut self, instance: Instance, at_ns: u64, _clock_ns: u64) {
         if let Some(kept) = &mut self.kept {
             for of in kept.lines.iter().filter(|of| of.is_found_by(instance)) {
-                of.line.show(at_ns, |sample| kept.latest.take(sample));
+                of.line.show(at_ns, |sample| kept.latest.store(sample));
             }
             // From now on the jobs up to the fault stay, whatever comes after them.
             kept.latest.hold(instance.dag.index(), instance.job);
@@ -131,7 +131,7 @@ impl Crossing for RecentJobs {
 struct OfLatest(PlanHistory);
 
 impl Drain for OfLatest {
-    fn begin(&mut self, to: &mut Record) {
+    fn send_header(&mut self, to: &mut Record) {
         let PlanHistory {
             header,
             latest,
@@ -171,7 +171,7 @@ impl Drain for OfLatest {
         false
     }
 
-    fn end(&mut self, to: &mut Record) -> Option<RecordingState> {
+    fn send_losses(&mut self, to: &mut Record) -> Option<RecordingState> {
         Some(RecordingState::of(to, true))
     }
 }
@@ -191,7 +191,7 @@ impl Drain for OfLatest {
 ///     if job == 5 {
 ///         latest.hold(0, 4); // it has failed
 ///     }
-///     latest.take(&RecordedValue {
+///     latest.store(&RecordedValue {
 ///         channel: 0,
 ///         job: job.into(),
 ///         completed_ns: 0,
@@ -255,7 +255,7 @@ impl LatestJobs {
     }
 
     /// Takes a value, if it is an input.
-    pub fn take(&mut self, value: &RecordedValue<'_>) {
+    pub fn store(&mut self, value: &RecordedValue<'_>) {
         let Some(places) = self.places.get_mut(usize::from(value.channel)) else {
             return;
         };

@@ -202,7 +202,7 @@ pub type Record = Stream<dyn Sink + Send>;
 /// See [`Crossing`].
 pub trait Drain: Send {
     /// Sends the header.
-    fn begin(&mut self, to: &mut Record);
+    fn send_header(&mut self, to: &mut Record);
 
     /// Takes when the time of the run begins, on the clock of [`crate::now_ns`].
     fn begin_run(&mut self, epoch_ns: u64) {
@@ -213,7 +213,7 @@ pub trait Drain: Send {
     fn step(&mut self, to: Option<&mut Record>) -> bool;
 
     /// Sends what is lost, when the run is over and nothing is left; `None`: there is no file.
-    fn end(&mut self, to: &mut Record) -> Option<RecordingState>;
+    fn send_losses(&mut self, to: &mut Record) -> Option<RecordingState>;
 }
 
 /// How complete a recording is.
@@ -240,7 +240,7 @@ impl RecordingState {
 }
 
 /// Begins to do what is wished.
-pub(crate) fn begin(wish: EdgeMode, host: ReplayHost) -> Box<dyn Crossing> {
+pub(crate) fn new_crossing(wish: EdgeMode, host: ReplayHost) -> Box<dyn Crossing> {
     match wish {
         EdgeMode::Record { app, bytes, .. } => Box::new(tape::RunRecorder::new(app, bytes)),
         EdgeMode::Replay { bytes, from } => Box::new(replay::OfMachine::new(bytes, from, host)),
@@ -430,7 +430,7 @@ impl Edge {
         }
         if let (Some(drain), Some(to)) = (&mut self.outgoing, to) {
             // Not during the run: it takes long where a byte does.
-            drain.begin(to);
+            drain.send_header(to);
         }
         self.is_on = true;
         Ok(is_asked_for)

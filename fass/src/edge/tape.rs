@@ -93,13 +93,13 @@ impl RunRecorder {
         {
             // A lost event cannot be told as a lost value is: a replay would miss a signal. So the
             // recording ends here.
-            self.lost.end(at_ns);
+            self.lost.finish(at_ns);
         }
     }
 }
 
 /// Takes a value that is not where the drain reads it: it is given, and is put there, or is lost.
-fn take(given: &[Option<Outbox>], lost: &LossCounts, value: &RecordedValue<'_>, at_ns: u64) {
+fn store(given: &[Option<Outbox>], lost: &LossCounts, value: &RecordedValue<'_>, at_ns: u64) {
     let outbox = given
         .get(usize::from(value.channel))
         .and_then(Option::as_ref);
@@ -129,7 +129,7 @@ impl Crossing for RunRecorder {
     }
 
     fn record(&mut self, value: &RecordedValue<'_>, at_ns: u64) {
-        take(&self.given, &self.lost, value, at_ns);
+        store(&self.given, &self.lost, value, at_ns);
     }
 
     fn happened(&mut self, notice: &DriverNotice) {
@@ -145,8 +145,8 @@ impl Crossing for RunRecorder {
     fn failed(&mut self, instance: Instance, at_ns: u64, clock_ns: u64) {
         for of in self.lines.iter().filter(|of| of.is_found_by(instance)) {
             // What the instance found before its fault is needed to compute the fault again.
-            (of.line).end(clock_ns, |sample| {
-                take(&self.given, &self.lost, sample, at_ns);
+            (of.line).publish_or_give(clock_ns, |sample| {
+                store(&self.given, &self.lost, sample, at_ns);
             });
         }
         self.put(EntryKind::Fault, instance, None, at_ns);
@@ -287,7 +287,7 @@ impl OfTape {
         let dag = self.header.channels[usize::from(channel)].dag;
         let before = next.map(|(job, _)| job);
         // Before the value that comes next, so that the file is in the order of jobs.
-        while let Some((first, last)) = self.lost.values[usize::from(channel)].take(before) {
+        while let Some((first, last)) = self.lost.values[usize::from(channel)].next_run(before) {
             for job in first..=last {
                 // What is told at the end only has no time of its own.
                 let release_ns = || self.releases.of(dag.into(), job).unwrap_or(0);
@@ -349,7 +349,7 @@ impl OfTape {
 }
 
 impl Drain for OfTape {
-    fn begin(&mut self, to: &mut Record) {
+    fn send_header(&mut self, to: &mut Record) {
         to.header(&self.header);
     }
 
@@ -371,7 +371,7 @@ impl Drain for OfTape {
         true
     }
 
-    fn end(&mut self, to: &mut Record) -> Option<RecordingState> {
+    fn send_losses(&mut self, to: &mut Record) -> Option<RecordingState> {
         let is_cut = self.has_ended(u64::MAX);
         if !is_cut {
             (0..)
@@ -430,7 +430,7 @@ impl LostJobs {
     }
 
     /// Takes the next run if it comes before a job whose value is there, or at the end.
-    fn take(&self, before: Option<u64>) -> Option<(u64, u64)> {
+    fn next_run(&self, before: Option<u64>) -> Option<(u64, u64)> {
         let read = self.read.load(Ordering::Relaxed);
         if read == self.written.load(Ordering::Acquire) {
             return None;
@@ -462,13 +462,13 @@ impl LossCounts {
     fn note(&self, value: &RecordedValue<'_>, at_ns: u64) {
         let jobs = self.values.get(usize::from(value.channel));
         if jobs.is_some_and(|jobs| !jobs.note(value.job)) {
-            self.end(at_ns);
+            self.finish(at_ns);
         }
     }
 
     /// Ends the recording, unless it has ended before.
     #[cold]
-    fn end(&self, at_ns: u64) {
+    fn finish(&self, at_ns: u64) {
         self.rest_ns.fetch_min(at_ns, Ordering::Release);
     }
 }
@@ -483,13 +483,19 @@ mod tests {
         for job in [3, 4, 5, 7, 9, 10] {
             assert!(lost.note(job));
         }
-        assert_eq!(lost.take(Some(2)), None);
-        assert_eq!(lost.take(Some(8)), Some((3, 5)));
-        assert_eq!(lost.take(Some(8)), Some((7, 7)));
-        assert_eq!(lost.take(Some(8)), None);
-        assert_eq!((lost.take(None), lost.take(None)), (Some((9, 10)), None));
+        assert_eq!(lost.next_run(Some(2)), None);
+        assert_eq!(lost.next_run(Some(8)), Some((3, 5)));
+        assert_eq!(lost.next_run(Some(8)), Some((7, 7)));
+        assert_eq!(lost.next_run(Some(8)), None);
+        assert_eq!(
+            (lost.next_run(None), lost.next_run(None)),
+            (Some((9, 10)), None)
+        );
         let noted = (0..100).filter(|run| lost.note(2 * run)).count();
         assert_eq!(noted, MOST_RUNS, "more are refused");
-        assert!(lost.take(None).is_some() && lost.note(1000), "one is gone");
+        assert!(
+            lost.next_run(None).is_some() && lost.note(1000),
+            "one is gone"
+        );
     }
 }

@@ -135,11 +135,11 @@ impl ChannelState {
 
     /// Publishes or gives the value, whichever it is.
     pub(super) fn give(&self, completed_ns: u64) {
-        self.end(completed_ns, self.edge.record);
+        self.publish_or_give(completed_ns, self.edge.record);
     }
 
     /// Publishes the value, or gives it to that, as what has no room to be published.
-    pub(crate) fn end(&self, at_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
+    pub(crate) fn publish_or_give(&self, at_ns: u64, take: impl FnOnce(&RecordedValue<'_>)) {
         let is_read = self.is_read.load(Ordering::Relaxed);
         if !is_read || !(self.outbox.get()).is_some_and(|outbox| outbox.publish(at_ns)) {
             self.show(at_ns, take);

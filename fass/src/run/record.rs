@@ -102,7 +102,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
             if let Some((probe, schema, line)) = sample.of.probe(latest, sample.sampler) {
                 let way = (schema, Arc::clone(&line));
                 open(sample.subtask, Role::Sample, latest.topic(), way, None);
-                let look = move |job| probe.begin(job);
+                let look = move |job| probe.note_job(job);
                 around.push((sample.subtask, looking(line, look)));
             }
         }
@@ -337,7 +337,7 @@ struct SampleProbe<T> {
 }
 
 impl<T: Recordable + 'static> Probe for SampleProbe<T> {
-    fn begin(&self, job: u64) {
+    fn note_job(&self, job: u64) {
         // One instance of the subtask at a time (R2), so this needs no order.
         self.job.store(job, Ordering::Relaxed);
     }

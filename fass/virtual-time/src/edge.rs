@@ -188,7 +188,7 @@ impl Edge {
     }
 
     /// Begins an instance.
-    pub(crate) fn begin(&self, instance: Instance) {
+    pub(crate) fn start_instance(&self, instance: Instance) {
         let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
         let is_noted = self.header.borrow().channels.iter().any(of_dag);
         let recorded = self.of_replay(|replay| replay.clock(instance).map(<[u64]>::to_vec));
@@ -211,7 +211,7 @@ impl Edge {
     }
 
     /// Ends an instance, which began then.
-    pub(crate) fn end(&self, instance: Instance, start_ns: u64) {
+    pub(crate) fn finish_instance(&self, instance: Instance, start_ns: u64) {
         let told = self.told.take().map(|told| told.answers);
         let Some(answers) = told.filter(|answers| !answers.is_empty()) else {
             return;
@@ -231,7 +231,7 @@ impl Edge {
     pub(crate) fn record(&self, value: &RecordedValue<'_>) {
         self.of_replay(|replay| replay.compare(value));
         match self.latest.borrow_mut().as_mut() {
-            Some(latest) => latest.take(value),
+            Some(latest) => latest.store(value),
             None => {
                 let kept = Kept::new(&self.header.borrow(), value);
                 self.values.borrow_mut().push(kept);
@@ -281,7 +281,7 @@ impl Edge {
         if self.latest.borrow().is_none() {
             record.end_run(run);
         }
-        record.end()
+        record.finish()
     }
 
     /// Returns what a recording says of an event, if anything; what was skipped or cut in the

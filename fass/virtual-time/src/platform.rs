@@ -559,12 +559,12 @@ impl Workload<SubtaskRunner> for Calls {
         machine.now_ns.set(now_ns);
         machine.executed_ns.set(Some(0));
         machine.running.set(Some(instance));
-        machine.edge.begin(instance);
+        machine.edge.start_instance(instance);
         let settings = machine.settings.borrow();
         let mut faults = settings.faults.iter();
         let fails = faults.any(|fault| fault.is(instance, &self.task_set));
         let mut result = self.call(runner, fails);
-        machine.edge.end(instance, now_ns);
+        machine.edge.finish_instance(instance, now_ns);
         machine.running.set(None);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
         let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);

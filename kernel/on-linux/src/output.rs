@@ -18,7 +18,7 @@ pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
     let mut pieces = TextPieces::new(kind, |piece, is_first| hand_over(piece, kind, is_first));
     // Only a `Display` that fails of its own accord can fail here.
     let _ = pieces.write_fmt(text);
-    pieces.end();
+    pieces.finish();
 }
 
 fn hand_over(piece: &[u8], kind: OutputKind, is_first: bool) {

@@ -70,7 +70,7 @@ impl System for BareMachine {
         const LEAD_NS: u64 = 100_000;
         let epoch_ns = epoch_ns.unwrap_or_else(|| machine::clock::now_ns() + LEAD_NS);
         let nothing = || AppError::Failure("nothing is committed; call finish_create_dags".into());
-        let total = execution::begin(epoch_ns).ok_or_else(nothing)?;
+        let total = execution::set_epoch(epoch_ns).ok_or_else(nothing)?;
         let mut outgoing = edge::get().begin_run(epoch_ns);
         let allocations_before = heap::usage().allocations;
         let locks_before = execution::lock_acquisitions();
@@ -90,7 +90,7 @@ impl System for BareMachine {
             crate::println!("\n({dropped} bytes of output did not fit in the buffer)");
         }
         record::end_recording(outgoing, !self.is_shut_down());
-        let run = execution::end().ok_or_else(nothing)?;
+        let run = execution::take_run().ok_or_else(nothing)?;
         let run = run.with_counts(RunCounts {
             epoch_ns,
             allocations,

@@ -78,10 +78,11 @@ fn run() -> Result<MeasuredCosts, AppError> {
     committed?;
     let failure =
         |what: &str| AppError::Failure(format!("overheads could not be measured: {what}"));
-    execution::begin(clock::now_ns() + LEAD_NS).ok_or_else(|| failure("nothing is committed"))?;
+    execution::set_epoch(clock::now_ns() + LEAD_NS)
+        .ok_or_else(|| failure("nothing is committed"))?;
     execution::arm_all();
     worker::wait_in_background(|| false);
-    let ended = execution::end().ok_or_else(|| failure("nothing was run"))?;
+    let ended = execution::take_run().ok_or_else(|| failure("nothing was run"))?;
     let costs = ended.journal().costs(ended.task_set());
     costs.ok_or_else(|| failure("there is no memory for their journal; give the machine more"))
 }

@@ -237,7 +237,7 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
     let _ = fass::platform::install(&KERNEL);
     fass::platform::set_clock(&CLOCK);
     announce(info, name, layout.total_bytes, &rate);
-    end(if *probes {
+    finish(if *probes {
         probe::run()
     } else {
         run_app(info, name, *app, by_number(platform).count())
@@ -367,12 +367,12 @@ fn run_app(
     );
     let wishes = settings.wishes;
     let result = Machine::serve(BareMachine::new(wishes), options, module, verdict, app);
-    record::end();
+    record::finish();
     result
 }
 
 /// Prints how the app ended, as the last line, and stops the machine.
-fn end(result: Result<(), AppError>) -> ! {
+fn finish(result: Result<(), AppError>) -> ! {
     let told = ending::tell(&result);
     console::resume();
     power::exit(told)

@@ -83,7 +83,7 @@ pub(crate) fn set_wish(
     let kib = record_kib.max(options.number("keep", 0..=1 << 20, 0)?);
     let jobs = options.number("latest", 0..=64, 16)?;
     if options.choice("events", &[("off", false), ("on", true)])? {
-        record::begin(false);
+        record::start(false);
     }
     let wish = match (replay_bytes, kib, jobs) {
         (1.., 1.., _) => {
@@ -111,7 +111,7 @@ pub(crate) fn set_wish(
         (0, 0, 0) => return Ok(module),
     };
     if matches!(wish, EdgeMode::Record { .. }) {
-        record::begin(true);
+        record::start(true);
     }
     edge::set_wish(wish);
     Ok(module)
@@ -237,21 +237,21 @@ mod tests {
     /// Four cores with two siblings each, and two without.
     const IDS: [u32; 10] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 10];
 
-    fn of(list: Option<&str>, bits: u32) -> Vec<u32> {
+    fn processors(list: Option<&str>, bits: u32) -> Vec<u32> {
         select(IDS.into_iter(), list, bits)
     }
 
     #[test]
     fn a_list_selects_by_numbers() {
-        assert_eq!(of(None, 0), IDS);
-        assert_eq!(of(Some("0-2,9,1"), 0), [0, 1, 2, 10]);
-        assert_eq!(of(Some("0"), 0), [0]);
+        assert_eq!(processors(None, 0), IDS);
+        assert_eq!(processors(Some("0-2,9,1"), 0), [0, 1, 2, 10]);
+        assert_eq!(processors(Some("0"), 0), [0]);
     }
 
     #[test]
     fn of_siblings_the_first_that_is_listed_stays() {
-        assert_eq!(of(None, 1), [0, 2, 4, 6, 8, 10]);
-        assert_eq!(of(Some("0,3,5,6,7"), 1), [0, 3, 5, 6]);
+        assert_eq!(processors(None, 1), [0, 2, 4, 6, 8, 10]);
+        assert_eq!(processors(Some("0,3,5,6,7"), 1), [0, 3, 5, 6]);
         assert_eq!(siblings(&IDS, 1), 4);
         assert_eq!(siblings(&[0, 3, 5, 6], 1), 0);
         assert_eq!(siblings(&IDS, 0), 0);

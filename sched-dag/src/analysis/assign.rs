@@ -223,11 +223,11 @@ pub fn federated(tasks: &[&Task], cores: u32) -> Option<Federation> {
             light.push(position);
         }
     }
-    let light = place(tasks, light, left)?;
+    let light = pack_sorted(tasks, light, left)?;
     Some(Federation { heavy, light })
 }
 
-fn place(tasks: &[&Task], mut light: Vec<usize>, cores: u32) -> Option<Vec<Vec<usize>>> {
+fn pack_sorted(tasks: &[&Task], mut light: Vec<usize>, cores: u32) -> Option<Vec<Vec<usize>>> {
     let cores = usize::try_from(cores).ok()?;
     let density = |position: usize| {
         let task = tasks[position];

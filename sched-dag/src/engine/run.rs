@@ -87,7 +87,7 @@ impl DagCounts {
 impl Run {
     /// Takes it out of an engine that has come to its end, on so many cores in all.
     #[must_use]
-    pub fn of<B: SubtaskBody, P>(
+    pub fn from_engine<B: SubtaskBody, P>(
         engine: &mut Engine<B, P>,
         proven: ProvenBounds,
         cores: u32,

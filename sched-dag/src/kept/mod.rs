@@ -167,7 +167,7 @@ impl Journal {
             self.oldest = 0;
         }
         if let (Some(tally), Some(event)) = (&mut self.tally, Event::unpack(words)) {
-            tally.take(&event);
+            tally.add(&event);
         }
     }
 
@@ -268,7 +268,7 @@ impl Journal {
             Some(tally) => tally.clone(),
             None => RunTally::new(task_set, bits),
         };
-        self.events().for_each(|event| tally.take(&event));
+        self.events().for_each(|event| tally.add(&event));
         self.is_complete.then_some(tally)
     }
 

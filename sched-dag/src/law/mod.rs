@@ -191,7 +191,7 @@ impl RunRecord {
     #[must_use]
     pub fn job(&self, dag: DagId, job: u64) -> Option<&JobRecord> {
         let dag = self.dags.get(dag.index())?;
-        Some(&dag.jobs[dag.place(job)?])
+        Some(&dag.jobs[dag.position(job)?])
     }
 
     /// Returns the instances of a job by subtask; empty if it is not recorded.
@@ -203,7 +203,7 @@ impl RunRecord {
     pub fn instances(&self, dag: DagId, job: u64) -> &[InstanceRecord] {
         let dag = &self.dags[dag.index()];
         let of_job = |place| &dag.instances[place * dag.subtasks..][..dag.subtasks];
-        dag.place(job).map_or(&[], of_job)
+        dag.position(job).map_or(&[], of_job)
     }
 
     /// Returns an instance's times, `None` if it is not recorded.
@@ -216,7 +216,7 @@ impl RunRecord {
     /// Returns an instance's times to be filled in, `None` if it is not recorded.
     fn instance_mut(&mut self, instance: Instance) -> Option<&mut InstanceRecord> {
         let dag = self.dags.get_mut(instance.dag.index())?;
-        let first = dag.place(instance.job)? * dag.subtasks;
+        let first = dag.position(instance.job)? * dag.subtasks;
         let of_job = &mut dag.instances[first..][..dag.subtasks];
         of_job.get_mut(instance.subtask.index())
     }
@@ -224,7 +224,7 @@ impl RunRecord {
     /// Returns a job's times to be filled in, `None` if it is not recorded.
     fn job_mut(&mut self, dag: DagId, job: u64) -> Option<&mut JobRecord> {
         let dag = self.dags.get_mut(dag.index())?;
-        let place = dag.place(job)?;
+        let place = dag.position(job)?;
         Some(&mut dag.jobs[place])
     }
 
@@ -262,7 +262,7 @@ impl RunRecord {
 }
 
 impl DagRecord {
-    fn place(&self, job: u64) -> Option<usize> {
+    fn position(&self, job: u64) -> Option<usize> {
         let place = usize::try_from(job.checked_sub(self.first_job)?).ok()?;
         (place < self.jobs.len()).then_some(place)
     }

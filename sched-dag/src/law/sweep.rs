@@ -199,7 +199,7 @@ impl<'m> DispatchSweep<'m> {
     }
 
     /// Judges the rest, up to the run's end.
-    pub(super) fn end(mut self, end_ns: u64) -> Vec<DispatchBreach> {
+    pub(super) fn finish(mut self, end_ns: u64) -> Vec<DispatchBreach> {
         self.settle(end_ns);
         self.now_ns = end_ns;
         for (key, owed) in core::mem::take(&mut self.owed) {

@@ -169,7 +169,7 @@ impl RunTally {
 
     /// Takes the next event. Those of a job whose release it has not seen are passed
     /// over.
-    pub fn take(&mut self, event: &Event) {
+    pub fn add(&mut self, event: &Event) {
         let model = self.task_set.dag(event.dag);
         let dag = &mut self.dags[event.dag.index()];
         match event.what {
@@ -179,7 +179,7 @@ impl RunTally {
             }
             EventKind::Released => {
                 let release_ns = model.release_ns(event.job, dag.due_ns);
-                dag.begin(event, release_ns, model.subtasks().len());
+                dag.open_job(event, release_ns, model.subtasks().len());
                 return;
             }
             // Times of a job that was cut say nothing about those of whole ones.
@@ -192,7 +192,7 @@ impl RunTally {
             what if what.is_of_dag() => return,
             _ => {}
         }
-        let Some(place) = dag.place(event.job) else {
+        let Some(place) = dag.slot(event.job) else {
             return;
         };
         let Some(instance) = event
@@ -215,7 +215,7 @@ impl DagTally {
     }
 
     /// Returns where a job in flight is.
-    fn place(&self, job: u64) -> Option<usize> {
+    fn slot(&self, job: u64) -> Option<usize> {
         let places = self.open.len();
         // Less than the number of places.
         let first = usize::try_from(job % places as u64).unwrap_or(0);
@@ -223,7 +223,7 @@ impl DagTally {
         order.find(|&place| self.open[place].number == job + 1)
     }
 
-    fn begin(&mut self, event: &Event, release_ns: u64, subtasks: usize) {
+    fn open_job(&mut self, event: &Event, release_ns: u64, subtasks: usize) {
         let places = self.open.len();
         let first = usize::try_from(event.job % places as u64).unwrap_or(0);
         let mut order = (first..places).chain(0..first);

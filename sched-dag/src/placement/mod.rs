@@ -99,7 +99,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Puts the body of an instance that has run to rest.
     #[inline]
     fn put(&mut self, vertex: Vertex, body: Body) {
-        let running = core::mem::replace(self.place(vertex), BodyState::Resting(body));
+        let running = core::mem::replace(self.body_state(vertex), BodyState::Resting(body));
         debug_assert!(matches!(running, BodyState::Running));
         // `Running` holds nothing: this skips the check whether there is something to drop.
         core::mem::forget(running);
@@ -109,7 +109,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// vertex. Its body stays on the stack of a context that is never resumed.
     pub fn lose(&mut self, core: usize) -> Option<Vertex> {
         let vertex = self.detach(core)?;
-        *self.place(vertex) = BodyState::Lost;
+        *self.body_state(vertex) = BodyState::Lost;
         self.forget_target(core, vertex);
         Some(vertex)
     }
@@ -117,12 +117,12 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Puts a body to rest where there is none: in the place of one that was
     /// [lost](Self::lose), or at first.
     pub fn replace(&mut self, vertex: Vertex, body: Body) {
-        *self.place(vertex) = BodyState::Resting(body);
+        *self.body_state(vertex) = BodyState::Resting(body);
     }
 
     /// Takes the body of a subtask out, if no instance of it has started.
     pub fn take(&mut self, vertex: Vertex) -> Option<Body> {
-        let place = self.place(vertex);
+        let place = self.body_state(vertex);
         match core::mem::replace(place, BodyState::Lost) {
             BodyState::Resting(body) => Some(body),
             // The place was emptied to look into it, and gets back what it had.
@@ -136,7 +136,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Takes note that an instance has finished that no core has: on a driver where a
     /// parked one may still be executed.
     pub fn finish_parked(&mut self, vertex: Vertex, body: Body) {
-        *self.place(vertex) = BodyState::Resting(body);
+        *self.body_state(vertex) = BodyState::Resting(body);
         self.forget_target(0, vertex);
     }
 
@@ -174,7 +174,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// Notes that `context` holds a detached instance. Returns the core
     /// that has been waiting for it, if there is one.
     pub fn suspend(&mut self, vertex: Vertex, context: Parked) -> Option<CoreId> {
-        *self.place(vertex) = BodyState::Suspended(context);
+        *self.body_state(vertex) = BodyState::Suspended(context);
         let mut seats = (0..).map(CoreId).zip(&self.seats);
         // The scheduler may have given it to another core before its context was known.
         seats.find_map(|(core, seat)| (seat.target == vertex).then_some(core))
@@ -184,7 +184,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// that is suspended.
     pub fn take_suspended(&mut self, core: usize) -> Option<Parked> {
         let vertex = some(self.seats[core].target)?;
-        let place = self.place(vertex);
+        let place = self.body_state(vertex);
         match core::mem::replace(place, BodyState::Running) {
             // Only if that has arrived: the core that it left may still be saving its registers.
             BodyState::Suspended(context) => {
@@ -203,7 +203,7 @@ impl<Body, Parked> Placement<Body, Parked> {
         let Some(vertex) = some(self.seats[core].target) else {
             return NextWork::Nothing;
         };
-        let place = self.place(vertex);
+        let place = self.body_state(vertex);
         let next = match core::mem::replace(place, BodyState::Running) {
             BodyState::Resting(body) => NextWork::Start(vertex, body),
             BodyState::Suspended(context) => NextWork::Continue(context),
@@ -223,7 +223,7 @@ impl<Body, Parked> Placement<Body, Parked> {
     /// start. `None`, and nothing is changed, if it is suspended.
     #[inline]
     pub fn start(&mut self, core: CoreId, vertex: Vertex) -> Option<Body> {
-        let place = self.place(vertex);
+        let place = self.body_state(vertex);
         match core::mem::replace(place, BodyState::Running) {
             BodyState::Resting(body) => {
                 self.seats[core.index()] = CoreSlot {
@@ -270,13 +270,13 @@ impl<Body, Parked> Placement<Body, Parked> {
 
     /// Returns the body of a subtask of which no instance has started.
     pub fn resting(&mut self, vertex: Vertex) -> Option<&mut Body> {
-        match self.place(vertex) {
+        match self.body_state(vertex) {
             BodyState::Resting(body) => Some(body),
             _ => None,
         }
     }
 
-    fn place(&mut self, vertex: Vertex) -> &mut BodyState<Body, Parked> {
+    fn body_state(&mut self, vertex: Vertex) -> &mut BodyState<Body, Parked> {
         &mut self.places[vertex.index()]
     }
 }

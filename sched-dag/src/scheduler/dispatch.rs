@@ -220,7 +220,7 @@ impl Scheduler {
             }
         } else {
             self.write_finish(core, vertex, now_ns);
-            self.end(vertex.0);
+            self.end_instance(vertex.0);
         }
         // The core takes one of the new instances; a second one may concern another core. (The
         // module says why one cannot.)

@@ -17,7 +17,7 @@ impl Scheduler {
     #[inline]
     pub(super) fn finish(&mut self, instance: Instance) {
         let vertex = self.take_off(instance, "is completed");
-        self.end(vertex);
+        self.end_instance(vertex);
         if self.log.now_ns >= self.quiet_until_ns {
             self.judge_ended(vertex);
         }
@@ -94,7 +94,8 @@ impl Scheduler {
             if vertex.phase == InstancePhase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
                 self.ready.remove(self.ready.key(number, vertex, || job));
-                self.log.of(EventKind::Cancelled, vertex.instance(job));
+                self.log
+                    .of_instance(EventKind::Cancelled, vertex.instance(job));
                 vertex.phase = InstancePhase::Absent;
                 // Ended below, not here: an end makes further instances ready, which the loop must
                 // not meet half-way.
@@ -107,7 +108,7 @@ impl Scheduler {
     /// Ends the instance that a vertex is doing, and all that are cancelled by
     /// that.
     #[inline]
-    pub(super) fn end(&mut self, vertex: u32) {
+    pub(super) fn end_instance(&mut self, vertex: u32) {
         self.end_one(vertex);
         if !self.ending.is_empty() {
             // Its next instance may be among them, and then hide that this one was late.
@@ -144,7 +145,7 @@ impl Scheduler {
             log,
             ..
         } = self;
-        let ended = vertices.end(number);
+        let ended = vertices.end_instance(number);
         let (dag, sequence) = (ended.dag, ended.progress);
         let jobs = &mut dags[dag.index()].jobs;
         // Read before `job_mut` borrows the jobs: whether a younger job is in flight, in which the
@@ -162,7 +163,7 @@ impl Scheduler {
                 // R3 holds in a cut job, too: edges are released, but the successors are cancelled
                 // instead of lined up.
                 if is_cut {
-                    log.of(EventKind::Cancelled, successor.instance(job));
+                    log.of_instance(EventKind::Cancelled, successor.instance(job));
                     ending.push(next);
                 } else {
                     line_up(next, successor, job, ready, log);
@@ -188,7 +189,8 @@ impl Scheduler {
             let jobs = &self.dags[vertex.dag.index()].jobs;
             let job = jobs.job(vertex.progress);
             if job.cut.is_some() {
-                self.log.of(EventKind::Cancelled, vertex.instance(job));
+                self.log
+                    .of_instance(EventKind::Cancelled, vertex.instance(job));
                 self.ending.push(number);
             } else {
                 line_up(number, vertex, job, &mut self.ready, &mut self.log);
@@ -256,5 +258,5 @@ pub(super) fn line_up(
     vertex.phase = InstancePhase::Ready;
     vertex.job = job.number;
     ready.insert(ready.key(number, vertex, || job));
-    log.of(EventKind::Ready, vertex.instance(job));
+    log.of_instance(EventKind::Ready, vertex.instance(job));
 }

@@ -116,7 +116,7 @@ impl EventLog {
 
     /// Writes down what has happened to an instance, at this instant.
     #[inline]
-    pub(super) fn of(&mut self, what: EventKind, instance: Instance) {
+    pub(super) fn of_instance(&mut self, what: EventKind, instance: Instance) {
         self.write(what, self.now_ns, EventSubject::of(instance));
         self.notify(what, EventSubject::of(instance), None);
     }

@@ -264,7 +264,7 @@ impl Scheduler {
         // Before the instance ends, so that no successor of it starts.
         self.end_dag(dag);
         // Only now its job may end, so that the job counts as cut short.
-        self.end(vertex);
+        self.end_instance(vertex);
     }
 
     /// Ends a DAG.
@@ -334,7 +334,7 @@ impl SurvivedFaults {
     }
 
     /// Counts a fault in a job, if it is survived, and reports whether it is.
-    fn take(&mut self, job: u64) -> bool {
+    fn count_fault(&mut self, job: u64) -> bool {
         let is_survived = self.would_take(job);
         // Overwrites the N-th before: faults older than that decide nothing any more.
         if is_survived && let Some(place) = self.jobs.get_mut(self.oldest) {
@@ -363,7 +363,7 @@ impl Scheduler {
     #[inline]
     pub(super) fn fail_replaceable(&mut self, instance: Instance) {
         let dag = instance.dag;
-        if self.is_ended(dag) || !self.dags[dag.index()].survived.take(instance.job) {
+        if self.is_ended(dag) || !self.dags[dag.index()].survived.count_fault(instance.job) {
             self.fail(instance);
             return;
         }
@@ -374,14 +374,14 @@ impl Scheduler {
         let state = &mut self.dags[dag.index()];
         state.statistics.faults += 1;
         state.statistics.restarts += 1;
-        self.log.of(EventKind::Restarted, instance);
+        self.log.of_instance(EventKind::Restarted, instance);
         // Not where the job was aborted before: its outcome stays, and its ready instances are
         // cancelled already.
         if state.jobs.cut(sequence, JobOutcome::Failed) {
             state.statistics.failed += 1;
             self.cancel_ready(dag, sequence);
         }
-        self.end(vertex);
+        self.end_instance(vertex);
         self.set_timer(dag);
     }
 }

@@ -159,7 +159,7 @@ impl VertexTable {
     /// ready are its [`successors`](Self::successors) in the same job, which are to
     /// be told by [`arrive`](Self::arrive), and its own next instance.
     #[inline]
-    pub(super) fn end(&mut self, vertex: u32) -> Vertex {
+    pub(super) fn end_instance(&mut self, vertex: u32) -> Vertex {
         let own = &mut self.vertices[vertex as usize];
         let ended = *own;
         own.phase = InstancePhase::Absent;

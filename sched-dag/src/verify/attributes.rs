@@ -31,7 +31,7 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
     }
     check_instances(options, findings);
     for dag in 0..count {
-        let page = &mut findings.of(dag);
+        let page = &mut findings.findings_of(dag);
         check_counts(page);
         check_times(page);
         check_subtasks(page);
@@ -76,12 +76,14 @@ fn check_instances(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
         return;
     }
     if let Some(most) = (0..specs.len()).max_by_key(|&dag| of(specs[dag])) {
-        findings.of(most).fault(|dag| DagFault::TooManyInstances {
-            dag,
-            in_flight: in_flight(specs[most]),
-            instances,
-            limit: options.instance_limit,
-        });
+        findings
+            .findings_of(most)
+            .fault(|dag| DagFault::TooManyInstances {
+                dag,
+                in_flight: in_flight(specs[most]),
+                instances,
+                limit: options.instance_limit,
+            });
     }
 }
 
@@ -267,7 +269,7 @@ fn check_clusters(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
         findings.fault(DagFault::ClustersBeyondCores { wanted, cores });
     }
     for dag in 0..findings.specs.len() {
-        let mut page = findings.of(dag);
+        let mut page = findings.findings_of(dag);
         match page.spec.cluster {
             None if clusters > 0 => page.fault(|dag| DagFault::NoCluster { dag, clusters }),
             Some(cluster) if cluster.index() >= clusters.max(1) => {
@@ -293,11 +295,13 @@ fn check_names(findings: &mut VerifyFindings<'_>) {
     for (dag, spec) in specs.iter().enumerate() {
         let names = spec.subtasks.iter().map(|subtask| subtask.name.as_str());
         for (first, second) in duplicates(names) {
-            findings.of(dag).fault(|dag| DagFault::DuplicateSubtask {
-                dag,
-                first: SubtaskLabel::new(spec, first),
-                second: SubtaskLabel::new(spec, second),
-            });
+            findings
+                .findings_of(dag)
+                .fault(|dag| DagFault::DuplicateSubtask {
+                    dag,
+                    first: SubtaskLabel::new(spec, first),
+                    second: SubtaskLabel::new(spec, second),
+                });
         }
     }
 }

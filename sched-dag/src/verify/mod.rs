@@ -161,7 +161,7 @@ impl<'s> VerifyFindings<'s> {
     }
 
     /// Opens the page of a DAG.
-    fn of(&mut self, dag: usize) -> DagFindings<'_, 's> {
+    fn findings_of(&mut self, dag: usize) -> DagFindings<'_, 's> {
         let spec = self.specs[dag];
         let findings = self;
         DagFindings {

@@ -60,7 +60,7 @@ fn priority_bases(findings: &mut VerifyFindings<'_>) -> Vec<u32> {
         let after = next + specs[dag].subtasks.len() as u64;
         match u32::try_from(next) {
             Ok(base) if after <= u64::from(u32::MAX) + 1 => bases[dag] = base,
-            _ => (findings.of(dag)).fault(|dag| DagFault::PrioritiesExhausted { dag }),
+            _ => (findings.findings_of(dag)).fault(|dag| DagFault::PrioritiesExhausted { dag }),
         }
         next = after;
     }
@@ -117,7 +117,7 @@ fn build_dag(spec: &DagSpec, shape: PrecedenceGraph, priority_base: u32) -> Dag 
         let states_deadline = spec.subtasks[subtask.index()]
             .relative_deadline_ns
             .is_some();
-        states_deadline || graph.successors.of(*subtask).is_empty()
+        states_deadline || graph.successors.neighbours(*subtask).is_empty()
     };
     graph.sinks = graph.subtasks().filter(is_sink).collect();
     let of_sinks_ns = graph.sinks.iter().map(|sink| deadlines_ns[sink.index()]);
@@ -152,7 +152,7 @@ fn deadlines_ns(spec: &DagSpec, graph: &Graph) -> Vec<u64> {
         .map(|subtask| subtask.relative_deadline_ns);
     let mut deadlines_ns: Vec<u64> = stated.map(|own_ns| own_ns.unwrap_or(whole_ns)).collect();
     for subtask in graph.topological_order.iter().rev() {
-        for next in graph.successors.of(*subtask) {
+        for next in graph.successors.neighbours(*subtask) {
             let least_ns = deadlines_ns[subtask.index()].min(deadlines_ns[next.index()]);
             deadlines_ns[subtask.index()] = least_ns;
         }

@@ -41,7 +41,7 @@ pub(super) fn check(
     policy: ConstructionPolicy,
     findings: &mut VerifyFindings<'_>,
 ) -> PrecedenceGraph {
-    let page = &mut findings.of(dag);
+    let page = &mut findings.findings_of(dag);
     let spec = page.spec;
     // Edges without topics, and those of topics: from here on they are alike.
     add_plain_edges(&mut topology.edges, page);
@@ -191,7 +191,7 @@ fn check_deadlines(graph: &Graph, page: &mut DagFindings<'_, '_>) {
     let stated = &page.spec.subtasks;
     for subtask in graph.subtasks() {
         if stated[subtask.index()].relative_deadline_ns.is_some()
-            && let Some(successor) = graph.successors.of(subtask).first()
+            && let Some(successor) = graph.successors.neighbours(subtask).first()
         {
             let (subtask, successor) = (subtask.index(), successor.index());
             let (subtask, successor) = (page.subtask(subtask), page.subtask(successor));
@@ -266,7 +266,7 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
                 open.push(subtask);
                 is_open[index] = true;
             }
-            if let Some(&successor) = graph.successors.of(subtask).get(*tried) {
+            if let Some(&successor) = graph.successors.neighbours(subtask).get(*tried) {
                 *tried += 1;
                 let to = successor.index();
                 if number[to] == NONE {
@@ -348,7 +348,7 @@ impl CycleSearch<'_> {
             if hops >= below {
                 return None;
             }
-            for &successor in self.graph.successors.of(subtask) {
+            for &successor in self.graph.successors.neighbours(subtask) {
                 // A large graph gets a cycle that may not be the shortest, rather than no answer
                 // in time.
                 self.budget = self.budget.saturating_sub(1);

@@ -109,10 +109,10 @@ pub(super) fn check<'a>(
             let dags = of_dags().map(|ends| findings.label(ends[0].dag)).collect();
             let topic = first.port.topic.clone();
             let shared = |_| DagFault::TopicInSeveralDags { topic, dags };
-            findings.of(first.dag).fault(shared);
+            findings.findings_of(first.dag).fault(shared);
         }
         for ends in of_dags() {
-            let page = &mut findings.of(ends[0].dag);
+            let page = &mut findings.findings_of(ends[0].dag);
             let topology = &mut topologies[ends[0].dag];
             sides.fill(ends);
             report_duplicates(ends, page);
@@ -120,7 +120,7 @@ pub(super) fn check<'a>(
         }
     }
     for (dag, topology) in topologies.iter_mut().enumerate() {
-        let page = &mut findings.of(dag);
+        let page = &mut findings.findings_of(dag);
         for latest in &page.spec.latest {
             let unread = &mut topology.unread;
             // Those who sample it read it.
@@ -329,7 +329,7 @@ pub(super) fn is_shared(state: &StateSpec) -> bool {
 /// Checks the states of all DAGs.
 pub(super) fn check_states(findings: &mut VerifyFindings<'_>) {
     for dag in 0..findings.specs.len() {
-        let page = &mut findings.of(dag);
+        let page = &mut findings.findings_of(dag);
         for (position, state) in page.spec.states.iter().enumerate() {
             let is_repeated = |other: &StateSpec| other.name == state.name;
             if page.spec.states[..position].iter().any(is_repeated) {
@@ -444,7 +444,7 @@ fn places(graph: &Graph) -> Vec<usize> {
     while let Some(Reverse(subtask)) = ready.pop() {
         place[subtask.index()] = next;
         next += 1;
-        for &successor in graph.successors.of(subtask) {
+        for &successor in graph.successors.neighbours(subtask) {
             missing[successor.index()] -= 1;
             if missing[successor.index()] == 0 {
                 ready.push(Reverse(successor));

@@ -150,9 +150,9 @@ fn bounds_are_sums_and_name_the_dag_that_has_none() {
 #[test]
 fn chains_between_two_subtasks_are_found_by_name_and_pass_no_dag_twice() {
     let (task_set, mut samplings) = model();
-    let find = |name| Chain::place(&task_set, name).expect(name);
+    let find = |name| Chain::find(&task_set, name).expect(name);
     assert_eq!(find("camera/1"), place(0, 1));
-    assert_eq!(Chain::place(&task_set, "camera/focus"), None);
+    assert_eq!(Chain::find(&task_set, "camera/focus"), None);
     let ways = |samplings: &[SampledEdge], from, to| {
         Chain::between(&task_set, samplings, find(from), find(to)).len()
     };

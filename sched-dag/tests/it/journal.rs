@@ -142,7 +142,7 @@ fn a_whole_journal_keeps_all_rules_and_its_record_has_the_statistics() {
         assert_eq!(judged(run, set, COMPLETE, &run.events), [], "seed {seed}");
         let record = record(run, true, 0);
         let mut tally = RunTally::new(&run.task_set, 5);
-        run.events.iter().for_each(|event| tally.take(event));
+        run.events.iter().for_each(|event| tally.add(event));
         let same = |counted: &Histogram, times: Vec<u64>| {
             let counted = counted.distribution();
             assert_eq!(counted.count(), times.len() as u64, "seed {seed}");

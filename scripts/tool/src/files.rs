@@ -38,7 +38,7 @@ impl Named<'_> {
     /// Returns the words that name it, for a message.
     fn words(&self) -> String {
         let Named { option, path } = self;
-        let place = place(path);
+        let place = shown_path(path);
         match option.is_empty() {
             true => format!("`{place}`"),
             false => format!("`--{option} {place}`"),
@@ -48,7 +48,7 @@ impl Named<'_> {
 
 /// Returns a file's whole name for a message, with control characters made visible.
 #[must_use]
-pub fn place(path: &Path) -> String {
+pub fn shown_path(path: &Path) -> String {
     visible(&path.to_string_lossy()).to_string()
 }
 
@@ -90,7 +90,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
 ///
 /// In words, with the file.
 pub(crate) fn read_at(path: &Path) -> Result<Vec<u8>, String> {
-    read(path).map_err(|why| format!("`{}`: {why}", place(path)))
+    read(path).map_err(|why| format!("`{}`: {why}", shown_path(path)))
 }
 
 /// Reads the input that an option names.
@@ -152,7 +152,7 @@ pub(crate) fn in_folder<R>(
 /// that it is not UTF-8, or that it is too long.
 pub fn read_text(path: &Path) -> Result<String, String> {
     let refused = |line: &dyn Display, why: &dyn Display| {
-        let place = place(path);
+        let place = shown_path(path);
         format!("{place}{line}: {why}; name another file")
     };
     let bytes = read(path).map_err(|why| refused(&"", &why))?;
@@ -209,7 +209,7 @@ pub fn check_once<'n>(inputs: impl Iterator<Item = &'n Path>) -> Result<(), Stri
             continue;
         };
         if let Some((other, _)) = before.iter().find(|(_, identity)| *identity == own) {
-            let (other, own) = (place(other), place(path));
+            let (other, own) = (shown_path(other), shown_path(path));
             return Err(format!("`{other}` and `{own}` are one file; give it once"));
         }
         before.push((path, own));
@@ -290,11 +290,11 @@ pub fn check_folder(output: &Named<'_>) -> Result<(), String> {
                 ..*output
             };
             return try_output(&trial).map_err(|_| {
-                let (words, folder) = (output.words(), place(folder));
+                let (words, folder) = (output.words(), shown_path(folder));
                 format!("{words}: nothing can be written into `{folder}`; name another folder")
             });
         }
-        Some((file, _)) => format!("`{}` is no folder", place(file)),
+        Some((file, _)) => format!("`{}` is no folder", shown_path(file)),
         None => "there is no such folder".into(),
     };
     Err(format!("{}: {why}; name another folder", output.words()))

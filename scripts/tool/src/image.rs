@@ -138,7 +138,7 @@ impl<'w> Contents<'w> {
     pub fn read(image: &Path, words: &'w str, module: Option<&Path>) -> Result<Self, String> {
         let loaded = elf::loaded(files::read_at(image)?);
         Ok(Contents {
-            image: loaded.map_err(|why| format!("`{}`: {why}", files::place(image)))?,
+            image: loaded.map_err(|why| format!("`{}`: {why}", files::shown_path(image)))?,
             words,
             module: module.map(files::read_at).transpose()?,
         })

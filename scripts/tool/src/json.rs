@@ -209,7 +209,7 @@ impl<'t> Parser<'t> {
         let mut members: Vec<(String, Value)> = Vec::new();
         let mut starts = Vec::new();
         self.skip_blanks();
-        if self.take(b'}') {
+        if self.skip(b'}') {
             return Ok(Value::Object(members));
         }
         loop {
@@ -220,7 +220,7 @@ impl<'t> Parser<'t> {
             }
             let key = self.string()?;
             self.skip_blanks();
-            if !self.take(b':') {
+            if !self.skip(b':') {
                 return Err(self.unexpected("`:`"));
             }
             // Depth 1 is inside the outermost object; equal names further in do not count.
@@ -228,10 +228,10 @@ impl<'t> Parser<'t> {
             let value = self.value()?;
             members.push((key, value));
             self.skip_blanks();
-            if self.take(b'}') {
+            if self.skip(b'}') {
                 break;
             }
-            if !self.take(b',') {
+            if !self.skip(b',') {
                 return Err(self.unexpected("`,` or `}`"));
             }
         }
@@ -249,7 +249,7 @@ impl<'t> Parser<'t> {
     fn array(&mut self) -> Result<Value, JsonError> {
         let mut elements = Vec::new();
         self.skip_blanks();
-        if self.take(b']') {
+        if self.skip(b']') {
             return Ok(Value::Array(elements));
         }
         // A list inside the watched member has its own elements, which are not recorded.
@@ -261,10 +261,10 @@ impl<'t> Parser<'t> {
             }
             elements.push(self.value()?);
             self.skip_blanks();
-            if self.take(b']') {
+            if self.skip(b']') {
                 return Ok(Value::Array(elements));
             }
-            if !self.take(b',') {
+            if !self.skip(b',') {
                 return Err(self.unexpected("`,` or `]`"));
             }
         }
@@ -317,7 +317,7 @@ impl<'t> Parser<'t> {
             0xd800..=0xdbff => {
                 // A high surrogate stands for half a character; the other half must follow (RFC
                 // 8259, section 7).
-                if !self.take(b'\\') || self.peek() != Some(b'u') {
+                if !self.skip(b'\\') || self.peek() != Some(b'u') {
                     return Err(self.error("half a surrogate pair".into()));
                 }
                 let second = self.hexadecimal()?;
@@ -343,8 +343,8 @@ impl<'t> Parser<'t> {
 
     fn number(&mut self) -> Result<Value, JsonError> {
         let start = self.position;
-        self.take(b'-');
-        if self.take(b'0') {
+        self.skip(b'-');
+        if self.skip(b'0') {
             // RFC 8259 allows no leading zeros (section 6).
             if matches!(self.peek(), Some(b'0'..=b'9')) {
                 return Err(self.error("a number with a leading zero".into()));
@@ -353,15 +353,15 @@ impl<'t> Parser<'t> {
             self.digits()?;
         }
         let mut integer = true;
-        if self.take(b'.') {
+        if self.skip(b'.') {
             integer = false;
             self.digits()?;
         }
         if matches!(self.peek(), Some(b'e' | b'E')) {
             integer = false;
             self.position += 1;
-            if !self.take(b'+') {
-                self.take(b'-');
+            if !self.skip(b'+') {
+                self.skip(b'-');
             }
             self.digits()?;
         }
@@ -403,7 +403,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    fn take(&mut self, byte: u8) -> bool {
+    fn skip(&mut self, byte: u8) -> bool {
         let found = self.peek() == Some(byte);
         self.position += usize::from(found);
         found
@@ -474,7 +474,7 @@ impl Object {
 
     /// Ends the object and returns its text.
     #[must_use]
-    pub fn end(self) -> String {
+    pub fn into_text(self) -> String {
         format!("{{{}}}", self.0)
     }
 }
@@ -622,18 +622,18 @@ nul | 1
 
     #[test]
     fn what_is_written_is_read_back() {
-        let inner = Object::new().text("b", "é\u{1}\"\\").end();
+        let inner = Object::new().text("b", "é\u{1}\"\\").into_text();
         let text = Object::new()
             .number("a", u64::MAX)
             .json("c", &inner)
             .json("d", "[null,true]")
-            .end();
+            .into_text();
         let value = parse(&text).expect("valid JSON");
         assert_eq!(value.get("a").and_then(Value::as_u64), Some(u64::MAX));
         let text = value.at(&["c", "b"]).and_then(Value::as_text);
         assert_eq!(text, Some("é\u{1}\"\\"));
         assert_eq!(value.get("d").map(|list| list.elements().len()), Some(2));
-        assert_eq!(Object::new().end(), "{}");
+        assert_eq!(Object::new().into_text(), "{}");
         assert_eq!(quoted("\n"), "\"\\u000a\"");
     }
 }

@@ -84,7 +84,7 @@ fn check(options: &Parsed) -> Result<String, String> {
     let inputs = options.named(&["module", "image"]);
     files::check(&inputs, &outputs)?;
     for input in &inputs {
-        let (option, place) = (input.option, files::place(input.path));
+        let (option, place) = (input.option, files::shown_path(input.path));
         let read = match option {
             "image" => image::check_file(input.path).map(|_| ()),
             _ => files::read(input.path).map(|_| ()),
@@ -120,7 +120,7 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
     if let Some(path) = options.path("iso") {
         // `Bios` and `Uefi` boot the same ISO, so either will do.
         let made = Medium::new(Loader::Bios, &image, words, module)?;
-        let place = files::place(path);
+        let place = files::shown_path(path);
         let bytes = fs::copy(made.path(), path)
             .map_err(|why| format!("`--iso {place}`: cannot be written: {why}"))?;
         lines += &format!(
@@ -132,7 +132,7 @@ fn make(options: &Parsed, words: &str) -> Result<String, String> {
     if let Some(path) = options.path("efi") {
         let made = application(&Contents::read(&image, words, module)?)?;
         files::write_named("efi", path, &made)?;
-        let place = files::place(path);
+        let place = files::shown_path(path);
         lines += &format!(
             "{place}: {} KiB that boot under UEFI; copy it to {} of a FAT stick\n",
             made.len() >> 10,
@@ -272,7 +272,7 @@ fn rescue(folder: &Path, iso: &Path) -> Result<(), String> {
         true => Ok(()),
         false => Err(format!(
             "`grub-mkrescue` has not made `{}`",
-            files::place(iso)
+            files::shown_path(iso)
         )),
     })
 }
@@ -316,7 +316,7 @@ impl Section {
 pub fn application(contents: &Contents<'_>) -> Result<Vec<u8>, String> {
     let own = image::build("boot-efi")?.path;
     let made = assemble(&files::read_at(&own)?, parts(contents));
-    made.map_err(|why| format!("`{}`: {why}", files::place(&own)))
+    made.map_err(|why| format!("`{}`: {why}", files::shown_path(&own)))
 }
 
 /// Returns the sections that the application looks for.

@@ -156,7 +156,7 @@ impl Frame {
     }
 
     /// Returns file and line in short form: from the workspace's root, or from the library's root.
-    fn place(&self) -> &str {
+    fn file_and_line(&self) -> &str {
         let line = self.line.as_str();
         if let Some((_, below)) = line
             .split_once("/library/")
@@ -254,7 +254,7 @@ fn tell(place: Option<u64>, calls: &[Call], frames: &BTreeMap<u64, Vec<Frame>>) 
         if frame.is_of_library() && all.peek().is_some_and(|outer| outer.is_of_library()) {
             continue;
         }
-        let line = format!("{}, {}", brief(&frame.function), frame.place());
+        let line = format!("{}, {}", brief(&frame.function), frame.file_and_line());
         match lines.last_mut() {
             // A recursion fills the list with one line, so it is counted.
             Some((last, times)) if *last == line => *times += 1,

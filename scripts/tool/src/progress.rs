@@ -49,7 +49,7 @@ impl Progress {
     }
 
     /// Wipes the line away.
-    pub fn end(&self) {
+    pub fn wipe(&self) {
         if self.on_terminal {
             let _ = write!(stderr(), "\r\x1b[K");
         }

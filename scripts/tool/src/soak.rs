@@ -83,7 +83,7 @@ pub fn soak(words: &[OsString]) -> ExitCode {
         );
         let mut progress = Progress::new(rounds, "rounds");
         let report = run(&plan, |over| progress.show(over));
-        progress.end();
+        progress.wipe();
         Ok(conclude(&report?))
     })
 }
@@ -270,7 +270,7 @@ pub fn run(plan: &SoakPlan, mut show: impl FnMut(u64)) -> Result<SoakReport, Str
         drop(send);
         loop {
             match receive.recv_timeout(SILENCE) {
-                Ok((round, booted)) => report.take(plan, round, &booted?),
+                Ok((round, booted)) => report.add_round(plan, round, &booted?),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(report),
             }
@@ -301,7 +301,7 @@ fn boot(plan: &SoakPlan, qemu: &Qemu, image: &Path, round: u64) -> Result<Outcom
 
 impl SoakReport {
     /// Judges a round, and removes its log if nothing is wrong.
-    fn take(&mut self, plan: &SoakPlan, round: u64, outcome: &Outcome) {
+    fn add_round(&mut self, plan: &SoakPlan, round: u64, outcome: &Outcome) {
         let mut wrong = Vec::from_iter(outcome.judge().err().map(|fault| fault.reason));
         let lines: Vec<_> = outcome.transcript.of_kind("scenario").collect();
         match read(&outcome.serial) {

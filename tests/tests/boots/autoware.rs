@@ -27,7 +27,7 @@ fn the_hot_path_keeps_its_bounds_and_the_trace_tells_the_ages_that_its_values_te
 fn tells_its_ages(outcome: &Outcome, line: &MachineLine) {
     let mut runs = tool::trace::read(&outcome.serial).expect("a trace");
     let run = runs.remove(0);
-    let place = |name| Chain::place(&run.task_set, name).expect(name);
+    let place = |name| Chain::find(&run.task_set, name).expect(name);
     let ends = (
         place("lidar/FrontLidarDriver"),
         place("behaviour/VehicleDBWSystem"),

@@ -55,7 +55,7 @@ pub fn parse(text: &str) -> Result<DagFile, Malformed> {
             line.exactly(0)?;
             break reader.finish(&line)?;
         }
-        reader.take(&line)?;
+        reader.read_line(&line)?;
     }
     match next_record(&mut lines) {
         None => Ok(reader.file),
@@ -116,7 +116,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn take(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
+    fn read_line(&mut self, line: &Line<'a>) -> Result<(), Malformed> {
         match line.kind {
             "set" => self.take_set(line),
             "dag" => self.take_dag(line),

@@ -51,7 +51,9 @@ impl Stage {
         finish_create_dags(&dags).unwrap();
         let team = Arc::clone(&HOST.take_launched().unwrap().control.teams[0]);
         drop(machine);
-        team.workers.iter().for_each(|worker| worker.begin());
+        team.workers
+            .iter()
+            .for_each(|worker| worker.register_thread());
         let mut state = team.lock();
         for core in 0..cores {
             state.pin(core as usize, CoreId(core), &team.workers);

@@ -105,7 +105,7 @@ fn read<T: Recordable + Debug>(schema: &Schema, bytes: &[u8]) -> Option<T> {
     let mut input = Decoder::new(bytes);
     let walked = schema
         .walk(&mut input, &mut |_| ())
-        .and_then(|()| input.end());
+        .and_then(|()| input.expect_end());
     match read {
         Ok(value) => {
             assert_eq!(walked, Ok(()));

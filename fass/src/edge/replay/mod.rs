@@ -653,7 +653,7 @@ struct SignalReplayer {
 }
 
 impl Drain for SignalReplayer {
-    fn begin(&mut self, _to: &mut Record) {}
+    fn send_header(&mut self, _to: &mut Record) {}
 
     fn begin_run(&mut self, epoch_ns: u64) {
         self.epoch_ns = epoch_ns;
@@ -668,7 +668,7 @@ impl Drain for SignalReplayer {
         false
     }
 
-    fn end(&mut self, _to: &mut Record) -> Option<RecordingState> {
+    fn send_losses(&mut self, _to: &mut Record) -> Option<RecordingState> {
         None
     }
 }

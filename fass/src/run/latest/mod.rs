@@ -110,7 +110,7 @@ pub(crate) trait Stage<T>: Send + Sync {
 /// no code for it.
 pub(crate) trait Probe: Send + Sync {
     /// Notes the job whose instance runs.
-    fn begin(&self, job: u64);
+    fn note_job(&self, job: u64);
 
     /// Puts into the slot what the instance found when it was recorded, and reports whether that
     /// is known.

@@ -234,7 +234,11 @@ impl WireInput {
     }
 
     /// Takes the oldest packet before the mark: its bytes, in front of the buffer, and its time.
-    pub(crate) fn take<'b>(&self, mark: usize, buffer: &'b mut [u8]) -> Option<(&'b [u8], u64)> {
+    pub(crate) fn take_packet<'b>(
+        &self,
+        mark: usize,
+        buffer: &'b mut [u8],
+    ) -> Option<(&'b [u8], u64)> {
         // Up to the mark only: what comes while the instance runs is for a later one.
         if self.ring.waiting(mark) == 0 {
             return None;
@@ -281,7 +285,7 @@ impl WireOutput {
     }
 
     /// Forgets what an instance has sent that never was complete.
-    pub(crate) fn begin(&self) {
+    pub(crate) fn discard_staged(&self) {
         self.staged.store(0, Ordering::Relaxed);
         self.is_lost.store(false, Ordering::Relaxed);
     }
@@ -299,7 +303,7 @@ impl WireOutput {
     }
 
     /// Takes the next byte that is to go.
-    pub(crate) fn take(&self) -> Option<u8> {
+    pub(crate) fn take_byte(&self) -> Option<u8> {
         if self.is_empty() {
             return None;
         }
@@ -329,7 +333,7 @@ impl Effect for SendCompletion {
             outgoing.sent.add(staged);
         }
         // The next instance begins with nothing staged.
-        outgoing.begin();
+        outgoing.discard_staged();
     }
 }
 
@@ -353,7 +357,7 @@ impl ByteRing {
     }
 
     #[inline(always)]
-    fn place(&self, at: usize) -> &AtomicU8 {
+    fn byte(&self, at: usize) -> &AtomicU8 {
         &self.bytes[at & (self.bytes.len() - 1)]
     }
 
@@ -366,7 +370,7 @@ impl ByteRing {
         }
         let mut at = written.wrapping_add(ahead);
         for byte in bytes {
-            self.place(at).store(*byte, Ordering::Relaxed);
+            self.byte(at).store(*byte, Ordering::Relaxed);
             at = at.wrapping_add(1);
         }
         true
@@ -375,7 +379,7 @@ impl ByteRing {
     /// Returns the byte that was put so far ahead of what is written.
     fn ahead(&self, ahead: usize) -> u8 {
         let at = self.written.load(Ordering::Relaxed).wrapping_add(ahead);
-        self.place(at).load(Ordering::Relaxed)
+        self.byte(at).load(Ordering::Relaxed)
     }
 
     /// Shows so many bytes, which were put.
@@ -399,7 +403,7 @@ impl ByteRing {
     fn peek(&self, after: usize, bytes: &mut [u8]) {
         let read = self.read.load(Ordering::Relaxed);
         for (at, byte) in (read.wrapping_add(after)..).zip(bytes) {
-            *byte = self.place(at).load(Ordering::Relaxed);
+            *byte = self.byte(at).load(Ordering::Relaxed);
         }
     }
 

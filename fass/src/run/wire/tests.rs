@@ -9,7 +9,7 @@ use super::{Framing, WireInput};
 fn packets(incoming: &WireInput) -> Vec<String> {
     let (mark, mut buffer) = (incoming.mark(), incoming.buffer());
     let mut packets = Vec::new();
-    while let Some((bytes, _)) = incoming.take(mark, &mut buffer) {
+    while let Some((bytes, _)) = incoming.take_packet(mark, &mut buffer) {
         packets.push(String::from_utf8_lossy(bytes).to_string());
     }
     packets
@@ -53,9 +53,15 @@ fn what_comes_after_the_mark_waits() {
     incoming.arrive(b"one\ntwo\n", 7);
     let (mark, mut buffer) = (incoming.mark(), incoming.buffer());
     incoming.arrive(b"three\n", 8);
-    assert_eq!(incoming.take(mark, &mut buffer), Some((&b"one"[..], 7)));
-    assert_eq!(incoming.take(mark, &mut buffer), Some((&b"two"[..], 7)));
-    assert_eq!(incoming.take(mark, &mut buffer), None);
+    assert_eq!(
+        incoming.take_packet(mark, &mut buffer),
+        Some((&b"one"[..], 7))
+    );
+    assert_eq!(
+        incoming.take_packet(mark, &mut buffer),
+        Some((&b"two"[..], 7))
+    );
+    assert_eq!(incoming.take_packet(mark, &mut buffer), None);
     assert_eq!(packets(&incoming), ["three"]);
 }
 
@@ -76,7 +82,7 @@ fn packets_pass_from_one_thread_to_another_whole_and_in_order() {
         let all = || incoming.packets.get() + incoming.lost.get() == PACKETS;
         loop {
             let is_last = all();
-            while let Some((bytes, number)) = incoming.take(incoming.mark(), &mut buffer) {
+            while let Some((bytes, number)) = incoming.take_packet(incoming.mark(), &mut buffer) {
                 assert!(next <= number);
                 next = number + 1;
                 assert_eq!(bytes, vec![b'a' + (number % 26) as u8; length(number)]);

@@ -64,7 +64,7 @@ fn is_there() -> bool {
 }
 
 /// Tells the processor that executes this to have AVX, if it is on. It takes no interrupts yet.
-pub(super) fn begin() {
+pub(super) fn enable() {
     if !is_on() {
         return;
     }

@@ -101,7 +101,7 @@ pub fn load_table() {
 
 /// Handles one interrupt and returns the registers to resume.
 extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
-    interrupts_off::begin(Location::caller());
+    interrupts_off::note_disabled(Location::caller());
     turns::begin_urgent();
     // SAFETY: `interrupt.s` passes the registers of the context that this core
     // was running, which are this core's (context invariant).
@@ -120,7 +120,7 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
         (Ok(vector::SPURIOUS), _) => {}
         _ => local_apic::acknowledge(),
     }
-    interrupts_off::end();
+    interrupts_off::note_enabled();
     turns::end_interrupt();
     this_core::get().context().registers()
 }

@@ -30,7 +30,7 @@ pub fn disable() -> bool {
     if were_enabled {
         cpu::probe_stack();
         cpu::clear_interrupt_flag();
-        interrupts_off::begin(Location::caller());
+        interrupts_off::note_disabled(Location::caller());
     }
     were_enabled
 }
@@ -39,7 +39,7 @@ pub fn disable() -> bool {
 #[track_caller]
 pub fn disable_enabled() {
     cpu::clear_interrupt_flag();
-    interrupts_off::begin(Location::caller());
+    interrupts_off::note_disabled(Location::caller());
 }
 
 /// Reports whether interrupts are enabled on this processor.
@@ -49,7 +49,7 @@ pub fn are_enabled() -> bool {
 
 /// Enables interrupts on this processor.
 pub fn enable() {
-    interrupts_off::end();
+    interrupts_off::note_enabled();
     cpu::set_interrupt_flag();
 }
 
@@ -59,7 +59,7 @@ pub fn enable() {
 /// To be called with interrupts disabled: then no interrupt that the caller has checked
 /// for can leave the processor halted with work to do.
 pub fn enable_and_halt() {
-    interrupts_off::end();
+    interrupts_off::note_enabled();
     if stays_awake() {
         cpu::set_interrupt_flag();
         return cpu::relax();

@@ -21,14 +21,14 @@ pub fn enable() {
 }
 
 /// Notes that interrupts have just been disabled here, at `place`.
-pub(super) fn begin(place: &'static Location<'static>) {
+pub(super) fn note_disabled(place: &'static Location<'static>) {
     if ENABLED.load(Ordering::Relaxed) {
         measure_from(place);
     }
 }
 
 /// Notes that interrupts are about to be enabled.
-pub(super) fn end() {
+pub(super) fn note_enabled() {
     if ENABLED.load(Ordering::Relaxed) {
         measure_to_here();
     }

@@ -41,7 +41,7 @@ fn banks() -> (u64, impl Iterator<Item = u32>) {
 }
 
 /// Tells the processor that executes this to raise machine checks. It has an interrupt table.
-pub(super) fn begin() {
+pub(super) fn enable() {
     let (capabilities, banks) = banks();
     if capabilities & HAS_CONTROL != 0 {
         // SAFETY: the capability says that there is the register; all ones enable all.

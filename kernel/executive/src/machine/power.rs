@@ -40,7 +40,7 @@ pub unsafe fn set_registers(power: Power) {
 }
 
 /// Does what was settled. Returns where that is to halt, or nothing has come of it.
-fn end() {
+fn reset_or_power_off() {
     let end = END.load(Ordering::Acquire);
     let power = POWER.get().copied().unwrap_or_default();
     if end == PowerAction::Off as u8
@@ -130,6 +130,6 @@ pub fn exit(told: AppExit) -> ! {
         non_maskable::stop_others();
     }
     serial::FIRST.drain();
-    end();
+    reset_or_power_off();
     cpu::halt_forever()
 }

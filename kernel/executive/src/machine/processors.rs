@@ -25,9 +25,9 @@ pub fn become_core(apic_id: u32) -> &'static Core {
     let core = this_core::load(apic_id);
     let is_efficient = is_efficiency_core();
     core.is_efficient.store(is_efficient, Ordering::Relaxed);
-    avx::begin();
+    avx::enable();
     interrupt::load_table();
-    machine_check::begin();
+    machine_check::enable();
     local_apic::enable();
     core
 }

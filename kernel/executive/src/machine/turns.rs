@@ -158,9 +158,9 @@ fn enter_in_turn() {
         if core.part() == TimeSlicePart::Computes {
             return;
         }
-        interrupts_off::end();
+        interrupts_off::note_enabled();
         let has_turn = wait(core);
-        interrupts_off::begin(Location::caller());
+        interrupts_off::note_disabled(Location::caller());
         if has_turn {
             return;
         }
@@ -237,7 +237,7 @@ fn wait(core: &Core) -> bool {
         // One visit for all others, before anything begins.
         cpu::relax();
         looks += 1;
-        if let Some(length_ns) = begin(core, looks > MOST_LOOKS) {
+        if let Some(length_ns) = begin_slice(core, looks > MOST_LOOKS) {
             set_part(core, TimeSlicePart::Computes);
             timer::set(Alarm::Hold, clock::now_ns().saturating_add(length_ns));
             break true;
@@ -252,7 +252,7 @@ fn wait(core: &Core) -> bool {
 
 /// Begins this core's turn, if it may, or if it `takes_over` that of another. Returns how
 /// long it is.
-fn begin(core: &Core, takes_over: bool) -> Option<u64> {
+fn begin_slice(core: &Core, takes_over: bool) -> Option<u64> {
     let holder = HAS_TURN.load(Ordering::Relaxed);
     if (holder != NONE && !takes_over) || URGENT.load(Ordering::Relaxed) != 0 {
         return None;

@@ -54,7 +54,7 @@ impl FreeFrames {
     }
 
     /// Takes `count` adjacent frames and returns the first one's address.
-    pub(crate) fn take(&mut self, count: u64) -> Option<u64> {
+    pub(crate) fn allocate(&mut self, count: u64) -> Option<u64> {
         let bytes = count.checked_mul(FRAME)?;
         let (start, _) = self
             .free
@@ -118,9 +118,9 @@ mod tests {
             region(4 * MIB, 8 * MIB, false),
         ];
         let mut frames = FreeFrames::new(&map, &[2 * MIB..3 * MIB]);
-        assert_eq!(frames.take(256), Some(MIB));
-        assert_eq!(frames.take(256), Some(3 * MIB));
-        assert_eq!(frames.take(1), None);
+        assert_eq!(frames.allocate(256), Some(MIB));
+        assert_eq!(frames.allocate(256), Some(3 * MIB));
+        assert_eq!(frames.allocate(1), None);
         assert_eq!(frames.total_bytes(), 640 * 1024 + 3 * MIB);
     }
 
@@ -128,16 +128,16 @@ mod tests {
     fn takes_whole_frames_only() {
         let mut frames =
             FreeFrames::new(&[region(2 * MIB + 1, 2 * MIB + 3 * FRAME - 1, true)], &[]);
-        assert_eq!(frames.take(1), Some(2 * MIB + FRAME));
-        assert_eq!(frames.take(1), None);
+        assert_eq!(frames.allocate(1), Some(2 * MIB + FRAME));
+        assert_eq!(frames.allocate(1), None);
     }
 
     #[test]
     fn gives_the_heap_the_most_and_keeps_the_rest() {
         let mut frames = FreeFrames::new(&[region(4 * MIB, 8 * MIB, true)], &[]);
         assert_eq!(frames.take_heap(), Some(5 * MIB..8 * MIB));
-        assert_eq!(frames.take(256), Some(4 * MIB));
-        assert_eq!(frames.take(1), None);
+        assert_eq!(frames.allocate(256), Some(4 * MIB));
+        assert_eq!(frames.allocate(1), None);
     }
 
     #[test]
@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn has_nothing_without_a_map() {
         let mut frames = FreeFrames::new(&[], &[]);
-        assert_eq!(frames.take(1), None);
+        assert_eq!(frames.allocate(1), None);
         assert_eq!(frames.take_heap(), None);
     }
 }

@@ -189,7 +189,7 @@ pub fn pages_of_screen(range: Range<u64>, map: &[MemoryRegion]) -> Option<Range<
 }
 
 fn take_zeroed(frames: &mut FreeFrames) -> Option<u64> {
-    let frame = frames.take(1)?;
+    let frame = frames.allocate(1)?;
     let bytes = usize::try_from(FRAME).ok()?;
     // SAFETY: the frame was just taken, so nobody uses it; usable memory is
     // identity-mapped and writable under the boot table and under ours.
@@ -223,7 +223,7 @@ impl PhysicalMemory {
     fn map_stack(&mut self, part: Range<u64>) -> Result<(), MapError> {
         let PhysicalMemory { frames, table, .. } = self;
         let pages = (part.end - part.start) / PAGE;
-        let physical = frames.take(pages).ok_or(MapError::OutOfFrames)?;
+        let physical = frames.allocate(pages).ok_or(MapError::OutOfFrames)?;
         table.map(part, physical, PageAccess::Data, &mut || {
             take_zeroed(frames)
         })?;

@@ -145,7 +145,7 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
 
 /// Ends this core's instance, whose context a handler has interrupted.
 fn end_interrupted(interrupted: &mut Interrupted) {
-    let abandoned = interrupted.abandon(contexts::begin());
+    let abandoned = interrupted.abandon(contexts::new_worker());
     execution::fail(&abandoned);
     contexts::give_back(abandoned.recover());
 }

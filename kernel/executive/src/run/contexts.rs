@@ -112,7 +112,7 @@ pub fn provide(total: usize) -> Result<(), MapError> {
 /// # Panics
 ///
 /// If there is none, which [`provide`]'s rule excludes.
-fn take() -> Parked {
+fn take_spare() -> Parked {
     STOCK
         .lock_uninterrupted()
         .free
@@ -122,8 +122,8 @@ fn take() -> Parked {
 
 /// Makes a context that works, in place of one that is suspended or abandoned.
 /// Interrupts are disabled.
-pub fn begin() -> Parked {
-    let mut context = this_core::take_spare_context().unwrap_or_else(take);
+pub fn new_worker() -> Parked {
+    let mut context = this_core::take_spare_context().unwrap_or_else(take_spare);
     context.restart(interrupt::work);
     context
 }

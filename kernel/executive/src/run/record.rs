@@ -38,7 +38,7 @@ impl Sink for RecordSink {
 }
 
 /// Begins to keep a record.
-pub fn begin(is_live: bool) {
+pub fn start(is_live: bool) {
     IS_LIVE.store(is_live, Ordering::Relaxed);
     *RECORD.lock() = Some(BootRecord::new(match debug_port::is_there() {
         true => RecordSink::Port,
@@ -87,14 +87,14 @@ pub fn end_recording(outgoing: Outgoing, is_over: bool) {
         report::replayed(&outcome);
     }
     if before_fault.is_some() && RECORD.lock().is_none() {
-        begin(false);
+        start(false);
     }
     with(|record| {
         let Some(record) = record else { return };
         let is_live = IS_LIVE.load(Ordering::Relaxed);
         while is_live && take_events(record) {}
         let begin = |mut drain: Box<dyn Drain>| {
-            drain.begin(record.file());
+            drain.send_header(record.file());
             drain
         };
         let outgoing = outgoing.or_else(|| before_fault.map(begin));
@@ -114,9 +114,9 @@ pub fn end_run(run: &Run) {
 }
 
 /// Ends the record.
-pub fn end() {
+pub fn finish() {
     let record = RECORD.lock().take();
-    if let Some(RecordSink::Console(mut lines)) = record.map(BootRecord::end) {
+    if let Some(RecordSink::Console(mut lines)) = record.map(BootRecord::finish) {
         lines.flush();
     }
 }

@@ -57,7 +57,7 @@ pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
     // Only a `Display` that fails of its own accord can fail here; its text up
     // to there is then all there is to show.
     let _ = pieces.write_fmt(text);
-    pieces.end();
+    pieces.finish();
     if !DEFERRED.load(Ordering::Relaxed) {
         while send_pending_byte() {}
     }
@@ -68,7 +68,7 @@ pub fn write_as(kind: OutputKind, text: fmt::Arguments<'_>) {
 fn hand_over(piece: &[u8], kind: OutputKind, begins: bool, wanted: bool) -> bool {
     loop {
         let mut buffer = BUFFER.lock();
-        if wanted && buffer.take(piece, kind, begins) {
+        if wanted && buffer.append(piece, kind, begins) {
             PENDING.store(true, Ordering::Release);
             return true;
         }
@@ -172,7 +172,7 @@ fn send(kind: OutputKind, text: fmt::Arguments<'_>) {
     });
     // It fails where it is cut off.
     let _ = AtMost(&mut pieces, MOST_BYTES).write_fmt(text);
-    pieces.end();
+    pieces.finish();
     screen::draw_all();
 }
 
@@ -227,7 +227,7 @@ impl<const N: usize> OutputRing<N> {
 
     /// Takes a piece, unless there is no room for all of it. `begins`: it is the first
     /// one of its text or line.
-    fn take(&mut self, piece: &[u8], kind: OutputKind, begins: bool) -> bool {
+    fn append(&mut self, piece: &[u8], kind: OutputKind, begins: bool) -> bool {
         let Some(last) = piece.last() else {
             return true;
         };
@@ -282,7 +282,7 @@ mod tests {
     fn sent(pieces: &[(&str, OutputKind, bool)]) -> String {
         let mut buffer = OutputRing::<SIZE>::new();
         for (text, kind, begins) in pieces {
-            assert!(buffer.take(text.as_bytes(), *kind, *begins), "{text}");
+            assert!(buffer.append(text.as_bytes(), *kind, *begins), "{text}");
         }
         emptied(&mut buffer)
     }
@@ -318,18 +318,18 @@ mod tests {
     #[test]
     fn a_piece_that_does_not_fit_is_refused_as_a_whole() {
         let mut buffer = OutputRing::<SIZE>::new();
-        assert!(buffer.take(b"0123456789abcde\n", OutputKind::Text, true));
-        assert!(!buffer.take(b"x", OutputKind::Text, true));
-        assert!(!buffer.take(b"{}\n", OutputKind::Line, true));
+        assert!(buffer.append(b"0123456789abcde\n", OutputKind::Text, true));
+        assert!(!buffer.append(b"x", OutputKind::Text, true));
+        assert!(!buffer.append(b"{}\n", OutputKind::Line, true));
         assert!(
-            buffer.take(b"{}\n", OutputKind::KernelLine, true),
+            buffer.append(b"{}\n", OutputKind::KernelLine, true),
             "the reserve"
         );
         assert_eq!(emptied(&mut buffer), "0123456789abcde\n{}\n");
         assert!(buffer.is_empty() && buffer.pop().is_none());
-        assert!(!buffer.take(b"0123456789abcdefg", OutputKind::Text, true));
+        assert!(!buffer.append(b"0123456789abcdefg", OutputKind::Text, true));
         assert!(
-            buffer.take(b"{123456789abcde", OutputKind::Text, true),
+            buffer.append(b"{123456789abcde", OutputKind::Text, true),
             "and a blank"
         );
     }
@@ -341,7 +341,7 @@ mod tests {
         for number in 0..2000 {
             let text = format!("{number};");
             wanted.push_str(&text);
-            assert!(buffer.take(text.as_bytes(), OutputKind::Text, true));
+            assert!(buffer.append(text.as_bytes(), OutputKind::Text, true));
             got.push_str(&emptied(&mut buffer));
         }
         assert_eq!(got, wanted);

@@ -47,7 +47,7 @@ impl LineEditor {
 
     /// Takes a byte. A line ends with `\r` or `\n`; an empty one is nothing, and
     /// so `\r\n` ends one line.
-    pub(super) fn take(&mut self, byte: u8) -> TypedByte<'_> {
+    pub(super) fn on_byte(&mut self, byte: u8) -> TypedByte<'_> {
         match byte {
             b'\r' | b'\n' => {
                 let length = core::mem::take(&mut self.length);
@@ -89,7 +89,7 @@ mod tests {
         let mut input = LineEditor::new();
         let mut lines = Vec::new();
         for byte in text {
-            match input.take(*byte) {
+            match input.on_byte(*byte) {
                 TypedByte::Nothing => {}
                 TypedByte::Line(line) => lines.push(line.into()),
                 TypedByte::TooLong => lines.push("(too long)".into()),
@@ -111,10 +111,10 @@ mod tests {
     fn a_line_stays_until_the_next_one_begins() {
         let mut input = LineEditor::new();
         b" stats \n".iter().for_each(|byte| {
-            input.take(*byte);
+            input.on_byte(*byte);
         });
         assert_eq!(input.line(), "stats");
-        input.take(b'x');
+        input.on_byte(b'x');
         assert_eq!(input.line(), "");
     }
 

@@ -210,7 +210,7 @@ impl<R: LiveRun> ShellSession<R> {
             if self.echoes {
                 crate::print!("{}", char::from(if byte == b'\r' { b'\n' } else { byte }));
             }
-            match self.input.take(byte) {
+            match self.input.on_byte(byte) {
                 TypedByte::Nothing => continue,
                 TypedByte::Line(line) => {
                     let mut is_refused = false;

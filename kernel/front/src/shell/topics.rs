@@ -203,14 +203,14 @@ impl CompletionRate {
             task_set.dag(dag).cluster().index(),
             MOST_EVENTS,
             &mut |event| {
-                rate.take(event, dag, writer);
+                rate.on_event(event, dag, writer);
                 true
             },
         );
         rate
     }
 
-    fn take(&mut self, event: &Event, dag: DagId, writer: SubtaskId) {
+    fn on_event(&mut self, event: &Event, dag: DagId, writer: SubtaskId) {
         if (event.what, event.dag, event.subtask) != (EventKind::Finish, dag, Some(writer)) {
             return;
         }
@@ -280,12 +280,12 @@ mod tests {
         };
         // From the latest one back; another subtask writes between.
         for (time_ns, subtask) in [(1040, 2), (1035, 0), (1030, 2), (1018, 2), (1010, 2)] {
-            rate.take(&finish(time_ns, subtask), DagId(1), SubtaskId(2));
+            rate.on_event(&finish(time_ns, subtask), DagId(1), SubtaskId(2));
         }
         assert_eq!((rate.values, rate.mean_ns()), (4, Some(10)));
         assert_eq!((rate.least_ns, rate.most_ns), (8, 12));
         let mut one = CompletionRate::default();
-        one.take(&finish(7, 2), DagId(1), SubtaskId(2));
+        one.on_event(&finish(7, 2), DagId(1), SubtaskId(2));
         assert_eq!((one.values, one.mean_ns()), (1, None));
         assert_eq!(CompletionRate::default().mean_ns(), None);
     }

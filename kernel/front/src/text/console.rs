@@ -113,7 +113,7 @@ impl<F: FnMut(&[u8], bool)> TextPieces<F> {
     }
 
     /// Ends the text, or the line.
-    pub fn end(mut self) {
+    pub fn finish(mut self) {
         if self.kind != OutputKind::Text {
             self.push(b'\n');
         }
@@ -171,7 +171,7 @@ mod tests {
             all.push(String::from_utf8(piece.to_vec()).expect("whole characters"));
         });
         pieces.write_str(text).expect("it cannot fail");
-        pieces.end();
+        pieces.finish();
         all
     }
 
@@ -196,7 +196,7 @@ mod tests {
         let mut pieces = TextPieces::new(OutputKind::Text, |_: &[u8], begins| begun.push(begins));
         pieces.flush();
         write!(pieces, "{}", "x".repeat(3000)).expect("it cannot fail");
-        pieces.end();
+        pieces.finish();
         assert_eq!(begun, [true, false, false]);
     }
 }

@@ -71,7 +71,7 @@ pub(crate) enum ConsoleEcho {
 /// image whose app connects none has no code for it.
 pub(crate) trait Line: Sync {
     /// Begins a run.
-    fn begin(&self, now_ns: u64);
+    fn begin_run(&self, now_ns: u64);
 
     /// Takes what has arrived. In core 0's heartbeat.
     fn beat(&self, now_ns: u64);
@@ -80,7 +80,7 @@ pub(crate) trait Line: Sync {
     fn step(&self) -> bool;
 
     /// Ends the run: sends the rest.
-    fn end(&self);
+    fn end_run(&self);
 
     /// Prints what has come and gone.
     fn report(&self);
@@ -165,20 +165,20 @@ impl Background {
         if is_sliced {
             *SLICED.lock() = SlicedWork {
                 status: (wishes.status_ns > 0)
-                    .then(|| StatusPrinter::begin(wishes.status_ns, total)),
+                    .then(|| StatusPrinter::every(wishes.status_ns, total)),
                 session: wishes
                     .console
                     .map(|echo| ShellSession::new(echo == ConsoleEcho::On)),
             };
             RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         }
-        stall::begin();
+        stall::start();
         // What a person says to the console is no event.
         let input = input.filter(|_| wishes.console.is_none());
         let listener = input.map(|input| ByteListener::new(input, wishes.stops));
         watch_for_end(wishes.stops && wishes.console.is_none() && listener.is_none());
         if let Some(line) = LINE.get() {
-            line.begin(clock::now_ns());
+            line.begin_run(clock::now_ns());
         }
         Self {
             heartbeat_before_ns: before_ns,
@@ -206,9 +206,9 @@ impl Background {
     /// Ends it. Reports whether a person has asked for the run to end.
     pub(crate) fn end(self) -> bool {
         heartbeat::set_own_heartbeat(self.heartbeat_before_ns);
-        stall::end();
+        stall::stop();
         if let Some(line) = LINE.get() {
-            line.end();
+            line.end_run();
         }
         tell_log(execution::task_set);
         RAN_NS.store(u64::MAX, Ordering::Relaxed);

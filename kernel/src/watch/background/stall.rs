@@ -109,7 +109,7 @@ impl SeenInstance {
 }
 
 /// Begins to look, at a run that begins now.
-pub(super) fn begin() {
+pub(super) fn start() {
     *WATCH.lock() = StallWatch {
         looks: true,
         next_look_ns: clock::now_ns(),
@@ -118,7 +118,7 @@ pub(super) fn begin() {
 }
 
 /// Looks no longer.
-pub(super) fn end() {
+pub(super) fn stop() {
     WATCH.lock().looks = false;
 }
 

@@ -44,7 +44,7 @@ pub(super) struct StatusPrinter {
 
 impl StatusPrinter {
     /// Begins with the first line due after `period_ns`.
-    pub(super) fn begin(period_ns: u64, total: u64) -> Self {
+    pub(super) fn every(period_ns: u64, total: u64) -> Self {
         Self {
             period_ns,
             total,
@@ -160,7 +160,7 @@ fn of_cluster(cluster: usize, mut loads: CoreLoads, most: u64) -> Option<CoreLoa
         execution::with_scheduler(cluster, |scheduler| scheduler.log.journal.is_recording());
     is_on.filter(|is_on| *is_on)?;
     look_back::<KernelRun>(cluster, most, &mut |event| {
-        loads.take(event);
+        loads.on_event(event);
         !loads.is_over
     });
     Some(loads)
@@ -197,7 +197,7 @@ impl CoreLoads {
         }
     }
 
-    fn take(&mut self, event: &Event) {
+    fn on_event(&mut self, event: &Event) {
         let core = event.core.index();
         let time_ns = event.time_ns.clamp(self.from_ns, self.to_ns);
         self.oldest_ns = self.oldest_ns.min(time_ns);
@@ -280,7 +280,7 @@ mod tests {
     fn load(events: &[(u64, EventKind)], from_ns: u64, to_ns: u64) -> u64 {
         let mut loads = CoreLoads::new(from_ns, to_ns);
         for &(time_ns, what) in events.iter().rev() {
-            loads.take(&Event {
+            loads.on_event(&Event {
                 time_ns,
                 what,
                 core: CoreId(0),

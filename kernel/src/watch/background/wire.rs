@@ -100,7 +100,7 @@ impl WireConnection {
 }
 
 impl Line for WireConnection {
-    fn begin(&self, now_ns: u64) {
+    fn begin_run(&self, now_ns: u64) {
         *REST.lock() = Some(self.script.unwrap_or_default());
         timer::set_no_later(this_core::get(), Alarm::Heartbeat, now_ns);
     }
@@ -136,7 +136,7 @@ impl Line for WireConnection {
         true
     }
 
-    fn end(&self) {
+    fn end_run(&self) {
         *REST.lock() = None;
         core::iter::from_fn(|| self.wire.depart()).for_each(|byte| self.port.send(byte));
         self.port.drain();

@@ -90,7 +90,7 @@ fn of_cluster(
             sweep.enter(instance, stage_after(&event));
         }
     }
-    let wrong = sweep.end(end_ns);
+    let wrong = sweep.finish(end_ns);
     violations.extend(wrong.into_iter().map(Violation::PassedOver));
     violations.extend(wrong_cores(model, events));
 }

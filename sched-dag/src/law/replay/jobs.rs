@@ -188,7 +188,7 @@ impl JournalReplay<'_> {
         }
         self.found.extend(found.into_iter().flatten());
         if is_released {
-            self.begin(&event, release_ns);
+            self.open_job(&event, release_ns);
         }
     }
 
@@ -243,7 +243,7 @@ impl JournalReplay<'_> {
     }
 
     /// From now on the job is in flight.
-    fn begin(&mut self, event: &Event, release_ns: Option<u64>) {
+    fn open_job(&mut self, event: &Event, release_ns: Option<u64>) {
         let Event { dag, job, .. } = *event;
         let moment = self.moment(event);
         let of_dag = self.dag(dag);

@@ -76,9 +76,9 @@ pub fn judge(
         finish_to_ready_max_ns: 0,
     };
     for event in events {
-        replay.take(&event);
+        replay.judge_event(&event);
     }
-    replay.end();
+    replay.finish();
     ReplayVerdict {
         violations: replay.found,
         finish_to_ready_max_ns: replay.finish_to_ready_max_ns,
@@ -154,7 +154,7 @@ impl StepTime {
 }
 
 impl JournalReplay<'_> {
-    fn take(&mut self, event: &Event) {
+    fn judge_event(&mut self, event: &Event) {
         // The time of these may be before that of events that are lost.
         if !matches!(event.what, EventKind::Finish | EventKind::Due) {
             self.first_ns.get_or_insert(event.time_ns);
@@ -228,7 +228,7 @@ impl JournalReplay<'_> {
         is_partial
     }
 
-    fn end(&mut self) {
+    fn finish(&mut self) {
         for dag in (0..).map(DagId).take(self.dags.len()) {
             let jobs: Vec<u64> = self.dag(dag).jobs.keys().copied().collect();
             for job in jobs {

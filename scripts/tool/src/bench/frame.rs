@@ -137,7 +137,7 @@ impl Figure {
             .number("median", self.median)
             .number("p99", self.p99)
             .number("max", self.max)
-            .end()
+            .into_text()
     }
 
     /// Returns whether two figures are of the same quantity.

@@ -66,7 +66,7 @@ fn weigh(app: &str) -> Result<bool, String> {
     for (part, bytes) in &parts {
         let line = Object::new().text("kind", "bench").text("name", "size");
         let line = line.text("app", app).text("part", part);
-        println!("{}", line.number("bytes", *bytes).end());
+        println!("{}", line.number("bytes", *bytes).into_text());
     }
     Ok(stripped <= most)
 }

@@ -92,7 +92,7 @@ fn name_of(path: &Path) -> String {
 ///
 /// Lines for people, each beginning with the file and mostly the line.
 pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
-    let place = files::place(path);
+    let place = files::shown_path(path);
     let located = |faults: Vec<Malformed>| -> Vec<String> {
         let located = faults.into_iter();
         located
@@ -234,7 +234,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         return Err(refuse(format!(
             "{}: its {} subtasks, their jobs and the file itself need {memory_mib} MiB, and a \
              guest has {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
-            files::place(path),
+            files::shown_path(path),
             file.most_subtasks()
         )));
     }
@@ -245,7 +245,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         return Err(refuse(format!(
             "{}: its jobs take {} hours or more, and a run has {} if nobody says how long; give \
              fewer jobs by --jobs, or a limit by --timeout",
-            files::place(path),
+            files::shown_path(path),
             limit_s / 3600,
             MOST_S / 3600
         )));

@@ -48,7 +48,7 @@ impl Menu {
     pub fn run(&self, words: &[OsString]) -> ExitCode {
         match self.choose(words) {
             Ok(choice) => (choice.work)(&words[1..]),
-            Err(refusal) => refusal.end(self.invocation),
+            Err(refusal) => refusal.report(self.invocation),
         }
     }
 

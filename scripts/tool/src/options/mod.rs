@@ -71,7 +71,7 @@ impl From<String> for Refusal {
 
 impl Refusal {
     /// Prints the reason under the command's name and returns its exit code.
-    fn end(self, invocation: &str) -> ExitCode {
+    fn report(self, invocation: &str) -> ExitCode {
         let (lines, code) = match self {
             Refusal::Help(text) => {
                 print!("{text}");
@@ -103,18 +103,18 @@ impl Command {
         work: impl FnOnce(&Parsed) -> Result<ExitCode, Refusal>,
     ) -> ExitCode {
         let done = self.parse(words).and_then(|options| work(&options));
-        done.unwrap_or_else(|refusal| refusal.end(self.invocation))
+        done.unwrap_or_else(|refusal| refusal.report(self.invocation))
     }
 
     /// Reports why the command line, or a file that it names, is refused, each line under the
     /// command's name, and returns exit code 2.
     pub fn refuse(&self, lines: &str) -> ExitCode {
-        Refusal::Usage(lines.into()).end(self.invocation)
+        Refusal::Usage(lines.into()).report(self.invocation)
     }
 
     /// Reports a failure, as [`refuse`](Self::refuse) does, and returns exit code 1.
     pub fn fail(&self, lines: &str) -> ExitCode {
-        Refusal::Failure(lines.into()).end(self.invocation)
+        Refusal::Failure(lines.into()).report(self.invocation)
     }
 
     /// Prints lines under the command's name.
@@ -164,7 +164,7 @@ impl Command {
                     .ok_or_else(|| Refusal::Usage(option.missing(words.peek().is_some())))?,
             };
             option.check(value).map_err(Refusal::Usage)?;
-            parsed.take(name, value);
+            parsed.store(name, value);
         }
         Ok(parsed)
     }
@@ -562,7 +562,7 @@ impl Parsed {
         }
     }
 
-    fn take(&mut self, name: &'static str, value: &OsStr) {
+    fn store(&mut self, name: &'static str, value: &OsStr) {
         self.given.insert(name, value.into());
     }
 
@@ -670,7 +670,7 @@ impl Parsed {
     #[must_use]
     pub fn with(&self, name: &'static str, value: impl AsRef<OsStr>) -> Parsed {
         let mut other = self.clone();
-        other.take(name, value.as_ref());
+        other.store(name, value.as_ref());
         other
     }
 

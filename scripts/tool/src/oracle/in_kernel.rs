@@ -290,7 +290,7 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
         judged.extend(found);
         progress.show(judged.len() as u64);
     }
-    progress.end();
+    progress.wipe();
     Ok(judged)
 }
 

@@ -121,12 +121,12 @@ fn run_files<Case>(
             progress.show(over);
             if let Err(difference) = checked {
                 failed += 1;
-                progress.end();
+                progress.wipe();
                 // The progress line is gone by now, so the difference has its own line.
                 println!("{}: {difference}", name(case));
             }
         }
-        progress.end();
+        progress.wipe();
         println!("{} passed, {failed} failed", cases.len() - failed);
         Ok(ExitCode::from(u8::from(failed > 0)))
     })
@@ -144,7 +144,7 @@ fn read<'f, Case>(
     files::check_once(names.clone())?;
     let mut cases = Vec::new();
     for file in names {
-        let place = files::place(file);
+        let place = files::shown_path(file);
         let parsed = parse(&files::read_text(file)?)
             .map_err(|Malformed { line, reason }| format!("{place}:{line}: {reason}"))?;
         cases.extend(parsed);

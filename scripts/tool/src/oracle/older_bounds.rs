@@ -23,7 +23,7 @@ pub(crate) enum Width {
 }
 
 impl Width {
-    fn of(self, task: &Task, cores: u32) -> u64 {
+    fn width(self, task: &Task, cores: u32) -> u64 {
         match self {
             Self::Ignored => u64::from(cores),
             Self::Used => parallelism(task, cores),
@@ -82,7 +82,7 @@ pub(crate) fn melani_edf(tasks: &[&Task], cores: u32, width: Width) -> Option<Ve
             bounds[dag] = least(tasks[dag], cores, 0, |window| {
                 let others = (0..tasks.len()).filter(|&other| other != dag);
                 let workloads = others.map(|other| {
-                    let used = width.of(tasks[other], cores);
+                    let used = width.width(tasks[other], cores);
                     // No more than the jobs whose deadlines come no later can delay it under EDF.
                     let limit = due(tasks[other], used, bounds[other], deadline);
                     workload(tasks[other], used, bounds[other], window).min(limit)
@@ -106,7 +106,7 @@ fn by_priority(
     for (dag, task) in tasks.iter().enumerate() {
         let bound = least(task, cores, blocking(dag), |window| {
             let workloads = tasks.iter().zip(&bounds).map(|(task, &bound)| {
-                let used = width.of(task, cores);
+                let used = width.width(task, cores);
                 workload(task, used, bound, window)
             });
             workloads.sum()

@@ -79,7 +79,7 @@ pub(super) fn command(words: &[OsString]) -> ExitCode {
             }
             progress.show(seen.accepted);
         }
-        progress.end();
+        progress.wipe();
         print!("{}", seen.text());
         Ok(ExitCode::from(u8::from(seen.above > 0)))
     })

@@ -104,7 +104,7 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
                 .number("median", times.median())
                 .number("p99", times.p99())
                 .number("max", times.max())
-                .end();
+                .into_text();
             Object::new()
                 .text("kind", "observed")
                 .text("dag", &dag.name)
@@ -112,7 +112,7 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
                 .text("subtask", name)
                 .json("execution_time_ns", &times_ns)
                 .list("execution_histogram", buckets)
-                .end()
+                .into_text()
         });
         lines.collect()
     };
@@ -184,7 +184,7 @@ impl MeasuredOverheads {
             .number("releases", self.0.releases)
             .number("late_ns", self.0.late_ns)
             .number("margin_percent", margin_percent)
-            .end()
+            .into_text()
     }
 }
 
@@ -228,7 +228,7 @@ fn with_margin(longest_ns: u64, margin_percent: u64) -> u64 {
 /// In words, with file and line.
 pub fn read(path: &Path) -> Result<String, String> {
     let text = files::read_text(path)?;
-    let refuse = |line: usize, why: &str| format!("{}:{line}: {why}", files::place(path));
+    let refuse = |line: usize, why: &str| format!("{}:{line}: {why}", files::shown_path(path));
     let (mut last, mut has_dag, mut hashes) = (0, false, Vec::new());
     let mut numbers = Vec::new();
     let mut has_ended = false;
@@ -280,7 +280,7 @@ pub fn translate(said: &str, path: &Path) -> Option<String> {
     let (before, rest) = said.split_once("line ")?;
     let (line, after) = rest.split_once(" of the WCETs: ")?;
     let is_line = !line.is_empty() && line.bytes().all(|byte| byte.is_ascii_digit());
-    is_line.then(|| format!("{before}{}:{line}: {after}", files::place(path)))
+    is_line.then(|| format!("{before}{}:{line}: {after}", files::shown_path(path)))
 }
 
 /// Returns the table of the observed times.

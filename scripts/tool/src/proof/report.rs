@@ -58,7 +58,7 @@ pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<ProofRow>, 
                 dag: dag.name.clone(),
                 bound_ns: dag.bound_ns,
                 longest_ns: *longest_ns,
-                slack: of(commit, number),
+                slack: slack(commit, number),
             });
         }
     }
@@ -126,7 +126,7 @@ impl ProofRow {
                 line = line.number(name, number);
             }
         }
-        line.end()
+        line.into_text()
     }
 }
 
@@ -203,7 +203,7 @@ pub struct Slack {
 
 /// Splits the bound of a DAG of a commit into its parts.
 #[must_use]
-pub fn of(commit: &Committed, dag: DagId) -> Slack {
+pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
         let options = SchedulerOptions {
             policy: settings.policy,
@@ -263,7 +263,7 @@ pub fn write(path: &Path, commits: &[Committed]) -> Result<String, String> {
         let path = file(path, commit.number);
         let text = analysis::witness(&commit.task_set, &commit.settings());
         files::write_named("witness", &path, text)?;
-        names.push(files::place(&path));
+        names.push(files::shown_path(&path));
     }
     match names.join(" ") {
         none if none.is_empty() => Err("the guest has committed no DAG".into()),

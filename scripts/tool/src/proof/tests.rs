@@ -72,7 +72,7 @@ fn the_model_is_made_again_and_bounded_alike() {
         own_order_ns: Some(0),
         length_ns: Some(5_000_000),
     };
-    assert_eq!(report::of(&commits[0], DagId(0)), expected);
+    assert_eq!(report::slack(&commits[0], DagId(0)), expected);
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub const SCHED_EXT_NS: u64 = 10_000_000;
 pub const NORMAL_NS: u64 = 100_000_000;
 
 /// Returns the bound that a person has chosen, or else the usual one of the run.
-pub fn of(run: &Run, options: &Parsed) -> u64 {
+pub fn tolerance_ns(run: &Run, options: &Parsed) -> u64 {
     let chosen = options.number("bound-us");
     chosen.map_or(run.usual_bound_ns, |bound_us| bound_us.saturating_mul(1000))
 }

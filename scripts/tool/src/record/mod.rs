@@ -421,8 +421,8 @@ impl Committed {
             let of_writer = self.told.dags.get(usize::try_from(writer).ok()?)?;
             let topic = of_writer.topics.get(usize::try_from(topic).ok()?)?;
             Some(SampledEdge {
-                writer: self.place(DagId(writer), topic.writer)?,
-                reader: self.place(dag, reader)?,
+                writer: self.subtask_ref(DagId(writer), topic.writer)?,
+                reader: self.subtask_ref(dag, reader)?,
             })
         };
         dags.flat_map(|(id, dag)| dag.samples.iter().map(move |sample| (id, sample)))
@@ -430,7 +430,7 @@ impl Committed {
             .collect()
     }
 
-    fn place(&self, dag: DagId, subtask: u32) -> Option<(DagId, SubtaskId)> {
+    fn subtask_ref(&self, dag: DagId, subtask: u32) -> Option<(DagId, SubtaskId)> {
         let model = self.task_set.dags().get(dag.index())?;
         let subtask = SubtaskId(subtask);
         (subtask.index() < model.subtasks().len()).then_some((dag, subtask))

@@ -102,7 +102,12 @@ fn message(header: &Header, entry: &Entry<'_>, json: &mut String) -> u16 {
                 .text("what", what.name())
                 .number("subtask", subtask);
             // Writing into a `String` cannot fail.
-            let _ = write!(json, "{{\"job\":{},\"value\":{}}}", entry.job, event.end());
+            let _ = write!(
+                json,
+                "{{\"job\":{},\"value\":{}}}",
+                entry.job,
+                event.into_text()
+            );
             // The channels of events follow those of values, one for each DAG.
             number(header.channels.len()).saturating_add(entry.dag)
         }
@@ -320,7 +325,7 @@ impl File<'_> {
 /// Returns the schema of the messages of a channel: the job, and a value of this type.
 pub(super) fn of_message(schema: &Schema) -> String {
     let job = Schema::Scalar(Scalar::U64);
-    object([("job", &job), ("value", schema)].into_iter()).end()
+    object([("job", &job), ("value", schema)].into_iter()).into_text()
 }
 
 /// Writes a message: the job, and a value of this type.
@@ -342,21 +347,21 @@ pub(super) fn write_message(
     };
     values.write_field("value", schema)?;
     out.push('}');
-    input.end()
+    input.expect_end()
 }
 
 fn object<'s>(fields: impl Iterator<Item = (impl Display, &'s Schema)>) -> Object {
     let (mut properties, mut required) = (Object::new(), Vec::new());
     for (name, schema) in fields {
         let name = name.to_string();
-        properties = properties.json(&name, &of(schema));
+        properties = properties.json(&name, &schema_text(schema));
         if !may_lack(schema) {
             required.push(quoted(&name));
         }
     }
     Object::new()
         .text("type", "object")
-        .json("properties", &properties.end())
+        .json("properties", &properties.into_text())
         .list("required", required)
 }
 
@@ -380,31 +385,33 @@ fn is_wrapped(schema: &Schema) -> bool {
     )
 }
 
-fn of(schema: &Schema) -> String {
+fn schema_text(schema: &Schema) -> String {
     let of_type = |name| Object::new().text("type", name);
-    let wrapped = |inner| object([("value", inner)].into_iter()).end();
+    let wrapped = |inner| object([("value", inner)].into_iter()).into_text();
     let of_element = |element| match is_wrapped(element) {
         true => wrapped(element),
-        false => of(element),
+        false => schema_text(element),
     };
     match schema {
         Schema::Scalar(scalar) => match scalar.name().as_bytes() {
-            b"bool" => of_type("boolean").end(),
-            b"char" | b"text" => of_type("string").end(),
-            [b'f', ..] => of_type("number").end(),
-            [b'u', ..] => of_type("integer").number("minimum", 0_u8).end(),
-            _ => of_type("integer").end(),
+            b"bool" => of_type("boolean").into_text(),
+            b"char" | b"text" => of_type("string").into_text(),
+            [b'f', ..] => of_type("number").into_text(),
+            [b'u', ..] => of_type("integer").number("minimum", 0_u8).into_text(),
+            _ => of_type("integer").into_text(),
         },
         Schema::Option(inner) if matches!(**inner, Schema::Option(_)) => wrapped(inner),
-        Schema::Option(inner) => of(inner),
-        Schema::List(element) => of_type("array").json("items", &of_element(element)).end(),
+        Schema::Option(inner) => schema_text(inner),
+        Schema::List(element) => of_type("array")
+            .json("items", &of_element(element))
+            .into_text(),
         Schema::Array(element, count) => of_type("array")
             .json("items", &of_element(element))
             .number("minItems", *count)
             .number("maxItems", *count)
-            .end(),
-        Schema::Tuple(elements) => object((0..).zip(elements)).end(),
-        Schema::Struct(name, fields) => object(named(fields)).text("title", name).end(),
+            .into_text(),
+        Schema::Tuple(elements) => object((0..).zip(elements)).into_text(),
+        Schema::Struct(name, fields) => object(named(fields)).text("title", name).into_text(),
     }
 }
 

@@ -92,7 +92,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
         let bytes = table::convert(file, options).map_err(Refusal::Usage)?;
         let out = options.path("out").unwrap_or(Path::new(""));
         write(out, |out| out.write_all(&bytes))?;
-        println!("{}: {} bytes", files::place(out), bytes.len());
+        println!("{}: {} bytes", files::shown_path(out), bytes.len());
         return Ok(());
     }
     let bytes = read(file).map_err(Refusal::Usage)?;
@@ -107,7 +107,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
         for (name, table) in table::tables(&recording) {
             let path = folder.join(name);
             write(&path, |out| out.write_all(table.as_bytes()))?;
-            println!("{}", files::place(&path));
+            println!("{}", files::shown_path(&path));
         }
     }
     if let Some(path) = options.path("mcap") {
@@ -116,7 +116,7 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
             messages = mcap::write(&recording, out)?;
             Ok(())
         })?;
-        println!("{}: {messages} messages", files::place(path));
+        println!("{}: {messages} messages", files::shown_path(path));
     }
     Ok(())
 }
@@ -140,7 +140,7 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         observed::add(&mut observed, &record)?;
         let text = observed::text(&observed, observed::MARGIN_PERCENT);
         files::write_named("observe", path, text)?;
-        println!("{}", files::place(path));
+        println!("{}", files::shown_path(path));
     }
     Ok(())
 }
@@ -151,7 +151,7 @@ pub(crate) fn drawn_and_proven(record: &Record, options: &Parsed) -> Result<Vec<
     let mut announced = Vec::new();
     if let Some(path) = options.path("dot") {
         files::write_named("dot", path, dot::text(record)?)?;
-        let file = files::place(path);
+        let file = files::shown_path(path);
         announced.push(format!(
             "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
         ));
@@ -189,7 +189,8 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
 
 /// Reads a file that must be a recording.
 pub(crate) fn read(file: &Path) -> Result<Vec<u8>, String> {
-    files::read(file).map_err(|why| format!("{}: {why}; name another file", files::place(file)))
+    files::read(file)
+        .map_err(|why| format!("{}: {why}; name another file", files::shown_path(file)))
 }
 
 /// Reads the bytes that a guest has sent to the debug port. A firmware prints there, too, before
@@ -209,7 +210,7 @@ pub fn received(file: &Path) -> std::io::Result<Vec<u8>> {
 
 /// Reads bytes as a recording.
 pub(crate) fn parse<'b>(file: &Path, bytes: &'b [u8]) -> Result<Recording<'b>, String> {
-    let place = files::place(file);
+    let place = files::shown_path(file);
     Recording::read(bytes).map_err(|malformed| format!("{place}: {malformed}"))
 }
 
@@ -225,7 +226,7 @@ fn write(
         fill(&mut out)?;
         out.flush()
     };
-    write().map_err(|error| format!("cannot write {}: {error}", files::place(path)))
+    write().map_err(|error| format!("cannot write {}: {error}", files::shown_path(path)))
 }
 
 /// Returns a Python that has PyPI's `mcap`, a reader of such files independent of this one.
@@ -242,7 +243,7 @@ pub fn independent_reader() -> Result<OsString, String> {
         true => Ok(python),
         false => Err(format!(
             "{} has no package mcap; install it, or name a Python that has it by MCAP_PYTHON",
-            files::place(Path::new(&python))
+            files::shown_path(Path::new(&python))
         )),
     }
 }

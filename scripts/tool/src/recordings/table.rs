@@ -30,7 +30,7 @@ use crate::options::Parsed;
 )]
 pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> {
     let text = files::read_text(file)?;
-    let place = files::place(file);
+    let place = files::shown_path(file);
     let mut rows = Rows {
         text: &text,
         line: 0,
@@ -256,25 +256,25 @@ fn encode<'c>(
 }
 
 fn scalar_bytes(scalar: Scalar, cell: &str) -> Option<Vec<u8>> {
-    fn of<T: recording::Recordable + std::str::FromStr>(cell: &str) -> Option<Vec<u8>> {
+    fn bytes_of_cell<T: recording::Recordable + std::str::FromStr>(cell: &str) -> Option<Vec<u8>> {
         cell.parse::<T>().ok().map(|value| to_bytes(&value))
     }
     match scalar {
-        Scalar::Bool => of::<bool>(cell),
-        Scalar::Char => of::<char>(cell),
-        Scalar::Text => of::<String>(cell),
-        Scalar::U8 => of::<u8>(cell),
-        Scalar::U16 => of::<u16>(cell),
-        Scalar::U32 => of::<u32>(cell),
-        Scalar::U64 => of::<u64>(cell),
-        Scalar::U128 => of::<u128>(cell),
-        Scalar::I8 => of::<i8>(cell),
-        Scalar::I16 => of::<i16>(cell),
-        Scalar::I32 => of::<i32>(cell),
-        Scalar::I64 => of::<i64>(cell),
-        Scalar::I128 => of::<i128>(cell),
-        Scalar::F32 => of::<f32>(cell),
-        Scalar::F64 => of::<f64>(cell),
+        Scalar::Bool => bytes_of_cell::<bool>(cell),
+        Scalar::Char => bytes_of_cell::<char>(cell),
+        Scalar::Text => bytes_of_cell::<String>(cell),
+        Scalar::U8 => bytes_of_cell::<u8>(cell),
+        Scalar::U16 => bytes_of_cell::<u16>(cell),
+        Scalar::U32 => bytes_of_cell::<u32>(cell),
+        Scalar::U64 => bytes_of_cell::<u64>(cell),
+        Scalar::U128 => bytes_of_cell::<u128>(cell),
+        Scalar::I8 => bytes_of_cell::<i8>(cell),
+        Scalar::I16 => bytes_of_cell::<i16>(cell),
+        Scalar::I32 => bytes_of_cell::<i32>(cell),
+        Scalar::I64 => bytes_of_cell::<i64>(cell),
+        Scalar::I128 => bytes_of_cell::<i128>(cell),
+        Scalar::F32 => bytes_of_cell::<f32>(cell),
+        Scalar::F64 => bytes_of_cell::<f64>(cell),
     }
 }
 

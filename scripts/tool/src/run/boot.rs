@@ -66,7 +66,7 @@ pub fn boot(words: &[OsString]) -> ExitCode {
     let error = process::Command::new(file).args(rest).exec();
     BOOT.fail(&format!(
         "cannot start {}: {error}",
-        files::place(Path::new(file))
+        files::shown_path(Path::new(file))
     ))
 }
 

@@ -110,7 +110,7 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     check_files(&run)?;
     let commands = own.path("commands");
     if let Some(path) = commands {
-        let place = files::place(path);
+        let place = files::shown_path(path);
         // Read to see that it can be; gdb itself would only complain after the boot.
         files::read(path)
             .map_err(|why| Refusal::Usage(format!("`--commands {place}` {why}; name another")))?;

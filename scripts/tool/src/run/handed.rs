@@ -98,7 +98,7 @@ fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
 fn parameters(options: &Parsed) -> Result<String, Refusal> {
     let mut parts = Vec::new();
     if let Some(path) = options.path("params") {
-        let place = files::place(path);
+        let place = files::shown_path(path);
         let option = "params";
         let bytes = files::read_named(&Named { option, path }).map_err(Refusal::Usage)?;
         let text = String::from_utf8_lossy(&bytes);
@@ -182,7 +182,7 @@ fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
     let Some(path) = options.path("input").filter(|_| !is_live(options)) else {
         return Ok(Vec::new());
     };
-    let place = files::place(path);
+    let place = files::shown_path(path);
     let text = files::read_text(path)
         .map_err(|why| Refusal::Usage(format!("`--input`: {why}; name another file")))?;
     let entries = wire_script::read(&text)
@@ -205,7 +205,7 @@ pub(super) fn second(options: &Parsed) -> Option<Second> {
 
 /// Returns a warning if `--output` is given but the app has no wire, so that nothing was sent.
 pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
-    let file = options.path("output").map(files::place)?;
+    let file = options.path("output").map(files::shown_path)?;
     let has_wire = outcome.transcript.of_kind("wire").next().is_some();
     (!has_wire).then(|| format!("{file}: the app has connected no wire, and so it is empty"))
 }

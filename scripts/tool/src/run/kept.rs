@@ -117,7 +117,7 @@ impl Kept {
         };
         let announce = |(name, path): (&str, &Path)| {
             files::write_named(name, path, &bytes)?;
-            let file = files::place(path);
+            let file = files::shown_path(path);
             Ok(format!(
                 "{file}: all of the run, {how}{} bytes; `./scripts/check-trace {file}` judges it, \
                  `./scripts/trace {file} -o {file}.json` draws it, `./scripts/recording {file}` \
@@ -175,7 +175,7 @@ impl Kept {
             return Ok(Vec::new());
         };
         let path = raw.with_extension("rec");
-        let file = files::place(&path);
+        let file = files::shown_path(&path);
         fs::write(&path, bytes).map_err(|error| format!("{file}: cannot be written: {error}"))?;
         let shown = self.replay_package().map_or(String::new(), |package| {
             format!(
@@ -248,7 +248,7 @@ pub(super) fn check(options: &Parsed) -> Result<(), String> {
         .path("serial")
         .filter(is_other)
         .map_or(Ok(()), |path| {
-            let place = files::place(path);
+            let place = files::shown_path(path);
             Err(format!(
                 "`--serial {place}`: it is a device or a pipe, and the log is read while it is \
              written; name a file"

@@ -93,7 +93,7 @@ pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result
 pub(super) fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
     if let Some(named) = options.path("qemu") {
         return system::find_program(named).ok_or_else(|| {
-            let place = files::place(named);
+            let place = files::shown_path(named);
             Refusal::Usage(format!("`--qemu {place}`: there is no such program"))
         });
     }

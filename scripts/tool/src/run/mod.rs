@@ -170,7 +170,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     };
     let talk = screen::relay(options, &log.path);
     let outcome = boot_with_input(&qemu, &image, &log.path, limit, talk, show);
-    screen.end();
+    screen.wipe();
     kept::write(options, &kept, outcome?, log, screen)
 }
 
@@ -189,7 +189,7 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
         image::check_app(app).map_err(Refusal::Usage)?;
         return Ok(app.into());
     };
-    let place = files::place(path);
+    let place = files::shown_path(path);
     let checked = match on_linux::is_asked_for(options) {
         true => image::check_linux_file(path),
         false => image::check_file(path),

@@ -182,7 +182,7 @@ pub(super) fn run_app(
             program::run_for(&order, &mut show, |_| guest.code())
         }
     };
-    screen.end();
+    screen.wipe();
     let mut outcome = outcome?;
     // If Linux itself failed, the app's log is empty; the console of the guest tells why.
     if let (Some(guest), Ending::Program(why)) = (&guest, &mut outcome.ending) {

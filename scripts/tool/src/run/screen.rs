@@ -87,17 +87,17 @@ impl Screen {
         };
         if wanted {
             // A progress line may stand there; the new line would begin behind it.
-            self.end();
+            self.wipe();
             println!("{line}");
         }
         if let Some(place) = self.places.explain(line) {
-            self.end();
+            self.wipe();
             self.say(&format!("  {place}"));
         }
     }
 
     /// Wipes the progress line away.
-    pub(super) fn end(&mut self) {
+    pub(super) fn wipe(&mut self) {
         if std::mem::take(&mut self.bar_is_shown) {
             eprint!("\r\x1b[K");
         }

@@ -90,7 +90,7 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
             false => Status::Failure,
         })
     })?;
-    progress.end();
+    progress.wipe();
     say(
         options,
         &report::table(&rows),
@@ -212,7 +212,7 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         observed::lines(&all),
     );
     if let Some(path) = file {
-        let place = files::place(path);
+        let place = files::shown_path(path);
         files::write_named("observe", path, observed::text(&all, margin))?;
         if options.is_given("observe") && !options.is_given("json") {
             println!("{place}: the WCETs; `--wcets {place}` commits with them");
@@ -291,7 +291,7 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
         let status = judged.map_or_else(|fault| fault.status, |()| Status::Success);
         // The messages of a failed run do not name its file.
         if status == Status::Failure {
-            RUN.complain(&format!("{}:", files::place(file)));
+            RUN.complain(&format!("{}:", files::shown_path(file)));
         }
         conclude(&booted, dags.as_ref(), &one);
         go_on(&booted)?;
@@ -326,7 +326,7 @@ pub(super) fn each(
                 Status::Usage
             }
             Err(Refusal::Failure(line)) => {
-                RUN.complain(&format!("{}: {line}", files::place(file)));
+                RUN.complain(&format!("{}: {line}", files::shown_path(file)));
                 Status::Failure
             }
             // Ctrl-C ends the whole series, not only this file.

@@ -240,7 +240,7 @@ fn follow(
         if plan.verbose && line.starts_with("test ") {
             println!("{line}");
         }
-        report.take(line);
+        report.read_line(line);
     };
     let followed = child.follow(LIMIT, &log, &mut show, None, |_| true);
     // The file is ours; one that cannot be removed harms nothing.
@@ -262,7 +262,7 @@ struct LibtestReport {
 }
 
 impl LibtestReport {
-    fn take(&mut self, line: &str) {
+    fn read_line(&mut self, line: &str) {
         self.output += line;
         self.output.push('\n');
         if let Some(result) = line.strip_prefix("test result: ") {
@@ -321,7 +321,7 @@ test result: ok. 40 passed; 0 failed; 0 ignored; 0 measured; 9 filtered out; fin
 
     fn report(said: &str) -> LibtestReport {
         let mut report = LibtestReport::default();
-        said.lines().for_each(|line| report.take(line));
+        said.lines().for_each(|line| report.read_line(line));
         assert_eq!(report.output, said);
         report
     }

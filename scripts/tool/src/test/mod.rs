@@ -115,7 +115,7 @@ pub fn test(words: &[OsString]) -> ExitCode {
             let linted = aside
                 .join()
                 .map_err(|_| "the thread of the lints panicked")?;
-            tally.take(linted);
+            tally.add(linted);
             Ok::<(), String>(())
         })?;
         if let Some(list) = &plan.blessed {
@@ -277,7 +277,7 @@ impl Tally {
     }
 
     /// Adds the counts of another tally.
-    fn take(&mut self, other: Tally) {
+    fn add(&mut self, other: Tally) {
         self.passed += other.passed;
         self.failures.extend(other.failures);
         self.skips.extend(other.skips);

@@ -156,7 +156,7 @@ fn judge_all(options: &Parsed) -> Result<usize, String> {
     let mut runs = Vec::new();
     for file in options.files() {
         let found = read_file(file)?.into_iter();
-        runs.extend(found.map(|run| (files::place(file), run)));
+        runs.extend(found.map(|run| (files::shown_path(file), run)));
     }
     // All chains are measured first, so that a wrong name is reported before any output.
     let measured = runs.iter().map(|(_, run)| measure(run, options));
@@ -168,7 +168,7 @@ fn judge_all(options: &Parsed) -> Result<usize, String> {
 
 /// Reads a file's runs, of which at least one must have events.
 fn read_file(path: &Path) -> Result<Vec<Run>, String> {
-    let file = files::place(path);
+    let file = files::shown_path(path);
     let bytes = files::read(path).map_err(|why| format!("{file}: {why}; name another file"))?;
     let runs = Record::read(&bytes)
         .map_err(|why| format!("{file}: {why}"))?
@@ -186,7 +186,7 @@ fn read_file(path: &Path) -> Result<Vec<Run>, String> {
 
 /// Judges a run, prints the findings, and returns the number of breaches.
 fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> usize {
-    let bound_ns = bound::of(run, options);
+    let bound_ns = bound::tolerance_ns(run, options);
     let shown = options.number("show").unwrap_or(u64::MAX);
     let shown = usize::try_from(shown).unwrap_or(usize::MAX);
     let findings = check(run, bound_ns);
@@ -287,7 +287,7 @@ pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
         .json("preemption_latency_ns", &object(&figures.preemption))
         .number("longest_inversion_ns", figures.longest_inversion_ns)
         .list("load_permille", &figures.load_permille)
-        .end()
+        .into_text()
 }
 
 fn microseconds(ns: u64) -> String {
@@ -339,7 +339,10 @@ fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
     let chains = match ends {
         (None, None) => Chain::all(&run.task_set, samplings),
         (Some(from), Some(to)) => {
-            let ends = (place(run, "from", from)?, place(run, "to", to)?);
+            let ends = (
+                named_subtask(run, "from", from)?,
+                named_subtask(run, "to", to)?,
+            );
             let chains = Chain::between(&run.task_set, samplings, ends.0, ends.1);
             if chains.is_empty() {
                 return Err(format!(
@@ -374,8 +377,8 @@ fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
 }
 
 /// Finds the subtask that an option names.
-fn place(run: &Run, option: &str, name: &str) -> Result<SubtaskRef, String> {
-    Chain::place(&run.task_set, name).ok_or_else(|| {
+fn named_subtask(run: &Run, option: &str, name: &str) -> Result<SubtaskRef, String> {
+    Chain::find(&run.task_set, name).ok_or_else(|| {
         let dags = (0..).map(DagId).zip(run.task_set.dags());
         let all: Vec<String> = dags
             .flat_map(|(dag, model)| {
@@ -441,7 +444,7 @@ fn chain_line(file: &str, run: &Run, chain: &MeasuredChain) -> String {
         .json("reaction_ns", &object(&chain.reaction.0))
         .json("output_age_bound_ns", &bound(&chain.output_age.1))
         .json("reaction_bound_ns", &bound(&chain.reaction.1))
-        .end()
+        .into_text()
 }
 
 /// The figures of one run. Times are in nanoseconds.
@@ -675,7 +678,7 @@ impl History {
         );
         if is_lossy && is_first && ran {
             // Its start is lost: it has run since before the trace.
-            self.begin(event.core, from_ns);
+            self.begin_slice(event.core, from_ns);
         }
         // Any later event of the instance ends the slice; a second one does not move its end.
         if let Some(slice) = self.slices.last_mut() {
@@ -691,11 +694,11 @@ impl History {
         place.get_or_insert(time_ns);
         self.suspensions += u64::from(event.what == EventKind::Suspend);
         if matches!(event.what, EventKind::Start | EventKind::Resume) {
-            self.begin(event.core, time_ns);
+            self.begin_slice(event.core, time_ns);
         }
     }
 
-    fn begin(&mut self, core: CoreId, from_ns: u64) {
+    fn begin_slice(&mut self, core: CoreId, from_ns: u64) {
         self.slices.push(Slice {
             core,
             from_ns,

@@ -158,7 +158,7 @@ impl Tlsf {
         } else {
             0
         };
-        let found = self.free.take(needed.checked_add(slack)?)?;
+        let found = self.free.take_free(needed.checked_add(slack)?)?;
         let block = self.trim_front(found, layout.align());
         self.trim_back(block, needed);
         self.usage.count_allocation(block.size());
@@ -290,7 +290,7 @@ impl FreeLists {
     }
 
     /// Takes a block of at least `size` bytes out of its list.
-    fn take(&mut self, size: usize) -> Option<Block> {
+    fn take_free(&mut self, size: usize) -> Option<Block> {
         let class = self.first_nonempty_from(SizeClass::fitting(size)?)?;
         let block = self.head(class)?;
         self.remove(block);

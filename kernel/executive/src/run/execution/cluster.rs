@@ -121,7 +121,7 @@ fn another(number: usize) -> &'static ClusterState {
 
 /// Returns the cluster that a core is in.
 #[inline]
-pub(super) fn of(core: &Core) -> &'static ClusterState {
+pub(super) fn cluster_of(core: &Core) -> &'static ClusterState {
     nth(core.group.load(Ordering::Relaxed) as usize)
 }
 

@@ -141,7 +141,7 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
 
 /// Sets time 0 of the prepared run, from which the releases count. Returns the
 /// number of jobs to come, or `None` if nothing is prepared.
-pub fn begin(epoch_ns: u64) -> Option<u64> {
+pub fn set_epoch(epoch_ns: u64) -> Option<u64> {
     let task_set = task_set()?;
     EPOCH_NS.store(epoch_ns, Ordering::Relaxed);
     for cluster in cluster::all() {
@@ -156,13 +156,13 @@ pub fn begin(epoch_ns: u64) -> Option<u64> {
 }
 
 /// Takes the run out when it has ended, and drops what it has left behind.
-pub fn end() -> Option<Run> {
+pub fn take_run() -> Option<Run> {
     let parts = cluster::all().filter_map(|cluster| cluster.execution.lock().take());
     let mut parts: Vec<ClusterRun> = parts.collect();
     let (first, others) = parts.split_first_mut()?;
     let cores = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
     let proven = core::mem::take(&mut first.proven);
-    let mut run = Run::of(&mut first.engine, proven, cores);
+    let mut run = Run::from_engine(&mut first.engine, proven, cores);
     if cluster::MAY_DIVIDE {
         (others.iter_mut()).for_each(|other| run.absorb(&mut other.engine));
     }

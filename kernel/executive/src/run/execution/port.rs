@@ -213,7 +213,7 @@ pub fn keeps_time(core: &Core) -> bool {
 /// Sets this core's alarm for the next event; it is its cluster's first one. Interrupts are
 /// disabled, or nothing else runs here.
 pub fn arm_next_event() {
-    let cluster = cluster::of(this_core::get());
+    let cluster = cluster::cluster_of(this_core::get());
     timer::set(Alarm::Schedule, cluster.next_event_ns());
 }
 

@@ -86,7 +86,7 @@ pub(super) fn note_running(core: &Core, subject: Option<EventSubject>) {
 
 /// Returns how long an instance that runs here may execute for, `u64::MAX` if there is no limit.
 pub fn budget_ns(instance: Instance) -> u64 {
-    let place = cluster::of(this_core::get()).execution.lock();
+    let place = cluster::cluster_of(this_core::get()).execution.lock();
     place.as_ref().map_or(u64::MAX, |execution| {
         let dag = execution.task_set().dag(instance.dag);
         let subtask = dag.subtask(instance.subtask);
@@ -98,7 +98,7 @@ pub fn budget_ns(instance: Instance) -> u64 {
 /// run goes on. Of two faults of a DAG at one moment, either may take what is left to be survived;
 /// the journal tells.
 pub fn cost_of_fault(instance: Instance) -> Option<(FaultCost, Arc<TaskSet>)> {
-    let place = cluster::of(this_core::get()).execution.lock();
+    let place = cluster::cluster_of(this_core::get()).execution.lock();
     place.as_ref().map(|execution| {
         let task_set = execution.task_set();
         let cost = execution.engine.cost_of_fault(task_set.vertex(instance));
@@ -116,7 +116,7 @@ pub fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T)
 /// Its cores count from the second argument of `look`.
 pub fn try_journal<R>(look: impl FnOnce(&Journal, u32) -> R) -> Option<R> {
     let cluster = match this_core::is_ready() {
-        true => cluster::of(this_core::get()),
+        true => cluster::cluster_of(this_core::get()),
         false => cluster::nth(0),
     };
     let place = cluster.execution.try_lock()?;

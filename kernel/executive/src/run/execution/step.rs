@@ -194,7 +194,7 @@ impl ClusterRun {
             }
             None => {
                 turns::come(core);
-                contexts::begin()
+                contexts::new_worker()
             }
         };
         note_running(core, self.current(here).map(EventSubject::of));
@@ -232,7 +232,7 @@ impl ClusterRun {
 /// Finds what this core, which runs nothing, is to do. Interrupts are disabled.
 pub fn find_work() -> CoreWork {
     let core = this_core::get();
-    let mut place = cluster::of(core).execution.lock_uninterrupted();
+    let mut place = cluster::cluster_of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return CoreWork::Rest;
     };
@@ -287,7 +287,7 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
 /// `left` here. Interrupts are disabled.
 pub fn fail(left: &AbandonedContext) {
     let core = this_core::get();
-    let mut place = cluster::of(core).execution.lock_uninterrupted();
+    let mut place = cluster::cluster_of(core).execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return;
     };
@@ -314,7 +314,7 @@ pub fn fail(left: &AbandonedContext) {
 /// core. In an interrupt handler.
 pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
     let core = this_core::get();
-    let cluster = cluster::of(core);
+    let cluster = cluster::cluster_of(core);
     let mut place = cluster.execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return;

@@ -123,7 +123,7 @@ fn usual_hop(executed: &[u64], call: u64) -> Option<&[u64]> {
 }
 
 /// Returns the line and the function of an instruction.
-fn place<'f>(frames: &'f Frames, address: &u64) -> (&'f str, &'f str) {
+fn line_and_function<'f>(frames: &'f Frames, address: &u64) -> (&'f str, &'f str) {
     let frames = frames.get(address).map_or(&[][..], |frames| frames);
     code::own(frames).unwrap_or(("elsewhere", "?"))
 }
@@ -131,7 +131,7 @@ fn place<'f>(frames: &'f Frames, address: &u64) -> (&'f str, &'f str) {
 fn table(hop: &[u64], frames: &Frames) -> String {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for address in hop {
-        let (line, _) = place(frames, address);
+        let (line, _) = line_and_function(frames, address);
         let file = line.split(':').next().unwrap_or(line);
         *counts.entry(file).or_default() += 1;
     }
@@ -146,7 +146,7 @@ fn table(hop: &[u64], frames: &Frames) -> String {
 /// Returns the hop, one instruction a line: address, text, and its innermost line of ours.
 fn listing(hop: &[u64], frames: &Frames, instructions: &BTreeMap<u64, String>) -> String {
     let line = |address: &u64| {
-        let (line, function) = place(frames, address);
+        let (line, function) = line_and_function(frames, address);
         let instruction = instructions.get(address).map_or("?", |text| text);
         format!("{address:x}  {instruction:60} {line}: {function}\n")
     };
@@ -155,7 +155,7 @@ fn listing(hop: &[u64], frames: &Frames, instructions: &BTreeMap<u64, String>) -
 
 #[cfg(test)]
 mod tests {
-    use super::{Frames, addresses, place, table, usual_hop};
+    use super::{Frames, addresses, line_and_function, table, usual_hop};
     use crate::places::Frame;
     use crate::system::workspace;
 
@@ -186,7 +186,7 @@ mod tests {
         ];
         let frames = Frames::from([(7, inlined.map(frame).into()), (8, Vec::new())]);
         let expected = ("kernel/executive/src/machine/spinlock.rs:3", "f");
-        assert_eq!(place(&frames, &7), expected);
+        assert_eq!(line_and_function(&frames, &7), expected);
         let counted = table(&[7, 8, 7], &frames);
         assert!(counted.starts_with("     2 kernel/executive/src/machine/spinlock.rs\n"));
     }

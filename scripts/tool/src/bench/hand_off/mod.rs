@@ -185,7 +185,7 @@ fn measure_mode(mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
             figures.insert(end.map_or(figures.len(), |end| end + 1), figure);
         }
     }
-    progress.end();
+    progress.wipe();
     Ok(figures)
 }
 

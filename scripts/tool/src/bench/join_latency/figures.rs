@@ -263,7 +263,7 @@ pub(super) fn summary_json(setting: &Setting<'_>, measured: &MeasuredConditions)
         .number("conditions", plan.conditions.len() as u64)
         .number("conditions_measured", measured.len() as u64)
         .json("results", &format!("[\n{results}\n]"));
-    summary.end() + "\n"
+    summary.into_text() + "\n"
 }
 
 fn result_json(condition: Condition, figures: &ConditionFigures) -> String {
@@ -282,9 +282,9 @@ fn result_json(condition: Condition, figures: &ConditionFigures) -> String {
             .json("mean", &figures.mean_ns(position).to_string())
             .number("p99", of.p99())
             .number("max", of.max());
-        result = result.json(&format!("{metric}_ns"), &distribution.end());
+        result = result.json(&format!("{metric}_ns"), &distribution.into_text());
     }
-    result.end()
+    result.into_text()
 }
 
 /// Returns the table of the figures for each policy and N.

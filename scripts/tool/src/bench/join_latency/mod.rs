@@ -75,7 +75,7 @@ fn measure_all(plan: &JoinPlan) -> Result<(), String> {
             &figures::samples_csv(&measured),
         )?;
     }
-    progress.end();
+    progress.wipe();
     if let Err(line) = draw("join_latency.py", &plan.out) {
         eprintln!("{line}");
     }

@@ -126,7 +126,7 @@ fn measure(plan: &NativePlan) -> Result<bool, String> {
         let measured = throughput(graph, &WORKERS, plan.rounds, &mut show)?;
         rows.extend(measured);
     }
-    progress.end();
+    progress.wipe();
     if plan.with_join {
         rows.extend(across_cores::join(plan.jobs)?);
     }
@@ -145,7 +145,7 @@ fn measure(plan: &NativePlan) -> Result<bool, String> {
         let line = Object::new().text("kind", "bench");
         let line = line.text("name", "native-clusters").text("workload", graph);
         let line = line.number("clusters", 2_u64);
-        println!("{}", line.json("times", &format!("{times:.3}")).end());
+        println!("{}", line.json("times", &format!("{times:.3}")).into_text());
     }
     Ok(true)
 }
@@ -185,7 +185,7 @@ fn machine_line((figure, runner): &NativeRow) -> String {
         .json("min_ns", &one(figure.min))
         .json("median_ns", &one(figure.median))
         .json("p99_ns", &one(figure.p99))
-        .end()
+        .into_text()
 }
 
 /// The number of turns of each runner: a change of the host's speed meets them all.

@@ -155,8 +155,8 @@ fn read_link(link: &Node, graph: &mut RateGraph, unit_ns: u64) -> Result<(), Mal
     let (mut source, mut target, mut communication_ns) = (None, None, 0);
     for (key, value) in members(link, "a link")? {
         match key.as_str() {
-            "source" => source = Some(end(value, key, graph)?),
-            "target" => target = Some(end(value, key, graph)?),
+            "source" => source = Some(node_index(value, key, graph)?),
+            "target" => target = Some(node_index(value, key, graph)?),
             "communication_time" => communication_ns = time_ns(value, key, unit_ns)?,
             "firing_prob" => {
                 let reason = "`firing_prob`: here every subtask runs in every job; generate \
@@ -183,7 +183,7 @@ fn read_link(link: &Node, graph: &mut RateGraph, unit_ns: u64) -> Result<(), Mal
     Ok(())
 }
 
-fn end(value: &Node, key: &str, graph: &RateGraph) -> Result<usize, Malformed> {
+fn node_index(value: &Node, key: &str, graph: &RateGraph) -> Result<usize, Malformed> {
     let id = text(value, key)?;
     graph.position(id).ok_or_else(|| {
         let reason = format!(

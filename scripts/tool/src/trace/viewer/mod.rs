@@ -68,7 +68,7 @@ pub fn convert(runs: &[Run], bound_ns: u64) -> String {
         draw_breaches(run, &breaches, &prefix, &mut output);
         next_flow = flows.next();
     }
-    output.end()
+    output.into_text()
 }
 
 fn draw_breaches(run: &Run, breaches: &[Violation], prefix: &str, output: &mut Output) {
@@ -79,7 +79,7 @@ fn draw_breaches(run: &Run, breaches: &[Violation], prefix: &str, output: &mut O
     let mut track = output.track(group, "rules");
     for breach in breaches {
         let what = breach.with_names(&run.task_set).to_string();
-        let args = Object::new().text("what", &what).end();
+        let args = Object::new().text("what", &what).into_text();
         track.instant(breach.time_ns(), &breach.rule().to_string(), &args);
     }
     output.add(track);
@@ -119,7 +119,7 @@ fn draw_piece(
 ) {
     let history = &view.histories[&instance];
     let slice = history.slices[piece];
-    track.begin(slice.from_ns, name, args);
+    track.begin_slice(slice.from_ns, name, args);
     // A first piece without a start continues one before the trace: no arrow leads into it.
     if piece == 0 && history.start_ns.is_some() {
         flows.into(instance).for_each(|flow| track.flow_in(flow));
@@ -130,7 +130,7 @@ fn draw_piece(
     if piece + 1 == history.slices.len() && history.finish_ns.is_some() {
         flows.out(instance).for_each(|flow| track.flow_out(flow));
     }
-    track.end(to_ns);
+    track.end_slice(to_ns);
 }
 
 /// The table of `trace`.
@@ -171,7 +171,7 @@ pub fn trace(words: &[OsString]) -> ExitCode {
         match options.path("out") {
             None => print!("{text}"),
             Some(out) => {
-                let place = files::place(out);
+                let place = files::shown_path(out);
                 fs::write(out, text).map_err(|error| format!("cannot write {place}: {error}"))?;
                 let by = match options.is_given("svg") {
                     true => "in a browser",
@@ -189,7 +189,7 @@ fn draw(options: &Parsed) -> Result<String, String> {
     let input = options.file("which file? name a serial log with a trace")?;
     files::check(&[input], &options.named(&["out"]))?;
     let mut runs = read_file(input.path)?;
-    let file = files::place(input.path);
+    let file = files::shown_path(input.path);
     if let Some(number) = options.number("run") {
         let there: Vec<String> = runs.iter().map(|run| run.number.to_string()).collect();
         runs.retain(|run| run.number == number);
@@ -206,7 +206,9 @@ fn draw(options: &Parsed) -> Result<String, String> {
         return picture::draw(run, options.number("periods").unwrap_or(1));
     }
     // All runs of a file come from one boot, so one bound holds for all.
-    let bound_ns = runs.first().map_or(0, |run| bound::of(run, options));
+    let bound_ns = runs
+        .first()
+        .map_or(0, |run| bound::tolerance_ns(run, options));
     Ok(convert(&runs, bound_ns))
 }
 
@@ -274,7 +276,13 @@ fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut TrackWrit
         .text("begins", begins)
         .text("ends", ends);
     let name = instance_name(view.run, instance);
-    draw_piece(view, (instance, number), (&name, &args.end()), flows, track);
+    draw_piece(
+        view,
+        (instance, number),
+        (&name, &args.into_text()),
+        flows,
+        track,
+    );
 }
 
 fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut TrackWriter) {
@@ -290,7 +298,7 @@ fn draw_preemptions(view: &View<'_>, core: CoreId, track: &mut TrackWriter) {
             && event.core == core
         {
             let name = format!("{what} {}", instance_name(view.run, instance));
-            track.instant(event.time_ns, &name, &instance_args(instance).end());
+            track.instant(event.time_ns, &name, &instance_args(instance).into_text());
         }
     }
 }
@@ -324,7 +332,7 @@ fn draw_dags(view: &View<'_>, prefix: &str, flows: &mut Flows, output: &mut Outp
 /// Draws the events of jobs, and their deadlines, as instants.
 fn draw_moments(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
     let mut track = output.track(group, "releases, deadlines");
-    let args = |job: u64| Object::new().number("job", job).end();
+    let args = |job: u64| Object::new().number("job", job).into_text();
     for event in view.events.iter().filter(|event| event.dag == dag) {
         let what = match event.what {
             EventKind::Released => "release",
@@ -373,8 +381,8 @@ fn draw_jobs(view: &View<'_>, dag: DagId, group: Group, output: &mut Output) {
         busy_until_ns[lane] = to_ns;
         let name = format!("job #{job}{}", what_became_of(history));
         let args = job_args(view, dag, job, history);
-        lanes[lane].begin(nominal_ns, &name, &args);
-        lanes[lane].end(to_ns);
+        lanes[lane].begin_slice(nominal_ns, &name, &args);
+        lanes[lane].end_slice(to_ns);
     }
     lanes.into_iter().for_each(|lane| output.add(lane));
 }
@@ -401,7 +409,7 @@ fn job_args(view: &View<'_>, dag: DagId, job: u64, history: &JobHistory) -> Stri
         let response_ns = completed_ns.saturating_sub(release_ns);
         args = args.number("response_time_ns", response_ns);
     }
-    args.end()
+    args.into_text()
 }
 
 /// Draws a subtask's instances from readiness to their end.
@@ -435,16 +443,16 @@ fn draw_subtask(
         };
         if let Some(ready_ns) = history.ready_ns {
             let name = format!("ready #{}", instance.job);
-            track.instant(ready_ns, &name, &instance_args(instance).end());
+            track.instant(ready_ns, &name, &instance_args(instance).into_text());
         }
         let args = instance_args(instance).number("suspensions", history.suspensions);
-        track.begin(begin_ns, &name, &args.end());
+        track.begin_slice(begin_ns, &name, &args.into_text());
         for (index, slice) in history.slices.iter().enumerate() {
-            let args = Object::new().number("core", slice.core.0).end();
+            let args = Object::new().number("core", slice.core.0).into_text();
             let name = format!("on core {}", slice.core.0);
             draw_piece(view, (instance, index), (&name, &args), flows, track);
         }
-        track.end(over_ns.unwrap_or(view.end_ns));
+        track.end_slice(over_ns.unwrap_or(view.end_ns));
     }
 }
 
@@ -620,7 +628,7 @@ impl Output {
     }
 
     /// Returns the whole text.
-    fn end(self) -> String {
+    fn into_text(self) -> String {
         format!(
             "{{\"displayTimeUnit\":\"ns\",\"traceEvents\":[\n{}\n]}}\n",
             self.events
@@ -633,8 +641,8 @@ impl Output {
             .text("name", what)
             .number("pid", group)
             .number("tid", track)
-            .json("args", &args.end());
-        self.push(&event.end());
+            .json("args", &args.into_text());
+        self.push(&event.into_text());
     }
 
     fn push(&mut self, event: &str) {
@@ -647,7 +655,7 @@ impl Output {
 impl TrackWriter {
     /// Begins a slice, inside the open one if there is one. `args` is a JSON object. It does not
     /// begin before the last slice has ended.
-    fn begin(&mut self, time_ns: u64, name: &str, args: &str) {
+    fn begin_slice(&mut self, time_ns: u64, name: &str, args: &str) {
         self.latest_ns = self.latest_ns.max(time_ns);
         self.open += 1;
         let rest = format!(",\"name\":{},\"args\":{args}", quoted(name));
@@ -655,7 +663,7 @@ impl TrackWriter {
     }
 
     /// Ends the slice that was begun last.
-    fn end(&mut self, time_ns: u64) {
+    fn end_slice(&mut self, time_ns: u64) {
         self.latest_ns = self.latest_ns.max(time_ns);
         self.open = self.open.saturating_sub(1);
         self.draw('E', self.latest_ns, "");
