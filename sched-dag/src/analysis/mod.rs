@@ -26,9 +26,9 @@
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
 //! uses that releases lie on a grid: their papers' model is the sporadic one, and
-//! the equations count the jobs that fit into a window at that distance. What is
-//! *certain* to go wrong is not said of sporadic DAGs, except by a path that is
-//! longer than the deadline, since their signals may stay away.
+//! the equations count the jobs that fit into a window at that distance. That a
+//! deadline is *certain* to be missed is not said of sporadic DAGs, except by a path that
+//! is longer than the deadline, since their signals may stay away.
 //!
 //! Each module cites its paper and states its assumptions and the traps that it
 //! avoids. The functions for single tests take [`Task`]s in priority order and

@@ -41,7 +41,7 @@
 //! project.
 //!
 //! Let `Delta(x)` be the sum of the `x` largest lower-ranked subtasks of other DAGs. While a
-//! subtask of the job waits, nothing lower starts. What lower-ranked work it finds was
+//! subtask of the job waits, nothing lower starts. Lower-ranked work that it finds was
 //! started before it became ready: on at most `m` cores for a source, on at most `m - 1` for
 //! a later one, because the core of its predecessor has just become free. A subtask never
 //! overlaps with itself, so those running are different subtasks. On `m - j` cores then
@@ -61,8 +61,8 @@
 //! being preempted: in the unit test below that gives 10 and 11 is observed.
 //!
 //! Under EDF any other DAG's job may have the later deadline, whatever the relative
-//! deadlines: it may be released during this job. So `Delta` is over all other DAGs. What
-//! starts while a subtask waits is due no later than that subtask, so it is among the
+//! deadlines: it may be released during this job. So `Delta` is over all other DAGs. An
+//! instance that starts while a subtask waits is due no later than that, so it is among the
 //! interference, be it up to the job's deadline or up to a sink's.
 //!
 //! Assumes: *no* subtask of any DAG is ever preempted; work-conserving.
@@ -115,6 +115,8 @@ impl<'a> ResponseEquation<'a> {
         let own = &loads[dag];
         let mut least = own.priorities[1];
         loop {
+            // Until nothing more comes in: what may delay one of these may delay the job through
+            // it.
             let outrank = loads.iter().filter(|load| load.priorities[0] < least);
             match outrank.map(|load| load.priorities[1]).max() {
                 Some(lower) if lower > least => least = lower,
@@ -163,6 +165,7 @@ impl<'a> ResponseEquation<'a> {
                 window = after;
             }
             windows.push(window);
+            // The core is done before the next job is released: that one finds nothing left over.
             if window <= (back + 1) * period {
                 break;
             }

@@ -41,7 +41,7 @@ pub enum OverheadSource {
     /// Someone states them, or nobody: then they are 0.
     #[default]
     Stated,
-    /// They are the longest of so many, and a margin.
+    /// They are the longest that were measured, and a margin.
     Measured {
         /// How many instances were dispatched meanwhile.
         dispatches: u64,

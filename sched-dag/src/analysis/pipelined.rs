@@ -144,6 +144,7 @@ impl PipelineTerms {
         let mut response = u128::from(start_ns);
         let mut windows: Vec<u128> = Vec::new();
         loop {
+            // With the response the windows only grow, so they go on from where they are.
             self.extend(&mut windows, response, delays, steps)?;
             let back = windows.iter().zip(0..);
             let responses = back.map(|(window, back)| window.saturating_sub(back * self.period));

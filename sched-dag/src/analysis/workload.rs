@@ -50,8 +50,8 @@
 //! for steps before its own is late, at most by `late = charge + E(late)` with `late = 0` on
 //! the right.
 //!
-//! In the equations all cores are busy for so long. What DAGs execute (`workload`) is not more
-//! for it. A DAG without bound counts as if it kept up.
+//! In the equations all cores are busy for so long. The workloads of the DAGs do not grow by
+//! it. A DAG without bound counts as if it kept up.
 
 use alloc::vec::Vec;
 
@@ -143,6 +143,7 @@ impl InterferingWorkload {
                 span: None,
             },
             Some(ceiling) if piece.slope > 0 => {
+                // The piece ends where it meets the ceiling: from there on it does not grow.
                 let room = (ceiling - piece.value) / piece.slope;
                 let span = Some(piece.span.map_or(room, |span| span.min(room)));
                 WorkloadSegment { span, ..piece }.or_one_flat_step()
@@ -231,6 +232,7 @@ impl WorkloadSegment {
             None | Some(0) => whole_piece,
             Some(closing) => gap.div_ceil(closing).min(whole_piece),
         };
+        // The workload never falls, so what is missing now has to be executed in any case.
         Some(ahead.max(gap.div_ceil(cores)))
     }
 
@@ -308,6 +310,7 @@ impl WorkloadBursts {
         bursts.repeated.retain(|burst| burst[2] > 0);
         let charge_ns = settings.overheads.of_an_instance_ns(settings.preemption);
         let late_ns = charge_ns.and_then(|charge_ns| bursts.after(charge_ns));
+        // If lateness has no end, each window counts as full of bursts, and nothing is proven.
         bursts.late_ns = late_ns.unwrap_or(u64::MAX);
         bursts
     }

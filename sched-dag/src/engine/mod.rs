@@ -89,6 +89,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             alternates: (0..vertices).map(|_| None).collect(),
             after_fault,
             notices: Vec::with_capacity(room),
+            // No more instances are in flight, and each is cancelled once at most.
             undiscarded: Vec::with_capacity(instances),
             scheduler,
             task_set,
@@ -154,6 +155,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             (self.requests).take_letters(letters, self.cluster, &mut moment);
         }
         self.requests.serve(&mut moment);
+        // The `Step` that keeps the short way closed comes here: by now an older instance may have
+        // ended, and its body may rest.
         self.discard_late();
     }
 
@@ -251,6 +254,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         self.placement.finish_parked(vertex, body);
         let instance = self.scheduler.instance_of(vertex);
+        // By the whole step: its core runs something else by now, so it passes on to nobody.
         self.step((now_ns, core), port, |moment| moment.complete(instance));
     }
 
@@ -282,7 +286,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         cost
     }
 
-    /// Does the same, and leaves the instant open.
+    /// Ends an instance as [`fail`](Self::fail) does, and leaves the instant open.
     pub fn tell_fault(
         &mut self,
         instant: (u64, CoreId),
@@ -322,8 +326,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         cost
     }
 
-    /// Finds what a core without an instance does next. An instance that it is to start has
-    /// started; that it resumes an instance is [written down](Self::note) by whoever knows when.
+    /// Finds what a core without an instance does next. An instance to start has started, and is
+    /// written down; a resumption is [written down](Self::note) by the caller, who knows when.
     #[inline]
     pub fn next(&mut self, core: CoreId, port: &mut impl PlatformPort<B>) -> NextWork<B, P> {
         let mut next = self.placement.next(core.index());

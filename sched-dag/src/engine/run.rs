@@ -127,14 +127,17 @@ impl Run {
         self.add(other, journal);
     }
 
-    /// Does so with an engine that may go on, and with a copy of its journal.
+    /// Takes over the same of an engine that may go on, and of a copy of its journal.
     pub(crate) fn add<B: SubtaskBody, P>(&mut self, other: &Engine<B, P>, journal: Journal) {
         let (task_set, cluster) = (&self.task_set, other.cluster);
         let ids = (0..).map(DagId).zip(&mut self.dags);
+        // To each scheduler the DAGs of other clusters are ended from the start: it knows its own
+        // only.
         for (dag, of_dag) in ids.filter(|(dag, _)| task_set.dag(*dag).cluster() == cluster) {
             *of_dag = DagCounts::new(&other.scheduler, dag);
         }
         let first_core = task_set.cores_of(cluster, self.options.cores).start;
+        // A cluster's scheduler counts its cores from 0, the run counts those of the machine.
         self.journal.absorb(journal, cluster, first_core);
     }
 

@@ -56,6 +56,7 @@ impl MeasuredCosts {
                     let free_ns = free_ns.get(core).copied().unwrap_or(0);
                     let waits = waiting.iter().position(|(other, _)| *other == instance);
                     let since_ns = waits.map(|place| waiting.swap_remove(place).1.max(free_ns));
+                    // One that was not seen to become ready, or be suspended, is owed nothing.
                     let owed_ns = event.time_ns.saturating_sub(since_ns.unwrap_or(u64::MAX));
                     costs.owed_ns = costs.owed_ns.max(owed_ns);
                 }

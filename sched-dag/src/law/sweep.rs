@@ -70,7 +70,7 @@ impl DispatchModel<'_> {
 /// The state of an instance for the dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DispatchState {
-    /// It is not ready yet, as far as is known.
+    /// No event has made it ready yet.
     Absent,
     /// It waits for a core and has not started.
     Ready,

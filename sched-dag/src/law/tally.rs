@@ -155,6 +155,7 @@ impl RunTally {
                 *ours = theirs;
                 of_dag.for_each(|(ours, theirs)| *ours = theirs);
             } else {
+                // Passed over, so that the next DAG's subtasks come next.
                 of_dag.for_each(drop);
             }
         }
@@ -289,6 +290,7 @@ impl DagTally {
                     *join_ns = event.time_ns.max(*join_ns);
                 }
                 let job = &mut self.open[place];
+                // Two cores may finish in one order and be written down in the other.
                 job.last_finish_ns = event.time_ns.max(job.last_finish_ns);
                 if let Some(response_time) = &mut statistics.response_time {
                     response_time.add(event.time_ns.saturating_sub(job.release_ns));

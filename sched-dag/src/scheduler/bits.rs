@@ -56,6 +56,7 @@ impl BitSet {
             let was_empty = *word == 0;
             *word |= 1 << (place % 64);
             place /= 64;
+            // The levels above have the word's bit already.
             if !was_empty {
                 return;
             }
@@ -69,6 +70,7 @@ impl BitSet {
         for level in self.levels.iter_mut().rev() {
             let word = &mut level[place / 64];
             *word &= !(1 << (place % 64));
+            // Others are left in the word, so the levels above keep its bit.
             if *word != 0 {
                 return;
             }

@@ -175,8 +175,6 @@ impl Scheduler {
     #[inline(always)]
     pub fn pass_on(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, bool) {
         let done = self.end_shortly(now_ns, core, vertex);
-        // Only now: where the core goes on with another instance, it never was in the stack of
-        // idle ones.
         if let HandOff::Idle = done.0 {
             // Idle only now: where the core goes on with another instance, it never enters the
             // stack of idle ones.
@@ -190,6 +188,7 @@ impl Scheduler {
     /// whether it has still to be written down that the one has finished and the other is ready.
     #[inline(always)]
     fn end_shortly(&mut self, now_ns: u64, core: CoreId, vertex: Vertex) -> (HandOff, bool) {
+        // Cores may tell their times in another order than they read them: time never goes back.
         self.log.now_ns = self.log.now_ns.max(now_ns);
         let ending = self.vertices.get(vertex.0);
         // Otherwise a dispatch is owed from before, or the instance was to move.
@@ -268,6 +267,7 @@ impl Scheduler {
         });
         next.phase = InstancePhase::Running(core);
         self.cores.run(core, key, next.is_preemptible);
+        // Never a resumption: it has become ready by this very end, so it has not run before.
         let decision = Decision {
             what: EventKind::Start,
             core,
@@ -279,6 +279,8 @@ impl Scheduler {
     /// Puts all successors of a vertex in line that its end has made ready.
     #[inline]
     fn line_up_successors(&mut self, vertex: u32) {
+        // `pass_on` has counted them already. A counter that is 0 now waited for this end alone, so
+        // no instance is put in line twice.
         for place in VertexTable::successors(self.vertices.get(vertex)) {
             if let Some((number, next)) = self.vertices.ready_successor(place) {
                 let job = self.dags[next.dag.index()].jobs.job(next.progress);
@@ -355,6 +357,7 @@ impl CoreTable {
     pub(super) fn prefer(&mut self, core: CoreId) {
         // From the top of the stack, where the core that a driver prefers mostly is.
         if let Some(place) = self.idle.iter().rposition(|&idle| idle == core) {
+            // Rotated, not swapped: the others keep the order in which they became idle.
             self.idle[place..].rotate_left(1);
         }
     }

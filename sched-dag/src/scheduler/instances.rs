@@ -18,6 +18,7 @@ impl Scheduler {
     pub(super) fn finish(&mut self, instance: Instance) {
         let vertex = self.take_off(instance, "is completed");
         self.end_instance(vertex);
+        // Earlier no deadline of any DAG has passed, so nothing can be late.
         if self.log.now_ns >= self.quiet_until_ns {
             self.judge_ended(vertex);
         }
@@ -45,6 +46,8 @@ impl Scheduler {
             // It lost its core in the scheduler's eyes, but finished before the machine took the
             // core away.
             InstancePhase::Preempted if in_flight => {
+                // No vertex keeps its key: it is absolute, so it comes out as when it was put in
+                // line.
                 let key = (self.ready).key(number, vertex, || jobs.job(vertex.progress));
                 self.ready.remove(key);
             }
@@ -70,6 +73,7 @@ impl Scheduler {
         let first_vertex = task_set.first_vertex(dag);
         for source in task_set.dag(dag).sources() {
             let number = first_vertex + source.0;
+            // A source may still do the job before (R2); then the end of that lines this one up.
             if let Some(vertex) = vertices.arrive(number, sequence) {
                 line_up(number, vertex, job, ready, log);
                 *fresh += 1;
@@ -188,6 +192,8 @@ impl Scheduler {
         if let Some(vertex) = self.vertices.next_is_ready(number) {
             let jobs = &self.dags[vertex.dag.index()].jobs;
             let job = jobs.job(vertex.progress);
+            // The job was cut while this instance still waited for its turn: it is cancelled now
+            // that it would be ready.
             if job.cut.is_some() {
                 self.log
                     .of_instance(EventKind::Cancelled, vertex.instance(job));
@@ -218,6 +224,7 @@ impl Scheduler {
                 self.vertices.allow_passing_on(first..first + subtasks);
             }
         } else {
+            // Not for a cut job: it does not even end a run of misses (rule 5 of `overrun`).
             state.statistics.completed += 1;
             if !job.missed {
                 state.statistics.count_met();

@@ -97,7 +97,7 @@ impl DispatchKey {
         self.0 >> 32
     }
 
-    /// Puts a vertex behind that.
+    /// Makes a key of the part before the vertex, and a vertex.
     #[inline]
     pub(super) const fn of_job(before: u128, vertex: u32) -> Self {
         Self(before << 32 | vertex as u128)

@@ -92,6 +92,7 @@ impl EventLog {
     /// Takes the notices out, in exchange for a list whose room is used next.
     #[inline]
     pub fn exchange_notices(&mut self, room: &mut Vec<DriverNotice>) {
+        // Exchanged, not copied: both lists keep their memory, so neither ever allocates.
         room.clear();
         core::mem::swap(&mut self.notices, room);
     }
@@ -121,7 +122,7 @@ impl EventLog {
         self.notify(what, EventSubject::of(instance), None);
     }
 
-    /// Does the same of a job as a whole, or of a DAG, and says when that was due or late.
+    /// Writes down what has happened to a job as a whole, or a DAG, and when that was due or late.
     #[inline]
     pub(super) fn of_job(&mut self, what: EventKind, dag: DagId, job: u64, at_ns: Option<u64>) {
         self.has_job_event = true;
@@ -129,7 +130,7 @@ impl EventLog {
         self.notify(what, EventSubject::of_job(dag, job), at_ns);
     }
 
-    /// Does the same of a DAG.
+    /// Writes down what has happened to a DAG.
     #[inline]
     pub(super) fn of_dag(&mut self, what: EventKind, dag: DagId) {
         self.of_job(what, dag, 0, None);

@@ -53,6 +53,8 @@ impl<'s> Moment<'s> {
     /// If the instance has not started or has ended before.
     #[inline]
     pub fn complete(&mut self, instance: Instance) {
+        // At the driver's own time: another core may have told a later one since, but this instance
+        // finished then.
         self.scheduler
             .log
             .on_this(EventKind::Finish, self.told_ns, instance);

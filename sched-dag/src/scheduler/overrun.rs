@@ -58,6 +58,8 @@ impl Scheduler {
         while let Some((job, release_ns)) = self.take_due(dag) {
             self.release_or_overrun(dag, job, release_ns);
             let jobs = &mut self.dags[dag.index()].jobs;
+            // Waiting jobs are judged only when announced: an end that makes room for this one must
+            // not find it late before an event has told of it.
             jobs.announce();
             // Only if the driver came late has a deadline passed that was not known of before.
             if jobs.first_deadline_ns(release_ns) < self.log.now_ns {

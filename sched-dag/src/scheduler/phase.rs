@@ -248,6 +248,7 @@ impl Scheduler {
         if self.is_closed(dag) {
             return;
         }
+        // A waiting job whose deadline has passed is a miss; once skipped it could not be one.
         self.judge(dag, None);
         self.dags[dag.index()].jobs.close(DagPhase::Closed);
         // Before the skips, which follow from it.
@@ -273,6 +274,8 @@ impl Scheduler {
         if self.is_ended(dag) {
             return;
         }
+        // E6: what is late by now is a miss. Afterwards all jobs are cut, and a cut job is never
+        // late.
         self.judge(dag, None);
         let state = &mut self.dags[dag.index()];
         // From here on no job is released, so what is in flight is all that can end.
@@ -311,6 +314,7 @@ impl SurvivedFaults {
     pub(super) fn new(on_fault: OnFault) -> Self {
         let (window, left, most) = match on_fault {
             OnFault::EndDag => (0, 0, 0),
+            // The ring need not be longer than all faults that may be survived.
             OnFault::DropJob(of) => (of.window, of.in_all, of.faults.min(of.in_all)),
         };
         Self {
@@ -328,6 +332,7 @@ impl SurvivedFaults {
         let has_room = self.count < self.jobs.len();
         // The N-th survived fault before this one; the ring holds N.
         let nth_before = self.jobs.get(self.oldest);
+        // `None` where the window reaches back to before job 0: then every earlier fault is inside.
         let last_outside = job.checked_sub(self.window);
         let is_outside = |before| last_outside.is_some_and(|last| before <= last);
         self.left > 0 && (has_room || nth_before.is_some_and(|&before| is_outside(before)))
@@ -368,6 +373,7 @@ impl Scheduler {
             return;
         }
         let vertex = self.take_off(instance, "fails");
+        // D5: after the cut no deadline of the job is looked at any more.
         self.judge(dag, None);
         // Before the end, which moves the vertex on to its next job.
         let sequence = self.vertices.get(vertex).progress;

@@ -230,6 +230,7 @@ impl QueueStorage {
         match self {
             Self::Word { ranks, vertices } => {
                 let rank = ranks.trailing_zeros();
+                // An empty word has 64 zeros, and no rank is 64.
                 let vertex = vertices.get(rank as usize)?;
                 Some(DispatchKey::of_rank(rank, *vertex))
             }
@@ -410,6 +411,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         let position = self.positions[item];
         let entry = (key, item);
         match self.entries.get(position) {
+            // `ABSENT` is no position, so an item that is not in the heap is found here.
             None => {
                 self.entries.push(entry);
                 self.rise(self.entries.len() - 1, entry);
@@ -454,6 +456,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     fn rise(&mut self, mut position: usize, entry: (K, usize)) {
         while position > 0 {
             let above = (position - 1) / BELOW;
+            // Of equal keys the upper one stays: an exchange would only cost writes.
             if self.entries[above].0 <= entry.0 {
                 break;
             }
@@ -578,6 +581,8 @@ impl ByDeadline {
         let (job, slot) = self.jobs.peek()?;
         let line = &mut self.lines[slot];
         let vertex = line.first + to_u32(line.subtasks.pop()?);
+        // With its last ready instance the job leaves the heap: `peek` relies on no line being
+        // empty.
         if line.subtasks.is_empty() {
             self.jobs.remove(slot);
         }

@@ -1,7 +1,7 @@
 //! The subtasks of all DAGs as the scheduler walks them: joins and phases (R2).
 //!
 //! Subtasks are numbered over all DAGs, in the order of the commit; the number
-//! is a *vertex*. What the way from a completion to its successors needs of a
+//! is a *vertex*. All that the way from a completion to its successors needs of a
 //! vertex lies together, in one cache line.
 //!
 //! Jobs in flight are known by *sequence number*: their position among the released jobs
@@ -151,13 +151,15 @@ impl VertexTable {
     pub(super) fn allow_passing_on(&mut self, vertices: Range<usize>) {
         for vertex in &mut self.vertices[vertices] {
             let [from, to] = vertex.successors;
+            // With one slot no next job can wait for this vertex, and only the end of a sink can be
+            // the end of the job: with successors, neither has to be looked at.
             vertex.only_passes_on = vertex.slot_mask == 0 && from < to;
         }
     }
 
-    /// Ends the instance that a vertex is doing. What thereby may have become
-    /// ready are its [`successors`](Self::successors) in the same job, which are to
-    /// be told by [`arrive`](Self::arrive), and its own next instance.
+    /// Ends the instance that a vertex is doing. By that its [`successors`](Self::successors)
+    /// in the same job, which are to be told by [`arrive`](Self::arrive), and its own next
+    /// instance may be ready.
     #[inline]
     pub(super) fn end_instance(&mut self, vertex: u32) -> Vertex {
         let own = &mut self.vertices[vertex as usize];
@@ -169,7 +171,7 @@ impl VertexTable {
         ended
     }
 
-    /// Does so for a vertex that [only passes on](Vertex::only_passes_on), and tells its
+    /// Ends the instance of a vertex that [only passes on](Vertex::only_passes_on), and tells its
     /// successors. Returns how many of them are ready by that, and one of these.
     #[inline(always)]
     pub(super) fn pass_on(&mut self, vertex: u32) -> (u32, u32) {
@@ -183,6 +185,8 @@ impl VertexTable {
         loop {
             let number = self.successors[place as usize];
             let next = &mut self.vertices[number as usize];
+            // The successor's progress need not be asked: with one slot no older job is in flight
+            // that it could still have to do.
             next.counter -= 1;
             if next.counter == 0 {
                 // The vertex now does this job; its key is made of it.

@@ -61,6 +61,7 @@ pub(super) fn in_flight(spec: &DagSpec) -> u64 {
     let (Some(period_ns), Some(deadline_ns)) = (spec.period_ns, spec.relative_deadline_ns) else {
         return 1;
     };
+    // A fault of its own; the other checks need a number to go on with.
     if period_ns == 0 {
         return 1;
     }
@@ -75,6 +76,7 @@ fn check_instances(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
     if instances <= u128::from(options.instance_limit) {
         return;
     }
+    // The sum is too large, which is no single DAG's fault; a change helps most in the largest one.
     if let Some(most) = (0..specs.len()).max_by_key(|&dag| of(specs[dag])) {
         findings
             .findings_of(most)
@@ -208,6 +210,7 @@ fn check_sink_deadline(page: &mut DagFindings<'_, '_>, index: usize) {
     };
     let sink = page.subtask(index);
     let of_dag_ns = spec.relative_deadline_ns;
+    // A DAG's deadline of 0 is told once, by itself, and not again for each sink.
     if relative_deadline_ns == 0 && of_dag_ns != Some(0) {
         page.fault(|dag| DagFault::ZeroSinkDeadline { dag, sink });
     } else if let Some(of_dag_ns @ 1..) = of_dag_ns
@@ -226,6 +229,7 @@ fn check_priorities_given(page: &mut DagFindings<'_, '_>) {
     let subtasks = &page.spec.subtasks;
     let without = (0..subtasks.len()).filter(|&index| subtasks[index].priority.is_none());
     let without: Vec<_> = without.map(|index| page.subtask(index)).collect();
+    // None at all is a choice: the commit derives priorities then.
     if !without.is_empty() && without.len() < subtasks.len() {
         page.fault(|dag| DagFault::PrioritiesPartlyGiven { dag, without });
     }
@@ -313,6 +317,7 @@ fn duplicates<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> Vec<(usize, 
     let mut found = Vec::new();
     for (position, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
         let number = interner.intern(name);
+        // New names are numbered in their order, so an unknown number is the next one in the list.
         match first_positions.get(number) {
             Some(&first) => found.push((first, position)),
             None => first_positions.push(position),

@@ -331,6 +331,7 @@ impl JournalReplay<'_> {
                 }
                 // Of an ended DAG, an instance may be taken away for good.
                 _ if of_dag.is_ended => return None,
+                // All its events may be among those that are lost.
                 None if known.is_partial && life.is_none() => return None,
                 late => {
                     let awaited = Instance { dag, job, subtask };
@@ -440,6 +441,8 @@ impl JournalReplay<'_> {
             job,
             subtask: None,
         };
+        // A sink that met its deadline may be meant, too: its core may have finished while another
+        // one was noticing the miss.
         let may_be_meant = |due: &&SinkDeadline| {
             let finish_ns = due.finish_ns.filter(|_| due.is_met());
             finish_ns.is_none_or(|finish_ns| self.is_tolerable(finish_ns, missed.time_ns))
@@ -582,6 +585,7 @@ impl JournalReplay<'_> {
     /// Returns the condition that held last, if all are known to have held.
     fn last_condition(&self, instance: Instance) -> Option<InstanceCondition> {
         let mut last: Option<InstanceCondition> = None;
+        // At one time a finish comes after the release: it is what the latency is measured from.
         let rank = |condition: &InstanceCondition| {
             let time_ns = condition.held.map(|held| held.time_ns);
             (time_ns, condition.awaited.is_some())
@@ -638,6 +642,7 @@ impl JournalReplay<'_> {
         }
         let held = self.last_condition(instance)?.held?;
         let is_tolerable = self.is_tolerable(held.time_ns, self.end_ns);
+        // Of a run in which every job has ended nothing is still to come, however short ago it was.
         (!is_tolerable || self.terms.is_complete).then_some(Violation::NeverReady {
             instance,
             since_ns: held.time_ns,

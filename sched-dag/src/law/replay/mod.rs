@@ -274,6 +274,7 @@ impl InstanceLife {
     /// Takes note of an event, whether it is allowed or not, and says what is wrong.
     fn note(&mut self, event: &Event, moment: StepTime) -> Option<Violation> {
         let (stage, last) = (self.stage, self.last);
+        // Also after a breach: else one slip would make each later event a breach of its own.
         self.stage = stage_after(event);
         self.last = Some((event.what, event.time_ns));
         let place = match event.what {
@@ -404,6 +405,8 @@ impl JournalReplay<'_> {
             return;
         }
         let core = self.core(event.core);
+        // What the scheduler writes from here on, up to the core's next machine event, is of one
+        // step.
         core.step += 1;
         let event = *event;
         match event.what {

@@ -208,6 +208,8 @@ impl Scheduler {
         let model = self.task_set.dag(dag);
         let first = self.task_set.first_vertex(dag);
         let state = &mut self.dags[dag.index()];
+        // Each round judges one job by one deadline, in the order of time: so it costs what was
+        // missed since the last look, and the misses are written down in their order.
         while let Some(unjudged) = state.jobs.first_unjudged(model)
             // A finish at the deadline itself is in time.
             && unjudged.deadline_ns < self.log.now_ns

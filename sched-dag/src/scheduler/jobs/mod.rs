@@ -147,6 +147,7 @@ impl JobTable {
     /// Returns the job that a signal is for, or that one is kept for.
     #[inline]
     pub(super) fn signal_job(&self) -> u64 {
+        // A waiting sporadic job is the one before `next_due`; it is what keeps the signal.
         self.next_due - self.waiting().min(1)
     }
 
@@ -167,6 +168,7 @@ impl JobTable {
         // Never earlier than one minimum inter-arrival time after the job before: the bound rests
         // on that.
         let release_ns = now_ns.max(earliest_ns);
+        // A job whose deadline is beyond the last time is never due: its signal is dropped.
         let deadline_ns = release_ns.checked_add(dag.relative_deadline_ns())?;
         self.next_due_ns = (deadline_ns < u64::MAX).then_some(release_ns);
         self.next_due_ns
@@ -220,6 +222,7 @@ impl JobTable {
         // The next sporadic job keeps its distance from this one.
         self.last_due_ns = release_ns;
         self.next_due += 1;
+        // Of a sporadic DAG this is no time: the next signal sets it.
         self.next_due_ns = due_ns(dag, self.next_due);
         Some((number, release_ns))
     }
@@ -251,6 +254,7 @@ impl JobTable {
             release_ns,
             deadline_ns: release_ns + dag.relative_deadline_ns(),
             unfinished,
+            // It belongs to the place, not to the job; keys are made of it.
             slot: job.slot,
             missed,
             cut: None,
