@@ -52,6 +52,7 @@ impl<'b> Encoder<'b> {
     #[inline]
     pub(crate) fn places(&mut self, count: usize) -> Option<&mut [u8]> {
         let start = self.written;
+        // Counted even if it does not fit: so the caller learns how large the buffer has to be.
         self.written = start.saturating_add(count);
         // Cut in this way, the compiler knows its length where it knows `count`.
         let (places, _) = self.buffer.get_mut(start..)?.split_at_mut_checked(count)?;
@@ -62,6 +63,7 @@ impl<'b> Encoder<'b> {
     pub(crate) fn count(&mut self, count: usize) {
         match u32::try_from(count) {
             Ok(count) => self.put(&count.to_le_bytes()),
+            // Cut short it would be another value; `finish` reports a buffer that is too small.
             Err(_) => self.written = usize::MAX,
         }
     }
@@ -182,8 +184,11 @@ impl<'b> Decoder<'b> {
     pub(crate) fn count(&mut self, least_bytes: usize) -> Result<usize, Malformed> {
         let expected = "how many elements follow, as many as there are bytes for";
         let offset = self.offset;
+        // 4 bytes on every target, so a recording of one machine can be read on another.
         let count = u32::from_le_bytes(self.array(expected)?);
         let count = usize::try_from(count).unwrap_or(usize::MAX);
+        // Before anything is allocated: an altered count must not cost memory that the file does
+        // not fill.
         match count.checked_mul(least_bytes.max(1)) {
             Some(bytes) if bytes <= self.remaining() => Ok(count),
             _ => Err(Malformed { offset, expected }),

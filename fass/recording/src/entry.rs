@@ -86,10 +86,12 @@ macro_rules! kinds {
             }
 
             fn encode(&self, out: &mut Encoder<'_>) {
+                // The number is the place in the declaration: new kinds are added at the end only.
                 out.put(&[*self as u8]);
             }
 
             fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
+                // Taken before the byte is read, so that it names the place of the number itself.
                 let malformed = input.expected($expected);
                 let number = usize::from(u8::decode(input)?);
                 [$(Self::$Kind),+].get(number).copied().ok_or(malformed)
@@ -181,6 +183,7 @@ pub struct Entry<'v> {
 
 impl<'v> Entry<'v> {
     pub(super) fn encode(&self, out: &mut Encoder<'_>) {
+        // The value comes last and has no length: the frame's length says where it ends.
         self.what.encode(out);
         (self.dag, self.place, self.job, self.release_ns, self.at_ns).encode(out);
         out.put(self.value);
@@ -208,6 +211,7 @@ impl<'v> Entry<'v> {
         const PLACE: usize = 3;
         const VALUE: usize = 29;
         let malformed = |offset, expected| Malformed { offset, expected };
+        // Later code takes these numbers for indices without asking again.
         if usize::from(self.dag) >= header.dags.len() {
             return Err(malformed(DAG, "the number of a DAG of the header"));
         }
@@ -220,6 +224,7 @@ impl<'v> Entry<'v> {
                 };
                 match self.what {
                     EntryKind::Value => channel.schema.walk(&mut rest, &mut |_| ()),
+                    // A lost value has no bytes, which `end` below makes sure of.
                     _ => Ok(()),
                 }
             }

@@ -104,6 +104,7 @@ impl<'b> Recording<'b> {
     ///
     /// See [`Writer`](crate::Writer).
     pub fn entries(&self) -> impl Iterator<Item = Entry<'b>> + Clone + Debug + use<'b> {
+        // Decoded again, not kept: reading takes no memory that grows with the recording.
         let entries = self.frames().filter(|frame| frame.kind == ENTRY);
         entries.filter_map(|frame| Entry::decode(frame.payload).ok())
     }
@@ -241,10 +242,13 @@ impl Progress {
         }
         let malformed =
             input.expected("version 1 to 5 of recordings, which are those that are read");
+        // A later version may have kinds that this code cannot check; an earlier one only lacks
+        // some.
         if !(1..=VERSION).contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
             return Err(malformed);
         }
         let mut crc = Crc::new();
+        // Mark and version are in all checksums, so a frame fits to no file of another version.
         crc.update(&bytes[..input.offset()]);
 
         (self.first, self.last, self.crc) = (input.offset(), input.offset(), crc);
@@ -253,6 +257,8 @@ impl Progress {
             let inside = |malformed: Malformed| malformed.behind(frame.offset);
             match Chunk::read(&frame)? {
                 Some(Chunk::Header(header)) => {
+                    // Entries are checked against the header, so it cannot change or come after
+                    // them.
                     if self.has_header || self.count > 0 {
                         return Err(frame.expected("no other header"));
                     }
@@ -271,18 +277,21 @@ impl Progress {
                 Some(_) => {}
                 None => {
                     let said = <(u64, u64)>::from_bytes(frame.payload).map_err(inside)?;
+                    // Checksums find altered frames; this finds a writer that has miscounted.
                     if said != (self.count, self.lost) {
                         return Err(inside(Malformed {
                             offset: 0,
                             expected: "how many entries there are, and how many of them are lost",
                         }));
                     }
+                    // Bytes behind the end are in no checksum, so nobody vouches for them.
                     if input.remaining() > 0 {
                         return Err(input.expected("the end of the file"));
                     }
                     return Ok(frame.kind == CUT);
                 }
             }
+            // Only now: `mended` goes on from here, behind the last frame that was found right.
             (self.last, self.crc) = (input.offset(), crc);
         }
     }
@@ -312,6 +321,8 @@ pub fn mended(bytes: &[u8]) -> Result<Vec<u8>, Malformed> {
     {
         return Err(malformed);
     }
+    // The end, if there was one, is not in it: a new one is written, with the counts of what is
+    // left.
     let whole = bytes[..progress.last].to_vec();
     let stream = Stream::behind(progress.crc, (progress.count, progress.lost), whole);
     Ok(stream.cut())
@@ -329,6 +340,7 @@ impl Frame<'_> {
 
 /// Reads the next frame.
 fn frame<'b>(input: &mut Decoder<'b>) -> Result<Frame<'b>, Malformed> {
+    // Kind and length are 5 bytes before the payload, from which `Frame::expected` counts back.
     let [kind] = input.array("another frame; the recording has no end, so a part is missing")?;
     let length = u32::from_le_bytes(input.array("4 bytes, how long the frame is")?);
     let length = usize::try_from(length).unwrap_or(usize::MAX);
@@ -349,6 +361,7 @@ fn frame<'b>(input: &mut Decoder<'b>) -> Result<Frame<'b>, Malformed> {
 /// Reads the next frame, and makes sure that no byte up to its end was altered.
 fn checked<'b>(input: &mut Decoder<'b>, crc: &mut Crc) -> Result<Frame<'b>, Malformed> {
     let frame = frame(input)?;
+    // In the order of the file, without the checksums, as the writer has summed up.
     crc.update(&[frame.kind]);
     // It was a `u32`.
     let length = u32::try_from(frame.payload.len()).unwrap_or(u32::MAX);
@@ -410,6 +423,7 @@ impl<'b> Recording<'b> {
         let name_of = |dag: u16| &*header.dags[usize::from(dag)].name;
         let mut channels = (0_u16..).zip(&header.channels);
         let found = channels.find(|(_, channel)| {
+            // A topic may be sampled as well: only its writer's channel has the value of each job.
             let is_written = channel.role.is_written();
             is_written && channel.topic == topic && name_of(channel.dag) == dag
         });

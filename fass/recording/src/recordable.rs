@@ -81,6 +81,7 @@ pub trait Recordable: Sized {
     ///
     /// See [`Recordable`].
     fn from_bytes(bytes: &[u8]) -> Result<Self, Malformed> {
+        // When it is compiled: no value of such a type could be read by its schema.
         const { assert!(Self::DEPTH <= MOST_DEPTH, "the type is nested too deeply") };
         let mut input = Decoder::new(bytes);
         let value = Self::decode(&mut input)?;
@@ -177,6 +178,7 @@ impl Recordable for bool {
 
     fn decode(input: &mut Decoder<'_>) -> Result<Self, Malformed> {
         let malformed = input.expected("a truth value, 0 or 1");
+        // Other bytes are refused, not taken for true: each of both values has one form.
         match input.array(malformed.expected)? {
             [0] => Ok(false),
             [1] => Ok(true),
@@ -373,6 +375,7 @@ impl<T: Recordable, const N: usize> Recordable for [T; N] {
             );
         }
         let mut malformed = None;
+        // `map` cannot stop early, so after an error the other elements are not read.
         let values = [(); N].map(|()| match malformed {
             None => T::decode(input)
                 .map_err(|error| malformed = Some(error))
@@ -526,6 +529,7 @@ impl Recordable for Schema {
 impl Schema {
     fn decode_at(input: &mut Decoder<'_>, depth: usize) -> Result<Self, Malformed> {
         let start = input.clone();
+        // Before anything is read: each level is a call, and the stack has an end.
         if depth == MOST_DEPTH {
             return Err(start.expected(DEEP));
         }
@@ -538,6 +542,7 @@ impl Schema {
             let malformed = input.expected(WEIGHTLESS);
             let element = inner(input)?;
             match element.least_bytes() {
+                // A list of these would have any number of elements in no bytes.
                 0 => Err(malformed),
                 _ => Ok(Box::new(element)),
             }
@@ -550,6 +555,7 @@ impl Schema {
                 Self::Array(element(input)?, count)
             }
             TUPLE => {
+                // Each element's schema takes a byte at least.
                 let count = input.count(1)?;
                 let elements = (0..count).map(|_| inner(input));
                 Self::Tuple(elements.collect::<Result<_, _>>()?)

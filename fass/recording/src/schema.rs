@@ -37,7 +37,7 @@ pub enum Schema {
     Option(Box<Schema>),
     /// Any number of values.
     List(Box<Schema>),
-    /// So many values.
+    /// A fixed number of values.
     Array(Box<Schema>, u32),
     /// Values of different types.
     Tuple(Vec<Schema>),
@@ -279,6 +279,7 @@ impl<'t> Rest<'t> {
             Some('(') => self.tuple(depth)?,
             _ => self.named(depth)?,
         };
+        // Each `?` is one more level around what is read already.
         for depth in depth.. {
             if !self.takes('?') {
                 break;
@@ -294,6 +295,7 @@ impl<'t> Rest<'t> {
     fn sequence(&mut self, depth: usize) -> Result<Schema, Refused> {
         self.expect('[', "`[`")?;
         let element = Box::new(self.schema(depth + 1)?);
+        // As the reader of bytes does: a schema that can be typed is one that can be recorded.
         if element.least_bytes() == 0 {
             return self.refuse("elements that take bytes");
         }

@@ -178,6 +178,7 @@ pub fn write_json(schema: &Schema, bytes: &[u8], out: &mut dyn Write) -> Result<
         if follows && !matches!(part, Part::Close(_)) {
             let _ = out.write_char(',');
         }
+        // Nothing stands before the first part of a whole, or between a field's name and its value.
         follows = !matches!(part, Part::Open(_) | Part::Field(_));
         let _ = write!(out, "{part}");
     })?;
@@ -223,6 +224,7 @@ fn write_text(text: &str, out: &mut dyn Write) -> fmt::Result {
         match letter {
             '"' => out.write_str("\\\"")?,
             '\\' => out.write_str("\\\\")?,
+            // JSON allows all other characters as they are, in UTF-8.
             control if control < ' ' => write!(out, "\\u{:04x}", u32::from(control))?,
             other => out.write_char(other)?,
         }
@@ -252,6 +254,7 @@ impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { schema, bytes } = *self;
         let mut input = Decoder::new(bytes);
+        // Once without output: half a value in JSON would look like a whole one.
         let walked = schema.walk(&mut input, &mut |_| ());
         match walked.and_then(|()| input.expect_end()) {
             Ok(()) => write_json(schema, bytes, f).map_err(|_| fmt::Error),

@@ -210,6 +210,7 @@ impl<S: Sink> Stream<S> {
     pub fn begin(to: S) -> Self {
         let mut stream = Self::behind(Crc::new(), (0, 0), to);
         stream.put(&MAGIC);
+        // Right behind the mark, in every version: so a reader knows what it cannot read.
         stream.put(&VERSION.to_le_bytes());
         stream
     }
@@ -261,6 +262,7 @@ impl<S: Sink + ?Sized> Stream<S> {
     pub fn write(&mut self, entry: &Entry<'_>) {
         self.entries += 1;
         self.lost += u64::from(entry.what == EntryKind::Lost);
+        // On the stack, and the value goes out from where it is: an entry allocates nothing.
         let mut head = [0; ENTRY_HEAD];
         let mut out = Encoder::new(&mut head);
         Entry {
@@ -303,6 +305,7 @@ impl<S: Sink + ?Sized> Stream<S> {
     pub fn events(&mut self, cluster: u16, before: u64, words: &[[u64; 3]]) {
         let mut head = [0; EVENTS_HEAD];
         crate::Recordable::encode(&(cluster, before), &mut Encoder::new(&mut head));
+        // The length comes first, and is known without a copy of the events.
         self.head(EVENTS, EVENTS_HEAD + size_of_val(words));
         self.put(&head);
         for word in words.as_flattened() {
@@ -331,6 +334,7 @@ impl<S: Sink + ?Sized> Stream<S> {
     }
 
     fn finish(&mut self, kind: u8) {
+        // The counts are in the end, not in the header: nothing that is written is gone back to.
         self.whole(kind, &[&to_bytes(&(self.entries, self.lost))]);
     }
 
@@ -353,6 +357,7 @@ impl<S: Sink + ?Sized> Stream<S> {
     }
 
     fn checksum(&mut self) {
+        // Not by `put`: a checksum is of all bytes but the checksums themselves.
         self.to.put(&self.crc.value().to_le_bytes());
     }
 }
