@@ -124,6 +124,7 @@ fn replay(
     if cfg!(panic = "abort") {
         name_remedy();
     }
+    // Mostly the panic is what is looked for: contained, its job can be shown.
     let machine = machine.contain_panics().replay(bytes);
     let machine = machine.map_err(|malformed| format!("{place}: {malformed}"))?;
     let machine = match &words.from {

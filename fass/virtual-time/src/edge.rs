@@ -3,8 +3,8 @@
 //! A *replay* does not call sources that are recorded, and takes their values; it gives subtasks
 //! what they sampled and the time that they were told; signals come when they came. No job is
 //! lost on the way: releases queue, and a fault cuts what it cut. A job that the recording has no
-//! values of, and an instance that was cut, is passed over: its function is not called. What else
-//! is recorded is compared.
+//! values of, and an instance that was cut, is passed over: its function is not called. All
+//! other recorded values are compared.
 
 use std::cell::RefCell;
 
@@ -190,6 +190,7 @@ impl Edge {
     /// Begins an instance.
     pub(crate) fn start_instance(&self, instance: Instance) {
         let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
+        // Only for DAGs of which something is recorded: the others are never replayed.
         let is_noted = self.header.borrow().channels.iter().any(of_dag);
         let recorded = self.of_replay(|replay| replay.clock(instance).map(<[u64]>::to_vec));
         self.told.replace(is_noted.then(|| Told {
@@ -205,6 +206,8 @@ impl Edge {
         let Some(Told { answers, recorded }) = &mut *told else {
             return now_ns;
         };
+        // By its place among the answers. A function that asks more often than it did is told this
+        // run's time.
         let answer_ns = recorded.get(answers.len()).copied().unwrap_or(now_ns);
         answers.push(answer_ns);
         answer_ns
@@ -218,6 +221,8 @@ impl Edge {
         };
         let mut values = self.values.borrow_mut();
         if let Some(latest) = self.latest.borrow().as_ref() {
+            // Times are kept as long as the inputs of their jobs, so memory does not grow with the
+            // run.
             values.retain(|Kept { entry, .. }| latest.has(entry.dag.into(), entry.job));
         }
         let of = [instance.dag.0, instance.subtask.0].map(narrow);
@@ -267,10 +272,13 @@ impl Edge {
         for entry in &mut entries {
             let job = run.record().job(DagId(entry.dag.into()), entry.job);
             let release_ns = job.and_then(|job| job.release_ns);
+            // A job that was never released, such as a skipped one, has the time of its event.
             entry.release_ns = release_ns.unwrap_or(entry.at_ns);
         }
         let replay = self.replay.borrow();
         entries.extend(replay.iter().flat_map(Replay::events));
+        // The sort is stable: at one instant values stay before events, as completions are before
+        // releases.
         entries.sort_by_key(|entry| entry.at_ns);
         let Some(mut record) = self.committed.borrow().clone() else {
             return Vec::new();

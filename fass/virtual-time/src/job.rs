@@ -87,6 +87,7 @@ impl JobShown {
                 EntryKind::Clock if is_of_job => None,
                 _ => return None,
             };
+            // Without a channel, the place of an entry is the number of the subtask.
             let subtask = channel.map_or(entry.place, |channel| channel.subtask);
             let (schema, bytes) = (channel.map_or(&times, |it| &it.schema), entry.value);
             let value = match entry.what {
@@ -106,6 +107,7 @@ impl JobShown {
             let mut crossed = crossed.iter();
             let value = match crossed.find(|(channel, ..)| channel.is_some_and(is_it)) {
                 Some((.., value)) => value.clone(),
+                // Recorded, but not in this job: its writer was cut, or is not complete yet.
                 None if channels.iter().any(is_it) => Value::None,
                 None => Value::NotRecorded(topic.type_name),
             };

@@ -6,8 +6,8 @@
 //! meet nothing borrowed but the settings, which no function changes.
 //!
 //! Bytes arrive at their times, between the completions and the releases of that instant, as
-//! signals do. What an instance sends is gone at its completion: no device is slow here, so only
-//! an instance that sends more than its wire has room for loses bytes.
+//! signals do. Bytes that an instance sends are gone at its completion: no device is slow here, so
+//! only an instance that sends more than its wire has room for loses bytes.
 //!
 //! # A plan while it runs
 //!
@@ -151,6 +151,8 @@ impl Machine {
                 Arrival::Request(request) => return Some(request),
                 Arrival::Bytes(wire, bytes) => {
                     if let Some((_, dag)) = wire.arrive(&bytes, at_ns) {
+                        // As an arrival of this instant, which a later round takes, behind those
+                        // that are due already.
                         self.signal_at(now_ns, dag);
                     }
                 }
@@ -275,6 +277,8 @@ impl Platform for HostPlatform {
         // the last time there is.
         let ns = nanoseconds(duration);
         (machine.executed_ns).set(Some(executed_ns.saturating_add(ns)));
+        // Time passes for this function alone: it is called at the instant of its start, and the
+        // scheduler learns how long it took when it has returned.
         let now_ns = &machine.now_ns;
         now_ns.set(now_ns.get().saturating_add(ns));
     }
@@ -379,6 +383,7 @@ fn dags(task_set: &TaskSet) -> impl Iterator<Item = (DagId, &Dag)> + Clone {
 impl Session {
     pub(crate) fn new(plan: Plan, options: SchedulerOptions, machine: &Rc<Machine>) -> Self {
         let task_set: Arc<TaskSet> = plan.task_set;
+        // In a replay, the first signal of each; the others follow one by one.
         for (dag, _) in dags(&task_set).filter(|(_, model)| model.is_sporadic()) {
             machine.follow_signal(dag, 0);
         }
@@ -422,6 +427,7 @@ impl Session {
         let until = until.map(|(dag, job)| Ok((self.find(dag)?, job)));
         let until = until.transpose()?;
         self.calls.until = until;
+        // An earlier call may have come beyond that job: then nothing is left to be run.
         self.calls.has_arrived = until.is_some_and(|(dag, last)| {
             let run = self.driver.run_so_far();
             let mut jobs = run.record().numbered(dag);
@@ -435,6 +441,7 @@ impl Session {
             RunOutcome::Finished | RunOutcome::TimeOverflow(_) => (now_ns, until_ns),
             RunOutcome::Stopped => (now_ns, now_ns),
         };
+        // Between two calls the clock stands here: an arrival at an earlier time comes at once.
         machine.now_ns.set(clock_ns);
         self.until_ns = reached_ns;
         let is_over = end == RunOutcome::Finished;
@@ -568,6 +575,8 @@ impl Workload<SubtaskRunner> for Calls {
         machine.running.set(None);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
         let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
+        // A function that panics has executed what it said until then. One that is to fail was not
+        // called, so the time of a silent call passes before its fault.
         if executed_ns == 0 && (result.is_ok() || fails) {
             executed_ns = settings.silent.of_call_ns(instance, subtask.wcet_ns());
         }
@@ -582,6 +591,7 @@ impl Workload<SubtaskRunner> for Calls {
             runner.body.failed(now_ns);
             let panic = PanicRecord { instance, message };
             if !settings.contains_panics {
+                // The driver stops: no function is called after a panic that fails the run.
                 self.panic = Some(panic);
                 return None;
             }
@@ -603,6 +613,8 @@ impl Workload<SubtaskRunner> for Calls {
 
     fn fails(&mut self, instance: Instance) -> bool {
         let mut panics = self.panics.iter();
+        // Of a DAG in a replay, recorded cuts say what a fault cost; to the scheduler none has
+        // failed.
         !self.machine.edge.is_replayed(instance.dag)
             && panics.any(|panic| panic.instance == instance)
     }
@@ -621,6 +633,7 @@ impl Workload<SubtaskRunner> for Calls {
             _ => Some(event.job),
         };
         self.has_arrived |=
+            // A release ends no job: `None` is less than any number.
             (self.until).is_some_and(|(dag, job)| dag == event.dag && Some(job) <= ended);
         // In a replay, a signal follows when the one before it has led to something.
         if let EventKind::Released | EventKind::Skipped = event.what {

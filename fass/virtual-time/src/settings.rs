@@ -108,6 +108,8 @@ impl VirtualTime {
 impl Late {
     /// Returns how late the interrupt is that is due then.
     pub(crate) fn of_interrupt_ns(self, due_ns: u64) -> u64 {
+        // By the due time, not by a count of draws: an interrupt that another event forestalls does
+        // not change how late the later ones are.
         scale(nth(nth(self.seed, 0) ^ due_ns, 0), 0..=self.most_ns)
     }
 }
@@ -184,6 +186,8 @@ impl Silent {
                 let Instance { dag, subtask, job } = instance;
                 let numbers = [dag.0.into(), subtask.0.into(), job].into_iter();
                 let drawn = numbers.fold(nth(seed, 0), |drawn, n| nth(drawn ^ n, 0));
+                // At least 1 ns, so that a call which has a WCET takes time; without a WCET it is
+                // 0.
                 scale(drawn, wcet_ns.min(1)..=wcet_ns)
             }
         }
@@ -192,8 +196,8 @@ impl Silent {
 
 impl VirtualTime {
     /// Sets how long a call takes whose function does not say so by `fass::execute_for`: its
-    /// WCET, unless this says otherwise. Execution counts from the call's start, so
-    /// `fass::now_ns` in the function does not show it.
+    /// WCET, unless this says otherwise. The time counts from the call's start, and is added
+    /// when the function has returned, so `fass::now_ns` in the function does not show it.
     ///
     /// See [`Silent`].
     #[must_use = "the machine itself is returned"]
