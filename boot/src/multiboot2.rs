@@ -2,8 +2,8 @@
 //!
 //! The layout is that of the Multiboot2 specification 2.0, 3.6. The loader's list lies in
 //! memory that counts as free, so all that is wanted is copied here; of the ACPI root
-//! pointer, of which a tag holds a copy, only its place is kept. What is not known is
-//! passed over, and a list that is cut short tells what it tells.
+//! pointer, of which a tag holds a copy, only its place is kept. Unknown tags are passed
+//! over, and of a list that is cut short the tags before the cut count.
 
 use crate::physical::PhysicalMemory;
 use crate::{BootInfo, Framebuffer};

@@ -3,8 +3,8 @@
 //! The API of the paper "Function-as-Subtask API Replacing Publish/Subscribe
 //! for OS-Native DAG Scheduling". An app states *functions* and the *topics*
 //! between them; it has no way to publish in mid-function, to match messages,
-//! or to wake anybody. What remains is a DAG task in the sense of real-time
-//! theory, and the scheduler may take it for one.
+//! or to wake anybody. So an app is a set of DAG tasks in the sense of
+//! real-time theory, and the scheduler may take it for one.
 //!
 //! # Words
 //!

@@ -146,13 +146,12 @@ impl Chain {
         })
     }
 
-    /// Returns how old an output can be at its finish; or else the first DAG that has no bound of
-    /// its own in `responses_ns`, which are in the order of the DAGs, or is sporadic and not the
-    /// last one.
+    /// Returns how old an output can be at its finish.
     ///
     /// # Errors
     ///
-    /// That DAG.
+    /// The first DAG that has no bound of its own in `responses_ns`, which are in the order of the
+    /// DAGs, or is sporadic and not the last one.
     pub fn output_age_bound_ns(
         &self,
         task_set: &TaskSet,
@@ -165,12 +164,11 @@ impl Chain {
         Ok(before.saturating_add(response_ns.ok_or(dag)?))
     }
 
-    /// Returns the longest reaction time, which is the longest data age; or else the first DAG
-    /// that has no bound of its own, or is sporadic.
+    /// Returns the longest reaction time, which is the longest data age.
     ///
     /// # Errors
     ///
-    /// That DAG.
+    /// The first DAG that has no bound of its own, or is sporadic.
     pub fn reaction_bound_ns(
         &self,
         task_set: &TaskSet,

@@ -36,8 +36,8 @@
 //! - **M1, what is on.** A run begins in mode 0. When a mode is entered, its DAGs are resumed, and
 //!   the others that are in some mode are paused (P1 to P5). DAGs that are on in the old
 //!   mode and in the new one notice nothing.
-//! - **M2, at once.** The mode is entered at the instant of the request. What is in flight of the
-//!   DAGs that leave goes on to its end, next to the jobs of those that join.
+//! - **M2, at once.** The mode is entered at the instant of the request. Jobs in flight of the
+//!   DAGs that leave go on to their ends, next to the jobs of those that join.
 //! - **M3, when idle.** The DAGs that leave are paused at the request. The mode is entered at the
 //!   first instant at which no job of them is in flight: after the completions of that
 //!   instant, before its releases; at the request itself, if none is then. Until then the DAGs that
@@ -165,8 +165,8 @@ impl PendingRequests {
         self.kept.retain(|&request| !take(request));
     }
 
-    /// Takes what has come from other clusters and from outside. What concerns one DAG only, and
-    /// no [`Lifecycle`], is passed on at once.
+    /// Takes what has come from other clusters and from outside. A letter that concerns one DAG
+    /// only, and no [`Lifecycle`], is passed on at once.
     #[inline(always)]
     pub fn take_letters(
         &mut self,

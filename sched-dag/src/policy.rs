@@ -173,11 +173,11 @@ texts! {
     /// Why the commit has put a DAG into its cluster.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum AssignmentReason {
-        /// It is heavy: so much work of a job, overheads included, is to be done within that time.
+        /// It is heavy: a job has this much work, overheads included, to do within that time.
         Heavy { volume_ns: u64, within_ns: u64 } =
             "its own, as a job is {:?} of work within {:?}",
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
-        /// It is light, and there the load was least.
+        /// It is light: the cluster with the least load takes it.
         Light = "the emptiest one";
     }
 }

@@ -1,7 +1,7 @@
 //! The topics of a verified DAG, for code that shows the graph.
 //!
-//! Scheduling needs the edges alone, which are in [`Dag`](crate::Dag). What they
-//! carry is kept here, as it was stated.
+//! Scheduling needs the edges alone, which are in [`Dag`](crate::Dag). Their
+//! topics are kept here, as they were stated.
 
 use alloc::boxed::Box;
 use alloc::string::String;

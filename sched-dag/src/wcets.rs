@@ -10,8 +10,8 @@
 //! end
 //! ```
 //!
-//! The hash is of names and edges, so that WCETs of another graph are told from these. What
-//! the file does not say stays as the app has stated it. Nothing here trusts the file.
+//! The hash is of names and edges, so that WCETs of another graph are told from these.
+//! WCETs that the file lacks stay as the app has stated them. Nothing here trusts the file.
 
 use core::fmt;
 

@@ -48,7 +48,7 @@ pub const JOBS: u64 = 30;
 /// The fate of the doomed DAG after its crime.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Policy {
-    /// It is ended.
+    /// The DAG is ended.
     End,
     /// It goes on with the next job, and the middle subtask is made anew.
     Restart,

@@ -1,6 +1,6 @@
 //! Work that a processor really does: a product of matrices, a sort, bytes in memory.
 //!
-//! A simulated execution ([`fass::execute_for`]) halts its core or watches the clock. What
+//! A simulated execution ([`fass::execute_for`]) halts its core or watches the clock. Code that
 //! computes does neither: it never waits, and has its processor until somebody takes it
 //! away. [`compute`] is such work, in *rounds* that are all alike. Its result depends on
 //! everything it has done, so that a register or a byte that goes wrong shows.

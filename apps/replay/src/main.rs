@@ -1,4 +1,4 @@
-//! Runs the reference schedules in the loader's file. Their traces have what happened.
+//! Runs the reference schedules in the loader's file. Their traces tell what happened.
 //!
 //! Words of the command line: `unit_us` is the length of a unit of the cases'
 //! time; `guard_us` is how much before the end of a unit of time a unit of

@@ -31,8 +31,8 @@ use crate::worker::Worker;
 /// How the scheduler's decisions are carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mechanism {
-    /// By levels of SCHED_FIFO. Workers come before all normal programs, and
-    /// is preempted by what the scheduler puts before it.
+    /// By levels of SCHED_FIFO. An instance that should run comes before all normal programs,
+    /// and is preempted by those that the scheduler puts before it.
     Fifo,
     /// By our policy of `sched_ext`, the paper's way: the same order, put by a store and not
     /// by a system call. The policy has to be loaded.

@@ -1,8 +1,8 @@
 //! State shared by the clusters of a run: where each is asked for something, and the end.
 //!
 //! A run whose cores are not divided is one cluster. Each has a [`Team`](crate::team::Team) of
-//! its own: a scheduler under a lock, workers, a release thread. What one wants of another it
-//! leaves here and *rings* for that one's release thread; so it never waits for the other's
+//! its own: a scheduler under a lock, workers, a release thread. A request to another cluster is
+//! left here, and its release thread is *rung* for; so nobody waits for another cluster's
 //! lock.
 //!
 //! # The end

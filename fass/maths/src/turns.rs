@@ -2,7 +2,7 @@
 //!
 //! The argument is reduced by multiples of a quarter turn, held in three parts of which the first
 //! two have zeros at their ends, so that their multiples are exact (W. J. Cody and W. Waite,
-//! Software Manual for the Elementary Functions, 1980). The rest, at most an eighth of a turn,
+//! Software Manual for the Elementary Functions, 1980). The remainder, at most an eighth of a turn,
 //! comes with the rest that it is rounded by. There nine terms of the Taylor series are enough.
 
 use core::f64::consts::FRAC_2_PI;

@@ -1,7 +1,7 @@
 //! The life of a run, as functions change it: DAGs that rest, modes, and the end.
 //!
 //! A subtask that may change what runs says so at its registration, as one that raises a signal
-//! does. What its function asks for takes effect when its instance is complete (R3); the rules L1
+//! does. A request of its function takes effect when its instance is complete (R3); the rules L1
 //! to L6 are in `sched-dag/src/lifecycle.rs`.
 //!
 //! Modes are named sets of DAGs, one of which runs; `sched-dag/src/lifecycle.rs` has the

@@ -35,9 +35,9 @@ impl Dag {
     ///
     /// A replay takes the values that a source wrote, in place of calling it. So if one topic of a
     /// source is recorded, the commit refuses the DAG unless all topics of its sources are, and
-    /// all that its other subtasks sample. What another subtask writes is what a
-    /// replay compares. What subtasks sample of the topic is recorded, too, and given to them in
-    /// a replay. A topic that is recorded counts as read. The type must be the
+    /// all that its other subtasks sample. A replay compares the values that other subtasks write.
+    /// The values that subtasks sample of the topic are recorded, too, and given to them in a
+    /// replay. A topic that is recorded counts as read. The type must be the
     /// writer's, which the commit checks; a [`Unique`](crate::Unique) cannot be recorded.
     ///
     /// A value is written down when its function has returned, into a buffer that is made at the

@@ -1,7 +1,7 @@
 //! States: what several subtasks of one DAG share from job to job.
 //!
-//! A closure may keep what it alone needs. Values that *several* functions need, such as a
-//! pose that one estimates and another corrects, is a [`State`]: declared with
+//! A closure may keep what it alone needs. A value that *several* functions need, such as
+//! a pose that one estimates and another corrects, is a [`State`]: declared with
 //! [`Dag::state`], and used by the subtasks that say so at registration
 //! ([`Dag::using`]). So the flow is in the model, where a mutex hides it.
 //!

@@ -74,7 +74,7 @@ pub struct Subtask<'d> {
 
 impl Dag {
     /// Begins the registration of a source: a function without inputs, which every release
-    /// starts. What releases the DAG is its own statement: [`period`](Self::period) or
+    /// starts. A statement of its own says when the DAG is released: [`period`](Self::period) or
     /// [`sporadic`](Self::sporadic).
     ///
     /// See [`Subtask`].
@@ -147,7 +147,7 @@ impl<'d> Subtask<'d> {
 
     /// Registers it.
     ///
-    /// See [`Subtask`]. What is wrong with it is reported at the commit.
+    /// See [`Subtask`]. The commit reports all that is wrong with it.
     #[track_caller]
     pub fn register(self, attributes: SubtaskAttributes) {
         let _ = self.register_labelled(attributes);
@@ -251,8 +251,8 @@ impl Dag {
 
     /// Adds an edge: of each job, `later` starts only when `earlier` is complete.
     ///
-    /// See [`register_untyped_subtask`](Self::register_untyped_subtask). What is
-    /// wrong with the graph is reported at the commit.
+    /// See [`register_untyped_subtask`](Self::register_untyped_subtask). The commit reports all
+    /// that is wrong with the graph.
     ///
     /// # Panics
     ///

@@ -13,9 +13,9 @@
 //!   the receiver is the source of a sporadic DAG, each packet raises its signal.
 //! - What an instance sends goes when it is complete (R3), all of it or nothing, in the order
 //!   of jobs. Of an instance that fails nothing goes.
-//! - Nobody waits: not the device for the receiver, nor the sender for the device. What finds
-//!   no room is lost, as a whole packet, or all that an instance has sent, and the newest: what
-//!   was there stays. Losses are counted ([`Wire::counts`]).
+//! - Nobody waits: not the device for the receiver, nor the sender for the device. Bytes
+//!   that find no room are lost, as a whole packet, or all that an instance has sent, and the
+//!   newest: those that were there stay. Losses are counted ([`Wire::counts`]).
 //! - The decoder runs in the receiver's instance. If it panics, that is contained as if
 //!   the function had.
 //!

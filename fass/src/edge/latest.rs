@@ -276,7 +276,7 @@ impl LatestJobs {
     }
 
     /// Holds what is kept of a DAG, one job of which has failed: later jobs take no place of
-    /// those before. Those held already stay.
+    /// those before. Jobs that are held already stay.
     pub fn hold(&mut self, dag: usize, job: u64) {
         if let Some(last @ &mut u64::MAX) = self.last.get_mut(dag) {
             *last = job;

@@ -270,8 +270,8 @@ pub struct RecordedValue<'v> {
     pub bytes: Option<&'v [u8]>,
 }
 
-/// The way from a topic to the platform, and back. What a commit does about recorded topics is
-/// reached through them only, so that an image without any has no code for it.
+/// The way from a topic to the platform, and back. All code of a commit for recorded topics
+/// is reached through them only, so that an image without any does not contain it.
 pub(crate) struct TopicEdge {
     /// Reports whether anything is recorded or replayed.
     pub(crate) crosses: fn() -> bool,

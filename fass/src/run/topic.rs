@@ -103,7 +103,7 @@ impl<T: Message> Publisher<T> {
     }
 
     /// Hands the value of `job` to every reader: clones for all but the last,
-    /// the value itself for the last. What samples the latest value is a reader
+    /// the value itself for the last. A subtask that samples the latest value is a reader
     /// whose value is prepared, and shows at the completion.
     ///
     /// # Panics

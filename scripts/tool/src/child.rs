@@ -211,7 +211,7 @@ const GRACE: Duration = Duration::from_secs(10);
 pub enum Asked {
     /// A person pressed ctrl-C, or this program was asked to end.
     ByPerson,
-    /// This limit was exceeded.
+    /// It took longer than this limit.
     ByLimit(Duration),
 }
 

@@ -1,8 +1,8 @@
 //! Whether an instance that occupies its core for a time does so for all of it.
 //!
 //! On one core a long instance is preempted again and again while it computes for a
-//! stated time. The part that the record leaves of its time, without the times of those that
-//! preempted it, has to be what it asked for. Times differ a little from job to job,
+//! stated time. Its time in the record, without the times of those that preempted it,
+//! has to be the one that it asked for. Times differ a little from job to job,
 //! so that the preemptions come at all places of the loop that looks at the clock.
 
 use core::hint::black_box;

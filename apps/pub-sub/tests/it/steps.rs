@@ -1,8 +1,8 @@
 //! Each numbered step of both policies, on traces small enough to follow by hand.
 //!
 //! A row is a policy with its topics and queue size, and a trace. In the trace
-//! `TOPIC@STAMP` is an arrival; messages are numbered by arrival, from 0. What leaves
-//! stands behind the arrival at which it does, in order: `{1,2}` is a set, `-0` was
+//! `TOPIC@STAMP` is an arrival; messages are numbered by arrival, from 0. Messages
+//! that leave stand behind the arrival at which they do, in order: `{1,2}` is a set, `-0` was
 //! dropped, `~0` was replaced. The age penalty is 0 unless said.
 //!
 //! That the two do what the originals do is for `./scripts/oracle synchronizer`, on

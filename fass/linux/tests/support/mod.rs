@@ -71,7 +71,7 @@ pub(crate) fn chain(name: &str, links: usize, jobs: u64, period: Duration, us: u
 }
 
 /// Returns every breach of R1 to R4, and those of R5 that last for longer than this bound: a
-/// second with SCHED_FIFO, ten without. What should run waits for what Linux and a hypervisor
+/// second with SCHED_FIFO, ten without. An instance waits for what Linux and a hypervisor
 /// do and, without SCHED_FIFO, for other programs. A breach that lasts longer is ours. Nothing of
 /// a DAG may ever have been on a core of another cluster.
 pub(crate) fn breaches(run: &Run) -> Vec<Violation> {

@@ -1,9 +1,9 @@
 //! Whether a recording is one of a plan, and which channel is which; with which job of each DAG the
 //! replay begins, and what states it finds there.
 //!
-//! A recording need not have a run's first jobs, or the person wants a later one. What functions
-//! remember of the jobs before is then lacking, unless the DAG's states are recorded: the replay
-//! begins with a job of which each of them is.
+//! A recording need not have a run's first jobs, or the person wants a later one. Then
+//! functions lack all that they remember of the jobs before, unless the DAG's states are recorded:
+//! the replay begins with a job of which each of them is.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -244,8 +244,8 @@ impl Replay {
         jobs[first..end].iter().map(|(_, job)| *job)
     }
 
-    /// Reports whether all states of a DAG are recorded in a job, and there is one. What a function
-    /// has fallen back on before is no state.
+    /// Reports whether all states of a DAG are recorded in a job, and there is one. That a
+    /// subtask has fallen back before is no state.
     fn has_states(&self, dag: u16, job: u64) -> bool {
         let events = self.events.iter();
         let mut restarts =

@@ -2,9 +2,9 @@
 //! do not
 //! come again.
 //!
-//! A function that fails because of its inputs fails again. What it remembers of jobs that are not
-//! recorded is lacking in a replay, so a fault that follows from that does not come again; nor does
-//! one of a source that is not called, or of a budget.
+//! A function that fails because of its inputs fails again. In a replay it lacks its
+//! memory of jobs that are not recorded, so a fault that follows from that does not come again; nor
+//! does one of a source that is not called, or of a budget.
 //!
 //! # A replay as a machine carries it out
 //!

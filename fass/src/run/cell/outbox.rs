@@ -1,8 +1,8 @@
 //! The fourth cell: records on their way from the instances of one subtask to a reader.
 //!
-//! An instance *stages* a record, which nobody sees; its completion *publishes* it. A record that
-//! an instance staged that never was complete, the next one writes over. A record lies in one
-//! piece: three words, and its bytes. Neither side waits for the other.
+//! An instance *stages* a record, which nobody sees; its completion *publishes* it. If an
+//! instance is never complete, the next one writes over its record. A record lies in one piece:
+//! three words, and its bytes. Neither side waits for the other.
 //!
 //! > **Record invariant.** The words from `read` on up to `written`, round the end, are the
 //! > reader's; all others are those of the *claim*'s holder. A claim is made by an `Acquire`

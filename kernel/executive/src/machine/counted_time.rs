@@ -36,7 +36,7 @@
 //! other cores compute, not all cores had halted, and the clock has not jumped: nothing
 //! is done then. It cannot hide that, of two cores whose timers end at the same time, or
 //! within some 100 ns, the one is first with which QEMU goes on, and that is the host's
-//! choice in the rare cases above. So no several cores should wait for one time.
+//! choice in the rare cases above. So several cores should not wait for one time.
 
 use core::arch::asm;
 use core::sync::atomic::{AtomicBool, Ordering};

@@ -13,7 +13,7 @@ use super::cpu;
 /// How many banks there are, and whether one register enables them all.
 const CAPABILITIES: u32 = 0x179;
 const HAS_CONTROL: u64 = 1 << 8;
-/// That register.
+/// The register that enables all banks.
 const CONTROL: u32 = 0x17b;
 /// The registers of the first bank: what it reports, what it has found, and where.
 const BANK_CONTROL: u32 = 0x400;

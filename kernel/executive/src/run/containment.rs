@@ -6,8 +6,8 @@
 //! core, cause and place, and all other DAGs go on.
 //!
 //! The core leaves the context that it happened in for another one, within an interrupt, and
-//! the context goes back into the stock. What a fault takes until the machine is reset is what
-//! the function owned on the heap, and the app's locks that it held.
+//! the context goes back into the stock. Until the machine is reset a fault keeps all that the
+//! function owned on the heap, and the app's locks that it held.
 //!
 //! That is possible because code that may be at fault is told apart by the
 //! interrupt flag: apps run with interrupts enabled, while code that holds a

@@ -151,7 +151,7 @@ pub trait Commands: Sync {
     /// none of these commands. Allocates nothing.
     fn answer(&self, name: &str, rest: &str, refuse: Refuse<'_>) -> bool;
 
-    /// Does a little of what a command has begun.
+    /// Goes on a little with a command that takes long.
     fn step(&self) {}
 }
 

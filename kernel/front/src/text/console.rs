@@ -3,14 +3,13 @@
 //! Text and machine lines are told apart: only [`json`](super::json) can print a line that begins
 //! with `{`. Printed text goes to the function of the platform that the program's entry names
 //! by [`output!`](crate::output). It is found when the program is linked: a pointer to it would
-//! cost
-//! each image bytes, and each line a look.
+//! cost each image bytes, and each line a look.
 //!
 //! # From a value's `Display` to the bytes that are handed over
 //!
 //! An app's `Display` may take long, print, or panic. So text is made outside every
 //! lock, in a buffer on the stack of the context that prints, with interrupts as they
-//! are there: all of it is then that context's own affair. A line that is full goes on as a
+//! are there: all of it is then that context's own affair. A full buffer goes on as a
 //! *piece*. Up to [`LONGEST`] bytes are one piece, and stay together.
 
 use core::fmt;

@@ -61,9 +61,9 @@ pub(crate) struct BackgroundOptions {
 /// Whether the console sends back what is typed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ConsoleEcho {
-    /// It does, for a terminal that does not show it by itself.
+    /// Each byte is sent back, for a terminal that does not show it by itself.
     On,
-    /// It does not.
+    /// Nothing is sent back: the terminal shows what is typed.
     Off,
 }
 

@@ -1,7 +1,7 @@
 //! Forged witnesses: each number of a true one altered, with the old hashes and with new ones.
 //!
 //! With the old hashes the checker must refuse every one. With new ones it may accept another
-//! proof of the same bounds, say by another chain of the same length. What is stated may be
+//! proof of the same bounds, say by another chain of the same length. The statement may be
 //! altered, too: then the bounds are of other DAGs, and they must hold for these.
 
 use std::fs;

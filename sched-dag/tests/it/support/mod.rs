@@ -3,7 +3,7 @@
 //! A timeline is text, an instant a line: the time, and the events that are written down, by the
 //! journal's words. Only events of the kinds that the text has are compared. Cores are named by
 //! `on`, DAGs, jobs and instances as `dag`, `dag.job` and `dag.job.subtask`; a completed job has
-//! its outcome. What has a `=` is asked of the scheduler: a counter of DAG 0, of DAG 1 as in
+//! its outcome. A word with a `=` is asked of the scheduler: a counter of DAG 0, of DAG 1 as in
 //! `misses@1=2`, or what [`ask`] knows; a line of such at the end needs no time.
 
 #![allow(dead_code, reason = "each test uses a part of this")]

@@ -20,9 +20,9 @@ use kernel::{AppError, Machine, json};
 /// Whether the crime has a budget.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Time {
-    /// It is ended after 6 ms.
+    /// The budget is 6 ms.
     Limited,
-    /// It may take as long as it wants.
+    /// There is none.
     Unlimited,
 }
 
