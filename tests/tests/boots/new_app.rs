@@ -307,7 +307,8 @@ const BEFORE: &str = r#"
     let signal = other.sporadic(Duration::from_millis(9));
     let read = other.using((gain.reading(), log.sending())).source(|_| ());
     read.register(SubtaskAttributes::named("read"));
-    let dags = [first_steps::build(jobs), other];
+    let [first] = first_steps::build(jobs);
+    let dags = [first, other];
     machine.spread(&dags);
 "#;
 
@@ -341,7 +342,7 @@ fn a_main_with_every_call_of_the_machine_is_one_source_on_the_machine_and_on_lin
     let app = repository("every-call", NAME);
     for (file, old, new) in [
         ("src/main.rs", "    options.finish(&[\"jobs\"])?;\n", BEFORE),
-        ("src/main.rs", "&[first_steps::build(jobs)]", "&dags"),
+        ("src/main.rs", "&first_steps::build(jobs)", "&dags"),
         ("src/main.rs", "    let run = machine.run()?;\n", RUN),
         ("src/main.rs", "use fass::finish_create_dags;", USES),
         (

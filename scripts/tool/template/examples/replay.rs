@@ -8,7 +8,7 @@ use fass::finish_create_dags;
 fn main() -> ExitCode {
     virtual_time::replay_command(|_file| {
         // As many jobs as any run has: those that were not recorded are skipped.
-        finish_create_dags(&[app_template::build(100_000)])?;
+        finish_create_dags(&app_template::build(100_000))?;
         Ok(())
     })
 }

@@ -1,4 +1,4 @@
-//! The app's functions, and the DAG of them.
+//! The app's functions, and the DAGs of them.
 //!
 //! Nothing here knows the machine, so the same code is booted (`src/main.rs`)
 //! and tested on the host (`tests/virtual_time.rs`). Put your own functions in
@@ -14,10 +14,10 @@ use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
 /// The time between two releases, and the time that each job has.
 pub const PERIOD: Duration = Duration::from_millis(10);
 
-/// Builds the DAG: `sense`, then `brake` and `steer` side by side, then `act`.
+/// Builds the app's DAGs, here one: `sense`, then `brake` and `steer` side by side, then `act`.
 /// It ends after `jobs` jobs.
 #[must_use]
-pub fn build(jobs: u64) -> Dag {
+pub fn build(jobs: u64) -> [Dag; 1] {
     let dag = create_dag();
     // With `--record FILE` the source's values are recorded, for a replay.
     dag.name("app-template").jobs(jobs).record::<u32>("distance");
@@ -34,7 +34,7 @@ pub fn build(jobs: u64) -> Dag {
     dag.register_subtask(brake, ["distance"], ["force"], taking("brake", 3));
     dag.register_subtask(steer, ["distance"], ["angle"], taking("steer", 4));
     dag.register_sink_subtask(act, ["force", "angle"], PERIOD, taking("act", 1));
-    dag
+    [dag]
 }
 
 /// Brakes harder, the nearer the obstacle is.

@@ -18,8 +18,7 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     let jobs = options.number("jobs", 1..=100_000, 100)?;
     options.finish(&["jobs"])?;
 
-    // Several DAGs of one machine are committed in one call: `&[this, that]`.
-    let commit = finish_create_dags(&[app_template::build(jobs)])?;
+    let commit = finish_create_dags(&app_template::build(jobs))?;
     for warning in commit.warnings() {
         println!("warning: {warning}");
     }

@@ -7,8 +7,7 @@ use virtual_time::VirtualTime;
 #[test]
 fn every_job_is_in_time_and_within_its_bound() {
     let machine = VirtualTime::new().cores(2).policy(Policy::Edf);
-    let dag = app_template::build(200);
-    let commit = finish_create_dags(&[dag]).expect("the DAG is sound");
+    let commit = finish_create_dags(&app_template::build(200)).expect("the DAG is sound");
     let answer = commit.answer("app-template");
     let bound = answer.verdict.bound().expect("it is proven");
     assert!(bound <= app_template::PERIOD);
