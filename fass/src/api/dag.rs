@@ -286,8 +286,8 @@ impl Dag {
             .register(attributes);
     }
 
-    /// Sets the time between two releases, for a DAG of untyped subtasks. (A
-    /// typed source states it itself.)
+    /// Sets the time between two releases, where no source states it: of untyped subtasks, or of a
+    /// [`source`](Self::source).
     #[track_caller]
     pub fn period(&self, period: Duration) -> &Self {
         self.open().replace_period(period);

@@ -167,6 +167,7 @@ fn is_there(folder: &str) -> String {
   src/lib.rs             the functions and their DAG: begin here
   src/main.rs            boots it and reports
   tests/virtual_time.rs  runs it on the host, in virtual time
+  examples/              replay a recording, run it on Linux
 
 "
     )

@@ -504,6 +504,8 @@ pub(in crate::edge) struct OfMachine {
     lines: Vec<LineOf>,
     /// From the launch on.
     replay: Option<(Replay, SignalTimes)>,
+    /// Until core 0 has it.
+    replayer: Option<Box<dyn Drain>>,
 }
 
 impl OfMachine {
@@ -519,6 +521,7 @@ impl OfMachine {
             own: Header::default(),
             lines: Vec::new(),
             replay: None,
+            replayer: None,
         }
     }
 }
@@ -541,6 +544,7 @@ impl Crossing for OfMachine {
         replay.guard(plan);
         self.lines = mem::take(&mut plan.lines);
         let signals = SignalTimes::take_over(plan, &mut replay);
+        self.replayer = signals.raiser(self.host);
         self.replay = Some((replay, signals));
         Ok(())
     }
@@ -583,7 +587,7 @@ impl Crossing for OfMachine {
     }
 
     fn drain(&mut self) -> Option<Box<dyn Drain>> {
-        self.replay.as_ref()?.1.raiser(self.host)
+        self.replayer.take()
     }
 
     fn outcome(&self, is_over: bool) -> Option<ReplayOutcome> {

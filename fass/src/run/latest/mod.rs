@@ -284,8 +284,8 @@ pub struct Staleness {
     /// The topic.
     pub topic: String,
     /// The time, never reached, from the nominal release of the job that the value is
-    /// of to the start of the instance that samples it. `None` if the writer has no
-    /// proven bound, or is sporadic.
+    /// of to the start of the instance that samples it, while the writer is not paused and has
+    /// jobs to come. `None` if the writer has no proven bound, or is sporadic.
     pub bound: Option<Duration>,
 }
 

@@ -49,7 +49,7 @@ fn report(run: &Run, name: &str) {
         statistics.completed, statistics.misses
     );
     let response_times = Distribution::new(run.response_times_ns(name));
-    // Times are kept only for DAGs with a limited number of jobs.
+    // A DAG that has released no job has no times.
     if response_times.count() > 0 {
         println!(
             "{name}: response time: median {}, at most {}",
