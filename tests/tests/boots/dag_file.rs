@@ -276,21 +276,24 @@ fn the_pages_commands_name_files_that_are_there_and_the_first_one_runs() {
     }
 }
 
-/// The README's picture, by the commands that stand below it.
-#[test]
-fn the_readmes_picture_is_what_its_commands_draw() {
-    let mut shown = blocks(&page("README.md")).into_iter();
-    let shown = shown.find(|block| block.text.contains("--svg"));
+/// Draws a page's pictures by the commands that stand there, of which a run comes before each.
+fn assert_drawn(document: &str, pictures: usize) {
     let trace = system::new_log("picture").expect("a folder for logs");
     let trace = trace.with_extension("trace");
-    let mut drawn = String::new();
-    for command in shown.expect("it is there").text.lines() {
-        let words = command.trim_start_matches("$ ").split_whitespace();
-        let words = words.take_while(|word| *word != "-o");
-        let [program, words @ ..] = &*words.collect::<Vec<_>>() else {
-            continue;
+    let shown = blocks(&page(document)).into_iter();
+    let shown = shown.filter(|block| block.text.contains("--svg"));
+    let commands: Vec<String> = shown
+        .flat_map(|block| block.text.lines().map(String::from).collect::<Vec<_>>())
+        .collect();
+    assert_eq!(commands.len(), 2 * pictures, "{document}");
+    for command in commands {
+        let (command, picture) = match command.split_once(" -o ") {
+            Some((command, picture)) => (command, Some(picture)),
+            None => (&*command, None),
         };
-        let words = words.iter().map(|&word| match word {
+        let mut words = command.trim_start_matches("$ ").split_whitespace();
+        let program = words.next().expect("a command");
+        let words = words.map(|word| match word {
             "run.trace" => trace.as_os_str(),
             word => word.as_ref(),
         });
@@ -306,15 +309,23 @@ fn the_readmes_picture_is_what_its_commands_draw() {
         } = output.expect("it can be started");
         let stderr = String::from_utf8_lossy(&stderr);
         assert!(status.success(), "{program}: {stderr}");
-        drawn = String::from_utf8(stdout).expect("text");
+        let Some(picture) = picture else { continue };
+        let drawn = String::from_utf8(stdout).expect("text");
+        let file = format!("docs/{picture}");
+        let kept = page(&file);
+        let golden = Golden {
+            file: &file,
+            below: "<svg",
+            text: &kept["<svg".len()..],
+        };
+        golden.assert_is(&drawn["<svg".len()..]);
     }
     let _ = fs::remove_file(&trace);
-    let file = "docs/schedule.svg";
-    let kept = page(file);
-    let golden = Golden {
-        file,
-        below: "<svg",
-        text: &kept["<svg".len()..],
-    };
-    golden.assert_is(&drawn["<svg".len()..]);
+}
+
+#[test]
+fn the_pages_pictures_are_what_their_commands_draw() {
+    assert_drawn("README.md", 1);
+    assert_drawn("docs/guide.md", 2);
+    assert_drawn("docs/multi-path-bound.md", 1);
 }
