@@ -60,10 +60,6 @@ fn a_sporadic_dag_is_replayed_without_its_packets_on_the_machine_and_on_the_host
         let line = line.expect("it says what came of it");
         let number = |name| line.number_at(name).expect("the line has it");
         assert_eq!([number("compared"), number("uncompared")], [signals, 0]);
-        assert!(
-            outcome.sent.is_empty(),
-            "no fault, and so no file of jobs before one"
-        );
         assert_eq!(text(sent), wanted, "{cores} cores, {policy}");
     }
 

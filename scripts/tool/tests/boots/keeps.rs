@@ -57,6 +57,18 @@ run --on debian --keep x | `--keep` is not for `--on debian`; leave it out",
 }
 
 #[test]
+fn a_replay_of_signals_leaves_no_file_unless_an_instance_has_failed() {
+    let folder = folder("signals");
+    fs::write(folder.join("gaps"), "1ms \"gap 2350\\n\"\n").expect("our folder takes a file");
+    let run = "run --app cruise --mode deterministic --jobs 5 --input gaps --append \
+               releases=packets";
+    succeed(&folder, &format!("{run} --record run.rec"));
+    let replayed = succeed(&folder, &format!("{run} --replay run.rec"));
+    assert!(replayed.contains("\"kind\":\"replayed\""), "{replayed}");
+    assert!(!replayed.contains("before the fault"), "{replayed}");
+}
+
+#[test]
 fn of_a_run_that_died_what_it_said_until_then_is_kept() {
     tool::install::ensure_qemu().expect("QEMU");
     let folder = folder("died");
