@@ -3,7 +3,8 @@
 //! On one core a long instance is preempted again and again while it computes for a
 //! stated time. Its time in the record, without the times of those that preempted it,
 //! has to be the one that it asked for. Times differ a little from job to job,
-//! so that the preemptions come at all places of the loop that looks at the clock.
+//! so that the preemptions come at all places of the loop that looks at the clock, and
+//! where instructions are counted, also at all places between its first two looks.
 
 use core::hint::black_box;
 use core::time::Duration;
@@ -14,8 +15,16 @@ use kernel::{AppError, Machine, json};
 use crate::single::{named, single_every};
 
 const LONG_NS: u64 = 1_200_000;
-const STEP_NS: usize = 3_001;
-const JOBS: u64 = 40;
+const STEP_NS: u64 = 3_001;
+const JOBS: u64 = 150;
+
+/// How long before the next preemption it is released. Its first look at the clock is in job 0
+/// before that, and in the last job after it.
+const BEFORE_NS: u64 = 2_000;
+
+const fn time_ns(job: u64) -> u64 {
+    LONG_NS + job * STEP_NS
+}
 
 /// Runs both, and counts the jobs whose time was too short.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
@@ -31,12 +40,16 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     };
     let (urgent, ms) = (named("short").priority(0), Duration::from_millis(1));
     let short = single_every(ms, "short", 5 * JOBS, urgent, interrupt);
-    let mut times_ns = (LONG_NS..).step_by(STEP_NS);
+    let mut job = 0;
     let compute = move || {
-        let time = Duration::from_nanos(times_ns.next().unwrap_or_default());
-        execute_for(time, Occupation::Spin);
+        (0..job).for_each(|step| {
+            black_box(step);
+        });
+        execute_for(Duration::from_nanos(time_ns(job)), Occupation::Spin);
+        job += 1;
     };
     let long = single_every(5 * ms, "long", JOBS, named("long").priority(1), compute);
+    long.offset(ms - Duration::from_nanos(BEFORE_NS));
     finish_create_dags(&[short, long])?;
     let run = machine.run()?;
 
@@ -52,7 +65,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
         let others = times("short").filter(|(_, start, end)| start_ns < *start && *end < finish_ns);
         let others_ns: u64 = others.map(|(_, start, end)| end - start).sum();
         let own_ns = finish_ns - start_ns - others_ns;
-        too_short += u64::from(own_ns < LONG_NS + job * STEP_NS as u64);
+        too_short += u64::from(own_ns < time_ns(job));
     }
     json::emit("occupation", |line| {
         line.number("jobs", JOBS).number("too_short", too_short);

@@ -44,17 +44,18 @@ struct ExecutionTimer {
 
 impl ExecutionTimer {
     fn from_now() -> Self {
+        // A suspension between the two would be in neither, and so pass for execution.
         let were_enabled = interrupt_flag::disable();
         let context = this_core::get().context();
-        let start_ns = clock::now_ns();
+        let timer = Self {
+            context,
+            start_ns: clock::now_ns(),
+            suspended_before_ns: context.suspended_ns(),
+        };
         if were_enabled {
             interrupt_flag::enable();
         }
-        Self {
-            context,
-            start_ns,
-            suspended_before_ns: context.suspended_ns(),
-        }
+        timer
     }
 
     fn ns(&self) -> u64 {
