@@ -1,7 +1,8 @@
 //! Support of the boot tests, above the host tool's library: a [`Guest`] that a test
 //! describes and boots, [`said`] for what it says, [`stick`] for what it boots from as a PC does,
 //! [`bochs`], where it is not QEMU that boots it, [`markdown`] and
-//! [`fault_page`] for pages that are held to their word, and the tutorials, whose examples are
+//! [`fault_page`] for pages that are held to their word, [`workload`] for what the baseline's policies
+//! do by their rules, and the tutorials, whose examples are
 //! this crate's doctests.
 
 #![forbid(unsafe_code)]
@@ -14,6 +15,7 @@ pub mod guide;
 pub mod markdown;
 pub mod said;
 pub mod stick;
+pub mod workload;
 
 use std::process::Command;
 

@@ -255,15 +255,9 @@ fn list(numbers: impl IntoIterator<Item = u64>) -> String {
 /// Prints the counts and distributions, as a machine line and for people.
 fn emit_summary(name: &str, outcome: &Outcome) {
     let samples = &outcome.samples;
-    let record = samples.record();
-    let [joins, same_index, cross_index, missing] = [
-        record.sets.len(),
-        record.same_index_sets(),
-        record.cross_index_sets(),
-        record.missing_joins(),
-    ];
-    let literal = Distribution::new(record.join_latencies_ns());
-    let cover = Distribution::new(record.cover_delays_ns());
+    let [joins, same_index, cross_index, missing] = samples.counts();
+    let literal = Distribution::new(samples.join_latencies_ns());
+    let cover = Distribution::new(samples.cover_delays_ns());
     json::emit("join_latency", |line| {
         line.text("policy", name)
             .number("subtasks", samples.parallel.len() as u64)

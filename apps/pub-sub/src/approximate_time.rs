@@ -411,10 +411,6 @@ impl<M> ApproximateTime<M> {
 }
 
 impl<M> Synchronizer<M> for ApproximateTime<M> {
-    fn topics(&self) -> usize {
-        self.rings.len()
-    }
-
     fn arrive(&mut self, topic: usize, message: Stamped<M>, outlet: &mut dyn Outlet<M>) {
         let topics = self.rings.len();
         assert!(

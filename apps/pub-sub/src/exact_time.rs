@@ -142,10 +142,6 @@ fn empty<M>(topics: usize) -> Slots<M> {
 }
 
 impl<M> Synchronizer<M> for ExactTime<M> {
-    fn topics(&self) -> usize {
-        self.topics
-    }
-
     fn arrive(&mut self, topic: usize, message: Stamped<M>, outlet: &mut dyn Outlet<M>) {
         assert!(
             topic < self.topics,

@@ -21,10 +21,7 @@
 //! - [`ExactTime`]: equal stamps make a set;
 //! - [`ApproximateTime`], [`Parameters`], [`AgePenalty`]: close stamps make a set;
 //! - [`graph`]: topics, subscriptions and callbacks, and the workers that
-//!   execute them: what the synchronizers run in;
-//! - [`workload`]: the paper's workload under a policy, in virtual time, and what the joins of a
-//!   run
-//!   amount to.
+//!   execute them: what the synchronizers run in.
 //!
 //! It guarantees that every message leaves at most once, that what is held is
 //! bounded by the queue size, and that nothing is allocated after construction
@@ -40,7 +37,6 @@ extern crate alloc;
 mod approximate_time;
 mod exact_time;
 pub mod graph;
-pub mod workload;
 
 use alloc::vec::Drain;
 
@@ -61,9 +57,6 @@ pub struct Stamped<M> {
 ///
 /// A policy can be chosen at run time: `Box<dyn Synchronizer<M>>`.
 pub trait Synchronizer<M> {
-    /// Returns the number of topics.
-    fn topics(&self) -> usize;
-
     /// Takes one message, and hands what leaves on account of it to `outlet`.
     ///
     /// # Panics

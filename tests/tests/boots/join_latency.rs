@@ -5,8 +5,8 @@ use std::num::NonZeroUsize;
 use std::thread;
 
 use fork_join::ExecutionTimes;
+use harness::workload::{self, Stamping};
 use harness::{Guest, Members, Said};
-use pub_sub::workload::{self, Stamping};
 use pub_sub::{ApproximateTime, Parameters};
 use tool::protocol::{MachineLine, Status};
 
@@ -52,28 +52,23 @@ fn close_stamps_join_as_the_policy_does_in_virtual_time() {
         let line = summary(&format!("policy_under_test=approximate {words}"));
         let joins = line.number("joins");
 
-        let jobs = usize::try_from(JOBS).expect("small");
         let queue = NonZeroUsize::new(1000).expect("not 0");
         let parameters = Parameters::new(parallel, queue).max_interval_ns(ms * 1_000_000);
         let mut synchronizer = ApproximateTime::new(parameters);
-        let mut times: Vec<ExecutionTimes> = (0..parallel)
-            .map(|branch| ExecutionTimes::new(1, branch))
-            .collect();
-        let execution_ns = |branch: usize, _| {
-            times[branch]
-                .next_time()
-                .as_nanos()
-                .try_into()
-                .expect("50 ms at most")
+        let times_ns = |branch| {
+            let mut times = ExecutionTimes::new(1, branch);
+            let ns = (0..JOBS).map(|_| times.next_time().as_nanos().try_into());
+            ns.map(|ns| ns.expect("50 ms at most")).collect()
         };
-        let record = workload::run(&mut synchronizer, Stamping::Publication, jobs, execution_ns);
+        let times_ns: Vec<Vec<u64>> = (0..parallel).map(times_ns).collect();
+        let samples = workload::run(&mut synchronizer, Stamping::Publication, &times_ns);
+        let in_virtual_time = samples.joins.len() as u64;
         // A machine takes microseconds for what takes no time there, so that of
         // stamps that are nearly equally close now and then others win.
-        let difference = joins.abs_diff(record.sets.len() as u64);
+        let difference = joins.abs_diff(in_virtual_time);
         assert!(
             difference <= 3,
-            "{} joins in virtual time, {}",
-            record.sets.len(),
+            "{in_virtual_time} joins in virtual time, {}",
             line.text
         );
     }

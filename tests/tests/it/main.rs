@@ -1,5 +1,6 @@
-//! Pages and faults held to their word, without a guest.
+//! Pages and faults held to their word, and the baseline to its reference, without a guest.
 
 mod commit_faults;
 mod documentation;
 mod platforms;
+mod workload;

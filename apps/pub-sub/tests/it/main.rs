@@ -1,5 +1,4 @@
-//! The baselines of publish and subscribe: their properties, step by step, and as a workload.
+//! The baselines of publish and subscribe: their properties, and step by step.
 
 mod properties;
 mod steps;
-mod workload;

@@ -142,18 +142,16 @@ pub(super) struct ConditionFigures {
 impl ConditionFigures {
     /// Computes the figures of one condition.
     pub(super) fn of(samples: &Samples) -> Self {
-        let record = samples.record();
-        let covering = record.covering_sets();
+        let covering = samples.covering_joins();
         let published = |join: usize| {
-            let indices = &record.sets[join].indices;
-            let topics = record.publications_ns.iter().zip(indices);
+            let topics = samples.parallel.iter().zip(samples.indices_of(join));
             topics
-                .filter_map(|(times_ns, &index)| times_ns.get(index))
+                .filter_map(|(spans, &index)| spans.get(usize::try_from(index).ok()?))
+                .map(|span| span.finish_ns)
                 .max()
-                .copied()
         };
-        let joins = samples.joins.iter().enumerate();
-        let join_to_start = joins.filter_map(|(join, joined)| {
+        let all = samples.joins.iter().enumerate();
+        let join_to_start = all.filter_map(|(join, joined)| {
             Some((join, joined.span.start_ns.saturating_sub(published(join)?)))
         });
         let response = covering.iter().enumerate().map(|(job, &join)| {
@@ -163,18 +161,19 @@ impl ConditionFigures {
         });
         let numbered = |values_ns: Vec<u64>| values_ns.into_iter().enumerate().collect();
         let jobs = samples.source.len();
+        let [joins, same_index, cross_index, missing] = samples.counts();
         Self {
             counts: [
                 jobs,
-                record.sets.len(),
-                record.same_index_sets(),
-                record.cross_index_sets(),
-                record.missing_joins(),
+                joins,
+                same_index,
+                cross_index,
+                missing,
                 jobs - covering.len(),
             ],
             samples: [
-                numbered(record.join_latencies_ns()),
-                numbered(record.cover_delays_ns()),
+                numbered(samples.join_latencies_ns()),
+                numbered(samples.cover_delays_ns()),
                 join_to_start.collect(),
                 response.collect(),
             ],

@@ -6,33 +6,40 @@
 use std::num::NonZeroUsize;
 
 use common::random::Random;
-use pub_sub::workload::{self, Record, Stamping};
+use harness::workload::{self, Stamping};
+use join_latency::Samples;
 use pub_sub::{ApproximateTime, ExactTime, Parameters, Synchronizer};
 
 const JOBS: usize = 2000;
 const QUEUE_SIZE: usize = 1000;
 const SEEDS: u64 = 20;
 
-fn run(synchronizer: &mut dyn Synchronizer<usize>, stamping: Stamping, seed: u64) -> Record {
+fn run(
+    synchronizer: &mut dyn Synchronizer<u64>,
+    stamping: Stamping,
+    parallel: usize,
+    seed: u64,
+) -> Samples {
     let mut seeds = Random::new(seed);
-    let topics = (0..synchronizer.topics()).map(|_| Random::new(seeds.number()));
-    let mut times: Vec<Random> = topics.collect();
-    workload::run(synchronizer, stamping, JOBS, |topic, _| {
-        times[topic].within(1_000_000..=50_000_000)
-    })
+    let times_ns = |mut random: Random| {
+        let times_ns = (0..JOBS).map(|_| random.within(1_000_000..=50_000_000));
+        times_ns.collect::<Vec<u64>>()
+    };
+    let topics = (0..parallel).map(|_| times_ns(Random::new(seeds.number())));
+    workload::run(synchronizer, stamping, &topics.collect::<Vec<_>>())
 }
 
-fn exact(parallel: usize, queue_size: usize, seed: u64) -> Record {
+fn exact(parallel: usize, queue_size: usize, seed: u64) -> Samples {
     let mut exact = ExactTime::new(parallel, queue_size);
-    run(&mut exact, Stamping::Release, seed)
+    run(&mut exact, Stamping::Release, parallel, seed)
 }
 
-fn approximate(parallel: usize, max_interval_ms: u64, seed: u64) -> Record {
+fn approximate(parallel: usize, max_interval_ms: u64, seed: u64) -> Samples {
     let queue_size = NonZeroUsize::new(QUEUE_SIZE).expect("not 0");
     let parameters =
         Parameters::new(parallel, queue_size).max_interval_ns(max_interval_ms * 1_000_000);
     let mut approximate = ApproximateTime::new(parameters);
-    run(&mut approximate, Stamping::Publication, seed)
+    run(&mut approximate, Stamping::Publication, parallel, seed)
 }
 
 /// Returns a value at a rank in percent.
@@ -61,17 +68,18 @@ fn approximate_sets_per_job_agree_with_the_reference() {
         let mut sets = 0;
         let mut delays_ns = Vec::new();
         for seed in 1..=SEEDS {
-            let record = approximate(parallel, max_interval_ms, seed);
+            let samples = approximate(parallel, max_interval_ms, seed);
             // Also each run on its own.
-            let difference = (record.sets.len() as u64 * 1000).abs_diff(thousandths * JOBS as u64);
+            let difference =
+                (samples.joins.len() as u64 * 1000).abs_diff(thousandths * JOBS as u64);
             assert!(
                 difference <= 30 * JOBS as u64,
                 "N = {parallel}, {max_interval_ms} ms, seed {seed}: {} sets of {JOBS}, \
                  not about {thousandths} of 1000",
-                record.sets.len()
+                samples.joins.len()
             );
-            sets += record.sets.len();
-            delays_ns.extend(record.cover_delays_ns());
+            sets += samples.joins.len();
+            delays_ns.extend(samples.cover_delays_ns());
         }
         let jobs = JOBS as u64 * SEEDS;
         let difference = (sets as u64 * 1000).abs_diff(thousandths * jobs);
@@ -92,13 +100,10 @@ fn approximate_sets_per_job_agree_with_the_reference() {
 fn exact_joins_every_job_without_delay() {
     for parallel in [2, 4, 6] {
         for seed in 1..=SEEDS {
-            let record = exact(parallel, QUEUE_SIZE, seed);
-            assert_eq!(
-                (record.same_index_sets(), record.missing_joins()),
-                (JOBS, 0)
-            );
-            assert_eq!(record.cover_delays_ns(), [0; JOBS]);
-            assert_eq!(record.join_latencies_ns(), [0; JOBS]);
+            let samples = exact(parallel, QUEUE_SIZE, seed);
+            assert_eq!(samples.counts(), [JOBS, JOBS, 0, 0]);
+            assert_eq!(samples.cover_delays_ns(), [0; JOBS]);
+            assert_eq!(samples.join_latencies_ns(), [0; JOBS]);
         }
     }
 }
@@ -108,9 +113,9 @@ fn exact_loses_joins_when_the_backlog_exceeds_its_queue() {
     // Of the joins of 2000 jobs, 55, 84 and 91 % go missing with a queue of 10; how
     // many varies much from seed to seed.
     for (parallel, percent) in [(2, 55), (4, 84), (6, 91)] {
-        let records: Vec<_> = (1..=SEEDS).map(|seed| exact(parallel, 10, seed)).collect();
-        let missing: usize = records.iter().map(Record::missing_joins).sum();
-        let missing_percent = missing * 100 / (records.len() * JOBS);
+        let missing = (1..=SEEDS).map(|seed| exact(parallel, 10, seed).counts()[3]);
+        let missing: Vec<usize> = missing.collect();
+        let missing_percent = missing.iter().sum::<usize>() * 100 / (missing.len() * JOBS);
         assert!(
             missing_percent.abs_diff(percent) <= 12,
             "{missing_percent} % missing, not about {percent}"
@@ -120,8 +125,8 @@ fn exact_loses_joins_when_the_backlog_exceeds_its_queue() {
 
 #[test]
 fn the_papers_latency_grows_with_the_run() {
-    let record = approximate(2, 10, 1);
-    let median_ns = |sets: usize| rank(&mut record.join_latencies_ns()[..sets].to_vec(), 50);
+    let samples = approximate(2, 10, 1);
+    let median_ns = |sets: usize| rank(&mut samples.join_latencies_ns()[..sets].to_vec(), 50);
     let (short_ns, long_ns) = (median_ns(100), median_ns(1000));
     assert!(long_ns > 4 * short_ns, "{short_ns} to {long_ns}");
 }
