@@ -58,15 +58,6 @@ static IN_KERNEL: Command = Command {
         "cores-up-to": Takes::number(1..=MOST_CORES), or "64";
         /// The length of a unit of time in microseconds.
         "unit-us": Takes::number(100..=10_000_000), or "10000";
-        /// Events less than this apart count as one instant; a 100th of a unit, with --work compute
-        /// a 40th.
-        "window-us": Takes::number(0..=2_500_000);
-        /// How much before a unit's end execution in it ends; a 500th of a unit, with --work
-        /// compute a 40th.
-        "guard-us": Takes::number(0..=2_500_000);
-        /// How far starts and finishes may be from the reference, in percent of a unit; 2, with
-        /// --work compute 5.
-        "tolerance": Takes::number(1..=49);
         /// Whether execution is simulated, or cores also compute, for half of each unit in all.
         "work": Takes::OneOf(&["simulate", "compute"]), or "simulate";
         /// The meaning of time; see ./scripts/run --help.
@@ -80,10 +71,11 @@ Compared are start, finish and preemptions of every instance, and release, finis
 and miss of every job. Printed are the first difference of each failing case, a
 line for each number of cores, and `N passed, M failed`.
 
-The window and the tolerance are there because a machine takes time and its
-events come one after the other, where the reference has them at one instant. In
-the modes threads and kvm a unit takes its real time, and has to be far longer
-than the host's noise.
+A machine takes time, and its events come one after the other, where the reference
+has them at one instant. So those less than a 100th of a unit apart count as one
+instant, and starts and finishes may be 2 percent of a unit from the reference;
+with --work compute these are a 40th and 5 percent. In the modes threads and kvm a
+unit takes its real time, and has to be far longer than the host's noise.
 
 Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
 ",
@@ -96,12 +88,6 @@ pub(super) fn command(words: &[OsString]) -> ExitCode {
 
 fn run_files(options: &Parsed) -> Result<ExitCode, Refusal> {
     let settings = settings(options);
-    let most_us = settings.unit_us / 4;
-    if settings.window_us > most_us || settings.guard_us > most_us {
-        return Err(Refusal::Usage(format!(
-            "the window and the guard may be a quarter of a unit at most, here {most_us} us"
-        )));
-    }
     let mut cases = read(options.files(), schedules::parse).map_err(Refusal::Usage)?;
     let most_cores = options.number("cores-up-to").unwrap_or(MOST_CORES);
     let all = cases.len();
@@ -123,13 +109,9 @@ fn settings(options: &Parsed) -> Settings {
     };
     let mode = options.text("mode").and_then(Mode::from_name);
     let machine = options.text("machine").and_then(Machine::from_name);
-    let number = |name: &str, usual| options.number(name).unwrap_or(usual);
     Settings {
         mode: mode.unwrap_or(usual.mode),
         machine: machine.unwrap_or(usual.machine),
-        guard_us: number("guard-us", usual.guard_us),
-        window_us: number("window-us", usual.window_us),
-        tolerance_percent: number("tolerance", usual.tolerance_percent),
         ..usual
     }
 }
