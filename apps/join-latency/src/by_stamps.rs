@@ -20,7 +20,7 @@ use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
 use fork_join::{ExecutionTimes, PERIOD};
 use join_latency::{Joined, Samples, Span};
 use kernel::{AppError, Event, Lock, Machine};
-use pub_sub::graph::{Call, Graph, Next, TopicId};
+use pub_sub::graph::{Graph, Next};
 use pub_sub::{ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer};
 
 use super::Outcome;
@@ -40,7 +40,9 @@ pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, 
     fass::finish_create_dags(&[workers(machine.cores(), &shared)])?;
     let run = machine.run()?;
     // The workers are at their end, and whatever they still hold of it stays.
-    let graph = shared.graph.with(core::mem::take);
+    let graph = shared
+        .graph
+        .with(|graph| core::mem::replace(graph, Graph::new(0)));
     Ok(Outcome {
         samples: samples(graph),
         allocations: run.allocations(),
@@ -112,8 +114,8 @@ impl Cores {
             let seen = self.event.version();
             let now_ns = self.now_ns();
             match self.graph.with(|graph| graph.take(now_ns)) {
-                Next::Call(group, mut callbacks, call) => {
-                    callbacks.call(call, self);
+                Next::Call(group, mut callbacks, message) => {
+                    callbacks.call(message, self);
                     let now_ns = self.now_ns();
                     let is_awaited = |graph: &mut Graph<Message, Part>| {
                         graph.give_back(group, callbacks, now_ns)
@@ -133,7 +135,7 @@ impl Cores {
         fass::now_ns().saturating_sub(self.epoch_ns.load(Ordering::Relaxed))
     }
 
-    fn publish(&self, topic: TopicId, message: Message) {
+    fn publish(&self, topic: usize, message: Message) {
         self.graph.with(|graph| graph.publish(topic, message));
         self.event.notify();
     }
@@ -197,31 +199,30 @@ impl Experiment {
     /// Builds the graph. Its time 0 is the run's epoch; it shuts down when all has
     /// been published and joined.
     fn graph(self) -> Graph<Message, Part> {
-        let mut graph = Graph::new();
-        let input = graph.add_topic();
-        let outputs: Vec<TopicId> = (0..self.parallel).map(|_| graph.add_topic()).collect();
-        let part = |role| Part {
+        let mut graph = Graph::new(1 + self.parallel);
+        let part = |role, executions| Part {
             experiment: self,
             role,
-            spans: Vec::with_capacity(self.jobs),
+            spans: Vec::with_capacity(executions),
         };
-        let source = graph.add_group(part(Role::Source { output: input }));
+        let source = graph.add_group(part(Role::Source, self.jobs));
         let period_ns = u64::try_from(PERIOD.as_nanos()).unwrap_or(u64::MAX);
         graph.add_timer(source, 0, period_ns);
-        for (branch, &output) in outputs.iter().enumerate() {
+        for branch in 0..self.parallel {
             let times = ExecutionTimes::new(self.seed, branch);
-            let parallel = graph.add_group(part(Role::Parallel { output, times }));
-            graph.subscribe(parallel, input, self.depth.get());
+            let output = FIRST_OUTPUT + branch;
+            let parallel = graph.add_group(part(Role::Parallel { output, times }, self.jobs));
+            graph.subscribe(parallel, INPUT, self.depth.get());
         }
-        let join = graph.add_group(part(Role::Join {
+        let join = Role::Join {
             synchronizer: self.synchronizer(),
-            inputs: outputs.clone(),
-            ready_ns: Vec::with_capacity(self.jobs),
+            joins: Vec::with_capacity(self.jobs),
             indices: Vec::with_capacity(self.jobs * self.parallel),
             expected: self.parallel * self.jobs,
-        }));
-        for &output in &outputs {
-            graph.subscribe(join, output, self.depth.get());
+        };
+        let join = graph.add_group(part(join, 0));
+        for branch in 0..self.parallel {
+            graph.subscribe(join, FIRST_OUTPUT + branch, self.depth.get());
         }
         graph
     }
@@ -230,10 +231,9 @@ impl Experiment {
         match self.matching {
             Matching::Exact => Box::new(ExactTime::new(self.parallel, self.queue.get())),
             Matching::Approximate { max_interval_ns } => {
-                let parameters = Parameters::new(self.parallel, self.queue);
-                Box::new(ApproximateTime::new(
-                    parameters.max_interval_ns(max_interval_ns),
-                ))
+                let mut parameters = Parameters::new(self.parallel, self.queue);
+                parameters.max_interval_ns = Some(max_interval_ns);
+                Box::new(ApproximateTime::new(parameters))
             }
         }
     }
@@ -242,29 +242,32 @@ impl Experiment {
 /// A published message: a job's number, and a stamp.
 type Message = Stamped<u64>;
 
+/// The source's topic.
+const INPUT: usize = 0;
+
+/// The topic of the first parallel subtask; those of the others follow, in their order.
+const FIRST_OUTPUT: usize = 1;
+
 /// The callbacks of one group, with what they have seen so far.
 struct Part {
     experiment: Experiment,
     role: Role,
-    /// Its executions: of a source or a parallel subtask one a job, else one a join.
+    /// The executions of the source or a parallel subtask, one a job.
     spans: Vec<Span>,
 }
 
 enum Role {
     /// Publishes a job at each call of its timer, until all are published.
-    Source { output: TopicId },
+    Source,
     /// Executes each job it receives for a drawn time, and publishes it.
     Parallel {
-        output: TopicId,
+        output: usize,
         times: ExecutionTimes,
     },
     /// Joins what the parallel subtasks publish.
     Join {
         synchronizer: Box<dyn Synchronizer<u64> + Send>,
-        /// The topics of the parallel subtasks, in their order.
-        inputs: Vec<TopicId>,
-        /// When each join was ready.
-        ready_ns: Vec<u64>,
+        joins: Vec<Joined>,
         /// The jobs that were joined, as in [`Samples::indices`].
         indices: Vec<u64>,
         /// How many messages are to come; after that, nothing can happen any more.
@@ -273,25 +276,25 @@ enum Role {
 }
 
 impl Part {
-    /// Executes one of them.
-    fn call(&mut self, call: Call<Message>, cores: &Cores) {
+    /// Executes one of them: for a message, which comes with its topic, or for the timer.
+    fn call(&mut self, message: Option<(usize, Message)>, cores: &Cores) {
         let start_ns = cores.now_ns();
         let spans = &mut self.spans;
-        match (&mut self.role, call) {
-            (Role::Source { output }, _) if spans.len() < self.experiment.jobs => {
+        match (&mut self.role, message) {
+            (Role::Source, _) if spans.len() < self.experiment.jobs => {
                 let stamp_ns = cores.now_ns();
                 let message = spans.len() as u64;
                 spans.push(Span {
                     start_ns,
                     finish_ns: stamp_ns,
                 });
-                cores.publish(*output, Stamped { stamp_ns, message });
+                cores.publish(INPUT, Stamped { stamp_ns, message });
             }
             // The join waits for messages that will never come.
-            (Role::Source { .. }, _) if cores.graph.with(|graph| graph.dropped()) > 0 => {
+            (Role::Source, _) if cores.graph.with(|graph| graph.dropped()) > 0 => {
                 cores.shut_down();
             }
-            (Role::Parallel { output, times }, Call::Message { message: job, .. }) => {
+            (Role::Parallel { output, times }, Some((_, job))) => {
                 // The core is held while the processor halts.
                 fass::execute_for(times.next_time(), Occupation::Hold);
                 let finish_ns = cores.now_ns();
@@ -308,29 +311,25 @@ impl Part {
             (
                 Role::Join {
                     synchronizer,
-                    inputs,
-                    ready_ns,
+                    joins,
                     indices,
                     expected,
                 },
-                Call::Message { topic, message },
+                Some((topic, message)),
             ) => {
-                if let Some(position) = inputs.iter().position(|input| *input == topic) {
-                    let mut outlet = Joining {
-                        cores,
-                        ready_ns,
-                        spans,
-                        indices,
-                    };
-                    synchronizer.arrive(position, message, &mut outlet);
-                    *expected -= 1;
-                }
+                let mut outlet = Joining {
+                    cores,
+                    joins,
+                    indices,
+                };
+                synchronizer.arrive(topic - FIRST_OUTPUT, message, &mut outlet);
+                *expected -= 1;
                 if *expected == 0 {
                     cores.shut_down();
                 }
             }
             // A source that is through; and the graph registers no other timer.
-            (_, Call::Timer { .. }) | (Role::Source { .. }, _) => {}
+            (Role::Source, _) | (_, None) => {}
         }
     }
 }
@@ -339,40 +338,35 @@ impl Part {
 /// calls it. Like the DAG's sink, it only looks.
 struct Joining<'a> {
     cores: &'a Cores,
-    ready_ns: &'a mut Vec<u64>,
-    spans: &'a mut Vec<Span>,
+    joins: &'a mut Vec<Joined>,
     indices: &'a mut Vec<u64>,
 }
 
 impl Outlet<u64> for Joining<'_> {
     fn emitted(&mut self, set: Set<'_, u64>) {
-        self.ready_ns.push(self.cores.now_ns());
+        let ready_ns = self.cores.now_ns();
         let start_ns = self.cores.now_ns();
         self.indices.extend(set.map(|stamped| stamped.message));
-        self.spans.push(Span {
+        let span = Span {
             start_ns,
             finish_ns: self.cores.now_ns(),
-        });
+        };
+        self.joins.push(Joined { ready_ns, span });
     }
 }
 
 /// Takes what a graph has seen when it was shut down and no worker uses it.
 fn samples(graph: Graph<Message, Part>) -> Samples {
-    let lost_inputs = graph.dropped();
     let mut samples = Samples {
-        lost_inputs,
+        lost_inputs: graph.dropped(),
         ..Samples::default()
     };
     for Part { role, spans, .. } in graph.into_callbacks() {
         match role {
-            Role::Source { .. } => samples.source = spans,
+            Role::Source => samples.source = spans,
             Role::Parallel { .. } => samples.parallel.push(spans),
-            Role::Join {
-                ready_ns, indices, ..
-            } => {
-                let joins = ready_ns.into_iter().zip(spans);
-                let joined = |(ready_ns, span)| Joined { ready_ns, span };
-                (samples.joins, samples.indices) = (joins.map(joined).collect(), indices);
+            Role::Join { joins, indices, .. } => {
+                (samples.joins, samples.indices) = (joins, indices);
             }
         }
     }

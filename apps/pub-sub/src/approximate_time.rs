@@ -58,24 +58,28 @@ use crate::{Outlet, Stamped, Synchronizer};
 /// use pub_sub::Parameters;
 ///
 /// let queue_size = NonZeroUsize::new(10).expect("not 0");
-/// let parameters = Parameters::new(3, queue_size)
-///     .max_interval_ns(30_000_000)
-///     .lower_bound_ns(0, 25_000_000);
+/// let mut parameters = Parameters::new(3, queue_size);
+/// parameters.max_interval_ns = Some(30_000_000);
+/// parameters.lower_bounds_ns[0] = 25_000_000;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Parameters {
-    queue_size: NonZeroUsize,
-    /// `None` for no limit.
-    max_interval_ns: Option<u64>,
-    age_penalty: AgePenalty,
-    /// One a topic.
-    lower_bounds_ns: Vec<u64>,
+    /// How many messages of a topic are held between arrivals, at most.
+    pub queue_size: NonZeroUsize,
+    /// How far the earliest and the latest stamp of a first candidate may be apart, itself
+    /// included; `None` for no limit. Later candidates are not tested: they are better.
+    pub max_interval_ns: Option<u64>,
+    /// How much a later set has to be better by.
+    pub age_penalty: AgePenalty,
+    /// For each topic how far two successive stamps are apart at least, so that a set may be
+    /// proved best without waiting for the next message. It is believed: a promise that is not
+    /// kept changes which sets come out.
+    pub lower_bounds_ns: Vec<u64>,
 }
 
 impl Parameters {
     /// Starts with the defaults: no longest interval, an age penalty of 0.1, lower
-    /// bounds of 0. At most `queue_size` messages of a topic are held between
-    /// arrivals.
+    /// bounds of 0.
     ///
     /// # Panics
     ///
@@ -92,39 +96,6 @@ impl Parameters {
             age_penalty: AgePenalty::default(),
             lower_bounds_ns: vec![0; topics],
         }
-    }
-
-    /// Limits how far the earliest and the latest stamp of a first candidate may be
-    /// apart, itself included. Later candidates are not tested: they are better.
-    #[must_use]
-    pub fn max_interval_ns(mut self, max_interval_ns: u64) -> Self {
-        self.max_interval_ns = Some(max_interval_ns);
-        self
-    }
-
-    /// Sets how much a later set has to be better by.
-    #[must_use]
-    pub fn age_penalty(mut self, age_penalty: AgePenalty) -> Self {
-        self.age_penalty = age_penalty;
-        self
-    }
-
-    /// Promises that two successive stamps of a topic are at least this far apart,
-    /// so that a set may be proved best without waiting for the next message. It is
-    /// believed: a promise that is not kept changes which sets come out.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such topic.
-    #[must_use]
-    pub fn lower_bound_ns(mut self, topic: usize, lower_bound_ns: u64) -> Self {
-        let topics = self.lower_bounds_ns.len();
-        assert!(
-            topic < topics,
-            "there is no topic {topic}; there are {topics}, counted from 0"
-        );
-        self.lower_bounds_ns[topic] = lower_bound_ns;
-        self
     }
 }
 
@@ -422,11 +393,6 @@ impl<M> Synchronizer<M> for ApproximateTime<M> {
         if self.rings[topic].entries.len() > self.parameters.queue_size.get() {
             self.overflow(topic, outlet);
         }
-    }
-
-    fn held(&self, topic: usize) -> usize {
-        assert!(topic < self.rings.len(), "there is no topic {topic}");
-        self.rings[topic].entries.len()
     }
 }
 

@@ -33,33 +33,8 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-/// A topic of a [`Graph`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TopicId(usize);
-
-/// A group of a [`Graph`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GroupId(usize);
-
-/// Why a callback is executed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Call<M> {
-    /// A timer of the group was due at this time.
-    Timer {
-        /// The time in nanoseconds.
-        due_ns: u64,
-    },
-    /// A subscription of the group has this message.
-    Message {
-        /// The topic on which it was published.
-        topic: TopicId,
-        /// The message.
-        message: M,
-    },
-}
-
 /// Topics, groups, timers and subscriptions that belong together. `M` is the type of
-/// all messages, `C` of all groups' callbacks.
+/// all messages, `C` of all groups' callbacks. Topics and groups are numbered from 0.
 #[derive(Debug)]
 pub struct Graph<M, C> {
     /// For each topic its subscriptions.
@@ -80,7 +55,7 @@ struct Timer {
 
 #[derive(Debug)]
 struct Subscription<M> {
-    topic: TopicId,
+    topic: usize,
     group: usize,
     queue: VecDeque<M>,
     depth: usize,
@@ -90,8 +65,9 @@ struct Subscription<M> {
 /// The next work of a worker.
 #[derive(Debug)]
 pub enum Next<M, C> {
-    /// Call these callbacks and give them back.
-    Call(GroupId, C, Call<M>),
+    /// Call the callbacks of this group and give them back: for a message, which comes with its
+    /// topic, or for the timer that is due.
+    Call(usize, C, Option<(usize, M)>),
     /// Look again when something was published or given back, or at this time;
     /// `u64::MAX` is never.
     WaitUntil(u64),
@@ -99,18 +75,12 @@ pub enum Next<M, C> {
     End,
 }
 
-impl<M, C> Default for Graph<M, C> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl<M, C> Graph<M, C> {
-    /// Makes an empty graph.
+    /// Makes a graph of so many topics, without groups.
     #[must_use]
-    pub const fn new() -> Self {
+    pub fn new(topics: usize) -> Self {
         Self {
-            topics: Vec::new(),
+            topics: (0..topics).map(|_| Vec::new()).collect(),
             groups: Vec::new(),
             timers: Vec::new(),
             subscriptions: Vec::new(),
@@ -118,16 +88,10 @@ impl<M, C> Graph<M, C> {
         }
     }
 
-    /// Adds a topic.
-    pub fn add_topic(&mut self) -> TopicId {
-        self.topics.push(Vec::new());
-        TopicId(self.topics.len() - 1)
-    }
-
     /// Adds a group with its callbacks.
-    pub fn add_group(&mut self, callbacks: C) -> GroupId {
+    pub fn add_group(&mut self, callbacks: C) -> usize {
         self.groups.push(Some(callbacks));
-        GroupId(self.groups.len() - 1)
+        self.groups.len() - 1
     }
 
     /// Adds a timer to a group: due first at `first_ns`, then each `period_ns`.
@@ -135,10 +99,10 @@ impl<M, C> Graph<M, C> {
     /// # Panics
     ///
     /// If the period is 0.
-    pub fn add_timer(&mut self, group: GroupId, first_ns: u64, period_ns: u64) {
+    pub fn add_timer(&mut self, group: usize, first_ns: u64, period_ns: u64) {
         assert!(period_ns > 0, "a timer's period is at least 1 ns");
         self.timers.push(Timer {
-            group: group.0,
+            group,
             next_ns: first_ns,
             period_ns,
         });
@@ -149,12 +113,12 @@ impl<M, C> Graph<M, C> {
     /// # Panics
     ///
     /// If the depth is 0 or there is no such topic.
-    pub fn subscribe(&mut self, group: GroupId, topic: TopicId, depth: usize) {
+    pub fn subscribe(&mut self, group: usize, topic: usize, depth: usize) {
         assert!(depth > 0, "a subscription queues at least 1 message");
-        self.topics[topic.0].push(self.subscriptions.len());
+        self.topics[topic].push(self.subscriptions.len());
         self.subscriptions.push(Subscription {
             topic,
-            group: group.0,
+            group,
             queue: VecDeque::with_capacity(depth),
             depth,
             dropped: 0,
@@ -166,11 +130,11 @@ impl<M, C> Graph<M, C> {
     /// # Panics
     ///
     /// If there is no such topic.
-    pub fn publish(&mut self, topic: TopicId, message: M)
+    pub fn publish(&mut self, topic: usize, message: M)
     where
         M: Clone,
     {
-        for &index in &self.topics[topic.0] {
+        for &index in &self.topics[topic] {
             self.subscriptions[index].push(message.clone());
         }
     }
@@ -182,8 +146,8 @@ impl<M, C> Graph<M, C> {
         }
         for timer in self.timers.iter_mut().filter(|timer| timer.is_due(now_ns)) {
             if let Some(callbacks) = self.groups[timer.group].take() {
-                let due_ns = timer.serve(now_ns);
-                return Next::Call(GroupId(timer.group), callbacks, Call::Timer { due_ns });
+                timer.serve(now_ns);
+                return Next::Call(timer.group, callbacks, None);
             }
         }
         for subscription in &mut self.subscriptions {
@@ -192,9 +156,8 @@ impl<M, C> Graph<M, C> {
                 && let Some(message) = subscription.queue.pop_front()
                 && let Some(callbacks) = group.take()
             {
-                let topic = subscription.topic;
-                let call = Call::Message { topic, message };
-                return Next::Call(GroupId(subscription.group), callbacks, call);
+                let message = Some((subscription.topic, message));
+                return Next::Call(subscription.group, callbacks, message);
             }
         }
         // A timer that is due has a busy group: the worker that gives that back sees it.
@@ -209,12 +172,12 @@ impl<M, C> Graph<M, C> {
     /// # Panics
     ///
     /// If there is no such group.
-    pub fn give_back(&mut self, group: GroupId, callbacks: C, now_ns: u64) -> bool {
-        self.groups[group.0] = Some(callbacks);
+    pub fn give_back(&mut self, group: usize, callbacks: C, now_ns: u64) -> bool {
+        self.groups[group] = Some(callbacks);
         let mut timers = self.timers.iter();
         let mut subscriptions = self.subscriptions.iter();
-        timers.any(|timer| timer.group == group.0 && timer.is_due(now_ns))
-            || subscriptions.any(|one| one.group == group.0 && !one.queue.is_empty())
+        timers.any(|timer| timer.group == group && timer.is_due(now_ns))
+            || subscriptions.any(|one| one.group == group && !one.queue.is_empty())
     }
 
     /// Ends the taking of callbacks for good.
@@ -240,13 +203,11 @@ impl Timer {
         self.next_ns <= now_ns
     }
 
-    /// Moves on to the next time that is not past, and returns when it was due.
-    fn serve(&mut self, now_ns: u64) -> u64 {
-        let due_ns = self.next_ns;
-        let behind = now_ns.saturating_sub(due_ns.saturating_add(self.period_ns));
+    /// Moves on to the next time that is not past.
+    fn serve(&mut self, now_ns: u64) {
+        let behind = now_ns.saturating_sub(self.next_ns.saturating_add(self.period_ns));
         let periods = 1 + behind.div_ceil(self.period_ns);
-        self.next_ns = due_ns.saturating_add(self.period_ns.saturating_mul(periods));
-        due_ns
+        self.next_ns = (self.next_ns).saturating_add(self.period_ns.saturating_mul(periods));
     }
 }
 
@@ -262,59 +223,52 @@ impl<M> Subscription<M> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Call, Graph, GroupId, Next, TopicId};
+    use super::{Graph, Next};
 
     /// Callbacks that are only a name.
     type Names = Graph<u32, &'static str>;
 
-    /// Takes what is ready, as (name, what it is called for).
-    fn take(graph: &mut Names, now_ns: u64) -> Option<(GroupId, &'static str, Call<u32>)> {
+    /// Takes what is ready, as (name, message with its topic).
+    fn take(graph: &mut Names, now_ns: u64) -> Option<(&'static str, Option<(usize, u32)>)> {
         match graph.take(now_ns) {
-            Next::Call(group, name, call) => Some((group, name, call)),
+            Next::Call(_, name, message) => Some((name, message)),
             Next::WaitUntil(_) | Next::End => None,
         }
     }
 
-    fn message(topic: TopicId, message: u32) -> Call<u32> {
-        Call::Message { topic, message }
-    }
-
     #[test]
     fn timers_come_before_subscriptions_and_both_in_order() {
-        let mut graph = Names::new();
-        let topic = graph.add_topic();
+        let (mut graph, topic) = (Names::new(1), 0);
         let groups = ["a", "b", "c"].map(|name| graph.add_group(name));
         graph.subscribe(groups[2], topic, 3);
         graph.subscribe(groups[0], topic, 3);
         graph.add_timer(groups[1], 10, 5);
         graph.publish(topic, 7);
-        let names = core::iter::from_fn(|| take(&mut graph, 10)).map(|(_, name, _)| name);
+        let names = core::iter::from_fn(|| take(&mut graph, 10)).map(|(name, _)| name);
         assert_eq!(names.collect::<Vec<_>>(), ["b", "c", "a"]);
     }
 
     #[test]
     fn callbacks_of_a_group_exclude_each_other() {
-        let mut graph = Names::new();
-        let topics = [graph.add_topic(), graph.add_topic()];
+        let (mut graph, topics) = (Names::new(2), [0, 1]);
         let group = graph.add_group("both");
         for topic in topics {
             graph.subscribe(group, topic, 2);
         }
         graph.publish(topics[1], 1);
         graph.publish(topics[0], 2);
-        let (_, name, call) = take(&mut graph, 0).unwrap();
-        assert_eq!(call, message(topics[0], 2));
+        let (name, message) = take(&mut graph, 0).unwrap();
+        assert_eq!(message, Some((topics[0], 2)));
         assert!(matches!(graph.take(0), Next::WaitUntil(u64::MAX)));
         assert!(graph.give_back(group, name, 0), "another one waits");
-        let (_, name, call) = take(&mut graph, 0).unwrap();
-        assert_eq!(call, message(topics[1], 1));
+        let (name, message) = take(&mut graph, 0).unwrap();
+        assert_eq!(message, Some((topics[1], 1)));
         assert!(!graph.give_back(group, name, 0));
     }
 
     #[test]
     fn a_full_queue_drops_its_oldest_message() {
-        let mut graph = Names::new();
-        let topic = graph.add_topic();
+        let (mut graph, topic) = (Names::new(1), 0);
         let group = graph.add_group("slow");
         graph.subscribe(group, topic, 2);
         for number in 1..=5 {
@@ -322,8 +276,8 @@ mod tests {
         }
         assert_eq!(graph.dropped(), 3);
         for number in [4, 5] {
-            let (_, name, call) = take(&mut graph, 0).unwrap();
-            assert_eq!(call, message(topic, number));
+            let (name, message) = take(&mut graph, 0).unwrap();
+            assert_eq!(message, Some((topic, number)));
             graph.give_back(group, name, 0);
         }
         assert_eq!(take(&mut graph, 0), None);
@@ -331,24 +285,25 @@ mod tests {
 
     #[test]
     fn a_timer_keeps_its_grid_and_skips_what_it_missed() {
-        let mut graph = Names::new();
+        let mut graph = Names::new(0);
         let group = graph.add_group("timer");
         graph.add_timer(group, 100, 10);
         assert!(matches!(graph.take(99), Next::WaitUntil(100)));
         // Served late by less than a period, exactly one, and more.
-        for (now_ns, due_ns) in [(103, 100), (120, 110), (165, 120), (170, 170)] {
-            let (_, name, call) = take(&mut graph, now_ns).unwrap();
-            assert_eq!(call, Call::Timer { due_ns }, "at {now_ns}");
+        for (now_ns, next_ns) in [(103, 110), (120, 120), (165, 170), (170, 180)] {
+            let (name, message) = take(&mut graph, now_ns).unwrap();
+            let next = graph.timers[0].next_ns;
+            assert_eq!((message, next), (None, next_ns), "at {now_ns}");
             graph.give_back(group, name, now_ns);
         }
     }
 
     #[test]
     fn a_worker_learns_of_a_timer_whose_group_is_busy() {
-        let mut graph = Names::new();
+        let mut graph = Names::new(0);
         let group = graph.add_group("timer");
         graph.add_timer(group, 0, 10);
-        let (_, name, _) = take(&mut graph, 0).unwrap();
+        let (name, _) = take(&mut graph, 0).unwrap();
         assert!(matches!(graph.take(5), Next::WaitUntil(10)));
         assert!(matches!(graph.take(10), Next::WaitUntil(u64::MAX)));
         assert!(graph.give_back(group, name, 10), "it is due by now");
@@ -356,7 +311,7 @@ mod tests {
 
     #[test]
     fn nothing_is_taken_after_the_shutdown() {
-        let mut graph = Names::new();
+        let mut graph = Names::new(0);
         let group = graph.add_group("timer");
         graph.add_timer(group, 0, 10);
         graph.shut_down();

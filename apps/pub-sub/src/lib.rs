@@ -63,13 +63,6 @@ pub trait Synchronizer<M> {
     ///
     /// If there is no such topic.
     fn arrive(&mut self, topic: usize, message: Stamped<M>, outlet: &mut dyn Outlet<M>);
-
-    /// Returns how many messages of a topic have arrived and not left.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such topic.
-    fn held(&self, topic: usize) -> usize;
 }
 
 /// Where messages leave a synchronizer to.

@@ -53,7 +53,8 @@ fn close_stamps_join_as_the_policy_does_in_virtual_time() {
         let joins = line.number("joins");
 
         let queue = NonZeroUsize::new(1000).expect("not 0");
-        let parameters = Parameters::new(parallel, queue).max_interval_ns(ms * 1_000_000);
+        let mut parameters = Parameters::new(parallel, queue);
+        parameters.max_interval_ns = Some(ms * 1_000_000);
         let mut synchronizer = ApproximateTime::new(parameters);
         let times_ns = |branch| {
             let mut times = ExecutionTimes::new(1, branch);

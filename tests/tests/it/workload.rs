@@ -36,8 +36,8 @@ fn exact(parallel: usize, queue_size: usize, seed: u64) -> Samples {
 
 fn approximate(parallel: usize, max_interval_ms: u64, seed: u64) -> Samples {
     let queue_size = NonZeroUsize::new(QUEUE_SIZE).expect("not 0");
-    let parameters =
-        Parameters::new(parallel, queue_size).max_interval_ns(max_interval_ms * 1_000_000);
+    let mut parameters = Parameters::new(parallel, queue_size);
+    parameters.max_interval_ns = Some(max_interval_ms * 1_000_000);
     let mut approximate = ApproximateTime::new(parameters);
     run(&mut approximate, Stamping::Publication, parallel, seed)
 }

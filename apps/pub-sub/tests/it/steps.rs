@@ -92,21 +92,22 @@ fn synchronizer(words: &str) -> Box<dyn Synchronizer<u64>> {
     }
     let no_penalty = AgePenalty::from_factor(1, 0).expect("in range");
     let queue_size = NonZeroUsize::new(queue_size).expect("in range");
-    let mut parameters = Parameters::new(topics, queue_size).age_penalty(no_penalty);
+    let mut parameters = Parameters::new(topics, queue_size);
+    parameters.age_penalty = no_penalty;
     for option in words[3..].chunks(2) {
         let pair = |separator| option[1].split_once(separator).expect(option[1]);
-        parameters = match option[0] {
-            "within" => parameters.max_interval_ns(number(option[1])),
+        match option[0] {
+            "within" => parameters.max_interval_ns = Some(number(option[1])),
             "bound" => {
                 let (topic, bound_ns) = pair('=');
-                parameters.lower_bound_ns(number(topic), number(bound_ns))
+                parameters.lower_bounds_ns[number::<usize>(topic)] = number(bound_ns);
             }
             _ => {
                 let (factor, shift) = pair('/');
                 let penalty = AgePenalty::from_factor(number(factor), number(shift));
-                parameters.age_penalty(penalty.expect("in range"))
+                parameters.age_penalty = penalty.expect("in range");
             }
-        };
+        }
     }
     Box::new(ApproximateTime::new(parameters))
 }

@@ -112,21 +112,19 @@ fn parse_parameters(
     mut parameters: Parameters,
 ) -> Result<Parameters, Malformed> {
     if words[0] != "-" {
-        parameters = parameters.max_interval_ns(line.number(words[0])?);
+        parameters.max_interval_ns = Some(line.number(words[0])?);
     }
     let (factor, shift) = (line.number(words[1])?, line.number(words[2])?);
-    let age_penalty = AgePenalty::from_factor(factor, shift).ok_or_else(|| {
+    parameters.age_penalty = AgePenalty::from_factor(factor, shift).ok_or_else(|| {
         line.malformed(format!(
             "the factor {factor} / 2^{shift} is out of range; expected 1 to {} / 2^(0 to {})",
             AgePenalty::MOST_FACTOR,
             AgePenalty::MOST_SHIFT
         ))
     })?;
-    let mut bounds = words[3..].iter().enumerate();
-    bounds.try_fold(
-        parameters.age_penalty(age_penalty),
-        |parameters, (topic, bound)| Ok(parameters.lower_bound_ns(topic, line.number(bound)?)),
-    )
+    let bounds = words[3..].iter().map(|bound| line.number(bound));
+    parameters.lower_bounds_ns = bounds.collect::<Result<_, _>>()?;
+    Ok(parameters)
 }
 
 fn parse_arrivals(lines: &mut Lines<'_>, topics: usize) -> Result<Vec<Arrival>, Malformed> {
