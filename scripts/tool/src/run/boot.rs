@@ -80,5 +80,5 @@ fn for_linux(app: Option<&str>) -> Result<PathBuf, String> {
     let (app, folder) = package.ok_or(
         "`--on`: which package is the image of? say `cargo run -- --on linux` in the app's folder",
     )?;
-    Ok(image::build_linux(app, Some(Path::new(&folder)))?.path)
+    image::build_linux(app, Some(Path::new(&folder)))
 }

@@ -26,7 +26,7 @@ use super::loading;
 use super::{RUN, check_files, choose_app};
 use crate::child;
 use crate::files;
-use crate::image::{self, Profile};
+use crate::image;
 use crate::install;
 use crate::options::{Command, Opt, Parsed, Refusal, Takes, did_you_mean};
 use crate::qemu::{Mode, Qemu};
@@ -132,7 +132,7 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
         Some(path) => path.into(),
         None => {
             eprintln!("building `{app}` by the profile `gdb`");
-            image::build_by(&app, Profile::Gdb)?.path
+            image::build_for_gdb(&app)?
         }
     };
     let places = own.text("break").unwrap_or_default();

@@ -146,7 +146,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let log = Log::choose(options, &app)?;
     let image = match options.path("image") {
         Some(path) => path.into(),
-        None => image::build(&app)?.path,
+        None => image::build(&app)?,
     };
     // Interactive runs need real time; a firmware takes minutes where instructions are counted.
     let is_live = options.is_given("console") || handed::is_live(options);
