@@ -323,7 +323,7 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         };
         // Nothing has run, so the person's earlier log must not be lost.
         log.restore();
-        return RUN.refuse(&(lines + remedy));
+        return RUN.report(Refusal::Usage(lines + remedy));
     }
     match outcome.transcript.verdict() {
         // The screen has shown the guest's own reason already.
@@ -342,7 +342,8 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         }
         _ => String::new(),
     };
-    let code = RUN.fail(&format!("failed: {}{remedy}", fault.reason));
+    let line = format!("failed: {}{remedy}", fault.reason);
+    let code = RUN.report(Refusal::Failure(line));
     // Ctrl-C has the last word: the fault of a run that was cut short is not the app's.
     if by_person {
         return ExitCode::from(BY_PERSON);
