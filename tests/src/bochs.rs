@@ -43,7 +43,7 @@ pub fn succeed(command: &str, package: &str, words: &str, model: &str, cores: u6
         install::ensure(&install::BOCHS)?;
         let program = find_program("bochs").ok_or("there is no program `bochs`")?;
         let words = format!("{words} end=off");
-        let iso = Medium::new(Loader::Bios, &built(package)?.path, &words, None)?;
+        let iso = Medium::new(Loader::Bios, &built(package)?, &words, None)?;
         if !command.is_empty() {
             put_before(command, iso.path())?;
         }

@@ -22,7 +22,7 @@ use std::process::ChildStdin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use tool::image::{self, Image};
+use tool::image;
 use tool::install;
 use tool::outcome::{Outcome, boot_with_input};
 use tool::protocol::Status;
@@ -263,7 +263,7 @@ impl Guest {
         let run = || {
             let image = match &self.image {
                 Some(file) => install::ensure_qemu().map(|()| file.clone())?,
-                None => built(&self.package)?.path,
+                None => built(&self.package)?,
             };
             install::ensure_loader(self.qemu.loader)?;
             let log = system::new_log(&self.package)?;
@@ -335,8 +335,8 @@ impl Guest {
 }
 
 /// Builds each image once in the life of a test binary.
-pub(crate) fn built(package: &str) -> Result<Image, String> {
-    static BUILT: Mutex<BTreeMap<String, Image>> = Mutex::new(BTreeMap::new());
+pub(crate) fn built(package: &str) -> Result<PathBuf, String> {
+    static BUILT: Mutex<BTreeMap<String, PathBuf>> = Mutex::new(BTreeMap::new());
     // The map is whole at every moment, so a panic elsewhere does not harm it.
     let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(image) = built.get(package) {

@@ -31,13 +31,6 @@ pub fn most_stripped_bytes(app: &str) -> u64 {
     }
 }
 
-/// A built image.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Image {
-    /// The path of the file.
-    pub path: PathBuf,
-}
-
 /// Returns the names of the apps: the packages under `apps/`, sorted.
 #[must_use]
 pub fn apps() -> Vec<String> {
@@ -145,36 +138,24 @@ impl<'w> Contents<'w> {
     }
 }
 
-/// The cargo profile of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Profile {
-    /// Optimized, as it runs.
-    Release,
-    /// Not optimized, so that a debugger shows every variable.
-    Gdb,
-}
-
-/// Builds the image of a package in release. Cargo's progress and errors go to standard error as
-/// they come.
+/// Builds the image of a package in release, and returns the file. Cargo's progress and errors go
+/// to standard error as they come.
 ///
 /// # Errors
 ///
 /// Cargo failed, or the package has no binary of its own name.
-pub fn build(package: &str) -> Result<Image, String> {
-    build_by(package, Profile::Release)
+pub fn build(package: &str) -> Result<PathBuf, String> {
+    build_target(package, "release", ["--bin", package], None)
 }
 
-/// Builds the image of a package by a profile, as [`build`] does.
+/// Builds the image of a package as [`build`] does, but not optimized, so that a debugger shows
+/// every variable.
 ///
 /// # Errors
 ///
 /// As [`build`].
-pub fn build_by(package: &str, profile: Profile) -> Result<Image, String> {
-    let profile = match profile {
-        Profile::Release => "release",
-        Profile::Gdb => "gdb",
-    };
-    build_target(package, profile, ["--bin", package], None)
+pub fn build_for_gdb(package: &str) -> Result<PathBuf, String> {
+    build_target(package, "gdb", ["--bin", package], None)
 }
 
 /// Makes sure that an app has a program for Linux.
@@ -210,7 +191,7 @@ fn linux_name(app: &str) -> String {
 /// # Errors
 ///
 /// Cargo failed, or the package has no such program.
-pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<Image, String> {
+pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<PathBuf, String> {
     build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
@@ -219,7 +200,7 @@ pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<Image, String> {
 /// # Errors
 ///
 /// Cargo failed, or the package has no such test.
-pub fn build_test(package: &str, test: &str) -> Result<Image, String> {
+pub fn build_test(package: &str, test: &str) -> Result<PathBuf, String> {
     build_target(package, "linux", ["--test", test], None)
 }
 
@@ -241,7 +222,7 @@ fn build_target(
     profile: &str,
     target: [&str; 2],
     folder: Option<&Path>,
-) -> Result<Image, String> {
+) -> Result<PathBuf, String> {
     let [kind, name] = target;
     let (verb, flags) = match kind {
         // Only `cargo rustc` takes flags for the last crate alone.
@@ -260,10 +241,8 @@ fn build_target(
     let (messages, ended) = system::messages_of(&mut command);
     ended.map_err(|why| failed(&why))?;
     let mut paths = messages.iter().filter_map(|it| executable(it, name));
-    match paths.next_back() {
-        Some(path) => Ok(Image { path }),
-        None => Err(failed("cargo built no binary of that name")),
-    }
+    let path = paths.next_back();
+    path.ok_or_else(|| failed("cargo built no binary of that name"))
 }
 
 /// Reports on standard error that another command builds images: cargo would wait for it silently.
@@ -287,20 +266,6 @@ fn executable(message: &Value, package: &str) -> Option<PathBuf> {
     let name = message.at(&["target", "name"]).and_then(Value::as_text)?;
     let path = message.get("executable").and_then(Value::as_text)?;
     (name == package).then(|| path.into())
-}
-
-impl Image {
-    /// Returns the bytes that the image would have after stripping symbols
-    /// and debugging data.
-    ///
-    /// # Errors
-    ///
-    /// In words: the file cannot be read, or is no ELF file.
-    pub fn stripped_bytes(&self) -> Result<u64, String> {
-        let place = self.path.display();
-        let bytes = fs::read(&self.path).map_err(|error| format!("`{place}`: {error}"))?;
-        elf::stripped_bytes(&bytes).map_err(|error| format!("`{place}`: {error}"))
-    }
 }
 
 #[cfg(test)]

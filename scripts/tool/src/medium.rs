@@ -113,7 +113,7 @@ fn check(options: &Parsed) -> Result<String, String> {
 fn make(options: &Parsed, words: &str) -> Result<String, String> {
     let image = match options.path("image") {
         Some(path) => path.into(),
-        None => image::build(options.text("app").unwrap_or_default())?.path,
+        None => image::build(options.text("app").unwrap_or_default())?,
     };
     let module = options.path("module");
     let mut lines = String::new();
@@ -314,7 +314,7 @@ impl Section {
 ///
 /// In words: the build failed, or its result is none of ours.
 pub fn application(contents: &Contents<'_>) -> Result<Vec<u8>, String> {
-    let own = image::build("boot-efi")?.path;
+    let own = image::build("boot-efi")?;
     let made = assemble(&files::read_at(&own)?, parts(contents));
     made.map_err(|why| format!("`{}`: {why}", files::shown_path(&own)))
 }

@@ -244,13 +244,13 @@ pub fn run(plan: &SoakPlan, mut show: impl FnMut(u64)) -> Result<SoakReport, Str
         memory_mib: MEMORY_MIB,
         ..Qemu::default()
     };
-    probe::choose(Some(plan.mode), plan.mode, &qemu, &image.path)?;
+    probe::choose(Some(plan.mode), plan.mode, &qemu, &image)?;
     let next = AtomicU64::new(plan.rounds.start);
     let mut report = SoakReport::default();
     let (send, receive) = mpsc::channel();
     thread::scope(|scope| {
         for _ in 0..plan.side_by_side.max(1) {
-            let (send, next, qemu, path) = (send.clone(), &next, &qemu, &image.path);
+            let (send, next, qemu, path) = (send.clone(), &next, &qemu, &image);
             scope.spawn(move || {
                 loop {
                     // Each worker takes the next round, so that none waits for a slow one.

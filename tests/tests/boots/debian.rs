@@ -49,7 +49,7 @@ fn the_tests_of_linux_pass_by_sched_ext_too() {
         ("mechanism_replays", 1),
         ("wires::", 2),
     ] {
-        let said = run(&program.path, only);
+        let said = run(&program, only);
         assert!(said.contains("by SchedExt"), "{said}");
         assert!(said.contains(&format!("ok. {passed} passed")), "{said}");
     }

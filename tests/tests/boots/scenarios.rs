@@ -49,7 +49,7 @@ fn each_scenario_is_as_it_says_where_cores_run_side_by_side() {
 #[ignore = "fetches 145 MB of Debian's; `cargo test -p harness --test boots -- --ignored` runs it"]
 fn on_debians_linux_each_scenario_is_as_it_says_by_both_mechanisms() {
     let program = image::build_linux("guest-tests", None).expect("it is built");
-    let program = program.path.to_string_lossy();
+    let program = program.to_string_lossy();
     for mechanism in ["fifo", "sched_ext"] {
         run(|cores| {
             let cores = cores.to_string();

@@ -12,9 +12,9 @@ use std::process::ExitCode;
 
 use super::code::{self, Frames};
 use super::frame::by_plan;
-use crate::image;
 use crate::json::Object;
 use crate::options::{Command, Parsed, Takes, options};
+use crate::{elf, files, image};
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench sizes",
@@ -49,9 +49,9 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 /// limit.
 fn weigh(app: &str) -> Result<bool, String> {
     let image = image::build(app)?;
-    let stripped = image.stripped_bytes()?;
-    let addresses: Vec<u64> = code::instructions(&image.path)?.into_keys().collect();
-    let mut parts = parts(&addresses, &code::frames(&image.path, &addresses)?);
+    let stripped = elf::stripped_bytes(&files::read_at(&image)?)?;
+    let addresses: Vec<u64> = code::instructions(&image)?.into_keys().collect();
+    let mut parts = parts(&addresses, &code::frames(&image, &addresses)?);
     let code: u64 = parts.values().sum();
     let rest = stripped.saturating_sub(code);
     parts.insert("constants, variables, headers".into(), rest);

@@ -81,17 +81,12 @@ impl Refusal {
             Refusal::Failure(lines) => (lines, 1),
             Refusal::ByPerson => (String::new(), BY_PERSON),
         };
-        complain(invocation, &lines);
+        // The scripts have short names; the prefix would only lengthen each line.
+        let name = invocation.trim_start_matches("./scripts/");
+        // Text from files and command lines must not rewrite a terminal.
+        (lines.lines()).for_each(|line| eprintln!("{name}: {}", visible(line)));
         ExitCode::from(code)
     }
-}
-
-/// Prints lines under a command's name. Control characters are made visible, since text from files
-/// and command lines must not rewrite a terminal.
-fn complain(invocation: &str, lines: &str) {
-    // The scripts have short names; the prefix would only lengthen each line.
-    let name = invocation.trim_start_matches("./scripts/");
-    (lines.lines()).for_each(|line| eprintln!("{name}: {}", visible(line)));
 }
 
 impl Command {
@@ -103,23 +98,13 @@ impl Command {
         work: impl FnOnce(&Parsed) -> Result<ExitCode, Refusal>,
     ) -> ExitCode {
         let done = self.parse(words).and_then(|options| work(&options));
-        done.unwrap_or_else(|refusal| refusal.report(self.invocation))
+        done.unwrap_or_else(|refusal| self.report(refusal))
     }
 
-    /// Reports why the command line, or a file that it names, is refused, each line under the
-    /// command's name, and returns exit code 2.
-    pub fn refuse(&self, lines: &str) -> ExitCode {
-        Refusal::Usage(lines.into()).report(self.invocation)
-    }
-
-    /// Reports a failure, as [`refuse`](Self::refuse) does, and returns exit code 1.
-    pub fn fail(&self, lines: &str) -> ExitCode {
-        Refusal::Failure(lines.into()).report(self.invocation)
-    }
-
-    /// Prints lines under the command's name.
-    pub(crate) fn complain(&self, lines: &str) {
-        complain(self.invocation, lines);
+    /// Prints why the command did not do its work, each line under the command's name, and returns
+    /// the exit code.
+    pub(crate) fn report(&self, refusal: Refusal) -> ExitCode {
+        refusal.report(self.invocation)
     }
 
     /// Parses a command line that must be valid; for tests.
@@ -136,7 +121,11 @@ impl Command {
     ///
     /// The first word that the table does not allow; or the help text, if the line asks for it.
     pub fn parse(&self, words: &[OsString]) -> Result<Parsed, Refusal> {
-        let mut parsed = Parsed::new(self.options);
+        let mut parsed = Parsed {
+            options: self.options,
+            given: BTreeMap::new(),
+            positionals: Vec::new(),
+        };
         let mut words = words.iter().map(OsString::as_os_str).peekable();
         while let Some(word) = words.next() {
             if word == "--help" || word == "-h" {
@@ -164,7 +153,7 @@ impl Command {
                     .ok_or_else(|| Refusal::Usage(option.missing(words.peek().is_some())))?,
             };
             option.check(value).map_err(Refusal::Usage)?;
-            parsed.store(name, value);
+            parsed.given.insert(name, value.into());
         }
         Ok(parsed)
     }
@@ -192,7 +181,7 @@ impl Command {
                 "{shown}: a {name} must be UTF-8 text; write it so"
             )));
         }
-        parsed.take_positional(word);
+        parsed.positionals.push(word.into());
         Ok(())
     }
 
@@ -330,8 +319,15 @@ macro_rules! options {
         $name:literal $($short:literal)? $(in $group:literal)?: $takes:expr $(, or $default:expr)?;
     )*) => {
         &[$(
-            $crate::options::Opt::new($name, $takes, concat!($($help),+))
-                $(.short($short))?$(.begins($group))?$(.or($default))?
+            $crate::options::Opt {
+                name: $name,
+                takes: $takes,
+                help: concat!($($help),+),
+                $(short: Some($short),)?
+                $(group: $group,)?
+                $(default: $default,)?
+                ..$crate::options::Opt::FLAG
+            }
         ),*]
     };
 }
@@ -342,15 +338,10 @@ pub(crate) use options;
 pub enum Takes {
     /// Nothing: the option is a flag.
     Nothing,
-    /// A decimal number within bounds, both included.
-    Number {
-        /// The smallest number allowed.
-        least: u64,
-        /// The largest number allowed.
-        most: u64,
-        /// Whether there may be more, with commas between.
-        is_list: bool,
-    },
+    /// A decimal number, from the first of these to the second.
+    Number(u64, u64),
+    /// Such numbers, with commas between.
+    Numbers(u64, u64),
     /// One of these words.
     OneOf(&'static [&'static str]),
     /// Any text; the word stands for it in the help text.
@@ -363,31 +354,21 @@ impl Takes {
     /// Returns the kind of a number within a range.
     #[must_use]
     pub const fn number(range: RangeInclusive<u64>) -> Takes {
-        let (least, most, is_list) = (*range.start(), *range.end(), false);
-        Takes::Number {
-            least,
-            most,
-            is_list,
-        }
+        Takes::Number(*range.start(), *range.end())
     }
 
     /// Returns the kind of numbers within a range, with commas between.
     #[must_use]
     pub const fn numbers(range: RangeInclusive<u64>) -> Takes {
-        let (least, most, is_list) = (*range.start(), *range.end(), true);
-        Takes::Number {
-            least,
-            most,
-            is_list,
-        }
+        Takes::Numbers(*range.start(), *range.end())
     }
 
     /// Returns the placeholder of a value in the help text; empty for a flag.
     const fn name(self) -> &'static str {
         match self {
             Takes::Nothing => "",
-            Takes::Number { is_list: false, .. } => "N",
-            Takes::Number { is_list: true, .. } => "N,N,...",
+            Takes::Number(..) => "N",
+            Takes::Numbers(..) => "N,N,...",
             Takes::OneOf(_) => "WORD",
             Takes::Text(what) | Takes::File(what) => what,
         }
@@ -397,12 +378,8 @@ impl Takes {
     fn allowed(self) -> String {
         match self {
             Takes::Nothing => "nothing".into(),
-            Takes::Number {
-                least,
-                most,
-                is_list: false,
-            } => format!("a number from {least} to {most}"),
-            Takes::Number { least, most, .. } => {
+            Takes::Number(least, most) => format!("a number from {least} to {most}"),
+            Takes::Numbers(least, most) => {
                 format!("numbers from {least} to {most} with commas between")
             }
             Takes::OneOf(words) => format!("one of {}", words.join(", ")),
@@ -412,39 +389,15 @@ impl Takes {
 }
 
 impl Opt {
-    /// Describes an option without short form and default.
-    #[must_use]
-    pub const fn new(name: &'static str, takes: Takes, help: &'static str) -> Opt {
-        Opt {
-            name,
-            short: None,
-            takes,
-            default: "",
-            help,
-            group: "",
-        }
-    }
-
-    /// Adds a short form, without its dash.
-    #[must_use]
-    pub const fn short(mut self, short: char) -> Opt {
-        self.short = Some(short);
-        self
-    }
-
-    /// Makes the option the first of a group of this name.
-    #[must_use]
-    pub const fn begins(mut self, group: &'static str) -> Opt {
-        self.group = group;
-        self
-    }
-
-    /// Adds a default.
-    #[must_use]
-    pub const fn or(mut self, default: &'static str) -> Opt {
-        self.default = default;
-        self
-    }
+    /// A flag without a name, which the others differ from.
+    pub const FLAG: Opt = Opt {
+        name: "",
+        short: None,
+        takes: Takes::Nothing,
+        default: "",
+        help: "",
+        group: "",
+    };
 
     /// Checks a value against the kind of value that the option takes.
     fn check(&self, value: &OsStr) -> Result<(), String> {
@@ -455,17 +408,9 @@ impl Opt {
             (Takes::File(_), _) => !value.is_empty(),
             // All other values are text.
             (_, None) => false,
-            (
-                Takes::Number {
-                    least,
-                    most,
-                    is_list,
-                },
-                Some(text),
-            ) => {
-                let mut numbers = text.split(',');
-                let is_number = |text| number(text).is_some_and(|n| (least..=most).contains(&n));
-                numbers.all(is_number) && (is_list || !text.contains(','))
+            (Takes::Number(least, most), Some(text)) => is_number(text, least..=most),
+            (Takes::Numbers(least, most), Some(text)) => {
+                text.split(',').all(|text| is_number(text, least..=most))
             }
             (Takes::OneOf(words), Some(text)) => words.contains(&text),
             (Takes::Text(_), Some(text)) => !text.is_empty(),
@@ -515,7 +460,7 @@ impl Opt {
         let mut parts = Vec::new();
         match self.takes {
             // `u64::MAX` stands for "no upper bound"; printing it would only be noise.
-            Takes::Number { least, most, .. } => parts.push(match most {
+            Takes::Number(least, most) | Takes::Numbers(least, most) => parts.push(match most {
                 u64::MAX => format!("from {least}"),
                 most => format!("{least} to {most}"),
             }),
@@ -538,10 +483,10 @@ pub(crate) fn did_you_mean(name: &str, names: &[&str]) -> String {
     nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }
 
-fn number(text: &str) -> Option<u64> {
+fn is_number(text: &str, range: RangeInclusive<u64>) -> bool {
     // `parse` alone would let `+1` pass.
     let is_plain = text.bytes().all(|byte| byte.is_ascii_digit());
-    text.parse().ok().filter(|_| is_plain)
+    is_plain && text.parse().is_ok_and(|number| range.contains(&number))
 }
 
 /// A command line that was parsed and checked.
@@ -553,23 +498,6 @@ pub struct Parsed {
 }
 
 impl Parsed {
-    /// Starts without any given option.
-    fn new(options: &'static [Opt]) -> Parsed {
-        Parsed {
-            options,
-            given: BTreeMap::new(),
-            positionals: Vec::new(),
-        }
-    }
-
-    fn store(&mut self, name: &'static str, value: &OsStr) {
-        self.given.insert(name, value.into());
-    }
-
-    fn take_positional(&mut self, word: &OsStr) {
-        self.positionals.push(word.into());
-    }
-
     /// Returns whether the person gave the option (or flag).
     #[must_use]
     pub fn is_given(&self, name: &str) -> bool {
@@ -577,15 +505,11 @@ impl Parsed {
     }
 
     fn value(&self, name: &str) -> Option<&OsStr> {
-        let default = || {
-            let mut options = self.options.iter();
-            let option = options.find(|option| option.name == name)?;
-            (!option.default.is_empty()).then(|| OsStr::new(option.default))
-        };
-        self.given
-            .get(name)
-            .map(OsString::as_os_str)
-            .or_else(default)
+        if let Some(given) = self.given.get(name) {
+            return Some(given);
+        }
+        let option = self.options.iter().find(|option| option.name == name)?;
+        (!option.default.is_empty()).then(|| OsStr::new(option.default))
     }
 
     /// Returns the option's value or default; `None` if it has neither. For one that
@@ -670,7 +594,7 @@ impl Parsed {
     #[must_use]
     pub fn with(&self, name: &'static str, value: impl AsRef<OsStr>) -> Parsed {
         let mut other = self.clone();
-        other.store(name, value.as_ref());
+        other.given.insert(name, value.as_ref().into());
         other
     }
 

@@ -4,24 +4,26 @@ use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::Path;
 
-use super::{Command, Opt, Parsed, Refusal, Takes};
+use super::{Command, Parsed, Refusal, Takes};
 
 static COMMAND: Command = Command {
     invocation: "./scripts/example",
     about: "Does nothing.",
     positional: None,
-    options: &[
-        Opt::new("cores", Takes::number(1..=64), "Processors of the guest.").or("8"),
-        Opt::new("subtasks", Takes::numbers(1..=14), "Parallel subtasks."),
-        Opt::new(
-            "mode",
-            Takes::OneOf(&["kvm", "deterministic", "threads"]),
-            "What time means.",
-        ),
-        Opt::new("serial", Takes::File("FILE"), "Keep the log."),
-        Opt::new("only", Takes::Text("NAME"), "Only this."),
-        Opt::new("quiet", Takes::Nothing, "Say less.").short('q'),
-    ],
+    options: options! {
+        /// Processors of the guest.
+        "cores": Takes::number(1..=64), or "8";
+        /// Parallel subtasks.
+        "subtasks": Takes::numbers(1..=14);
+        /// What time means.
+        "mode": Takes::OneOf(&["kvm", "deterministic", "threads"]);
+        /// Keep the log.
+        "serial": Takes::File("FILE");
+        /// Only this.
+        "only": Takes::Text("NAME");
+        /// Say less.
+        "quiet" 'q': Takes::Nothing;
+    },
     notes: "Exit codes: none.",
 };
 

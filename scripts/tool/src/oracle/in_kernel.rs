@@ -253,7 +253,7 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
             .unwrap_or(1),
         ..Qemu::default()
     };
-    probe::choose(Some(settings.mode), settings.mode, &machine, &image.path)?;
+    probe::choose(Some(settings.mode), settings.mode, &machine, &image)?;
     let mut by_cores: Vec<&Case> = cases.iter().collect();
     by_cores.sort_by_key(|case| case.cores);
     let mut waiting = &by_cores[..];
@@ -265,7 +265,7 @@ pub fn run(cases: &[Case], settings: &Settings) -> Result<Vec<Judged>, String> {
         let count = waiting.iter().take(MOST_CASES).take_while(fits).count();
         let found = match &waiting[..count] {
             [] => vec![verdict(first, runs_there(first, settings))],
-            cases => judge(&boot_with(&image.path, cases, settings)?, cases, settings),
+            cases => judge(&boot_with(&image, cases, settings)?, cases, settings),
         };
         // A boot may judge fewer cases than it was given: the rest go into the next one.
         waiting = &waiting[found.len()..];

@@ -57,17 +57,15 @@ pub fn boot(words: &[OsString]) -> ExitCode {
         {
             return match for_linux(app.as_deref()) {
                 Ok(program) => run(&[&["--image".into(), program.into()], rest].concat()),
-                Err(why) => BOOT.fail(&why),
+                Err(why) => BOOT.report(Refusal::Failure(why)),
             };
         }
         return run(&[&["--image".into(), file.clone()], rest].concat());
     }
     // `exec` returns only if it failed.
     let error = process::Command::new(file).args(rest).exec();
-    BOOT.fail(&format!(
-        "cannot start {}: {error}",
-        files::shown_path(Path::new(file))
-    ))
+    let file = files::shown_path(Path::new(file));
+    BOOT.report(Refusal::Failure(format!("cannot start {file}: {error}")))
 }
 
 /// Builds the program for Linux of the package whose image cargo has built.
@@ -80,5 +78,5 @@ fn for_linux(app: Option<&str>) -> Result<PathBuf, String> {
     let (app, folder) = package.ok_or(
         "`--on`: which package is the image of? say `cargo run -- --on linux` in the app's folder",
     )?;
-    Ok(image::build_linux(app, Some(Path::new(&folder)))?.path)
+    image::build_linux(app, Some(Path::new(&folder)))
 }

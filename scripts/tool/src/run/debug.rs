@@ -26,7 +26,7 @@ use super::loading;
 use super::{RUN, check_files, choose_app};
 use crate::child;
 use crate::files;
-use crate::image::{self, Profile};
+use crate::image;
 use crate::install;
 use crate::options::{Command, Opt, Parsed, Refusal, Takes, did_you_mean};
 use crate::qemu::{Mode, Qemu};
@@ -41,31 +41,34 @@ static DEBUG: Command = Command {
     about: "Boots an app in QEMU with gdb at it, in an image that gdb shows whole.",
     positional: None,
     options: &[
-        of_run("app"),
-        Opt::new(
-            "break",
-            Takes::Text("PLACES"),
-            "Where to stop, with commas between: a function, by the end of its path \
-             (control, attitude::control), or FILE:LINE (src/dags.rs:153).",
-        )
-        .or("kernel_main"),
-        Opt::new(
-            "commands",
-            Takes::File("FILE"),
-            "Have gdb do what this file says once it has stopped, and end; no person is asked.",
-        ),
-        of_run("cores").or("1"),
-        of_run("jobs"),
-        of_run("seed"),
-        of_run("memory"),
-        of_run("mode").or("deterministic"),
-        of_run("append"),
-        of_run("module"),
-        of_run("input"),
-        of_run("replay"),
-        of_run("from"),
-        of_run("image"),
-        of_run("qemu"),
+        of_run("app", None),
+        Opt {
+            name: "break",
+            takes: Takes::Text("PLACES"),
+            help: "Where to stop, with commas between: a function, by the end of its path \
+                   (control, attitude::control), or FILE:LINE (src/dags.rs:153).",
+            default: "kernel_main",
+            ..Opt::FLAG
+        },
+        Opt {
+            name: "commands",
+            takes: Takes::File("FILE"),
+            help: "Have gdb do what this file says once it has stopped, and end; no person is \
+                   asked.",
+            ..Opt::FLAG
+        },
+        of_run("cores", Some("1")),
+        of_run("jobs", None),
+        of_run("seed", None),
+        of_run("memory", None),
+        of_run("mode", Some("deterministic")),
+        of_run("append", None),
+        of_run("module", None),
+        of_run("input", None),
+        of_run("replay", None),
+        of_run("from", None),
+        of_run("image", None),
+        of_run("qemu", None),
     ],
     notes: "\
 gdb is installed if it is missing. Budgets are off. In mode deterministic time stands still
@@ -76,13 +79,18 @@ exit codes: gdb's; 1 a failure; 2 a refused command line
 ",
 };
 
-/// Returns an option of `run`.
-const fn of_run(name: &str) -> Opt {
+/// Returns an option of `run`, with another default if one is given.
+const fn of_run(name: &str, default: Option<&'static str>) -> Opt {
     let mut at = 0;
     // A loop with an index, since a `const fn` can use neither iterators nor `==` on text.
     while at < RUN.options.len() {
         if is_same(RUN.options[at].name.as_bytes(), name.as_bytes()) {
-            return RUN.options[at].begins("");
+            let mut option = RUN.options[at];
+            option.group = "";
+            if let Some(default) = default {
+                option.default = default;
+            }
+            return option;
         }
         at += 1;
     }
@@ -132,7 +140,7 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
         Some(path) => path.into(),
         None => {
             eprintln!("building `{app}` by the profile `gdb`");
-            image::build_by(&app, Profile::Gdb)?.path
+            image::build_for_gdb(&app)?
         }
     };
     let places = own.text("break").unwrap_or_default();

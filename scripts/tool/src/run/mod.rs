@@ -146,7 +146,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let log = Log::choose(options, &app)?;
     let image = match options.path("image") {
         Some(path) => path.into(),
-        None => image::build(&app)?.path,
+        None => image::build(&app)?,
     };
     // Interactive runs need real time; a firmware takes minutes where instructions are counted.
     let is_live = options.is_given("console") || handed::is_live(options);
@@ -323,7 +323,7 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         };
         // Nothing has run, so the person's earlier log must not be lost.
         log.restore();
-        return RUN.refuse(&(lines + remedy));
+        return RUN.report(Refusal::Usage(lines + remedy));
     }
     match outcome.transcript.verdict() {
         // The screen has shown the guest's own reason already.
@@ -342,7 +342,8 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         }
         _ => String::new(),
     };
-    let code = RUN.fail(&format!("failed: {}{remedy}", fault.reason));
+    let line = format!("failed: {}{remedy}", fault.reason);
+    let code = RUN.report(Refusal::Failure(line));
     // Ctrl-C has the last word: the fault of a run that was cut short is not the app's.
     if by_person {
         return ExitCode::from(BY_PERSON);

@@ -127,7 +127,7 @@ pub(super) fn run_app(
     let log = Log::choose(options, app)?;
     let image = match given {
         Some(path) => path.into(),
-        None => image::build_linux(app, None)?.path,
+        None => image::build_linux(app, None)?,
     };
     let mut screen = Screen::new(options, &image);
     let mode = options.text("mode").and_then(Mode::from_name);

@@ -245,7 +245,7 @@ pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
     let path = options.path("wcets");
     match path.and_then(|path| observed::translate(reason, path)) {
         Some(line) => {
-            RUN.complain(&line);
+            RUN.report(Refusal::Usage(line));
             true
         }
         None => false,
@@ -291,7 +291,7 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
         let status = judged.map_or_else(|fault| fault.status, |()| Status::Success);
         // The messages of a failed run do not name its file.
         if status == Status::Failure {
-            RUN.complain(&format!("{}:", files::shown_path(file)));
+            RUN.report(Refusal::Failure(format!("{}:", files::shown_path(file))));
         }
         conclude(&booted, dags.as_ref(), &one);
         go_on(&booted)?;
@@ -322,11 +322,12 @@ pub(super) fn each(
         let status = match run(file) {
             Ok(status) => status,
             Err(Refusal::Usage(lines)) => {
-                RUN.complain(&lines);
+                RUN.report(Refusal::Usage(lines));
                 Status::Usage
             }
             Err(Refusal::Failure(line)) => {
-                RUN.complain(&format!("{}: {line}", files::shown_path(file)));
+                let line = format!("{}: {line}", files::shown_path(file));
+                RUN.report(Refusal::Failure(line));
                 Status::Failure
             }
             // Ctrl-C ends the whole series, not only this file.

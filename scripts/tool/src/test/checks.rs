@@ -79,7 +79,7 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     );
     run("a guest runs under KVM", &|| {
         let image = image::build("fork-join");
-        let probed = image.and_then(|image| probe::kvm(&Qemu::default(), &image.path));
+        let probed = image.and_then(|image| probe::kvm(&Qemu::default(), &image));
         probed.map_err(CheckFailure::Skipped)
     });
 }

@@ -29,9 +29,8 @@ use std::thread;
 use std::time::Instant;
 
 use crate::image::{self, package_name};
-use crate::install;
 use crate::options::{Command, Refusal, Takes, options};
-use crate::system;
+use crate::{elf, files, install, system};
 
 /// The table of `test`.
 pub static TEST: Command = Command {
@@ -170,7 +169,7 @@ fn build_images(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally) {
 }
 
 fn build_image(app: &str, most: u64) -> Result<(), String> {
-    let bytes = image::build(app)?.stripped_bytes()?;
+    let bytes = elf::stripped_bytes(&files::read_at(&image::build(app)?)?)?;
     println!("image of {app}: {bytes} bytes stripped");
     if bytes <= most {
         return Ok(());

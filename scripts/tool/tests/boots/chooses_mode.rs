@@ -51,7 +51,7 @@ fn call_by(stub: &Path, line: &str) -> Called {
 fn the_probe_passes_where_nothing_is_wrong() {
     install::ensure_qemu().expect("QEMU");
     let image = image::build("fork-join").expect("the image");
-    assert_eq!(probe::run(&Qemu::default(), &image.path, FAR), Ok(()));
+    assert_eq!(probe::run(&Qemu::default(), &image, FAR), Ok(()));
 }
 
 #[test]

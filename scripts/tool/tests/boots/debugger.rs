@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::io::{Write, stderr};
 
-use tool::image::{self, Profile};
+use tool::image;
 use tool::{install, system::workspace};
 
 use crate::support::{call, folder};
@@ -67,7 +67,7 @@ fn without_optimization_the_stacks_hold() {
         ("fork-join", "jobs=2 work=compute", "\"kind\":\"fork_join\""),
         ("drone", "seconds=1", "\"kind\":\"drone\""),
     ] {
-        let image = image::build_by(app, Profile::Gdb).expect("it builds").path;
+        let image = image::build_for_gdb(app).expect("it builds");
         let words = format!("budget_factor=0 {words}");
         let run = [
             "run",

@@ -8,7 +8,7 @@ use tool::{image, system::workspace};
 use crate::support::{call, folder, refusal, succeed};
 
 fn words_of(app: &str) -> [String; 4] {
-    let image = image::build(app).expect("it builds").path;
+    let image = image::build(app).expect("it builds");
     let image = image.to_str().expect("a path of text").into();
     [
         "run".into(),

@@ -100,7 +100,7 @@ impl Boot {
         let cores = self.cores;
         let image = match self.kind {
             Kind::Figures => image.to_path_buf(),
-            Kind::Recorded | Kind::Divided => image::build("guest-tests")?.path,
+            Kind::Recorded | Kind::Divided => image::build("guest-tests")?,
         };
         judged(
             format_args!("the guest on {cores} cores, mode {mode},"),

@@ -111,7 +111,7 @@ pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
     install::ensure_qemu()?;
     let before = baseline::read()?;
     let image = image::build("hand-off")?;
-    let now = measure_mode(Mode::Deterministic, &image.path)?;
+    let now = measure_mode(Mode::Deterministic, &image)?;
     let (table, complaints) = baseline::comparison(&now, &before);
     print!("{table}");
     match (&complaints[..], list) {
@@ -124,7 +124,7 @@ pub(crate) fn check(list: Option<&Path>) -> Result<(), String> {
 /// Measures and reports. Returns whether no figure has grown.
 fn measure(plan: &HandOffPlan) -> Result<bool, String> {
     install::ensure_qemu()?;
-    let image = &image::build("hand-off")?.path;
+    let image = &image::build("hand-off")?;
     if plan.scale {
         return boots::measure_scale(image).map(|()| true);
     }

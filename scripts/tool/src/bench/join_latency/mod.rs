@@ -356,11 +356,11 @@ impl<'p> Setting<'p> {
         };
         let mut why = None;
         if plan.on_linux {
-            setting.image = image::build_linux("join-latency", None)?.path;
+            setting.image = image::build_linux("join-latency", None)?;
             setting.version = first_line("uname", &["-sr"]);
         } else {
             install::ensure_qemu()?;
-            setting.image = image::build("join-latency")?.path;
+            setting.image = image::build("join-latency")?;
             setting.version = first_line(PROGRAM, &["--version"]);
             let machine = setting.qemu(&plan.conditions[0], Mode::Deterministic);
             let (mode, reason) =
