@@ -8,15 +8,14 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier, PoisonError, RwLock};
 use std::{io, thread};
 
-use fass::edge::WatchedValue;
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, DagKey, Scheduler, TaskSet};
 
 use crate::level::Role;
 use crate::office::Office;
+use crate::sys;
 use crate::sys::Catch;
 use crate::team::Team;
-use crate::{edge, sys};
 
 /// The handle of a committed run. Its requests are carried out by the release thread of the DAG's
 /// cluster, at once; after the run it does nothing.
@@ -153,16 +152,6 @@ impl Control {
     ) -> Option<T> {
         let mut state = self.teams.get(cluster)?.lock();
         Some(look(&mut state.engine.scheduler))
-    }
-
-    /// Has the values of a topic kept to be seen, or none; reports whether it is recorded.
-    pub fn see(&self, topic: Option<&str>) -> bool {
-        edge::get().watch(topic)
-    }
-
-    /// Takes the latest value that is to be seen, if there is a new one.
-    pub fn take_seen(&self, into: &mut [u8]) -> Option<WatchedValue> {
-        edge::get().take_seen(into)
     }
 
     /// Has the run end in order when a signal that is caught asks for it, or has: nothing more is

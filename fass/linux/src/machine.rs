@@ -409,11 +409,6 @@ impl Linux {
         edge::get().set_wish(Box::leak(Box::new(EdgeMode::Replay { bytes, from })));
     }
 
-    /// Lets people look at what crosses, by [`watch`](fass::edge::Edge::watch).
-    pub fn let_look(&self) {
-        edge::get().let_look();
-    }
-
     /// Writes the rest of what a run has recorded. Returns what a replay has found, and how
     /// complete the recording is. `is_over`: the run has not been ended before its time.
     ///
@@ -439,14 +434,6 @@ impl Linux {
         let mut file = file.finish();
         file.flush();
         file.failure.map_or(Ok(()), Err)
-    }
-
-    /// Returns why a recording or a replay could not be, and how a replay differed from its
-    /// recording, if that is so.
-    #[must_use]
-    pub fn objections() -> [Option<String>; 2] {
-        let edge = edge::get();
-        [edge.refusal(), edge.complaint()].map(|text| text.map(str::to_owned))
     }
 }
 

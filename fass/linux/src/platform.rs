@@ -9,8 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use fass::Occupation;
-use fass::edge::{Begin, BootRecord};
-use fass::edge::{Channel, RecordedValue};
+use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
 use fass::platform::{LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
 use sched_dag::engine::{self, ProvenBounds};
@@ -95,28 +94,12 @@ impl Platform for Host {
         }
     }
 
-    fn crosses(&self) -> bool {
-        edge::get().is_wished()
-    }
-
-    fn results_cross(&self) -> bool {
-        edge::get().has_results()
-    }
-
-    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
-        edge::get().open(dag, graph, channels, begin)
+    fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {
+        work(&mut edge::get());
     }
 
     fn record(&self, value: &RecordedValue<'_>) {
         edge::record(value);
-    }
-
-    fn replays(&self) -> bool {
-        edge::get().is_replay()
-    }
-
-    fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        edge::get().lend(channel, job, take);
     }
 
     fn log(&self, mut line: LogLine) {

@@ -519,16 +519,11 @@ impl Edge {
         }
     }
 
-    /// Returns why the wish could not be met, if it could not.
+    /// Returns why the wish could not be met, and how a replay differs from its recording, if that
+    /// is so.
     #[must_use]
-    pub fn refusal(&self) -> Option<&str> {
-        self.refusal.as_deref()
-    }
-
-    /// Returns how a replay differs from its recording, if it does.
-    #[must_use]
-    pub fn complaint(&self) -> Option<&str> {
-        self.complaint.as_deref()
+    pub fn objections(&self) -> [Option<String>; 2] {
+        [self.refusal.clone(), self.complaint.clone()]
     }
 }
 

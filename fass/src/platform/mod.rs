@@ -16,7 +16,7 @@ use recording::Channel;
 use sched_dag::{DagId, TaskSet};
 
 use crate::Occupation;
-use crate::edge::Begin;
+use crate::edge::{Begin, Edge};
 use crate::run::line::RecordedValue;
 use crate::run::log::{Field, Level, LogLine};
 
@@ -97,16 +97,23 @@ pub trait Platform: Sync {
         panic!("this platform takes no signals from outside; raise them in subtasks");
     }
 
+    /// Lends `work` what the platform keeps at its edge, under its lock; a platform that keeps
+    /// nothing there, or has an edge of its own kind, does not define this. The questions below
+    /// are answered by it.
+    fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {
+        let _ = work;
+    }
+
     /// Reports whether the plan to come shall be recorded or replayed. If it shall not, recorded
     /// topics ([`Dag::record`](crate::Dag::record)) cost nothing.
     fn crosses(&self) -> bool {
-        false
+        ask_edge(self, |edge| edge.is_wished()).unwrap_or(false)
     }
 
     /// Reports whether recorded topics matter that other subtasks than sources write: a replay
     /// compares their values, and computes them if they are not there.
     fn results_cross(&self) -> bool {
-        true
+        ask_edge(self, |edge| edge.has_results()).unwrap_or(true)
     }
 
     /// Takes the recorded topics of a DAG and the hash of its names and edges, before the plan
@@ -115,8 +122,7 @@ pub trait Platform: Sync {
     /// [`Crossing::open`](crate::edge::Crossing::open) does, or else `false`: then values come by
     /// [`record`](Self::record).
     fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
-        let _ = (dag, graph, channels, begin);
-        false
+        ask_edge(self, |edge| edge.open(dag, graph, channels, begin)).unwrap_or(false)
     }
 
     /// Takes a value of a recorded topic, at the completion of its writer, or what a subtask had
@@ -129,12 +135,12 @@ pub trait Platform: Sync {
     /// Reports whether the plan to come shall take the values of recorded sources from
     /// [`replay`](Self::replay), in place of calling them.
     fn replays(&self) -> bool {
-        false
+        ask_edge(self, |edge| edge.is_replay()).unwrap_or(false)
     }
 
     /// Lends the recorded value of a channel and a job to `take`, if there is one.
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        let _ = (channel, job, take);
+        self.at_edge(&mut |edge| edge.lend(channel, job, take));
     }
 
     /// Takes a line of the [log](mod@crate::log) from the function that runs here. Adds which
@@ -232,6 +238,20 @@ pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> 
     } else {
         Err(AlreadyInstalled)
     }
+}
+
+/// Does `work` with what the installed platform keeps at its edge, if it does.
+pub fn with_edge<T>(work: impl FnOnce(&mut Edge) -> T) -> Option<T> {
+    ask_edge(installed()?, work)
+}
+
+fn ask_edge<T>(
+    platform: &(impl Platform + ?Sized),
+    work: impl FnOnce(&mut Edge) -> T,
+) -> Option<T> {
+    let (mut work, mut answer) = (Some(work), None);
+    platform.at_edge(&mut |edge| answer = work.take().map(|work| work(edge)));
+    answer
 }
 
 /// Returns the installed platform, if there is one.

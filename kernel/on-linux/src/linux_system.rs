@@ -13,7 +13,6 @@ use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use fass::edge::WatchedValue;
 use fass::platform::RunConfig;
 use fass::shared::{Signal, Wire};
 use front::app::ending::AppError;
@@ -181,18 +180,10 @@ impl System for LinuxSystem {
         }
     }
 
-    fn let_look(&self) {
-        self.linux.let_look();
-    }
-
     fn measure_overheads(_margin_percent: u32) -> Result<(), AppError> {
         let line = "`overheads`: what Linux costs is not measured; state it by `overheads_ns=`, \
                     or run the app on the machine";
         Err(UsageError::new(line).into())
-    }
-
-    fn objections() -> [Option<String>; 2] {
-        Linux::objections()
     }
 
     fn memory() -> MemoryDemand {
@@ -282,14 +273,6 @@ impl LiveRun for LinuxRun {
             Err(TryRecvError::Disconnected) if is_endless() => Some(END),
             Err(_) => None,
         }
-    }
-
-    fn watch(topic: Option<&str>) -> bool {
-        Control::get().is_some_and(|live| live.see(topic))
-    }
-
-    fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
-        Control::get()?.take_seen(into)
     }
 }
 

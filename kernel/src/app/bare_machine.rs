@@ -1,6 +1,5 @@
 //! The kernel as the system below an app's machine.
 
-use alloc::string::String;
 use core::cell::Cell;
 use core::fmt;
 use core::panic::Location;
@@ -130,10 +129,6 @@ impl System for BareMachine {
         wire::connect(wire, script)
     }
 
-    fn let_look(&self) {
-        edge::get().let_look();
-    }
-
     fn measure_overheads(margin_percent: u32) -> Result<(), AppError> {
         calibration::charge(margin_percent)
     }
@@ -142,10 +137,6 @@ impl System for BareMachine {
         let (contexts, in_stock) = contexts::count();
         let spare = this_core::all().iter().filter(|core| core.has_spare());
         (contexts, in_stock + spare.count())
-    }
-
-    fn objections() -> [Option<String>; 2] {
-        edge::objections()
     }
 
     fn memory() -> MemoryDemand {

@@ -6,7 +6,6 @@
 //! nobody.
 
 use alloc::boxed::Box;
-use alloc::string::String;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::edge::RecordedValue;
@@ -65,11 +64,4 @@ pub fn happened(notice: &DriverNotice) {
     if IS_ON.load(Ordering::Relaxed) {
         EDGE.lock_uninterrupted().happened(notice);
     }
-}
-
-/// Returns why the wish could not be met, and how a replay differs from its recording, if that is
-/// so.
-pub fn objections() -> [Option<String>; 2] {
-    let edge = EDGE.lock();
-    [edge.refusal(), edge.complaint()].map(|text| text.map(String::from))
 }

@@ -4,8 +4,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::Occupation;
-use fass::edge::{Begin, BootRecord};
-use fass::edge::{Channel, RecordedValue};
+use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
 use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig};
 use sched_dag::DagId;
@@ -89,28 +88,12 @@ impl Platform for Kernel {
         execution::raise(plan, dag);
     }
 
-    fn crosses(&self) -> bool {
-        edge::get().is_wished()
-    }
-
-    fn results_cross(&self) -> bool {
-        edge::get().has_results()
-    }
-
-    fn open_channels(&self, dag: DagId, graph: u64, channels: &[Channel], begin: Begin) -> bool {
-        edge::get().open(dag, graph, channels, begin)
+    fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {
+        work(&mut edge::get());
     }
 
     fn record(&self, value: &RecordedValue<'_>) {
         edge::record(value, execution::since_epoch(value.completed_ns));
-    }
-
-    fn replays(&self) -> bool {
-        edge::get().is_replay()
-    }
-
-    fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        edge::get().lend(channel, job, take);
     }
 
     fn log(&self, mut line: LogLine) {

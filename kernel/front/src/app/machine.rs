@@ -11,13 +11,13 @@
 //! # How an app divides the cores, or leaves that to the command line
 
 use alloc::boxed::Box;
-use alloc::string::String;
 use alloc::vec::Vec;
 use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
 use fass::commit::CoreDivision;
-use fass::platform::RunConfig;
+use fass::edge::Edge;
+use fass::platform::{RunConfig, with_edge};
 use fass::shared::{Signal, Tunable, Wire};
 use fass::{Dag, Policy, Preemption};
 use sched_dag::engine::Run;
@@ -67,9 +67,6 @@ pub trait System: Sized {
         module: &Cell<Option<&'static [u8]>>,
     ) -> Result<(), AppError>;
 
-    /// Has the topics of the runs to come be there to be looked at.
-    fn let_look(&self);
-
     /// Measures what it takes itself, and charges that with so many hundredths more.
     fn measure_overheads(margin_percent: u32) -> Result<(), AppError>;
 
@@ -77,11 +74,6 @@ pub trait System: Sized {
     fn contexts() -> (usize, usize) {
         (0, 0)
     }
-
-    /// Returns what was wrong with a recording: why it could not be replayed, and what makes the
-    /// app
-    /// fail, if anything was.
-    fn objections() -> [Option<String>; 2];
 
     /// Returns what memory is needed.
     fn memory() -> MemoryDemand;
@@ -143,7 +135,7 @@ impl<S: System> Machine<S> {
             );
         }
         let complaint = machine.verdict.complaint();
-        match S::objections() {
+        match with_edge(|edge| edge.objections()).unwrap_or_default() {
             [Some(refusal), _] => Err(UsageError::new(refusal).into()),
             [None, other] => AppError::or_complaint(result, complaint.or(other)),
         }
@@ -375,7 +367,7 @@ impl<S: System> Machine<S> {
     /// ```
     pub fn show_topics(&self) {
         if self.has_console() {
-            self.system.let_look();
+            with_edge(Edge::let_look);
             // Once is enough.
             TOPICS.set(Box::leak(Box::new(TopicCommands::<S::Run>::new())));
         }

@@ -19,7 +19,7 @@ use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::edge::WatchedValue;
-use fass::platform::SetOnce;
+use fass::platform::{SetOnce, with_edge};
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, DagSnapshot, Scheduler, TaskSet};
@@ -78,10 +78,14 @@ pub trait LiveRun {
     fn receive() -> Option<u8>;
 
     /// Has the values of a topic kept to be seen, or none; reports whether it is recorded.
-    fn watch(topic: Option<&str>) -> bool;
+    fn watch(topic: Option<&str>) -> bool {
+        with_edge(|edge| edge.watch(topic)).unwrap_or(false)
+    }
 
     /// Takes the latest value that is to be seen, if there is a new one.
-    fn take_seen(into: &mut [u8]) -> Option<WatchedValue>;
+    fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
+        with_edge(|edge| edge.take_seen(into)).flatten()
+    }
 }
 
 /// Returns how a DAG does, if a run goes on.

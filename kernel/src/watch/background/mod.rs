@@ -37,9 +37,8 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use executive::machine::spinlock::SpinLock;
 use executive::machine::{clock, serial};
-use executive::run::{edge, execution, heartbeat};
+use executive::run::{execution, heartbeat};
 use executive::text::console;
-use fass::edge::WatchedValue;
 use fass::platform::SetOnce;
 use front::report::tell_log;
 use front::shell::{self, END, LiveRun, ShellSession, shut_down};
@@ -290,13 +289,5 @@ impl LiveRun for KernelRun {
 
     fn receive() -> Option<u8> {
         serial::FIRST.receive()
-    }
-
-    fn watch(topic: Option<&str>) -> bool {
-        edge::get().watch(topic)
-    }
-
-    fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
-        edge::get().take_seen(into)
     }
 }
