@@ -27,12 +27,6 @@ use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sorted, sorted_by_key};
 use crate::task_set::StatePrecedence;
 
-/// The graph of a DAG, with the edges that follow from shared states.
-pub(super) struct PrecedenceGraph {
-    pub(super) graph: Graph,
-    pub(super) state_precedences: Vec<StatePrecedence>,
-}
-
 /// Checks the graph of DAG number `dag`.
 #[inline(never)]
 pub(super) fn check(
@@ -40,7 +34,7 @@ pub(super) fn check(
     mut topology: TopicGraph<'_>,
     policy: ConstructionPolicy,
     findings: &mut VerifyFindings<'_>,
-) -> PrecedenceGraph {
+) -> (Graph, Vec<StatePrecedence>) {
     let page = &mut findings.findings_of(dag);
     let spec = page.spec;
     // Edges without topics, and those of topics: from here on they are alike.
@@ -68,10 +62,7 @@ pub(super) fn check(
         topology.edges.extend(added);
         graph = Graph::new(graph.len(), &topology.edges);
     }
-    PrecedenceGraph {
-        graph,
-        state_precedences,
-    }
+    (graph, state_precedences)
 }
 
 /// Adds the edges that are given without a topic.
