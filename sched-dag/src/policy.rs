@@ -45,18 +45,9 @@ pub enum Preemption {
 /// The urgency of a subtask under [`Policy::StaticPriority`].
 ///
 /// The smaller number is the *higher* priority. There is no `Ord`, because
-/// `a < b` would read as the opposite of what it means; ask
-/// [`is_higher_than`](Self::is_higher_than).
+/// `a < b` would read as the opposite of what it means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Priority(pub u32);
-
-impl Priority {
-    /// Reports whether this priority wins over `other`.
-    #[must_use]
-    pub const fn is_higher_than(self, other: Self) -> bool {
-        self.0 < other.0
-    }
-}
 
 /// The policy for a release that finds as many jobs in flight as the DAG may have.
 ///

@@ -82,18 +82,16 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
     let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
     let overhead_ns = overhead_ns.ok_or(TaskError::VolumeOverflow);
     let mut tasks = Vec::with_capacity(task_set.dags().len());
-    for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
-        let refused = |reason| NotAssigned { dag, reason };
+    for (dag, model) in task_set.dags().iter().enumerate() {
         if model.states_cluster() {
-            return Err(refused(AssignmentFailure::Stated));
+            return Err(refused(dag, AssignmentFailure::Stated));
         }
         let task = overhead_ns.and_then(|overhead_ns| Task::from_dag(model, overhead_ns));
-        tasks.push(task.map_err(|error| refused(AssignmentFailure::Unknown(error)))?);
+        tasks.push(task.map_err(|error| refused(dag, AssignmentFailure::Unknown(error)))?);
     }
-    let mut assignment = AssignmentSearch {
-        sizes: Vec::new(),
-        of_dags: vec![(ClusterId(0), AssignmentReason::Light); tasks.len()],
-    };
+    // The cores of each cluster, and where each DAG is.
+    let mut sizes = Vec::new();
+    let mut of_dags = vec![(ClusterId(0), AssignmentReason::Light); tasks.len()];
     let mut left = settings.cores;
     let mut light = Vec::new();
     for (dag, task) in tasks.iter().enumerate() {
@@ -107,12 +105,11 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         // No number of cores shortens the longest path, so this is told apart from a lack of them.
         let length_ns = task.length_ns();
         if length_ns > within_ns {
-            let reason = AssignmentFailure::TooLong {
+            let too_long = AssignmentFailure::TooLong {
                 length_ns,
                 within_ns,
             };
-            let dag = DagId(to_u32(dag));
-            return Err(NotAssigned { dag, reason });
+            return Err(refused(dag, too_long));
         }
         let allows = fixed_order::allows(&task_set.dags()[dag]);
         let is_enough = |&count: &u32| {
@@ -122,29 +119,24 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         };
         // The least number that proves it, since light DAGs share what is left.
         let Some(count) = (1..=left).find(is_enough) else {
-            let (dag, reason) = (DagId(to_u32(dag)), AssignmentFailure::TooHeavy { left });
-            return Err(NotAssigned { dag, reason });
+            return Err(refused(dag, AssignmentFailure::TooHeavy { left }));
         };
-        let cluster = ClusterId(to_u32(assignment.sizes.len()));
         let why = AssignmentReason::Heavy {
             volume_ns,
             within_ns,
         };
-        assignment.of_dags[dag] = (cluster, why);
-        assignment.sizes.push(count);
+        of_dags[dag] = (ClusterId(to_u32(sizes.len())), why);
+        sizes.push(count);
         left -= count;
     }
-    pack(&tasks, light, left, &mut assignment)?;
-    task_set.divide(&assignment.sizes, &assignment.of_dags);
+    pack(&tasks, light, left, &mut sizes, &mut of_dags)?;
+    task_set.divide(&sizes, &of_dags);
     Ok(())
 }
 
-/// Which DAG gets which cores.
-struct AssignmentSearch {
-    /// The cores of each cluster.
-    sizes: Vec<u32>,
-    /// The cluster of each DAG, and why it is that.
-    of_dags: Vec<(ClusterId, AssignmentReason)>,
+fn refused(dag: usize, reason: AssignmentFailure) -> NotAssigned {
+    let dag = DagId(to_u32(dag));
+    NotAssigned { dag, reason }
 }
 
 /// Returns the work of a job, and the time in which one core would have to do it.
@@ -158,16 +150,17 @@ fn pack(
     tasks: &[Task],
     mut light: Vec<usize>,
     left: u32,
-    assignment: &mut AssignmentSearch,
+    sizes: &mut Vec<u32>,
+    of_dags: &mut [(ClusterId, AssignmentReason)],
 ) -> Result<(), NotAssigned> {
     sort_largest_first(&mut light, |dag| density(&tasks[dag]));
-    let first = assignment.sizes.len();
+    let first = sizes.len();
     // The densities on each core.
     let mut loads: Vec<Vec<(u64, u64)>> = Vec::new();
     for dag in light {
         if loads.len() < left as usize {
             loads.push(Vec::new());
-            assignment.sizes.push(1);
+            sizes.push(1);
         }
         let sum = |place: usize| Ratio::sum(loads[place].iter().copied());
         let is_emptier = |one, other| match (sum(one), sum(other)) {
@@ -181,11 +174,10 @@ fn pack(
             Ratio::sum(all).is_some_and(|sum| sum.at_most(1, 1))
         };
         let Some(place) = place.filter(fits) else {
-            let (dag, reason) = (DagId(to_u32(dag)), AssignmentFailure::NoRoom { left });
-            return Err(NotAssigned { dag, reason });
+            return Err(refused(dag, AssignmentFailure::NoRoom { left }));
         };
         loads[place].push(density(&tasks[dag]));
-        assignment.of_dags[dag].0 = ClusterId(to_u32(first + place));
+        of_dags[dag].0 = ClusterId(to_u32(first + place));
     }
     Ok(())
 }

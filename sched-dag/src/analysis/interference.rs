@@ -85,39 +85,30 @@ impl InterferingDag {
         cores: u64,
         limit: impl Fn(InterferingWorkload) -> InterferingWorkload,
     ) -> Self {
+        let workload = |volume_ns, parallelism, cores| {
+            let all = InterferingWorkload::new(task, volume_ns, response_ns, parallelism, cores);
+            limit(all)
+        };
         let by_cores = |volume_ns: u64| {
-            let counts = 1..=shape.parallelism;
-            let workload = counts.map(|count| {
-                // Where all that a job can use count, jobs that overlap may use more.
-                let all = if count < shape.parallelism {
+            // Where all that a job can use count, jobs that overlap may use more.
+            let of_all = |count| {
+                if count < shape.parallelism {
                     count
                 } else {
                     cores
-                };
-                limit(InterferingWorkload::new(
-                    task,
-                    volume_ns,
-                    response_ns,
-                    count,
-                    all,
-                ))
-            });
-            workload.collect()
+                }
+            };
+            let counts = 1..=shape.parallelism;
+            let workloads = counts.map(|count| workload(volume_ns, count, of_all(count)));
+            workloads.collect()
         };
         let left = task.volume_ns() - shape.chains.iter().sum::<u64>();
-        let chain = |&volume_ns| {
-            limit(InterferingWorkload::new(
-                task,
-                volume_ns,
-                response_ns,
-                1,
-                cores,
-            ))
-        };
         Self {
             whole: by_cores(task.volume_ns()),
             rest: if left > 0 { by_cores(left) } else { Vec::new() },
-            chains: shape.chains.iter().map(chain).collect(),
+            chains: (shape.chains.iter())
+                .map(|&volume_ns| workload(volume_ns, 1, cores))
+                .collect(),
         }
     }
 
@@ -158,31 +149,22 @@ impl InterferingDag {
         (count, pieces.map(|piece| piece.value))
     }
 
-    fn of_chains(&self, (window_ns, waiting_ns): (u64, u64)) -> WorkloadSegment {
-        self.chains
-            .iter()
-            .fold(WorkloadSegment::NONE, |sum, chain| {
-                sum.and(chain.at(window_ns).least(chain.over(waiting_ns)))
-            })
+    fn of_chains(&self, times: (u64, u64)) -> WorkloadSegment {
+        let chains = self.chains.iter().map(|chain| chain.within(times));
+        chains.fold(WorkloadSegment::NONE, WorkloadSegment::and)
     }
 
     fn pieces(
         &self,
-        (window_ns, waiting_ns): (u64, u64),
+        times: (u64, u64),
         count: usize,
         of_chains: Option<WorkloadSegment>,
     ) -> [WorkloadSegment; 2] {
         let whole = &self.whole[count - 1];
-        let plain = whole.at(window_ns);
-        let clipped = plain.least(whole.over(waiting_ns));
+        let (plain, clipped) = (whole.at(times.0), whole.within(times));
         let by_chains = of_chains.map(|of_chains| {
-            let rest = self
-                .rest
-                .get(count - 1)
-                .map_or(WorkloadSegment::NONE, |rest| {
-                    rest.at(window_ns).least(rest.over(waiting_ns))
-                });
-            clipped.least(of_chains.and(rest))
+            let rest = self.rest.get(count - 1).map(|rest| rest.within(times));
+            clipped.least(of_chains.and(rest.unwrap_or(WorkloadSegment::NONE)))
         });
         [plain, by_chains.unwrap_or(clipped)]
     }

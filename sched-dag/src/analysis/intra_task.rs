@@ -38,11 +38,10 @@ pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
     if cores == 0 || paths(task) > PATH_LIMIT {
         return None;
     }
-    let closure = TransitiveClosure::of(task)?;
-    let interferes = |v: usize, u: usize| {
-        ranks[u] < ranks[v] && !closure.precedes(u, v) && !closure.precedes(v, u)
-    };
-    let words = closure.words();
+    let words = count.div_ceil(64);
+    let successors = successors(task, words)?;
+    let precedes = |u: usize, v: usize| contains(&successors[u * words..], v);
+    let interferes = |v: usize, u: usize| ranks[u] < ranks[v] && !precedes(u, v) && !precedes(v, u);
     let mut interfering = vec![0_u64; words * count];
     for v in 0..count {
         for u in (0..count).filter(|&u| interferes(v, u)) {
@@ -119,51 +118,20 @@ fn ranks(task: &Task, order: &[usize]) -> Option<Vec<usize>> {
 /// near linear and its temporary memory small.
 pub const SUBTASK_LIMIT: usize = 1024;
 
-/// For each subtask the set of subtasks that it precedes, directly or not.
-struct TransitiveClosure {
-    words: usize,
-    rows: Vec<u64>,
-}
-
-impl TransitiveClosure {
-    /// Builds the closure, or returns `None` beyond [`SUBTASK_LIMIT`].
-    fn of(task: &Task) -> Option<Self> {
-        let count = task.subtask_count();
-        if count > SUBTASK_LIMIT {
-            return None;
-        }
-        let words = words_for(count);
-        let mut rows = vec![0; words * count];
-        for subtask in task.topological_order().rev() {
-            for successor in task.successors(subtask) {
-                for word in 0..words {
-                    rows[subtask * words + word] |= rows[successor * words + word];
-                }
-                insert(&mut rows[subtask * words..], successor);
+/// Returns for each subtask the set of `words` words of the subtasks that it precedes, directly or
+/// not; `None` beyond [`SUBTASK_LIMIT`].
+fn successors(task: &Task, words: usize) -> Option<Vec<u64>> {
+    let count = task.subtask_count();
+    let mut sets = (count <= SUBTASK_LIMIT).then(|| vec![0; words * count])?;
+    for subtask in task.topological_order().rev() {
+        for successor in task.successors(subtask) {
+            for word in 0..words {
+                sets[subtask * words + word] |= sets[successor * words + word];
             }
+            insert(&mut sets[subtask * words..], successor);
         }
-        Some(Self { words, rows })
     }
-
-    /// Returns the words of a row.
-    const fn words(&self) -> usize {
-        self.words
-    }
-
-    /// Returns the set of subtasks after `subtask`.
-    fn row(&self, subtask: usize) -> &[u64] {
-        &self.rows[subtask * self.words..(subtask + 1) * self.words]
-    }
-
-    /// Reports whether `first` precedes `second`.
-    fn precedes(&self, first: usize, second: usize) -> bool {
-        contains(self.row(first), second)
-    }
-}
-
-/// Returns the number of 64-bit words that hold `count` bits.
-const fn words_for(count: usize) -> usize {
-    count.div_ceil(64)
+    Some(sets)
 }
 
 /// Adds an element to a bit set.

@@ -80,21 +80,15 @@ impl MultiPathEquations<'_> {
         let mut window = start_ns.max(start.unwrap_or(0)).max(length);
         while window <= self.limit_ns {
             *steps = steps.checked_sub(1).ok_or(SolverFailure::Limit)?;
-            let lacks = self.forms(delays, window).map(|form| {
-                let lack = form.busy.lacks(form.cores, u128::from(window - length));
-                lack.unwrap_or(0)
-            });
+            let waiting = u128::from(window - length);
+            let forms = self.forms(delays, window);
+            let lacks = forms.map(|form| form.busy.lacks(form.cores, waiting));
             // Without subtasks there are no forms, and nothing to wait for.
-            let least = lacks.min().unwrap_or(0);
-            match least {
-                0 => return Ok(window),
-                lack => {
-                    let lack = u64::try_from(lack).map_err(|_| SolverFailure::BeyondDeadline)?;
-                    window = window
-                        .checked_add(lack)
-                        .ok_or(SolverFailure::BeyondDeadline)?;
-                }
-            }
+            let Some(lack) = lacks.min().flatten() else {
+                return Ok(window);
+            };
+            let after = u64::try_from(u128::from(window).saturating_add(lack));
+            window = after.map_err(|_| SolverFailure::BeyondDeadline)?;
         }
         Err(SolverFailure::BeyondDeadline)
     }

@@ -152,6 +152,11 @@ impl InterferingWorkload {
         }
     }
 
+    /// Returns what of the workload of a window fits into the shorter time of which a job waits.
+    pub(super) fn within(&self, (window_ns, waiting_ns): (u64, u64)) -> WorkloadSegment {
+        self.at(window_ns).least(self.over(waiting_ns))
+    }
+
     /// Returns the work that all cores of the jobs could execute in a time.
     pub(super) fn over(&self, time_ns: u64) -> WorkloadSegment {
         WorkloadSegment {

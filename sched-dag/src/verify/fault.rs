@@ -132,13 +132,13 @@ worded! {
             dag: DagLabel, subtask: SubtaskLabel, topic: String, direction: TopicSide
         } = "duplicate_topic",
             "{subtask} of {dag} {} topic `{topic}` twice; drop one of the {}",
-            direction.verb(), direction.noun();
+            direction.verb_and_noun()[0], direction.verb_and_noun()[1];
         /// More inputs or more outputs than [`MAX_ARITY`].
         ArityTooLarge {
             dag: DagLabel, subtask: SubtaskLabel, direction: TopicSide, arity: usize
         } = "arity_too_large",
             "{subtask} of {dag} has {arity} {}, more than {MAX_ARITY}; bundle some into one \
-             message", direction.noun();
+             message", direction.verb_and_noun()[1];
         /// A DAG without period.
         MissingPeriod { dag: DagLabel } = "missing_period",
             "{dag} has no period; register its source as a periodic subtask";
@@ -191,7 +191,7 @@ worded! {
         /// A time that 64 bits of nanoseconds do not hold.
         TimeOverflow { dag: DagLabel, time: OverflowingTime } = "time_overflow",
             "{} of {dag} exceeds {} ns, the last time there is; {}",
-            time.noun(), u64::MAX, time.remedy();
+            time.noun_and_remedy()[0], u64::MAX, time.noun_and_remedy()[1];
         /// Under static priority: some subtasks of a DAG have a priority, these not.
         PrioritiesPartlyGiven { dag: DagLabel, without: Vec<SubtaskLabel> } =
             "priorities_partly_given",
@@ -300,35 +300,26 @@ pub enum OverflowingTime {
 }
 
 impl TopicSide {
-    const fn verb(self) -> &'static str {
+    const fn verb_and_noun(self) -> [&'static str; 2] {
         match self {
-            Self::Input => "reads",
-            Self::Output => "writes",
-        }
-    }
-
-    const fn noun(self) -> &'static str {
-        match self {
-            Self::Input => "inputs",
-            Self::Output => "outputs",
+            Self::Input => ["reads", "inputs"],
+            Self::Output => ["writes", "outputs"],
         }
     }
 }
 
 impl OverflowingTime {
-    const fn noun(self) -> &'static str {
+    const fn noun_and_remedy(self) -> [&'static str; 2] {
         match self {
-            Self::FirstDeadline => "the deadline of the first job",
-            Self::LastDeadline => "the deadline of the last job",
-            Self::Volume => "the sum of the WCETs",
-        }
-    }
-
-    const fn remedy(self) -> &'static str {
-        match self {
-            Self::FirstDeadline => "lower the offset or the relative deadline",
-            Self::LastDeadline => "lower the number of jobs, the period or the offset",
-            Self::Volume => "lower the WCETs",
+            Self::FirstDeadline => [
+                "the deadline of the first job",
+                "lower the offset or the relative deadline",
+            ],
+            Self::LastDeadline => [
+                "the deadline of the last job",
+                "lower the number of jobs, the period or the offset",
+            ],
+            Self::Volume => ["the sum of the WCETs", "lower the WCETs"],
         }
     }
 }

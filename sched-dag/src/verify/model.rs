@@ -4,7 +4,6 @@ use alloc::vec::Vec;
 
 use super::attributes::in_flight;
 use super::fault::DagFault;
-use super::shape::PrecedenceGraph;
 use super::{CommitOptions, VerifyFindings};
 use crate::graph::Graph;
 use crate::ids::SubtaskId;
@@ -12,7 +11,7 @@ use crate::order::sort_by_key;
 use crate::policy::Priority;
 use crate::priorities::ranks;
 use crate::spec::DagSpec;
-use crate::task_set::{Dag, Subtask, TaskSet};
+use crate::task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
 
@@ -23,7 +22,7 @@ use crate::wcets::{WcetSource, graph_hash};
 /// If the specs have a fault that an earlier check finds.
 pub(super) fn build(
     options: &CommitOptions,
-    shapes: Vec<PrecedenceGraph>,
+    shapes: Vec<(Graph, Vec<StatePrecedence>)>,
     findings: &mut VerifyFindings<'_>,
 ) -> Option<TaskSet> {
     let bases = priority_bases(findings);
@@ -75,11 +74,11 @@ fn has_priorities(spec: &DagSpec) -> bool {
 
 #[inline(never)]
 #[allow(clippy::too_many_lines, reason = "fills one structure, field by field")]
-fn build_dag(spec: &DagSpec, shape: PrecedenceGraph, priority_base: u32) -> Dag {
-    let PrecedenceGraph {
-        mut graph,
-        state_precedences,
-    } = shape;
+fn build_dag(
+    spec: &DagSpec,
+    (mut graph, state_precedences): (Graph, Vec<StatePrecedence>),
+    priority_base: u32,
+) -> Dag {
     let ranks = if has_priorities(spec) {
         Vec::new()
     } else {

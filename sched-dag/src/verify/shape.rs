@@ -4,8 +4,8 @@
 //! # One shortest cycle for each knot of a graph
 //!
 //! A *knot* is a strongly connected component of two or more subtasks: a set in
-//! which each precedes each, found by Tarjan's algorithm (SIAM Journal on
-//! Computing 1, 1972) without recursion. One cycle a knot is reported, because
+//! which each precedes each, found by Kosaraju's two walks (Sharir, Computers and
+//! Mathematics 7, 1981) without recursion. One cycle a knot is reported, because
 //! the number of cycles may be exponential, and the shortest, because it is the
 //! easiest to read.
 //!
@@ -22,16 +22,10 @@ use super::fault::{DagFault, Warning};
 use super::label::SubtaskLabel;
 use super::topics::TopicGraph;
 use super::{ConstructionPolicy, CountLimit, DagFindings, VerifyFindings, topics};
-use crate::graph::Graph;
+use crate::graph::{AdjacencyList, Graph};
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sorted, sorted_by_key};
 use crate::task_set::StatePrecedence;
-
-/// The graph of a DAG, with the edges that follow from shared states.
-pub(super) struct PrecedenceGraph {
-    pub(super) graph: Graph,
-    pub(super) state_precedences: Vec<StatePrecedence>,
-}
 
 /// Checks the graph of DAG number `dag`.
 #[inline(never)]
@@ -40,7 +34,7 @@ pub(super) fn check(
     mut topology: TopicGraph<'_>,
     policy: ConstructionPolicy,
     findings: &mut VerifyFindings<'_>,
-) -> PrecedenceGraph {
+) -> (Graph, Vec<StatePrecedence>) {
     let page = &mut findings.findings_of(dag);
     let spec = page.spec;
     // Edges without topics, and those of topics: from here on they are alike.
@@ -68,10 +62,7 @@ pub(super) fn check(
         topology.edges.extend(added);
         graph = Graph::new(graph.len(), &topology.edges);
     }
-    PrecedenceGraph {
-        graph,
-        state_precedences,
-    }
+    (graph, state_precedences)
 }
 
 /// Adds the edges that are given without a topic.
@@ -212,7 +203,7 @@ fn labels(page: &DagFindings<'_, '_>, subtasks: &[SubtaskId]) -> Vec<SubtaskLabe
 /// How many edges all searches of one graph may visit.
 const BUDGET: usize = 4_000_000;
 
-/// Not numbered yet, or in no knot.
+/// In no knot, or not found yet.
 const NONE: u32 = u32::MAX;
 
 /// Returns one cycle for each knot, each from its smallest subtask on.
@@ -242,60 +233,19 @@ fn shortest_cycles(graph: &Graph) -> Vec<Vec<SubtaskId>> {
 /// Returns the knots, and within each the subtasks, ascending.
 #[inline(never)]
 fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
-    let mut number = vec![NONE; graph.len()];
-    let mut lowest = vec![NONE; graph.len()];
-    let mut open: Vec<SubtaskId> = Vec::new();
-    let mut is_open = vec![false; graph.len()];
-    let mut path: Vec<(SubtaskId, usize)> = Vec::new();
-    let mut next_number = 0;
-    let mut knots: Vec<Vec<SubtaskId>> = Vec::new();
-
+    let (mut is_seen, mut ended) = (vec![false; graph.len()], Vec::new());
     for root in graph.subtasks() {
-        if number[root.index()] != NONE {
-            continue;
-        }
-        path.push((root, 0));
-        while let Some(&mut (subtask, ref mut tried)) = path.last_mut() {
-            let index = subtask.index();
-            // Tarjan's algorithm (SIAM Journal on Computing 1, 1972), with a path of its own
-            // instead of recursion: a graph may be 100,000 subtasks deep.
-            if *tried == 0 {
-                number[index] = next_number;
-                lowest[index] = next_number;
-                next_number += 1;
-                open.push(subtask);
-                is_open[index] = true;
-            }
-            if let Some(&successor) = graph.successors.neighbours(subtask).get(*tried) {
-                *tried += 1;
-                let to = successor.index();
-                if number[to] == NONE {
-                    path.push((successor, 0));
-                } else if is_open[to] {
-                    lowest[index] = lowest[index].min(number[to]);
-                }
-                continue;
-            }
-            path.pop();
-            // What a recursion would do when it returns.
-            if let Some(&(before, _)) = path.last() {
-                lowest[before.index()] = lowest[before.index()].min(lowest[index]);
-            }
-            // The root of a part: all that is still open above it belongs to it.
-            if lowest[index] == number[index] {
-                let mut knot = Vec::new();
-                while let Some(member) = open.pop() {
-                    is_open[member.index()] = false;
-                    knot.push(member);
-                    if member == subtask {
-                        break;
-                    }
-                }
-                // A single subtask with an edge to itself was refused before.
-                if knot.len() > 1 {
-                    knots.push(sorted(&knot));
-                }
-            }
+        walk(&graph.successors, root, &mut is_seen, &mut ended);
+    }
+    is_seen.fill(false);
+    let mut knots: Vec<Vec<SubtaskId>> = Vec::new();
+    // From what ended last no edge leads backwards out of its own part.
+    for root in ended.into_iter().rev() {
+        let mut knot = Vec::new();
+        walk(&graph.predecessors, root, &mut is_seen, &mut knot);
+        // A single subtask with an edge to itself was refused before.
+        if knot.len() > 1 {
+            knots.push(sorted(&knot));
         }
     }
     // They have no member in common, so the first ones tell them apart.
@@ -304,6 +254,23 @@ fn knots(graph: &Graph) -> Vec<Vec<SubtaskId>> {
         .iter()
         .map(|&knot| core::mem::take(&mut knots[knot]))
         .collect()
+}
+
+/// Adds all that `root` leads to and that was not seen, each after what it leads to itself. The
+/// path is a list instead of a recursion: a graph may be 100,000 subtasks deep.
+fn walk(edges: &AdjacencyList, root: SubtaskId, is_seen: &mut [bool], ended: &mut Vec<SubtaskId>) {
+    let mut enter = |subtask: SubtaskId| !core::mem::replace(&mut is_seen[subtask.index()], true);
+    let mut path = Vec::new();
+    path.extend(enter(root).then_some((root, 0)));
+    while let Some((subtask, tried)) = path.last_mut() {
+        if let Some(&next) = edges.neighbours(*subtask).get(*tried) {
+            *tried += 1;
+            path.extend(enter(next).then_some((next, 0)));
+        } else {
+            ended.push(*subtask);
+            path.pop();
+        }
+    }
 }
 
 struct CycleSearch<'a> {
