@@ -6,6 +6,10 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
+use super::bytes::{Decoder, Malformed};
+use super::recordable::{Recordable, text, to_bytes};
+use super::shown::Part;
+
 /// The deepest that types may be nested.
 pub const MOST_DEPTH: usize = 16;
 
@@ -57,7 +61,7 @@ pub struct Field {
 }
 
 macro_rules! define_scalars {
-    ($($Scalar:ident $name:literal $bytes:literal)*) => {
+    ($($Scalar:ident $name:literal $Type:ident $read:expr;)*) => {
         /// A type that is not made of others.
         ///
         /// See [`Schema`].
@@ -83,9 +87,28 @@ macro_rules! define_scalars {
                 }
             }
 
+            /// Returns the bytes of a value that is written as Rust writes it; text stands for
+            /// itself. None if the type has no such value.
+            ///
+            /// ```
+            /// assert_eq!(recording::Scalar::U16.parse("258"), Some(vec![2, 1]));
+            /// ```
+            #[must_use]
+            pub fn parse(self, value: &str) -> Option<Vec<u8>> {
+                match self {
+                    $(Self::$Scalar => value.parse::<$Type>().ok().map(|value| to_bytes(&value))),*
+                }
+            }
+
             const fn least_bytes(self) -> usize {
                 match self {
-                    $(Self::$Scalar => $bytes),*
+                    $(Self::$Scalar => $Type::LEAST_BYTES),*
+                }
+            }
+
+            pub(super) fn read<'b>(self, input: &mut Decoder<'b>) -> Result<Part<'b>, Malformed> {
+                match self {
+                    $(Self::$Scalar => $read(input).map(Part::from)),*
                 }
             }
         }
@@ -93,21 +116,21 @@ macro_rules! define_scalars {
 }
 
 define_scalars!(
-    Bool "bool" 1
-    Char "char" 4
-    Text "text" 4
-    U8 "u8" 1
-    U16 "u16" 2
-    U32 "u32" 4
-    U64 "u64" 8
-    U128 "u128" 16
-    I8 "i8" 1
-    I16 "i16" 2
-    I32 "i32" 4
-    I64 "i64" 8
-    I128 "i128" 16
-    F32 "f32" 4
-    F64 "f64" 8
+    Bool "bool" bool bool::decode;
+    Char "char" char char::decode;
+    Text "text" String text;
+    U8 "u8" u8 u8::decode;
+    U16 "u16" u16 u16::decode;
+    U32 "u32" u32 u32::decode;
+    U64 "u64" u64 u64::decode;
+    U128 "u128" u128 u128::decode;
+    I8 "i8" i8 i8::decode;
+    I16 "i16" i16 i16::decode;
+    I32 "i32" i32 i32::decode;
+    I64 "i64" i64 i64::decode;
+    I128 "i128" i128 i128::decode;
+    F32 "f32" f32 f32::decode;
+    F64 "f64" f64 f64::decode;
 );
 
 impl Schema {

@@ -7,8 +7,8 @@
 use core::fmt::{self, Write};
 
 use super::bytes::{Decoder, Malformed};
-use super::recordable::{Recordable, text};
-use super::schema::{Field, Scalar, Schema};
+use super::recordable::Recordable;
+use super::schema::{Field, Schema};
 
 /// A part of a value, in the order of its bytes.
 ///
@@ -62,12 +62,17 @@ macro_rules! part_from {
 part_from!(
     Bool: bool;
     Char: char;
-    Text: &'static str;
     Unsigned: u8 u16 u32 u64 u128;
     Signed: i8 i16 i32 i64 i128;
     Single: f32;
     Double: f64;
 );
+
+impl<'p> From<&'p str> for Part<'p> {
+    fn from(value: &'p str) -> Self {
+        Self::Text(value)
+    }
+}
 
 impl From<usize> for Part<'_> {
     fn from(value: usize) -> Self {
@@ -131,28 +136,6 @@ impl Schema {
         }
         see(Part::Close(None));
         Ok(())
-    }
-}
-
-impl Scalar {
-    fn read<'b>(self, input: &mut Decoder<'b>) -> Result<Part<'b>, Malformed> {
-        Ok(match self {
-            Self::Bool => Part::Bool(bool::decode(input)?),
-            Self::Char => Part::Char(char::decode(input)?),
-            Self::Text => Part::Text(text(input)?),
-            Self::U8 => Part::Unsigned(u8::decode(input)?.into()),
-            Self::U16 => Part::Unsigned(u16::decode(input)?.into()),
-            Self::U32 => Part::Unsigned(u32::decode(input)?.into()),
-            Self::U64 => Part::Unsigned(u64::decode(input)?.into()),
-            Self::U128 => Part::Unsigned(u128::decode(input)?),
-            Self::I8 => Part::Signed(i8::decode(input)?.into()),
-            Self::I16 => Part::Signed(i16::decode(input)?.into()),
-            Self::I32 => Part::Signed(i32::decode(input)?.into()),
-            Self::I64 => Part::Signed(i64::decode(input)?.into()),
-            Self::I128 => Part::Signed(i128::decode(input)?),
-            Self::F32 => Part::Single(f32::decode(input)?),
-            Self::F64 => Part::Double(f64::decode(input)?),
-        })
     }
 }
 

@@ -24,7 +24,7 @@ use std::io::{self, Write};
 
 use recording::{
     Crc, Decoder, Entry, EntryKind, Field, Header, Malformed, Part, Recordable, Recording, Role,
-    Scalar, Schema, write_json,
+    Scalar, Schema, to_bytes,
 };
 
 use crate::json::{Object, quoted};
@@ -63,10 +63,9 @@ pub fn write(recording: &Recording<'_>, out: &mut dyn Write) -> io::Result<u64> 
         times: None,
     };
     file.put(MAGIC)?;
-    let mut about = Vec::new();
-    text(&mut about, "");
-    text(&mut about, concat!("fass-tool ", env!("CARGO_PKG_VERSION")));
-    file.record(HEADER, &about)?;
+    // No profile, and the library.
+    let about = ["", concat!("fass-tool ", env!("CARGO_PKG_VERSION"))].map(String::from);
+    file.record(HEADER, &to_bytes(&about))?;
     for (kind, content) in &channels {
         file.record(*kind, content)?;
     }
@@ -77,7 +76,7 @@ pub fn write(recording: &Recording<'_>, out: &mut dyn Write) -> io::Result<u64> 
     }
     file.end_chunk()?;
     // The checksum of the data section is optional; each chunk has its own.
-    file.record(DATA_END, &0_u32.to_le_bytes())?;
+    file.record(DATA_END, &to_bytes(&0_u32))?;
     file.summary(&channels)
 }
 
@@ -133,43 +132,17 @@ fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
         (header.dags.iter()).map(|dag| (format!("/{}/events", dag.name), "events", &event));
     let (mut schemas, mut channels) = (Vec::new(), Vec::new());
     for (id, (topic, role, schema)) in (0_u16..).zip(of_values.chain(of_events)) {
-        let mut content = Vec::new();
         // The id 0 is reserved for "no schema".
-        content.extend((id + 1).to_le_bytes());
-        text(&mut content, &schema.to_string());
-        text(&mut content, "jsonschema");
-        text(&mut content, &of_message(schema));
-        schemas.push((SCHEMA, content));
-        let mut content = Vec::new();
-        content.extend(id.to_le_bytes());
-        content.extend((id + 1).to_le_bytes());
-        text(&mut content, &topic);
-        text(&mut content, "json");
-        let mut metadata = Vec::new();
-        text(&mut metadata, "role");
-        text(&mut metadata, role);
-        bytes(&mut content, &metadata);
-        channels.push((CHANNEL, content));
+        let of_schema = id + 1;
+        let [name, form, encoding] = [&*schema.to_string(), "jsonschema", "json"].map(String::from);
+        let content = (of_schema, name, form, of_message(schema));
+        schemas.push((SCHEMA, to_bytes(&content)));
+        let metadata = to_bytes(&["role", role].map(String::from));
+        let content = (id, of_schema, topic, encoding, metadata);
+        channels.push((CHANNEL, to_bytes(&content)));
     }
     schemas.append(&mut channels);
     schemas
-}
-
-/// Adds bytes behind their length.
-fn bytes(to: &mut Vec<u8>, content: &[u8]) {
-    // Only names and schemas come here, which are far shorter.
-    let length = u32::try_from(content.len()).unwrap_or(u32::MAX);
-    to.extend(length.to_le_bytes());
-    to.extend(content);
-}
-
-fn text(to: &mut Vec<u8>, text: &str) {
-    bytes(to, text.as_bytes());
-}
-
-/// Returns numbers as little-endian bytes, one behind the other.
-fn longs<const COUNT: usize>(numbers: [u64; COUNT]) -> impl Iterator<Item = u8> {
-    numbers.into_iter().flat_map(u64::to_le_bytes)
 }
 
 /// The messages of one chunk.
@@ -213,15 +186,13 @@ impl File<'_> {
 
     fn message(&mut self, channel: u16, entry: &Entry<'_>, json: &[u8]) -> io::Result<()> {
         let place = self.chunk.records.len() as u64;
-        // 22 bytes of fixed fields: channel, sequence, log time, publish time.
-        let records = &mut self.chunk.records;
-        records.push(MESSAGE);
-        records.extend((22 + json.len() as u64).to_le_bytes());
-        records.extend(channel.to_le_bytes());
         // The sequence number has 32 bits; the low bits of the job suffice to find gaps.
         let [low @ .., _, _, _, _] = entry.job.to_le_bytes();
-        records.extend(low);
-        records.extend(longs([entry.at_ns, entry.release_ns]));
+        let fixed = to_bytes(&(channel, low, entry.at_ns, entry.release_ns));
+        let length = (fixed.len() + json.len()) as u64;
+        let records = &mut self.chunk.records;
+        records.extend(to_bytes(&(MESSAGE, length)));
+        records.extend(fixed);
         records.extend(json);
         self.chunk
             .index
@@ -249,12 +220,9 @@ impl File<'_> {
         let size = records.len() as u64;
         let mut crc = Crc::new();
         crc.update(&records);
-        let mut content = Vec::with_capacity(records.len() + 64);
-        content.extend(longs([first, last, size]));
-        content.extend(crc.value().to_le_bytes());
         // An empty name of the compression: none, so both sizes are equal.
-        text(&mut content, "");
-        content.extend(longs([size]));
+        let none = String::new();
+        let mut content = to_bytes(&(first, last, size, crc.value(), none.clone(), size));
         content.extend(records);
         let chunk_start = self.length;
         self.record(CHUNK, &content)?;
@@ -262,23 +230,14 @@ impl File<'_> {
 
         let mut places = Vec::new();
         for (channel, messages) in index {
-            places.extend(channel.to_le_bytes());
-            places.extend(self.length.to_le_bytes());
-            let mut entries = Vec::with_capacity(messages.len() * 16);
-            for (time_ns, place) in messages {
-                entries.extend(longs([time_ns, place]));
-            }
-            let mut content = channel.to_le_bytes().to_vec();
-            bytes(&mut content, &entries);
-            self.record(MESSAGE_INDEX, &content)?;
+            places.extend(to_bytes(&(channel, self.length)));
+            let entries: Vec<u8> = messages.iter().flat_map(to_bytes).collect();
+            self.record(MESSAGE_INDEX, &to_bytes(&(channel, entries)))?;
         }
 
-        let mut content = Vec::new();
-        content.extend(longs([first, last, chunk_start, index_start - chunk_start]));
-        bytes(&mut content, &places);
-        content.extend(longs([self.length - index_start]));
-        text(&mut content, "");
-        content.extend(longs([size, size]));
+        let of_chunk = (first, last, chunk_start, index_start - chunk_start);
+        let of_index = (places, self.length - index_start);
+        let content = to_bytes(&(of_chunk, of_index, none, size, size));
         self.chunk_indexes.push(content);
         Ok(())
     }
@@ -287,23 +246,24 @@ impl File<'_> {
     fn summary(&mut self, channels: &[(u8, Vec<u8>)]) -> io::Result<u64> {
         let start = self.length;
         let messages: u64 = self.counts.values().sum();
-        let mut statistics = messages.to_le_bytes().to_vec();
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
         // `channels` has a schema and a channel for each.
         let of_each = u16::try_from(channels.len() / 2).unwrap_or(u16::MAX);
-        statistics.extend(of_each.to_le_bytes());
-        statistics.extend(u32::from(of_each).to_le_bytes());
-        // No attachments, no metadata.
-        statistics.extend([0; 8]);
-        statistics.extend(count(self.chunk_indexes.len()).to_le_bytes());
-        let (first, last) = self.times.unwrap_or_default();
-        statistics.extend(longs([first, last]));
-        let mut counts = Vec::new();
-        for (channel, count) in &self.counts {
-            counts.extend(channel.to_le_bytes());
-            counts.extend(count.to_le_bytes());
-        }
-        bytes(&mut statistics, &counts);
+        let no_attachments_and_metadata = [0_u32; 2];
+        let counts: Vec<u8> = self
+            .counts
+            .iter()
+            .flat_map(|(channel, count)| to_bytes(&(*channel, *count)))
+            .collect();
+        let statistics = to_bytes(&(
+            messages,
+            of_each,
+            u32::from(of_each),
+            no_attachments_and_metadata,
+            count(self.chunk_indexes.len()),
+            self.times.unwrap_or_default(),
+            counts,
+        ));
 
         let indexes = std::mem::take(&mut self.chunk_indexes);
         let indexes = indexes.into_iter().map(|content| (CHUNK_INDEX, content));
@@ -314,9 +274,7 @@ impl File<'_> {
             self.record(kind, &content)?;
         }
         // No offsets within the summary: it is short.
-        let mut footer: Vec<u8> = longs([start, 0]).collect();
-        footer.extend(0_u32.to_le_bytes());
-        self.record(FOOTER, &footer)?;
+        self.record(FOOTER, &to_bytes(&(start, 0_u64, 0_u32)))?;
         self.put(MAGIC)?;
         Ok(messages)
     }
@@ -341,7 +299,6 @@ pub(super) fn write_message(
     let _ = write!(out, "{{\"job\":{job}");
     let mut input = Decoder::new(bytes);
     let mut values = Values {
-        bytes,
         input: &mut input,
         out,
     };
@@ -421,7 +378,6 @@ fn named(fields: &[Field]) -> impl Iterator<Item = (&str, &Schema)> {
 
 /// Writes values, one behind the other.
 struct Values<'v, 'b> {
-    bytes: &'b [u8],
     input: &'v mut Decoder<'b>,
     out: &'v mut String,
 }
@@ -485,19 +441,21 @@ impl Values<'_, '_> {
     }
 
     fn write_scalar(&mut self, schema: &Schema) -> Result<bool, Malformed> {
-        let (start, mut real) = (self.input.offset(), 0.0);
-        schema.walk(self.input, &mut |part| match part {
-            Part::Single(number) => real = number.into(),
-            Part::Double(number) => real = number,
-            _ => {}
+        let (mut real, mut text) = (0.0, String::new());
+        schema.walk(self.input, &mut |part| {
+            real = match part {
+                Part::Single(number) => number.into(),
+                Part::Double(number) => number,
+                _ => 0.0,
+            };
+            text = part.to_string();
         })?;
-        if real.is_infinite() {
-            // `write_json` would print `inf`, which is no JSON.
-            *self.out += if real > 0.0 { "1e999" } else { "-1e999" };
-        } else {
-            let bytes = &self.bytes[start..self.input.offset()];
-            write_json(schema, bytes, self.out)?;
-        }
+        *self.out += match real {
+            // Shown as `null`, it would be left out as NaN is.
+            f64::INFINITY => "1e999",
+            f64::NEG_INFINITY => "-1e999",
+            _ => &text,
+        };
         Ok(!real.is_nan())
     }
 }

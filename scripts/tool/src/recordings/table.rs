@@ -16,7 +16,7 @@ use std::path::Path;
 use dag_file::time::parse_ns;
 use recording::{
     Channel, DagHeader, Decoder, Entry, EntryKind, Field, Header, Malformed, Part, Recording, Role,
-    Scalar, Schema, Writer, to_bytes, write_json,
+    Scalar, Schema, Writer, write_json,
 };
 use replay::shown::quoted;
 
@@ -61,6 +61,17 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         return Err(at(1, line.into()));
     }
     let schema = schema(&columns, options).map_err(|why| at(1, why))?;
+    let mut parts = Vec::new();
+    spread(&schema, "value", &mut parts);
+    let (wanted, here) = (parts.len(), columns.values.len());
+    if wanted != here {
+        let names = columns.names.join(", ");
+        let why = format!(
+            "the type has {wanted} numbers and texts, and there are {here} columns for them \
+             ({names}); change `--type`, or leave columns out by `--ignore`"
+        );
+        return Err(at(1, why));
+    }
     let app = options.text("dag").unwrap_or_default();
     let mut writer = Writer::new(&Header {
         app: app.into(),
@@ -107,14 +118,9 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         let release_ns = job.saturating_mul(period_ns.unwrap_or(0));
         let release_ns = number(columns.release_ns, release_ns)?;
         let mut value = Vec::new();
-        let mut own = columns.values.iter();
-        encode(
-            &schema,
-            // The cells of a row are as many as the type's parts: `schema` has checked it.
-            &mut || own.next().map_or("", |&column| &cells[column]),
-            &mut value,
-        )
-        .map_err(|why| at(line, why))?;
+        for ((_, part), &column) in parts.iter().zip(&columns.values) {
+            encode(part, &cells[column], &mut value).map_err(|why| at(line, why))?;
+        }
         writer.write(&Entry {
             what: EntryKind::Value,
             dag: 0,
@@ -188,7 +194,7 @@ fn twice<'t>(titles: &'t [String], options: &Parsed) -> Option<&'t str> {
     used.find(|title| !seen.insert(*title))
 }
 
-/// Returns the type of the values, after a check that it fits the columns.
+/// Returns the type of the values.
 fn schema(columns: &Columns, options: &Parsed) -> Result<Schema, String> {
     let Some(text) = options.text("type") else {
         let field = |name: &String| Field {
@@ -200,81 +206,33 @@ fn schema(columns: &Columns, options: &Parsed) -> Result<Schema, String> {
             columns.names.iter().map(field).collect(),
         ));
     };
-    let schema = Schema::parse(text)
-        .map_err(|(column, expected)| format!("`--type`, column {column}: expected {expected}"))?;
-    let mut parts = Vec::new();
-    spread(&schema, "value", &mut parts);
-    let (wanted, here) = (parts.len(), columns.values.len());
-    if wanted != here {
-        let names = columns.names.join(", ");
-        return Err(format!(
-            "the type has {wanted} numbers and texts, and there are {here} columns for them \
-             ({names}); change `--type`, or leave columns out by `--ignore`"
-        ));
-    }
-    Ok(schema)
+    Schema::parse(text)
+        .map_err(|(column, expected)| format!("`--type`, column {column}: expected {expected}"))
 }
 
-/// Appends the bytes of a value whose parts are the next cells.
-fn encode<'c>(
-    schema: &Schema,
-    next: &mut dyn FnMut() -> &'c str,
-    out: &mut Vec<u8>,
-) -> Result<(), String> {
-    match schema {
+/// Appends the bytes of a part of a value, which is a cell.
+fn encode(part: &Schema, cell: &str, out: &mut Vec<u8>) -> Result<(), String> {
+    match part {
         Schema::Scalar(scalar) => {
-            let cell = next();
             let refused = || format!("{} is no value of type {}", quoted(cell), scalar.name());
-            out.extend(scalar_bytes(*scalar, cell.trim()).ok_or_else(refused)?);
+            out.extend(scalar.parse(cell.trim()).ok_or_else(refused)?);
             Ok(())
         }
         Schema::Option(inner) => {
-            let cell = next();
             // An empty cell is an option without a value.
             out.push(u8::from(!cell.is_empty()));
             match (&**inner, cell.is_empty()) {
                 (_, true) => Ok(()),
-                (Schema::Scalar(_), false) => encode(inner, &mut || cell, out),
+                (Schema::Scalar(_), false) => encode(inner, cell, out),
                 // Other options are JSON in their cell, which is only written.
-                _ => Err(format!("a value of type {schema} is not read from a table")),
+                _ => Err(format!("a value of type {part} is not read from a table")),
             }
         }
-        Schema::Struct(_, fields) => {
-            (fields.iter()).try_for_each(|field| encode(&field.schema, next, out))
-        }
-        Schema::Tuple(elements) => {
-            (elements.iter()).try_for_each(|element| encode(element, next, out))
-        }
-        Schema::Array(element, count) if spread_width(element, *count).is_some() => {
-            (0..*count).try_for_each(|_| encode(element, next, out))
-        }
-        Schema::Array(..) => Err(format!(
-            "an array of more than {MOST_COLUMNS} columns, {schema}, is not read from a table"
+        Schema::List(_) => Err(format!("a list, {part}, is not read from a table")),
+        // Whatever else is no array has been spread.
+        _ => Err(format!(
+            "an array of more than {MOST_COLUMNS} columns, {part}, is not read from a table"
         )),
-        Schema::List(_) => Err(format!("a list, {schema}, is not read from a table")),
-    }
-}
-
-fn scalar_bytes(scalar: Scalar, cell: &str) -> Option<Vec<u8>> {
-    fn bytes_of_cell<T: recording::Recordable + std::str::FromStr>(cell: &str) -> Option<Vec<u8>> {
-        cell.parse::<T>().ok().map(|value| to_bytes(&value))
-    }
-    match scalar {
-        Scalar::Bool => bytes_of_cell::<bool>(cell),
-        Scalar::Char => bytes_of_cell::<char>(cell),
-        Scalar::Text => bytes_of_cell::<String>(cell),
-        Scalar::U8 => bytes_of_cell::<u8>(cell),
-        Scalar::U16 => bytes_of_cell::<u16>(cell),
-        Scalar::U32 => bytes_of_cell::<u32>(cell),
-        Scalar::U64 => bytes_of_cell::<u64>(cell),
-        Scalar::U128 => bytes_of_cell::<u128>(cell),
-        Scalar::I8 => bytes_of_cell::<i8>(cell),
-        Scalar::I16 => bytes_of_cell::<i16>(cell),
-        Scalar::I32 => bytes_of_cell::<i32>(cell),
-        Scalar::I64 => bytes_of_cell::<i64>(cell),
-        Scalar::I128 => bytes_of_cell::<i128>(cell),
-        Scalar::F32 => bytes_of_cell::<f32>(cell),
-        Scalar::F64 => bytes_of_cell::<f64>(cell),
     }
 }
 
@@ -330,7 +288,7 @@ impl Iterator for Rows<'_> {
 }
 
 /// The largest number of columns that an array is spread into.
-pub(super) const MOST_COLUMNS: usize = 256;
+const MOST_COLUMNS: u64 = 256;
 
 /// Returns the tables, with the names of their files.
 #[allow(
@@ -340,7 +298,7 @@ pub(super) const MOST_COLUMNS: usize = 256;
 pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
     let header = recording.header();
     let mut names = BTreeMap::<String, usize>::new();
-    let mut tables: Vec<(String, String)> = Vec::new();
+    let (mut tables, mut parts_of) = (Vec::new(), Vec::new());
     for channel in &header.channels {
         let dag = &header.dags[usize::from(channel.dag)].name;
         let found = match channel.role {
@@ -358,8 +316,11 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
             format!("{name}.csv")
         };
         let mut columns = Vec::from(["job", "release_ns", "at_ns"].map(String::from));
-        spread(&channel.schema, "value", &mut columns);
+        let mut parts = Vec::new();
+        spread(&channel.schema, "value", &mut parts);
+        columns.extend(parts.iter().map(|(name, _)| name.clone()));
         tables.push((name, row(&columns)));
+        parts_of.push(parts);
     }
     let mut others =
         row(&["what", "dag", "subtask", "job", "release_ns", "at_ns"].map(String::from));
@@ -377,14 +338,11 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
         if entry.what == EntryKind::Value {
             let place = usize::from(place);
             cells.extend([job, release_ns, at_ns].map(|number| number.to_string()));
-            let schema = &header.channels[place].schema;
-            // The recording's reader has checked every value, so this cannot fail.
-            let _ = fill(
-                schema,
-                &mut Decoder::new(entry.value),
-                entry.value,
-                &mut cells,
-            );
+            let mut input = Decoder::new(entry.value);
+            for (_, part) in &parts_of[place] {
+                // The recording's reader has checked every value, so this cannot fail.
+                cells.push(cell(part, &mut input, entry.value).unwrap_or_default());
+            }
             tables[place].1 += &row(&cells);
             continue;
         }
@@ -429,25 +387,8 @@ fn row(cells: &[String]) -> String {
     line
 }
 
-/// Returns the number of columns of a type.
-fn width(schema: &Schema) -> usize {
-    let sum = |width: usize, schema: &Schema| width.saturating_add(self::width(schema));
-    match schema {
-        Schema::Struct(_, fields) => (fields.iter().map(|field| &field.schema)).fold(0, sum),
-        Schema::Tuple(elements) => elements.iter().fold(0, sum),
-        Schema::Array(element, count) => spread_width(element, *count).unwrap_or(1),
-        Schema::Scalar(_) | Schema::Option(_) | Schema::List(_) => 1,
-    }
-}
-
-/// Returns the number of columns of an array, if it is spread.
-pub(super) fn spread_width(element: &Schema, count: u32) -> Option<usize> {
-    let all = width(element).checked_mul(usize::try_from(count).ok()?)?;
-    Some(all).filter(|&all| all <= MOST_COLUMNS)
-}
-
-/// Adds the names of a type's columns.
-pub(super) fn spread(schema: &Schema, name: &str, columns: &mut Vec<String>) {
+/// Adds the columns of a type: the name of each, and the part of a value that is in it.
+fn spread<'s>(schema: &'s Schema, name: &str, columns: &mut Vec<(String, &'s Schema)>) {
     let within = |part: &dyn std::fmt::Display| match name {
         "value" => part.to_string(),
         _ => format!("{name}_{part}"),
@@ -463,56 +404,39 @@ pub(super) fn spread(schema: &Schema, name: &str, columns: &mut Vec<String>) {
                 spread(schema, &within(&number), columns);
             }
         }
-        Schema::Array(element, count) if spread_width(element, *count).is_some() => {
-            (0..*count).for_each(|number| spread(element, &within(&number), columns));
+        Schema::Array(element, count) => {
+            let mut of_one = Vec::new();
+            spread(element, name, &mut of_one);
+            match of_one.len() as u64 * u64::from(*count) <= MOST_COLUMNS {
+                true => (0..*count).for_each(|number| spread(element, &within(&number), columns)),
+                false => columns.push((name.into(), schema)),
+            }
         }
-        _ => columns.push(name.into()),
+        _ => columns.push((name.into(), schema)),
     }
 }
 
-/// Adds the cells of a value that is read from `input`, a decoder of `all`.
-fn fill(
-    schema: &Schema,
-    input: &mut Decoder<'_>,
-    all: &[u8],
-    cells: &mut Vec<String>,
-) -> Result<(), Malformed> {
-    match schema {
-        Schema::Struct(_, fields) => {
-            (fields.iter()).try_for_each(|field| fill(&field.schema, input, all, cells))
-        }
-        Schema::Tuple(elements) => {
-            (elements.iter()).try_for_each(|element| fill(element, input, all, cells))
-        }
-        Schema::Array(element, count) if spread_width(element, *count).is_some() => {
-            (0..*count).try_for_each(|_| fill(element, input, all, cells))
-        }
-        Schema::Scalar(scalar) => {
-            let mut cell = String::new();
-            let walked = schema.walk(input, &mut |part| cell = scalar_cell(*scalar, part));
-            cells.push(cell);
-            walked
-        }
-        Schema::Option(_) | Schema::List(_) | Schema::Array(..) => {
-            let start = input.offset();
-            schema.walk(input, &mut |_| ())?;
-            let mut cell = String::new();
-            write_json(schema, &all[start..input.offset()], &mut cell)?;
-            cells.push(if cell == "null" { String::new() } else { cell });
-            Ok(())
+/// Returns the cell of a part of a value that is read from `input`, a decoder of `all`.
+fn cell(part: &Schema, input: &mut Decoder<'_>, all: &[u8]) -> Result<String, Malformed> {
+    let (start, mut cell) = (input.offset(), String::new());
+    part.walk(input, &mut |part| cell = shown(part))?;
+    if !matches!(part, Schema::Scalar(_)) {
+        cell.clear();
+        write_json(part, &all[start..input.offset()], &mut cell)?;
+        if cell == "null" {
+            cell.clear();
         }
     }
+    Ok(cell)
 }
 
-fn scalar_cell(scalar: Scalar, part: Part<'_>) -> String {
+/// Returns a scalar as Rust writes it, and text as it is.
+fn shown(part: Part<'_>) -> String {
     match part {
-        Part::Bool(truth) => truth.to_string(),
         Part::Char(letter) => letter.to_string(),
         Part::Text(text) => text.into(),
-        Part::Unsigned(number) => number.to_string(),
-        Part::Signed(number) => number.to_string(),
         Part::Single(number) => format!("{number:?}"),
         Part::Double(number) => format!("{number:?}"),
-        _ => scalar.name().into(),
+        other => other.to_string(),
     }
 }
