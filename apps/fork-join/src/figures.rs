@@ -9,6 +9,14 @@ use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
 use sched_dag::Instance;
 
+/// The names of latencies, in the table and in the machine line.
+const LATENCIES: [(&str, &str); 4] = [
+    ("join latency", "join_latency_ns"),
+    ("join to start", "join_to_start_ns"),
+    ("response time", "response_time_ns"),
+    ("release jitter", "release_jitter_ns"),
+];
+
 /// The figures of one run.
 pub(crate) struct Figures {
     parallel: usize,
@@ -20,14 +28,8 @@ pub(crate) struct Figures {
     first_release_ns: u64,
     /// The first job of which the times are left.
     first_recorded_job: u64,
-    /// From the last parallel subtask's finish to the sink being ready.
-    join_latency: Distribution,
-    /// From the last parallel subtask's finish to the sink's first instruction.
-    join_to_start: Distribution,
-    /// From the nominal release to the completion.
-    response_time: Distribution,
-    /// From the nominal release to the release.
-    release_jitter: Distribution,
+    /// In the order of [`LATENCIES`].
+    latencies: [Distribution; 4],
 }
 
 impl Figures {
@@ -43,7 +45,16 @@ impl Figures {
             ))
         });
         let since = |later: Option<u64>, earlier: u64| Some(later?.saturating_sub(earlier));
-        let releases = jobs;
+        // From the last parallel subtask's finish to the sink being ready.
+        let to_ready = (sinks.clone()).filter_map(|(join, sink)| since(sink.ready_ns, join));
+        // From there to the sink's first instruction.
+        let to_start = sinks.filter_map(|(join, sink)| since(sink.start_ns, join));
+        // From the nominal release to the completion.
+        let responses = jobs
+            .clone()
+            .filter_map(|(job, times)| since(record.completion_ns(dag, job), times.release_ns?));
+        // From the nominal release to the release.
+        let jitter = jobs.filter_map(|(_, times)| since(times.released_ns, times.release_ns?));
         let statistics = run.statistics(dag);
         let found = run
             .violations()
@@ -57,20 +68,12 @@ impl Figures {
             allocations: run.allocations(),
             first_release_ns: run.epoch_ns(),
             first_recorded_job: record.first_job(dag),
-            join_latency: Distribution::new(
-                sinks
-                    .clone()
-                    .filter_map(|(join, sink)| since(sink.ready_ns, join)),
-            ),
-            join_to_start: Distribution::new(
-                sinks.filter_map(|(join, sink)| since(sink.start_ns, join)),
-            ),
-            response_time: Distribution::new(releases.clone().filter_map(|(job, times)| {
-                since(record.completion_ns(dag, job), times.release_ns?)
-            })),
-            release_jitter: Distribution::new(
-                releases.filter_map(|(_, times)| since(times.released_ns, times.release_ns?)),
-            ),
+            latencies: [
+                Distribution::new(to_ready),
+                Distribution::new(to_start),
+                Distribution::new(responses),
+                Distribution::new(jitter),
+            ],
         }
     }
 
@@ -80,12 +83,11 @@ impl Figures {
             line.number("subtasks", self.parallel as u64)
                 .number("jobs", self.jobs)
                 .number("joins", self.joins)
-                .number("violations", self.violations)
-                .distribution("join_latency_ns", &self.join_latency)
-                .distribution("join_to_start_ns", &self.join_to_start)
-                .distribution("response_time_ns", &self.response_time)
-                .distribution("release_jitter_ns", &self.release_jitter)
-                .number("deadline_misses", self.deadline_misses)
+                .number("violations", self.violations);
+            for ((_, member), times) in LATENCIES.iter().zip(&self.latencies) {
+                line.distribution(member, times);
+            }
+            line.number("deadline_misses", self.deadline_misses)
                 .number("allocations", self.allocations)
                 .number("first_release_ns", self.first_release_ns);
         });
@@ -112,39 +114,26 @@ impl Figures {
             "  {:<16}{:>12}{:>12}{:>12}{:>12}",
             "", "min", "median", "p99", "max"
         );
-        for (name, distribution) in [
-            ("join latency", &self.join_latency),
-            ("join to start", &self.join_to_start),
-            ("response time", &self.response_time),
-            ("release jitter", &self.release_jitter),
-        ] {
+        for ((name, _), times) in LATENCIES.iter().zip(&self.latencies) {
             println!(
                 "  {name:<16}{:>12}{:>12}{:>12}{:>12}",
-                Ns(distribution.min()),
-                Ns(distribution.median()),
-                Ns(distribution.p99()),
-                Ns(distribution.max())
+                Ns(times.min()),
+                Ns(times.median()),
+                Ns(times.p99()),
+                Ns(times.max())
             );
         }
     }
 
     /// Says what is wrong with the run, if anything is.
     pub(crate) fn complaint(&self) -> Option<String> {
-        let Self {
-            parallel,
-            jobs,
-            joins,
-            violations,
-            allocations,
-            ..
-        } = self;
-        if *violations > 0 {
-            return Some(format!("N = {parallel}: {violations} semantic violations"));
-        }
-        if jobs != joins {
-            return Some(format!("N = {parallel}: {jobs} jobs but {joins} joins"));
-        }
-        (*allocations > 0)
-            .then(|| format!("N = {parallel}: {allocations} allocations while running"))
+        let (jobs, joins) = (self.jobs, self.joins);
+        let wrong = match (self.violations, self.allocations) {
+            (count @ 1.., _) => format!("{count} semantic violations"),
+            _ if jobs != joins => format!("{jobs} jobs but {joins} joins"),
+            (_, count @ 1..) => format!("{count} allocations while running"),
+            _ => return None,
+        };
+        Some(format!("N = {}: {wrong}", self.parallel))
     }
 }

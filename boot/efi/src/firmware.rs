@@ -12,7 +12,7 @@ use core::arch::asm;
 use core::ffi::c_void;
 use core::ptr::null_mut;
 
-use boot_efi::list::Range;
+use boot::MemoryRegion;
 
 /// The result of a call; 0 is success.
 type Status = usize;
@@ -291,16 +291,16 @@ pub(crate) fn halt() -> ! {
 
 impl MemoryMap {
     /// Returns all ranges, in the firmware's order.
-    pub(crate) fn ranges(&self) -> impl Iterator<Item = Range> {
+    pub(crate) fn ranges(&self) -> impl Iterator<Item = MemoryRegion> {
         (0..self.length / self.step).map(|index| {
             let at = self.start.wrapping_add(index * self.step);
             // SAFETY: the firmware has written that many descriptors there, each of `step` bytes.
             let range = unsafe { &*at.cast::<Descriptor>() };
-            Range {
+            MemoryRegion {
                 start: range.start,
-                bytes: range.pages.wrapping_mul(4096),
+                end: range.start.saturating_add(range.pages.saturating_mul(4096)),
                 // Of applications, of the boot services, of nobody: free by now.
-                is_usable: matches!(range.kind, 1..=4 | 7),
+                usable: matches!(range.kind, 1..=4 | 7),
             }
         })
     }

@@ -3,6 +3,7 @@
 //! [`boot::multiboot2`] reads it, and says which tags there are. A tag that does not fit is
 //! counted and not written, so that it can be refused once, at the end.
 
+use boot::MemoryRegion;
 use boot::multiboot2::tag;
 
 /// A list of tags that is being written.
@@ -10,17 +11,6 @@ use boot::multiboot2::tag;
 pub struct List<'b> {
     bytes: &'b mut [u8],
     length: usize,
-}
-
-/// A range of memory of one kind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Range {
-    /// The physical address of its first byte.
-    pub start: u64,
-    /// Its size in bytes.
-    pub bytes: u64,
-    /// Whether it is ordinary memory that nobody uses.
-    pub is_usable: bool,
 }
 
 impl<'b> List<'b> {
@@ -62,7 +52,7 @@ impl<'b> List<'b> {
     }
 
     /// Adds the memory map.
-    pub fn memory_map(&mut self, ranges: impl Iterator<Item = Range>) {
+    pub fn memory_map(&mut self, ranges: impl Iterator<Item = MemoryRegion>) {
         const ENTRY_SIZE: u32 = 24;
         const RESERVED: u32 = 2;
         let start = self.length;
@@ -71,9 +61,9 @@ impl<'b> List<'b> {
             &[&ENTRY_SIZE.to_le_bytes(), &0_u32.to_le_bytes()],
         );
         for range in ranges {
-            let kind: u32 = if range.is_usable { 1 } else { RESERVED };
+            let kind: u32 = if range.usable { 1 } else { RESERVED };
             self.put(&range.start.to_le_bytes());
-            self.put(&range.bytes.to_le_bytes());
+            self.put(&(range.end - range.start).to_le_bytes());
             self.put(&u64::from(kind).to_le_bytes());
         }
         self.put_size(start, 4);
@@ -118,7 +108,7 @@ impl<'b> List<'b> {
 mod tests {
     use super::*;
     use boot::physical::PhysicalMemory;
-    use boot::{BootInfo, MemoryRegion, Module, multiboot2};
+    use boot::{BootInfo, Module, multiboot2};
 
     /// A machine of so many bytes.
     struct Machine(Vec<u8>);
@@ -137,10 +127,10 @@ mod tests {
         let mut copy = [0; 36];
         copy[15] = 2;
         list.root_pointer(&copy, true);
-        let pages = (0..40).map(|page| Range {
+        let pages = (0..40).map(|page| MemoryRegion {
             start: page << 12,
-            bytes: 4096,
-            is_usable: page < 30,
+            end: (page + 1) << 12,
+            usable: page < 30,
         });
         list.memory_map(pages);
     }

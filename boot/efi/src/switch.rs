@@ -9,6 +9,14 @@ use core::arch::asm;
 /// The segments: none, 32-bit code, data.
 const SEGMENTS: [u64; 3] = [0, 0x00cf_9b00_0000_ffff, 0x00cf_9300_0000_ffff];
 
+/// Where a table of segments is, as `lgdt` takes it.
+#[repr(C, packed)]
+struct SegmentTable {
+    /// The offset of its last byte.
+    limit: u16,
+    start: u64,
+}
+
 /// The code that runs below 4 GiB, in 32-bit mode.
 const CODE: [u8; 21] = [
     0xb8, 0x10, 0, 0, 0, // mov eax, 0x10: the data segment
@@ -38,18 +46,10 @@ pub(crate) unsafe fn enter(page: *mut u8, list: u32, entry: u32) -> ! {
     unsafe { page.cast::<[u8; 21]>().write_unaligned(CODE) };
     // SAFETY: condition 3.
     unsafe { segments.cast::<[u64; 3]>().write_unaligned(SEGMENTS) };
-    let mut table = [0_u16; 5];
-    let bytes = (segments as u64).to_le_bytes();
-    let address = bytes
-        .as_chunks::<2>()
-        .0
-        .iter()
-        .map(|two| u16::from_le_bytes(*two));
-    let fields = core::iter::once(8 * 3 - 1).chain(address);
-    table
-        .iter_mut()
-        .zip(fields)
-        .for_each(|(field, value)| *field = value);
+    let table = SegmentTable {
+        limit: 8 * 3 - 1,
+        start: segments as u64,
+    };
     // SAFETY: conditions 1 to 3. `CODE` runs with the same page table until it turns paging
     // off, and nothing of this application is used again.
     unsafe {
@@ -61,7 +61,7 @@ pub(crate) unsafe fn enter(page: *mut u8, list: u32, entry: u32) -> ! {
             "push 0x08",
             "push {page}",
             "retfq",
-            table = in(reg) table.as_ptr(),
+            table = in(reg) &raw const table,
             list = in(reg) list,
             page = in(reg) page,
             in("edx") entry,

@@ -87,7 +87,7 @@ pvh_entry:
     mov cr3, edi
 
     lgdt [boot_gdt_pointer]
-    mov esi, offset boot_long_mode_pointer
+    mov esi, offset boot_long_mode
     jmp enable_long_mode
 
 # Sends a line to the first serial port as the loader has left that, tells QEMU of a failure by
@@ -108,8 +108,8 @@ refuse:
     jmp 6b
 
 # Turns on long mode with the tables that cr3 holds, and SSE, which compiled
-# code uses from its first instruction on. Continues in 64-bit mode at the far
-# pointer that esi points to. Needs no stack; changes eax, ebx, ecx, edx. Used by every
+# code uses from its first instruction on. Continues in 64-bit mode at the address
+# in esi. Needs no stack; changes eax, ebx, ecx, edx. Used by every
 # processor (Intel SDM volume 3, 10.8.5). No-execute pages are turned on where there are
 # any: where a firmware has put them away, the kernel says so.
 #
@@ -138,16 +138,20 @@ enable_long_mode:
     mov eax, (1 << 31) | (1 << 16) | (1 << 5) | (1 << 4) | (1 << 1) | (1 << 0)
     mov cr0, eax
     fninit
-    jmp fword ptr [esi]
+    jmp fword ptr [long_mode_pointer]
 
 .code64
-boot_long_mode:
+long_mode:
     xor eax, eax
     mov ds, eax
     mov es, eax
     mov ss, eax
     mov fs, eax
     mov gs, eax
+    mov esi, esi                                # its upper half is undefined by now
+    jmp rsi
+
+boot_long_mode:
     lea rsp, [rip + boot_stack_top]
     mov edi, ebp
     xor ebp, ebp
@@ -177,17 +181,11 @@ processor_entry:
     cpuid
     shr ebx, 24
     mov ebp, ebx
-2:  mov esi, offset processor_long_mode_pointer
+2:  mov esi, offset processor_long_mode
     jmp enable_long_mode
 
 .code64
 processor_long_mode:
-    xor eax, eax
-    mov ds, eax
-    mov es, eax
-    mov ss, eax
-    mov fs, eax
-    mov gs, eax
     lea rax, [rip + {stacks}]
     lea rcx, [rax + {stacks_bytes}]
 3:  cmp [rax], rbp
@@ -241,11 +239,8 @@ boot_gdt_pointer:
     .word boot_gdt_end - boot_gdt - 1
     .long boot_gdt
 
-boot_long_mode_pointer:
-    .long boot_long_mode
-    .word 0x08
-processor_long_mode_pointer:
-    .long processor_long_mode
+long_mode_pointer:
+    .long long_mode
     .word 0x08
 
 .section .bss.boot, "aw", @nobits

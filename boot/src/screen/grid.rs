@@ -93,18 +93,8 @@ impl Grid {
         let letter = if letter == b' ' { 0 } else { letter };
         if let Some(wanted) = self.wanted.get(cell) {
             wanted.store(letter, Relaxed);
-            let (first, end) = (self.first.load(Relaxed), self.end.load(Relaxed));
-            let is_empty = first >= end;
-            self.first
-                .store(if is_empty { cell } else { first.min(cell) }, Relaxed);
-            self.end.store(
-                if is_empty {
-                    cell + 1
-                } else {
-                    end.max(cell + 1)
-                },
-                Relaxed,
-            );
+            self.first.fetch_min(cell, Relaxed);
+            self.end.fetch_max(cell + 1, Relaxed);
         }
     }
 
@@ -123,6 +113,11 @@ impl Grid {
             (self.drawn[cell].swap(letter, Relaxed) != letter).then_some((cell, letter))
         });
         self.first.store(open.start, Relaxed);
+        if open.is_empty() {
+            // The next cell that differs is the first one, and the last.
+            self.first.store(CELLS, Relaxed);
+            self.end.store(0, Relaxed);
+        }
         found
     }
 }
