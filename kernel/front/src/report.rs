@@ -70,30 +70,30 @@ pub struct MemoryInUse {
     pub contexts_free: usize,
 }
 
-/// The memory that a program needs.
-#[derive(Clone, Copy, Debug)]
-pub struct MemoryDemand {
-    /// The bytes of the heap that are in use.
-    pub in_use_bytes: usize,
-    /// The most that were.
-    pub peak_bytes: u64,
-    /// The bytes that there are.
-    pub bytes: u64,
+/// How much of a heap is, was and can be in use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HeapUsage {
     /// How often memory was allocated.
     pub allocations: u64,
+    /// The bytes that are in use.
+    pub in_use_bytes: usize,
+    /// The most that were, between two operations.
+    pub peak_bytes: usize,
+    /// The bytes that there are.
+    pub capacity_bytes: usize,
 }
 
-impl MemoryDemand {
+impl HeapUsage {
     /// Prints what was needed.
     pub(crate) fn report(self) {
         crate::println!(
             "heap: {} KiB at its peak of {} KiB",
             self.peak_bytes.div_ceil(1024),
-            self.bytes / 1024
+            self.capacity_bytes / 1024
         );
         json::emit("memory", |line| {
-            line.number("heap_peak_bytes", self.peak_bytes)
-                .number("heap_bytes", self.bytes)
+            line.number("heap_peak_bytes", self.peak_bytes as u64)
+                .number("heap_bytes", self.capacity_bytes as u64)
                 .number("allocations", self.allocations);
         });
     }

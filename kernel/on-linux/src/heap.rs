@@ -3,6 +3,8 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
+use front::report::HeapUsage;
+
 /// The allocator that an app's program has.
 #[derive(Debug)]
 pub struct Heap;
@@ -16,14 +18,14 @@ pub(crate) fn allocations() -> u64 {
     ALLOCATIONS.load(Relaxed)
 }
 
-/// Returns how many bytes are in use.
-pub(crate) fn in_use_bytes() -> usize {
-    IN_USE.load(Relaxed)
-}
-
-/// Returns how many bytes were in use when it was most.
-pub(crate) fn peak_bytes() -> usize {
-    PEAK.load(Relaxed)
+/// Returns how much memory is and was in use, of so many bytes that there are.
+pub(crate) fn usage(capacity_bytes: usize) -> HeapUsage {
+    HeapUsage {
+        allocations: allocations(),
+        in_use_bytes: IN_USE.load(Relaxed),
+        peak_bytes: PEAK.load(Relaxed),
+        capacity_bytes,
+    }
 }
 
 fn count(bytes: usize) {

@@ -19,7 +19,7 @@ use front::app::ending::AppError;
 use front::app::machine::{Divisible, System};
 use front::json;
 use front::options::{CommandLine, UsageError};
-use front::report::{self, MemoryDemand, tell_log};
+use front::report::{self, HeapUsage, tell_log};
 use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, ShellSession};
 use linux::{Connection, Control, EndSignals, Linux};
 use sched_dag::engine::Run;
@@ -186,13 +186,8 @@ impl System for LinuxSystem {
         Err(UsageError::new(line).into())
     }
 
-    fn memory() -> MemoryDemand {
-        MemoryDemand {
-            in_use_bytes: heap::in_use_bytes(),
-            peak_bytes: heap::peak_bytes() as u64,
-            bytes: memory_kib() * 1024,
-            allocations: heap::allocations(),
-        }
+    fn memory() -> HeapUsage {
+        heap::usage(usize::try_from(memory_kib() * 1024).unwrap_or(usize::MAX))
     }
 }
 

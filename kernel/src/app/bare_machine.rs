@@ -21,7 +21,7 @@ use executive::text::console;
 use front::app::ending::AppError;
 use front::app::machine::System;
 use front::json;
-use front::report::MemoryDemand;
+use front::report::HeapUsage;
 use sched_dag::engine::{Run, RunCounts};
 
 /// The machine, lent to the app's function for the time of the run.
@@ -139,14 +139,8 @@ impl System for BareMachine {
         (contexts, in_stock + spare.count())
     }
 
-    fn memory() -> MemoryDemand {
-        let usage = heap::usage();
-        MemoryDemand {
-            in_use_bytes: usage.in_use_bytes,
-            peak_bytes: usage.peak_bytes as u64,
-            bytes: usage.capacity_bytes as u64,
-            allocations: usage.allocations,
-        }
+    fn memory() -> HeapUsage {
+        heap::usage()
     }
 }
 

@@ -25,7 +25,7 @@ use sched_dag::engine::Run;
 use super::ending::AppError;
 use super::ending::{self, RunVerdict};
 use crate::options::{CommandLine, UsageError};
-use crate::report::{MemoryDemand, MemoryInUse};
+use crate::report::{HeapUsage, MemoryInUse};
 use crate::shell::parameters::ParameterTable;
 use crate::shell::topics::TopicCommands;
 use crate::shell::{LiveRun, PARAMETERS, TOPICS};
@@ -75,8 +75,8 @@ pub trait System: Sized {
         (0, 0)
     }
 
-    /// Returns what memory is needed.
-    fn memory() -> MemoryDemand;
+    /// Returns how much memory is and was in use.
+    fn memory() -> HeapUsage;
 }
 
 /// The machine, lent to the app's function for the time of the run.

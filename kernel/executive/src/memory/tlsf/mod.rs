@@ -65,6 +65,7 @@ use block::{
     Block, FIRST_LEVEL, FreeLinks, GRANULE, HEADER_SIZE, MIN_BLOCK_SIZE, SECOND_LEVEL, SIZE_LIMIT,
     SizeClass, block_size_for,
 };
+use front::report::HeapUsage;
 
 /// An allocator over any number of memory regions.
 #[derive(Debug)]
@@ -86,7 +87,12 @@ impl Tlsf {
     pub(crate) const fn new() -> Self {
         Self {
             free: FreeLists::new(),
-            usage: HeapUsage::new(),
+            usage: HeapUsage {
+                allocations: 0,
+                in_use_bytes: 0,
+                peak_bytes: 0,
+                capacity_bytes: 0,
+            },
             first: None,
         }
     }
@@ -161,7 +167,8 @@ impl Tlsf {
         let found = self.free.take_free(needed.checked_add(slack)?)?;
         let block = self.trim_front(found, layout.align());
         self.trim_back(block, needed);
-        self.usage.count_allocation(block.size());
+        self.usage.allocations += 1;
+        self.count_resize(0, block.size());
         Some(block.payload())
     }
 
@@ -182,7 +189,7 @@ impl Tlsf {
             layout.size() <= block.size() - HEADER_SIZE,
             "{payload:p} is deallocated with a larger size than it was allocated with"
         );
-        self.usage.count_deallocation(block.size());
+        self.usage.in_use_bytes -= block.size();
         self.release(block);
     }
 
@@ -217,7 +224,7 @@ impl Tlsf {
             block.absorb(next);
         }
         self.trim_back(block, needed);
-        self.usage.count_resize(size_before, block.size());
+        self.count_resize(size_before, block.size());
         true
     }
 
@@ -264,6 +271,13 @@ impl Tlsf {
             merged.absorb(next);
         }
         self.free.insert(merged);
+    }
+
+    /// Counts a block that has become larger or smaller.
+    fn count_resize(&mut self, size_before: usize, size_after: usize) {
+        let usage = &mut self.usage;
+        usage.in_use_bytes = usage.in_use_bytes - size_before + size_after;
+        usage.peak_bytes = usage.peak_bytes.max(usage.in_use_bytes);
     }
 }
 
@@ -383,50 +397,5 @@ impl FreeLists {
         } else {
             self.ranges &= !range_bit;
         }
-    }
-}
-
-/// How much of a heap is, was and can be in use.
-///
-/// Byte counts are of whole blocks, 16-byte headers and rounding included, so
-/// that `capacity_bytes - in_use_bytes` is what the free blocks hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct HeapUsage {
-    /// Allocations that succeeded since the start.
-    pub allocations: u64,
-    /// Deallocations since the start, at most `allocations`.
-    pub deallocations: u64,
-    /// Bytes of the blocks that are in use now.
-    pub in_use_bytes: usize,
-    /// The largest value that `in_use_bytes` ever had between two operations.
-    pub peak_bytes: usize,
-    /// Bytes of all blocks, used and free.
-    pub capacity_bytes: usize,
-}
-
-impl HeapUsage {
-    const fn new() -> Self {
-        Self {
-            allocations: 0,
-            deallocations: 0,
-            in_use_bytes: 0,
-            peak_bytes: 0,
-            capacity_bytes: 0,
-        }
-    }
-
-    fn count_allocation(&mut self, block_size: usize) {
-        self.allocations += 1;
-        self.count_resize(0, block_size);
-    }
-
-    const fn count_deallocation(&mut self, block_size: usize) {
-        self.deallocations += 1;
-        self.in_use_bytes -= block_size;
-    }
-
-    fn count_resize(&mut self, size_before: usize, size_after: usize) {
-        self.in_use_bytes = self.in_use_bytes - size_before + size_after;
-        self.peak_bytes = self.peak_bytes.max(self.in_use_bytes);
     }
 }
