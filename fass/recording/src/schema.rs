@@ -6,10 +6,6 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-use super::bytes::{Decoder, Malformed};
-use super::recordable::{Recordable, text, to_bytes};
-use super::shown::Part;
-
 /// The deepest that types may be nested.
 pub const MOST_DEPTH: usize = 16;
 
@@ -60,8 +56,33 @@ pub struct Field {
     pub schema: Schema,
 }
 
+/// Hands the types that are not made of others to a macro: what each is called here and in a schema,
+/// its least number of bytes, its type in Rust, and what reads it.
+macro_rules! of_scalars {
+    ($define:ident) => {
+        $define!(
+            Bool "bool" 1 bool bool::decode;
+            Char "char" 4 char char::decode;
+            Text "text" 4 String text;
+            U8 "u8" 1 u8 u8::decode;
+            U16 "u16" 2 u16 u16::decode;
+            U32 "u32" 4 u32 u32::decode;
+            U64 "u64" 8 u64 u64::decode;
+            U128 "u128" 16 u128 u128::decode;
+            I8 "i8" 1 i8 i8::decode;
+            I16 "i16" 2 i16 i16::decode;
+            I32 "i32" 4 i32 i32::decode;
+            I64 "i64" 8 i64 i64::decode;
+            I128 "i128" 16 i128 i128::decode;
+            F32 "f32" 4 f32 f32::decode;
+            F64 "f64" 8 f64 f64::decode;
+        );
+    };
+}
+pub(super) use of_scalars;
+
 macro_rules! define_scalars {
-    ($($Scalar:ident $name:literal $Type:ident $read:expr;)*) => {
+    ($($Scalar:ident $name:literal $bytes:literal $Type:ident $read:expr;)*) => {
         /// A type that is not made of others.
         ///
         /// See [`Schema`].
@@ -87,51 +108,16 @@ macro_rules! define_scalars {
                 }
             }
 
-            /// Returns the bytes of a value that is written as Rust writes it; text stands for
-            /// itself. None if the type has no such value.
-            ///
-            /// ```
-            /// assert_eq!(recording::Scalar::U16.parse("258"), Some(vec![2, 1]));
-            /// ```
-            #[must_use]
-            pub fn parse(self, value: &str) -> Option<Vec<u8>> {
-                match self {
-                    $(Self::$Scalar => value.parse::<$Type>().ok().map(|value| to_bytes(&value))),*
-                }
-            }
-
             const fn least_bytes(self) -> usize {
                 match self {
-                    $(Self::$Scalar => $Type::LEAST_BYTES),*
-                }
-            }
-
-            pub(super) fn read<'b>(self, input: &mut Decoder<'b>) -> Result<Part<'b>, Malformed> {
-                match self {
-                    $(Self::$Scalar => $read(input).map(Part::from)),*
+                    $(Self::$Scalar => $bytes),*
                 }
             }
         }
     };
 }
 
-define_scalars!(
-    Bool "bool" bool bool::decode;
-    Char "char" char char::decode;
-    Text "text" String text;
-    U8 "u8" u8 u8::decode;
-    U16 "u16" u16 u16::decode;
-    U32 "u32" u32 u32::decode;
-    U64 "u64" u64 u64::decode;
-    U128 "u128" u128 u128::decode;
-    I8 "i8" i8 i8::decode;
-    I16 "i16" i16 i16::decode;
-    I32 "i32" i32 i32::decode;
-    I64 "i64" i64 i64::decode;
-    I128 "i128" i128 i128::decode;
-    F32 "f32" f32 f32::decode;
-    F64 "f64" f64 f64::decode;
-);
+of_scalars!(define_scalars);
 
 impl Schema {
     /// Returns the schema of a struct.

@@ -4,11 +4,13 @@
 //! A struct is an object, what else has parts is an array; an option without a value, and a
 //! number that is infinite or none, is `null`, since JSON has no word for these.
 
+use alloc::string::String;
+use alloc::vec::Vec;
 use core::fmt::{self, Write};
 
 use super::bytes::{Decoder, Malformed};
-use super::recordable::Recordable;
-use super::schema::{Field, Schema};
+use super::recordable::{Recordable, text, to_bytes};
+use super::schema::{Field, Scalar, Schema, of_scalars};
 
 /// A part of a value, in the order of its bytes.
 ///
@@ -138,6 +140,33 @@ impl Schema {
         Ok(())
     }
 }
+
+macro_rules! read_scalars {
+    ($($Scalar:ident $name:literal $bytes:literal $Type:ident $read:expr;)*) => {
+        impl Scalar {
+            /// Returns the bytes of a value that is written as Rust writes it; text stands for
+            /// itself. None if the type has no such value.
+            ///
+            /// ```
+            /// assert_eq!(recording::Scalar::U16.parse("258"), Some(vec![2, 1]));
+            /// ```
+            #[must_use]
+            pub fn parse(self, value: &str) -> Option<Vec<u8>> {
+                match self {
+                    $(Self::$Scalar => value.parse::<$Type>().ok().map(|value| to_bytes(&value))),*
+                }
+            }
+
+            fn read<'b>(self, input: &mut Decoder<'b>) -> Result<Part<'b>, Malformed> {
+                match self {
+                    $(Self::$Scalar => $read(input).map(Part::from)),*
+                }
+            }
+        }
+    };
+}
+
+of_scalars!(read_scalars);
 
 /// Writes a value, whose type is known by its schema, as JSON.
 ///
