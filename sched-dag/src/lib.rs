@@ -134,7 +134,9 @@ pub use scheduler::{
     DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,
     Scheduler,
 };
-pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};
+pub use spec::{
+    DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort, Wait,
+};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{

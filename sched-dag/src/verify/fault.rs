@@ -171,6 +171,10 @@ worded! {
         } = "wcet_exceeds_deadline",
             "{subtask} of {dag} has a WCET of {:?}, longer than the relative deadline of {:?}; \
              shorten it or extend the deadline", ns(*wcet_ns), ns(*relative_deadline_ns);
+        /// A subtask that waits, some of whose segments have a WCET, or one of 0.
+        SegmentsPartlyGiven { dag: DagLabel, subtask: SubtaskLabel } = "segments_partly_given",
+            "{subtask} of {dag} waits, and not each of its segments has a WCET above 0; give one to \
+             each, or to none";
         /// A stack that is too small or too large.
         StackOutOfRange { dag: DagLabel, subtask: SubtaskLabel, bytes: u64 } =
             "stack_out_of_range",
@@ -297,6 +301,8 @@ pub enum OverflowingTime {
     LastDeadline,
     /// The sum of the WCETs of all subtasks.
     Volume,
+    /// The sum of the limits of all waits.
+    Waits,
 }
 
 impl TopicSide {
@@ -320,6 +326,7 @@ impl OverflowingTime {
                 "lower the number of jobs, the period or the offset",
             ],
             Self::Volume => ["the sum of the WCETs", "lower the WCETs"],
+            Self::Waits => ["the sum of the limits of waits", "lower the limits"],
         }
     }
 }
