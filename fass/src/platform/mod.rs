@@ -241,6 +241,8 @@ pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> 
 }
 
 /// Does `work` with what the installed platform keeps at its edge, if it does.
+///
+/// See [`Platform::at_edge`].
 pub fn with_edge<T>(work: impl FnOnce(&mut Edge) -> T) -> Option<T> {
     ask_edge(installed()?, work)
 }
