@@ -114,6 +114,9 @@ pub struct SubtaskSpec {
     pub outputs: Vec<TopicPort>,
 }
 
+/// The most waits that a subtask may state.
+pub const MOST_WAITS: usize = 254;
+
 /// A wait of a subtask, which each of its instances takes once, and the segment that follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wait {

@@ -270,7 +270,7 @@ impl Team {
                     NextAction::Step(ended) => {
                         let now_ns = port.now_ns();
                         engine.step((now_ns, core), &mut port, |moment| {
-                            ended.into_iter().for_each(|ended| moment.complete(ended));
+                            ended.into_iter().for_each(|turn| moment.end_turn(turn));
                         });
                         state_now.carry_out(workers);
                     }

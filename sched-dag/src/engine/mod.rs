@@ -27,12 +27,12 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::DerefMut;
 
-use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex};
+use crate::ids::{ClusterId, CoreId, DagId, Vertex};
 use crate::journal::{EventKind, EventSubject};
 use crate::kept::Journal;
 use crate::lifecycle::{Mailboxes, PendingRequests, Request};
 use crate::placement::{NextWork, Placement};
-use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler};
+use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd};
 use crate::task_set::{Dag, TaskSet};
 
 pub use crate::engine::run::{ProvenBounds, Run, RunCounts};
@@ -197,9 +197,8 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         // Something else belongs to this instant, so the whole step has to be taken.
         if !is_alone || !self.requests.are_none() {
-            let instance = self.scheduler.instance_of(vertex);
-            self.placement.finish(core.index(), vertex, body);
-            return NextAction::Step(Some(instance));
+            let turn = self.end_turn((core, vertex), body, finish_ns, port);
+            return NextAction::Step(Some(turn));
         }
         let (done, is_unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
         if let HandOff::To(next, decision) = done {
@@ -242,8 +241,28 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         NextAction::Look { is_rescheduled }
     }
 
-    /// Takes note that an instance has finished that no core has any more; it ran last on `core`.
-    /// It finished at the first time, and the instant is the second.
+    /// Takes back the body of an instance whose turn has ended on a core, and tells which way.
+    fn end_turn<C: PlatformPort<B>>(
+        &mut self,
+        (core, vertex): (CoreId, Vertex),
+        mut body: B,
+        finish_ns: u64,
+        port: &mut C,
+    ) -> TurnEnd {
+        let instance = self.scheduler.instance_of(vertex);
+        let limit_ns = self.requests.take_wait();
+        match limit_ns {
+            None => self.placement.finish(core.index(), vertex, body),
+            Some(_) => {
+                port.wait(core, &mut body, finish_ns);
+                self.placement.wait(core.index(), vertex, body);
+            }
+        }
+        TurnEnd { instance, limit_ns }
+    }
+
+    /// Takes note that a turn of an instance has ended that no core has any more; it ran last on
+    /// `core`. It ended at the first time, and the instant is the second.
     pub fn complete_parked(
         &mut self,
         (core, vertex): (CoreId, Vertex),
@@ -251,11 +270,19 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         (finish_ns, now_ns): (u64, u64),
         port: &mut impl PlatformPort<B>,
     ) {
-        let body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
-        self.placement.finish_parked(vertex, body);
+        let mut body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         let instance = self.scheduler.instance_of(vertex);
+        let limit_ns = self.requests.take_wait();
+        match limit_ns {
+            None => self.placement.finish_parked(vertex, body),
+            Some(_) => {
+                port.wait(core, &mut body, finish_ns);
+                self.placement.wait(core.index(), vertex, body);
+            }
+        }
+        let turn = TurnEnd { instance, limit_ns };
         // By the whole step: its core runs something else by now, so it passes on to nobody.
-        self.step((now_ns, core), port, |moment| moment.complete(instance));
+        self.step((now_ns, core), port, |moment| moment.end_turn(turn));
     }
 
     /// Returns the cost of a fault of the vertex' instance if it comes now.
@@ -338,6 +365,12 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             // The port reads the clock as late as it can, right before the function is called.
             let start_ns = port.start(core, body);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
+        } else if let NextWork::Proceed(vertex, body) = &mut next {
+            let (_, has_timed_out) = self.scheduler.latest_wait(*vertex);
+            body.wake(has_timed_out);
+            let subject = body.subject();
+            let resume_ns = port.proceed(core, body);
+            (self.scheduler.log.journal).write(core, EventKind::Resume, resume_ns, subject);
         }
         next
     }
@@ -374,6 +407,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
                 && let Some(instance) = notice.event.instance()
             {
                 let vertex = self.task_set.vertex(instance);
+                self.placement.cancel_wait(vertex);
                 self.undiscarded.push((vertex, instance.job));
             }
         }
@@ -437,14 +471,20 @@ pub trait SubtaskBody {
     /// Returns its instance as events are written of it.
     fn subject(&self) -> EventSubject;
 
-    /// Gives up the inputs that have arrived for a job which it will not run.
+    /// Gives up the inputs that have arrived for a job which it will not run, or what is left of
+    /// one in which it has waited.
     fn discard(&mut self, job: u64);
+
+    /// Learns, before its instance goes on, whether the wait has ended by its limit.
+    fn wake(&mut self, has_timed_out: bool) {
+        let _ = has_timed_out;
+    }
 
     /// Reports whether a completion has effects besides the scheduler's.
     fn has_effects(&self) -> bool;
 
-    /// Publishes these effects, and passes on what the function asks of the run. The time is that
-    /// of the clock which functions read.
+    /// Publishes these effects, and passes on what the function asks of the run; of a turn that ends
+    /// in a wait that is [`Request::Wait`] alone. The time is that of the clock which functions read.
     fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request));
 
     /// Returns the alternate that takes over if a fault ends the function.
@@ -470,6 +510,10 @@ impl<D: DerefMut<Target: SubtaskBody>> SubtaskBody for D {
 
     fn discard(&mut self, job: u64) {
         (**self).discard(job);
+    }
+
+    fn wake(&mut self, has_timed_out: bool) {
+        (**self).wake(has_timed_out);
     }
 
     #[inline]
@@ -533,6 +577,17 @@ pub trait PlatformPort<B> {
     /// A core begins with a body as soon as the engine's lock is free. Returns when.
     fn start(&mut self, core: CoreId, body: &mut B) -> u64;
 
+    /// The instance of a body gives its core up and begins a wait: a turn of it has ended then.
+    fn wait(&mut self, core: CoreId, body: &mut B, ended_ns: u64) {
+        let _ = (core, body, ended_ns);
+    }
+
+    /// A core goes on with a body whose wait has ended, as it [starts](Self::start) one. Returns
+    /// when.
+    fn proceed(&mut self, core: CoreId, body: &mut B) -> u64 {
+        self.start(core, body)
+    }
+
     /// Forwards a request to the other clusters that it concerns, and reports whether it does not
     /// concern this one.
     fn forward(&mut self, request: Request) -> bool {
@@ -572,9 +627,9 @@ pub enum NextAction<B> {
         /// Whether the time of the next event may have changed.
         is_rescheduled: bool,
     },
-    /// A step has to be taken first: one in which this instance completes, or else one that goes
-    /// on with the instant in hand.
-    Step(Option<Instance>),
+    /// A step has to be taken first: one in which this turn ends, or else one that goes on with the
+    /// instant in hand.
+    Step(Option<TurnEnd>),
 }
 
 /// The cost of a fault.

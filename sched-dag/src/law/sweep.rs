@@ -78,6 +78,8 @@ pub enum DispatchState {
     Running(CoreId),
     /// It waits for a core and has started.
     Suspended,
+    /// It has started, and its wait has not ended.
+    Waiting,
     /// It has finished, or will never run.
     Over,
 }
@@ -235,6 +237,10 @@ impl<'m> DispatchSweep<'m> {
             }
             DispatchState::Suspended => {
                 self.waiting.insert(key, since);
+                // It begins a segment, whose core it keeps.
+                if self.model.keeps_its_core(instance) {
+                    self.unstarted.insert(key);
+                }
             }
             DispatchState::Running(core) => {
                 self.running.insert(key, core);
@@ -242,7 +248,7 @@ impl<'m> DispatchSweep<'m> {
                     self.started.push((key, core, self.events));
                 }
             }
-            DispatchState::Absent | DispatchState::Over => {}
+            DispatchState::Absent | DispatchState::Waiting | DispatchState::Over => {}
         }
     }
 

@@ -14,6 +14,16 @@ pub struct Moment<'s> {
     told_ns: u64,
 }
 
+/// The end of a *turn*: of what an instance executes from its start, or the end of a wait, to
+/// its finish, or the next wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TurnEnd {
+    /// The instance.
+    pub instance: Instance,
+    /// If it waits, for how long at most, in nanoseconds; `None`: it has finished.
+    pub limit_ns: Option<u64>,
+}
+
 impl Scheduler {
     /// Does what is asked of one DAG. Compiled with its callers, so that a scheduler in a static is
     /// known there by its address, which is worth 2 % of a release; and once, as it is rare.
@@ -26,11 +36,13 @@ impl Scheduler {
             Request::Resume(dag) => self.resume(dag),
             Request::Close(dag) => self.close(dag),
             Request::End(dag) => self.end_dag(dag),
+            Request::Answer(wait) => self.answer(wait),
             // These concern the run, not one DAG; the engine serves them.
             Request::Enter(..)
             | Request::ShutDown
             | Request::Begin
             | Request::GoOn
+            | Request::Wait(_)
             | Request::Step => {}
         }
     }
@@ -59,6 +71,25 @@ impl<'s> Moment<'s> {
             .log
             .on_this(EventKind::Finish, self.told_ns, instance);
         self.scheduler.finish(instance);
+    }
+
+    /// Takes note that a turn of an instance has ended: it finishes, or waits (W1). As with
+    /// [`complete`](Self::complete), it need not run any more in the scheduler's eyes.
+    ///
+    /// # Panics
+    ///
+    /// As [`complete`](Self::complete), or if it waits and its subtask states no waits.
+    #[inline]
+    pub fn end_turn(&mut self, turn: TurnEnd) {
+        match turn.limit_ns {
+            None => self.complete(turn.instance),
+            Some(limit_ns) => {
+                let (log, told_ns) = (&mut self.scheduler.log, self.told_ns);
+                log.on_this(EventKind::Wait, told_ns, turn.instance);
+                let limit_ns = told_ns.saturating_add(limit_ns);
+                self.scheduler.begin_wait(turn.instance, limit_ns);
+            }
+        }
     }
 
     /// Takes note that an instance has ended by a fault, and ends its DAG.

@@ -46,11 +46,14 @@ use crate::policy::OverrunPolicy;
 
 impl Scheduler {
     /// Releases all jobs of a DAG that are due, and notices deadlines that have
-    /// passed.
+    /// passed. A number behind the DAGs' is that of a wait's timer.
     #[inline]
     pub(super) fn serve(&mut self, dag: DagId) {
+        let Some(state) = self.dags.get(dag.index()) else {
+            return self.time_out(dag.index());
+        };
         // Mostly what is due is a release, and the job before it has ended.
-        if !self.dags[dag.index()].jobs.are_at_rest() {
+        if !state.jobs.are_at_rest() {
             // Deadlines before releases: a late job may be the one that blocks the next.
             self.judge(dag, None);
             self.release_waiting(dag);

@@ -15,7 +15,7 @@ use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
-use crate::spec::{DagSpec, STACK_BYTES};
+use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES};
 
 /// Checks the attributes of the whole commit.
 pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
@@ -209,6 +209,15 @@ fn check_subtasks(page: &mut DagFindings<'_, '_>) {
 /// Checks the WCETs of a subtask's segments: all are given or none is, and each is above 0.
 fn check_segments(page: &mut DagFindings<'_, '_>, index: usize) {
     let stated = &page.spec.subtasks[index];
+    let count = stated.waits.len();
+    if count > MOST_WAITS {
+        let subtask = page.subtask(index);
+        page.fault(|dag| DagFault::TooManyWaits {
+            dag,
+            subtask,
+            count,
+        });
+    }
     let given = stated.waits.iter().filter_map(|wait| wait.segment_ns);
     let (count, later_ns) = (
         given.clone().count(),

@@ -14,7 +14,7 @@ use super::label::{
 };
 use crate::ids::ClusterId;
 use crate::policy::Priority;
-use crate::spec::STACK_BYTES;
+use crate::spec::{MOST_WAITS, STACK_BYTES};
 use crate::{MAX_ARITY, worded};
 
 worded! {
@@ -175,6 +175,9 @@ worded! {
         SegmentsPartlyGiven { dag: DagLabel, subtask: SubtaskLabel } = "segments_partly_given",
             "{subtask} of {dag} waits, and not each of its segments has a WCET above 0; give one to \
              each, or to none";
+        /// More waits of a subtask than are told apart.
+        TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
+            "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; split it";
         /// A stack that is too small or too large.
         StackOutOfRange { dag: DagLabel, subtask: SubtaskLabel, bytes: u64 } =
             "stack_out_of_range",

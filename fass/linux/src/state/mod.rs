@@ -394,7 +394,7 @@ impl State {
         };
         let (engine, mut port) = self.parts(workers);
         match engine.next(core, &mut port) {
-            NextWork::Start(_, runner) => Some(runner),
+            NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => Some(runner),
             NextWork::Continue(parked) => {
                 self.seats[me] = None;
                 self.spare.push(me);

@@ -137,7 +137,7 @@ impl ClusterRun {
         let mut none = CoreSet::default();
         let (engine, mut port) = self.parts(&mut none);
         match engine.next(here, &mut port) {
-            NextWork::Start(_, runner) => CoreWork::Run(runner),
+            NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => CoreWork::Run(runner),
             NextWork::Continue(context) => {
                 self.note_resumed(core, &context, clock::now_ns());
                 note_running(core, self.current(here.index()).map(EventSubject::of));
@@ -274,7 +274,7 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
             is_rescheduled: true,
         } => execution.announce(&mut woken),
         NextAction::Step(ended) => execution.step(finish_ns, &mut woken, |moment| {
-            ended.into_iter().for_each(|ended| moment.complete(ended));
+            ended.into_iter().for_each(|turn| moment.end_turn(turn));
         }),
     }
     let work = execution.find_work(core);

@@ -1,0 +1,172 @@
+//! Waits: instances that have started, hold no core and are not eligible until something has come.
+//!
+//! A subtask may wait between segments of its function: for a time, for a device, for bytes. Each
+//! wait has a *limit*, so that it ends whatever a device does. The rules, whose scenarios in
+//! `tests/scenarios/waits.txt` bear their numbers:
+//!
+//! - **W1, waiting.** From the end of a segment to the end of its wait the instance is not eligible
+//!   and holds no core. Waits do not queue: each instance has a timer and a limit of its own.
+//! - **W2, the end.** A wait ends with its answer, and at its limit at the latest; an answer at the
+//!   instant of the limit is one. At that instant the instance is eligible again, with the key that
+//!   it had, on any core of its cluster.
+//! - **W3, what a wait is not.** It is no finish: it releases no edge, completes no job, and the
+//!   subtask's next instance stays behind it (R2 to R4).
+//! - **W4, one instant.** Of one instant come first the segments that end, then the waits that end,
+//!   those of 0 that have just begun among them, then the releases, then one dispatch.
+//! - **W5, without preemption.** What keeps its core keeps it to the end of its segment. A wait,
+//!   also one of 0, gives it up.
+//! - **W6, cut jobs.** No instance of a job that is cut waits: it is cancelled when the job is cut,
+//!   or where it would begin to wait.
+//! - **W7, late answers.** An answer names the wait that it is for; to any other it is nothing.
+//!
+//! A wait that begins costs its DAG's timers a step of a heap, and so does its end.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use super::vertices::InstancePhase;
+use super::{Scheduler, earliest_ns};
+use crate::ids::{DagId, Instance, Vertex};
+use crate::journal::EventKind;
+use crate::request::WaitId;
+use crate::task_set::TaskSet;
+
+/// The vertices that may wait, and the latest wait of each.
+#[derive(Clone, Debug, Hash)]
+pub(super) struct WaitTable {
+    /// Ascending.
+    vertices: Box<[u32]>,
+    latest: Box<[LatestWait]>,
+}
+
+#[derive(Clone, Copy, Debug, Hash)]
+struct LatestWait {
+    /// The job that it is of; `u64::MAX` for none.
+    job: u64,
+    /// Its number among the waits of its instance, from 0 on.
+    number: u32,
+    has_timed_out: bool,
+}
+
+impl WaitTable {
+    pub(super) fn new(task_set: &TaskSet) -> Self {
+        let dags = (0..).map(DagId).zip(task_set.dags());
+        let vertices: Vec<u32> = dags
+            .flat_map(|(id, dag)| {
+                let numbered = (task_set.first_vertex(id)..).zip(dag.subtasks());
+                let waiting = numbered.filter(|(_, subtask)| !subtask.waits().is_empty());
+                waiting.map(|(vertex, _)| vertex)
+            })
+            .collect();
+        let none = LatestWait {
+            job: u64::MAX,
+            number: 0,
+            has_timed_out: false,
+        };
+        Self {
+            latest: vertices.iter().map(|_| none).collect(),
+            vertices: vertices.into(),
+        }
+    }
+
+    /// Returns the number of vertices that may wait, each of which has a timer.
+    pub(super) const fn len(&self) -> usize {
+        self.vertices.len()
+    }
+
+    fn place(&self, vertex: u32) -> usize {
+        let place = self.vertices.binary_search(&vertex);
+        place.expect("the subtask states its waits")
+    }
+}
+
+impl Scheduler {
+    /// Begins the wait of an instance that has started (W1), which ends at `limit_ns` at the latest.
+    pub(super) fn begin_wait(&mut self, instance: Instance, limit_ns: u64) {
+        let number = self.take_off(instance, "waits");
+        let vertex = self.vertices.get_mut(number);
+        let sequence = vertex.progress;
+        vertex.phase = InstancePhase::Waiting;
+        let place = self.waits.place(number);
+        let latest = &mut self.waits.latest[place];
+        let is_first = latest.job != instance.job;
+        latest.number = if is_first { 0 } else { latest.number + 1 };
+        latest.job = instance.job;
+        // W6: nothing is left for which it could be worth waiting.
+        if self.dags[instance.dag.index()]
+            .jobs
+            .job(sequence)
+            .cut
+            .is_some()
+        {
+            self.cancel_wait(number);
+            self.end_all();
+            return;
+        }
+        self.timers.set(self.dags.len() + place, limit_ns);
+        self.quiet_until_ns = earliest_ns(&self.timers);
+    }
+
+    /// Takes the answer for a wait (W7).
+    pub(super) fn answer(&mut self, wait: WaitId) {
+        let number = self.vertex(wait.instance).0;
+        let vertex = self.vertices.get(number);
+        if vertex.phase != InstancePhase::Waiting || vertex.job != wait.instance.job {
+            return;
+        }
+        let place = self.waits.place(number);
+        if self.waits.latest[place].number == wait.number {
+            self.end_wait(place, false);
+        }
+    }
+
+    /// Ends the wait whose limit has come, by the number of its timer behind those of the DAGs.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn time_out(&mut self, timer: usize) {
+        self.end_wait(timer - self.dags.len(), true);
+    }
+
+    /// Makes a waiting instance eligible again (W2).
+    fn end_wait(&mut self, place: usize, has_timed_out: bool) {
+        let number = self.waits.vertices[place];
+        self.waits.latest[place].has_timed_out = has_timed_out;
+        self.timers.remove(self.dags.len() + place);
+        self.quiet_until_ns = earliest_ns(&self.timers);
+        let vertex = self.vertices.get_mut(number);
+        // As one that was preempted, it has started and is in line for a core.
+        vertex.phase = InstancePhase::Preempted;
+        let job = self.dags[vertex.dag.index()].jobs.job(vertex.progress);
+        self.ready.insert(self.ready.key(number, vertex, || job));
+        self.log.of_instance(EventKind::Wake, vertex.instance(job));
+        self.fresh += 1;
+    }
+
+    /// Ends a waiting instance, whose job is cut; its successors are to be told by
+    /// [`end_all`](Self::end_all).
+    pub(super) fn cancel_wait(&mut self, number: u32) {
+        let place = self.waits.place(number);
+        self.timers.remove(self.dags.len() + place);
+        self.quiet_until_ns = earliest_ns(&self.timers);
+        let vertex = self.vertices.get_mut(number);
+        vertex.phase = InstancePhase::Absent;
+        let instance = vertex.present_instance();
+        self.log.of_instance(EventKind::Cancelled, instance);
+        self.ending.push(number);
+    }
+
+    /// Returns the latest wait of a vertex, and whether it has ended by its limit.
+    ///
+    /// # Panics
+    ///
+    /// If the subtask states no waits.
+    #[must_use]
+    pub fn latest_wait(&self, vertex: Vertex) -> (WaitId, bool) {
+        let latest = self.waits.latest[self.waits.place(vertex.0)];
+        let wait = WaitId {
+            instance: self.instance_of(vertex),
+            number: latest.number,
+        };
+        (wait, latest.has_timed_out)
+    }
+}
