@@ -241,7 +241,7 @@ impl Progress {
             return Err(Decoder::new(bytes).expected(mark));
         }
         let malformed =
-            input.expected("version 1 to 5 of recordings, which are those that are read");
+            input.expected("version 1 to 6 of recordings, which are those that are read");
         // A later version may have kinds that this code cannot check; an earlier one only lacks
         // some.
         if !(1..=VERSION).contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {
