@@ -591,6 +591,19 @@ impl<Q, A> DeviceDriver<Q, A> {
     pub fn on_question(&self, ring: impl Fn() + Send + Sync + 'static) -> bool {
         self.cell.bell.set(Box::new(ring))
     }
+
+    /// Reports whether there is still something that may ask.
+    ///
+    /// ```
+    /// let (sonar, driver) = fass::shared::create_device::<(), u32>("sonar");
+    /// assert!(driver.is_used());
+    /// drop(sonar);
+    /// assert!(!driver.is_used());
+    /// ```
+    #[must_use]
+    pub fn is_used(&self) -> bool {
+        Arc::strong_count(&self.cell) > 1
+    }
 }
 
 shown_as!(Device<Q, A>, |of| of.0.name);

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::mpsc::RecvError;
 use std::thread;
 use std::time::Duration;
 
 use crate::support::{alone, breaches, chain, mechanisms, ms, spin};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::shared::{Asker, DeviceDriver, TimedOut, create_device};
 use fass::{
     Dag, OverrunPolicy, SubtaskAttributes, WaitFault, create_dag, finish_create_dags, sleep, until,
@@ -148,12 +150,12 @@ fn wait_in(dag: &Dag, drops: &Arc<AtomicU64>) {
             drop(held);
         }
     };
-    let named = SubtaskAttributes::named("wait");
+    let named = SubtaskAttributes::named("wait").priority(0);
     dag.async_source(f).register(named.wait(MINUTE));
 }
 
 #[test]
-fn a_fault_or_an_end_takes_waits_back() {
+fn an_abort_or_an_end_takes_waits_back() {
     let alone = alone(1, Mechanism::Normal);
     let drops = Arc::<AtomicU64>::default();
     let (ended, aborted) = (every(2 * MINUTE, "ended"), every(ms(250), "aborted"));
@@ -161,12 +163,7 @@ fn a_fault_or_an_end_takes_waits_back() {
     let overrun = OverrunPolicy::Abort;
     aborted.jobs(3).in_flight(1).overrun(overrun);
     wait_in(&aborted, &drops);
-    let faulty = every(2 * MINUTE, "faulty");
-    faulty.jobs(1);
-    let foreign = SubtaskAttributes::named("foreign").wait(MINUTE);
-    let pending = std::future::pending::<()>;
-    faulty.async_source(pending).register(foreign);
-    finish_create_dags(&[ended, aborted, faulty]).unwrap();
+    finish_create_dags(&[ended, aborted]).unwrap();
     let control = alone.machine.control().unwrap();
     let person = thread::spawn(move || {
         thread::sleep(ms(60));
@@ -177,12 +174,30 @@ fn a_fault_or_an_end_takes_waits_back() {
     assert_eq!(breaches(&run), []);
     let statistics = run.statistics("aborted");
     assert_eq!((statistics.completed, statistics.aborts), (2, 1));
+    assert_eq!(run.faults(), []);
+    drop(run);
+    assert_eq!(drops.load(Relaxed), 4, "one with its subtask");
+}
+
+#[test]
+fn a_fault_ends_the_waits_of_its_dag() {
+    let alone = alone(1, Mechanism::Normal);
+    let drops = Arc::<AtomicU64>::default();
+    let dag = every(2 * MINUTE, "faulty");
+    dag.jobs(2);
+    wait_in(&dag, &drops);
+    let foreign = SubtaskAttributes::named("foreign").wait(MINUTE);
+    let pending = std::future::pending::<()>;
+    dag.async_source(pending).register(foreign.priority(9));
+    finish_create_dags_with(&[dag], ConstructionPolicy::any_graph()).unwrap();
+    let run = alone.machine.run().unwrap();
+    assert_eq!(breaches(&run), []);
     let [fault] = run.faults() else {
         panic!("{:?}", run.faults());
     };
     assert_eq!(fault.cause, WaitFault::Foreign.to_string());
     drop(run);
-    assert_eq!(drops.load(Relaxed), 4, "one with its subtask");
+    assert_eq!(drops.load(Relaxed), 1);
 }
 
 #[test]
@@ -208,4 +223,51 @@ fn a_budget_is_of_all_turns_and_of_no_wait() {
     let completed = ["within", "beyond"].map(|dag| run.statistics(dag).completed);
     assert_eq!(completed, [1, 0]);
     assert_eq!(run.faults()[0].cause, "its budget was exceeded");
+}
+
+#[test]
+fn a_call_that_blocks_is_made_in_a_thread_of_its_own() {
+    let (send, receive) = std::sync::mpsc::channel::<u64>();
+    let host = linux::blocking("host", move |factor: u64| {
+        receive.recv().map(|it| it * factor)
+    });
+    let alone = alone(1, Mechanism::Normal);
+    let dag = every(ms(20), "asks");
+    dag.jobs(3);
+    let is_late = Arc::<AtomicBool>::default();
+    let (mut job, late) = (0, Arc::clone(&is_late));
+    let ask = move |host: Asker<u64, Result<u64, RecvError>>| {
+        job += 1;
+        let late = Arc::clone(&late);
+        async move {
+            let limit = if job == 2 { ms(1) } else { MINUTE };
+            let answer = host.ask(job).within(limit).await;
+            // The second call blocks for longer, and the third one comes after it.
+            let expected = [Ok(Ok(10)), Err(TimedOut), Ok(Ok(90))];
+            assert_eq!(answer, expected[usize::try_from(job).unwrap() - 1]);
+            late.store(job == 2, Relaxed);
+        }
+    };
+    let ask = dag.using(host.asking()).async_source(ask);
+    ask.register(SubtaskAttributes::named("ask").wait(MINUTE));
+    // Another DAG, on the same core, gives what the calls wait for.
+    let gives = every(ms(10), "gives");
+    gives.jobs(20);
+    let mut numbers = [10, 30, 30].into_iter();
+    let give = move || {
+        let count = match numbers.len() {
+            3 => 1,
+            _ if is_late.load(Relaxed) => 2,
+            _ => 0,
+        };
+        let given = numbers.by_ref().take(count);
+        given.for_each(|number| send.send(number).expect("somebody waits"));
+    };
+    gives
+        .source(give)
+        .register(SubtaskAttributes::named("give"));
+    finish_create_dags(&[dag, gives]).unwrap();
+    let run = alone.machine.run().unwrap();
+    assert_eq!(run.faults(), []);
+    assert_eq!(run.statistics("asks").completed, 3);
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::support::{MS, Seen, commit, every, job_numbers, ms, named, run, taking, work};
 use common::random::Random;
-use fass::shared::{Asker, DeviceDriver, TimedOut, create_device};
+use fass::shared::{Asker, DeviceDriver, Shutdown, Switch, TimedOut, create_device, shutting_down};
 use fass::{
     Dag, OverrunPolicy, Preemption, SubtaskAttributes, WaitFault, create_dag, sleep, until,
 };
@@ -607,4 +607,42 @@ fn an_answer_is_shown_among_what_its_subtask_takes() {
     let shown = shown.to_string();
     let expected = r"takes `accelerator`: [[0,0,null],[2,2000000,5]]";
     assert!(shown.contains(expected), "{shown}");
+}
+
+#[test]
+fn a_pause_and_the_end_of_a_run_wait_no_longer_than_the_limit() {
+    let (device, _driver) = create_device::<(), ()>("deaf");
+    let dag = every(10, "asks");
+    let ask = |device: Asker<(), ()>| async move {
+        assert_eq!(device.ask(()).await, Err(TimedOut));
+    };
+    let ask = dag.using(device.asking()).async_source(ask);
+    ask.register(taking("ask", 1).wait(ms(6)).wcet(ms(1)));
+    let operator = create_dag();
+    operator.name("operator").relative_deadline(ms(10));
+    let mut presses = 0;
+    let act = move |(mut asks, mut all): (Switch<'_>, Shutdown<'_>)| {
+        presses += 1;
+        match presses {
+            1 => asks.pause(),
+            2 => asks.resume(),
+            _ => all.request(),
+        }
+    };
+    let button = operator.sporadic(ms(1));
+    let act = operator
+        .using((dag.switching(), shutting_down()))
+        .source(act);
+    act.register(named("act"));
+    let machine = VirtualTime::new();
+    commit(&[dag, operator]);
+    // In the midst of the waits of jobs 0 and 3.
+    for at_ms in [4, 25, 34] {
+        machine.raise_at(&button, ms(at_ms));
+    }
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert_eq!(responses_ms(&report, "asks"), [8, 8]);
+    assert_eq!(report.dag("asks").statistics().skips, 2);
+    assert_eq!(report.end_ns, 38 * MS);
 }
