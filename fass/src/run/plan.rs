@@ -130,16 +130,19 @@ pub(crate) trait PolledSubtask: Send {
 struct JobPreview<F> {
     subtask: Box<dyn PolledSubtask>,
     look: F,
+    /// The job that was given up last.
+    passed: u64,
 }
 
 impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
     fn take_turn(&mut self, job: u64) {
         // Once for each job, in the first turn of its instance.
         let goes_on = self.turn().is_some_and(|turn| turn.is_of(job));
-        match goes_on || (self.look)(job) {
-            true => self.subtask.take_turn(job),
-            false => self.subtask.discard(job),
+        if self.passed != job && (goes_on || (self.look)(job)) {
+            return self.subtask.take_turn(job);
         }
+        self.passed = job;
+        pass(&mut *self.subtask, job);
     }
 
     fn discard(&mut self, job: u64) {
@@ -160,6 +163,13 @@ impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
 
     fn forget(self: Box<Self>) {
         self.subtask.forget();
+    }
+}
+
+/// Takes a turn of a job whose function is not called.
+fn pass(subtask: &mut dyn PolledSubtask, job: u64) {
+    if subtask.turn().is_none_or(|turn| turn.pass(job)) {
+        subtask.discard(job);
     }
 }
 
@@ -293,7 +303,11 @@ impl SubtaskCode {
     /// Has each job looked at before its turn: it is given up where `look` returns false.
     pub(crate) fn before(mut self, look: impl FnMut(u64) -> bool + Send + 'static) -> Self {
         let subtask = self.subtask;
-        self.subtask = Box::new(JobPreview { subtask, look });
+        self.subtask = Box::new(JobPreview {
+            subtask,
+            look,
+            passed: NO_JOB,
+        });
         self
     }
 
@@ -316,6 +330,12 @@ impl SubtaskCode {
     #[must_use]
     pub fn has_effects(&self) -> bool {
         !self.effects.is_empty()
+    }
+
+    /// Takes a turn of job `job` without its function, in the place of [`run`](Self::run): the last
+    /// one gives up its inputs, and those before it end in the stated waits, of no time.
+    pub fn pass_over(&mut self, job: u64) {
+        pass(&mut *self.subtask, job);
     }
 
     /// Gives up the inputs of job `job` that have arrived, instead of running it.

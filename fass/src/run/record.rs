@@ -29,6 +29,7 @@ use super::line::{ChannelState, InstanceOutputs, KeptState, LineOf, TopicEdge};
 use super::message::{Message, MessageType};
 use super::plan::{PolledSubtask, SubtaskCode};
 use super::topic::{DagWiring, Ports, Publisher, Relay, Wrap};
+use super::turn::TurnState;
 
 /// A recorded topic while DAGs are built.
 pub(crate) struct RecordedTopic<T> {
@@ -179,9 +180,9 @@ pub(crate) trait AnyRecorded: AnyLatest {
         // The commit has made sure that all of them are recorded.
         let outputs = source.outputs.iter().filter_map(|port| find(&port.topic));
         let outputs = outputs.map(|recorded| recorded.replayed(&mut ports));
-        Some(SubtaskCode::new(Box::new(ReplayedSource(
-            outputs.collect(),
-        ))))
+        let outputs = outputs.collect();
+        let turn = Arc::new(TurnState::new(wiring.waits(subtask)));
+        Some(SubtaskCode::new(Box::new(ReplayedSource { outputs, turn })))
     }
 }
 
@@ -322,11 +323,21 @@ impl<T: Message + Recordable> Relay<T> for TopicTap<T> {
 }
 
 /// A source that is not called.
-struct ReplayedSource(Vec<Replayed>);
+struct ReplayedSource {
+    outputs: Vec<Replayed>,
+    /// It takes its waits all the same.
+    turn: Arc<TurnState>,
+}
 
 impl PolledSubtask for ReplayedSource {
     fn take_turn(&mut self, job: u64) {
-        self.0.iter_mut().for_each(|send| send(job));
+        if self.turn.pass(job) {
+            self.outputs.iter_mut().for_each(|send| send(job));
+        }
+    }
+
+    fn turn(&self) -> Option<&Arc<TurnState>> {
+        Some(&self.turn)
     }
 
     fn discard(&mut self, _job: u64) {}

@@ -646,3 +646,36 @@ fn a_pause_and_the_end_of_a_run_wait_no_longer_than_the_limit() {
     assert_eq!(report.dag("asks").statistics().skips, 2);
     assert_eq!(report.end_ns, 38 * MS);
 }
+
+#[test]
+fn a_recorded_source_that_waits_is_replayed() {
+    let commit_source = |salt: u64| {
+        let dag = every(10, "slow");
+        dag.jobs(5).record::<u64>("number").record::<u64>("twice");
+        let mut number = salt;
+        let source = move || {
+            number += 1;
+            async move {
+                sleep(ms(3)).await;
+                (number,)
+            }
+        };
+        let source = dag.async_source(source).writes(&["number"]);
+        source.register(taking("source", 1).wait(ms(3)).wcet(ms(1)));
+        let twice = |(number,): (u64,)| (2 * number,);
+        let twice = dag.subtask(twice).reads(&["number"]).writes(&["twice"]);
+        twice.register(named("twice"));
+        let sink = dag.subtask(|_: (u64,)| ()).reads(&["twice"]);
+        sink.register(named("sink"));
+        commit(&[dag]);
+    };
+    let machine = VirtualTime::new();
+    commit_source(7);
+    machine.run();
+    let recording = machine.recording();
+    let machine = VirtualTime::new().replay(&recording).expect("it is whole");
+    commit_source(70);
+    let report = machine.run();
+    assert_eq!((report.compared, report.divergence.as_ref()), (5, None));
+    assert_eq!(report.violations(), []);
+}
