@@ -83,7 +83,7 @@ pub(crate) struct State {
     pub(crate) spare: Vec<Number>,
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
-    /// How often letters were taken that the release thread has not settled yet.
+    /// How many letters were taken that the release thread has not settled yet.
     pub(crate) opened: u64,
     pub(crate) faults: Vec<Fault>,
     /// The cores that have to look for work.
@@ -168,9 +168,9 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     }
 
     fn take_letters(&mut self) -> Option<&Mailboxes> {
-        let has_letters = self.office.open(self.cluster);
-        *self.opened += u64::from(has_letters);
-        has_letters.then_some(&self.office.letters)
+        let letters = self.office.open(self.cluster);
+        *self.opened += letters;
+        (letters > 0).then_some(&self.office.letters)
     }
 }
 
