@@ -129,7 +129,7 @@ x 0 0 1 1 5 0 | x 0 0 0 1 5 0 | 7 | twice
 x 0 0 1 1 5 0 | x 0 2 1 1 5 0 | 7 | no job 2
 x 0 0 1 1 5 0 | x 1 0 1 1 5 0 | 7 | no dag 1
 j 0 1 4 10 6 1 | j 0 1 4 10 6 2 | 11 | expected 0 or 1
-j 0 1 4 10 6 1 | k 0 1 4 10 6 1 | 11 | expected `x`, `j` or `end`
+j 0 1 4 10 6 1 | k 0 1 4 10 6 1 | 11 | expected `x`, `s`, `j` or `end`
 end\n |  | 12 | the file ends";
 
 #[test]
