@@ -127,6 +127,16 @@ impl Scheduler {
         self.end_wait(timer - self.dags.len(), true);
     }
 
+    /// Ends all waits whose limit has come, before a release of this instant cuts a job (W4).
+    pub(super) fn time_out_due(&mut self) {
+        for place in 0..self.waits.len() {
+            let limit_ns = self.timers.key_of(self.dags.len() + place);
+            if limit_ns.is_some_and(|limit_ns| limit_ns <= self.log.now_ns) {
+                self.end_wait(place, true);
+            }
+        }
+    }
+
     /// Makes a waiting instance eligible again (W2).
     fn end_wait(&mut self, place: usize, has_timed_out: bool) {
         let number = self.waits.vertices[place];
