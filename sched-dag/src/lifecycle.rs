@@ -162,11 +162,21 @@ impl PendingRequests {
         self.kept.is_empty()
     }
 
-    /// Takes the latest request, if it is for a wait, and returns the limit of that.
-    pub(crate) fn take_wait(&mut self) -> Option<u64> {
-        let is_wait = |request: &mut Request| matches!(request, Request::Wait(_));
+    /// Takes the latest request, if it is for a wait, and returns the limit of that, which begins
+    /// now. The time of the job's release is asked for if the wait is until an instant of it.
+    pub(crate) fn take_wait(
+        &mut self,
+        now_ns: u64,
+        release_ns: impl FnOnce() -> u64,
+    ) -> Option<u64> {
+        let is_wait =
+            |request: &mut Request| matches!(request, Request::Wait(_) | Request::WaitUntil(_));
         match self.kept.pop_if(is_wait)? {
             Request::Wait(limit_ns) => Some(limit_ns),
+            Request::WaitUntil(after_ns) => {
+                let until_ns = release_ns().saturating_add(after_ns);
+                Some(until_ns.saturating_sub(now_ns))
+            }
             _ => None,
         }
     }
@@ -379,6 +389,7 @@ impl Lifecycle for LifecyclePlan {
             | Request::Close(_)
             | Request::End(_)
             | Request::Wait(_)
+            | Request::WaitUntil(_)
             | Request::Answer(_)
             | Request::Step => {}
         }
@@ -534,7 +545,11 @@ impl Mailboxes {
                 }
                 return false;
             }
-            Request::Begin | Request::GoOn | Request::Wait(_) | Request::Step => return false,
+            Request::Begin
+            | Request::GoOn
+            | Request::Wait(_)
+            | Request::WaitUntil(_)
+            | Request::Step => return false,
         };
         if Some(to) == from {
             return false;
@@ -561,6 +576,7 @@ impl Mailboxes {
             | Request::Begin
             | Request::GoOn
             | Request::Wait(_)
+            | Request::WaitUntil(_)
             | Request::Step => {}
         }
         sent(to);
@@ -588,7 +604,9 @@ impl Mailboxes {
             }
             for (subtask, answer) in &to.answers {
                 let word = answer.swap(0, Ordering::Acquire);
-                wait_of(dag, *subtask, word).map(|wait| take(Request::Answer(wait)));
+                let wait = wait_of(dag, *subtask, word);
+                wait.into_iter()
+                    .for_each(|wait| take(Request::Answer(wait)));
             }
         }
         let to = &self.clusters[cluster.index()];
@@ -603,12 +621,12 @@ impl Mailboxes {
 
 /// Returns a word for a wait of a subtask, the larger the later, never 0.
 const fn wait_word(wait: WaitId) -> u64 {
-    wait.instance.job << 8 | wait.number as u64 + 1
+    (wait.instance.job << 8) | (wait.number as u64 + 1)
 }
 
 fn wait_of(dag: DagId, subtask: SubtaskId, word: u64) -> Option<WaitId> {
     let job = word >> 8;
-    let number = (word as u8).checked_sub(1)?.into();
+    let number = u32::try_from(word & 0xff).ok()?.checked_sub(1)?;
     let instance = Instance { dag, job, subtask };
     Some(WaitId { instance, number })
 }

@@ -28,6 +28,9 @@ pub enum Request {
     /// The instance that asks waits, for so many nanoseconds at most, instead of finishing. Always
     /// the only request of its turn.
     Wait(u64),
+    /// As [`Wait`](Self::Wait), until so many nanoseconds after the release of its job; for none if
+    /// that is past.
+    WaitUntil(u64),
     /// A wait has its answer.
     Answer(WaitId),
     /// Nothing but a step. An engine asks for that, lest a completion take the short way.
@@ -45,6 +48,7 @@ impl Request {
                 | Self::Close(_)
                 | Self::End(_)
                 | Self::Wait(_)
+                | Self::WaitUntil(_)
                 | Self::Answer(_)
                 | Self::Step
         )

@@ -21,6 +21,7 @@
 //! | [`Wire::receiving`](crate::shared::Wire::receiving) | `Received<T>` | input |
 //! | [`Wire::sending`](crate::shared::Wire::sending) | `Sender` | output |
 //! | [`Parameter::reading`](crate::shared::Parameter::reading) | `T` | input |
+//! | [`Device::asking`](crate::shared::Device::asking) | `Asker<Q, A>` | a wait |
 //!
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
@@ -61,7 +62,7 @@ pub(crate) mod sealed {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is nothing that a subtask uses",
     label = "should be a use, or a tuple of up to 8 uses",
-    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()` and `parameter.reading()`"
+    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()`, `parameter.reading()` and `device.asking()`"
 )]
 pub trait Uses: sealed::Sealed {
     /// The argument of the function.

@@ -112,6 +112,7 @@ pub(crate) fn tie(
         if let (Some(any), Some(around)) = (any, around) {
             any.attach(around, &mut bodies);
         }
+        bodies.iter_mut().for_each(SubtaskCode::hold_effects);
         bodies
     })
     .collect();

@@ -30,6 +30,7 @@ pub(crate) fn check_dag(
 ) {
     check_others(drafts, draft, label, faults);
     check_replaceable(draft, label, faults);
+    check_waits(draft, label, faults);
     check_inputs(draft, label, faults);
 }
 
@@ -91,6 +92,25 @@ fn check_replaceable(draft: &DagDraft, label: &DagLabel, faults: &mut Vec<Fault>
                 state: state.name.clone(),
             });
         }
+    }
+}
+
+/// Adds what is wrong with waits: functions that cannot take them, and devices that several ask.
+fn check_waits(draft: &DagDraft, dag: &DagLabel, faults: &mut Vec<Fault>) {
+    for (number, subtask) in draft.spec.subtasks.iter().enumerate() {
+        if !subtask.waits.is_empty() && !draft.waiting.contains(&number) {
+            faults.push(Fault::CannotWait {
+                dag: dag.clone(),
+                subtask: draft.label(number),
+            });
+        }
+    }
+    for (subtask, device) in &draft.asked_twice {
+        faults.push(Fault::DeviceAskedTwice {
+            dag: dag.clone(),
+            subtask: draft.label(*subtask),
+            device: device.clone(),
+        });
     }
 }
 

@@ -7,7 +7,7 @@
 
 #[allow(
     unsafe_code,
-    reason = "the four cells of job slots, shared values and records"
+    reason = "the cells of job slots, shared values and records, and the waker of turns"
 )]
 pub(crate) mod cell;
 pub(crate) mod effect;
@@ -21,4 +21,5 @@ pub(crate) mod replaceable;
 pub(crate) mod subtask;
 pub(crate) mod topic;
 pub(crate) mod tuple;
+pub(crate) mod waiting;
 pub(crate) mod wire;

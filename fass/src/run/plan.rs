@@ -15,6 +15,7 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
 use super::effect::{Effect, MutedEffect};
 use super::latest::Staleness;
 use super::line::LineOf;
+use super::waiting::{TurnEffects, TurnState};
 
 /// A committed set of DAGs, ready to be scheduled.
 ///
@@ -115,6 +116,11 @@ pub(crate) trait PolledSubtask: Send {
     /// Gives the function up, and the states that it used: the next turn is another one's.
     fn replace(&mut self) {}
 
+    /// Returns the state of its turns, if it may wait.
+    fn turn(&self) -> Option<&Arc<TurnState>> {
+        None
+    }
+
     /// Gives back what it has, after a fault: all but what the app's function owns, of which no
     /// destructor can be called.
     fn forget(self: Box<Self>);
@@ -128,7 +134,9 @@ struct JobPreview<F> {
 
 impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
     fn take_turn(&mut self, job: u64) {
-        match (self.look)(job) {
+        // Once for each job, in the first turn of its instance.
+        let goes_on = self.turn().is_some_and(|turn| turn.is_of(job));
+        match goes_on || (self.look)(job) {
             true => self.subtask.take_turn(job),
             false => self.subtask.discard(job),
         }
@@ -144,6 +152,10 @@ impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
 
     fn replace(&mut self) {
         self.subtask.replace();
+    }
+
+    fn turn(&self) -> Option<&Arc<TurnState>> {
+        self.subtask.turn()
     }
 
     fn forget(self: Box<Self>) {
@@ -190,10 +202,26 @@ impl SubtaskCode {
         self.effects.extend(effects);
     }
 
-    /// Runs the subtask's part of job `job` to its end.
+    /// Lets what it has of effects happen when its instances have finished, if it may wait.
+    pub(crate) fn hold_effects(&mut self) {
+        if let Some(turn) = self.subtask.turn() {
+            let real = core::mem::take(&mut self.effects);
+            let held = TurnEffects::new(Arc::clone(turn), real);
+            self.effects.push(Box::new(held));
+        }
+    }
+
+    /// Takes note, before the next turn, of how the wait has ended in which its instance was.
+    pub fn wake(&mut self, has_timed_out: bool) {
+        if let Some(turn) = self.subtask.turn() {
+            turn.wake(has_timed_out);
+        }
+    }
+
+    /// Runs the subtask's part of job `job` to its end, or to its next wait.
     ///
     /// Returns after the function has returned and its outputs are in their
-    /// slots. Polls the subtask's future exactly once. Does not allocate (the
+    /// slots, or when [`complete`](Self::complete) will ask for a wait. Polls the subtask's future exactly once. Does not allocate (the
     /// function itself may).
     ///
     /// The caller calls [`complete`](Self::complete) afterwards, reports the
@@ -394,6 +422,10 @@ impl engine::SubtaskBody for SubtaskRunner {
 
     fn discard(&mut self, job: u64) {
         self.body.discard(job);
+    }
+
+    fn wake(&mut self, has_timed_out: bool) {
+        self.body.wake(has_timed_out);
     }
 
     #[inline]

@@ -30,11 +30,11 @@ use fass::edge::RecordedValue;
 use fass::edge::{Begin, Replay};
 use fass::log::{Level, LogLine, set_level};
 use fass::platform::{LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
-use fass::shared::Wire;
+use fass::shared::{DeviceDriver, Wire};
 use recording::Channel;
 use sched_dag::engine::{Alternate, FaultCost};
 use sched_dag::journal::EventKind;
-use sched_dag::lifecycle::Request;
+use sched_dag::lifecycle::{Request, WaitId};
 use sched_dag::virtual_time::{RunOutcome, VirtualTime as Driver, Workload};
 use sched_dag::{
     Dag, DagId, DagLabel, DriverNotice, Instance, SchedulerOptions, SubtaskLabel, TaskSet,
@@ -64,6 +64,8 @@ pub(crate) struct Machine {
     pub(crate) running: Cell<Option<Instance>>,
     /// The lines of the log so far.
     pub(crate) logs: RefCell<Vec<LogLine>>,
+    /// The devices that answer.
+    devices: RefCell<Vec<Answering>>,
     /// Arrivals to come, by time and in the order in which they were made.
     arrivals: RefCell<BTreeMap<(u64, u64), Arrival>>,
     /// How much of that there has been.
@@ -85,11 +87,15 @@ impl fmt::Debug for Machine {
 }
 
 /// Something that comes from outside of the scheduler at an instant.
-#[derive(Debug)]
 enum Arrival {
     Request(Request),
     Bytes(Wire, Vec<u8>),
+    /// A device gives an answer.
+    Answer(Box<dyn FnOnce()>),
 }
+
+/// Looks for a question of a device, and notes the answers to it.
+type Answering = Box<dyn FnMut(&Machine, u64)>;
 
 /// Makes a machine and makes it this thread's.
 pub(crate) fn make_current() -> Rc<Machine> {
@@ -155,6 +161,10 @@ impl Machine {
                         // that are due already.
                         self.signal_at(now_ns, dag);
                     }
+                }
+                Arrival::Answer(give) => {
+                    self.now_ns.set(now_ns);
+                    give();
                 }
             }
         }
@@ -229,6 +239,36 @@ impl VirtualTime {
             .keep(at_ns, Arrival::Bytes(wire.clone(), bytes.to_vec()));
     }
 
+    /// Lets a device answer its questions: `answer` is told the question and the job that asks, and
+    /// says which answers come how long after the question. A device that never answers has none,
+    /// and one that answers twice has two, of which the first counts.
+    ///
+    /// See [`Device`](fass::shared::Device).
+    pub fn answers<Q, A, Answers>(
+        &self,
+        driver: DeviceDriver<Q, A>,
+        mut answer: impl FnMut(Q, u64) -> Answers + 'static,
+    ) where
+        Q: Send + Sync + 'static,
+        A: Send + Sync + 'static,
+        Answers: IntoIterator<Item = (Duration, A)>,
+    {
+        let driver = Rc::new(RefCell::new(driver));
+        let look = move |machine: &Machine, now_ns: u64| {
+            let Some((ticket, question)) = driver.borrow_mut().question() else {
+                return;
+            };
+            for (after, answer) in answer(question, ticket.job()) {
+                let driver = Rc::clone(&driver);
+                // One that comes too late is given back.
+                let give = move || _ = driver.borrow_mut().answer(ticket, answer);
+                let at_ns = now_ns.saturating_add(nanoseconds(after));
+                machine.keep(at_ns, Arrival::Answer(Box::new(give)));
+            }
+        };
+        self.machine.devices.borrow_mut().push(Box::new(look));
+    }
+
     /// Returns all that complete instances have sent so far on a wire that is connected.
     ///
     /// See [`Wire`].
@@ -291,6 +331,14 @@ impl Platform for HostPlatform {
              `dag.using(signal.raising())`"
         );
         machine.raise_at(machine.now_ns.get(), (plan, dag));
+    }
+
+    fn answer(&self, plan: u64, wait: WaitId) {
+        let machine = expect_current();
+        if machine.plan.get() == Some(plan) {
+            let answer = Arrival::Request(Request::Answer(wait));
+            machine.keep(machine.now_ns.get(), answer);
+        }
     }
 
     fn crosses(&self) -> bool {
@@ -508,8 +556,10 @@ const FAULT: &str = "a fault that was asked for";
 struct Calls {
     pub(crate) task_set: Arc<TaskSet>,
     pub(crate) machine: Rc<Machine>,
-    /// How long each instance executes in all.
+    /// How long each instance has executed so far.
     pub(crate) executed_ns: BTreeMap<Instance, u64>,
+    /// The instances that have waited, with the segment that each executes next.
+    segments: BTreeMap<Instance, usize>,
     /// The contained panics.
     pub(crate) panics: Vec<PanicRecord>,
     /// For each DAG whether a subtask of it has fallen back.
@@ -528,6 +578,7 @@ impl Calls {
             task_set: Arc::clone(task_set),
             machine: Rc::clone(machine),
             executed_ns: BTreeMap::new(),
+            segments: BTreeMap::new(),
             panics: Vec::new(),
             degraded: vec![false; task_set.dags().len()],
             panic: None,
@@ -577,14 +628,16 @@ impl Workload<SubtaskRunner> for Calls {
         let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
         // A function that panics has executed what it said until then. One that is to fail was not
         // called, so the time of a silent call passes before its fault.
+        let segment = self.segments.remove(&instance).unwrap_or(0);
         if executed_ns == 0 && (result.is_ok() || fails) {
-            executed_ns = settings.silent.of_call_ns(instance, subtask.wcet_ns());
+            executed_ns = settings.silent.of_call_ns(instance, segment, subtask);
         }
+        let before_ns = self.executed_ns.get(&instance).copied().unwrap_or(0);
         // The function has run to its end, but nobody may see what it did beyond its budget.
-        let budget_ns = subtask.most_execution_ns(0);
+        let budget_ns = subtask.most_execution_ns(0).saturating_sub(before_ns);
         if executed_ns > budget_ns {
             executed_ns = budget_ns;
-            let budget = Duration::from_nanos(budget_ns);
+            let budget = Duration::from_nanos(before_ns + budget_ns);
             result = Err(format!("executed for more than its budget of {budget:?}"));
         }
         if let Err(message) = result {
@@ -607,7 +660,8 @@ impl Workload<SubtaskRunner> for Calls {
                 machine.edge.of_replay(cut);
             }
         }
-        self.executed_ns.insert(instance, executed_ns);
+        let in_all_ns = before_ns.saturating_add(executed_ns);
+        self.executed_ns.insert(instance, in_all_ns);
         Some(executed_ns)
     }
 
@@ -622,6 +676,14 @@ impl Workload<SubtaskRunner> for Calls {
     fn ended(&mut self, instance: Instance, fault: Option<FaultCost>) {
         self.degraded[instance.dag.index()] |= fault == Some(FaultCost::Degraded);
         self.machine.collect();
+    }
+
+    fn waits(&mut self, wait: WaitId, now_ns: u64) {
+        self.segments
+            .insert(wait.instance, wait.number as usize + 1);
+        let machine = &*self.machine;
+        let mut devices = machine.devices.borrow_mut();
+        devices.iter_mut().for_each(|look| look(machine, now_ns));
     }
 
     fn hear(&mut self, notice: &DriverNotice) {

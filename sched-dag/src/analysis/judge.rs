@@ -75,6 +75,7 @@ use super::pipelined::{PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::set::{BoundFailure, EquationSet, EvaluationBudget, constrained};
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
+use super::waiting::Rounding;
 use super::workload::WorkloadBursts;
 use super::{
     AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason, SchedulabilityTest,
@@ -269,8 +270,7 @@ impl<'a> AnalysisInput<'a> {
             return None;
         }
         let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
-        let covers = &self.set.shapes[dag].covers;
-        let others = multi_path::alone(task, covers, cores.into())?;
+        let others = multi_path::alone(task, &self.set.shapes[dag].left, cores, Rounding::Up)?;
         let limit = task.relative_deadline_ns().min(task.period_ns());
         let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
         // Long steps of the scheduler are in no equation of this test, so they are added to it.

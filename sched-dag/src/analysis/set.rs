@@ -26,6 +26,7 @@ use super::interference::{DelaySources, GraphSummary, InterferenceBound, Interfe
 use super::multi_path::{MultiPathEquations, alone};
 use super::pipelined::{OWN_STEPS, PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::task::Task;
+use super::waiting::{Rounding, with_blocking};
 use super::workload::{InterferingWorkload, WorkloadBursts};
 
 /// DAGs with what enters their equations.
@@ -41,6 +42,7 @@ pub(super) struct EquationSet<'a> {
     /// Which interference counts.
     pub(super) clip: InterferenceBound,
     pub(super) bursts: WorkloadBursts,
+    pub(super) rounding: Rounding,
     /// Bounds that are known already, by DAG.
     pub(super) known: Vec<Option<u64>>,
 }
@@ -84,6 +86,7 @@ impl<'a> EquationSet<'a> {
             keep_cores: false,
             clip: InterferenceBound::Chains,
             bursts: WorkloadBursts::default(),
+            rounding: Rounding::Up,
             known: alloc::vec![None; tasks.len()],
         }
     }
@@ -176,8 +179,10 @@ impl<'a> EquationSet<'a> {
         MultiPathEquations {
             task: self.tasks[dag],
             covers: &self.shapes[dag].covers,
+            left: &self.shapes[dag].left,
             cores: self.cores as usize,
             clip: self.clip,
+            rounding: self.rounding,
             limit_ns: figures.limit_ns().min(self.tasks[dag].period_ns()),
         }
     }
@@ -185,7 +190,14 @@ impl<'a> EquationSet<'a> {
     /// Returns the known bound, or that of a job alone, below which no solution lies: from
     /// there on the workloads only grow.
     fn start(&self, dag: usize) -> Option<u64> {
-        let alone = || alone(self.tasks[dag], &self.shapes[dag].covers, self.cores.into());
+        let alone = || {
+            alone(
+                self.tasks[dag],
+                &self.shapes[dag].left,
+                self.cores,
+                self.rounding,
+            )
+        };
         self.known[dag].or_else(alone)
     }
 
@@ -197,8 +209,8 @@ impl<'a> EquationSet<'a> {
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Option<Vec<u64>> {
         let mut steps = EvaluationBudget::of(self.tasks.len());
-        let mut bounds: Vec<u64> = (self.known.iter().zip(self.tasks))
-            .map(|(known, task)| known.unwrap_or(task.relative_deadline_ns()))
+        let mut bounds: Vec<u64> = (self.known.iter().zip(&self.figures))
+            .map(|(known, figures)| known.unwrap_or(figures.limit_ns()))
             .collect();
         let mut has_round = false;
         loop {
@@ -260,9 +272,14 @@ impl<'a> EquationSet<'a> {
             }
         }
         let blocking = (self.shapes[dag].unblocked).by(&blocking_ns, self.cores);
+        let (task, rounding) = (self.tasks[dag], self.rounding);
+        let is_coupled = !task.waits().is_empty() || rounding == Rounding::Down;
+        let left_and_blocking = (is_coupled && !blocking_ns.is_empty())
+            .then(|| with_blocking(task, self.cores, &blocking));
         Ok(DelaySources {
             others,
             blocking,
+            left_and_blocking,
             bursts: self.bursts.clone(),
         })
     }

@@ -250,7 +250,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         port: &mut C,
     ) -> TurnEnd {
         let instance = self.scheduler.instance_of(vertex);
-        let limit_ns = self.requests.take_wait();
+        let limit_ns = self.take_wait(vertex, finish_ns);
         match limit_ns {
             None => self.placement.finish(core.index(), vertex, body),
             Some(_) => {
@@ -272,7 +272,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     ) {
         let mut body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         let instance = self.scheduler.instance_of(vertex);
-        let limit_ns = self.requests.take_wait();
+        let limit_ns = self.take_wait(vertex, finish_ns);
         match limit_ns {
             None => self.placement.finish_parked(vertex, body),
             Some(_) => {
@@ -283,6 +283,12 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let turn = TurnEnd { instance, limit_ns };
         // By the whole step: its core runs something else by now, so it passes on to nobody.
         self.step((now_ns, core), port, |moment| moment.end_turn(turn));
+    }
+
+    /// Takes the request of a turn that has ended in a wait, and returns the limit of that.
+    fn take_wait(&mut self, vertex: Vertex, now_ns: u64) -> Option<u64> {
+        let release_ns = || self.scheduler.release_ns(vertex);
+        self.requests.take_wait(now_ns, release_ns)
     }
 
     /// Returns the cost of a fault of the vertex' instance if it comes now.

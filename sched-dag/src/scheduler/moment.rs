@@ -43,6 +43,7 @@ impl Scheduler {
             | Request::Begin
             | Request::GoOn
             | Request::Wait(_)
+            | Request::WaitUntil(_)
             | Request::Step => {}
         }
     }

@@ -165,6 +165,14 @@ impl Scheduler {
         self.ending.push(number);
     }
 
+    /// Returns when the job was released whose instance a vertex has.
+    #[must_use]
+    pub(crate) fn release_ns(&self, vertex: Vertex) -> u64 {
+        let vertex = self.vertices.get(vertex.0);
+        let jobs = &self.dags[vertex.dag.index()].jobs;
+        jobs.job(vertex.progress).release_ns
+    }
+
     /// Returns the latest wait of a vertex, and whether it has ended by its limit.
     ///
     /// # Panics

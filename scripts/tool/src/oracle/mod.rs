@@ -8,7 +8,8 @@
 //! - [`bounds`]: the analysis at commit;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
-//! - [`synchronizer`]: the policies of the publish/subscribe baseline.
+//! - [`synchronizer`]: the policies of the publish/subscribe baseline;
+//! - [`waiting`]: schedules and bounds of subtasks that wait, in one file.
 //!
 //! One kind reads no files: it simulates random sets that the analysis accepts (`responses`).
 
@@ -18,6 +19,7 @@ pub(crate) mod older_bounds;
 mod responses;
 pub mod schedules;
 pub mod synchronizer;
+pub mod waiting;
 
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -52,6 +54,7 @@ static ORACLE: Menu = Menu {
         "synchronizer": "sets that ExactTime and ApproximateTime emit, and what they drop", |words| {
             run_files(words, &SYNCHRONIZER, synchronizer::parse, synchronizer::check, |case| &case.name)
         };
+        "waiting": "bounds of DAGs whose subtasks wait", waiting::command;
     },
     notes: NOTES,
 };
@@ -114,22 +117,32 @@ fn run_files<Case>(
 ) -> ExitCode {
     table.carry_out(words, |options| {
         let cases = read(options.files(), parse).map_err(Refusal::Usage)?;
-        let mut failed = 0_usize;
-        let mut progress = Progress::new(cases.len() as u64, "cases");
-        for (over, case) in (1..).zip(&cases) {
-            let checked = check(case);
-            progress.show(over);
-            if let Err(difference) = checked {
-                failed += 1;
-                progress.wipe();
-                // The progress line is gone by now, so the difference has its own line.
-                println!("{}: {difference}", name(case));
-            }
-        }
-        progress.wipe();
+        let failed = failures(&cases, check, name);
         println!("{} passed, {failed} failed", cases.len() - failed);
         Ok(ExitCode::from(u8::from(failed > 0)))
     })
+}
+
+/// Checks each case, prints the differences by case, and returns how many have one.
+fn failures<Case>(
+    cases: &[Case],
+    check: impl Fn(&Case) -> Result<(), String>,
+    name: impl Fn(&Case) -> &str,
+) -> usize {
+    let mut failed = 0;
+    let mut progress = Progress::new(cases.len() as u64, "cases");
+    for (over, case) in (1..).zip(cases) {
+        let checked = check(case);
+        progress.show(over);
+        if let Err(difference) = checked {
+            failed += 1;
+            progress.wipe();
+            // The progress line is gone by now, so the difference has its own line.
+            println!("{}: {difference}", name(case));
+        }
+    }
+    progress.wipe();
+    failed
 }
 
 /// Reads the cases of all files, at least one.

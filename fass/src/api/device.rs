@@ -1,0 +1,474 @@
+//! Devices: what takes its time to answer a subtask, and may be late, or never come to an end.
+//!
+//! A device has two ends. One subtask *asks*: it is async, sends a question and waits for the
+//! answer, or until the limit of that wait. The other end is the *driver's*: it takes the question
+//! and answers it, from a thread, an interrupt's handler, a test. So all that a device can do to a
+//! DAG is to end a wait before its limit.
+//!
+//! # What is guaranteed
+//!
+//! - A question is there for the driver when the wait for its answer has begun, not before (R3).
+//! - An answer ends the wait that it is for, once. Another one, or one for a wait that has ended, or
+//!   whose job is gone, is given back.
+//! - Neither end waits for the other, or takes a lock; and nothing is allocated.
+//!
+//! # How the two ends meet
+//!
+//! Each question has a number, from 1 on. The word `posted` is that of the one that waits for its
+//! answer; whoever exchanges it for 0 has decided: the driver, who then has answered, or the asking
+//! end, which has given up. There are two places for questions, as the driver may be just taking one
+//! out that has been given up; the asking end writes the next one to the other. The place of the
+//! answer is the driver's until it has answered, and then the asking end's.
+
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::sync::Arc;
+use core::fmt;
+use core::pin::Pin;
+use core::sync::atomic::{AtomicU64, Ordering};
+use core::task::{Context, Poll};
+use core::time::Duration;
+
+use sched_dag::lifecycle::WaitId;
+use sched_dag::{Instance, SubtaskId};
+
+use super::dag::Dag;
+use super::uses::{Uses, sealed};
+use crate::platform;
+use crate::run::cell::{SetOnce, SharedCell};
+use crate::run::effect::{Effect, RequestTarget};
+use crate::run::waiting::{WaitEnd, WaitStep};
+
+/// Makes a device of that name: the end of the subtask that asks it, and the driver's.
+///
+/// See [`Device`].
+#[must_use]
+pub fn create_device<Q, A>(name: &str) -> (Device<Q, A>, DeviceDriver<Q, A>)
+where
+    Q: Send + Sync + 'static,
+    A: Send + Sync + 'static,
+{
+    let cell = Arc::new(DeviceCell {
+        name: name.into(),
+        asking: SetOnce::new(),
+        bell: SetOnce::new(),
+        questions: [(); 2].map(|()| SharedCell::new(None)),
+        answer: SharedCell::new(None),
+        count: AtomicU64::new(0),
+        staged: AtomicU64::new(0),
+        posted: AtomicU64::new(0),
+    });
+    let driver = DeviceDriver {
+        cell: Arc::clone(&cell),
+        taken: 0,
+    };
+    (Device(cell), driver)
+}
+
+/// A device, as the subtask has it that asks. Made by [`create_device`].
+///
+/// # Examples
+///
+/// A camera's DAG that asks an accelerator for what is in a frame, and goes on without if it is
+/// late:
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::shared::{Asker, create_device};
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let (ms, named) = (Duration::from_millis, SubtaskAttributes::named);
+/// let (accelerator, driver) = create_device::<u32, u32>("accelerator");
+///
+/// let dag = create_dag();
+/// dag.name("vision").jobs(2);
+/// let mut frame = 0_u32;
+/// let camera = move || {
+///     frame += 1;
+///     (frame,)
+/// };
+/// dag.register_periodic_subtask(camera, ["frame"], ms(20), named("camera").wcet(ms(1)));
+/// dag.using(accelerator.asking())
+///     .async_subtask(|accelerator: Asker<u32, u32>, (frame,): (u32,)| async move {
+///         (accelerator.ask(frame).await.ok(),)
+///     })
+///     .reads(&["frame"])
+///     .writes(&["objects"])
+///     .register(named("detect").wcet(ms(1)).wait(ms(5)).wcet(ms(2)));
+/// let mut expected = [Some(10), None].into_iter();
+/// let show = move |(objects,): (Option<u32>,)| assert_eq!(Some(objects), expected.next());
+/// dag.register_sink_subtask(show, ["objects"], ms(20), named("show").wcet(ms(1)));
+/// finish_create_dags(&[dag]).unwrap();
+///
+/// // The first answer comes after 3 ms, the second one too late.
+/// machine.answers(driver, move |frame, _job| [(ms(3 * u64::from(frame)), frame * 10)]);
+/// let report = machine.run();
+/// let response_ns = |job: usize| report.jobs[job].response_time_ns();
+/// assert_eq!([response_ns(0), response_ns(1)], [Some(8_000_000), Some(10_000_000)]);
+/// ```
+pub struct Device<Q, A>(Arc<DeviceCell<Q, A>>);
+
+/// The use of a [`Device`]: the function gets an [`Asker`]. Made by [`Device::asking`].
+///
+/// See [`Device`].
+#[derive(Debug)]
+pub struct DeviceUse<Q, A>(Device<Q, A>);
+
+/// The handle by which an async function asks a device.
+///
+/// See [`Device`].
+pub struct Asker<Q, A>(Arc<DeviceCell<Q, A>>);
+
+/// A question on its way to its answer. Made by [`Asker::ask`].
+///
+/// See [`Device`].
+#[must_use = "the question is sent when this is awaited"]
+pub struct Ask<'a, Q, A> {
+    cell: &'a DeviceCell<Q, A>,
+    question: Option<Q>,
+    wait: WaitStep,
+    /// Its number, 0 before it has one.
+    number: u64,
+}
+
+/// A device has not answered within the limit of the wait.
+///
+/// ```
+/// assert_eq!(fass::shared::TimedOut.to_string(), "the device has not answered in time");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimedOut;
+
+impl fmt::Display for TimedOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the device has not answered in time")
+    }
+}
+
+impl core::error::Error for TimedOut {}
+
+/// The driver's end of a device. Made by [`create_device`].
+///
+/// There is one, so of what drives a device one acts at a time.
+///
+/// See [`Ticket`].
+pub struct DeviceDriver<Q, A> {
+    cell: Arc<DeviceCell<Q, A>>,
+    /// The question that was taken last.
+    taken: u64,
+}
+
+/// The question that an answer is for.
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::shared::{Asker, create_device};
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+/// use virtual_time::VirtualTime;
+///
+/// let machine = VirtualTime::new();
+/// let ms = Duration::from_millis;
+/// let (sonar, mut driver) = create_device::<(), u32>("sonar");
+/// let dag = create_dag();
+/// dag.name("depth").jobs(1).period(ms(20)).relative_deadline(ms(20));
+/// let ping = |sonar: Asker<(), u32>| async move {
+///     assert_eq!(sonar.ask(()).await, Ok(7));
+/// };
+/// let ping = dag.using(sonar.asking()).async_source(ping);
+/// ping.register(SubtaskAttributes::named("ping").wait(ms(9)));
+/// finish_create_dags(&[dag]).unwrap();
+///
+/// assert!(driver.question().is_none());
+/// machine.run_for(ms(4));
+/// let (ticket, ()) = driver.question().unwrap();
+/// assert_eq!(ticket.job(), 0);
+/// assert_eq!(driver.answer(ticket, 7), Ok(()));
+/// assert_eq!(driver.answer(ticket, 8), Err(8)); // it has its answer
+/// assert_eq!(machine.run().jobs[0].response_time_ns(), Some(4_000_000));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ticket {
+    number: u64,
+    /// The plan.
+    plan: u64,
+    wait: WaitId,
+}
+
+impl Ticket {
+    /// Returns the job that asks.
+    #[must_use]
+    pub const fn job(&self) -> u64 {
+        self.wait.instance.job
+    }
+}
+
+/// A question, with its number and the wait for its answer: of which job, and which one there.
+struct Question<Q> {
+    number: u64,
+    wait: (u64, u32),
+    question: Q,
+}
+
+/// What the ends of a device share.
+struct DeviceCell<Q, A> {
+    name: String,
+    /// The subtask that asks.
+    asking: SetOnce<(Arc<RequestTarget>, SubtaskId)>,
+    /// Rung when a question is there.
+    bell: SetOnce<Box<dyn Fn() + Send + Sync>>,
+    questions: [SharedCell<Option<Question<Q>>>; 2],
+    answer: SharedCell<Option<(u64, A)>>,
+    /// How many questions have a number.
+    count: AtomicU64,
+    /// The question to be posted at the end of the turn, or 0.
+    staged: AtomicU64,
+    /// The question that waits for its answer, or 0.
+    posted: AtomicU64,
+}
+
+impl<Q, A> DeviceCell<Q, A> {
+    /// Writes a question down, which is not to be seen yet, and returns its number.
+    fn stage(&self, wait: (u64, u32), question: Q) -> u64 {
+        let number = self.count.fetch_add(1, Ordering::Relaxed) + 1;
+        // The driver is at one of them at most.
+        let place = self.questions.iter().find_map(SharedCell::change);
+        let mut place = place.expect("the driver's end is used by one thread at a time");
+        let question = Question {
+            number,
+            wait,
+            question,
+        };
+        let older = place.replace(question);
+        // What is dropped is the app's, and may panic: not in the place.
+        drop(place);
+        drop(older);
+        self.staged.store(number, Ordering::Relaxed);
+        number
+    }
+
+    /// Decides on a question that waits for its answer, and reports whether it did.
+    fn decide(&self, number: u64) -> bool {
+        let posted = &self.posted;
+        let decided = posted.compare_exchange(number, 0, Ordering::AcqRel, Ordering::Relaxed);
+        decided.is_ok()
+    }
+}
+
+/// Posts the question that an instance has staged, once its turn has ended in the wait for the
+/// answer.
+struct PostQuestion<Q, A>(Arc<DeviceCell<Q, A>>);
+
+impl<Q: Send + Sync, A: Send + Sync> Effect for PostQuestion<Q, A> {
+    fn happen(&mut self, _: u64, _: &mut dyn FnMut(platform::Request)) {}
+
+    fn wait(&mut self) {
+        let number = self.0.staged.load(Ordering::Relaxed);
+        if number == 0 {
+            return;
+        }
+        self.0.staged.store(0, Ordering::Relaxed);
+        // Release: the question is in its place.
+        self.0.posted.store(number, Ordering::Release);
+        if let Some(ring) = self.0.bell.get() {
+            ring();
+        }
+    }
+}
+
+impl<Q, A> Device<Q, A> {
+    /// Returns the use of the subtask that asks it, of which there is one.
+    #[must_use = "a use has no effect until a subtask is registered with it"]
+    pub fn asking(&self) -> DeviceUse<Q, A> {
+        DeviceUse(Self(Arc::clone(&self.0)))
+    }
+}
+
+impl<Q, A> sealed::Sealed for DeviceUse<Q, A> {}
+
+impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A> {
+    type Borrowed<'a> = Asker<Q, A>;
+    type Held = Asker<Q, A>;
+    type Guard<'a> = &'a Asker<Q, A>;
+
+    fn hold(self, dag: &Dag, subtask: usize) -> Asker<Q, A> {
+        let cell = self.0.0;
+        let mut draft = dag.draft.borrow_mut();
+        let id = SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX));
+        if !cell.asking.set((Arc::clone(&draft.target), id)) {
+            draft.asked_twice.push((subtask, cell.name.clone()));
+        }
+        let post = PostQuestion(Arc::clone(&cell));
+        draft.effects.push((subtask, Box::new(post)));
+        Asker(cell)
+    }
+
+    fn enter(held: &mut Asker<Q, A>) -> &Asker<Q, A> {
+        held
+    }
+
+    fn borrow(guard: &mut &Asker<Q, A>) -> Asker<Q, A> {
+        Asker(Arc::clone(&guard.0))
+    }
+}
+
+impl<Q, A> Asker<Q, A> {
+    /// Sends a question, and waits for the answer, or until the limit of the wait.
+    ///
+    /// The question goes out when the wait begins. An answer at the very instant of the limit counts.
+    ///
+    /// # Panics
+    ///
+    /// When polled, with a [`WaitFault`](crate::WaitFault), if the wait is not as stated.
+    pub fn ask(&self, question: Q) -> Ask<'_, Q, A> {
+        Ask {
+            cell: &self.0,
+            question: Some(question),
+            wait: WaitStep::new(WaitEnd::Limit),
+            number: 0,
+        }
+    }
+}
+
+impl<Q, A> Ask<'_, Q, A> {
+    /// Waits for a shorter time than the limit.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::shared::{Asker, TimedOut};
+    ///
+    /// async fn try_soon(sonar: Asker<(), u32>) -> Result<u32, TimedOut> {
+    ///     sonar.ask(()).within(Duration::from_micros(200)).await
+    /// }
+    /// ```
+    pub fn within(mut self, limit: Duration) -> Self {
+        self.wait.shorten(limit);
+        self
+    }
+}
+
+/// Nothing in it is pinned.
+impl<Q, A> Unpin for Ask<'_, Q, A> {}
+
+impl<Q, A> Future for Ask<'_, Q, A> {
+    type Output = Result<A, TimedOut>;
+
+    fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
+        let this = self.get_mut();
+        let polled = this.wait.poll(context);
+        if let (Some(wait), Some(question)) = (this.wait.id(), this.question.take()) {
+            this.number = this.cell.stage(wait, question);
+        }
+        polled.map(|has_timed_out| {
+            if has_timed_out {
+                return Err(TimedOut);
+            }
+            let mut place = this.cell.answer.change();
+            let is_its = |answer: &mut (u64, A)| answer.0 == this.number;
+            let answer = place.as_mut().and_then(|place| place.take_if(is_its));
+            match answer {
+                Some((_, answer)) => Ok(answer),
+                None => panic!(
+                    "the platform has ended the wait for an answer of device `{}`, which has given \
+                     none",
+                    this.cell.name
+                ),
+            }
+        })
+    }
+}
+
+/// From now on no answer is taken.
+impl<Q, A> Drop for Ask<'_, Q, A> {
+    fn drop(&mut self) {
+        if self.number > 0 {
+            let staged = &self.cell.staged;
+            if staged.load(Ordering::Relaxed) == self.number {
+                staged.store(0, Ordering::Relaxed);
+            }
+            self.cell.decide(self.number);
+        }
+    }
+}
+
+impl<Q, A> DeviceDriver<Q, A> {
+    /// Takes the question that waits for its answer, if there is one that was not taken before.
+    ///
+    /// See [`Ticket`].
+    pub fn question(&mut self) -> Option<(Ticket, Q)> {
+        let number = self.cell.posted.load(Ordering::Acquire);
+        if number == 0 || number == self.taken {
+            return None;
+        }
+        let is_it = |question: &mut Question<Q>| question.number == number;
+        let mut places = self.cell.questions.iter();
+        let found = places.find_map(|place| place.change()?.take_if(is_it))?;
+        self.taken = number;
+        let (target, subtask) = self.cell.asking.get()?;
+        let ((plan, dag), (job, number)) = (target.get()?, found.wait);
+        let (subtask, count) = (*subtask, found.number);
+        let ticket = Ticket {
+            number: count,
+            plan,
+            wait: WaitId {
+                instance: Instance { dag, job, subtask },
+                number,
+            },
+        };
+        Some((ticket, found.question))
+    }
+
+    /// Gives the answer to a question, which ends the wait for it.
+    ///
+    /// See [`Ticket`].
+    ///
+    /// # Errors
+    ///
+    /// The answer is given back if the question has one, or nobody waits for it any more.
+    pub fn answer(&mut self, ticket: Ticket, answer: A) -> Result<(), A> {
+        let (cell, number) = (&self.cell, ticket.number);
+        // Until then the place is the asking end's, which may not have taken its answer yet.
+        if cell.posted.load(Ordering::Acquire) != number {
+            return Err(answer);
+        }
+        let Some(mut place) = cell.answer.change() else {
+            return Err(answer);
+        };
+        let older = place.replace((number, answer));
+        drop(place);
+        drop(older);
+        if cell.decide(number) {
+            platform::expect_installed().answer(ticket.plan, ticket.wait);
+            return Ok(());
+        }
+        // It has been given up just now; nobody else writes to the place.
+        let mut place = cell.answer.change();
+        let taken = place.as_mut().and_then(|place| place.take());
+        taken.map_or(Ok(()), |(_, answer)| Err(answer))
+    }
+
+    /// Has something done when there is a question: it wakes a thread, or tells the hardware.
+    /// Reports whether it is the first such thing, which alone counts.
+    ///
+    /// It is done in the scheduler's step, so it must be short, and wait for nothing.
+    ///
+    /// ```
+    /// let (_sonar, driver) = fass::shared::create_device::<(), u32>("sonar");
+    /// let thread = std::thread::current();
+    /// assert!(driver.on_question(move || thread.unpark()));
+    /// ```
+    pub fn on_question(&self, ring: impl Fn() + Send + Sync + 'static) -> bool {
+        self.cell.bell.set(Box::new(ring))
+    }
+}
+
+shown_as!(Device<Q, A>, |of| of.0.name);
+shown_as!(Asker<Q, A>, |of| of.0.name);
+shown_as!(DeviceDriver<Q, A>, |of| of.cell.name);
+
+impl<Q, A> fmt::Debug for Ask<'_, Q, A> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Ask").field(&self.cell.name).finish()
+    }
+}
