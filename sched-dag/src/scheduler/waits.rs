@@ -181,10 +181,13 @@ impl Scheduler {
     #[must_use]
     pub fn latest_wait(&self, vertex: Vertex) -> (WaitId, bool) {
         let latest = self.waits.latest[self.waits.place(vertex.0)];
-        let wait = WaitId {
-            instance: self.instance_of(vertex),
-            number: latest.number,
+        // Where a cut job does not wait (W6), the subtask may have the next job's instance by now.
+        let instance = Instance {
+            job: latest.job,
+            ..self.instance_of(vertex)
         };
+        let number = latest.number;
+        let wait = WaitId { instance, number };
         (wait, latest.has_timed_out)
     }
 }
