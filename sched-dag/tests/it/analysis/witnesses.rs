@@ -125,7 +125,7 @@ fn tests(answer: &AnalysisResult, path: &Path) -> Vec<String> {
     let tests = answer.bounds.iter().flatten();
     let tests = tests.map(|bound| bound.test.to_string());
     let sinks = (tighter(answer) > 0).then(|| String::from("of a sink"));
-    let text = fs::read_to_string(path).unwrap();
+    let text = fs::read_to_string(path).expect("it was written");
     let forms = ["reserved", "blocked"].into_iter();
     let forms = forms.filter(|form| text.contains(&format!(" {form} ")));
     tests.chain(sinks).chain(forms.map(String::from)).collect()
