@@ -64,6 +64,7 @@ const TESTS: &[(&str, Test)] = &[
     ("unnoticed", single::unnoticed),
     ("values", values::run),
     ("waits", waits::run),
+    ("waits_cost", waits::cost),
     ("waits_faults", waits::faults),
 ];
 

@@ -121,6 +121,41 @@ fn accelerator(mut driver: DeviceDriver<u64, u64>, answers: &Arc<Answers>) -> Da
     dag
 }
 
+/// How many waits [`cost`] takes one after the other.
+const NAPS: u32 = 32;
+
+/// Counts what a wait and its wake add to an instance that has the machine for itself: of no time,
+/// and of a millisecond beyond that.
+pub(crate) fn cost(machine: &Machine) -> Result<(), AppError> {
+    machine.options().finish(&["test"])?;
+    for (word, time) in [("at_once", Duration::ZERO), ("later", ms(1))] {
+        let longest = Arc::new(AtomicU64::new(0));
+        let found = Arc::clone(&longest);
+        let naps = move || {
+            let found = Arc::clone(&found);
+            async move {
+                let from_ns = fass::now_ns();
+                for _ in 0..NAPS {
+                    sleep(time).await;
+                }
+                found.fetch_max(fass::now_ns() - from_ns, Ordering::Relaxed);
+            }
+        };
+        let attributes = (0..NAPS).fold(named("naps"), |naps, _| naps.wait(time));
+        let terms = (Some(3), ms(100));
+        finish_create_dags(&[waiting("naps", terms, attributes, naps)])?;
+        let run = machine.run()?;
+        let waited_ns = u64::try_from((time * NAPS).as_nanos()).unwrap_or(u64::MAX);
+        let added_ns = longest.load(Ordering::Relaxed).saturating_sub(waited_ns);
+        json::emit("waits_cost", |line| {
+            line.text("wait", word)
+                .number("instructions", added_ns / u64::from(NAPS))
+                .number("allocations", run.allocations());
+        });
+    }
+    Ok(())
+}
+
 /// A DAG of one subtask that waits.
 fn waiting<Fut>(
     name: &str,
@@ -314,6 +349,6 @@ fn aborted(dropped: &Arc<AtomicU64>) -> Dag {
         named("rests").wait(ms(15)),
         rests,
     );
-    dag.overrun(OverrunPolicy::Abort);
+    dag.in_flight(1).overrun(OverrunPolicy::Abort);
     dag
 }
