@@ -116,13 +116,24 @@ pub struct JobTimes {
 /// [`Malformed`] for the first record that is not as described above, and for
 /// DAGs that cannot be committed.
 pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
-    cases(text, |header, lines| {
-        let case = parse_case(header, lines)?;
-        let records = text.lines().take(lines.last()).skip(header.number - 1);
-        Ok(Case {
-            text: records.flat_map(|record| [record, "\n"]).collect(),
-            ..case
-        })
+    cases(text, |header, lines| parse_block(text, header, lines))
+}
+
+/// Reads the case of a text that begins with the record `header`.
+///
+/// # Errors
+///
+/// As [`parse`].
+pub fn parse_block(
+    text: &str,
+    header: &Line<'_>,
+    lines: &mut Lines<'_>,
+) -> Result<Case, Malformed> {
+    let case = parse_case(header, lines)?;
+    let records = text.lines().take(lines.last()).skip(header.number - 1);
+    Ok(Case {
+        text: records.flat_map(|record| [record, "\n"]).collect(),
+        ..case
     })
 }
 

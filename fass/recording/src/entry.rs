@@ -273,6 +273,9 @@ crate::recordable! {
         pub ready_ns: u64,
         /// The DAGs, in the order of their numbers.
         pub dags: Vec<CommittedDag>,
+        /// The waits, those of a subtask in their order: DAG and subtask, the limit, and the WCET
+        /// of the segment that follows, if it is stated.
+        pub waits: Vec<(u32, u32, u64, Option<u64>)>,
     }
 
     /// A DAG of a [`Commit`].

@@ -159,7 +159,21 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
                 ..of_dag(dag)
             })
             .collect(),
+        waits: waits(task_set),
     }
+}
+
+fn waits(task_set: &TaskSet) -> Vec<(u32, u32, u64, Option<u64>)> {
+    let dags = (0..).zip(task_set.dags());
+    let subtasks = dags.flat_map(|(dag, of)| {
+        let numbered = (0..).zip(of.subtasks());
+        numbered.map(move |(subtask, of)| (dag, subtask, of))
+    });
+    let waits = subtasks.flat_map(|(dag, subtask, of)| {
+        let waits = of.waits().iter();
+        waits.map(move |wait| (dag, subtask, wait.limit_ns, wait.segment_ns))
+    });
+    waits.collect()
 }
 
 fn of_dag(dag: &Dag) -> CommittedDag {

@@ -211,6 +211,18 @@ impl SubtaskCode {
         }
     }
 
+    /// Reports whether its instances may wait.
+    #[must_use]
+    pub fn may_wait(&self) -> bool {
+        self.subtask.turn().is_some()
+    }
+
+    /// Reports whether the instance of a job has begun and not finished: it has a further turn.
+    #[must_use]
+    pub fn goes_on(&self, job: u64) -> bool {
+        self.subtask.turn().is_some_and(|turn| turn.is_of(job))
+    }
+
     /// Takes note, before the next turn, of how the wait has ended in which its instance was.
     pub fn wake(&mut self, has_timed_out: bool) {
         if let Some(turn) = self.subtask.turn() {

@@ -47,14 +47,14 @@ static ORACLE: Menu = Menu {
             responses::command;
         "schedules": "starts, finishes, preemptions, response times and misses", |words| {
             if words.iter().any(|word| word == "--in-kernel") {
-                return in_kernel::command(words);
+                return in_kernel::command(words, schedules::parse);
             }
             run_files(words, &SCHEDULES, schedules::parse, schedules::check, |case| &case.name)
         };
         "synchronizer": "sets that ExactTime and ApproximateTime emit, and what they drop", |words| {
             run_files(words, &SYNCHRONIZER, synchronizer::parse, synchronizer::check, |case| &case.name)
         };
-        "waiting": "bounds of DAGs whose subtasks wait", waiting::command;
+        "waiting": "schedules and bounds of subtasks that wait", waiting::command;
     },
     notes: NOTES,
 };
@@ -117,32 +117,22 @@ fn run_files<Case>(
 ) -> ExitCode {
     table.carry_out(words, |options| {
         let cases = read(options.files(), parse).map_err(Refusal::Usage)?;
-        let failed = failures(&cases, check, name);
+        let mut failed = 0_usize;
+        let mut progress = Progress::new(cases.len() as u64, "cases");
+        for (over, case) in (1..).zip(&cases) {
+            let checked = check(case);
+            progress.show(over);
+            if let Err(difference) = checked {
+                failed += 1;
+                progress.wipe();
+                // The progress line is gone by now, so the difference has its own line.
+                println!("{}: {difference}", name(case));
+            }
+        }
+        progress.wipe();
         println!("{} passed, {failed} failed", cases.len() - failed);
         Ok(ExitCode::from(u8::from(failed > 0)))
     })
-}
-
-/// Checks each case, prints the differences by case, and returns how many have one.
-fn failures<Case>(
-    cases: &[Case],
-    check: impl Fn(&Case) -> Result<(), String>,
-    name: impl Fn(&Case) -> &str,
-) -> usize {
-    let mut failed = 0;
-    let mut progress = Progress::new(cases.len() as u64, "cases");
-    for (over, case) in (1..).zip(cases) {
-        let checked = check(case);
-        progress.show(over);
-        if let Err(difference) = checked {
-            failed += 1;
-            progress.wipe();
-            // The progress line is gone by now, so the difference has its own line.
-            println!("{}: {difference}", name(case));
-        }
-    }
-    progress.wipe();
-    failed
 }
 
 /// Reads the cases of all files, at least one.

@@ -2,10 +2,12 @@
 
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use replay::{Epoch, Scale, build};
-use tool::oracle::schedules::{Case, Deviation, check, compare, parse};
+use tool::oracle::schedules::{Case, Deviation, check, compare, compare_turns, parse};
+use tool::oracle::waiting::{self, WaitingCase};
 use virtual_time::VirtualTime;
 
 const PUBLIC: &str = include_str!("../../../../tests/oracle/schedules.txt");
+const WITH_WAITS: &str = include_str!("../../../../tests/oracle/waiting.txt");
 const CLUSTERS: &str = include_str!("../../../../tests/oracle/clusters.txt");
 
 /// One core, a chain of two, two jobs that overlap.
@@ -34,10 +36,26 @@ fn all_public_schedules_agree() {
     for (text, count) in [(PUBLIC, 40), (CLUSTERS, 30)] {
         let cases = parse(text).expect("the file is well formed");
         assert_eq!(cases.len(), count);
-        for case in &cases {
-            assert_eq!(check(case), Ok(()), "{}", case.name);
-            assert_eq!(built(case, 0, 0), Ok(Deviation::default()), "{}", case.name);
-        }
+        assert_cases_agree(&cases);
+    }
+}
+
+#[test]
+fn all_public_schedules_with_waits_agree() {
+    let blocks = waiting::parse(WITH_WAITS).expect("the file is well formed");
+    let schedules = blocks.into_iter().filter_map(|block| match block {
+        WaitingCase::Schedule(case) => Some(*case),
+        WaitingCase::Bounds(_) => None,
+    });
+    let cases: Vec<Case> = schedules.collect();
+    assert_eq!(cases.len(), 40);
+    assert_cases_agree(&cases);
+}
+
+fn assert_cases_agree(cases: &[Case]) {
+    for case in cases {
+        assert_eq!(check(case), Ok(()), "{}", case.name);
+        assert_eq!(built(case, 0, 0), Ok(Deviation::default()), "{}", case.name);
     }
 }
 
@@ -57,6 +75,7 @@ fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, Str
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("any graph is right");
     let report = machine.run();
     assert_eq!(report.violations(), []);
+    compare_turns(case, report.events.iter().copied(), 1000, tolerance_ns)?;
     compare(case, report.task_set(), report.record(), 1000, tolerance_ns)
 }
 

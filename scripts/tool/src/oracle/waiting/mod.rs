@@ -1,8 +1,8 @@
 //! Reference values of subtasks that wait: schedules and bounds, in one file.
 //!
-//! A file has blocks that begin with `case`, which are schedules, and blocks that begin with
-//! `bounds`; each ends with `end`. [`bounds`] and [`schedules`] state their records and compare
-//! them. In both, the waits of a subtask are on a line of its own:
+//! A file has blocks that begin with `case`, which are [schedules], and blocks that begin with
+//! `bounds`, which [`bounds`] reads; each ends with `end`. In both, the waits of a subtask are on a
+//! line of its own:
 //!
 //! ```text
 //! wait V n C_0 W_1 C_1 ..     subtask V has n >= 1 waits of the limits W between segments of the
@@ -10,22 +10,26 @@
 //! ```
 
 pub mod bounds;
-pub mod schedules;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use replay::lines::{Line, Lines, Malformed, blocks};
+use replay::lines::{Malformed, blocks};
+use replay::parse_block;
 
-use super::{FILES, NOTES, failures, read};
-use crate::options::{Command, Refusal};
+use super::schedules::{self, Case};
+use super::{FILES, NOTES, in_kernel, run_files};
+use crate::options::{Command, Takes, options};
 
 static WAITING: Command = Command {
     invocation: "./scripts/oracle waiting",
-    about: "Compares the bounds of DAGs whose subtasks wait with those of the analysis at \
-            commit. Schedules of such DAGs are read over and not compared.",
+    about: "Compares schedules of subtasks that wait with those of the scheduler in virtual time, \
+            and bounds with those of the analysis at commit.",
     positional: FILES,
-    options: &[],
+    options: options! {
+        /// The schedules alone, on the bare machine; see schedules --in-kernel --help.
+        "in-kernel": Takes::Nothing;
+    },
     notes: NOTES,
 };
 
@@ -33,7 +37,7 @@ static WAITING: Command = Command {
 #[derive(Debug)]
 pub enum WaitingCase {
     /// A schedule.
-    Schedule(schedules::ScheduleCase),
+    Schedule(Box<Case>),
     /// Bounds of a set.
     Bounds(bounds::BoundsCase),
 }
@@ -44,29 +48,46 @@ pub enum WaitingCase {
 ///
 /// [`Malformed`] for the first record that is not as described in the modules.
 pub fn parse(text: &str) -> Result<Vec<WaitingCase>, Malformed> {
-    blocks(text, &["case", "bounds"], parse_block)
+    blocks(text, &["case", "bounds"], |header, lines| {
+        match header.kind {
+            "bounds" => bounds::parse(header, lines).map(WaitingCase::Bounds),
+            _ => parse_block(text, header, lines).map(|case| WaitingCase::Schedule(Box::new(case))),
+        }
+    })
 }
 
-fn parse_block(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<WaitingCase, Malformed> {
-    match header.kind {
-        "bounds" => bounds::parse(header, lines).map(WaitingCase::Bounds),
-        _ => schedules::parse(header, lines).map(WaitingCase::Schedule),
+/// Reads all blocks of a file, and returns the schedules.
+fn parse_schedules(text: &str) -> Result<Vec<Case>, Malformed> {
+    let schedule = |case| match case {
+        WaitingCase::Schedule(case) => Some(*case),
+        WaitingCase::Bounds(_) => None,
+    };
+    Ok(parse(text)?.into_iter().filter_map(schedule).collect())
+}
+
+/// Compares everything that a block states.
+///
+/// # Errors
+///
+/// The first difference, in one line.
+pub fn check(case: &WaitingCase) -> Result<(), String> {
+    match case {
+        WaitingCase::Schedule(case) => schedules::check(case),
+        WaitingCase::Bounds(case) => bounds::check(case),
+    }
+}
+
+fn name(case: &WaitingCase) -> &str {
+    match case {
+        WaitingCase::Schedule(case) => &case.name,
+        WaitingCase::Bounds(case) => &case.name,
     }
 }
 
 /// Runs `oracle waiting`.
 pub(super) fn command(words: &[OsString]) -> ExitCode {
-    WAITING.carry_out(words, |options| {
-        let (mut sets, mut schedules) = (Vec::new(), 0);
-        for case in read(options.files(), parse).map_err(Refusal::Usage)? {
-            match case {
-                WaitingCase::Bounds(case) => sets.push(case),
-                WaitingCase::Schedule(_) => schedules += 1,
-            }
-        }
-        let failed = failures(&sets, bounds::check, |case| &case.name);
-        println!("schedules: {schedules} not checked");
-        println!("bounds: {} passed, {failed} failed", sets.len() - failed);
-        Ok(ExitCode::from(u8::from(failed > 0)))
-    })
+    if words.iter().any(|word| word == "--in-kernel") {
+        return in_kernel::command(words, parse_schedules);
+    }
+    run_files(words, &WAITING, parse, check, name)
 }
