@@ -64,8 +64,11 @@ impl Waits {
     /// W7: takes note of an answer, which ends the wait that it names and no other.
     pub(crate) fn answer(&mut self, named: WaitId) {
         let mut present = self.present.iter_mut();
-        let found = present.find(|of| (of.instance, of.number) == (named.instance, named.number));
-        found.map(|of| of.has_answer = true);
+        let is_it =
+            |of: &&mut PresentWait| (of.instance, of.number) == (named.instance, named.number);
+        if let Some(found) = present.find(is_it) {
+            found.has_answer = true;
+        }
     }
 
     /// Reports whether the rules allow what the scheduler tells of an instance at an instant, at
