@@ -83,7 +83,7 @@ pub fn build(
     let (device, driver) = create_device::<u64, u64>("accelerator");
     let camera = create_dag();
     camera.name("camera").jobs(frames);
-    let mut frame = 0;
+    let mut frame = 0_u64;
     let capture = move || {
         frame += 1;
         execute_for(us(800), Occupation::Hold);
