@@ -31,7 +31,7 @@ pub const LIMIT: Duration = ms(8);
 /// How often the accelerator looks for a question.
 const POLL: Duration = us(500);
 
-/// What the accelerator does.
+/// How the accelerator behaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Conduct {
     /// It answers after a random time, some too late.
@@ -42,7 +42,7 @@ pub enum Conduct {
     Silent,
 }
 
-/// What `detect` awaits.
+/// The wait of `detect`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detection {
     /// The accelerator's answer.

@@ -212,7 +212,7 @@ struct Question<Q> {
     question: Q,
 }
 
-/// What the ends of a device share.
+/// The cell that both ends of a device share.
 struct DeviceCell<Q, A> {
     name: String,
     /// The subtask that asks.

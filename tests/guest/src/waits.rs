@@ -23,7 +23,7 @@ const PERIOD: Duration = Duration::from_millis(20);
 /// For how long the device computes for each question; the second answer comes too late.
 const COMPUTES_MS: [u64; 4] = [2, 7, 0, 3];
 
-/// What has come of the questions.
+/// The outcomes of the questions.
 #[derive(Default)]
 struct Answers {
     right: AtomicU64,

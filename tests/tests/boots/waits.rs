@@ -60,7 +60,7 @@ fn camera(guest: &Guest) -> (Outcome, Run) {
     (outcome, runs.remove(0))
 }
 
-/// What has the core loses it to an instance whose wait ends, by an answer or by its limit.
+/// An instance loses its core to an instance whose wait ends, by an answer or by its limit.
 #[test]
 fn one_core_executes_others_while_an_instance_waits() {
     let guest = Guest::test("waits");

@@ -15,7 +15,7 @@ static COMMAND: Command = Command {
         "cores": Takes::number(1..=64), or "8";
         /// Parallel subtasks.
         "subtasks": Takes::numbers(1..=14);
-        /// What time means.
+        /// The meaning of time.
         "mode": Takes::OneOf(&["kvm", "deterministic", "threads"]);
         /// Keep the log.
         "serial": Takes::File("FILE");
