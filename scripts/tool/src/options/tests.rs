@@ -149,7 +149,7 @@ usage: ./scripts/example [options]
 
       --cores N           Processors of the guest. [1 to 64; default 8]
       --subtasks N,N,...  Parallel subtasks. [1 to 14]
-      --mode WORD         What time means. [kvm | deterministic | threads]
+      --mode WORD         The meaning of time. [kvm | deterministic | threads]
       --serial FILE       Keep the log.
       --only NAME         Only this.
   -q, --quiet             Say less.
