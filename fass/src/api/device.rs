@@ -29,16 +29,20 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use core::task::{Context, Poll};
 use core::time::Duration;
 
+use recording::{Recordable, Schema};
 use sched_dag::lifecycle::WaitId;
 use sched_dag::{Instance, SubtaskId};
 
 use super::dag::Dag;
+use super::record::EDGE;
 use super::uses::{Uses, sealed};
 use crate::platform;
+use crate::run::answers::{AnyAnswers, AnyDevice, RecordedAnswers};
 use crate::run::cell::{SetOnce, SharedCell};
 use crate::run::effect::{Effect, RequestTarget};
+use crate::run::line::ChannelState;
 use crate::run::turn::WaitEnd;
-use crate::run::waiting::WaitStep;
+use crate::run::waiting::{WaitStep, nanoseconds};
 
 /// Makes a device of that name: the end of the subtask that asks it, and the driver's.
 ///
@@ -55,6 +59,8 @@ where
         bell: SetOnce::new(),
         questions: [(); 2].map(|()| SharedCell::new(None)),
         answer: SharedCell::new(None),
+        answers: SetOnce::new(),
+        posted_ns: AtomicU64::new(0),
         count: AtomicU64::new(0),
         staged: AtomicU64::new(0),
         posted: AtomicU64::new(0),
@@ -132,6 +138,8 @@ pub struct PendingAnswer<'a, Q, A> {
     wait: WaitStep,
     /// Its number, 0 before it has one.
     number: u64,
+    /// The answer of the recorded run, if this is a replay.
+    recorded: Option<A>,
 }
 
 /// A device has not answered within the limit of the wait.
@@ -212,6 +220,13 @@ struct Question<Q> {
     question: Q,
 }
 
+/// An answer, with the number of its question and how long it took, if it is recorded.
+struct Answer<A> {
+    number: u64,
+    took_ns: u64,
+    answer: A,
+}
+
 /// The cell that both ends of a device share.
 struct DeviceCell<Q, A> {
     name: String,
@@ -220,7 +235,11 @@ struct DeviceCell<Q, A> {
     /// Rung when a question is there.
     bell: SetOnce<Box<dyn Fn() + Send + Sync>>,
     questions: [SharedCell<Option<Question<Q>>>; 2],
-    answer: SharedCell<Option<(u64, A)>>,
+    answer: SharedCell<Option<Answer<A>>>,
+    /// How the answers are recorded, if they are.
+    answers: SetOnce<Box<dyn AnyAnswers<A>>>,
+    /// When the latest question was posted.
+    posted_ns: AtomicU64,
     /// How many questions have a number.
     count: AtomicU64,
     /// The question to be posted at the end of the turn, or 0.
@@ -249,6 +268,20 @@ impl<Q, A> DeviceCell<Q, A> {
         number
     }
 
+    /// Takes the answer to a question, which has come.
+    fn take_answer(&self, number: u64) -> Answer<A> {
+        let mut place = self.answer.change();
+        let is_its = |answer: &mut Answer<A>| answer.number == number;
+        let answer = place.as_mut().and_then(|place| place.take_if(is_its));
+        match answer {
+            Some(answer) => answer,
+            None => panic!(
+                "the platform has ended the wait for an answer of device `{}`, which has given none",
+                self.name
+            ),
+        }
+    }
+
     /// Decides on a question that waits for its answer, and reports whether it did.
     fn decide(&self, number: u64) -> bool {
         let posted = &self.posted;
@@ -264,12 +297,13 @@ struct QuestionPost<Q, A>(Arc<DeviceCell<Q, A>>);
 impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
     fn happen(&mut self, _: u64, _: &mut dyn FnMut(platform::Request)) {}
 
-    fn wait(&mut self) {
+    fn wait(&mut self, ended_ns: u64) {
         let number = self.0.staged.load(Ordering::Relaxed);
         if number == 0 {
             return;
         }
         self.0.staged.store(0, Ordering::Relaxed);
+        self.0.posted_ns.store(ended_ns, Ordering::Relaxed);
         // Release: the question is in its place.
         self.0.posted.store(number, Ordering::Release);
         if let Some(ring) = self.0.bell.get() {
@@ -283,6 +317,73 @@ impl<Q, A> Device<Q, A> {
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn asking(&self) -> DeviceUse<Q, A> {
         DeviceUse(Self(Arc::clone(&self.0)))
+    }
+}
+
+impl<Q, A: Recordable + Send + Sync + 'static> Device<Q, A> {
+    /// Records the answers, where the platform records: each with how long it took, when the
+    /// instance that got it is complete. A replay takes them, in place of asking: its waits are as
+    /// long as they were.
+    ///
+    /// They are recorded if topics of the DAG are ([`Dag::record`]), too; if one of a source is, the
+    /// answers have to be. Those of a job that take more than 4 KiB together are lost. To be called
+    /// before the commit.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::shared::{Asker, create_device};
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    /// use virtual_time::VirtualTime;
+    ///
+    /// let ms = Duration::from_millis;
+    /// let commit = || {
+    ///     let (sonar, driver) = create_device::<u32, u32>("sonar");
+    ///     sonar.record();
+    ///     let dag = create_dag();
+    ///     dag.name("depth").jobs(3).record::<u32>("ping").record::<u32>("echo");
+    ///     let ping = SubtaskAttributes::named("ping");
+    ///     dag.register_periodic_subtask(|| (7_u32,), ["ping"], ms(20), ping);
+    ///     let listen = |sonar: Asker<u32, u32>, (ping,): (u32,)| async move {
+    ///         (sonar.ask(ping).await.unwrap_or(0),)
+    ///     };
+    ///     let listen = dag.using(sonar.asking()).async_subtask(listen);
+    ///     let named = SubtaskAttributes::named("listen");
+    ///     listen.reads(&["ping"]).writes(&["echo"]).register(named.wait(ms(5)));
+    ///     let show = SubtaskAttributes::named("show");
+    ///     dag.register_sink_subtask(|_: (u32,)| (), ["echo"], ms(20), show);
+    ///     finish_create_dags(&[dag]).unwrap();
+    ///     driver
+    /// };
+    /// let machine = VirtualTime::new();
+    /// let mut depth = 10;
+    /// machine.answers(commit(), move |_ping, job| {
+    ///     depth += 1;
+    ///     Some((ms(4 * job), depth)) // the last one is late
+    /// });
+    /// let recorded = machine.run();
+    /// let recording = machine.recording();
+    ///
+    /// let machine = VirtualTime::new().replay(&recording).unwrap();
+    /// let _driver = commit(); // which is not asked
+    /// let report = machine.run();
+    /// assert_eq!((report.compared, report.divergence), (3, None));
+    /// assert_eq!(report.jobs, recorded.jobs); // at the same times
+    /// ```
+    pub fn record(&self) -> &Self {
+        let answers = RecordedAnswers::new(&EDGE);
+        // Once is enough.
+        let _ = self.0.answers.set(Box::new(answers));
+        self
+    }
+}
+
+impl<Q: Send + Sync, A: Send + Sync> AnyDevice for DeviceCell<Q, A> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn line(&self) -> Option<(Schema, Arc<ChannelState>)> {
+        self.answers.get().map(|answers| answers.line())
     }
 }
 
@@ -300,6 +401,9 @@ impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A
         if !cell.asking.set((Arc::clone(&draft.target), id)) {
             draft.asked_twice.push((subtask, cell.name.clone()));
         }
+        draft
+            .devices
+            .push((subtask, Arc::<DeviceCell<Q, A>>::clone(&cell)));
         let post = QuestionPost(Arc::clone(&cell));
         draft.effects.push((subtask, Box::new(post)));
         Asker(cell)
@@ -328,6 +432,7 @@ impl<Q, A> Asker<Q, A> {
             question: Some(question),
             wait: WaitStep::new(WaitEnd::Limit),
             number: 0,
+            recorded: None,
         }
     }
 }
@@ -344,7 +449,7 @@ impl<Q, A> PendingAnswer<'_, Q, A> {
     /// }
     /// ```
     pub fn within(mut self, limit: Duration) -> Self {
-        self.wait.shorten(limit);
+        self.wait.end(WaitEnd::After(nanoseconds(limit)));
         self
     }
 }
@@ -357,26 +462,42 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
         let this = self.get_mut();
+        let answers = this.cell.answers.get();
+        if let Some(answers) = answers.filter(|answers| answers.replays()) {
+            return this.replay(&**answers, context);
+        }
         let polled = this.wait.poll(context);
-        if let (Some(wait), Some(question)) = (this.wait.id(), this.question.take()) {
+        let Some(wait) = this.wait.id() else {
+            return Poll::Pending;
+        };
+        if let Some(question) = this.question.take() {
             this.number = this.cell.stage(wait, question);
         }
         polled.map(|has_timed_out| {
-            if has_timed_out {
-                return Err(TimedOut);
+            let answer = (!has_timed_out).then(|| this.cell.take_answer(this.number));
+            if let Some(answers) = answers.filter(|answers| answers.is_open()) {
+                let took_ns = answer.as_ref().map_or(0, |answer| answer.took_ns);
+                answers.keep(wait, took_ns, answer.as_ref().map(|answer| &answer.answer));
             }
-            let mut place = this.cell.answer.change();
-            let is_its = |answer: &mut (u64, A)| answer.0 == this.number;
-            let answer = place.as_mut().and_then(|place| place.take_if(is_its));
-            match answer {
-                Some((_, answer)) => Ok(answer),
-                None => panic!(
-                    "the platform has ended the wait for an answer of device `{}`, which has given \
-                     none",
-                    this.cell.name
-                ),
-            }
+            answer.map(|answer| answer.answer).ok_or(TimedOut)
         })
+    }
+}
+
+impl<Q, A> PendingAnswer<'_, Q, A> {
+    /// Waits as long as it took in the recorded run, for the answer that there was.
+    fn replay(
+        &mut self,
+        answers: &dyn AnyAnswers<A>,
+        context: &Context<'_>,
+    ) -> Poll<Result<A, TimedOut>> {
+        let next = self.wait.next_id(context);
+        if let Some((took_ns, Some(answer))) = next.and_then(|wait| answers.recorded(wait)) {
+            self.recorded = Some(answer);
+            self.wait.end(WaitEnd::AtMost(took_ns));
+        }
+        let polled = self.wait.poll(context);
+        polled.map(|_| self.recorded.take().ok_or(TimedOut))
     }
 }
 
@@ -436,17 +557,25 @@ impl<Q, A> DeviceDriver<Q, A> {
         let Some(mut place) = cell.answer.change() else {
             return Err(answer);
         };
-        let older = place.replace((number, answer));
+        let platform = platform::expect_installed();
+        let is_recorded = cell.answers.get().is_some_and(|answers| answers.is_open());
+        let now_ns = if is_recorded { platform.now_ns() } else { 0 };
+        let posted_ns = cell.posted_ns.load(Ordering::Relaxed);
+        let older = place.replace(Answer {
+            number,
+            took_ns: now_ns.saturating_sub(posted_ns),
+            answer,
+        });
         drop(place);
         drop(older);
         if cell.decide(number) {
-            platform::expect_installed().answer(ticket.plan, ticket.wait);
+            platform.answer(ticket.plan, ticket.wait);
             return Ok(());
         }
         // It has been given up just now; nobody else writes to the place.
         let mut place = cell.answer.change();
         let taken = place.as_mut().and_then(|place| place.take());
-        taken.map_or(Ok(()), |(_, answer)| Err(answer))
+        taken.map_or(Ok(()), |taken| Err(taken.answer))
     }
 
     /// Has something done when there is a question: it wakes a thread, or tells the hardware.

@@ -71,6 +71,7 @@ pub(crate) fn tie(
                 order: verified.topological_order(),
                 recorded: of_dag,
                 samples: &samples[id.index()],
+                devices: &draft.devices,
                 states: &draft.states,
             };
             any.open_all(&of_dag, &mut lines)

@@ -315,6 +315,18 @@ pub(crate) fn check_recorded(drafts: &Drafts, faults: &mut Vec<Fault>) {
             );
             add("source_partly_recorded", text);
         }
+        let asks = draft.devices.iter();
+        for (subtask, device) in asks.filter(|(subtask, _)| !is_source(*subtask)) {
+            if device.line().is_none() {
+                let (subtask, device) = (draft.label(*subtask), device.name());
+                let text = format!(
+                    "{subtask} of {dag} asks device `{device}`, whose answers are not recorded, and \
+                     a replay could not give them, though topic `{first}` of a source is; record \
+                     both, or neither"
+                );
+                add("answers_not_recorded", text);
+            }
+        }
         let samples = draft.samples.iter();
         for (subtask, latest, _) in samples.filter(|(subtask, ..)| !is_source(*subtask)) {
             let (subtask, topic) = (draft.label(*subtask), latest.topic());

@@ -26,6 +26,7 @@ use sched_dag::{
     TopicPort, Wait,
 };
 
+use crate::run::answers::AnyDevice;
 use crate::run::effect::{Effect, InstanceRequests, RequestKind, RequestTarget, Wish};
 use crate::run::latest::AnyLatest;
 use crate::run::line::KeptState;
@@ -94,6 +95,8 @@ pub(crate) struct DagDraft {
     pub(crate) replaceable: Vec<usize>,
     /// The subtasks whose functions are async.
     pub(crate) waiting: Vec<usize>,
+    /// The devices that subtasks ask.
+    pub(crate) devices: Vec<(usize, Arc<dyn AnyDevice>)>,
     /// The devices that several subtasks ask: each further one, and the device's name.
     pub(crate) asked_twice: Vec<(usize, String)>,
     /// The states that are made anew after faults, and by what.

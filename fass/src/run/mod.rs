@@ -5,6 +5,7 @@
 //! Nothing in here knows how a DAG is built or verified, and nothing allocates once the
 //! commit has made it.
 
+pub(crate) mod answers;
 #[allow(
     unsafe_code,
     reason = "the cells of job slots, shared values and records, and the waker of turns"

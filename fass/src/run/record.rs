@@ -22,6 +22,7 @@ use recording::{Channel, Recordable, Role, Schema};
 use sched_dag::wcets::graph_hash;
 use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
 
+use super::answers::AnyDevice;
 use super::effect::Effect;
 use super::latest::{AnyLatest, LatestEntry, LatestSlot, Probe, SharedLatest};
 use super::line::{ChannelState, InstanceOutputs, KeptState, LineOf, TopicEdge};
@@ -106,6 +107,13 @@ pub(crate) trait AnyRecorded: AnyLatest {
                 around.push((sample.subtask, looking(line, look)));
             }
         }
+        for (subtask, device) in of.devices {
+            if let Some((schema, line)) = device.line() {
+                let way = (schema, Arc::clone(&line));
+                open(*subtask, Role::Answer, device.name(), way, None);
+                around.push((*subtask, finding(line)));
+            }
+        }
         for (position, of_state) in of.states {
             let state = &spec.states[*position];
             let changes = |subtask: &usize| {
@@ -185,6 +193,8 @@ pub(crate) struct OfDag<'d> {
     pub(crate) order: &'d [SubtaskId],
     pub(crate) recorded: &'d [Rc<dyn AnyRecorded>],
     pub(crate) samples: &'d [SampledValue],
+    /// The devices that its subtasks ask.
+    pub(crate) devices: &'d [(usize, Arc<dyn AnyDevice>)],
     /// Its recorded states, by their positions.
     pub(crate) states: &'d [(usize, Arc<KeptState>)],
 }
@@ -382,13 +392,18 @@ type Around = Box<dyn FnOnce(SubtaskCode) -> SubtaskCode>;
 
 /// Has a subtask look for something before each turn, and the line give away what it has found.
 fn looking(line: Arc<ChannelState>, look: impl Fn(u64) + Send + 'static) -> Around {
-    let found: Box<dyn Effect> = Box::new(InstanceOutputs(line));
+    let found = finding(line);
     let look = move |job| {
         look(job);
         true
     };
-    Box::new(|body| {
-        let mut body = body.before(look);
+    Box::new(|body| found(body.before(look)))
+}
+
+/// Has the line give away what a subtask finds.
+fn finding(line: Arc<ChannelState>) -> Around {
+    let found: Box<dyn Effect> = Box::new(InstanceOutputs(line));
+    Box::new(|mut body| {
         body.add_effects([found]);
         body
     })

@@ -89,6 +89,8 @@ pub(crate) enum WaitEnd {
     Limit,
     /// So many nanoseconds after it has begun.
     After(u64),
+    /// So many, or the stated limit if that is less.
+    AtMost(u64),
     /// So many nanoseconds after the release of the job.
     SinceRelease(u64),
 }
@@ -173,6 +175,7 @@ impl TurnState {
         let (asks, asked_ns, most_ns) = match end {
             WaitEnd::Limit => (AFTER, limit_ns, limit_ns),
             WaitEnd::After(ns) => (AFTER, ns, ns),
+            WaitEnd::AtMost(ns) => (AFTER, ns.min(limit_ns), limit_ns),
             WaitEnd::SinceRelease(ns) => (SINCE_RELEASE, ns, ns.saturating_sub(reached_ns)),
         };
         if most_ns > limit_ns {
@@ -255,7 +258,9 @@ impl Effect for TurnEffects {
                 real.for_each(|effect| effect.happen(completed_ns, ask));
             }
             Some(request) => {
-                self.real.iter_mut().for_each(|effect| effect.wait());
+                self.real
+                    .iter_mut()
+                    .for_each(|effect| effect.wait(completed_ns));
                 ask(request);
             }
         }

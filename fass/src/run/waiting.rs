@@ -35,9 +35,15 @@ impl WaitStep {
         self.begun.map(|(job, count)| (job, count - 1))
     }
 
-    /// Lets it end after that much time at most.
-    pub(crate) fn shorten(&mut self, limit: Duration) {
-        self.end = WaitEnd::After(nanoseconds(limit));
+    /// Lets it end otherwise.
+    pub(crate) fn end(&mut self, end: WaitEnd) {
+        self.end = end;
+    }
+
+    /// Returns the job and the number that it will have, if it has not begun.
+    pub(crate) fn next_id(&self, context: &Context<'_>) -> Option<(u64, u32)> {
+        let turn = turn_of(context.waker()).filter(|_| self.begun.is_none());
+        turn.map(TurnState::latest)
     }
 
     /// Begins it, or returns whether it has ended by its limit.
@@ -129,7 +135,7 @@ pub async fn until(since_release: Duration) {
 }
 
 /// Returns a duration as a number, the last one if it is beyond that.
-fn nanoseconds(duration: Duration) -> u64 {
+pub(crate) fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 

@@ -29,7 +29,7 @@ use fass::Occupation;
 use fass::edge::RecordedValue;
 use fass::edge::{Begin, Replay};
 use fass::log::{Level, LogLine, set_level};
-use fass::platform::{LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
+use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig, SubtaskRunner, set_clock};
 use fass::shared::{DeviceDriver, Wire};
 use recording::Channel;
 use sched_dag::engine::{Alternate, FaultCost};
@@ -97,6 +97,12 @@ enum Arrival {
 /// Looks for a question of a device, and notes the answers to it.
 type Answering = Box<dyn FnMut(&Machine, u64)>;
 
+/// The clock of functions, whose answers are recorded.
+static TOLD: Clock = || {
+    let machine = expect_current();
+    machine.edge.answer_ns(machine.now_ns.get())
+};
+
 /// Makes a machine and makes it this thread's.
 pub(crate) fn make_current() -> Rc<Machine> {
     static IS_OURS: OnceLock<bool> = OnceLock::new();
@@ -104,6 +110,7 @@ pub(crate) fn make_current() -> Rc<Machine> {
         IS_OURS.get_or_init(|| fass::platform::install(&HostPlatform).is_ok()),
         "another platform is installed; virtual time must be the program's only platform"
     );
+    set_clock(&TOLD);
     set_level(Some(Level::Debug));
     let machine = Rc::new(Machine::default());
     CURRENT.set(Rc::downgrade(&machine));
@@ -304,8 +311,7 @@ impl Platform for HostPlatform {
     }
 
     fn now_ns(&self) -> u64 {
-        let machine = expect_current();
-        machine.edge.answer_ns(machine.now_ns.get())
+        expect_current().now_ns.get()
     }
 
     fn execute_for(&self, duration: Duration, _how: Occupation) {
@@ -617,12 +623,14 @@ impl Workload<SubtaskRunner> for Calls {
         machine.now_ns.set(now_ns);
         machine.executed_ns.set(Some(0));
         machine.running.set(Some(instance));
-        machine.edge.start_instance(instance);
+        let is_later = runner.body.goes_on(instance.job);
+        machine.edge.start_turn(instance, is_later);
         let settings = machine.settings.borrow();
         let mut faults = settings.faults.iter();
         let fails = faults.any(|fault| fault.is(instance, &self.task_set));
         let mut result = self.call(runner, fails);
-        machine.edge.finish_instance(instance, now_ns);
+        let goes_on = runner.body.goes_on(instance.job);
+        machine.edge.finish_turn(instance, now_ns, goes_on);
         machine.running.set(None);
         let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
         let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);

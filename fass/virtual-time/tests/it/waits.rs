@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use crate::support::{MS, Seen, commit, every, ms, named, run, taking, work};
-use fass::shared::{Asker, TimedOut, create_device};
+use crate::support::{MS, Seen, commit, every, job_numbers, ms, named, run, taking, work};
+use common::random::Random;
+use fass::shared::{Asker, DeviceDriver, TimedOut, create_device};
 use fass::{
     Dag, OverrunPolicy, Preemption, SubtaskAttributes, WaitFault, create_dag, sleep, until,
 };
@@ -525,4 +526,85 @@ fn segments_take_their_own_wcets_or_less() {
     // A new draw for each segment, and the same again.
     let again = report(virtual_time::Silent::Drawn { seed: 5 });
     assert_eq!(again.events, drawn.events);
+}
+
+/// Commits a camera that asks an accelerator twice in a job, and asks for the time between its
+/// waits; and returns the driver's end. The function fails at an answer of 13.
+fn camera() -> DeviceDriver<u64, u64> {
+    let (device, driver) = create_device::<u64, u64>("accelerator");
+    device.record();
+    let dag = every(20, "camera");
+    dag.jobs(40).record::<u64>("frame").record::<u64>("found");
+    let source = dag.source(job_numbers(1)).writes(&["frame"]);
+    source.register(named("take"));
+    let ask = |device: Asker<u64, u64>, (frame,): (u64,)| async move {
+        let first = device.ask(frame).within(ms(3)).await;
+        let between_ns = fass::now_ns();
+        sleep(Duration::from_micros(frame * 10)).await;
+        let second = device.ask(frame + 1).await;
+        let of = |answer: Result<u64, TimedOut>| answer.unwrap_or(99);
+        assert!(frame != 30 || first != Ok(13), "worn out");
+        (of(first) + 1_000 * of(second) + 1_000_000 * (between_ns + fass::now_ns()),)
+    };
+    let ask = dag.using(device.asking()).async_subtask(ask);
+    let stated = taking("ask", 1).wait(ms(4)).wcet(ms(1));
+    let stated = stated.wait(ms(1)).wcet(ms(1)).wait(ms(4)).wcet(ms(1));
+    let ask = ask.reads(&["frame"]).writes(&["found"]);
+    ask.register(stated);
+    let sink = dag.subtask(|_: (u64,)| ()).reads(&["found"]);
+    sink.register(named("sink"));
+    commit(&[dag]);
+    driver
+}
+
+#[test]
+fn a_replay_computes_the_same_without_the_device_in_the_same_time() {
+    for last in [40, 30] {
+        let machine = VirtualTime::new().contain_panics();
+        let driver = camera();
+        let mut random = Random::new(last);
+        machine.answers(driver, move |question, job| {
+            let number = if job == last {
+                13
+            } else {
+                question + random.within(0..=90)
+            };
+            let after = Duration::from_micros(random.within(0..=6_000));
+            let after = if job == last { ms(1) } else { after };
+            random.chance(90).then_some((after, number))
+        });
+        let recorded = machine.run();
+        assert_eq!(recorded.violations(), []);
+        let recording = machine.recording();
+        let replaying = VirtualTime::new().contain_panics();
+        let machine = replaying.replay(&recording).expect("it is whole");
+        let mut driver = camera();
+        let report = machine.run();
+        assert_eq!(report.violations(), []);
+        assert!(driver.question().is_none());
+        assert_eq!((report.divergence.as_ref(), report.uncompared), (None, 0));
+        assert_eq!(report.compared, last);
+        // The source takes no time now, and what failed is cut by the recording.
+        let of_both = [&recorded, &report].map(|report| {
+            let all = report.dag("camera").subtask("ask").into_iter();
+            let all = all.filter(|of| of.instance.job < last);
+            let times = all.filter_map(|of| Some(of.finish_ns? - of.start_ns?));
+            times.collect::<Vec<_>>()
+        });
+        assert_eq!(of_both[0], of_both[1]);
+        assert_eq!(report.panics.len(), usize::from(last == 30));
+    }
+}
+
+#[test]
+fn an_answer_is_shown_among_what_its_subtask_takes() {
+    let machine = VirtualTime::new();
+    let driver = camera();
+    machine.answers(driver, |question, _| {
+        (question % 2 == 0).then_some((ms(2), 5))
+    });
+    let shown = machine.until("camera", 1).expect("it ends");
+    let shown = shown.to_string();
+    let expected = r"takes `accelerator`: [[0,0,null],[2,2000000,5]]";
+    assert!(shown.contains(expected), "{shown}");
 }

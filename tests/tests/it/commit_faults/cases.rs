@@ -235,6 +235,16 @@ pub(crate) const CASES: &[Case] = &[
         let sleep = || async { (1_u32,) };
         waiting(|dag| dag.async_source(sleep), read)
     }),
+    ("answers_not_recorded", || {
+        let (accelerator, _driver) = create_device::<u32, u32>("accelerator");
+        let dag = dag("lidar: > read > points");
+        dag.record::<u32>("points");
+        let store = dag.using(accelerator.asking());
+        let store = store.subtask(|_: Asker<u32, u32>, (_,): (u32,)| ());
+        let store = store.reads(&["points"]).due(PERIOD);
+        store.register(attributes("store"));
+        vec![dag]
+    }),
     ("too_many_waits", || {
         let read = (0..255).fold(attributes("read"), |read, _| read.wait(PERIOD / 300));
         waiting(|dag| dag.async_source(|| async { (1_u32,) }), read)
