@@ -126,5 +126,6 @@ pub use run::log;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
-pub use run::waiting::{WaitFault, sleep, until};
+pub use run::turn::WaitFault;
+pub use run::waiting::{sleep, until};
 pub use sched_dag::{FaultLimit, OverrunPolicy, Policy, Preemption, SubtaskOrder};

@@ -15,7 +15,7 @@
 //! A subtask that uses one is registered by [`Dag::using`](crate::Dag::using).
 
 pub use crate::api::device::{
-    Ask, Asker, Device, DeviceDriver, DeviceUse, Ticket, TimedOut, create_device,
+    Asker, Device, DeviceDriver, DeviceUse, PendingAnswer, Ticket, TimedOut, create_device,
 };
 pub use crate::api::latest::{Latest, LatestUse, Sample};
 pub use crate::api::lifecycle::{

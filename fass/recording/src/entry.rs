@@ -164,7 +164,7 @@ impl Role {
 /// See [`Writer`](crate::Writer).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry<'v> {
-    /// What.
+    /// The kind of it.
     pub what: EntryKind,
     /// The number of the DAG.
     pub dag: u16,

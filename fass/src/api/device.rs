@@ -37,7 +37,8 @@ use super::uses::{Uses, sealed};
 use crate::platform;
 use crate::run::cell::{SetOnce, SharedCell};
 use crate::run::effect::{Effect, RequestTarget};
-use crate::run::waiting::{WaitEnd, WaitStep};
+use crate::run::turn::WaitEnd;
+use crate::run::waiting::WaitStep;
 
 /// Makes a device of that name: the end of the subtask that asks it, and the driver's.
 ///
@@ -125,7 +126,7 @@ pub struct Asker<Q, A>(Arc<DeviceCell<Q, A>>);
 ///
 /// See [`Device`].
 #[must_use = "the question is sent when this is awaited"]
-pub struct Ask<'a, Q, A> {
+pub struct PendingAnswer<'a, Q, A> {
     cell: &'a DeviceCell<Q, A>,
     question: Option<Q>,
     wait: WaitStep,
@@ -211,7 +212,7 @@ struct Question<Q> {
     question: Q,
 }
 
-/// What the ends of a device share.
+/// The cell that both ends of a device share.
 struct DeviceCell<Q, A> {
     name: String,
     /// The subtask that asks.
@@ -258,9 +259,9 @@ impl<Q, A> DeviceCell<Q, A> {
 
 /// Posts the question that an instance has staged, once its turn has ended in the wait for the
 /// answer.
-struct PostQuestion<Q, A>(Arc<DeviceCell<Q, A>>);
+struct QuestionPost<Q, A>(Arc<DeviceCell<Q, A>>);
 
-impl<Q: Send + Sync, A: Send + Sync> Effect for PostQuestion<Q, A> {
+impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
     fn happen(&mut self, _: u64, _: &mut dyn FnMut(platform::Request)) {}
 
     fn wait(&mut self) {
@@ -299,7 +300,7 @@ impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A
         if !cell.asking.set((Arc::clone(&draft.target), id)) {
             draft.asked_twice.push((subtask, cell.name.clone()));
         }
-        let post = PostQuestion(Arc::clone(&cell));
+        let post = QuestionPost(Arc::clone(&cell));
         draft.effects.push((subtask, Box::new(post)));
         Asker(cell)
     }
@@ -321,8 +322,8 @@ impl<Q, A> Asker<Q, A> {
     /// # Panics
     ///
     /// When polled, with a [`WaitFault`](crate::WaitFault), if the wait is not as stated.
-    pub fn ask(&self, question: Q) -> Ask<'_, Q, A> {
-        Ask {
+    pub fn ask(&self, question: Q) -> PendingAnswer<'_, Q, A> {
+        PendingAnswer {
             cell: &self.0,
             question: Some(question),
             wait: WaitStep::new(WaitEnd::Limit),
@@ -331,7 +332,7 @@ impl<Q, A> Asker<Q, A> {
     }
 }
 
-impl<Q, A> Ask<'_, Q, A> {
+impl<Q, A> PendingAnswer<'_, Q, A> {
     /// Waits for a shorter time than the limit.
     ///
     /// ```
@@ -349,9 +350,9 @@ impl<Q, A> Ask<'_, Q, A> {
 }
 
 /// Nothing in it is pinned.
-impl<Q, A> Unpin for Ask<'_, Q, A> {}
+impl<Q, A> Unpin for PendingAnswer<'_, Q, A> {}
 
-impl<Q, A> Future for Ask<'_, Q, A> {
+impl<Q, A> Future for PendingAnswer<'_, Q, A> {
     type Output = Result<A, TimedOut>;
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
@@ -380,7 +381,7 @@ impl<Q, A> Future for Ask<'_, Q, A> {
 }
 
 /// From now on no answer is taken.
-impl<Q, A> Drop for Ask<'_, Q, A> {
+impl<Q, A> Drop for PendingAnswer<'_, Q, A> {
     fn drop(&mut self) {
         if self.number > 0 {
             let staged = &self.cell.staged;
@@ -467,8 +468,10 @@ shown_as!(Device<Q, A>, |of| of.0.name);
 shown_as!(Asker<Q, A>, |of| of.0.name);
 shown_as!(DeviceDriver<Q, A>, |of| of.cell.name);
 
-impl<Q, A> fmt::Debug for Ask<'_, Q, A> {
+impl<Q, A> fmt::Debug for PendingAnswer<'_, Q, A> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Ask").field(&self.cell.name).finish()
+        f.debug_tuple("PendingAnswer")
+            .field(&self.cell.name)
+            .finish()
     }
 }

@@ -21,5 +21,6 @@ pub(crate) mod replaceable;
 pub(crate) mod subtask;
 pub(crate) mod topic;
 pub(crate) mod tuple;
+pub(crate) mod turn;
 pub(crate) mod waiting;
 pub(crate) mod wire;

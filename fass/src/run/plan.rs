@@ -15,7 +15,7 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
 use super::effect::{Effect, MutedEffect};
 use super::latest::Staleness;
 use super::line::LineOf;
-use super::waiting::{TurnEffects, TurnState};
+use super::turn::{TurnEffects, TurnState};
 
 /// A committed set of DAGs, ready to be scheduled.
 ///

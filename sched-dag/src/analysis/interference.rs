@@ -47,7 +47,7 @@ impl GraphSummary {
     pub(super) fn of(task: &Task, cores: u32) -> Self {
         let (parallelism, mut covers, chains) = parallelism_covers_and_parts(task, cores);
         let mut largest_ns = largest(task.wcets_ns(), cores);
-        if !task.waits().is_empty() {
+        if task.has_waits() {
             covers = parallelism_covers_and_parts(task.oblivious(), cores).1;
             let segments_ns = task.waits().iter().map(|waits| waits.longest_segment_ns);
             largest_ns = largest(&segments_ns.collect::<Vec<u64>>(), cores);

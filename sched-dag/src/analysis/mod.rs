@@ -20,6 +20,7 @@
 //! | `one_core` | response times and demand on one core; subtasks that keep their core | Joseph and Pandya 1986; Baruah 1990 |
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `utilisation` | utilisation tests | Li 2014; Bonifaci 2013 |
+//! | `ranks` | which DAG may delay which | |
 //! | `judge`, `overheads` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
 //! | `fixed_order` | orders that the commit fixes | Graham 1969 |
@@ -72,6 +73,7 @@ mod multi_path;
 mod one_core;
 mod overheads;
 mod pipelined;
+mod ranks;
 mod set;
 mod task;
 mod utilisation;
@@ -221,6 +223,19 @@ texts! {
         InFlightTooFew { in_flight: u32 } =
             "no test bounds its response time by {in_flight} periods, the most jobs that it may \
              have in flight; allow more, or relax the load";
+        /// Subtasks wait, and the longest path with its waits exceeds the deadline or the period.
+        SpanBeyondLimit { span_ns: u64, limit_ns: u64 } =
+            "its longest path with all waits up to their limits takes {:?}, and a job that waits has \
+             {:?} until its deadline or the next release; lower the limits or lengthen both",
+            Duration::from_nanos(*span_ns), Duration::from_nanos(*limit_ns);
+        /// Subtasks wait, and no test bounds the response time by the period.
+        NoBoundByPeriod =
+            "no test bounds its response time by its period, as one must where subtasks wait (it may \
+             still meet its deadline); add cores, raise its priority or lengthen the period";
+        /// Subtasks wait, and jobs of another DAG, which may delay this one, may overlap.
+        OverlapsAmongWaits { dag: DagId } =
+            "jobs of dag {}, which may delay it, may overlap, and no test has that where subtasks \
+             wait; have that DAG finish within its period", dag.0;
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

@@ -365,6 +365,12 @@ impl Task {
         self.length_ns
     }
 
+    /// Reports whether a subtask waits.
+    #[must_use]
+    pub const fn has_waits(&self) -> bool {
+        self.waits.is_some()
+    }
+
     /// Returns the waits by subtask; empty if no subtask waits.
     #[must_use]
     pub fn waits(&self) -> &[SubtaskWaits] {

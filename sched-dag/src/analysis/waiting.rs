@@ -36,7 +36,7 @@
 
 use alloc::vec::Vec;
 
-use super::cover::STEPS;
+use super::cover::{CoverChain, STEPS};
 use super::interference::InterferenceBound;
 use super::multi_path::multi_path;
 use super::one_core::Blocking;
@@ -57,8 +57,8 @@ pub struct AloneBounds {
 /// Bounds the response time of one job alone by each form; `None` without cores.
 #[must_use]
 pub fn alone_forms(task: &Task, cores: u32) -> Option<AloneBounds> {
-    let waiting = |&(free, left): &(u128, u128)| left / free;
-    let reserved = reserving(task, cores);
+    let waiting = |with: &ReservedChains| with.left / with.free;
+    let reserved = reserved(task, cores);
     let bound = |waiting: u128| task.span_ns().checked_add(u64::try_from(waiting).ok()?);
     Some(AloneBounds {
         one_path_ns: bound(reserved.first().map(waiting)?)?,
@@ -114,7 +114,7 @@ fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<Equ
             .rev()
             .zip(by_covers)
             .for_each(|(free, left)| *left += free - 1);
-        lower(&mut shape.left, reserving(task, cores));
+        lower(&mut shape.left, &reserved(task, cores));
         if form != WaitingForm::Best {
             shape.left.truncate(1);
         }
@@ -149,34 +149,47 @@ pub(super) fn beside_span(task: &Task, covers: &[u64], cores: u32) -> Vec<u128> 
         .map(|cover| u128::from(volume_ns - cover))
         .collect();
     // Without waits the others are no better.
-    if !task.waits().is_empty() {
-        lower(&mut left, reserving(task, cores));
+    if task.has_waits() {
+        lower(&mut left, &reserved(task, cores));
     }
     left
 }
 
 /// Lowers what is left to what reserved chains give.
-fn lower(left: &mut Vec<u128>, reserving: Vec<(u128, u128)>) {
-    for (j, (_, own)) in reserving.into_iter().enumerate() {
+fn lower(left: &mut Vec<u128>, reserved: &[ReservedChains]) {
+    for (j, with) in reserved.iter().enumerate() {
         match left.get_mut(j) {
-            Some(least) => *least = own.min(*least),
-            None => left.push(own),
+            Some(least) => *least = with.left.min(*least),
+            None => left.push(with.left),
         }
     }
 }
 
-/// Returns the numbers of cores that 0, 1, .. reserved chains leave free, each with the most of
-/// `volume - c(P or U)` and the excess of `P` over the span on all free cores, over all paths.
-///
-/// The chains are the heaviest, one after the other, of what the path of no chains leaves.
-fn reserving(task: &Task, cores: u32) -> Vec<(u128, u128)> {
+/// The form of some reserved chains: those of the entries before, and one more.
+pub(super) struct ReservedChains {
+    /// The last of the chains; none of them is empty but the first.
+    pub(super) chain: CoverChain,
+    /// The cores that they leave free.
+    free: u128,
+    /// The most of `volume - c(P or U)`, and the excess of `P` over the span on each free core,
+    /// over all paths `P`.
+    left: u128,
+}
+
+/// Returns the forms of 0, 1, .. reserved chains: the heaviest, one after the other, of what the
+/// path of the form without chains leaves.
+pub(super) fn reserved(task: &Task, cores: u32) -> Vec<ReservedChains> {
     let steps = (task.subtask_count() + task.edge_count()).max(1);
     let span = u128::from(task.span_ns());
     // The WCETs of what is in no chain, and of what may be in the next one.
     let mut outside = Vec::from(task.wcets_ns());
     let mut unused = outside.clone();
+    let mut chain = CoverChain::new();
     let mut found = Vec::new();
     for free in (1..=u128::from(cores)).rev().take((STEPS / steps).max(2)) {
+        for &(subtask, _) in chain.iter().filter(|(_, takes)| *takes) {
+            outside[subtask] = 0;
+        }
         let whole_ns = task.oblivious().wcets_ns().iter().map(|&ns| u128::from(ns));
         let weights = whole_ns.zip(&outside);
         let weights = weights.map(|(whole, &own)| free * whole - u128::from(own));
@@ -184,19 +197,18 @@ fn reserving(task: &Task, cores: u32) -> Vec<(u128, u128)> {
         let path = task.longest_complete_path(&weights);
         let left: u128 = outside.iter().map(|&own| u128::from(own)).sum();
         let heaviest: u128 = path.iter().map(|&subtask| weights[subtask]).sum();
+        let left = left + heaviest - free * span;
         if found.is_empty() {
             path.iter().for_each(|&subtask| unused[subtask] = 0);
         }
-        found.push((free, left + heaviest - free * span));
-        let chain = task.longest_complete_path(&unused);
-        if chain.iter().all(|&subtask| unused[subtask] == 0) {
+        found.push(ReservedChains { chain, free, left });
+        // A chain takes what no other has, and passes the rest.
+        let next = task.longest_complete_path(&unused).into_iter();
+        chain = next
+            .map(|subtask| (subtask, core::mem::take(&mut unused[subtask]) > 0))
+            .collect();
+        if chain.iter().all(|(_, takes)| !takes) {
             break;
-        }
-        for subtask in chain {
-            // A chain takes what no other has, and passes the rest.
-            if core::mem::take(&mut unused[subtask]) > 0 {
-                outside[subtask] = 0;
-            }
         }
     }
     found

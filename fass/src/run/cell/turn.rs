@@ -12,7 +12,7 @@
 use core::ptr;
 use core::task::{Context, RawWaker, RawWakerVTable, Waker};
 
-use crate::run::waiting::TurnState;
+use crate::run::turn::TurnState;
 
 /// The functions of our wakers, which are known by this address. A `static` has one.
 static TURN: RawWakerVTable = RawWakerVTable::new(|_| inert(), |_| {}, |_| {}, |_| {});

@@ -123,7 +123,7 @@ pub struct CoreRunner {
     cluster: &'static ClusterState,
     /// The time that an instance may execute for, `u64::MAX` if there is no limit.
     pub(super) budget_ns: u64,
-    /// What was left of that when its instance began to wait.
+    /// The rest of that when its instance began to wait.
     budget_left_ns: u64,
 }
 
