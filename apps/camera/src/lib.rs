@@ -10,7 +10,8 @@
 //! `control` runs on, also on one core. An answer that comes later is refused, and `track` goes on
 //! with what it knows. The accelerator is simulated by a DAG of its own, which looks for a question
 //! each 500 us and answers after a random time of 1 to 12 ms: so the app runs alike on every
-//! platform, and a bound covers whatever the accelerator does. The code here knows no kernel.
+//! platform, and a bound covers whatever the accelerator does. Its answers are recorded, and a
+//! replay takes those. The code here knows no kernel.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -82,7 +83,10 @@ pub fn build(
     let counts = Arc::new(Counts::default());
     let (device, driver) = create_device::<u64, u64>("accelerator");
     let camera = create_dag();
-    camera.name("camera").jobs(frames);
+    device.record();
+    (camera.name("camera").jobs(frames))
+        .record::<u64>("frame")
+        .record::<Option<u64>>("objects");
     let mut frame = 0_u64;
     let capture = move || {
         frame += 1;
