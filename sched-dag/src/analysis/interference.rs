@@ -9,7 +9,7 @@
 
 use alloc::vec::Vec;
 
-use super::cover::parallelism_covers_and_parts;
+use super::cover::{self, parallelism_covers_and_parts};
 use super::one_core::{Blocking, largest};
 use super::task::Task;
 use super::waiting::beside_span;
@@ -48,7 +48,7 @@ impl GraphSummary {
         let (parallelism, mut covers, chains) = parallelism_covers_and_parts(task, cores);
         let mut largest_ns = largest(task.wcets_ns(), cores);
         if task.has_waits() {
-            covers = parallelism_covers_and_parts(task.oblivious(), cores).1;
+            covers = cover::covers(task.oblivious(), covers.len());
             let segments_ns = task.waits().iter().map(|waits| waits.longest_segment_ns);
             largest_ns = largest(&segments_ns.collect::<Vec<u64>>(), cores);
         }
