@@ -135,7 +135,7 @@ pub use scheduler::{
     Scheduler,
 };
 pub use spec::{
-    DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort, Wait,
+    DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort, Wait, Waits,
 };
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
