@@ -211,9 +211,7 @@ impl UnprovenDag {
         };
         let labels = subtasks.into_iter();
         let other = match reason {
-            NotProvenReason::DelayedBy { dag } | NotProvenReason::OverlapsAmongWaits { dag } => {
-                Some(dag)
-            }
+            NotProvenReason::DelayedBy { dag } => Some(dag),
             _ => None,
         };
         Self {
@@ -257,11 +255,6 @@ impl fmt::Display for UnprovenDag {
             (NotProvenReason::DelayedBy { .. }, _, Some(other)) => write!(
                 f,
                 "{other}, which may delay it, is not proven itself; see to that one first"
-            ),
-            (NotProvenReason::OverlapsAmongWaits { .. }, _, Some(other)) => write!(
-                f,
-                "jobs of {other}, which may delay it, may overlap, and no test has that where \
-                 subtasks wait; have that DAG finish within its period"
             ),
             (reason, _, _) => reason.fmt(f),
         }

@@ -61,10 +61,10 @@ texts! {
             "its longest path takes {:?}, and a job has {:?} until its deadline or the next \
              release; shorten the path, or lengthen both",
             Duration::from_nanos(*length_ns), Duration::from_nanos(*within_ns);
-        /// It is heavy, and the cores that are left are too few.
+        /// It is heavy, or waits, and the cores that are left are too few.
         TooHeavy { left: u32 } =
-            "a job is more work than one core does in time, and too few cores are left: {left}; \
-             add cores, or lengthen its deadline and period";
+            "a job needs cores of its own to be in time, and too few are left: {left}; add cores, or \
+             lengthen its deadline and period";
         /// It is light, and no core has room for it, of those that heavy DAGs leave.
         NoRoom { left: u32 } =
             "no core has room for it, of those that heavy DAGs leave: {left}; add cores, or \
@@ -76,7 +76,7 @@ texts! {
 ///
 /// # Errors
 ///
-/// The first DAG that gets no cores: heavy ones in the order of the commit, then light ones,
+/// The first DAG that gets no cores: heavy and waiting ones in the order of the commit, then light ones,
 /// the densest first.
 pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(), NotAssigned> {
     let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);

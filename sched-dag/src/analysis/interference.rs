@@ -35,7 +35,7 @@ pub(super) struct GraphSummary {
     /// work.
     pub(super) covers: Vec<u64>,
     /// The least that is left for `m`, `m - 1`, .. cores beside the span, by any form.
-    pub(super) left: Vec<u128>,
+    pub(super) left: Vec<u64>,
     /// The work of some disjoint chains.
     chains: Vec<u64>,
     /// The longest executions, which may block others where subtasks keep their cores.
@@ -47,10 +47,8 @@ impl GraphSummary {
     pub(super) fn of(task: &Task, cores: u32) -> Self {
         let (parallelism, mut covers, chains) = parallelism_covers_and_parts(task, cores);
         let mut largest_ns = largest(task.wcets_ns(), cores);
-        if task.has_waits() {
-            covers = parallelism_covers_and_parts(task.oblivious(), cores).1;
-            let segments_ns = task.waits().iter().map(|waits| waits.longest_segment_ns);
-            largest_ns = largest(&segments_ns.collect::<Vec<u64>>(), cores);
+        if let Some(analysis) = task.analysis() {
+            (analysis.summarise)(task, cores, &mut covers, &mut largest_ns);
         }
         Self {
             parallelism,

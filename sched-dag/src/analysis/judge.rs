@@ -289,8 +289,9 @@ impl<'a> AnalysisInput<'a> {
             figures.younger_may_win = self.relation.younger_may_win(dag);
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
         }
-        self.set
-            .forbid_overlap(self.relation.closure(&|dag| self.tasks[dag].has_waits()));
+        if let Some(waits) = self.set.waits {
+            (waits.forbid_overlap)(&mut self.set, &self.relation);
+        }
         self.set.known = match (self.settings.cores, self.settings.policy) {
             (1, Policy::StaticPriority) => responses(self),
             _ => {
@@ -330,7 +331,7 @@ impl<'a> AnalysisInput<'a> {
         let applies = self.relation.preemption == PreemptionMix::All
             && !self.relation.ranks_sinks
             && self.set.bursts.are_none()
-            && !tasks.iter().any(|task| task.has_waits());
+            && self.set.waits.is_none();
         if !applies || !constrained(tasks, cores) {
             return None;
         }
@@ -366,18 +367,12 @@ impl<'a> AnalysisInput<'a> {
             BoundFailure::Other(other) => NotProvenReason::DelayedBy {
                 dag: self.id(other),
             },
-            BoundFailure::Overlapping(other) => NotProvenReason::OverlapsAmongWaits {
-                dag: self.id(other),
-            },
+            BoundFailure::Overlapping => NotProvenReason::NoBoundByPeriod,
             BoundFailure::Own(SolverFailure::Limit) => NotProvenReason::Limit,
-            BoundFailure::Own(SolverFailure::BeyondDeadline) if self.set.waits_enter(dag) => {
-                let span_ns = task.span_ns();
-                let limit_ns = self.set.figures[dag].limit_ns();
-                match (span_ns > limit_ns, limit_ns < task.relative_deadline_ns()) {
-                    (true, _) => NotProvenReason::SpanBeyondLimit { span_ns, limit_ns },
-                    (false, true) => NotProvenReason::NoBoundByPeriod,
-                    (false, false) => NotProvenReason::NoBound,
-                }
+            BoundFailure::Own(SolverFailure::BeyondDeadline)
+                if let Some(waits) = self.set.waits.filter(|_| self.set.waits_enter(dag)) =>
+            {
+                (waits.reason)(task, self.set.figures[dag].limit_ns())
             }
             BoundFailure::Own(SolverFailure::BeyondDeadline)
                 // A job may wait for room until its deadline has passed, however fast the others
@@ -533,9 +528,8 @@ pub(super) fn are_in_time(case: &AnalysisInput<'_>) -> bool {
     let fit =
         |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
     let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
-    let waits = || case.tasks.iter().any(|task| task.has_waits());
     applies
-        && !waits()
+        && case.set.waits.is_none()
         && (0..case.tasks.len()).all(fit)
         && demand(&all_dues(case), &case.set.bursts).is_some()
 }

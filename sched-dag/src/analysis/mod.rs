@@ -100,6 +100,7 @@ pub use overheads::{OverheadSource, Overheads};
 pub use set::{multi_path_edf, multi_path_fp};
 pub use task::{SubtaskWaits, Task, TaskError};
 pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
+pub(crate) use waiting::{ANALYSIS, WaitAnalysis};
 pub use waiting::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
 pub use witness::witness;
 
@@ -228,14 +229,11 @@ texts! {
             "its longest path with all waits up to their limits takes {:?}, and a job that waits has \
              {:?} until its deadline or the next release; lower the limits or lengthen both",
             Duration::from_nanos(*span_ns), Duration::from_nanos(*limit_ns);
-        /// Subtasks wait, and no test bounds the response time by the period.
+        /// Subtasks wait, and no test bounds the response time by the period, or that of a DAG
+        /// which may delay this one by its own.
         NoBoundByPeriod =
-            "no test bounds its response time by its period, as one must where subtasks wait (it may \
-             still meet its deadline); add cores, raise its priority or lengthen the period";
-        /// Subtasks wait, and jobs of another DAG, which may delay this one, may overlap.
-        OverlapsAmongWaits { dag: DagId } =
-            "jobs of dag {}, which may delay it, may overlap, and no test has that where subtasks \
-             wait; have that DAG finish within its period", dag.0;
+            "no test bounds its response time, or that of a DAG that may delay it, by the period, \
+             as one must where subtasks wait; add cores, raise its priority or lengthen the period";
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

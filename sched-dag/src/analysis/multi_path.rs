@@ -48,12 +48,12 @@ pub fn multi_path(task: &Task, cores: u32) -> Option<u64> {
 }
 
 /// Bounds the response time of one job alone, by what is left beside its span.
-pub(super) fn alone(task: &Task, left: &[u128], cores: u32, rounding: Rounding) -> Option<u64> {
-    let left = (1..=u128::from(cores)).rev().zip(left);
-    let left = left.map(|(free, &left)| rounding.of(left, free).div_ceil(free));
+pub(super) fn alone(task: &Task, left: &[u64], cores: u32, rounding: Rounding) -> Option<u64> {
+    let left = (1..=u64::from(cores)).rev().zip(left);
+    let left = left.map(|(free, &left)| rounding.divide(left, free));
     // A DAG without subtasks has no chain, and takes no time.
     let waiting = left.min().or((cores > 0).then_some(0))?;
-    task.span_ns().checked_add(u64::try_from(waiting).ok()?)
+    task.span_ns().checked_add(waiting)
 }
 
 /// The terms of one DAG in its equations.
@@ -61,7 +61,7 @@ pub(super) struct MultiPathEquations<'a> {
     pub(super) task: &'a Task,
     /// As in the DAG's [`GraphSummary`](super::interference::GraphSummary).
     pub(super) covers: &'a [u64],
-    pub(super) left: &'a [u128],
+    pub(super) left: &'a [u64],
     pub(super) cores: usize,
     pub(super) clip: InterferenceBound,
     pub(super) rounding: Rounding,
@@ -144,7 +144,7 @@ impl MultiPathEquations<'_> {
             let with_blocking = |own: u128, is_clipped| {
                 own.saturating_add(blocking.during(self.cores, j, is_clipped))
             };
-            let left = || with_blocking(self.left[j], false);
+            let left = || with_blocking(self.left[j].into(), false);
             let first = form(j, false, left_and_blocking.unwrap_or_else(left), plain);
             let cover = self.covers.get(j).filter(|_| has_clipped);
             let clipped = cover.filter(|_| left_and_blocking.is_none()).map(|cover| {

@@ -26,7 +26,7 @@ use super::interference::{DelaySources, GraphSummary, InterferenceBound, Interfe
 use super::multi_path::{MultiPathEquations, alone};
 use super::pipelined::{OWN_STEPS, PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::task::Task;
-use super::waiting::{Rounding, with_blocking};
+use super::waiting::{Rounding, WaitAnalysis};
 use super::workload::{InterferingWorkload, WorkloadBursts};
 
 /// DAGs with what enters their equations.
@@ -43,6 +43,8 @@ pub(super) struct EquationSet<'a> {
     pub(super) clip: InterferenceBound,
     pub(super) bursts: WorkloadBursts,
     pub(super) rounding: Rounding,
+    /// The analysis of waits, if there are any.
+    pub(super) waits: Option<&'static WaitAnalysis>,
     /// By DAG, whether waits enter its equations; empty: of none.
     with_waits: Vec<bool>,
     /// Bounds that are known already, by DAG.
@@ -67,8 +69,8 @@ pub(super) enum BoundFailure {
     Own(SolverFailure),
     /// This DAG may outrank it and has no bound itself.
     Other(usize),
-    /// Jobs of this DAG, which may outrank it, may overlap, and waits enter.
-    Overlapping(usize),
+    /// Jobs of a DAG that may outrank it may overlap, and waits enter.
+    Overlapping,
 }
 
 impl<'a> EquationSet<'a> {
@@ -91,6 +93,7 @@ impl<'a> EquationSet<'a> {
             clip: InterferenceBound::Chains,
             bursts: WorkloadBursts::default(),
             rounding: Rounding::Up,
+            waits: tasks.iter().find_map(|task| task.analysis()),
             with_waits: Vec::new(),
             known: alloc::vec![None; tasks.len()],
         }
@@ -285,7 +288,7 @@ impl<'a> EquationSet<'a> {
                 // Without the other's response its carry-in is unknown, and so is this bound.
                 let response = responses[other].ok_or(BoundFailure::Other(other))?;
                 if self.waits_enter(dag) && response > self.tasks[other].period_ns() {
-                    return Err(BoundFailure::Overlapping(other));
+                    return Err(BoundFailure::Overlapping);
                 }
                 others.push(self.other(other, response, limit_ns));
             }
@@ -295,17 +298,28 @@ impl<'a> EquationSet<'a> {
                 blocking_ns.extend_from_slice(&self.shapes[other].largest_ns);
             }
         }
-        let blocking = (self.shapes[dag].unblocked).by(&blocking_ns, self.cores);
+        Ok(self.delays_by(dag, others, &blocking_ns))
+    }
+
+    /// Returns the sources of delay of a DAG: workloads, and longest segments that may block it.
+    fn delays_by(
+        &self,
+        dag: usize,
+        others: Vec<InterferingDag>,
+        blocking_ns: &[u64],
+    ) -> DelaySources {
+        let blocking = (self.shapes[dag].unblocked).by(blocking_ns, self.cores);
         let (task, rounding) = (self.tasks[dag], self.rounding);
         let is_coupled = task.has_waits() || rounding == Rounding::Down;
-        let left_and_blocking = (is_coupled && !blocking_ns.is_empty())
-            .then(|| with_blocking(task, self.cores, &blocking));
-        Ok(DelaySources {
+        let waits = (self.waits).filter(|_| is_coupled && !blocking_ns.is_empty());
+        let left_and_blocking =
+            waits.map(|waits| (waits.with_blocking)(task, self.cores, &blocking));
+        DelaySources {
             others,
             blocking,
             left_and_blocking,
             bursts: self.bursts.clone(),
-        })
+        }
     }
 
     /// Describes what a DAG with a response-time bound may execute next to another one.

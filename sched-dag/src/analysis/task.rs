@@ -31,6 +31,7 @@ use alloc::vec::Vec;
 use core::cmp::Reverse;
 use core::ops::Add;
 
+use super::waiting::{ANALYSIS, WaitAnalysis};
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::task_set::{Dag, Subtask};
@@ -53,6 +54,7 @@ pub struct Task {
 /// The waits of a task's subtasks, by subtask, and the task with all waits executed.
 #[derive(Clone, Debug)]
 struct TaskWaits {
+    analysis: &'static WaitAnalysis,
     of_subtasks: Box<[SubtaskWaits]>,
     oblivious: Task,
 }
@@ -146,9 +148,7 @@ impl Task {
             let (subtask, wcet_ns) = (SubtaskId(subtask), of.wcet_ns());
             let wcet_ns = wcet_ns.filter(|&wcet_ns| wcet_ns > 0);
             let wcet_ns = wcet_ns.ok_or(TaskError::MissingWcet { subtask })?;
-            // Each segment is dispatched, and so is charged.
-            let charged_ns = overhead_ns.checked_mul(of.waits().len() as u64 + 1);
-            let charged_ns = charged_ns.and_then(|charged_ns| charged_ns.checked_add(wcet_ns));
+            let charged_ns = wcet_ns.checked_add(overhead_ns);
             charged_ns.ok_or(TaskError::VolumeOverflow)
         };
         let wcets_ns = (0..).zip(dag.subtasks()).map(charge);
@@ -159,15 +159,36 @@ impl Task {
             least_deadline_ns: dag.least_deadline_ns(),
             ..task
         };
-        if dag.subtasks().iter().all(|of| of.waits().is_empty()) {
-            return Ok(task);
+        match dag.subtasks().iter().find_map(|of| of.waits.analysis) {
+            Some(analysis) => (analysis.charge)(task, dag, overhead_ns),
+            None => Ok(task),
         }
+    }
+
+    /// Adds the waits of a verified DAG, and `overhead_ns` for each segment but the first.
+    pub(super) fn charge_segments(
+        mut self,
+        dag: &Dag,
+        overhead_ns: u64,
+    ) -> Result<Self, TaskError> {
+        for (wcet_ns, of) in self.wcets_ns.iter_mut().zip(dag.subtasks()) {
+            let charged_ns = overhead_ns.checked_mul(of.waits().len() as u64);
+            let charged_ns = charged_ns.and_then(|charged_ns| charged_ns.checked_add(*wcet_ns));
+            *wcet_ns = charged_ns.ok_or(TaskError::VolumeOverflow)?;
+        }
+        let (period_ns, deadline_ns) = (self.period_ns, self.relative_deadline_ns);
+        let task = Self::assemble(period_ns, deadline_ns, self.wcets_ns.into(), self.graph)?;
         let waits = dag.subtasks().iter().map(|of| SubtaskWaits {
             count: to_u32(of.waits().len()),
             limits_ns: of.waiting_ns(),
             // No longer than the WCET, to which as much is added, if not more.
             longest_segment_ns: of.longest_segment_ns().unwrap_or(0) + overhead_ns,
         });
+        let least_deadline_ns = self.least_deadline_ns;
+        let task = Self {
+            least_deadline_ns,
+            ..task
+        };
         task.with_waits(waits.collect())
     }
 
@@ -196,6 +217,7 @@ impl Task {
         let (period_ns, deadline_ns) = (self.period_ns, self.relative_deadline_ns);
         let oblivious = Self::assemble(period_ns, deadline_ns, whole_ns, self.graph.clone());
         let waits = TaskWaits {
+            analysis: &ANALYSIS,
             of_subtasks: waits.into(),
             oblivious: oblivious.map_err(|_| TaskError::WaitsOverflow)?,
         };
@@ -369,6 +391,11 @@ impl Task {
     #[must_use]
     pub const fn has_waits(&self) -> bool {
         self.waits.is_some()
+    }
+
+    /// Returns the analysis of its waits, if it has any.
+    pub(super) fn analysis(&self) -> Option<&'static WaitAnalysis> {
+        Some(self.waits.as_ref()?.analysis)
     }
 
     /// Returns the waits by subtask; empty if no subtask waits.

@@ -36,12 +36,61 @@
 
 use alloc::vec::Vec;
 
-use super::cover::{CoverChain, STEPS};
+use super::NotProvenReason;
+use super::cover::{CoverChain, STEPS, covers};
 use super::interference::InterferenceBound;
 use super::multi_path::multi_path;
-use super::one_core::Blocking;
+use super::one_core::{Blocking, largest};
+use super::ranks::RankRelation;
 use super::set::EquationSet;
-use super::task::{SubtaskWaits, Task};
+use super::task::{SubtaskWaits, Task, TaskError};
+use crate::task_set::Dag;
+
+/// The parts of the analysis that only DAGs that wait ask for, as functions that waits bring with
+/// them: no other program links them.
+#[derive(Debug)]
+pub(crate) struct WaitAnalysis {
+    /// Adds the waits of a verified DAG, and overheads for each segment but the first.
+    pub(super) charge: fn(Task, &Dag, u64) -> Result<Task, TaskError>,
+    /// Replaces covers and largest executions by those of a task that waits.
+    pub(super) summarise: fn(&Task, u32, &mut Vec<u64>, &mut Vec<u64>),
+    /// Lowers what is left beside the span to what reserved chains give.
+    pub(super) reserve: fn(&mut Vec<u64>, &Task, u32),
+    /// Returns what is left on all cores beside the span of a job that is blocked.
+    pub(super) with_blocking: fn(&Task, u32, &Blocking) -> u128,
+    /// Accepts no overlapping jobs of DAGs that waits enter.
+    pub(super) forbid_overlap: fn(&mut EquationSet<'_>, &RankRelation),
+    /// Says why a DAG that waits enter has no bound within a limit.
+    pub(super) reason: fn(&Task, u64) -> NotProvenReason,
+}
+
+/// The analysis of waits.
+pub(crate) static ANALYSIS: WaitAnalysis = WaitAnalysis {
+    charge: Task::charge_segments,
+    summarise,
+    reserve: |left, task, cores| lower(left, &reserved(task, cores)),
+    with_blocking,
+    forbid_overlap: |set, relation| {
+        let tasks = set.tasks;
+        set.forbid_overlap(relation.closure(&|dag| tasks[dag].has_waits()));
+    },
+    reason,
+};
+
+fn summarise(task: &Task, cores: u32, covered: &mut Vec<u64>, largest_ns: &mut Vec<u64>) {
+    *covered = covers(task.oblivious(), covered.len());
+    let segments_ns = task.waits().iter().map(|waits| waits.longest_segment_ns);
+    *largest_ns = largest(&segments_ns.collect::<Vec<u64>>(), cores);
+}
+
+fn reason(task: &Task, limit_ns: u64) -> NotProvenReason {
+    let span_ns = task.span_ns();
+    match (span_ns > limit_ns, limit_ns < task.relative_deadline_ns()) {
+        (true, _) => NotProvenReason::SpanBeyondLimit { span_ns, limit_ns },
+        (false, true) => NotProvenReason::NoBoundByPeriod,
+        (false, false) => NotProvenReason::NoBound,
+    }
+}
 
 /// The bounds of one job alone by each form, in whole units of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,7 +149,7 @@ pub fn waiting_edf(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec
 
 fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<EquationSet<'a>> {
     let mut set = (cores > 0).then(|| EquationSet::new(tasks, cores))?;
-    set.rounding = Rounding::Down;
+    (set.rounding, set.waits) = (Rounding::Down, Some(&ANALYSIS));
     set.keep_cores = form == WaitingForm::NonPreemptive;
     set.clip = match form {
         WaitingForm::Best => InterferenceBound::Waiting,
@@ -110,10 +159,10 @@ fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<Equ
         figures.allow_in_flight(1);
         // Only covers round up, so that they count as less than a core more.
         let by_covers = shape.left.iter_mut();
-        (1..=u128::from(cores))
+        (1..=u64::from(cores))
             .rev()
             .zip(by_covers)
-            .for_each(|(free, left)| *left += free - 1);
+            .for_each(|(free, left)| *left = left.saturating_add(free - 1));
         lower(&mut shape.left, &reserved(task, cores));
         if form != WaitingForm::Best {
             shape.left.truncate(1);
@@ -139,28 +188,37 @@ impl Rounding {
             Self::Down => sum.saturating_sub(cores - 1),
         }
     }
+
+    /// Divides what so many cores are to execute.
+    pub(super) const fn divide(self, left: u64, cores: u64) -> u64 {
+        match self {
+            Self::Up => left.div_ceil(cores),
+            Self::Down => left / cores,
+        }
+    }
 }
 
 /// Returns what is left of a job for `m`, `m - 1`, .. cores while its path is ready and does not
 /// execute, by the best form for each; the covers are those of the oblivious task.
-pub(super) fn beside_span(task: &Task, covers: &[u64], cores: u32) -> Vec<u128> {
+pub(super) fn beside_span(task: &Task, covers: &[u64], cores: u32) -> Vec<u64> {
     let volume_ns = task.oblivious().volume_ns();
-    let mut left: Vec<u128> = (covers.iter())
-        .map(|cover| u128::from(volume_ns - cover))
-        .collect();
+    let mut left: Vec<u64> = covers.iter().map(|cover| volume_ns - cover).collect();
     // Without waits the others are no better.
-    if task.has_waits() {
-        lower(&mut left, &reserved(task, cores));
+    if let Some(analysis) = task.analysis() {
+        (analysis.reserve)(&mut left, task, cores);
     }
     left
 }
 
 /// Lowers what is left to what reserved chains give.
-fn lower(left: &mut Vec<u128>, reserved: &[ReservedChains]) {
+fn lower(left: &mut Vec<u64>, reserved: &[ReservedChains]) {
     for (j, with) in reserved.iter().enumerate() {
-        match left.get_mut(j) {
-            Some(least) => *least = with.left.min(*least),
-            None => left.push(with.left),
+        // A form whose numbers are too large is of no use, nor are those of more chains after it.
+        match (u64::try_from(with.left), left.get_mut(j)) {
+            (Ok(own), Some(least)) => *least = own.min(*least),
+            (Ok(own), None) => left.push(own),
+            (Err(_), Some(_)) => {}
+            (Err(_), None) => return,
         }
     }
 }
@@ -216,7 +274,7 @@ pub(super) fn reserved(task: &Task, cores: u32) -> Vec<ReservedChains> {
 
 /// Returns what is left of a job on all cores beside its span, if its path is blocked where its
 /// segments become eligible.
-pub(super) fn with_blocking(task: &Task, cores: u32, blocking: &Blocking) -> u128 {
+fn with_blocking(task: &Task, cores: u32, blocking: &Blocking) -> u128 {
     let count = cores as usize;
     let (all, but_one) = (blocking.sum(count), blocking.sum(count - 1));
     let cores = u128::from(cores);

@@ -310,7 +310,7 @@ impl WitnessText {
         let chains = equations.cores + 1 - usize::try_from(cores).unwrap_or(0);
         let by_cover = equations.covers.get(chains - 1).map(|cover| {
             let left = task.oblivious().volume_ns() - cover;
-            u128::from(if form.is_clipped { left.max(1) } else { left })
+            if form.is_clipped { left.max(1) } else { left }
         });
         let own = equations.left[chains - 1];
         match (delays.left_and_blocking, by_cover) {

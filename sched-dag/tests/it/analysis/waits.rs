@@ -110,8 +110,7 @@ fn each_dag_without_a_bound_has_its_reason() {
     let chain = spec(10, 30, &[6, 6, 6], &[(0, 1), (1, 2)], 0);
     let below = waiting(spec(100, 100, &[2], &[], 1), 0, 20, 1);
     let (why, answer) = reason(&[chain, below], FP, 4);
-    let overlaps = NotProvenReason::OverlapsAmongWaits { dag: DagId(0) };
-    assert_eq!((why, bounds(&answer)[0]), (Some(overlaps), Some(21)));
+    assert_eq!((why, bounds(&answer)[0]), (by_period, Some(21)));
 }
 
 #[test]

@@ -300,10 +300,7 @@ fn every_reason_against_a_proof_is_listed() {
                 limit_ns: 4,
             },
             NotProvenReason::SpanBeyondLimit { .. } => NotProvenReason::NoBoundByPeriod,
-            NotProvenReason::NoBoundByPeriod => {
-                NotProvenReason::OverlapsAmongWaits { dag: DagId(1) }
-            }
-            NotProvenReason::OverlapsAmongWaits { .. } => NotProvenReason::Limit,
+            NotProvenReason::NoBoundByPeriod => NotProvenReason::Limit,
             NotProvenReason::Limit => NotProvenReason::NoCores,
             NotProvenReason::NoCores => NotProvenReason::Unknown(TaskError::VolumeOverflow),
             NotProvenReason::Unknown(TaskError::VolumeOverflow) => {
