@@ -164,16 +164,15 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
 }
 
 fn waits(task_set: &TaskSet) -> Vec<(u32, u32, u64, Option<u64>)> {
-    let dags = (0..).zip(task_set.dags());
-    let subtasks = dags.flat_map(|(dag, of)| {
-        let numbered = (0..).zip(of.subtasks());
-        numbered.map(move |(subtask, of)| (dag, subtask, of))
-    });
-    let waits = subtasks.flat_map(|(dag, subtask, of)| {
-        let waits = of.waits().iter();
-        waits.map(move |wait| (dag, subtask, wait.limit_ns, wait.segment_ns))
-    });
-    waits.collect()
+    let mut all = Vec::new();
+    for (dag, of_dag) in (0..).zip(task_set.dags()) {
+        for (subtask, of_subtask) in (0..).zip(of_dag.subtasks()) {
+            for wait in of_subtask.waits() {
+                all.push((dag, subtask, wait.limit_ns, wait.segment_ns));
+            }
+        }
+    }
+    all
 }
 
 fn of_dag(dag: &Dag) -> CommittedDag {

@@ -82,6 +82,8 @@ impl WaitTable {
 
 impl Scheduler {
     /// Begins the wait of an instance that has started (W1), which ends at `limit_ns` at the latest.
+    #[cold]
+    #[inline(never)]
     pub(super) fn begin_wait(&mut self, instance: Instance, limit_ns: u64) {
         let number = self.take_off(instance, "waits");
         let vertex = self.vertices.get_mut(number);
