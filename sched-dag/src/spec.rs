@@ -6,7 +6,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::TypeId;
-use core::ops::{Deref, RangeInclusive};
+use core::ops::{Deref, DerefMut, RangeInclusive};
 
 use crate::analysis::{ANALYSIS, WaitAnalysis};
 use crate::ids::ClusterId;
@@ -154,6 +154,21 @@ impl Deref for Waits {
         &self.list
     }
 }
+
+impl DerefMut for Waits {
+    fn deref_mut(&mut self) -> &mut [Wait] {
+        &mut self.list
+    }
+}
+
+/// By the waits alone: there is one analysis.
+impl PartialEq for Waits {
+    fn eq(&self, other: &Self) -> bool {
+        self.list == other.list
+    }
+}
+
+impl Eq for Waits {}
 
 impl FromIterator<Wait> for Waits {
     fn from_iter<I: IntoIterator<Item = Wait>>(waits: I) -> Self {

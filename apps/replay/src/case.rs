@@ -295,10 +295,12 @@ fn parse_waits(
         return Err(line.malformed(format!("subtask {subtask} has its waits already")));
     }
     // WCETs play no part in a schedule.
-    waits.extend(pairs.iter().map(|&[limit_ns, _]| Wait {
-        limit_ns,
-        segment_ns: None,
-    }));
+    *waits = (pairs.iter())
+        .map(|&[limit_ns, _]| Wait {
+            limit_ns,
+            segment_ns: None,
+        })
+        .collect();
     for (job, &execution_ns) in (0..).zip(&executions_ns[subtask]) {
         let line = lines.expect("act")?;
         let numbers: Vec<u64> = line.numbers(2 * pairs.len() + 3)?;

@@ -243,10 +243,10 @@ fn the_law_finds_waits_beyond_their_limit_and_those_that_are_not_stated() {
     let spec = support::dag(20, 20, 1, &[0], &[]).with(|dag| {
         let segment_ns = None;
         dag.subtasks[0].non_preemptive = true;
-        dag.subtasks[0].waits = vec![Wait {
+        dag.subtasks[0].waits.push(Wait {
             limit_ns,
             segment_ns,
-        }];
+        });
     });
     let task_set = commit(&[spec], PREEMPTIVE);
     let found = |rest: &str| {

@@ -4,7 +4,7 @@ use common::random::Random;
 use sched_dag::lifecycle::WaitId;
 use sched_dag::{
     Activation, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
-    Priority, SchedulerOptions, SubtaskSpec, Wait,
+    Priority, SchedulerOptions, SubtaskSpec, Wait, Waits,
 };
 
 use super::shuffled_edges;
@@ -97,7 +97,7 @@ pub(crate) fn draw_tiny(random: &mut Random) -> Set {
             // Of every third one the first subtask waits, once.
             if random.once_in(3) {
                 let limit_ns = random.within(0..=1);
-                set.specs[0].subtasks[0].waits = vec![wait(limit_ns)];
+                set.specs[0].subtasks[0].waits.push(wait(limit_ns));
             }
             return set;
         }
@@ -214,7 +214,7 @@ impl Set {
     /// Returns it with subtasks that do not wait.
     pub(crate) fn without_waits(mut self) -> Self {
         let subtasks = self.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
-        subtasks.for_each(|subtask| subtask.waits.clear());
+        subtasks.for_each(|subtask| subtask.waits = Waits::default());
         self
     }
 
