@@ -28,7 +28,7 @@ use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 pub struct Event {
     /// When, in nanoseconds from the run's epoch.
     pub time_ns: u64,
-    /// What.
+    /// The kind of it.
     pub what: EventKind,
     /// The core that it happened on, or that made the scheduler's step; of a
     /// [`Request`](EventKind::Request) the core that shall switch.

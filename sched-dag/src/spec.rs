@@ -6,8 +6,9 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::TypeId;
-use core::ops::RangeInclusive;
+use core::ops::{Deref, DerefMut, RangeInclusive};
 
+use crate::analysis::{ANALYSIS, WaitAnalysis};
 use crate::ids::ClusterId;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
 
@@ -92,7 +93,7 @@ pub struct SubtaskSpec {
     /// The worst-case execution time, if known: the sum over its segments, if it waits.
     pub wcet_ns: Option<u64>,
     /// Its waits, in order: between n waits it has n + 1 segments.
-    pub waits: Vec<Wait>,
+    pub waits: Waits,
     /// The margin that it has over the longest call observed, in hundredths of that;
     /// `None`: it is stated.
     pub wcet_margin_percent: Option<u32>,
@@ -125,6 +126,56 @@ pub struct Wait {
     /// The worst-case execution time of the segment that follows, if known: a part of
     /// [`SubtaskSpec::wcet_ns`].
     pub segment_ns: Option<u64>,
+}
+
+/// The waits of a subtask, in order.
+///
+/// They bring the analysis of waits with them, so that a program whose subtasks never wait does not
+/// link it.
+#[derive(Clone, Debug, Default)]
+pub struct Waits {
+    pub(crate) list: Vec<Wait>,
+    /// `None` while there are none.
+    pub(crate) analysis: Option<&'static WaitAnalysis>,
+}
+
+impl Waits {
+    /// Adds a wait, and the segment that follows it.
+    pub fn push(&mut self, wait: Wait) {
+        self.list.push(wait);
+        self.analysis = Some(&ANALYSIS);
+    }
+}
+
+impl Deref for Waits {
+    type Target = [Wait];
+
+    fn deref(&self) -> &[Wait] {
+        &self.list
+    }
+}
+
+impl DerefMut for Waits {
+    fn deref_mut(&mut self) -> &mut [Wait] {
+        &mut self.list
+    }
+}
+
+/// By the waits alone: there is one analysis.
+impl PartialEq for Waits {
+    fn eq(&self, other: &Self) -> bool {
+        self.list == other.list
+    }
+}
+
+impl Eq for Waits {}
+
+impl FromIterator<Wait> for Waits {
+    fn from_iter<I: IntoIterator<Item = Wait>>(waits: I) -> Self {
+        let mut all = Self::default();
+        waits.into_iter().for_each(|wait| all.push(wait));
+        all
+    }
 }
 
 /// One end of a topic at a subtask: a typed, named edge bundle.

@@ -24,7 +24,7 @@ use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
-use crate::spec::Wait;
+use crate::spec::{Wait, Waits};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -80,7 +80,7 @@ pub struct StatePrecedence {
 pub struct Subtask {
     pub(crate) name: String,
     pub(crate) wcet_ns: Option<u64>,
-    pub(crate) waits: Box<[Wait]>,
+    pub(crate) waits: Waits,
     pub(crate) wcet_source: WcetSource,
     pub(crate) budget_ns: Option<u64>,
     pub(crate) stack_bytes: Option<u64>,
@@ -342,7 +342,7 @@ impl Subtask {
     /// Returns its waits, in order.
     #[must_use]
     pub const fn waits(&self) -> &[Wait] {
-        &self.waits
+        self.waits.list.as_slice()
     }
 
     /// Returns the sum of its waits' limits.

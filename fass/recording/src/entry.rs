@@ -168,7 +168,7 @@ impl Role {
 /// See [`Writer`](crate::Writer).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry<'v> {
-    /// What.
+    /// The kind of it.
     pub what: EntryKind,
     /// The number of the DAG.
     pub dag: u16,
@@ -277,6 +277,9 @@ crate::recordable! {
         pub ready_ns: u64,
         /// The DAGs, in the order of their numbers.
         pub dags: Vec<CommittedDag>,
+        /// The waits, those of a subtask in their order: DAG and subtask, the limit, and the WCET
+        /// of the segment that follows, if it is stated.
+        pub waits: Vec<(u32, u32, u64, Option<u64>)>,
     }
 
     /// A DAG of a [`Commit`].

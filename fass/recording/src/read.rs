@@ -205,7 +205,14 @@ impl<'b> Chunk<'b> {
                 let text = core::str::from_utf8(payload).map_err(|_| malformed);
                 text.map(Chunk::Text)
             }
-            COMMIT => Commit::from_bytes(payload).map(Chunk::Commit),
+            COMMIT => {
+                // In version 5 it ends before the waits: there are 0.
+                let without_waits = || [payload, &[0; 4]].concat();
+                let commit = Commit::from_bytes(payload);
+                let commit =
+                    commit.or_else(|wrong| Commit::from_bytes(&without_waits()).map_err(|_| wrong));
+                commit.map(Chunk::Commit)
+            }
             EVENTS => Events::read(payload).map(Chunk::Events),
             TIMES => Times::from_bytes(payload).map(Chunk::Times),
             END | CUT => return Ok(None),

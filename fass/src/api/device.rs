@@ -227,7 +227,7 @@ struct Answer<A> {
     answer: A,
 }
 
-/// What the ends of a device share.
+/// The cell that both ends of a device share.
 struct DeviceCell<Q, A> {
     name: String,
     /// The subtask that asks.

@@ -235,7 +235,7 @@ impl DagWiring {
                 .map(|latest| (latest.topic().into(), latest.stages()))
                 .collect(),
             waits: (spec.subtasks.iter())
-                .map(|subtask| subtask.waits.clone())
+                .map(|subtask| subtask.waits.to_vec())
                 .collect(),
         }
     }

@@ -245,7 +245,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     fn end_turn<C: PlatformPort<B>>(
         &mut self,
         (core, vertex): (CoreId, Vertex),
-        mut body: B,
+        body: B,
         finish_ns: u64,
         port: &mut C,
     ) -> TurnEnd {
@@ -253,12 +253,23 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let limit_ns = self.take_wait(vertex, finish_ns);
         match limit_ns {
             None => self.placement.finish(core.index(), vertex, body),
-            Some(_) => {
-                port.wait(core, &mut body, finish_ns);
-                self.placement.wait(core.index(), vertex, body);
-            }
+            Some(_) => self.put_to_wait((core, vertex), body, finish_ns, port),
         }
         TurnEnd { instance, limit_ns }
+    }
+
+    /// Takes back the body of an instance that waits. Apart, as most sets have none.
+    #[cold]
+    #[inline(never)]
+    fn put_to_wait(
+        &mut self,
+        (core, vertex): (CoreId, Vertex),
+        mut body: B,
+        ended_ns: u64,
+        port: &mut impl PlatformPort<B>,
+    ) {
+        port.wait(core, &mut body, ended_ns);
+        self.placement.wait(core.index(), vertex, body);
     }
 
     /// Takes note that a turn of an instance has ended that no core has any more; it ran last on
@@ -270,15 +281,12 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         (finish_ns, now_ns): (u64, u64),
         port: &mut impl PlatformPort<B>,
     ) {
-        let mut body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
+        let body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         let instance = self.scheduler.instance_of(vertex);
         let limit_ns = self.take_wait(vertex, finish_ns);
         match limit_ns {
             None => self.placement.finish_parked(vertex, body),
-            Some(_) => {
-                port.wait(core, &mut body, finish_ns);
-                self.placement.wait(core.index(), vertex, body);
-            }
+            Some(_) => self.put_to_wait((core, vertex), body, finish_ns, port),
         }
         let turn = TurnEnd { instance, limit_ns };
         // By the whole step: its core runs something else by now, so it passes on to nobody.

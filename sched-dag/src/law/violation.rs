@@ -172,7 +172,7 @@ worded! {
             "never_missed", (JobCompletion, At(*end_ns)),
             "{} is not missed although its deadline {deadline_ns} ns has passed",
             names.job(*dag, *job);
-        /// W2: a wait ended later than its limit lets it.
+        /// W1: a wait ended later than its limit lets it.
         WaitBeyondLimit { event: Event, since_ns: u64, limit_ns: u64 } =
             "wait_beyond_limit", (Waiting, By(event)),
             ", which began at {since_ns} ns and has a limit of {limit_ns} ns";

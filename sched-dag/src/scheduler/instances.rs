@@ -130,7 +130,10 @@ impl Scheduler {
     /// A vertex is in it at most once at a time: its next instance can only be
     /// ready when this one has been taken out. So each round of the loop ends
     /// another instance in flight.
-    #[inline]
+    ///
+    /// There is one copy of it, as jobs are cut rarely.
+    #[cold]
+    #[inline(never)]
     pub(super) fn end_all(&mut self) {
         // A stack in memory of its own, not recursion: a chain may be 100,000 subtasks long.
         while let Some(vertex) = self.ending.pop() {

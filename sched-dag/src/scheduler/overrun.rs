@@ -136,6 +136,7 @@ impl Scheduler {
 
     #[inline]
     fn make_room(&mut self, dag: DagId) {
+        self.time_out_due();
         let state = &mut self.dags[dag.index()];
         // All in flight are cut already, so room is on its way: aborting more would cost jobs and
         // bring nothing.

@@ -82,6 +82,8 @@ impl WaitTable {
 
 impl Scheduler {
     /// Begins the wait of an instance that has started (W1), which ends at `limit_ns` at the latest.
+    #[cold]
+    #[inline(never)]
     pub(super) fn begin_wait(&mut self, instance: Instance, limit_ns: u64) {
         let number = self.take_off(instance, "waits");
         let vertex = self.vertices.get_mut(number);
@@ -125,6 +127,16 @@ impl Scheduler {
     #[inline(never)]
     pub(super) fn time_out(&mut self, timer: usize) {
         self.end_wait(timer - self.dags.len(), true);
+    }
+
+    /// Ends all waits whose limit has come, before a release of this instant cuts a job (W4).
+    pub(super) fn time_out_due(&mut self) {
+        for place in 0..self.waits.len() {
+            let limit_ns = self.timers.key_of(self.dags.len() + place);
+            if limit_ns.is_some_and(|limit_ns| limit_ns <= self.log.now_ns) {
+                self.end_wait(place, true);
+            }
+        }
     }
 
     /// Makes a waiting instance eligible again (W2).
@@ -171,10 +183,13 @@ impl Scheduler {
     #[must_use]
     pub fn latest_wait(&self, vertex: Vertex) -> (WaitId, bool) {
         let latest = self.waits.latest[self.waits.place(vertex.0)];
-        let wait = WaitId {
-            instance: self.instance_of(vertex),
-            number: latest.number,
+        // Where a cut job does not wait (W6), the subtask may have the next job's instance by now.
+        let instance = Instance {
+            job: latest.job,
+            ..self.instance_of(vertex)
         };
+        let number = latest.number;
+        let wait = WaitId { instance, number };
         (wait, latest.has_timed_out)
     }
 }

@@ -139,7 +139,11 @@ fn check_times(page: &mut DagFindings<'_, '_>) {
     let mut wcets_ns = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
     let volume = wcets_ns.try_fold(0_u64, u64::checked_add);
     let volume = volume.is_none().then_some(OverflowingTime::Volume);
-    let waits = || spec.subtasks.iter().flat_map(|subtask| &subtask.waits);
+    let waits = || {
+        spec.subtasks
+            .iter()
+            .flat_map(|subtask| subtask.waits.iter())
+    };
     let mut limits_ns = waits().map(|wait| wait.limit_ns);
     let waiting = limits_ns.try_fold(0_u64, u64::checked_add);
     let waiting = waiting.is_none().then_some(OverflowingTime::Waits);

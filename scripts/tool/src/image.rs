@@ -25,7 +25,7 @@ use crate::system;
 pub fn most_stripped_bytes(app: &str) -> u64 {
     // `hand-off` and `join-latency` measure: their workloads and baselines are in the image.
     match app {
-        "dag-file" | "drone" | "hand-off" | "join-latency" | "replay" => 576 << 10,
+        "camera" | "dag-file" | "drone" | "hand-off" | "join-latency" | "replay" => 576 << 10,
         "autoware" | "cruise" | "gait" => 640 << 10,
         _ => 512 << 10,
     }

@@ -28,3 +28,4 @@ mod scenarios;
 mod seeing;
 mod stacks;
 mod topics;
+mod waits;

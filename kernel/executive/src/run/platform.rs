@@ -8,6 +8,7 @@ use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
 use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig};
 use sched_dag::DagId;
+use sched_dag::lifecycle::WaitId;
 
 use super::{edge, execution, occupation, record, stacks};
 use crate::machine::spinlock::SpinLock;
@@ -86,6 +87,10 @@ impl Platform for Kernel {
 
     fn raise(&self, plan: u64, dag: DagId) {
         execution::raise(plan, dag);
+    }
+
+    fn answer(&self, plan: u64, wait: WaitId) {
+        execution::answer(plan, wait);
     }
 
     fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {

@@ -8,7 +8,7 @@
 //! The run goes on: it may be no more than a long computation.
 //!
 //! Between two looks nothing is counted, so this costs a run nothing. It also sees
-//! less: an instance that was preempted in between counts as if it had not been.
+//! less: an instance that was preempted in between, or has waited, counts as if it had not.
 //!
 //! # Cores that watch each other: a core that takes no interrupts is noticed
 //!

@@ -2,8 +2,9 @@
 //!
 //! Here happens what a driver in virtual time does not meet: several dispatches at one time, a
 //! driver that comes late, ends of instances that have lost their core meanwhile, ends of several in
-//! any order, faults, ends, pauses and closings at any time. The journal is judged by the law
-//! ([`Walk::judged`]); what that does not judge, by [`Releases`] after each instant.
+//! any order, faults, ends, pauses and closings at any time, answers to waits, in time or not. The
+//! journal is judged by the law ([`Walk::judged`]); what that does not judge, by [`Releases`] and,
+//! of waits, by [`Waits`], after each instant.
 //!
 //! Each end that is the last thing of an instant is told by [`Scheduler::pass_on`], and the long way
 //! by a copy, too: both have to come to the same.
@@ -16,15 +17,19 @@ use sched_dag::law::{
     JobRecord, JudgeOptions, RunRecord, Violation, dispatch_violations, violations,
 };
 use sched_dag::lifecycle::Request;
-use sched_dag::{CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler};
+use sched_dag::{
+    CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler, TurnEnd,
+};
 
 use super::releases::{Releases, SAID};
+use super::waits::Waits;
 use crate::support::set::Set;
 use crate::support::{pass_on, scheduler};
 
 /// A step at an instant before its releases.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Step {
+    /// It ends a turn: it waits, as often as its subtask states, and then completes.
     Complete(Instance),
     Fail(Instance),
     /// It fails, and another function is there.
@@ -45,6 +50,7 @@ pub(crate) struct Walk<'s> {
     /// The idle cores; the last one has to be taken first.
     idle: Vec<CoreId>,
     releases: Vec<Releases>,
+    pub(crate) waits: Waits,
     /// Whether it has come later than it should, or an end after a core was lost.
     is_late: bool,
 }
@@ -53,7 +59,7 @@ impl<'s> Walk<'s> {
     pub(crate) fn new(set: &'s Set) -> Self {
         let mut scheduler = scheduler(&set.specs(), set.options);
         scheduler.log.journal = Journal::growing();
-        scheduler.hear(SAID);
+        scheduler.hear(SAID.into_iter().chain([EventKind::Cancelled]));
         let cores = set.options.cores;
         Self {
             set,
@@ -63,6 +69,7 @@ impl<'s> Walk<'s> {
             preempted: Vec::new(),
             idle: (0..cores).rev().map(CoreId).collect(),
             releases: set.specs.iter().map(Releases::new).collect(),
+            waits: Waits::default(),
             is_late: false,
         }
     }
@@ -94,6 +101,7 @@ impl<'s> Walk<'s> {
         let mut hasher = DefaultHasher::new();
         self.scheduler.hash(&mut hasher);
         (&self.releases, &self.cores, &self.preempted).hash(&mut hasher);
+        self.waits.hash(&mut hasher);
         hasher.finish()
     }
 
@@ -105,16 +113,16 @@ impl<'s> Walk<'s> {
         let mut decisions = None;
         for (number, &step) in (1..).zip(steps) {
             match step {
-                Step::Complete(instance) if number == steps.len() => {
+                Step::Complete(instance) if number == steps.len() && !self.waits_next(instance) => {
                     decisions = Some(self.pass_on(instance)?);
                 }
                 step => self.take(step),
             }
-            self.hear()?;
+            self.hear(decisions.is_some())?;
         }
         let end = |scheduler: &mut Scheduler| scheduler.at(now_ns).dispatch().to_vec();
         let decisions = decisions.unwrap_or_else(|| end(&mut self.scheduler));
-        self.hear()?;
+        self.hear(true)?;
         self.carry_out(&decisions)?;
         for (core, running) in (0..).map(CoreId).zip(&self.cores) {
             if self.scheduler.running(core) != *running {
@@ -126,6 +134,10 @@ impl<'s> Walk<'s> {
             if suspended > dag.most_suspended() {
                 return Err(format!("{suspended} instances of {id:?} are suspended"));
             }
+        }
+        let is_cut = |it: Instance| self.releases[it.dag.index()].is_cut(it.job);
+        if let Some(instance) = self.waits.overdue(now_ns, is_cut) {
+            return Err(format!("{instance:?} still waits"));
         }
         let next_ns = self.scheduler.next_event_ns();
         if next_ns.is_some_and(|next_ns| next_ns <= now_ns) {
@@ -154,6 +166,11 @@ impl<'s> Walk<'s> {
                     Request::Close(dag) => (dag, EventKind::Closed),
                     Request::End(dag) => (dag, EventKind::DagEnded),
                     Request::Signal(dag) => (dag, EventKind::Signalled),
+                    Request::Answer(wait) => {
+                        self.waits.answer(wait);
+                        self.scheduler.at(self.now_ns).serve(request);
+                        return;
+                    }
                     _ => unreachable!("it is not asked of a scheduler"),
                 };
                 releases[dag.index()].ask(answer);
@@ -162,13 +179,22 @@ impl<'s> Walk<'s> {
         if let Step::Complete(instance) | Step::Fail(instance) | Step::Replace(instance) = step {
             self.scheduler.log.here = self.leave(instance);
         }
+        let limit_ns = match step {
+            Step::Complete(instance) => self.waits.begin(self.set, instance, self.now_ns),
+            _ => None,
+        };
         let mut moment = self.scheduler.at(self.now_ns);
         match step {
-            Step::Complete(instance) => moment.complete(instance),
+            Step::Complete(instance) => moment.end_turn(TurnEnd { instance, limit_ns }),
             Step::Fail(instance) => moment.fail(instance),
             Step::Replace(instance) => moment.fail_replaceable(instance),
             Step::Ask(request) => moment.serve(request),
         }
+    }
+
+    /// Reports whether the instance's turn ends in a wait.
+    fn waits_next(&self, instance: Instance) -> bool {
+        self.waits.next_limit_ns(self.set, instance).is_some()
     }
 
     /// Takes an instance from its core, or from what has lost its core. Returns the core.
@@ -208,14 +234,23 @@ impl<'s> Walk<'s> {
         }
     }
 
-    /// Hands what the scheduler tells to the judges of releases.
-    fn hear(&mut self) -> Result<(), String> {
+    /// Hands what the scheduler tells to the judges of releases and of waits; `is_end`: the instant
+    /// ends.
+    fn hear(&mut self, is_end: bool) -> Result<(), String> {
         let mut notices = Vec::new();
         self.scheduler.log.exchange_notices(&mut notices);
         for notice in &notices {
             let dag = notice.event.dag.index();
-            let spec = &self.set.specs[dag];
-            if !self.releases[dag].takes(spec, notice, self.now_ns) {
+            let is_right = match notice.event.instance() {
+                Some(instance) if notice.event.what != EventKind::Restarted => {
+                    let is_cut = self.releases[dag].is_cut(instance.job);
+                    let now_ns = (self.now_ns, is_end);
+                    self.waits
+                        .takes(notice.event.what, instance, now_ns, is_cut)
+                }
+                _ => self.releases[dag].takes(&self.set.specs[dag], notice, self.now_ns),
+            };
+            if !is_right {
                 return Err(format!("no rule allows {notice:?}"));
             }
         }
@@ -240,6 +275,10 @@ impl<'s> Walk<'s> {
                     match self.preempted.iter().position(|it| *it == instance) {
                         Some(at) => {
                             self.preempted.remove(at);
+                            let is_resumed = decision.what == EventKind::Resume;
+                            (EventKind::Resume, is_free && is_resumed)
+                        }
+                        None if self.waits.go_on(instance) => {
                             let is_resumed = decision.what == EventKind::Resume;
                             (EventKind::Resume, is_free && is_resumed)
                         }
@@ -321,9 +360,11 @@ fn is_of_lateness(violation: &Violation) -> bool {
     match violation {
         Violation::Unpunctual { .. }
         | Violation::StillQueued { .. }
-        | Violation::MissedLate { .. } => true,
+        | Violation::MissedLate { .. }
+        | Violation::WaitBeyondLimit { .. } => true,
         Violation::OutOfTurn { event, stage } => {
-            event.what == EventKind::Finish && *stage == DispatchState::Suspended
+            matches!(event.what, EventKind::Finish | EventKind::Wait)
+                && *stage == DispatchState::Suspended
         }
         _ => false,
     }

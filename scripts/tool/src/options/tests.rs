@@ -15,7 +15,7 @@ static COMMAND: Command = Command {
         "cores": Takes::number(1..=64), or "8";
         /// Parallel subtasks.
         "subtasks": Takes::numbers(1..=14);
-        /// What time means.
+        /// The meaning of time.
         "mode": Takes::OneOf(&["kvm", "deterministic", "threads"]);
         /// Keep the log.
         "serial": Takes::File("FILE");
@@ -149,7 +149,7 @@ usage: ./scripts/example [options]
 
       --cores N           Processors of the guest. [1 to 64; default 8]
       --subtasks N,N,...  Parallel subtasks. [1 to 14]
-      --mode WORD         What time means. [kvm | deterministic | threads]
+      --mode WORD         The meaning of time. [kvm | deterministic | threads]
       --serial FILE       Keep the log.
       --only NAME         Only this.
   -q, --quiet             Say less.

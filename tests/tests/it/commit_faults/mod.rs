@@ -295,9 +295,17 @@ fn every_reason_against_a_proof_is_listed() {
             NotProvenReason::Overload => NotProvenReason::DelayedBy { dag: DagId(1) },
             NotProvenReason::DelayedBy { .. } => NotProvenReason::NoBound,
             NotProvenReason::NoBound => NotProvenReason::InFlightTooFew { in_flight: 2 },
-            NotProvenReason::InFlightTooFew { .. } => NotProvenReason::Limit,
+            NotProvenReason::InFlightTooFew { .. } => NotProvenReason::SpanBeyondLimit {
+                span_ns: 5,
+                limit_ns: 4,
+            },
+            NotProvenReason::SpanBeyondLimit { .. } => NotProvenReason::NoBoundByPeriod,
+            NotProvenReason::NoBoundByPeriod => NotProvenReason::Limit,
             NotProvenReason::Limit => NotProvenReason::NoCores,
             NotProvenReason::NoCores => NotProvenReason::Unknown(TaskError::VolumeOverflow),
+            NotProvenReason::Unknown(TaskError::VolumeOverflow) => {
+                NotProvenReason::Unknown(TaskError::WaitsOverflow)
+            }
             NotProvenReason::Unknown(_) => return None,
         })
     };

@@ -19,6 +19,7 @@ use core::sync::atomic::Ordering;
 use fass::platform::{Plan, Request};
 use sched_dag::engine::{Engine, NextAction};
 use sched_dag::journal::{EventKind, EventSubject};
+use sched_dag::lifecycle::WaitId;
 use sched_dag::placement::NextWork;
 use sched_dag::{CoreId, DagId, Instance, Moment};
 
@@ -27,7 +28,7 @@ use super::letters::Letters;
 use super::loans::RunnerLoan;
 use super::port::{SmpPort, here, instance_time_ns, seat, since_epoch};
 use super::status::{self, note_running};
-use super::{ClusterRun, CoreWork, EPOCH_NS};
+use super::{ClusterRun, CoreWork, EPOCH_NS, divided};
 use crate::machine::abandoned::AbandonedContext;
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
@@ -388,5 +389,16 @@ pub fn raise(plan: u64, dag: DagId) {
 /// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
 /// are disabled.
 pub fn raise_in_interrupt(plan: u64, dag: DagId) {
-    status::serve(Some(plan), dag, Request::Signal(dag));
+    status::serve(Some(plan), divided::of_dag(dag), Request::Signal(dag));
+}
+
+/// Takes the answer to a wait of the plan with a number, from wherever it comes: an instance, an
+/// interrupt's handler, or the background. One for another cluster is a letter.
+pub fn answer(plan: u64, wait: WaitId) {
+    let were_enabled = interrupt_flag::disable();
+    let cluster = cluster::cluster_of(this_core::get());
+    status::serve(Some(plan), cluster, Request::Answer(wait));
+    if were_enabled {
+        interrupt_flag::enable();
+    }
 }
