@@ -170,6 +170,15 @@ impl PartialEq for Waits {
 
 impl Eq for Waits {}
 
+impl<'a> IntoIterator for &'a Waits {
+    type Item = &'a Wait;
+    type IntoIter = core::slice::Iter<'a, Wait>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.list.iter()
+    }
+}
+
 impl FromIterator<Wait> for Waits {
     fn from_iter<I: IntoIterator<Item = Wait>>(waits: I) -> Self {
         let mut all = Self::default();

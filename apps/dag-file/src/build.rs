@@ -104,7 +104,7 @@ fn build_dag(
                 wcet_ns: subtask.wcet_ns.unwrap_or(0),
                 samples_ns: more.samples_ns.clone(),
                 seed,
-                waits: subtask.waits.clone(),
+                waits: subtask.waits.to_vec(),
             };
             register(&dag, times, settings.occupation, attributes)
         })

@@ -20,7 +20,7 @@ const LATE_NS: u64 = 3;
 pub(crate) fn explore(set: &Set) -> Result<usize, String> {
     let of_dag = |dag: &sched_dag::DagSpec| {
         let last = dag.jobs? - 1;
-        let waits = dag.subtasks.iter().flat_map(|subtask| &*subtask.waits);
+        let waits = dag.subtasks.iter().flat_map(|subtask| &subtask.waits);
         let waits_ns: u64 = waits.map(|wait| wait.limit_ns).sum();
         let most_ns = dag.relative_deadline_ns?.max(1 + waits_ns * (last + 1));
         Some(dag.offset_ns + dag.period_ns? * last + most_ns + 1)
