@@ -49,8 +49,9 @@ pub fn multi_path(task: &Task, cores: u32) -> Option<u64> {
 
 /// Bounds the response time of one job alone, by what is left beside its span.
 pub(super) fn alone(task: &Task, left: &[u64], cores: u32, rounding: Rounding) -> Option<u64> {
-    let left = (1..=u64::from(cores)).rev().zip(left);
-    let left = left.map(|(free, &left)| rounding.divide(left, free));
+    let cores = u64::from(cores);
+    let left = (0..cores).zip(left);
+    let left = left.map(|(j, &left)| rounding.divide(left, cores - j));
     // A DAG without subtasks has no chain, and takes no time.
     let waiting = left.min().or((cores > 0).then_some(0))?;
     task.span_ns().checked_add(waiting)
