@@ -380,13 +380,25 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             let start_ns = port.start(core, body);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
         } else if let NextWork::Proceed(vertex, body) = &mut next {
-            let (_, has_timed_out) = self.scheduler.latest_wait(*vertex);
-            body.wake(has_timed_out);
-            let subject = body.subject();
-            let resume_ns = port.proceed(core, body);
-            (self.scheduler.log.journal).write(core, EventKind::Resume, resume_ns, subject);
+            self.proceed((core, *vertex), body, port);
         }
         next
+    }
+
+    /// Has a core go on with an instance that has waited. Apart, as most sets have none.
+    #[cold]
+    #[inline(never)]
+    fn proceed(
+        &mut self,
+        (core, vertex): (CoreId, Vertex),
+        body: &mut B,
+        port: &mut impl PlatformPort<B>,
+    ) {
+        let (_, has_timed_out) = self.scheduler.latest_wait(vertex);
+        body.wake(has_timed_out);
+        let subject = body.subject();
+        let resume_ns = port.proceed(core, body);
+        (self.scheduler.log.journal).write(core, EventKind::Resume, resume_ns, subject);
     }
 
     /// Takes a core's instance away, if it has one, and returns the core that has been waiting for

@@ -98,6 +98,21 @@ fn answers_come_from_other_cores_and_from_other_clusters() {
     assert_told(&of_camera(&run), &expected.replacen(at_once, preempted, 1));
 }
 
+/// The instructions that a wait and its wake add to an instance which has the machine for itself,
+/// the function's own included; and for one that takes time, how late it goes on.
+#[test]
+fn a_wait_costs_two_steps_of_the_scheduler() {
+    let outcome = Guest::test("waits_cost").succeed();
+    let lines = outcome.lines("waits_cost");
+    assert_eq!(lines.len(), 2);
+    for (line, word) in lines.iter().zip(["at_once", "later"]) {
+        line.reads([("wait", word)]);
+        line.has([("allocations", 0)]);
+        let instructions = line.number("instructions");
+        assert!((1..=1_600).contains(&instructions), "{}", line.text);
+    }
+}
+
 /// Whatever a busy host does to their times.
 #[test]
 fn each_wait_is_taken_in_real_time() {
