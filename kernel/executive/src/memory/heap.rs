@@ -14,10 +14,11 @@ use core::alloc::{GlobalAlloc, Layout};
 use core::ops::Range;
 use core::ptr::NonNull;
 
+use front::report::HeapUsage;
+
 use super::tlsf::Tlsf;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core;
-use front::report::HeapUsage;
 
 static HEAP: SpinLock<Tlsf> = SpinLock::new(Tlsf::new());
 

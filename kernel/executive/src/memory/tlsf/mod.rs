@@ -61,11 +61,12 @@ mod tests;
 use core::alloc::Layout;
 use core::ptr::NonNull;
 
+use front::report::HeapUsage;
+
 use block::{
     Block, FIRST_LEVEL, FreeLinks, GRANULE, HEADER_SIZE, MIN_BLOCK_SIZE, SECOND_LEVEL, SIZE_LIMIT,
     SizeClass, block_size_for,
 };
-use front::report::HeapUsage;
 
 /// An allocator over any number of memory regions.
 #[derive(Debug)]
@@ -228,7 +229,8 @@ impl Tlsf {
         true
     }
 
-    /// Tells how much memory is in use.
+    /// Tells how much memory is in use, in bytes of whole blocks, 16-byte headers and rounding
+    /// included: so `capacity_bytes - in_use_bytes` is what the free blocks hold.
     #[must_use]
     pub(crate) const fn usage(&self) -> HeapUsage {
         self.usage
