@@ -77,6 +77,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use crate::ids::{ClusterId, DagId, Instance, ModeId, SubtaskId};
 use crate::order::sorted;
 use crate::scheduler::Moment;
+use crate::spec::WAITS;
 use crate::task_set::TaskSet;
 
 pub use crate::request::{ModeEntry, Request, WaitId};
@@ -566,7 +567,7 @@ impl Mailboxes {
                 let place = &self.clusters[to.index()].mode;
                 place.store(packed(mode, entry), Ordering::Release);
             }
-            Request::Answer(wait) => {
+            Request::Answer(wait) if WAITS => {
                 let answers = &of(wait.instance.dag).answers;
                 let place = answers.iter().find(|of| of.0 == wait.instance.subtask);
                 // Of two, the older one comes too late: its instance waits for the other by now.
@@ -577,6 +578,7 @@ impl Mailboxes {
             | Request::GoOn
             | Request::Wait(_)
             | Request::WaitUntil(_)
+            | Request::Answer(_)
             | Request::Step => {}
         }
         sent(to);
@@ -602,7 +604,7 @@ impl Mailboxes {
                 END => take(Request::End(dag)),
                 _ => {}
             }
-            for (subtask, answer) in &to.answers {
+            for (subtask, answer) in to.answers.iter().filter(|_| WAITS) {
                 let word = answer.swap(0, Ordering::Acquire);
                 let wait = wait_of(dag, *subtask, word);
                 wait.into_iter()

@@ -13,7 +13,7 @@
 //! | `task`, `graph` | length, volume, bottom levels | |
 //! | `cover` | the most work of disjoint chains, and the width, by a flow | Ahuja 1993; Dilworth |
 //! | `multi_path` | one job of a DAG at a time, alone or among others | derived here |
-//! | `waiting` | the same of subtasks that wait | derived here |
+//! | `waiting`, `whole_units` | the same of subtasks that wait | derived here |
 //! | `intra_task` | one DAG alone, by its subtasks' priorities | He 2019 |
 //! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
 //! | `set` | the equations of all DAGs, solved exactly | |
@@ -78,6 +78,7 @@ mod set;
 mod task;
 mod utilisation;
 mod waiting;
+mod whole_units;
 mod witness;
 mod workload;
 
@@ -100,8 +101,7 @@ pub use overheads::{OverheadSource, Overheads};
 pub use set::{multi_path_edf, multi_path_fp};
 pub use task::{SubtaskWaits, Task, TaskError};
 pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
-pub(crate) use waiting::{ANALYSIS, WaitAnalysis};
-pub use waiting::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
+pub use whole_units::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
 pub use witness::witness;
 
 /// Under what conditions the DAGs will run.

@@ -33,6 +33,7 @@ use crate::kept::Journal;
 use crate::lifecycle::{Mailboxes, PendingRequests, Request};
 use crate::placement::{NextWork, Placement};
 use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd};
+use crate::spec::WAITS;
 use crate::task_set::{Dag, TaskSet};
 
 pub use crate::engine::run::{ProvenBounds, Run, RunCounts};
@@ -296,7 +297,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     /// Takes the request of a turn that has ended in a wait, and returns the limit of that.
     fn take_wait(&mut self, vertex: Vertex, now_ns: u64) -> Option<u64> {
         let release_ns = || self.scheduler.release_ns(vertex);
-        self.requests.take_wait(now_ns, release_ns)
+        WAITS
+            .then(|| self.requests.take_wait(now_ns, release_ns))
+            .flatten()
     }
 
     /// Returns the cost of a fault of the vertex' instance if it comes now.
@@ -379,7 +382,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             // The port reads the clock as late as it can, right before the function is called.
             let start_ns = port.start(core, body);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
-        } else if let NextWork::Proceed(vertex, body) = &mut next {
+        } else if WAITS && let NextWork::Proceed(vertex, body) = &mut next {
             self.proceed((core, *vertex), body, port);
         }
         next
@@ -433,7 +436,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
                 && let Some(instance) = notice.event.instance()
             {
                 let vertex = self.task_set.vertex(instance);
-                self.placement.cancel_wait(vertex);
+                if WAITS {
+                    self.placement.cancel_wait(vertex);
+                }
                 self.undiscarded.push((vertex, instance.job));
             }
         }

@@ -11,6 +11,7 @@ use super::vertices::{InstancePhase, Vertex, VertexTable};
 use super::{DagPhase, EventLog, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
+use crate::spec::WAITS;
 
 impl Scheduler {
     /// Ends an instance that has started.
@@ -104,7 +105,7 @@ impl Scheduler {
                 // Ended below, not here: an end makes further instances ready, which the loop must
                 // not meet half-way.
                 self.ending.push(number);
-            } else if vertex.phase == InstancePhase::Waiting && is_meant {
+            } else if WAITS && vertex.phase == InstancePhase::Waiting && is_meant {
                 self.cancel_wait(number);
             }
         }

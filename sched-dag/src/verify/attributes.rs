@@ -221,6 +221,7 @@ fn check_segments(page: &mut DagFindings<'_, '_>, index: usize) {
             subtask,
             count,
         });
+        return;
     }
     let given = stated.waits.iter().filter_map(|wait| wait.segment_ns);
     let (count, later_ns) = (

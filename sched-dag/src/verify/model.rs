@@ -97,7 +97,7 @@ fn build_dag(
         .map(|(index, subtask)| Subtask {
             name: subtask.name.clone(),
             wcet_ns: subtask.wcet_ns,
-            waits: subtask.waits.clone(),
+            waits: subtask.waits.as_slice().into(),
             wcet_source: match (subtask.wcet_ns, subtask.wcet_margin_percent) {
                 (None, _) => WcetSource::None,
                 (_, None) => WcetSource::Stated,

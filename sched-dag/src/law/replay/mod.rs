@@ -37,7 +37,7 @@ use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind};
 use crate::policy::OnFault;
-use crate::spec::Wait;
+use crate::spec::{WAITS, Wait};
 use crate::task_set::TaskSet;
 use jobs::JobState;
 
@@ -403,7 +403,7 @@ impl JournalReplay<'_> {
         let ready_ns = life.ready.map(|ready| ready.time_ns);
         let out_of_turn = life.note(event, moment);
         let stated = task_set.dag(instance.dag).subtask(instance.subtask).waits();
-        let waited = life.wait(event, stated, terms);
+        let waited = WAITS.then(|| life.wait(event, stated, terms)).flatten();
         self.found.extend(out_of_turn);
         self.found.extend(waited.filter(|_| !is_partial));
         let event = *event;
