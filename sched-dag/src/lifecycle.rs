@@ -506,7 +506,7 @@ pub fn divide(
                 answers: (0..)
                     .map(SubtaskId)
                     .zip(dag.subtasks())
-                    .filter(|(_, subtask)| !subtask.waits().is_empty())
+                    .filter(|(_, subtask)| WAITS && !subtask.waits().is_empty())
                     .map(|(id, _)| (id, AtomicU64::new(0)))
                     .collect(),
             })

@@ -224,7 +224,7 @@ impl SubtaskCode {
 
     /// Returns the state of its turns, if it may wait.
     fn turn(&self) -> Option<&Arc<TurnState>> {
-        self.subtask.turn().filter(|_| WAITS)
+        WAITS.then(|| self.subtask.turn()).flatten()
     }
 
     /// Reports whether its instances may wait.

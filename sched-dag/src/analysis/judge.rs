@@ -289,7 +289,7 @@ impl<'a> AnalysisInput<'a> {
             figures.younger_may_win = self.relation.younger_may_win(dag);
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
         }
-        if self.set.has_waits {
+        if self.set.has_waits() {
             let tasks = self.tasks;
             let with_waits = self.relation.closure(&|dag| tasks[dag].has_waits());
             self.set.forbid_overlap(with_waits);
@@ -333,7 +333,7 @@ impl<'a> AnalysisInput<'a> {
         let applies = self.relation.preemption == PreemptionMix::All
             && !self.relation.ranks_sinks
             && self.set.bursts.are_none()
-            && !self.set.has_waits;
+            && !self.set.has_waits();
         if !applies || !constrained(tasks, cores) {
             return None;
         }
@@ -534,7 +534,7 @@ pub(super) fn are_in_time(case: &AnalysisInput<'_>) -> bool {
         |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
     let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
     applies
-        && !case.set.has_waits
+        && !case.set.has_waits()
         && (0..case.tasks.len()).all(fit)
         && demand(&all_dues(case), &case.set.bursts).is_some()
 }

@@ -44,8 +44,8 @@ pub(super) struct EquationSet<'a> {
     pub(super) clip: InterferenceBound,
     pub(super) bursts: WorkloadBursts,
     pub(super) rounding: Rounding,
-    /// Whether subtasks wait.
-    pub(super) has_waits: bool,
+    /// Whether the forms are those of subtasks that wait; see [`Self::has_waits`].
+    pub(super) is_of_waits: bool,
     /// By DAG, whether waits enter its equations; empty: of none.
     with_waits: Vec<bool>,
     /// Bounds that are known already, by DAG.
@@ -94,10 +94,15 @@ impl<'a> EquationSet<'a> {
             clip: InterferenceBound::Chains,
             bursts: WorkloadBursts::default(),
             rounding: Rounding::Up,
-            has_waits: tasks.iter().any(|task| task.has_waits()),
+            is_of_waits: tasks.iter().any(|task| task.has_waits()),
             with_waits: Vec::new(),
             known: alloc::vec![None; tasks.len()],
         }
+    }
+
+    /// Reports whether subtasks wait.
+    pub(super) const fn has_waits(&self) -> bool {
+        WAITS && self.is_of_waits
     }
 
     /// Accepts no response time beyond a period of those DAGs that waits enter: the forms with
@@ -111,9 +116,7 @@ impl<'a> EquationSet<'a> {
 
     /// Reports whether a DAG's subtasks wait, or those of a DAG that may delay it.
     pub(super) fn waits_enter(&self, dag: usize) -> bool {
-        self.with_waits
-            .get(dag)
-            .is_some_and(|with_waits| *with_waits)
+        self.has_waits() && self.with_waits[dag]
     }
 
     /// Solves the equations, visiting the DAGs in `order`: any will do, and the highest priority

@@ -69,7 +69,7 @@ pub fn waiting_edf(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec
 
 fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<EquationSet<'a>> {
     let mut set = (cores > 0).then(|| EquationSet::new(tasks, cores))?;
-    (set.rounding, set.has_waits) = (Rounding::Down, true);
+    (set.rounding, set.is_of_waits) = (Rounding::Down, true);
     set.keep_cores = form == WaitingForm::NonPreemptive;
     set.clip = match form {
         WaitingForm::Best => InterferenceBound::Waiting,

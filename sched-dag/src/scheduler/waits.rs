@@ -154,9 +154,21 @@ impl Scheduler {
         self.fresh += 1;
     }
 
-    /// Ends a waiting instance, whose job is cut; its successors are to be told by
-    /// [`end_all`](Self::end_all).
-    pub(super) fn cancel_wait(&mut self, number: u32) {
+    /// Cancels the instances of a DAG that wait, of the job with a sequence number (of all jobs if
+    /// that is `u64::MAX`); their successors are to be told by [`end_all`](Self::end_all).
+    pub(super) fn cancel_waits(&mut self, dag: DagId, sequence: u64) {
+        for place in 0..self.waits.len() {
+            let number = self.waits.vertices[place];
+            let vertex = self.vertices.get(number);
+            let is_meant = sequence == u64::MAX || vertex.progress == sequence;
+            if vertex.dag == dag && vertex.phase == InstancePhase::Waiting && is_meant {
+                self.cancel_wait(number);
+            }
+        }
+    }
+
+    /// Cancels a waiting instance, whose job is cut.
+    fn cancel_wait(&mut self, number: u32) {
         let place = self.waits.place(number);
         self.timers.remove(self.dags.len() + place);
         self.quiet_until_ns = earliest_ns(&self.timers);
