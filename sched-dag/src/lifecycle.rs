@@ -78,7 +78,7 @@ use crate::ids::{ClusterId, DagId, Instance, ModeId, SubtaskId};
 use crate::order::sorted;
 use crate::scheduler::Moment;
 use crate::spec::WAITS;
-use crate::task_set::TaskSet;
+use crate::task_set::{Dag, TaskSet};
 
 pub use crate::request::{ModeEntry, Request, WaitId};
 
@@ -503,12 +503,7 @@ pub fn divide(
                 signals: AtomicU32::new(0),
                 change: AtomicU32::new(NOTHING),
                 end: AtomicU32::new(NOTHING),
-                answers: (0..)
-                    .map(SubtaskId)
-                    .zip(dag.subtasks())
-                    .filter(|(_, subtask)| WAITS && !subtask.waits().is_empty())
-                    .map(|(id, _)| (id, AtomicU64::new(0)))
-                    .collect(),
+                answers: WAITS.then(|| answers(dag)).unwrap_or_default(),
             })
             .collect(),
         clusters: task_set
@@ -619,6 +614,13 @@ impl Mailboxes {
             take(Request::ShutDown);
         }
     }
+}
+
+/// Returns room for answers to the subtasks that wait.
+fn answers(dag: &Dag) -> Box<[(SubtaskId, AtomicU64)]> {
+    let numbered = (0..).map(SubtaskId).zip(dag.subtasks());
+    let waiting = numbered.filter(|(_, subtask)| !subtask.waits().is_empty());
+    waiting.map(|(id, _)| (id, AtomicU64::new(0))).collect()
 }
 
 /// Returns a word for a wait of a subtask, the larger the later, never 0.

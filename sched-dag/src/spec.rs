@@ -122,7 +122,7 @@ pub const WAITS: bool = cfg!(feature = "waits");
 pub const MOST_WAITS: usize = if WAITS { 254 } else { 0 };
 
 /// A wait of a subtask, which each of its instances takes once, and the segment that follows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wait {
     /// The time after which it ends without an answer; 0 is allowed.
     pub limit_ns: u64,

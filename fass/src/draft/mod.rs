@@ -23,7 +23,7 @@ use core::time::Duration;
 use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{
     Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel, SubtaskSpec,
-    TopicPort, Wait,
+    TopicPort, WAITS, Wait,
 };
 
 use crate::run::answers::AnyDevice;
@@ -194,13 +194,16 @@ impl DagDraft {
         // A duration that does not fit into nanoseconds becomes a fault of the commit, not a panic
         // here.
         let wcet_ns = wcet.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
-        let waits = attributes.waits.into_iter().map(|(limit, segment)| Wait {
-            limit_ns: self.convert(limit, Some(subtask), "wait").unwrap_or(0),
-            segment_ns: segment.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET")),
-        });
-        let waits: Vec<Wait> = waits.collect();
+        // Without the feature their number is enough: the verification refuses any.
+        let mut waits = alloc::vec![Wait::default(); attributes.waits.len()];
+        for (wait, (limit, segment)) in waits.iter_mut().zip(attributes.waits).filter(|_| WAITS) {
+            wait.limit_ns = self.convert(limit, Some(subtask), "wait").unwrap_or(0);
+            wait.segment_ns = segment.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
+        }
         // The sum; where a part is missing, the verification says so.
-        let later_ns = waits.iter().filter_map(|wait| wait.segment_ns);
+        let later_ns = waits
+            .iter()
+            .filter_map(|wait| wait.segment_ns.filter(|_| WAITS));
         let wcet_ns = wcet_ns.map(|first_ns| later_ns.fold(first_ns, u64::saturating_add));
         let budget = attributes.budget;
         let budget_ns = budget.and_then(|budget| self.convert(budget, Some(subtask), "budget"));
@@ -350,6 +353,7 @@ impl DagDraft {
     }
 
     /// Converts a duration, or notes that it is too long.
+    #[inline(never)]
     fn convert(
         &mut self,
         duration: Duration,

@@ -226,14 +226,14 @@ texts! {
              have in flight; allow more, or relax the load";
         /// Subtasks wait, and the longest path with its waits exceeds the deadline or the period.
         SpanBeyondLimit { span_ns: u64, limit_ns: u64 } =
-            "its longest path with all waits up to their limits takes {:?}, and a job that waits has \
-             {:?} until its deadline or the next release; lower the limits or lengthen both",
+            "its longest path with all waits takes {:?}, more than its deadline or period of {:?}; \
+             lower the limits or lengthen both",
             Duration::from_nanos(*span_ns), Duration::from_nanos(*limit_ns);
         /// Subtasks wait, and no test bounds the response time by the period, or that of a DAG
         /// which may delay this one by its own.
         NoBoundByPeriod =
-            "no test bounds its response time, or that of a DAG that may delay it, by the period, \
-             as one must where subtasks wait; add cores, raise its priority or lengthen the period";
+            "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \
+             by the period; add cores, raise its priority or lengthen the period";
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

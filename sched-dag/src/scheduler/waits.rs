@@ -29,10 +29,11 @@ use super::{Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance, Vertex};
 use crate::journal::EventKind;
 use crate::request::WaitId;
+use crate::spec::WAITS;
 use crate::task_set::TaskSet;
 
 /// The vertices that may wait, and the latest wait of each.
-#[derive(Clone, Debug, Hash)]
+#[derive(Clone, Debug, Default, Hash)]
 pub(super) struct WaitTable {
     /// Ascending.
     vertices: Box<[u32]>,
@@ -50,6 +51,9 @@ struct LatestWait {
 
 impl WaitTable {
     pub(super) fn new(task_set: &TaskSet) -> Self {
+        if !WAITS {
+            return Self::default();
+        }
         let dags = (0..).map(DagId).zip(task_set.dags());
         let vertices: Vec<u32> = dags
             .flat_map(|(id, dag)| {
@@ -71,7 +75,7 @@ impl WaitTable {
 
     /// Returns the number of vertices that may wait, each of which has a timer.
     pub(super) const fn len(&self) -> usize {
-        self.vertices.len()
+        if WAITS { self.vertices.len() } else { 0 }
     }
 
     fn place(&self, vertex: u32) -> usize {

@@ -97,7 +97,9 @@ fn build_dag(
         .map(|(index, subtask)| Subtask {
             name: subtask.name.clone(),
             wcet_ns: subtask.wcet_ns,
-            waits: subtask.waits.iter().copied().filter(|_| WAITS).collect(),
+            waits: WAITS
+                .then(|| subtask.waits.as_slice().into())
+                .unwrap_or_default(),
             wcet_source: match (subtask.wcet_ns, subtask.wcet_margin_percent) {
                 (None, _) => WcetSource::None,
                 (_, None) => WcetSource::Stated,

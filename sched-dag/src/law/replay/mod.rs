@@ -338,13 +338,11 @@ fn is_allowed(stage: DispatchState, event: &Event) -> bool {
         (DispatchState::Absent, EventKind::Ready | EventKind::Cancelled)
         | (DispatchState::Ready, EventKind::Start | EventKind::Cancelled)
         | (DispatchState::Suspended, EventKind::Resume)
-        | (DispatchState::Waiting, EventKind::Wake | EventKind::Cancelled)
         // Whichever core finds the fault, or ends the DAG, ends the instance.
         | (DispatchState::Running(_) | DispatchState::Suspended, EventKind::Ended) => true,
-        (
-            DispatchState::Running(core),
-            EventKind::Suspend | EventKind::Wait | EventKind::Finish,
-        ) => core == event.core,
+        (DispatchState::Running(core), EventKind::Suspend | EventKind::Finish) => core == event.core,
+        (DispatchState::Running(core), EventKind::Wait) => WAITS && core == event.core,
+        (DispatchState::Waiting, EventKind::Wake | EventKind::Cancelled) => WAITS,
         _ => false,
     }
 }
