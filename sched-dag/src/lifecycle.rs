@@ -503,7 +503,7 @@ pub fn divide(
                 signals: AtomicU32::new(0),
                 change: AtomicU32::new(NOTHING),
                 end: AtomicU32::new(NOTHING),
-                answers: WAITS.then(|| answers(dag)).unwrap_or_default(),
+                answers: if WAITS { answers(dag) } else { Box::default() },
             })
             .collect(),
         clusters: task_set

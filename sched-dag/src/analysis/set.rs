@@ -116,7 +116,7 @@ impl<'a> EquationSet<'a> {
 
     /// Reports whether a DAG's subtasks wait, or those of a DAG that may delay it.
     pub(super) fn waits_enter(&self, dag: usize) -> bool {
-        self.has_waits() && self.with_waits[dag]
+        self.has_waits() && self.with_waits.get(dag) == Some(&true)
     }
 
     /// Solves the equations, visiting the DAGs in `order`: any will do, and the highest priority

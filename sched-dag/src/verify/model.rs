@@ -97,9 +97,11 @@ fn build_dag(
         .map(|(index, subtask)| Subtask {
             name: subtask.name.clone(),
             wcet_ns: subtask.wcet_ns,
-            waits: WAITS
-                .then(|| subtask.waits.as_slice().into())
-                .unwrap_or_default(),
+            waits: if WAITS {
+                subtask.waits.as_slice().into()
+            } else {
+                Box::default()
+            },
             wcet_source: match (subtask.wcet_ns, subtask.wcet_margin_percent) {
                 (None, _) => WcetSource::None,
                 (_, None) => WcetSource::Stated,
