@@ -82,7 +82,7 @@
 //! - What comes from outside and goes there while DAGs run passes a [`Wire`](shared::Wire), or is
 //!   a [`Parameter`](shared::Parameter).
 //! - A function may be async, and wait in its midst: as often as is stated, each time until a limit
-//!   at the latest, for a time or a [`Device`](shared::Device). Meanwhile it has no core.
+//!   at the latest, for a time, a [`Device`](shared::Device) or a [`Wire`](shared::Wire). Meanwhile it has no core.
 //! - After the commit the crate allocates nothing and takes no lock. Edges do no
 //!   locked read-modify-write; states and latest values do one or two a use. (What
 //!   functions and their messages' `clone` do is theirs.)

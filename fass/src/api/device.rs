@@ -19,13 +19,16 @@
 //! end, which has given up. There are two places for questions, as the driver may be just taking one
 //! out that has been given up; the asking end writes the next one to the other. The place of the
 //! answer is the driver's until it has answered, and then the asking end's.
+//!
+//! A [wire](super::wire_waits) is a device, too: its driver says that an answer is there, and the
+//! asking end takes it from the wire. It may be there before it is asked for.
 
 use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::sync::Arc;
 use core::fmt;
 use core::pin::Pin;
-use core::sync::atomic::{AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
 use core::task::{Context, Poll};
 use core::time::Duration;
 
@@ -59,8 +62,11 @@ where
         bell: SetOnce::new(),
         questions: [(); 2].map(|()| SharedCell::new(None)),
         answer: SharedCell::new(None),
+        source: SetOnce::new(),
+        is_at_once: AtomicBool::new(false),
         answers: SetOnce::new(),
         posted_ns: AtomicU64::new(0),
+        took_ns: AtomicU64::new(0),
         count: AtomicU64::new(0),
         staged: AtomicU64::new(0),
         posted: AtomicU64::new(0),
@@ -220,11 +226,13 @@ struct Question<Q> {
     question: Q,
 }
 
-/// An answer, with the number of its question and how long it took, if it is recorded.
-struct Answer<A> {
-    number: u64,
-    took_ns: u64,
-    answer: A,
+/// The place of the answers of a device whose driver has none of its own.
+pub(super) trait AnswerSource<A>: Send + Sync {
+    /// Reports whether there is one.
+    fn is_there(&self) -> bool;
+
+    /// Takes it.
+    fn take(&self) -> Option<A>;
 }
 
 /// The cell that both ends of a device share.
@@ -235,11 +243,17 @@ struct DeviceCell<Q, A> {
     /// Rung when a question is there.
     bell: SetOnce<Box<dyn Fn() + Send + Sync>>,
     questions: [SharedCell<Option<Question<Q>>>; 2],
-    answer: SharedCell<Option<Answer<A>>>,
+    /// The answer, with the number of its question.
+    answer: SharedCell<Option<(u64, A)>>,
+    /// Where the answers are, if not there.
+    source: SetOnce<Box<dyn AnswerSource<A>>>,
+    /// Whether the answer to the latest question was there when that was posted.
+    is_at_once: AtomicBool,
     /// How the answers are recorded, if they are.
     answers: SetOnce<Box<dyn AnyAnswers<A>>>,
-    /// When the latest question was posted.
+    /// When the latest question was posted, and how long the answer took, if it is recorded.
     posted_ns: AtomicU64,
+    took_ns: AtomicU64,
     /// How many questions have a number.
     count: AtomicU64,
     /// The question to be posted at the end of the turn, or 0.
@@ -269,10 +283,17 @@ impl<Q, A> DeviceCell<Q, A> {
     }
 
     /// Takes the answer to a question, which has come.
-    fn take_answer(&self, number: u64) -> Answer<A> {
-        let mut place = self.answer.change();
-        let is_its = |answer: &mut Answer<A>| answer.number == number;
-        let answer = place.as_mut().and_then(|place| place.take_if(is_its));
+    fn take_answer(&self, number: u64) -> A {
+        let answer = match self.source.get() {
+            Some(source) => source.take(),
+            None => {
+                let mut place = self.answer.change();
+                let answer = place
+                    .as_mut()
+                    .and_then(|place| place.take_if(|(of, _)| *of == number));
+                answer.map(|(_, answer)| answer)
+            }
+        };
         match answer {
             Some(answer) => answer,
             None => panic!(
@@ -297,18 +318,27 @@ struct QuestionPost<Q, A>(Arc<DeviceCell<Q, A>>);
 impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
     fn happen(&mut self, _: u64, _: &mut dyn FnMut(platform::Request)) {}
 
-    fn wait(&mut self, ended_ns: u64) {
-        let number = self.0.staged.load(Ordering::Relaxed);
+    fn wait(&mut self, ended_ns: u64) -> bool {
+        let cell = &*self.0;
+        let number = cell.staged.load(Ordering::Relaxed);
         if number == 0 {
-            return;
+            return false;
         }
-        self.0.staged.store(0, Ordering::Relaxed);
-        self.0.posted_ns.store(ended_ns, Ordering::Relaxed);
+        cell.staged.store(0, Ordering::Relaxed);
+        cell.posted_ns.store(ended_ns, Ordering::Relaxed);
+        cell.took_ns.store(0, Ordering::Relaxed);
         // Release: the question is in its place.
-        self.0.posted.store(number, Ordering::Release);
-        if let Some(ring) = self.0.bell.get() {
+        cell.posted.store(number, Ordering::Release);
+        if let Some(ring) = cell.bell.get() {
             ring();
         }
+        let is_at_once = cell.source.get().is_some_and(|source| {
+            // With the driver's: an answer that comes now is seen here, or the question there.
+            fence(Ordering::SeqCst);
+            source.is_there() && cell.decide(number)
+        });
+        cell.is_at_once.store(is_at_once, Ordering::Relaxed);
+        is_at_once
     }
 }
 
@@ -427,9 +457,14 @@ impl<Q, A> Asker<Q, A> {
     ///
     /// When polled, with a [`WaitFault`](crate::WaitFault), if the wait is not as stated.
     pub fn ask(&self, question: Q) -> PendingAnswer<'_, Q, A> {
+        self.ask_if(Some(question))
+    }
+
+    /// Asks, or waits until the limit for nothing.
+    pub(super) fn ask_if(&self, question: Option<Q>) -> PendingAnswer<'_, Q, A> {
         PendingAnswer {
             cell: &self.0,
-            question: Some(question),
+            question,
             wait: WaitStep::new(WaitEnd::Limit),
             number: 0,
             recorded: None,
@@ -474,12 +509,14 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
             this.number = this.cell.stage(wait, question);
         }
         polled.map(|has_timed_out| {
-            let answer = (!has_timed_out).then(|| this.cell.take_answer(this.number));
+            let cell = this.cell;
+            let is_there =
+                this.number > 0 && (!has_timed_out || cell.is_at_once.load(Ordering::Relaxed));
+            let answer = is_there.then(|| cell.take_answer(this.number));
             if let Some(answers) = answers.filter(|answers| answers.is_open()) {
-                let took_ns = answer.as_ref().map_or(0, |answer| answer.took_ns);
-                answers.keep(wait, took_ns, answer.as_ref().map(|answer| &answer.answer));
+                answers.keep(wait, cell.took_ns.load(Ordering::Relaxed), answer.as_ref());
             }
-            answer.map(|answer| answer.answer).ok_or(TimedOut)
+            answer.ok_or(TimedOut)
         })
     }
 }
@@ -557,25 +594,45 @@ impl<Q, A> DeviceDriver<Q, A> {
         let Some(mut place) = cell.answer.change() else {
             return Err(answer);
         };
-        let platform = platform::expect_installed();
-        let is_recorded = cell.answers.get().is_some_and(|answers| answers.is_open());
-        let now_ns = if is_recorded { platform.now_ns() } else { 0 };
-        let posted_ns = cell.posted_ns.load(Ordering::Relaxed);
-        let older = place.replace(Answer {
-            number,
-            took_ns: now_ns.saturating_sub(posted_ns),
-            answer,
-        });
+        let older = place.replace((number, answer));
         drop(place);
         drop(older);
-        if cell.decide(number) {
-            platform.answer(ticket.plan, ticket.wait);
+        if self.end_wait(ticket) {
             return Ok(());
         }
         // It has been given up just now; nobody else writes to the place.
-        let mut place = cell.answer.change();
+        let mut place = self.cell.answer.change();
         let taken = place.as_mut().and_then(|place| place.take());
-        taken.map_or(Ok(()), |taken| Err(taken.answer))
+        taken.map_or(Ok(()), |(_, taken)| Err(taken))
+    }
+
+    /// Ends the wait for an answer, which is there. Reports whether somebody waits for it.
+    fn end_wait(&self, ticket: Ticket) -> bool {
+        let (cell, platform) = (&self.cell, platform::expect_installed());
+        if cell.answers.get().is_some_and(|answers| answers.is_open()) {
+            let posted_ns = cell.posted_ns.load(Ordering::Relaxed);
+            let took_ns = platform.now_ns().saturating_sub(posted_ns);
+            cell.took_ns.store(took_ns, Ordering::Relaxed);
+        }
+        let decided = cell.decide(ticket.number);
+        if decided {
+            platform.answer(ticket.plan, ticket.wait);
+        }
+        decided
+    }
+
+    /// Has the asking end take its answers from there.
+    pub(super) fn answer_from(&self, source: impl AnswerSource<A> + 'static) {
+        self.cell.source.set(Box::new(source));
+    }
+
+    /// Ends the wait for an answer, if there is one, that is where the asking end takes it.
+    pub(super) fn tell(&mut self) {
+        // With that of the post: a question that comes now is seen here, or the answer there.
+        fence(Ordering::SeqCst);
+        if let Some((ticket, _)) = self.question() {
+            self.end_wait(ticket);
+        }
     }
 
     /// Has something done when there is a question: it wakes a thread, or tells the hardware.

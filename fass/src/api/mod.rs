@@ -29,3 +29,4 @@ pub(crate) mod topics;
 pub(crate) mod uses;
 pub(crate) mod waiting;
 pub(crate) mod wire;
+pub(crate) mod wire_waits;

@@ -2,7 +2,8 @@
 //!
 //! Such a function is as any other of its tuples, and may await, between its inputs and its
 //! outputs, what `fass` offers: [`sleep`](crate::sleep()), [`until`](crate::until()) an instant of its
-//! job, the answer of a [device](crate::shared::Device). While it waits its instance has no core and
+//! job, the answer of a [device](crate::shared::Device), bytes of a
+//! [wire](crate::shared::Wire::reading). While it waits its instance has no core and
 //! no stack. The number of its waits and the limit of each are stated
 //! ([`SubtaskAttributes::wait`]), so the response time is bounded, whatever a device does.
 //!

@@ -100,12 +100,14 @@ fn check_replaceable(draft: &DagDraft, label: &DagLabel, faults: &mut Vec<Fault>
 /// Adds what is wrong with waits: functions that cannot take them, and devices that several ask.
 fn check_waits(draft: &DagDraft, dag: &DagLabel, faults: &mut Vec<Fault>) {
     for (number, subtask) in draft.spec.subtasks.iter().enumerate() {
-        if !subtask.waits.is_empty() && !draft.waiting.contains(&number) {
-            faults.push(Fault::CannotWait {
-                dag: dag.clone(),
-                subtask: draft.label(number),
-            });
+        if subtask.waits.is_empty() || draft.waiting.contains(&number) {
+            continue;
         }
+        let (dag, subtask) = (dag.clone(), draft.label(number));
+        faults.push(match draft.replaceable.contains(&number) {
+            true => Fault::ReplaceableWaits { dag, subtask },
+            false => Fault::CannotWait { dag, subtask },
+        });
     }
     for (subtask, device) in &draft.asked_twice {
         faults.push(Fault::DeviceAskedTwice {

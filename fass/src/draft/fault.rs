@@ -120,6 +120,11 @@ worded! {
         CannotWait { dag: DagLabel, subtask: SubtaskLabel } = "cannot_wait",
             "{subtask} of {dag} states waits, and its function is not async; register an async \
              one, or state no waits";
+        /// A subtask states waits, and has another function for after a fault.
+        ReplaceableWaits { dag: DagLabel, subtask: SubtaskLabel } = "replaceable_waits",
+            "{subtask} of {dag} states waits, and has another function for after a fault, which \
+             could not have the place of a future that the fault has ended; register an async one \
+             alone, or state no waits";
         /// A device is asked by more than one subtask.
         DeviceAskedTwice { dag: DagLabel, subtask: SubtaskLabel, device: String } =
             "device_asked_twice",

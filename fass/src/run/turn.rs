@@ -67,7 +67,7 @@ worded! {
         /// The future is pending, and no wait of ours is the reason.
         Foreign = "foreign_wait",
             "a foreign wait: the function awaits what is none of its subtask's waits, and nothing \
-             would end that; await `sleep`, `until` or a device's answer";
+             would end that; await `sleep`, `until`, a device's answer or a wire";
         /// A wait of ours is begun by something else than the future of a subtask.
         Outside = "wait_outside",
             "a wait outside: it is polled by something else than the future of a subtask; await it \
@@ -272,10 +272,12 @@ impl Effect for TurnEffects {
                 real.for_each(|effect| effect.happen(completed_ns, ask));
             }
             Some(request) => {
-                self.real
-                    .iter_mut()
-                    .for_each(|effect| effect.wait(completed_ns));
-                ask(request);
+                let mut is_there = false;
+                for effect in &mut self.real {
+                    is_there |= effect.wait(completed_ns);
+                }
+                // It is a wait all the same: the instance gives its core up.
+                ask(if is_there { Request::Wait(0) } else { request });
             }
         }
     }

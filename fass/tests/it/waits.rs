@@ -2,13 +2,14 @@
 //! and that nothing is allocated.
 
 use core::time::Duration;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Barrier};
+use std::thread;
 
 use crate::no_allocation::counting::allocated;
 use crate::support::{PERIOD, answers, commit, named, panic_message};
 use fass::platform::{Request, SubtaskCode};
-use fass::shared::{Asker, Device, Raiser, Sample, TimedOut, create_device};
+use fass::shared::{Asker, Device, Raiser, Reader, Sample, TimedOut, Wire, Writer, create_device};
 use fass::{Dag, create_dag, sleep, until};
 use sched_dag::DagId;
 use sched_dag::lifecycle::WaitId;
@@ -253,4 +254,56 @@ fn of_two_questions_the_later_one_counts_whatever_the_driver_does() {
     assert_eq!(answers().map(|wait| wait.instance.job), Some(3));
     body.wake(false);
     assert_eq!(turn(body, 3), []);
+}
+
+/// Takes a turn while another thread does something, and returns the requests and the answer.
+fn turn_while(
+    body: &mut SubtaskCode,
+    job: u64,
+    other: impl FnOnce() + Send,
+) -> (Vec<Request>, Option<WaitId>) {
+    let start = Barrier::new(2);
+    thread::scope(|scope| {
+        let other = scope.spawn(|| {
+            start.wait();
+            other();
+            answers()
+        });
+        start.wait();
+        let asked = turn(body, job);
+        (asked, other.join().expect("it does not panic"))
+    })
+}
+
+#[test]
+fn bytes_that_come_or_go_as_a_wait_for_them_begins_end_it_once() {
+    let (wire, dag) = (Wire::new("wire"), dag());
+    let ask = |(input, output): (Reader<usize>, Writer)| async move {
+        assert_eq!(input.read().await, Ok(1));
+        assert_eq!(output.write(b"x").await, Ok(()));
+    };
+    let uses = dag.using((wire.reading(|packet| packet.len()), wire.writing()));
+    let limit = Duration::from_nanos(9);
+    let stated = named("ask").wait(limit).wait(limit);
+    uses.async_source(ask).register(stated);
+    let mut plan = commit(&[dag]);
+    let body = &mut plan.bodies[0][0];
+    let (arrive, depart) = (
+        || _ = wire.arrive(b"a\n", 0),
+        || while wire.depart().is_none() {},
+    );
+    for job in 0..1_000 {
+        let others: [&(dyn Fn() + Sync); 2] = [&arrive, &depart];
+        for (number, other) in (0..).zip(others) {
+            let (asked, answered) = turn_while(body, job, other);
+            let found = answered.map(|wait| (wait.instance.job, wait.number));
+            match asked[..] {
+                [Request::Wait(0)] => assert_eq!(found, None),
+                [Request::Wait(9)] => assert_eq!(found, Some((job, number))),
+                _ => panic!("{asked:?}"),
+            }
+            body.wake(answered.is_none());
+        }
+        assert_eq!(turn(body, job), []);
+    }
 }

@@ -163,6 +163,8 @@ impl Machine {
             match arrival {
                 Arrival::Request(request) => return Some(request),
                 Arrival::Bytes(wire, bytes) => {
+                    // An answer to a wait, if it is one, comes now.
+                    self.now_ns.set(now_ns);
                     if let Some((_, dag)) = wire.arrive(&bytes, at_ns) {
                         // As an arrival of this instant, which a later round takes, behind those
                         // that are due already.
@@ -690,6 +692,8 @@ impl Workload<SubtaskRunner> for Calls {
         self.segments
             .insert(wait.instance, wait.number as usize + 1);
         let machine = &*self.machine;
+        machine.now_ns.set(now_ns);
+        machine.collect();
         let mut devices = machine.devices.borrow_mut();
         devices.iter_mut().for_each(|look| look(machine, now_ns));
     }

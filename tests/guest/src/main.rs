@@ -66,6 +66,7 @@ const TESTS: &[(&str, Test)] = &[
     ("waits", waits::run),
     ("waits_cost", waits::cost),
     ("waits_faults", waits::faults),
+    ("waits_wire", waits::wire),
 ];
 
 fn main(machine: &Machine) -> Result<(), AppError> {

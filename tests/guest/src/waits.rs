@@ -1,5 +1,5 @@
-//! Instances that wait: for a time, for a device that another DAG stands for, and at the moment of
-//! a fault or of an end.
+//! Instances that wait: for a time, for a device that another DAG stands for, for bytes of a wire,
+//! and at the moment of a fault or of an end.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -9,7 +9,9 @@ use core::future::pending;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::shared::{Asker, DeviceDriver, Shutdown, Switch, create_device, shutting_down};
+use fass::shared::{
+    Asker, DeviceDriver, Reader, Shutdown, Switch, Wire, Writer, create_device, shutting_down,
+};
 use fass::{
     Dag, Occupation, OverrunPolicy, SubtaskAttributes, create_dag, execute_for, finish_create_dags,
     sleep,
@@ -119,6 +121,55 @@ fn accelerator(mut driver: DeviceDriver<u64, u64>, answers: &Arc<Answers>) -> Da
     let dag = single_every(PERIOD, "accelerator", 4, attributes, serve);
     dag.offset(ms(2));
     dag
+}
+
+/// Runs a modem, which is written a question and read for an answer, and says what came: the sum of
+/// it, and how often there was nothing. In two clusters it is not in that of the port.
+pub(crate) fn wire(machine: &Machine) -> Result<(), AppError> {
+    let modem = Wire::new("modem");
+    machine.connect(&modem)?;
+    machine.offer_clusters()?;
+    machine.options().finish(&["test", "input", "clusters"])?;
+    let (answers, mut job) = (Arc::new(Answers::default()), 0_u64);
+    let tally = Arc::clone(&answers);
+    let ask = move |(input, output): (Reader<u64>, Writer)| {
+        let (tally, question) = (Arc::clone(&tally), job);
+        job += 1;
+        async move {
+            hold(1);
+            let line = [b'0' + (question % 10) as u8, b'\n'];
+            if output.write(&line).await.is_err() {
+                count(&tally.returned);
+            }
+            match input.read().await {
+                Ok(answer) => _ = tally.right.fetch_add(answer, Ordering::Relaxed),
+                Err(_) => count(&tally.timed_out),
+            }
+            hold(1);
+        }
+    };
+    let decode = |line: &[u8]| {
+        line.iter()
+            .fold(0, |sum, byte| sum * 10 + u64::from(byte - b'0'))
+    };
+    let uses = (modem.reading(decode), modem.writing());
+    let dag = create_dag();
+    (dag.name("modem").jobs(4).period(PERIOD)).relative_deadline(PERIOD);
+    let attributes = named("ask").wait(ms(10)).wait(ms(5));
+    dag.using(uses).async_source(ask).register(attributes);
+    if machine.clusters().sizes().len() > 1 {
+        dag.cluster(1);
+    }
+    finish_create_dags(&[dag])?;
+    let run = machine.run()?;
+    json::emit("waits_wire", |line| {
+        line.number("sum", answers.right.load(Ordering::Relaxed))
+            .number("timed_out", answers.timed_out.load(Ordering::Relaxed))
+            .number("unsent", answers.returned.load(Ordering::Relaxed))
+            .number("allocations", run.allocations())
+            .number("violations", run.violations().count() as u64);
+    });
+    Ok(())
 }
 
 /// How many waits [`cost`] takes one after the other.

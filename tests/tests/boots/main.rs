@@ -4,6 +4,7 @@ mod attacks;
 mod autoware;
 mod by_efi;
 mod by_grub;
+mod camera;
 mod cruise;
 mod cruise_replay;
 mod dag_file;

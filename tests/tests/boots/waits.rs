@@ -98,6 +98,32 @@ fn answers_come_from_other_cores_and_from_other_clusters() {
     assert_told(&of_camera(&run), &expected.replacen(at_once, preempted, 1));
 }
 
+/// Bytes of the serial port end waits; one that comes too late is there for the next job.
+#[test]
+fn a_function_waits_until_its_bytes_have_gone_and_for_those_that_come() {
+    let input = "4ms \"1000\\n\"\n28ms \"200\\n\"\n64ms \"30\\n\"\n";
+    for (cores, clusters) in [(1, ""), (4, ""), (2, "clusters=1,1")] {
+        let guest = Guest::test("waits_wire").input(input).cores(cores);
+        let guest = guest.word("events=on").word(clusters);
+        let (outcome, sent) = guest.succeed_sending();
+        assert_eq!(sent, b"0\n1\n2\n3\n");
+        let line = outcome.line("waits_wire");
+        line.has([("sum", 1230), ("timed_out", 1), ("unsent", 0)]);
+        line.has([("allocations", 0), ("violations", 0)]);
+        let run = lawful_runs(&outcome, COUNTED_NS).remove(0);
+        if !clusters.is_empty() {
+            // The port is of an idle core of the other one, which looks each millisecond.
+            continue;
+        }
+        let expected = "
+            0.0 start ask, 1.0 wait ask, 1.0 wake ask, 1.0 resume ask, 1.0 wait ask, 4.0 wake ask, 4.0 resume ask, 5.0 finish ask
+            20.0 start ask, 21.0 wait ask, 21.0 wake ask, 21.0 resume ask, 21.0 wait ask, 26.0 wake ask, 26.0 resume ask, 27.0 finish ask
+            40.0 start ask, 41.0 wait ask, 41.0 wake ask, 41.0 resume ask, 41.0 wait ask, 41.0 wake ask, 41.0 resume ask, 42.0 finish ask
+            60.0 start ask, 61.0 wait ask, 61.0 wake ask, 61.0 resume ask, 61.0 wait ask, 64.0 wake ask, 64.0 resume ask, 65.0 finish ask";
+        assert_told(&told(&run, |_| true, "ask"), expected);
+    }
+}
+
 /// The instructions that a wait and its wake add to an instance which has the machine for itself,
 /// the function's own included; and for one that takes time, how late it goes on.
 #[test]

@@ -355,6 +355,13 @@ fn what_cannot_wait_or_is_asked_twice_is_a_fault_of_the_commit() {
         ask.register(named(name).wait(ms(1)));
     }
     dag.source(|| ()).register(named("plain").wait(ms(1)));
+    dag.survive_faults(fass::FaultLimit {
+        faults: 1,
+        window: 1,
+        in_all: 1,
+    });
+    let anew = dag.restarting(|| |()| ());
+    anew.register(named("anew").wait(ms(1)));
     let partly = taking("partly", 1).wait(ms(1)).wait(ms(1)).wcet(ms(1));
     dag.async_source(|| sleep(ms(1))).register(partly);
     let construction = fass::commit::ConstructionPolicy {
@@ -364,11 +371,14 @@ fn what_cannot_wait_or_is_asked_twice_is_a_fault_of_the_commit() {
         ..fass::commit::ConstructionPolicy::paper()
     };
     let error = fass::commit::finish_create_dags_with(&[dag], construction);
-    let error = error.expect_err("three subtasks are wrong");
+    let error = error.expect_err("four subtasks are wrong");
     assert_eq!(
         error.to_string(),
         "subtask `plain` of dag `wrong` states waits, and its function is not async; register an \
          async one, or state no waits\n\
+         subtask `anew` of dag `wrong` states waits, and has another function for after a fault, \
+         which could not have the place of a future that the fault has ended; register an async \
+         one alone, or state no waits\n\
          subtask `two` of dag `wrong` asks device `sonar`, which another subtask asks; make a \
          device for each\n\
          subtask `partly` of dag `wrong` waits, and not each of its segments has a WCET above 0; \
@@ -411,6 +421,51 @@ fn the_future_of_an_aborted_job_is_dropped_and_its_wait_taken_back() {
     assert_eq!(responses_ms(&report, "abort"), [4, 10, 4, 4]);
     assert_eq!(kept.all(), [(0, 0), (1, 1), (2, 2), (3, 3)]);
     assert_eq!(drops.load(Ordering::Relaxed), 4);
+}
+
+#[test]
+fn a_fault_that_costs_a_job_ends_the_waits_of_that_job() {
+    let machine = VirtualTime::new().cores(2).contain_panics();
+    let drops = Arc::<AtomicUsize>::default();
+    let dag = every(20, "both");
+    dag.jobs(3).survive_faults(fass::FaultLimit {
+        faults: 1,
+        window: 1,
+        in_all: 1,
+    });
+    dag.source(job_numbers(0))
+        .writes(&["go"])
+        .register(named("go"));
+    let (kept, keep) = Seen::shared();
+    let held = Arc::clone(&drops);
+    let waits = move |(job,): (u64,)| {
+        let (held, keep) = (Dropped(Arc::clone(&held)), keep.clone());
+        keep.add((job, held.0.load(Ordering::Relaxed)));
+        async move {
+            sleep(ms(5)).await;
+            drop(held);
+            (job,)
+        }
+    };
+    let waits = dag.async_subtask(waits).reads(&["go"]).writes(&["a"]);
+    waits.register(named("waits").wait(ms(5)));
+    let fails = || {
+        |(job,): (u64,)| {
+            work(3);
+            assert_ne!(job, 1, "worn out");
+            (job,)
+        }
+    };
+    let fails = dag.restarting(fails).reads(&["go"]).writes(&["b"]);
+    fails.register(named("fails"));
+    let sink = |(a, b): (u64, u64)| assert_eq!(a, b);
+    dag.subtask(sink).reads(&["a", "b"]).register(named("sink"));
+    let report = run(&machine, &[dag]);
+    let counts = report.dag("both").statistics();
+    assert_eq!((counts.completed, counts.failed), (2, 1));
+    // The future of job 1 is dropped by job 2, before its function is called.
+    assert_eq!(kept.all(), [(0, 0), (1, 1), (2, 2)]);
+    assert_eq!(drops.load(Ordering::Relaxed), 3);
 }
 
 #[test]

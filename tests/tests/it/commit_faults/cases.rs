@@ -230,6 +230,12 @@ pub(crate) const CASES: &[Case] = &[
         let read = attributes("read").wait(PERIOD / 2);
         waiting(|dag| dag.source(|| (1_u32,)), read)
     }),
+    ("replaceable_waits", || {
+        let read = attributes("read").wait(PERIOD / 2);
+        let dags = waiting(|dag| dag.restarting(|| |()| (1_u32,)), read);
+        dags[0].survive_faults(FAULT_LIMIT);
+        dags
+    }),
     ("segments_partly_given", || {
         let read = attributes("read").wait(PERIOD / 2).wcet(PERIOD / 4);
         let sleep = || async { (1_u32,) };

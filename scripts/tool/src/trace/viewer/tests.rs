@@ -216,6 +216,12 @@ fn a_wait_ends_a_piece_and_is_shown_in_its_subtask() {
         on core 0 1001..1010
         waits 1010..1100";
     assert_drawn(&run, "s: ", of_subtask);
+
+    let stated = format!("{HEADER}\nwait 0.0 30\nwait 0.0 20");
+    let svg = picture::draw(&run_of(&stated, waits), 1).expect("it has a job");
+    assert_eq!(svg.matches(">waits 50 ns<").count(), 1, "{svg}");
+    // Job 1 has no release.
+    assert_eq!(svg.matches(" height=\"4\"").count(), 2, "{svg}");
 }
 
 /// Each is drawn twice: between cores, and between the DAGs' own tracks.
