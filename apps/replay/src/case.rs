@@ -369,25 +369,12 @@ fn check_horizon(
 
 /// Reads what is expected of each instance and each job.
 fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malformed> {
-    let executions_ns = &case.executions_ns;
-    let dag_and_job = |line: &Line<'_>, dag: &str, job: &str| {
-        let dag = line.index("dag", dag, executions_ns.len())?;
-        let job = line.index("job", job, executions_ns[dag][0].len())?;
-        Ok::<_, Malformed>((dag, job as u64))
-    };
-    let id = |index| u32::try_from(index).unwrap_or(u32::MAX);
     loop {
         let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
         match line.kind {
             "x" => {
                 let [dag, job, subtask, start, finish, preemptions] = line.fixed()?;
-                let (dag, job) = dag_and_job(&line, dag, job)?;
-                let subtask = line.index("subtask", subtask, executions_ns[dag].len())?;
-                let instance = Instance {
-                    dag: DagId(id(dag)),
-                    job,
-                    subtask: SubtaskId(id(subtask)),
-                };
+                let instance = instance_of(&line, case, [dag, job, subtask])?;
                 let times = InstanceTimes {
                     start_ns: line.number(start)?,
                     finish_ns: line.number(finish)?,
@@ -397,19 +384,11 @@ fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malforme
             }
             "s" => {
                 let numbers: Vec<u64> = line.numbers(line.words.len())?;
-                let [_, job, _, timeouts, spans @ ..] = &numbers[..] else {
+                let [_, _, _, timeouts, spans @ ..] = &numbers[..] else {
                     return Err(line.malformed("expected `s dag job subtask timeouts start_0 ..`"));
                 };
-                let dag = line.index("dag", line.words[0], executions_ns.len())?;
-                let subtask = line.index("subtask", line.words[2], executions_ns[dag].len())?;
-                let instance = Instance {
-                    dag: DagId(id(dag)),
-                    job: *job,
-                    subtask: SubtaskId(id(subtask)),
-                };
-                let spans_ns: Vec<(u64, u64)> = (spans.chunks_exact(2))
-                    .map(|span| (span[0], span[1]))
-                    .collect();
+                let of = [line.words[0], line.words[1], line.words[2]];
+                let instance = instance_of(&line, case, of)?;
                 let turns = case.turns.get(&instance).map_or(0, Vec::len);
                 if turns == 0 || 2 * turns != spans.len() {
                     return Err(line.malformed(format!(
@@ -418,35 +397,25 @@ fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malforme
                 }
                 let times = TurnTimes {
                     timeouts: *timeouts,
-                    spans_ns,
+                    spans_ns: spans.chunks_exact(2).map(|of| (of[0], of[1])).collect(),
                 };
                 once(&line, case.turn_times.insert(instance, times))?;
             }
             "j" => {
                 let [dag, job, release, finish, response, missed] = line.fixed()?;
-                let (dag, job) = dag_and_job(&line, dag, job)?;
+                // Each subtask has an instance of each job.
+                let Instance { dag, job, .. } = instance_of(&line, case, [dag, job, "0"])?;
                 let times = JobTimes {
                     release_ns: line.number(release)?,
                     finish_ns: line.number(finish)?,
                     response_ns: line.number(response)?,
                     missed: line.flag(missed)?,
                 };
-                once(&line, case.jobs.insert((DagId(id(dag)), job), times))?;
+                once(&line, case.jobs.insert((dag, job), times))?;
             }
             "end" => {
                 line.exactly(0)?;
-                let jobs: usize = executions_ns.iter().map(|dag| dag[0].len()).sum();
-                let instances: usize = executions_ns.iter().flatten().map(Vec::len).sum();
-                let instances = instances - case.instances.len();
-                let jobs = jobs - case.jobs.len();
-                let turns = case.turns.len() - case.turn_times.len();
-                if instances + jobs + turns > 0 {
-                    return Err(line.malformed(format!(
-                        "the case ends without {instances} `x` records, {turns} `s` records and \
-                         {jobs} `j` records"
-                    )));
-                }
-                return Ok(());
+                return check_all_told(&line, case);
             }
             other => {
                 return Err(line.malformed(format!(
@@ -456,6 +425,38 @@ fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malforme
             }
         }
     }
+}
+
+/// Returns the instance that a record names by its DAG, job and subtask.
+fn instance_of(
+    line: &Line<'_>,
+    case: &Case,
+    [dag, job, subtask]: [&str; 3],
+) -> Result<Instance, Malformed> {
+    let id = |index| u32::try_from(index).unwrap_or(u32::MAX);
+    let dag = line.index("dag", dag, case.executions_ns.len())?;
+    let of_dag = &case.executions_ns[dag];
+    Ok(Instance {
+        dag: DagId(id(dag)),
+        job: line.index("job", job, of_dag[0].len())? as u64,
+        subtask: SubtaskId(id(line.index("subtask", subtask, of_dag.len())?)),
+    })
+}
+
+/// Refuses a case that ends without what is expected of some instance or job.
+fn check_all_told(end: &Line<'_>, case: &Case) -> Result<(), Malformed> {
+    let jobs: usize = case.executions_ns.iter().map(|dag| dag[0].len()).sum();
+    let instances: usize = case.executions_ns.iter().flatten().map(Vec::len).sum();
+    let instances = instances - case.instances.len();
+    let jobs = jobs - case.jobs.len();
+    let turns = case.turns.len() - case.turn_times.len();
+    if instances + jobs + turns > 0 {
+        return Err(end.malformed(format!(
+            "the case ends without {instances} `x` records, {turns} `s` records and {jobs} `j` \
+             records"
+        )));
+    }
+    Ok(())
 }
 
 /// Refuses a record that has replaced an earlier one.

@@ -1,10 +1,12 @@
 //! From specs without fault to the model.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::attributes::in_flight;
 use super::fault::DagFault;
 use super::{CommitOptions, VerifyFindings};
+
 use crate::graph::Graph;
 use crate::ids::SubtaskId;
 use crate::order::sort_by_key;

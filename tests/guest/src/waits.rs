@@ -244,18 +244,13 @@ impl Drop for Dropped {
 pub(crate) fn faults(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test"])?;
     machine.accept_faults();
-    let all: [(&str, fn() -> Vec<Dag>); 7] = [
-        ("panics", panics),
-        ("overruns", overruns),
-        ("foreign", foreign),
-        ("ended", ended),
-        ("paused", paused),
-        ("shut down", shut_down),
-        ("left out", left_out),
-    ];
-    for (title, dags) in all {
-        run_one(machine, title, &dags())?;
-    }
+    run_one(machine, "panics", &panics())?;
+    run_one(machine, "overruns", &overruns())?;
+    run_one(machine, "foreign", &foreign())?;
+    run_one(machine, "ended", &ended())?;
+    run_one(machine, "paused", &paused())?;
+    run_one(machine, "shut down", &shut_down())?;
+    run_one(machine, "left out", &left_out())?;
     let dropped = Arc::new(AtomicU64::new(0));
     run_one(machine, "aborted", &[aborted(&dropped)])?;
     json::emit("waits_dropped", |line| {

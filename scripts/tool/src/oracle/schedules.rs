@@ -138,8 +138,9 @@ impl SubtaskBody for CaseBody {
     }
 
     fn complete(&mut self, _: u64, ask: &mut dyn FnMut(Request)) {
-        let limit_ns = self.limits_ns.get(self.turn);
-        limit_ns.map(|limit_ns| ask(Request::Wait(*limit_ns)));
+        if let Some(&limit_ns) = self.limits_ns.get(self.turn) {
+            ask(Request::Wait(limit_ns));
+        }
     }
 
     fn alternate(&self) -> Option<()> {
