@@ -23,7 +23,7 @@ use core::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use core::time::Duration;
 
 use common::random::Random;
-use fass::shared::{Asker, DeviceDriver, Ticket, create_device};
+use fass::shared::{Asker, Device, DeviceDriver, Ticket, create_device};
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
 
 /// The time that `detect` waits at most.
@@ -82,11 +82,28 @@ pub fn build(
 ) -> ([Dag; 3], Arc<Counts>) {
     let counts = Arc::new(Counts::default());
     let (device, driver) = create_device::<u64, u64>("accelerator");
-    let camera = create_dag();
     device.record();
-    (camera.name("camera").jobs(frames))
-        .record::<u64>("frame")
-        .record::<Option<u64>>("objects");
+    let camera = build_camera(&device, detection, &counts);
+    let accelerator = create_dag();
+    (accelerator.name("accelerator").jobs(40 * frames)).relative_deadline(POLL);
+    let mut simulated = Accelerator {
+        driver,
+        conduct,
+        random: Random::new(seed),
+        asked: None,
+        counts: Arc::clone(&counts),
+    };
+    let serve = move || simulated.serve();
+    accelerator.register_periodic_subtask(serve, [], POLL, named("serve", us(30)));
+    let control = build_control();
+    camera.jobs(frames);
+    control.jobs(20 * frames);
+    ([camera, control, accelerator], counts)
+}
+
+fn build_camera(device: &Device<u64, u64>, detection: Detection, counts: &Arc<Counts>) -> Dag {
+    let camera = create_dag();
+    (camera.name("camera").record::<u64>("frame")).record::<Option<u64>>("objects");
     let mut frame = 0_u64;
     let capture = move || {
         frame += 1;
@@ -94,7 +111,7 @@ pub fn build(
         (frame,)
     };
     camera.register_periodic_subtask(capture, ["frame"], ms(20), named("capture", ms(1)));
-    let counted = Arc::clone(&counts);
+    let counted = Arc::clone(counts);
     let detect = move |accelerator: Asker<u64, u64>, (frame,): (u64,)| {
         let counts = Arc::clone(&counted);
         async move {
@@ -128,9 +145,12 @@ pub fn build(
         execute_for(us(800), Occupation::Hold);
     };
     camera.register_sink_subtask(track, ["objects"], ms(20), named("track", ms(1)));
+    camera
+}
 
+fn build_control() -> Dag {
     let control = create_dag();
-    control.name("control").jobs(20 * frames);
+    control.name("control");
     let mut step = 0_u32;
     let sense = move || {
         step = step.wrapping_add(1);
@@ -145,19 +165,7 @@ pub fn build(
     control.register_subtask(steer, ["state"], ["command"], named("steer", us(100)));
     let act = |(_,): (u32,)| execute_for(us(20), Occupation::Hold);
     control.register_sink_subtask(act, ["command"], ms(1), named("act", us(40)));
-
-    let accelerator = create_dag();
-    (accelerator.name("accelerator").jobs(40 * frames)).relative_deadline(POLL);
-    let mut simulated = Accelerator {
-        driver,
-        conduct,
-        random: Random::new(seed),
-        asked: None,
-        counts: Arc::clone(&counts),
-    };
-    let serve = move || simulated.serve();
-    accelerator.register_periodic_subtask(serve, [], POLL, named("serve", us(30)));
-    ([camera, control, accelerator], counts)
+    control
 }
 
 fn named(name: &str, wcet: Duration) -> SubtaskAttributes {
