@@ -12,6 +12,9 @@ use crate::analysis::{ANALYSIS, WaitAnalysis};
 use crate::ids::ClusterId;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
 
+/// Whether subtasks may wait: the feature `waits`.
+pub const WAITS: bool = cfg!(feature = "waits");
+
 /// A DAG task as its app describes it.
 #[derive(Clone, Debug, Default)]
 pub struct DagSpec {

@@ -292,7 +292,7 @@ impl Scheduler {
 
     /// Gives a core the first in line.
     #[inline]
-    fn give_first(&mut self, core: CoreId) -> HandOff {
+    pub(super) fn give_first(&mut self, core: CoreId) -> HandOff {
         match self.ready.pop() {
             Some(key) => HandOff::To(Vertex(key.vertex()), self.give(core, key)),
             None => HandOff::Idle,
@@ -343,13 +343,13 @@ impl CoreTable {
 
     /// Reports whether any core is idle.
     #[inline]
-    const fn any_idle(&self) -> bool {
+    pub(super) const fn any_idle(&self) -> bool {
         !self.idle.is_empty()
     }
 
     /// Returns an idle core, which the caller gives an instance.
     #[inline]
-    fn take_idle(&mut self) -> Option<CoreId> {
+    pub(super) fn take_idle(&mut self) -> Option<CoreId> {
         self.idle.pop()
     }
 

@@ -101,15 +101,16 @@ fn answers_come_from_other_cores_and_from_other_clusters() {
 /// The instructions that a wait and its wake add to an instance which has the machine for itself,
 /// the function's own included; and for one that takes time, how late it goes on.
 #[test]
-fn a_wait_costs_two_steps_of_the_scheduler() {
+fn a_wait_costs_no_step_of_the_scheduler() {
     let outcome = Guest::test("waits_cost").succeed();
     let lines = outcome.lines("waits_cost");
     assert_eq!(lines.len(), 2);
-    for (line, word) in lines.iter().zip(["at_once", "later"]) {
+    // That which takes time begins and ends by an interrupt's context switch.
+    for (line, (word, most)) in lines.iter().zip([("at_once", 600), ("later", 1_200)]) {
         line.reads([("wait", word)]);
         line.has([("allocations", 0)]);
         let instructions = line.number("instructions");
-        assert!((1..=1_600).contains(&instructions), "{}", line.text);
+        assert!((1..=most).contains(&instructions), "{}", line.text);
     }
 }
 
