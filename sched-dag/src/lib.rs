@@ -140,7 +140,7 @@ pub use scheduler::{
 };
 pub use spec::{
     DagSpec, LatestSpec, MOST_WAITS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort,
-    WAITS, Wait, Waits,
+    WAITS, Wait,
 };
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;

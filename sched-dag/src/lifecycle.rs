@@ -77,7 +77,8 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use crate::ids::{ClusterId, DagId, Instance, ModeId, SubtaskId};
 use crate::order::sorted;
 use crate::scheduler::Moment;
-use crate::task_set::TaskSet;
+use crate::spec::WAITS;
+use crate::task_set::{Dag, TaskSet};
 
 pub use crate::request::{ModeEntry, Request, WaitId};
 
@@ -483,12 +484,7 @@ pub fn divide(
                 signals: AtomicU32::new(0),
                 change: AtomicU32::new(NOTHING),
                 end: AtomicU32::new(NOTHING),
-                answers: (0..)
-                    .map(SubtaskId)
-                    .zip(dag.subtasks())
-                    .filter(|(_, subtask)| !subtask.waits().is_empty())
-                    .map(|(id, _)| (id, AtomicU64::new(0)))
-                    .collect(),
+                answers: WAITS.then(|| answers(dag)).unwrap_or_default(),
             })
             .collect(),
         clusters: task_set
@@ -547,7 +543,7 @@ impl Mailboxes {
                 let place = &self.clusters[to.index()].mode;
                 place.store(packed(mode, entry), Ordering::Release);
             }
-            Request::Answer(wait) => {
+            Request::Answer(wait) if WAITS => {
                 let answers = &of(wait.instance.dag).answers;
                 let place = answers.iter().find(|of| of.0 == wait.instance.subtask);
                 // Of two, the older one comes too late: its instance waits for the other by now.
@@ -558,6 +554,7 @@ impl Mailboxes {
             | Request::GoOn
             | Request::Wait(_)
             | Request::WaitUntil(_)
+            | Request::Answer(_)
             | Request::Step => {}
         }
         sent(to);
@@ -583,7 +580,7 @@ impl Mailboxes {
                 END => take(Request::End(dag)),
                 _ => {}
             }
-            for (subtask, answer) in &to.answers {
+            for (subtask, answer) in to.answers.iter().filter(|_| WAITS) {
                 let word = answer.swap(0, Ordering::Acquire);
                 let wait = wait_of(dag, *subtask, word);
                 wait.into_iter()
@@ -598,6 +595,13 @@ impl Mailboxes {
             take(Request::ShutDown);
         }
     }
+}
+
+/// Returns room for answers to the subtasks that wait.
+fn answers(dag: &Dag) -> Box<[(SubtaskId, AtomicU64)]> {
+    let numbered = (0..).map(SubtaskId).zip(dag.subtasks());
+    let waiting = numbered.filter(|(_, subtask)| !subtask.waits().is_empty());
+    waiting.map(|(id, _)| (id, AtomicU64::new(0))).collect()
 }
 
 /// Returns a word for a wait of a subtask, the larger the later, never 0.

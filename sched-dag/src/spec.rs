@@ -6,14 +6,10 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::TypeId;
-use core::ops::{Deref, DerefMut, RangeInclusive};
+use core::ops::RangeInclusive;
 
-use crate::analysis::{ANALYSIS, WaitAnalysis};
 use crate::ids::ClusterId;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
-
-/// Whether subtasks may wait: the feature `waits`.
-pub const WAITS: bool = cfg!(feature = "waits");
 
 /// A DAG task as its app describes it.
 #[derive(Clone, Debug, Default)]
@@ -96,7 +92,7 @@ pub struct SubtaskSpec {
     /// The worst-case execution time, if known: the sum over its segments, if it waits.
     pub wcet_ns: Option<u64>,
     /// Its waits, in order: between n waits it has n + 1 segments.
-    pub waits: Waits,
+    pub waits: Vec<Wait>,
     /// The margin that it has over the longest call observed, in hundredths of that;
     /// `None`: it is stated.
     pub wcet_margin_percent: Option<u32>,
@@ -118,76 +114,21 @@ pub struct SubtaskSpec {
     pub outputs: Vec<TopicPort>,
 }
 
+/// Whether subtasks may wait: what the feature `waits` is for. A program without it has no
+/// instruction for waits.
+pub const WAITS: bool = cfg!(feature = "waits");
+
 /// The most waits that a subtask may state.
-pub const MOST_WAITS: usize = 254;
+pub const MOST_WAITS: usize = if WAITS { 254 } else { 0 };
 
 /// A wait of a subtask, which each of its instances takes once, and the segment that follows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wait {
     /// The time after which it ends without an answer; 0 is allowed.
     pub limit_ns: u64,
     /// The worst-case execution time of the segment that follows, if known: a part of
     /// [`SubtaskSpec::wcet_ns`].
     pub segment_ns: Option<u64>,
-}
-
-/// The waits of a subtask, in order.
-///
-/// They bring the analysis of waits with them, so that a program whose subtasks never wait does not
-/// link it.
-#[derive(Clone, Debug, Default)]
-pub struct Waits {
-    pub(crate) list: Vec<Wait>,
-    /// `None` while there are none.
-    pub(crate) analysis: Option<&'static WaitAnalysis>,
-}
-
-impl Waits {
-    /// Adds a wait, and the segment that follows it.
-    pub fn push(&mut self, wait: Wait) {
-        self.list.push(wait);
-        self.analysis = Some(&ANALYSIS);
-    }
-}
-
-impl Deref for Waits {
-    type Target = [Wait];
-
-    fn deref(&self) -> &[Wait] {
-        &self.list
-    }
-}
-
-impl DerefMut for Waits {
-    fn deref_mut(&mut self) -> &mut [Wait] {
-        &mut self.list
-    }
-}
-
-/// By the waits alone: there is one analysis.
-impl PartialEq for Waits {
-    fn eq(&self, other: &Self) -> bool {
-        self.list == other.list
-    }
-}
-
-impl Eq for Waits {}
-
-impl<'a> IntoIterator for &'a Waits {
-    type Item = &'a Wait;
-    type IntoIter = core::slice::Iter<'a, Wait>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.list.iter()
-    }
-}
-
-impl FromIterator<Wait> for Waits {
-    fn from_iter<I: IntoIterator<Item = Wait>>(waits: I) -> Self {
-        let mut all = Self::default();
-        waits.into_iter().for_each(|wait| all.push(wait));
-        all
-    }
 }
 
 /// One end of a topic at a subtask: a typed, named edge bundle.

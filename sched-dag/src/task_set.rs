@@ -24,7 +24,7 @@ use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
-use crate::spec::{Wait, Waits};
+use crate::spec::{WAITS, Wait};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -80,7 +80,7 @@ pub struct StatePrecedence {
 pub struct Subtask {
     pub(crate) name: String,
     pub(crate) wcet_ns: Option<u64>,
-    pub(crate) waits: Waits,
+    pub(crate) waits: Box<[Wait]>,
     pub(crate) wcet_source: WcetSource,
     pub(crate) budget_ns: Option<u64>,
     pub(crate) stack_bytes: Option<u64>,
@@ -342,19 +342,19 @@ impl Subtask {
     /// Returns its waits, in order.
     #[must_use]
     pub const fn waits(&self) -> &[Wait] {
-        self.waits.list.as_slice()
+        if WAITS { &self.waits } else { &[] }
     }
 
     /// Returns the sum of its waits' limits.
     #[must_use]
     pub fn waiting_ns(&self) -> u64 {
-        self.waits.iter().map(|wait| wait.limit_ns).sum()
+        self.waits().iter().map(|wait| wait.limit_ns).sum()
     }
 
     /// Returns the WCETs of its segments, if they are known; that of a subtask without waits is one.
     #[must_use]
     pub fn segments_ns(&self) -> Option<Vec<u64>> {
-        let later = self.waits.iter().map(|wait| wait.segment_ns);
+        let later = self.waits().iter().map(|wait| wait.segment_ns);
         let later = later.collect::<Option<Vec<u64>>>()?;
         let first = self.wcet_ns?.checked_sub(later.iter().sum())?;
         Some(core::iter::once(first).chain(later).collect())

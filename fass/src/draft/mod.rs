@@ -23,7 +23,7 @@ use core::time::Duration;
 use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{
     Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel, SubtaskSpec,
-    TopicPort, Wait, Waits,
+    TopicPort, WAITS, Wait,
 };
 
 use crate::run::answers::AnyDevice;
@@ -194,13 +194,16 @@ impl DagDraft {
         // A duration that does not fit into nanoseconds becomes a fault of the commit, not a panic
         // here.
         let wcet_ns = wcet.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
-        let mut waits = attributes.waits;
-        for (wait, (limit, segment)) in waits.iter_mut().zip(attributes.limits) {
+        // Without the feature their number is enough: the verification refuses any.
+        let mut waits = alloc::vec![Wait::default(); attributes.waits.len()];
+        for (wait, (limit, segment)) in waits.iter_mut().zip(attributes.waits).filter(|_| WAITS) {
             wait.limit_ns = self.convert(limit, Some(subtask), "wait").unwrap_or(0);
             wait.segment_ns = segment.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
         }
         // The sum; where a part is missing, the verification says so.
-        let later_ns = waits.iter().filter_map(|wait| wait.segment_ns);
+        let later_ns = waits
+            .iter()
+            .filter_map(|wait| wait.segment_ns.filter(|_| WAITS));
         let wcet_ns = wcet_ns.map(|first_ns| later_ns.fold(first_ns, u64::saturating_add));
         let budget = attributes.budget;
         let budget_ns = budget.and_then(|budget| self.convert(budget, Some(subtask), "budget"));
@@ -350,6 +353,7 @@ impl DagDraft {
     }
 
     /// Converts a duration, or notes that it is too long.
+    #[inline(never)]
     fn convert(
         &mut self,
         duration: Duration,
@@ -424,10 +428,7 @@ pub struct SubtaskAttributes {
     pub(crate) priority: Option<u32>,
     pub(crate) wcet: Option<Duration>,
     /// The limits of its waits, and the WCETs of the segments behind them.
-    limits: Vec<(Duration, Option<Duration>)>,
-    /// As many waits, whose times are filled in at the registration. They are made where an app
-    /// states them, so that one without waits does not link what belongs to these.
-    waits: Waits,
+    waits: Vec<(Duration, Option<Duration>)>,
     pub(crate) budget: Option<Duration>,
     stack_bytes: Option<u64>,
     non_preemptive: bool,
@@ -462,7 +463,7 @@ impl SubtaskAttributes {
     /// [`wait`](Self::wait) it is that of the segment which follows that wait, and only what
     /// executes counts.
     pub fn wcet(mut self, wcet: Duration) -> Self {
-        let segment = self.limits.last_mut().map(|(_, segment)| segment);
+        let segment = self.waits.last_mut().map(|(_, segment)| segment);
         *segment.unwrap_or(&mut self.wcet) = Some(wcet);
         self
     }
@@ -471,7 +472,8 @@ impl SubtaskAttributes {
     ///
     /// Each instance of an [async subtask](crate::Dag::register_async_subtask) takes its waits one
     /// after the other, each once; what it executes between them are its *segments*. Their WCETs are
-    /// stated where they stand, of all segments or of none:
+    /// stated where they stand, of all segments or of none. An app whose subtasks wait is built with
+    /// `fass`' feature `waits`:
     ///
     /// ```
     /// use core::time::Duration;
@@ -481,11 +483,7 @@ impl SubtaskAttributes {
     /// let attributes = SubtaskAttributes::named("ask").wcet(ms(1)).wait(ms(3)).wcet(ms(1));
     /// ```
     pub fn wait(mut self, limit: Duration) -> Self {
-        self.limits.push((limit, None));
-        self.waits.push(Wait {
-            limit_ns: 0,
-            segment_ns: None,
-        });
+        self.waits.push((limit, None));
         self
     }
 

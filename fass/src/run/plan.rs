@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use sched_dag::engine::{Alternate, ProvenBounds};
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::{Lifecycle, Request};
-use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, WAITS, engine};
 
 use super::effect::{Effect, MutedEffect};
 use super::latest::Staleness;
@@ -137,7 +137,7 @@ struct JobPreview<F> {
 impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
     fn take_turn(&mut self, job: u64) {
         // Once for each job, in the first turn of its instance.
-        let goes_on = self.turn().is_some_and(|turn| turn.is_of(job));
+        let goes_on = WAITS && self.turn().is_some_and(|turn| turn.is_of(job));
         if self.passed != job && (goes_on || (self.look)(job)) {
             return self.subtask.take_turn(job);
         }
@@ -168,7 +168,7 @@ impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
 
 /// Takes a turn of a job whose function is not called.
 fn pass(subtask: &mut dyn PolledSubtask, job: u64) {
-    if subtask.turn().is_none_or(|turn| turn.pass(job)) {
+    if !WAITS || subtask.turn().is_none_or(|turn| turn.pass(job)) {
         subtask.discard(job);
     }
 }
@@ -214,28 +214,34 @@ impl SubtaskCode {
 
     /// Lets what it has of effects happen when its instances have finished, if it may wait.
     pub(crate) fn hold_effects(&mut self) {
-        if let Some(turn) = self.subtask.turn() {
+        if let Some(turn) = self.turn() {
+            let turn = Arc::clone(turn);
             let real = core::mem::take(&mut self.effects);
-            let held = TurnEffects::new(Arc::clone(turn), real);
+            let held = TurnEffects::new(turn, real);
             self.effects.push(Box::new(held));
         }
+    }
+
+    /// Returns the state of its turns, if it may wait.
+    fn turn(&self) -> Option<&Arc<TurnState>> {
+        WAITS.then(|| self.subtask.turn()).flatten()
     }
 
     /// Reports whether its instances may wait.
     #[must_use]
     pub fn may_wait(&self) -> bool {
-        self.subtask.turn().is_some()
+        self.turn().is_some()
     }
 
     /// Reports whether the instance of a job has begun and not finished: it has a further turn.
     #[must_use]
     pub fn goes_on(&self, job: u64) -> bool {
-        self.subtask.turn().is_some_and(|turn| turn.is_of(job))
+        self.turn().is_some_and(|turn| turn.is_of(job))
     }
 
     /// Takes note, before the next turn, of how the wait has ended in which its instance was.
     pub fn wake(&mut self, has_timed_out: bool) {
-        if let Some(turn) = self.subtask.turn() {
+        if let Some(turn) = self.turn() {
             turn.wake(has_timed_out);
         }
     }

@@ -20,7 +20,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use recording::{Channel, Recordable, Role, Schema};
 use sched_dag::wcets::graph_hash;
-use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
+use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort, WAITS};
 
 use super::answers::AnyDevice;
 use super::effect::Effect;
@@ -108,7 +108,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
                 around.push((sample.subtask, looking(line, look)));
             }
         }
-        for (subtask, device) in of.devices {
+        for (subtask, device) in of.devices.iter().filter(|_| WAITS) {
             if let Some((schema, line)) = device.line() {
                 let way = (schema, Arc::clone(&line));
                 open(*subtask, Role::Answer, device.name(), way, None);

@@ -47,8 +47,10 @@ impl GraphSummary {
     pub(super) fn of(task: &Task, cores: u32) -> Self {
         let (parallelism, mut covers, chains) = parallelism_covers_and_parts(task, cores);
         let mut largest_ns = largest(task.wcets_ns(), cores);
-        if let Some(analysis) = task.analysis() {
-            (analysis.summarise)(task, cores, &mut covers, &mut largest_ns);
+        if task.has_waits() {
+            covers = super::cover::covers(task.oblivious(), covers.len());
+            let segments_ns = task.waits().iter().map(|waits| waits.longest_segment_ns);
+            largest_ns = largest(&segments_ns.collect::<Vec<u64>>(), cores);
         }
         Self {
             parallelism,

@@ -289,8 +289,10 @@ impl<'a> AnalysisInput<'a> {
             figures.younger_may_win = self.relation.younger_may_win(dag);
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
         }
-        if let Some(waits) = self.set.waits {
-            (waits.forbid_overlap)(&mut self.set, &self.relation);
+        if self.set.has_waits() {
+            let tasks = self.tasks;
+            let with_waits = self.relation.closure(&|dag| tasks[dag].has_waits());
+            self.set.forbid_overlap(with_waits);
         }
         self.set.known = match (self.settings.cores, self.settings.policy) {
             (1, Policy::StaticPriority) => responses(self),
@@ -331,7 +333,7 @@ impl<'a> AnalysisInput<'a> {
         let applies = self.relation.preemption == PreemptionMix::All
             && !self.relation.ranks_sinks
             && self.set.bursts.are_none()
-            && self.set.waits.is_none();
+            && !self.set.has_waits();
         if !applies || !constrained(tasks, cores) {
             return None;
         }
@@ -369,10 +371,13 @@ impl<'a> AnalysisInput<'a> {
             },
             BoundFailure::Overlapping => NotProvenReason::NoBoundByPeriod,
             BoundFailure::Own(SolverFailure::Limit) => NotProvenReason::Limit,
-            BoundFailure::Own(SolverFailure::BeyondDeadline)
-                if let Some(waits) = self.set.waits.filter(|_| self.set.waits_enter(dag)) =>
-            {
-                (waits.reason)(task, self.set.figures[dag].limit_ns())
+            BoundFailure::Own(SolverFailure::BeyondDeadline) if self.set.waits_enter(dag) => {
+                let (span_ns, limit_ns) = (task.span_ns(), self.set.figures[dag].limit_ns());
+                match (span_ns > limit_ns, limit_ns < task.relative_deadline_ns()) {
+                    (true, _) => NotProvenReason::SpanBeyondLimit { span_ns, limit_ns },
+                    (false, true) => NotProvenReason::NoBoundByPeriod,
+                    (false, false) => NotProvenReason::NoBound,
+                }
             }
             BoundFailure::Own(SolverFailure::BeyondDeadline)
                 // A job may wait for room until its deadline has passed, however fast the others
@@ -529,7 +534,7 @@ pub(super) fn are_in_time(case: &AnalysisInput<'_>) -> bool {
         |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
     let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
     applies
-        && case.set.waits.is_none()
+        && !case.set.has_waits()
         && (0..case.tasks.len()).all(fit)
         && demand(&all_dues(case), &case.set.bursts).is_some()
 }

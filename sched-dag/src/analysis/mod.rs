@@ -13,7 +13,7 @@
 //! | `task`, `graph` | length, volume, bottom levels | |
 //! | `cover` | the most work of disjoint chains, and the width, by a flow | Ahuja 1993; Dilworth |
 //! | `multi_path` | one job of a DAG at a time, alone or among others | derived here |
-//! | `waiting` | the same of subtasks that wait | derived here |
+//! | `waiting`, `whole_units` | the same of subtasks that wait | derived here |
 //! | `intra_task` | one DAG alone, by its subtasks' priorities | He 2019 |
 //! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
 //! | `set` | the equations of all DAGs, solved exactly | |
@@ -78,6 +78,7 @@ mod set;
 mod task;
 mod utilisation;
 mod waiting;
+mod whole_units;
 mod witness;
 mod workload;
 
@@ -100,8 +101,7 @@ pub use overheads::{OverheadSource, Overheads};
 pub use set::{multi_path_edf, multi_path_fp};
 pub use task::{SubtaskWaits, Task, TaskError};
 pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
-pub(crate) use waiting::{ANALYSIS, WaitAnalysis};
-pub use waiting::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
+pub use whole_units::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
 pub use witness::witness;
 
 /// Under what conditions the DAGs will run.
@@ -226,14 +226,14 @@ texts! {
              have in flight; allow more, or relax the load";
         /// Subtasks wait, and the longest path with its waits exceeds the deadline or the period.
         SpanBeyondLimit { span_ns: u64, limit_ns: u64 } =
-            "its longest path with all waits up to their limits takes {:?}, and a job that waits has \
-             {:?} until its deadline or the next release; lower the limits or lengthen both",
+            "its longest path with all waits takes {:?}, more than its deadline or period of {:?}; \
+             lower the limits or lengthen both",
             Duration::from_nanos(*span_ns), Duration::from_nanos(*limit_ns);
         /// Subtasks wait, and no test bounds the response time by the period, or that of a DAG
         /// which may delay this one by its own.
         NoBoundByPeriod =
-            "no test bounds its response time, or that of a DAG that may delay it, by the period, \
-             as one must where subtasks wait; add cores, raise its priority or lengthen the period";
+            "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \
+             by the period; add cores, raise its priority or lengthen the period";
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

@@ -26,8 +26,9 @@ use super::interference::{DelaySources, GraphSummary, InterferenceBound, Interfe
 use super::multi_path::{MultiPathEquations, alone};
 use super::pipelined::{OWN_STEPS, PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::task::Task;
-use super::waiting::{Rounding, WaitAnalysis};
+use super::waiting::{Rounding, with_blocking};
 use super::workload::{InterferingWorkload, WorkloadBursts};
+use crate::spec::WAITS;
 
 /// DAGs with what enters their equations.
 pub(super) struct EquationSet<'a> {
@@ -43,8 +44,8 @@ pub(super) struct EquationSet<'a> {
     pub(super) clip: InterferenceBound,
     pub(super) bursts: WorkloadBursts,
     pub(super) rounding: Rounding,
-    /// The analysis of waits, if there are any.
-    pub(super) waits: Option<&'static WaitAnalysis>,
+    /// Whether the forms are those of subtasks that wait; see [`Self::has_waits`].
+    pub(super) is_of_waits: bool,
     /// By DAG, whether waits enter its equations; empty: of none.
     with_waits: Vec<bool>,
     /// Bounds that are known already, by DAG.
@@ -93,10 +94,15 @@ impl<'a> EquationSet<'a> {
             clip: InterferenceBound::Chains,
             bursts: WorkloadBursts::default(),
             rounding: Rounding::Up,
-            waits: tasks.iter().find_map(|task| task.analysis()),
+            is_of_waits: tasks.iter().any(|task| task.has_waits()),
             with_waits: Vec::new(),
             known: alloc::vec![None; tasks.len()],
         }
+    }
+
+    /// Reports whether subtasks wait.
+    pub(super) const fn has_waits(&self) -> bool {
+        WAITS && self.is_of_waits
     }
 
     /// Accepts no response time beyond a period of those DAGs that waits enter: the forms with
@@ -110,9 +116,7 @@ impl<'a> EquationSet<'a> {
 
     /// Reports whether a DAG's subtasks wait, or those of a DAG that may delay it.
     pub(super) fn waits_enter(&self, dag: usize) -> bool {
-        self.with_waits
-            .get(dag)
-            .is_some_and(|with_waits| *with_waits)
+        self.has_waits() && self.with_waits[dag]
     }
 
     /// Solves the equations, visiting the DAGs in `order`: any will do, and the highest priority
@@ -310,10 +314,9 @@ impl<'a> EquationSet<'a> {
     ) -> DelaySources {
         let blocking = (self.shapes[dag].unblocked).by(blocking_ns, self.cores);
         let (task, rounding) = (self.tasks[dag], self.rounding);
-        let is_coupled = task.has_waits() || rounding == Rounding::Down;
-        let waits = (self.waits).filter(|_| is_coupled && !blocking_ns.is_empty());
-        let left_and_blocking =
-            waits.map(|waits| (waits.with_blocking)(task, self.cores, &blocking));
+        let is_coupled = WAITS && (task.has_waits() || rounding == Rounding::Down);
+        let left_and_blocking = (is_coupled && !blocking_ns.is_empty())
+            .then(|| with_blocking(task, self.cores, &blocking));
         DelaySources {
             others,
             blocking,

@@ -31,9 +31,9 @@ use alloc::vec::Vec;
 use core::cmp::Reverse;
 use core::ops::Add;
 
-use super::waiting::{ANALYSIS, WaitAnalysis};
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
+use crate::spec::WAITS;
 use crate::task_set::{Dag, Subtask};
 use crate::worded::texts;
 
@@ -54,7 +54,6 @@ pub struct Task {
 /// The waits of a task's subtasks, by subtask, and the task with all waits executed.
 #[derive(Clone, Debug)]
 struct TaskWaits {
-    analysis: &'static WaitAnalysis,
     of_subtasks: Box<[SubtaskWaits]>,
     oblivious: Task,
 }
@@ -159,18 +158,15 @@ impl Task {
             least_deadline_ns: dag.least_deadline_ns(),
             ..task
         };
-        match dag.subtasks().iter().find_map(|of| of.waits.analysis) {
-            Some(analysis) => (analysis.charge)(task, dag, overhead_ns),
-            None => Ok(task),
+        let mut subtasks = dag.subtasks().iter();
+        match subtasks.all(|of| of.waits().is_empty()) {
+            true => Ok(task),
+            false => task.charge_segments(dag, overhead_ns),
         }
     }
 
     /// Adds the waits of a verified DAG, and `overhead_ns` for each segment but the first.
-    pub(super) fn charge_segments(
-        mut self,
-        dag: &Dag,
-        overhead_ns: u64,
-    ) -> Result<Self, TaskError> {
+    fn charge_segments(mut self, dag: &Dag, overhead_ns: u64) -> Result<Self, TaskError> {
         for (wcet_ns, of) in self.wcets_ns.iter_mut().zip(dag.subtasks()) {
             let charged_ns = overhead_ns.checked_mul(of.waits().len() as u64);
             let charged_ns = charged_ns.and_then(|charged_ns| charged_ns.checked_add(*wcet_ns));
@@ -217,7 +213,6 @@ impl Task {
         let (period_ns, deadline_ns) = (self.period_ns, self.relative_deadline_ns);
         let oblivious = Self::assemble(period_ns, deadline_ns, whole_ns, self.graph.clone());
         let waits = TaskWaits {
-            analysis: &ANALYSIS,
             of_subtasks: waits.into(),
             oblivious: oblivious.map_err(|_| TaskError::WaitsOverflow)?,
         };
@@ -390,18 +385,13 @@ impl Task {
     /// Reports whether a subtask waits.
     #[must_use]
     pub const fn has_waits(&self) -> bool {
-        self.waits.is_some()
-    }
-
-    /// Returns the analysis of its waits, if it has any.
-    pub(super) fn analysis(&self) -> Option<&'static WaitAnalysis> {
-        Some(self.waits.as_ref()?.analysis)
+        WAITS && self.waits.is_some()
     }
 
     /// Returns the waits by subtask; empty if no subtask waits.
     #[must_use]
     pub fn waits(&self) -> &[SubtaskWaits] {
-        let waits = self.waits.as_ref();
+        let waits = self.waits.as_ref().filter(|_| WAITS);
         waits.map_or(&[], |waits| &waits.of_subtasks)
     }
 
@@ -409,7 +399,7 @@ impl Task {
     /// this one.
     #[must_use]
     pub fn oblivious(&self) -> &Self {
-        let waits = self.waits.as_ref();
+        let waits = self.waits.as_ref().filter(|_| WAITS);
         waits.map_or(self, |waits| &waits.oblivious)
     }
 

@@ -36,140 +36,10 @@
 
 use alloc::vec::Vec;
 
-use super::NotProvenReason;
-use super::cover::{CoverChain, STEPS, covers};
-use super::interference::InterferenceBound;
-use super::multi_path::multi_path;
-use super::one_core::{Blocking, largest};
-use super::ranks::RankRelation;
-use super::set::EquationSet;
-use super::task::{SubtaskWaits, Task, TaskError};
-use crate::task_set::Dag;
-
-/// The parts of the analysis that only DAGs that wait ask for, as functions that waits bring with
-/// them: no other program links them.
-#[derive(Debug)]
-pub(crate) struct WaitAnalysis {
-    /// Adds the waits of a verified DAG, and overheads for each segment but the first.
-    pub(super) charge: fn(Task, &Dag, u64) -> Result<Task, TaskError>,
-    /// Replaces covers and largest executions by those of a task that waits.
-    pub(super) summarise: fn(&Task, u32, &mut Vec<u64>, &mut Vec<u64>),
-    /// Lowers what is left beside the span to what reserved chains give.
-    pub(super) reserve: fn(&mut Vec<u64>, &Task, u32),
-    /// Returns what is left on all cores beside the span of a job that is blocked.
-    pub(super) with_blocking: fn(&Task, u32, &Blocking) -> u128,
-    /// Accepts no overlapping jobs of DAGs that waits enter.
-    pub(super) forbid_overlap: fn(&mut EquationSet<'_>, &RankRelation),
-    /// Says why a DAG that waits enter has no bound within a limit.
-    pub(super) reason: fn(&Task, u64) -> NotProvenReason,
-}
-
-/// The analysis of waits.
-pub(crate) static ANALYSIS: WaitAnalysis = WaitAnalysis {
-    charge: Task::charge_segments,
-    summarise,
-    reserve: |left, task, cores| lower(left, &reserved(task, cores)),
-    with_blocking,
-    forbid_overlap: |set, relation| {
-        let tasks = set.tasks;
-        set.forbid_overlap(relation.closure(&|dag| tasks[dag].has_waits()));
-    },
-    reason,
-};
-
-fn summarise(task: &Task, cores: u32, covered: &mut Vec<u64>, largest_ns: &mut Vec<u64>) {
-    *covered = covers(task.oblivious(), covered.len());
-    let segments_ns = task.waits().iter().map(|waits| waits.longest_segment_ns);
-    *largest_ns = largest(&segments_ns.collect::<Vec<u64>>(), cores);
-}
-
-fn reason(task: &Task, limit_ns: u64) -> NotProvenReason {
-    let span_ns = task.span_ns();
-    match (span_ns > limit_ns, limit_ns < task.relative_deadline_ns()) {
-        (true, _) => NotProvenReason::SpanBeyondLimit { span_ns, limit_ns },
-        (false, true) => NotProvenReason::NoBoundByPeriod,
-        (false, false) => NotProvenReason::NoBound,
-    }
-}
-
-/// The bounds of one job alone by each form, in whole units of time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AloneBounds {
-    /// By one path.
-    pub one_path_ns: u64,
-    /// By the best number of reserved chains, none among them.
-    pub reserved_ns: u64,
-    /// By several paths, with waits that are executed.
-    pub oblivious_ns: u64,
-}
-
-/// Bounds the response time of one job alone by each form; `None` without cores.
-#[must_use]
-pub fn alone_forms(task: &Task, cores: u32) -> Option<AloneBounds> {
-    let waiting = |with: &ReservedChains| with.left / with.free;
-    let reserved = reserved(task, cores);
-    let bound = |waiting: u128| task.span_ns().checked_add(u64::try_from(waiting).ok()?);
-    Some(AloneBounds {
-        one_path_ns: bound(reserved.first().map(waiting)?)?,
-        reserved_ns: bound(reserved.iter().map(waiting).min()?)?,
-        oblivious_ns: multi_path(task.oblivious(), cores)?,
-    })
-}
-
-/// Which forms bound the response times of a set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WaitingForm {
-    /// One path, preemptive.
-    OnePath,
-    /// Any of the three forms, preemptive.
-    Best,
-    /// One path, with segments that keep their cores.
-    NonPreemptive,
-}
-
-/// Bounds the response times under global fixed priorities, in whole units of time, the DAGs given
-/// from the highest priority to the lowest. `None` if there is no core, or a DAG has no bound
-/// within its deadline and its period.
-#[must_use]
-pub fn waiting_fp(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
-    let set = in_units(tasks, cores, form)?;
-    let order: Vec<usize> = (0..tasks.len()).collect();
-    let solution = set.solve(&order, |other, dag| other < dag);
-    solution.responses.into_iter().collect()
-}
-
-/// Bounds the response times under global EDF, in whole units of time and in the order given: down
-/// from deadlines and periods. `None` as [`waiting_fp`].
-#[must_use]
-pub fn waiting_edf(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
-    let mut set = in_units(tasks, cores, form)?;
-    set.deadlines_limit = true;
-    set.down_from_deadlines(|_, _| true)
-}
-
-fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<EquationSet<'a>> {
-    let mut set = (cores > 0).then(|| EquationSet::new(tasks, cores))?;
-    (set.rounding, set.waits) = (Rounding::Down, Some(&ANALYSIS));
-    set.keep_cores = form == WaitingForm::NonPreemptive;
-    set.clip = match form {
-        WaitingForm::Best => InterferenceBound::Waiting,
-        WaitingForm::OnePath | WaitingForm::NonPreemptive => InterferenceBound::Window,
-    };
-    for ((task, shape), figures) in (tasks.iter()).zip(&mut set.shapes).zip(&mut set.figures) {
-        figures.allow_in_flight(1);
-        // Only covers round up, so that they count as less than a core more.
-        let by_covers = shape.left.iter_mut();
-        (1..=u64::from(cores))
-            .rev()
-            .zip(by_covers)
-            .for_each(|(free, left)| *left = left.saturating_add(free - 1));
-        lower(&mut shape.left, &reserved(task, cores));
-        if form != WaitingForm::Best {
-            shape.left.truncate(1);
-        }
-    }
-    Some(set)
-}
+use super::cover::{CoverChain, STEPS};
+use super::one_core::Blocking;
+use super::task::{SubtaskWaits, Task};
+use crate::spec::WAITS;
 
 /// At which instants a schedule may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,16 +54,16 @@ impl Rounding {
     /// Prepares what so many cores are to execute, to be divided by their number and rounded up.
     pub(super) const fn of(self, sum: u128, cores: u128) -> u128 {
         match self {
-            Self::Up => sum,
-            Self::Down => sum.saturating_sub(cores - 1),
+            Self::Down if WAITS => sum.saturating_sub(cores - 1),
+            _ => sum,
         }
     }
 
     /// Divides what so many cores are to execute.
     pub(super) const fn divide(self, left: u64, cores: u64) -> u64 {
         match self {
-            Self::Up => left.div_ceil(cores),
-            Self::Down => left / cores,
+            Self::Down if WAITS => left / cores,
+            _ => left.div_ceil(cores),
         }
     }
 }
@@ -204,14 +74,14 @@ pub(super) fn beside_span(task: &Task, covers: &[u64], cores: u32) -> Vec<u64> {
     let volume_ns = task.oblivious().volume_ns();
     let mut left: Vec<u64> = covers.iter().map(|cover| volume_ns - cover).collect();
     // Without waits the others are no better.
-    if let Some(analysis) = task.analysis() {
-        (analysis.reserve)(&mut left, task, cores);
+    if task.has_waits() {
+        lower(&mut left, &reserved(task, cores));
     }
     left
 }
 
 /// Lowers what is left to what reserved chains give.
-fn lower(left: &mut Vec<u64>, reserved: &[ReservedChains]) {
+pub(super) fn lower(left: &mut Vec<u64>, reserved: &[ReservedChains]) {
     for (j, with) in reserved.iter().enumerate() {
         // A form whose numbers are too large is of no use, nor are those of more chains after it.
         match (u64::try_from(with.left), left.get_mut(j)) {
@@ -228,10 +98,10 @@ pub(super) struct ReservedChains {
     /// The last of the chains; none of them is empty but the first.
     pub(super) chain: CoverChain,
     /// The cores that they leave free.
-    free: u128,
+    pub(super) free: u128,
     /// The most of `volume - c(P or U)`, and the excess of `P` over the span on each free core,
     /// over all paths `P`.
-    left: u128,
+    pub(super) left: u128,
 }
 
 /// Returns the forms of 0, 1, .. reserved chains: the heaviest, one after the other, of what the
@@ -274,7 +144,7 @@ pub(super) fn reserved(task: &Task, cores: u32) -> Vec<ReservedChains> {
 
 /// Returns what is left of a job on all cores beside its span, if its path is blocked where its
 /// segments become eligible.
-fn with_blocking(task: &Task, cores: u32, blocking: &Blocking) -> u128 {
+pub(super) fn with_blocking(task: &Task, cores: u32, blocking: &Blocking) -> u128 {
     let count = cores as usize;
     let (all, but_one) = (blocking.sum(count), blocking.sum(count - 1));
     let cores = u128::from(cores);
@@ -294,69 +164,4 @@ fn with_blocking(task: &Task, cores: u32, blocking: &Blocking) -> u128 {
     let heaviest: u128 = path.map(|subtask| weights[subtask]).sum();
     let sum = u128::from(task.volume_ns()) + all - but_one + heaviest;
     sum - cores * u128::from(task.span_ns())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
-    use crate::analysis::{SubtaskWaits, Task, multi_path};
-
-    /// A task of subtasks with segments and the limits between them, in turn.
-    fn task(period: u64, deadline: u64, subtasks: &[&[u64]], edges: &[(usize, usize)]) -> Task {
-        let segments = |times: &'_ &[u64]| times.iter().copied().step_by(2).collect::<Vec<_>>();
-        let waits = subtasks.iter().map(|times| SubtaskWaits {
-            count: u32::try_from(times.len() / 2).unwrap(),
-            limits_ns: times.iter().skip(1).step_by(2).sum(),
-            longest_segment_ns: segments(times).into_iter().max().unwrap(),
-        });
-        let wcets = subtasks.iter().map(|times| segments(times).iter().sum());
-        let task = Task::new(period, deadline, wcets.collect(), edges).unwrap();
-        task.with_waits(waits.collect()).unwrap()
-    }
-
-    #[test]
-    fn each_form_has_its_own_bound_of_a_job_alone() {
-        let edges = [(0, 1), (0, 2), (1, 3), (2, 3)];
-        let one = task(99, 99, &[&[1], &[3, 4, 1], &[5], &[1]], &edges);
-        let bounds = AloneBounds {
-            one_path_ns: 12,
-            reserved_ns: 11,
-            oblivious_ns: 10,
-        };
-        assert_eq!((one.span_ns(), one.length_ns()), (10, 7));
-        assert_eq!(alone_forms(&one, 2), Some(bounds));
-        // At any instant of real time: the least of 12.5, 11 and 10, rounded up.
-        assert_eq!(multi_path(&one, 2), Some(10));
-        assert_eq!((alone_forms(&one, 0), multi_path(&one, 0)), (None, None));
-    }
-
-    #[test]
-    fn real_time_rounds_up() {
-        let one = task(99, 99, &[&[1, 9, 1], &[2], &[3]], &[]);
-        // Two cores: max_P of 11 + (7 - 2) / 2, and 11 + (7 - 5) / 1 with one chain reserved.
-        assert_eq!(alone_forms(&one, 2).unwrap().one_path_ns, 13);
-        assert_eq!(alone_forms(&one, 2).unwrap().reserved_ns, 13);
-        assert_eq!(multi_path(&one, 2), Some(13));
-    }
-
-    #[test]
-    fn each_wait_may_be_blocked_again() {
-        // E4: two cores, no wait; blocked at the release by two and at each end by one.
-        let high = task(100, 100, &[&[1], &[1], &[1]], &[(0, 1), (1, 2)]);
-        let low = task(100, 100, &[&[3], &[3], &[2]], &[]);
-        let bounds = |high: &Task| waiting_fp(&[high, &low], 2, WaitingForm::NonPreemptive);
-        let of_e4 = bounds(&high).unwrap()[0];
-        let waiting = task(100, 100, &[&[1], &[1, 0, 1], &[1]], &[(0, 1), (1, 2)]);
-        // One more unit of execution, and two lower ones after the wait.
-        let with_wait = bounds(&waiting).unwrap()[0];
-        assert_eq!((of_e4, with_wait), (9, 13));
-    }
-
-    #[test]
-    fn later_deadlines_alone_do_not_bound_the_blocking_under_edf() {
-        let waiting = task(40, 21, &[&[1, 8, 1], &[1]], &[(1, 0)]);
-        let short = task(12, 20, &[&[3]], &[]);
-        let bounds = waiting_edf(&[&waiting, &short], 1, WaitingForm::NonPreemptive);
-        assert_eq!(bounds.unwrap()[0], 20);
-    }
 }

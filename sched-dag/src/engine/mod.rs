@@ -319,11 +319,11 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let (mut body, limit_ns) = self.publish(vertex, body, finish_ns, port);
         let instance = self.scheduler.instance_of(vertex);
         match limit_ns {
-            None => self.placement.finish_parked(vertex, body),
-            Some(_) => {
+            Some(_) if WAITS => {
                 port.wait(core, &mut body, finish_ns);
                 self.placement.wait(core.index(), vertex, body);
             }
+            _ => self.placement.finish_parked(vertex, body),
         }
         let turn = TurnEnd { instance, limit_ns };
         // By the whole step: its core runs something else by now, so it passes on to nobody.
@@ -410,7 +410,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             // The port reads the clock as late as it can, right before the function is called.
             let start_ns = port.start(core, body);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
-        } else if let NextWork::Proceed(vertex, body) = &mut next {
+        } else if WAITS && let NextWork::Proceed(vertex, body) = &mut next {
             self.proceed((core, *vertex), body, port);
         }
         next
@@ -480,7 +480,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
                 && let Some(instance) = notice.event.instance()
             {
                 let vertex = self.task_set.vertex(instance);
-                self.placement.cancel_wait(vertex);
+                if WAITS {
+                    self.placement.cancel_wait(vertex);
+                }
                 self.undiscarded.push((vertex, instance.job));
             }
         }

@@ -11,6 +11,7 @@ use super::vertices::{InstancePhase, Vertex, VertexTable};
 use super::{DagPhase, EventLog, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
+use crate::spec::WAITS;
 
 impl Scheduler {
     /// Ends an instance that has started.
@@ -86,17 +87,20 @@ impl Scheduler {
     /// that thereby would become ready.
     #[inline]
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64) {
+        if WAITS {
+            self.cancel_waits(dag, sequence);
+        }
+        let state = &self.dags[dag.index()];
         // In topological order each vertex is looked at after its predecessors, so none becomes
         // ready behind the loop's back.
-        for place in 0..self.task_set.dag(dag).subtasks().len() {
-            let subtask = self.task_set.dag(dag).topological_order()[place];
+        for &subtask in self.task_set.dag(dag).topological_order() {
             let number = self.task_set.first_vertex(dag) + subtask.0;
             let vertex = self.vertices.get_mut(number);
             // From now on an end has to ask whether its job is cut, which the short way does not.
             vertex.only_passes_on = false;
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
             if vertex.phase == InstancePhase::Ready && is_meant {
-                let job = self.dags[dag.index()].jobs.job(vertex.progress);
+                let job = state.jobs.job(vertex.progress);
                 self.ready.remove(self.ready.key(number, vertex, || job));
                 self.log
                     .of_instance(EventKind::Cancelled, vertex.instance(job));
@@ -104,8 +108,6 @@ impl Scheduler {
                 // Ended below, not here: an end makes further instances ready, which the loop must
                 // not meet half-way.
                 self.ending.push(number);
-            } else if vertex.phase == InstancePhase::Waiting && is_meant {
-                self.cancel_wait(number);
             }
         }
         self.end_all();
@@ -130,10 +132,7 @@ impl Scheduler {
     /// A vertex is in it at most once at a time: its next instance can only be
     /// ready when this one has been taken out. So each round of the loop ends
     /// another instance in flight.
-    ///
-    /// There is one copy of it, as jobs are cut rarely.
-    #[cold]
-    #[inline(never)]
+    #[inline]
     pub(super) fn end_all(&mut self) {
         // A stack in memory of its own, not recursion: a chain may be 100,000 subtasks long.
         while let Some(vertex) = self.ending.pop() {

@@ -29,10 +29,11 @@ use super::{Decision, HandOff, Scheduler, earliest_ns};
 use crate::ids::{CoreId, DagId, Instance, Vertex};
 use crate::journal::EventKind;
 use crate::request::WaitId;
+use crate::spec::WAITS;
 use crate::task_set::TaskSet;
 
 /// The vertices that may wait, and the latest wait of each.
-#[derive(Clone, Debug, Hash)]
+#[derive(Clone, Debug, Default, Hash)]
 pub(super) struct WaitTable {
     /// Ascending.
     vertices: Box<[u32]>,
@@ -50,6 +51,9 @@ struct LatestWait {
 
 impl WaitTable {
     pub(super) fn new(task_set: &TaskSet) -> Self {
+        if !WAITS {
+            return Self::default();
+        }
         let dags = (0..).map(DagId).zip(task_set.dags());
         let vertices: Vec<u32> = dags
             .flat_map(|(id, dag)| {
@@ -71,7 +75,7 @@ impl WaitTable {
 
     /// Returns the number of vertices that may wait, each of which has a timer.
     pub(super) const fn len(&self) -> usize {
-        self.vertices.len()
+        if WAITS { self.vertices.len() } else { 0 }
     }
 
     #[inline]
@@ -247,9 +251,21 @@ impl Scheduler {
         self.fresh += 1;
     }
 
-    /// Ends a waiting instance, whose job is cut; its successors are to be told by
-    /// [`end_all`](Self::end_all).
-    pub(super) fn cancel_wait(&mut self, number: u32) {
+    /// Cancels the instances of a DAG that wait, of the job with a sequence number (of all jobs if
+    /// that is `u64::MAX`); their successors are to be told by [`end_all`](Self::end_all).
+    pub(super) fn cancel_waits(&mut self, dag: DagId, sequence: u64) {
+        for place in 0..self.waits.len() {
+            let number = self.waits.vertices[place];
+            let vertex = self.vertices.get(number);
+            let is_meant = sequence == u64::MAX || vertex.progress == sequence;
+            if vertex.dag == dag && vertex.phase == InstancePhase::Waiting && is_meant {
+                self.cancel_wait(number);
+            }
+        }
+    }
+
+    /// Cancels a waiting instance, whose job is cut.
+    fn cancel_wait(&mut self, number: u32) {
         let place = self.waits.place(number);
         self.timers.remove(self.dags.len() + place);
         self.quiet_until_ns = earliest_ns(&self.timers);

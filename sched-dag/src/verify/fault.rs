@@ -14,7 +14,7 @@ use super::label::{
 };
 use crate::ids::ClusterId;
 use crate::policy::Priority;
-use crate::spec::{MOST_WAITS, STACK_BYTES};
+use crate::spec::{MOST_WAITS, STACK_BYTES, WAITS};
 use crate::{MAX_ARITY, worded};
 
 worded! {
@@ -177,7 +177,8 @@ worded! {
              each, or to none";
         /// More waits of a subtask than are told apart.
         TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
-            "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; split it";
+            "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; {}",
+            if WAITS { "split it" } else { "build it with `fass`' feature `waits`" };
         /// A stack that is too small or too large.
         StackOutOfRange { dag: DagLabel, subtask: SubtaskLabel, bytes: u64 } =
             "stack_out_of_range",

@@ -10,7 +10,7 @@ use crate::ids::SubtaskId;
 use crate::order::sort_by_key;
 use crate::policy::Priority;
 use crate::priorities::ranks;
-use crate::spec::DagSpec;
+use crate::spec::{DagSpec, WAITS};
 use crate::task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
@@ -97,7 +97,9 @@ fn build_dag(
         .map(|(index, subtask)| Subtask {
             name: subtask.name.clone(),
             wcet_ns: subtask.wcet_ns,
-            waits: subtask.waits.clone(),
+            waits: WAITS
+                .then(|| subtask.waits.as_slice().into())
+                .unwrap_or_default(),
             wcet_source: match (subtask.wcet_ns, subtask.wcet_margin_percent) {
                 (None, _) => WcetSource::None,
                 (_, None) => WcetSource::Stated,

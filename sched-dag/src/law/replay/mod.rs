@@ -37,7 +37,7 @@ use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind};
 use crate::policy::OnFault;
-use crate::spec::Wait;
+use crate::spec::{WAITS, Wait};
 use crate::task_set::TaskSet;
 use jobs::JobState;
 
@@ -338,13 +338,11 @@ fn is_allowed(stage: DispatchState, event: &Event) -> bool {
         (DispatchState::Absent, EventKind::Ready | EventKind::Cancelled)
         | (DispatchState::Ready, EventKind::Start | EventKind::Cancelled)
         | (DispatchState::Suspended, EventKind::Resume)
-        | (DispatchState::Waiting, EventKind::Wake | EventKind::Cancelled)
         // Whichever core finds the fault, or ends the DAG, ends the instance.
         | (DispatchState::Running(_) | DispatchState::Suspended, EventKind::Ended) => true,
-        (
-            DispatchState::Running(core),
-            EventKind::Suspend | EventKind::Wait | EventKind::Finish,
-        ) => core == event.core,
+        (DispatchState::Running(core), EventKind::Suspend | EventKind::Finish) => core == event.core,
+        (DispatchState::Running(core), EventKind::Wait) => WAITS && core == event.core,
+        (DispatchState::Waiting, EventKind::Wake | EventKind::Cancelled) => WAITS,
         _ => false,
     }
 }
@@ -403,7 +401,7 @@ impl JournalReplay<'_> {
         let ready_ns = life.ready.map(|ready| ready.time_ns);
         let out_of_turn = life.note(event, moment);
         let stated = task_set.dag(instance.dag).subtask(instance.subtask).waits();
-        let waited = life.wait(event, stated, terms);
+        let waited = WAITS.then(|| life.wait(event, stated, terms)).flatten();
         self.found.extend(out_of_turn);
         self.found.extend(waited.filter(|_| !is_partial));
         let event = *event;

@@ -4,7 +4,7 @@ use common::random::Random;
 use sched_dag::lifecycle::WaitId;
 use sched_dag::{
     Activation, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
-    Priority, SchedulerOptions, SubtaskSpec, Wait, Waits,
+    Priority, SchedulerOptions, SubtaskSpec, Wait,
 };
 
 use super::shuffled_edges;
@@ -214,7 +214,7 @@ impl Set {
     /// Returns it with subtasks that do not wait.
     pub(crate) fn without_waits(mut self) -> Self {
         let subtasks = self.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
-        subtasks.for_each(|subtask| subtask.waits = Waits::default());
+        subtasks.for_each(|subtask| subtask.waits.clear());
         self
     }
 
