@@ -194,14 +194,15 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         // Before the scheduler knows: a latest value is there when a successor of this instance
         // starts.
         if body.has_effects() {
-            let limit_ns;
-            (body, limit_ns) = self.publish(vertex, body, finish_ns, port);
-            if WAITS && let Some(limit_ns) = limit_ns {
-                return self.wait((core, vertex), body, (finish_ns, limit_ns), is_alone, port);
-            }
+            body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         }
         // Something else belongs to this instant, so the whole step has to be taken.
         if !is_alone || !self.requests.are_none() {
+            if WAITS && let Some(limit_ns) = self.take_wait(vertex, finish_ns) {
+                // Asked here, so that the port need not lie in memory for those that do not wait.
+                let is_alone = is_alone && !port.has_letters();
+                return self.wait((core, vertex), body, (finish_ns, limit_ns), is_alone, port);
+            }
             let instance = self.scheduler.instance_of(vertex);
             self.placement.finish(core.index(), vertex, body);
             let limit_ns = None;
@@ -261,8 +262,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         port: &mut C,
     ) -> NextAction<B> {
         port.wait(core, &mut body, ended_ns);
-        let is_alone = is_alone && !C::ANSWERS_AT_ONCE && self.requests.are_none();
-        let done = match is_alone && !port.has_letters() {
+        let done = match is_alone && !C::ANSWERS_AT_ONCE && self.requests.are_none() {
             true => (self.scheduler).wait_shortly(ended_ns, core, vertex, limit_ns),
             false => None,
         };
@@ -316,8 +316,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         (finish_ns, now_ns): (u64, u64),
         port: &mut impl PlatformPort<B>,
     ) {
-        let (mut body, limit_ns) = self.publish(vertex, body, finish_ns, port);
+        let mut body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         let instance = self.scheduler.instance_of(vertex);
+        let limit_ns = self.take_wait(vertex, finish_ns);
         match limit_ns {
             Some(_) if WAITS => {
                 port.wait(core, &mut body, finish_ns);
@@ -328,6 +329,15 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let turn = TurnEnd { instance, limit_ns };
         // By the whole step: its core runs something else by now, so it passes on to nobody.
         self.step((now_ns, core), port, |moment| moment.end_turn(turn));
+    }
+
+    /// Takes the request of a turn that has ended in a wait, and returns the limit of that.
+    #[inline]
+    fn take_wait(&mut self, vertex: Vertex, now_ns: u64) -> Option<u64> {
+        let release_ns = || self.scheduler.release_ns(vertex);
+        WAITS
+            .then(|| self.requests.take_wait(now_ns, release_ns))
+            .flatten()
     }
 
     /// Returns the cost of a fault of the vertex' instance if it comes now.
@@ -440,27 +450,14 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         self.placement.suspend(vertex, parked)
     }
 
-    /// Publishes the effects of a turn, and returns the limit of the wait in which it has ended, if
-    /// it has. A body that goes and comes stays in a register.
+    /// A body that goes and comes stays in a register.
     #[inline]
-    fn publish(
-        &mut self,
-        vertex: Vertex,
-        mut body: B,
-        ended_ns: u64,
-        port: &impl PlatformPort<B>,
-    ) -> (B, Option<u64>) {
-        let (scheduler, requests) = (&self.scheduler, &mut self.requests);
-        let mut limit_ns = None;
-        body.complete(port.on_clock(ended_ns), &mut |request| match request {
-            Request::Wait(ns) if WAITS => limit_ns = Some(ns),
-            Request::WaitUntil(ns) if WAITS => {
-                let until_ns = scheduler.release_ns(vertex).saturating_add(ns);
-                limit_ns = Some(until_ns.saturating_sub(ended_ns));
-            }
+    fn publish(requests: &mut PendingRequests, mut body: B, finish_ns: u64) -> B {
+        body.complete(finish_ns, &mut |request| match request {
+            Request::Wait(_) | Request::WaitUntil(_) if WAITS => requests.keep_wait(request),
             _ => requests.keep(request),
         });
-        (body, limit_ns)
+        body
     }
 
     #[inline]

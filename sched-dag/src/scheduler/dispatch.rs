@@ -37,6 +37,10 @@
 //! idle last is taken first. Virtual time goes either way, the short one where
 //! exactly one instance finishes; so its tests hold both to one law.
 //!
+//! A wait ends a turn by the same short way ([`Scheduler::wait_shortly`]). One of no time makes its
+//! own instance ready, and no other. A limit that comes while a core is idle concerns that core
+//! ([`Scheduler::wake_shortly`]).
+//!
 //! # The cores
 //!
 //! Idle cores form a stack: the core that has become idle last is taken first.

@@ -155,7 +155,8 @@ impl Scheduler {
         } else {
             // W4: it ends where it begins, and then competes for its own core.
             self.waits.latest[place].has_timed_out = true;
-            if self.ready.peek().is_none_or(|first| key < first) {
+            let is_first = |first| key < first;
+            if self.ready.is_empty() || self.ready.peek().is_none_or(is_first) {
                 let what = EventKind::Resume;
                 let decision = Decision {
                     what,

@@ -105,8 +105,8 @@ fn a_wait_costs_no_step_of_the_scheduler() {
     let outcome = Guest::test("waits_cost").succeed();
     let lines = outcome.lines("waits_cost");
     assert_eq!(lines.len(), 2);
-    // That which takes time begins and ends by an interrupt's context switch.
-    for (line, (word, most)) in lines.iter().zip([("at_once", 600), ("later", 1_200)]) {
+    // One that takes time ends by the timer's interrupt, which two context switches frame.
+    for (line, (word, most)) in lines.iter().zip([("at_once", 560), ("later", 1_160)]) {
         line.reads([("wait", word)]);
         line.has([("allocations", 0)]);
         let instructions = line.number("instructions");
