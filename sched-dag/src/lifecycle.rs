@@ -156,6 +156,12 @@ impl PendingRequests {
         }
     }
 
+    /// Keeps the request of a turn that ends in a wait, which is [taken](Self::take_wait) at once.
+    #[inline]
+    pub(crate) fn keep_wait(&mut self, request: Request) {
+        self.kept.push(request);
+    }
+
     /// Reports whether none is on its way: then a completion may be all of a step.
     #[inline]
     #[must_use]
@@ -165,6 +171,7 @@ impl PendingRequests {
 
     /// Takes the latest request, if it is for a wait, and returns the limit of that, which begins
     /// now. The time of the job's release is asked for if the wait is until an instant of it.
+    #[inline]
     pub(crate) fn take_wait(
         &mut self,
         now_ns: u64,

@@ -494,6 +494,7 @@ impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
         EventKind::Completed,
     ];
     const SUSPENDS_LATER: bool = false;
+    const ANSWERS_AT_ONCE: bool = true;
 
     fn now_ns(&self) -> u64 {
         self.now_ns

@@ -160,6 +160,7 @@ impl TurnState {
     }
 
     /// Begins the next wait.
+    #[inline(always)]
     pub(crate) fn begin(&self, end: WaitEnd) {
         let number = self.begun.load(Ordering::Relaxed);
         let stated = self.limits_ns.len();

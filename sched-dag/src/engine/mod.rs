@@ -198,8 +198,15 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         // Something else belongs to this instant, so the whole step has to be taken.
         if !is_alone || !self.requests.are_none() {
-            let turn = self.end_turn((core, vertex), body, finish_ns, port);
-            return NextAction::Step(Some(turn));
+            if WAITS && let Some(limit_ns) = self.take_wait(vertex, finish_ns) {
+                // Asked here, so that the port need not lie in memory for those that do not wait.
+                let is_alone = is_alone && !port.has_letters();
+                return self.wait((core, vertex), body, (finish_ns, limit_ns), is_alone, port);
+            }
+            let instance = self.scheduler.instance_of(vertex);
+            self.placement.finish(core.index(), vertex, body);
+            let limit_ns = None;
+            return NextAction::Step(Some(TurnEnd { instance, limit_ns }));
         }
         let (done, is_unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
         if let HandOff::To(next, decision) = done {
@@ -242,35 +249,62 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         NextAction::Look { is_rescheduled }
     }
 
-    /// Takes back the body of an instance whose turn has ended on a core, and tells which way.
-    fn end_turn<C: PlatformPort<B>>(
-        &mut self,
-        (core, vertex): (CoreId, Vertex),
-        body: B,
-        finish_ns: u64,
-        port: &mut C,
-    ) -> TurnEnd {
-        let instance = self.scheduler.instance_of(vertex);
-        let limit_ns = self.take_wait(vertex, finish_ns);
-        match limit_ns {
-            None => self.placement.finish(core.index(), vertex, body),
-            Some(_) => self.put_to_wait((core, vertex), body, finish_ns, port),
-        }
-        TurnEnd { instance, limit_ns }
-    }
-
-    /// Takes back the body of an instance that waits. Apart, as most sets have none.
+    /// Takes note that the turn of a core's instance has ended in a wait, which may be all of the
+    /// instant, too. Apart, as most sets have none.
     #[cold]
     #[inline(never)]
-    fn put_to_wait(
+    fn wait<C: PlatformPort<B>>(
         &mut self,
         (core, vertex): (CoreId, Vertex),
         mut body: B,
-        ended_ns: u64,
-        port: &mut impl PlatformPort<B>,
-    ) {
+        (ended_ns, limit_ns): (u64, u64),
+        is_alone: bool,
+        port: &mut C,
+    ) -> NextAction<B> {
         port.wait(core, &mut body, ended_ns);
+        let done = match is_alone && !C::ANSWERS_AT_ONCE && self.requests.are_none() {
+            true => (self.scheduler).wait_shortly(ended_ns, core, vertex, limit_ns),
+            false => None,
+        };
+        if let Some(HandOff::To(next, _)) = done
+            && next == vertex
+        {
+            body.wake(true);
+            let (log, subject) = (&mut self.scheduler.log, body.subject());
+            let wait = (EventKind::Wait, ended_ns, subject);
+            let wake = (EventKind::Wake, log.now_ns(), subject);
+            let resume = (EventKind::Resume, port.proceed(core, &mut body), subject);
+            log.journal.write_all(core, [wait, wake, resume]);
+            return NextAction::Run(body);
+        }
         self.placement.wait(core.index(), vertex, body);
+        match done {
+            None => {
+                let instance = self.scheduler.instance_of(vertex);
+                let limit_ns = Some(limit_ns);
+                return NextAction::Step(Some(TurnEnd { instance, limit_ns }));
+            }
+            Some(HandOff::To(next, _)) => self.placement.set_target(core, Some(next)),
+            Some(HandOff::Idle | HandOff::Open) => {}
+        }
+        let is_rescheduled = self.scheduler.log.take_job_event();
+        NextAction::Look { is_rescheduled }
+    }
+
+    /// Ends the wait whose limit has come, at an instant and on a core, and gives its instance an
+    /// idle core. Reports whether that is all of the instant; if not, the step has to be taken.
+    #[inline]
+    pub fn wake(&mut self, (now_ns, here): (u64, CoreId), port: &mut impl PlatformPort<B>) -> bool {
+        let is_alone = WAITS && self.requests.are_none() && !port.has_letters();
+        let woken = match is_alone {
+            true => self.scheduler.wake_shortly(now_ns, here),
+            false => None,
+        };
+        if let Some((core, vertex)) = woken {
+            self.placement.set_target(core, Some(vertex));
+            port.retarget(core);
+        }
+        woken.is_some()
     }
 
     /// Takes note that a turn of an instance has ended that no core has any more; it ran last on
@@ -282,12 +316,15 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         (finish_ns, now_ns): (u64, u64),
         port: &mut impl PlatformPort<B>,
     ) {
-        let body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
+        let mut body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         let instance = self.scheduler.instance_of(vertex);
         let limit_ns = self.take_wait(vertex, finish_ns);
         match limit_ns {
-            None => self.placement.finish_parked(vertex, body),
-            Some(_) => self.put_to_wait((core, vertex), body, finish_ns, port),
+            Some(_) if WAITS => {
+                port.wait(core, &mut body, finish_ns);
+                self.placement.wait(core.index(), vertex, body);
+            }
+            _ => self.placement.finish_parked(vertex, body),
         }
         let turn = TurnEnd { instance, limit_ns };
         // By the whole step: its core runs something else by now, so it passes on to nobody.
@@ -295,6 +332,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     }
 
     /// Takes the request of a turn that has ended in a wait, and returns the limit of that.
+    #[inline]
     fn take_wait(&mut self, vertex: Vertex, now_ns: u64) -> Option<u64> {
         let release_ns = || self.scheduler.release_ns(vertex);
         WAITS
@@ -415,7 +453,10 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     /// A body that goes and comes stays in a register.
     #[inline]
     fn publish(requests: &mut PendingRequests, mut body: B, finish_ns: u64) -> B {
-        body.complete(finish_ns, &mut |request| requests.keep(request));
+        body.complete(finish_ns, &mut |request| match request {
+            Request::Wait(_) | Request::WaitUntil(_) if WAITS => requests.keep_wait(request),
+            _ => requests.keep(request),
+        });
         body
     }
 
@@ -596,6 +637,10 @@ pub trait PlatformPort<B> {
 
     /// Whether a core gives up what it runs some time after it was asked to.
     const SUSPENDS_LATER: bool = true;
+
+    /// Whether a wait may have its answer at the instant at which it begins: then the instant is
+    /// not over by that.
+    const ANSWERS_AT_ONCE: bool = false;
 
     /// Returns the time, in nanoseconds since the run's epoch.
     fn now_ns(&self) -> u64;

@@ -25,8 +25,8 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::vertices::InstancePhase;
-use super::{Scheduler, earliest_ns};
-use crate::ids::{DagId, Instance, Vertex};
+use super::{Decision, HandOff, Scheduler, earliest_ns};
+use crate::ids::{CoreId, DagId, Instance, Vertex};
 use crate::journal::EventKind;
 use crate::request::WaitId;
 use crate::spec::WAITS;
@@ -78,9 +78,23 @@ impl WaitTable {
         if WAITS { self.vertices.len() } else { 0 }
     }
 
+    #[inline]
     fn place(&self, vertex: u32) -> usize {
         let place = self.vertices.binary_search(&vertex);
         place.expect("the subtask states its waits")
+    }
+
+    /// Gives a number to the wait that an instance begins, and returns where that of its vertex is.
+    #[inline]
+    fn begin(&mut self, vertex: u32, job: u64) -> usize {
+        let place = self.place(vertex);
+        let latest = &mut self.latest[place];
+        latest.number = match latest.job == job {
+            true => latest.number + 1,
+            false => 0,
+        };
+        latest.job = job;
+        place
     }
 }
 
@@ -91,26 +105,105 @@ impl Scheduler {
     pub(super) fn begin_wait(&mut self, instance: Instance, limit_ns: u64) {
         let number = self.take_off(instance, "waits");
         let vertex = self.vertices.get_mut(number);
-        let sequence = vertex.progress;
         vertex.phase = InstancePhase::Waiting;
-        let place = self.waits.place(number);
-        let latest = &mut self.waits.latest[place];
-        let is_first = latest.job != instance.job;
-        latest.number = if is_first { 0 } else { latest.number + 1 };
-        latest.job = instance.job;
+        let jobs = &self.dags[vertex.dag.index()].jobs;
+        let is_cut = jobs.job(vertex.progress).cut.is_some();
+        let place = self.waits.begin(number, instance.job);
         // W6: nothing is left for which it could be worth waiting.
-        if self.dags[instance.dag.index()]
-            .jobs
-            .job(sequence)
-            .cut
-            .is_some()
-        {
+        if is_cut {
             self.cancel_wait(number);
             self.end_all();
             return;
         }
+        self.set_limit(place, limit_ns);
+    }
+
+    /// Begins the wait of the instance which `core` has been given last, whose turn has ended at
+    /// `now_ns`, and gives the core the first in line. `None`, and nothing is changed, if more is to
+    /// be decided at this instant (the module `dispatch` says what may be): then the driver ends the
+    /// turn, and the instant, as ever. A time earlier than one before counts as that one.
+    ///
+    /// If the core goes on with the instance, as its wait is of no time and it is the first in line,
+    /// neither the wait nor its end is written down. No answer may come at this instant.
+    ///
+    /// # Panics
+    ///
+    /// If the subtask states no waits.
+    #[inline]
+    pub fn wait_shortly(
+        &mut self,
+        now_ns: u64,
+        core: CoreId,
+        vertex: Vertex,
+        limit_ns: u64,
+    ) -> Option<HandOff> {
+        let instant_ns = self.log.now_ns.max(now_ns);
+        let waiting = self.vertices.get_mut(vertex.0);
+        let job = self.dags[waiting.dag.index()].jobs.job(waiting.progress);
+        let is_alone = self.fresh == 0 && instant_ns < self.quiet_until_ns && job.cut.is_none();
+        if !is_alone || waiting.phase != InstancePhase::Running(core) {
+            return None;
+        }
+        let (key, instance) = (self.cores.running(core)?, waiting.present_instance());
+        let place = self.waits.begin(vertex.0, instance.job);
+        (self.log.now_ns, self.log.here) = (instant_ns, core);
+        let limit_ns = now_ns.saturating_add(limit_ns);
+        if limit_ns > instant_ns {
+            waiting.phase = InstancePhase::Waiting;
+            self.log.on_this(EventKind::Wait, now_ns, instance);
+            self.set_limit(place, limit_ns);
+        } else {
+            // W4: it ends where it begins, and then competes for its own core.
+            self.waits.latest[place].has_timed_out = true;
+            let is_first = |first| key < first;
+            if self.ready.is_empty() || self.ready.peek().is_none_or(is_first) {
+                let what = EventKind::Resume;
+                let decision = Decision {
+                    what,
+                    core,
+                    instance,
+                };
+                return Some(HandOff::To(vertex, decision));
+            }
+            waiting.phase = InstancePhase::Preempted;
+            self.log.on_this(EventKind::Wait, now_ns, instance);
+            self.log.of_instance(EventKind::Wake, instance);
+            self.ready.insert(key);
+        }
+        let done = self.give_first(core);
+        if done == HandOff::Idle {
+            self.cores.free(core);
+        }
+        Some(done)
+    }
+
+    /// Ends the wait whose limit comes first, if it has come by `now_ns`, and gives its instance an
+    /// idle core. `None` if that is not all of the instant, of which this may be a part: the step
+    /// is to be taken as ever. No request is to be served.
+    #[inline]
+    pub fn wake_shortly(&mut self, now_ns: u64, here: CoreId) -> Option<(CoreId, Vertex)> {
+        let (limit_ns, timer) = self.timers.peek()?;
+        let place = timer.checked_sub(self.dags.len())?;
+        // Where a core is idle, nothing is in line.
+        if self.fresh != 0 || limit_ns > now_ns || !self.cores.any_idle() {
+            return None;
+        }
+        (self.log.now_ns, self.log.here) = (self.log.now_ns.max(now_ns), here);
+        self.end_wait(place, true);
+        if self.log.now_ns >= self.quiet_until_ns {
+            return None;
+        }
+        self.fresh = 0;
+        let (key, core) = (self.ready.pop()?, self.cores.take_idle()?);
+        let _ = self.give(core, key);
+        Some((core, Vertex(key.vertex())))
+    }
+
+    #[inline]
+    fn set_limit(&mut self, place: usize, limit_ns: u64) {
         self.timers.set(self.dags.len() + place, limit_ns);
-        self.quiet_until_ns = earliest_ns(&self.timers);
+        self.quiet_until_ns = self.quiet_until_ns.min(limit_ns);
+        self.log.has_job_event = true;
     }
 
     /// Takes the answer for a wait (W7).
@@ -128,7 +221,7 @@ impl Scheduler {
 
     /// Ends the wait whose limit has come, by the number of its timer behind those of the DAGs.
     #[cold]
-    #[inline(never)]
+    #[inline]
     pub(super) fn time_out(&mut self, timer: usize) {
         self.end_wait(timer - self.dags.len(), true);
     }
@@ -144,6 +237,7 @@ impl Scheduler {
     }
 
     /// Makes a waiting instance eligible again (W2).
+    #[inline]
     fn end_wait(&mut self, place: usize, has_timed_out: bool) {
         let number = self.waits.vertices[place];
         self.waits.latest[place].has_timed_out = has_timed_out;

@@ -127,15 +127,16 @@ fn a_function_waits_until_its_bytes_have_gone_and_for_those_that_come() {
 /// The instructions that a wait and its wake add to an instance which has the machine for itself,
 /// the function's own included; and for one that takes time, how late it goes on.
 #[test]
-fn a_wait_costs_two_steps_of_the_scheduler() {
+fn a_wait_costs_no_step_of_the_scheduler() {
     let outcome = Guest::test("waits_cost").succeed();
     let lines = outcome.lines("waits_cost");
     assert_eq!(lines.len(), 2);
-    for (line, word) in lines.iter().zip(["at_once", "later"]) {
+    // One that takes time ends by the timer's interrupt, which two context switches frame.
+    for (line, (word, most)) in lines.iter().zip([("at_once", 560), ("later", 1_160)]) {
         line.reads([("wait", word)]);
         line.has([("allocations", 0)]);
         let instructions = line.number("instructions");
-        assert!((1..=1_600).contains(&instructions), "{}", line.text);
+        assert!((1..=most).contains(&instructions), "{}", line.text);
     }
 }
 

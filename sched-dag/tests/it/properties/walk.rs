@@ -6,8 +6,9 @@
 //! journal is judged by the law ([`Walk::judged`]); what that does not judge, by [`Releases`] and,
 //! of waits, by [`Waits`], after each instant.
 //!
-//! Each end that is the last thing of an instant is told by [`Scheduler::pass_on`], and the long way
-//! by a copy, too: both have to come to the same.
+//! Each end that is the last thing of an instant is told by [`Scheduler::pass_on`], or
+//! [`Scheduler::wait_shortly`], and the long way by a copy, too: both have to come to the same. So
+//! have [`Scheduler::wake_shortly`] and a dispatch.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -113,15 +114,17 @@ impl<'s> Walk<'s> {
         let mut decisions = None;
         for (number, &step) in (1..).zip(steps) {
             match step {
-                Step::Complete(instance) if number == steps.len() && !self.waits_next(instance) => {
+                Step::Complete(instance) if number == steps.len() => {
                     decisions = Some(self.pass_on(instance)?);
                 }
                 step => self.take(step),
             }
             self.hear(decisions.is_some())?;
         }
-        let end = |scheduler: &mut Scheduler| scheduler.at(now_ns).dispatch().to_vec();
-        let decisions = decisions.unwrap_or_else(|| end(&mut self.scheduler));
+        let decisions = match decisions {
+            Some(decisions) => decisions,
+            None => self.end()?,
+        };
         self.hear(true)?;
         self.carry_out(&decisions)?;
         for (core, running) in (0..).map(CoreId).zip(&self.cores) {
@@ -192,11 +195,6 @@ impl<'s> Walk<'s> {
         }
     }
 
-    /// Reports whether the instance's turn ends in a wait.
-    fn waits_next(&self, instance: Instance) -> bool {
-        self.waits.next_limit_ns(self.set, instance).is_some()
-    }
-
     /// Takes an instance from its core, or from what has lost its core. Returns the core.
     fn leave(&mut self, instance: Instance) -> CoreId {
         let mut cores = (0..).map(CoreId).zip(&mut self.cores);
@@ -211,18 +209,34 @@ impl<'s> Walk<'s> {
         core
     }
 
-    /// Completes an instance and ends the instant by the short way; and, on copies, by the long
+    /// Ends a turn of an instance, and the instant, by the short way; and, on copies, by the long
     /// one, and by the short one of a core that does not run it any more.
     fn pass_on(&mut self, instance: Instance) -> Result<Vec<Decision>, String> {
         let core = self.leave(instance);
+        let limit_ns = self.waits.begin(self.set, instance, self.now_ns);
+        let turn = TurnEnd { instance, limit_ns };
         let mut long = self.scheduler.clone();
         long.log.here = core;
-        long.at(self.now_ns).complete(instance);
+        long.at(self.now_ns).end_turn(turn);
         let expected = long.at(self.now_ns).dispatch().to_vec();
         let mut elsewhere = self.scheduler.clone();
         let other = CoreId(instance.subtask.0 % self.set.options.cores);
-        end_shortly(&mut elsewhere, self.now_ns, other, instance);
-        let decisions = end_shortly(&mut self.scheduler, self.now_ns, core, instance);
+        if end_shortly(&mut elsewhere, self.now_ns, other, turn).is_none() {
+            let _ = elsewhere.at(self.now_ns).dispatch();
+        }
+        let decisions = match end_shortly(&mut self.scheduler, self.now_ns, core, turn) {
+            Some((decisions, goes_on)) => {
+                if goes_on {
+                    let now_ns = (self.now_ns, false);
+                    self.waits.takes(EventKind::Wake, instance, now_ns, false);
+                }
+                decisions
+            }
+            None => {
+                self.hear(false)?;
+                self.scheduler.at(self.now_ns).dispatch().to_vec()
+            }
+        };
         if seen(&elsewhere) != seen(&long) || seen(&self.scheduler) != seen(&long) {
             return Err(format!("the short way of {instance:?} is not the long one"));
         }
@@ -231,6 +245,25 @@ impl<'s> Walk<'s> {
             false => Err(format!(
                 "the short way comes to {decisions:?}, not {expected:?}"
             )),
+        }
+    }
+
+    /// Ends the instant, and, on a copy, by the short way of a wait whose limit has come.
+    fn end(&mut self) -> Result<Vec<Decision>, String> {
+        let (now_ns, mut shortly) = (self.now_ns, self.scheduler.clone());
+        let woken = shortly.wake_shortly(now_ns, shortly.log.here);
+        let found = match woken {
+            Some((core, vertex)) => vec![Decision {
+                what: EventKind::Resume,
+                core,
+                instance: shortly.instance_of(vertex),
+            }],
+            None => shortly.at(now_ns).dispatch().to_vec(),
+        };
+        let decisions = self.scheduler.at(now_ns).dispatch().to_vec();
+        match found == decisions && seen(&shortly) == seen(&self.scheduler) {
+            true => Ok(decisions),
+            false => Err(format!("the short way wakes {found:?}, not {decisions:?}")),
         }
     }
 
@@ -370,21 +403,40 @@ fn is_of_lateness(violation: &Violation) -> bool {
     }
 }
 
-/// Ends an instance by the short way, and the instant.
+/// Ends a turn by the short way, and the instant if that is all of it. Reports also whether the core
+/// goes on with the instance after a wait of which the scheduler has written nothing down.
 fn end_shortly(
     scheduler: &mut Scheduler,
     now_ns: u64,
     core: CoreId,
-    instance: Instance,
-) -> Vec<Decision> {
-    let vertex = scheduler.vertex(instance);
-    match pass_on(scheduler, now_ns, core, vertex) {
+    turn: TurnEnd,
+) -> Option<(Vec<Decision>, bool)> {
+    let vertex = scheduler.vertex(turn.instance);
+    let done = match turn.limit_ns {
+        None => pass_on(scheduler, now_ns, core, vertex),
+        Some(limit_ns) => match scheduler.wait_shortly(now_ns, core, vertex, limit_ns) {
+            Some(done) => done,
+            None => {
+                scheduler.log.here = core;
+                scheduler.at(now_ns).end_turn(turn);
+                HandOff::Open
+            }
+        },
+    };
+    match done {
         HandOff::To(next, decision) => {
             assert_eq!(scheduler.vertex(decision.instance), next);
-            vec![decision]
+            let goes_on = next == vertex && turn.limit_ns.is_some();
+            for what in [EventKind::Wait, EventKind::Wake] {
+                if goes_on {
+                    let log = &mut scheduler.log;
+                    log.on_core(core, what, now_ns, turn.instance);
+                }
+            }
+            Some((vec![decision], goes_on))
         }
-        HandOff::Idle => Vec::new(),
-        HandOff::Open => scheduler.at(now_ns).dispatch().to_vec(),
+        HandOff::Idle => Some((Vec::new(), false)),
+        HandOff::Open => None,
     }
 }
 

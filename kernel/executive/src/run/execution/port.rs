@@ -61,6 +61,7 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
         };
     }
 
+    #[inline]
     fn proceed(&mut self, _: CoreId, loan: &mut RunnerLoan) -> u64 {
         begin_turn(loan, loan.budget_left_ns)
     }

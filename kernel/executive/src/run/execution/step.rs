@@ -75,6 +75,18 @@ impl ClusterRun {
         self.end_step(now_ns, woken);
     }
 
+    /// Ends the wait whose limit has come, if that is all of a step, and reports whether it is.
+    #[inline]
+    fn wake(&mut self, now_ns: u64, woken: &mut CoreSet) -> bool {
+        let (may_hand_off, instant) = (self.may_hand_off, (since_epoch(now_ns), here()));
+        let (engine, mut port) = self.parts(woken);
+        let is_all = may_hand_off && engine.wake(instant, &mut port);
+        if is_all {
+            self.announce(woken);
+        }
+        is_all
+    }
+
     #[inline]
     fn end_step(&mut self, now_ns: u64, woken: &mut CoreSet) {
         // What happens before time 0 releases nothing yet.
@@ -321,7 +333,7 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
         return;
     };
     let mut woken = CoreSet::default();
-    if is_event || cluster.may_have_letters() {
+    if (is_event || cluster.may_have_letters()) && !execution.wake(now_ns, &mut woken) {
         execution.step(now_ns, &mut woken, |_| ());
     }
     if !section::puts_off(core, now_ns)
