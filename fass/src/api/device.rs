@@ -428,6 +428,7 @@ impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A
         let cell = self.0.0;
         let mut draft = dag.draft.borrow_mut();
         let id = SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX));
+        // A fault of the commit, as all are, and not a panic where the subtask is registered.
         if !cell.asking.set((Arc::clone(&draft.target), id)) {
             draft.asked_twice.push((subtask, cell.name.clone()));
         }
@@ -498,6 +499,7 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
         let this = self.get_mut();
         let answers = this.cell.answers.get();
+        // No question leaves in a replay: what it may set off happened in the recorded run.
         if let Some(answers) = answers.filter(|answers| answers.replays()) {
             return this.replay(&**answers, context);
         }
@@ -505,6 +507,7 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
         let Some(wait) = this.wait.id() else {
             return Poll::Pending;
         };
+        // Staged only: it goes out at the end of this turn, when nothing of it can fail any more.
         if let Some(question) = this.question.take() {
             this.number = this.cell.stage(wait, question);
         }
@@ -513,6 +516,7 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
             let is_there =
                 this.number > 0 && (!has_timed_out || cell.is_at_once.load(Ordering::Relaxed));
             let answer = is_there.then(|| cell.take_answer(this.number));
+            // That there was none in time is an answer, too, without which a replay would differ.
             if let Some(answers) = answers.filter(|answers| answers.is_open()) {
                 answers.keep(wait, cell.took_ns.load(Ordering::Relaxed), answer.as_ref());
             }
@@ -528,6 +532,7 @@ impl<Q, A> PendingAnswer<'_, Q, A> {
         answers: &dyn AnyAnswers<A>,
         context: &Context<'_>,
     ) -> Poll<Result<A, TimedOut>> {
+        // It is looked up before the wait begins, whose end depends on it.
         let next = self.wait.next_id(context);
         if let Some((took_ns, Some(answer))) = next.and_then(|wait| answers.recorded(wait)) {
             self.recorded = Some(answer);
@@ -561,6 +566,7 @@ impl<Q, A> DeviceDriver<Q, A> {
             return None;
         }
         let is_it = |question: &mut Question<Q>| question.number == number;
+        // The other place is of a question that is staged, or was given up.
         let mut places = self.cell.questions.iter();
         let found = places.find_map(|place| place.change()?.take_if(is_it))?;
         self.taken = number;
@@ -615,6 +621,7 @@ impl<Q, A> DeviceDriver<Q, A> {
             cell.took_ns.store(took_ns, Ordering::Relaxed);
         }
         let decided = cell.decide(ticket.number);
+        // Once for each question: whoever decides it first tells the scheduler, or nobody does.
         if decided {
             platform.answer(ticket.plan, ticket.wait);
         }

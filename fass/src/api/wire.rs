@@ -33,7 +33,7 @@ use alloc::sync::Arc;
 use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use sched_dag::DagId;
+use sched_dag::{DagId, WAITS};
 
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
@@ -270,7 +270,7 @@ impl Wire {
     /// For platforms, which have one place that calls this. It may be an interrupt handler.
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
         let is_whole = self.shared.incoming.arrive(bytes, now_ns);
-        if let Some(tell) = self.shared.on_packet.get().filter(|_| is_whole) {
+        if let Some(tell) = self.shared.on_packet.get().filter(|_| WAITS && is_whole) {
             tell();
         }
         let signal = self.shared.signal.get().filter(|_| is_whole)?;
@@ -292,7 +292,12 @@ impl Wire {
     pub fn depart(&self) -> Option<u8> {
         let outgoing = &self.shared.outgoing;
         let byte = outgoing.take_byte()?;
-        if let Some(tell) = self.shared.on_gone.get().filter(|_| outgoing.is_empty()) {
+        if let Some(tell) = self
+            .shared
+            .on_gone
+            .get()
+            .filter(|_| WAITS && outgoing.is_empty())
+        {
             tell();
         }
         Some(byte)

@@ -76,6 +76,7 @@ impl Wire {
         T: Send + Sync + 'static,
     {
         self.claim_in();
+        // Packets stay where they arrive; the device only says when there is one.
         let (device, driver) = create_device(self.name());
         let input = &self.shared.incoming;
         driver.answer_from(Packets {

@@ -77,6 +77,7 @@ impl RecordedAnswers {
 
 impl JobAnswers {
     fn add<A: Recordable>(&mut self, (job, number): (u64, u32), ns: u64, answer: Option<&A>) {
+        // Answers of a job that was cut are given up with the first of the next one.
         if self.job != job {
             (self.job, self.count, self.length) = (job, 0, 0);
         }
@@ -88,6 +89,7 @@ impl JobAnswers {
         self.count += 1;
         match out.finish() {
             Ok(count) => self.length += count,
+            // Then the whole value is too long for its line, which counts it as lost.
             Err(Full { .. }) => self.length = self.bytes.len(),
         }
     }

@@ -142,6 +142,7 @@ impl TurnState {
     }
 
     pub(crate) fn start(&self, job: u64) {
+        // An instance before it may have been cancelled, or have failed, at any of its waits.
         self.job.store(job, Ordering::Relaxed);
         self.begun.store(0, Ordering::Relaxed);
         self.asks.store(NONE, Ordering::Relaxed);
@@ -209,6 +210,7 @@ impl TurnState {
         if self.is_asking() {
             WaitFault::NotAwaited.raise()
         }
+        // Fewer would be harmless to the bound, but a replay and the law count on each.
         let (taken, stated) = (self.begun.load(Ordering::Relaxed), self.limits_ns.len());
         if (taken as usize) < stated {
             WaitFault::LeftOut { taken, stated }.raise()
@@ -219,6 +221,7 @@ impl TurnState {
     /// Takes a turn of a job whose function is not called, and reports whether it is the last one:
     /// each stated wait is taken, for no time.
     pub(crate) fn pass(&self, job: u64) -> bool {
+        // The job's first turn is told by the job alone, as in a turn that calls the function.
         if !self.is_of(job) {
             self.start(job);
         }
@@ -273,6 +276,7 @@ impl Effect for TurnEffects {
                 real.for_each(|effect| effect.happen(completed_ns, ask));
             }
             Some(request) => {
+                // All are asked, as each has something to post when a wait begins.
                 let mut is_there = false;
                 for effect in &mut self.real {
                     is_there |= effect.wait(completed_ns);

@@ -52,6 +52,7 @@ impl WaitStep {
             WaitFault::Outside.raise()
         };
         let Some(begun) = self.begun else {
+            // The first poll is in the turn that ends with this wait.
             turn.begin(self.end);
             self.begun = Some(turn.latest());
             return Poll::Pending;
@@ -162,6 +163,7 @@ impl<Subs: MulRecv + Send, Pubs: MulSend + Send> SubtaskEnds for TypedEnds<Subs,
 
     fn receive(&mut self, job: u64) -> Subs::Items {
         self.0.grant(job);
+        // Its inputs are there, or it would not be eligible, so one poll is enough.
         match pin!(self.0.recv_all()).poll(&mut Context::from_waker(Waker::noop())) {
             Poll::Ready(args) => args,
             Poll::Pending => unreachable!("a job that is granted is there"),
@@ -170,6 +172,7 @@ impl<Subs: MulRecv + Send, Pubs: MulSend + Send> SubtaskEnds for TypedEnds<Subs,
 
     fn send(&mut self, job: u64, results: Pubs::Items) {
         self.1.grant(job);
+        // A slot is free: no more jobs are in flight than an edge has slots.
         let sent = pin!(self.1.send_all(results)).poll(&mut Context::from_waker(Waker::noop()));
         debug_assert!(sent.is_ready());
     }
@@ -279,6 +282,7 @@ where
             Poll::Pending => turn.expect_wait(),
             Poll::Ready(results) => {
                 turn.finish();
+                // Before the outputs go out: its destructor is the function's, and may panic.
                 future.set(None);
                 ends.send(job, results);
             }
