@@ -34,7 +34,8 @@ use alloc::vec::Vec;
 use super::cover::parallelism_covers_and_parts;
 use super::list_schedule::ScheduledSubtask;
 use super::task::Task;
-use super::workload::InterferingWorkload;
+use super::workload::{InterferingWorkload, WorkloadSegment};
+use crate::ids::to_u32;
 
 /// The time that one core supplies besides its owner's subtasks.
 ///
@@ -81,18 +82,34 @@ impl CoreSupply {
     /// in nanoseconds; never more than the length, 0 without an owner.
     #[must_use]
     pub fn busy_ns(&self, window_ns: u64) -> u64 {
+        self.busiest(window_ns).0
+    }
+
+    /// Returns that time, and by how much it grows at once with the window, one for one.
+    fn busiest(&self, window_ns: u64) -> (u64, u64) {
         let job_ns = self.tails.first().map_or(0, |tail| tail.work_ns);
-        let (mut most_ns, period_ns) = (job_ns.min(window_ns), self.period_ns);
+        let within = |time_ns: u64| (job_ns.min(time_ns), job_ns.saturating_sub(time_ns));
+        let mut busiest = within(window_ns);
         for tail in &self.tails {
             // From the next release on; it lies in the window if that is not over before.
-            if let Some(after_ns @ 1..) = window_ns.checked_sub(period_ns - tail.start_ns) {
+            if let Some(after_ns @ 1..) = window_ns.checked_sub(self.period_ns - tail.start_ns) {
                 // A list takes no more than its period, so this is no more than the window.
-                let whole_ns = after_ns / period_ns * job_ns;
-                let last_ns = job_ns.min(after_ns % period_ns);
-                most_ns = most_ns.max(tail.work_ns + whole_ns + last_ns);
+                let whole_ns = after_ns / self.period_ns * job_ns;
+                let (last_ns, more_ns) = within(after_ns % self.period_ns);
+                busiest = busiest.max((tail.work_ns + whole_ns + last_ns, more_ns));
             }
         }
-        most_ns
+        busiest
+    }
+
+    /// Returns the busy time as work of one core, as far as it surely grows.
+    fn at(&self, window_ns: u64) -> WorkloadSegment {
+        let (value, more) = self.busiest(window_ns);
+        WorkloadSegment {
+            value: value.into(),
+            slope: u128::from(more > 0),
+            span: (more > 0).then_some(more.into()),
+        }
     }
 }
 
@@ -105,9 +122,9 @@ pub(super) struct MemberTask<'a> {
     covers: Vec<u64>,
 }
 
-/// The most evaluations of equations of one attempt; a member that needs more is not proven.
-/// Ordinary sets need hundreds.
-pub(super) const STEP_LIMIT: u32 = 1 << 13;
+/// How many terms of equations may be evaluated in one attempt, one for each core and member; a
+/// member that needs more is not proven. Ordinary sets need hundreds.
+pub(super) const STEP_LIMIT: u32 = 1 << 16;
 
 impl<'a> MemberTask<'a> {
     pub(super) fn of(task: &'a Task, cores: u32) -> Self {
@@ -127,65 +144,80 @@ impl<'a> MemberTask<'a> {
         above: &[(&Self, u64)],
         steps: &mut u32,
     ) -> Option<u64> {
-        // Both equations' right sides never fall, and neither is below this.
-        let mut next_ns = match cores {
-            [_] => u128::from(self.task.volume_ns()),
-            _ => u128::from(self.task.length_ns()),
+        // No response is shorter, and from there on all that is to be executed only grows.
+        let mut window_ns = match cores {
+            [_] => self.task.volume_ns(),
+            _ => self.task.length_ns(),
         };
-        loop {
-            let within = |window_ns: &u64| *window_ns <= self.task.relative_deadline_ns();
-            let window_ns = u64::try_from(next_ns).ok().filter(within)?;
-            *steps = steps.checked_sub(1)?;
-            next_ns = match cores {
+        let terms = to_u32(cores.len() * (above.len() + 1));
+        while window_ns <= self.task.relative_deadline_ns() {
+            *steps = steps.checked_sub(terms)?;
+            let lack = match cores {
                 [core] => self.on_one(core, above, window_ns),
                 _ => self.on_several(cores, above, window_ns),
             };
-            if next_ns <= window_ns.into() {
+            let Some(lack) = lack else {
                 return Some(window_ns);
-            }
+            };
+            window_ns = window_ns.checked_add(u64::try_from(lack).ok()?)?;
         }
+        None
     }
 
-    fn on_one(&self, core: &CoreSupply, above: &[(&Self, u64)], window_ns: u64) -> u128 {
-        let own = u128::from(self.task.volume_ns()) + u128::from(core.busy_ns(window_ns));
-        let released = above.iter().map(|(other, _)| {
+    /// Returns how much longer a window has to be at least on one core; `None`: it is enough.
+    fn on_one(&self, core: &CoreSupply, above: &[(&Self, u64)], window_ns: u64) -> Option<u128> {
+        let steady = |work_ns: u64, jobs: u64| WorkloadSegment {
+            value: u128::from(work_ns) * u128::from(jobs),
+            ..WorkloadSegment::NONE
+        };
+        let own = core.at(window_ns).and(steady(self.task.volume_ns(), 1));
+        let all = above.iter().fold(own, |sum, (other, _)| {
             let jobs = window_ns.div_ceil(other.task.period_ns());
-            u128::from(jobs) * u128::from(other.task.volume_ns())
+            sum.and(steady(other.task.volume_ns(), jobs))
         });
-        // A sum that is cut off is beyond every deadline.
-        released.fold(own, u128::saturating_add)
+        all.lacks(1, window_ns.into())
     }
 
-    /// Returns the least response time that some form gives for a window of at least the length.
-    fn on_several(&self, cores: &[&CoreSupply], above: &[(&Self, u64)], window_ns: u64) -> u128 {
-        let (volume_ns, length_ns) = (self.task.volume_ns(), self.task.length_ns());
-        let waiting_ns = window_ns - length_ns;
-        let (mut busy, mut busy_waiting) = (0_u128, 0_u128);
+    /// Returns how much longer a window of at least the length has to be at least on several
+    /// cores, by the best form; `None`: it is enough.
+    fn on_several(
+        &self,
+        cores: &[&CoreSupply],
+        above: &[(&Self, u64)],
+        window_ns: u64,
+    ) -> Option<u128> {
+        let waiting_ns = window_ns - self.task.length_ns();
+        let all_waiting = WorkloadSegment {
+            value: waiting_ns.into(),
+            slope: 1,
+            span: None,
+        };
+        let mut busy = [WorkloadSegment::NONE; 2];
         for core in cores {
-            let busy_ns = core.busy_ns(window_ns);
-            busy += u128::from(busy_ns);
-            busy_waiting += u128::from(busy_ns.min(waiting_ns));
+            let of_core = core.at(window_ns);
+            busy = [
+                busy[0].and(of_core),
+                busy[1].and(of_core.least(all_waiting)),
+            ];
         }
-        let forms = (1..=cores.len())
-            .rev()
-            .zip(&self.covers)
-            .map(|(free, &cover)| {
-                let left = u128::from(volume_ns - cover);
-                let (mut plain, mut clipped) = (left + busy, left.max(1) + busy_waiting);
-                for &(other, response_ns) in above {
-                    let used = other.parallelism.min(free as u64);
-                    let (task, volume_ns) = (other.task, other.task.volume_ns());
-                    let workload =
-                        InterferingWorkload::new(task, volume_ns, response_ns, used, used);
-                    let in_window = workload.at(window_ns).value;
-                    plain = plain.saturating_add(in_window);
-                    let in_waiting = workload.over(waiting_ns).value.min(in_window);
-                    clipped = clipped.saturating_add(in_waiting);
-                }
-                plain.min(clipped).div_ceil(free as u128)
-            });
-        // Without subtasks there is no chain, and nothing to wait for.
-        u128::from(length_ns).saturating_add(forms.min().unwrap_or(0))
+        let forms = (1..=cores.len()).rev().zip(&self.covers);
+        let lacks = forms.flat_map(|(free, &cover)| {
+            let [mut plain, mut clipped] = busy;
+            let left = u128::from(self.task.volume_ns() - cover);
+            plain.value += left;
+            clipped.value += left.max(1);
+            for &(other, response_ns) in above {
+                let used = other.parallelism.min(free as u64);
+                let (task, volume_ns) = (other.task, other.task.volume_ns());
+                let workload = InterferingWorkload::new(task, volume_ns, response_ns, used, used);
+                let in_window = workload.at(window_ns);
+                plain = plain.and(in_window);
+                clipped = clipped.and(in_window.least(workload.over(waiting_ns)));
+            }
+            [plain, clipped].map(|work| work.lacks(free as u128, waiting_ns.into()))
+        });
+        // Without subtasks there are no forms, and nothing to wait for.
+        lacks.min().flatten()
     }
 }
 
@@ -265,6 +297,19 @@ mod tests {
         // One core is always free for it. The whole unit that the clipped form begins with is
         // halved and rounded up.
         assert_eq!(bound(&task, &[&supply, &CoreSupply::UNOWNED], &[]), Some(6));
+    }
+
+    #[test]
+    fn the_number_of_steps_does_not_depend_on_the_unit_of_time() {
+        let unit = 1_000_000_000;
+        let task = |wcet_ns| Task::new(20 * unit, 20 * unit, vec![wcet_ns], &[]).unwrap();
+        let supply = owned(10 * unit, &[(0, 3 * unit)]);
+        let mut steps = 20;
+        // From some window on the owner takes what the window gains, up to the end of its list.
+        let (short, long) = (task(5 * unit), task(7 * unit + 1));
+        let several = MemberTask::of(&short, 2).respond(&[&supply, &supply], &[], &mut steps);
+        let one = MemberTask::of(&long, 1).respond(&[&supply], &[], &mut steps);
+        assert_eq!((several, one), (Some(8 * unit), Some(13 * unit + 1)));
     }
 
     #[test]
