@@ -38,14 +38,14 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &AnalysisSettings) {
     for dag in (0..).map(DagId).take(task_set.dags().len()) {
         let model = task_set.dag(dag);
         let cores = to_u32(task_set.cores_of(model.cluster(), settings.cores).len());
-        let edges = match Task::from_dag(model, overhead_ns) {
+        let schedule = match Task::from_dag(model, overhead_ns) {
             Ok(task) if allows(model) => shorter(&task, cores),
             _ => None,
         };
-        let Some((edges, _)) = edges else {
+        let Some(schedule) = schedule else {
             continue;
         };
-        let mut precedence = task_set.with_edges(dag, &edges);
+        let mut precedence = task_set.with_edges(dag, &schedule.edges());
         let before = free.take().unwrap_or_else(|| answer(task_set, settings));
         task_set.exchange(dag, &mut precedence);
         let after = answer(task_set, settings);
@@ -64,13 +64,11 @@ pub(super) fn allows(dag: &Dag) -> bool {
     dag.order == SubtaskOrder::Fixed && dag.least_deadline_ns() == dag.relative_deadline_ns()
 }
 
-/// Returns the edges of a schedule and its length, if that is below the bound of one job alone.
-pub(super) fn shorter(task: &Task, cores: u32) -> Option<(Vec<(u32, u32)>, u64)> {
-    let bound_ns = multi_path(task, cores)?;
+/// Returns a schedule that is shorter than the bound of one job alone.
+pub(super) fn shorter(task: &Task, cores: u32) -> Option<ListSchedule> {
+    let limit_ns = multi_path(task, cores)?.checked_sub(1)?;
     let count = task.subtask_count().min(cores as usize);
-    let schedule = ListSchedule::within(task.oblivious(), &vec![u64::MAX; count])?;
-    let length_ns = schedule.length_ns();
-    (length_ns < bound_ns).then(|| (schedule.edges(), length_ns))
+    ListSchedule::within(task.oblivious(), &vec![limit_ns; count])
 }
 
 /// Compares answers: one DAG is to have a shorter bound, and no other a longer one, nor a sink

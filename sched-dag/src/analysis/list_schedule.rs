@@ -59,27 +59,28 @@ impl ListSchedule {
         let latest_ns = *limits_ns.iter().max()?;
         let (levels, wcets_ns) = (task.bottom_levels(), task.wcets_ns());
         let mut missing = task.graph.predecessor_counts();
-        let urgency = |subtask: usize| (levels[subtask], Reverse(subtask));
-        let mut ready: BinaryHeap<_> = task.sources().map(urgency).collect();
+        let mut ready = BinaryHeap::new();
+        // Those that are to join the others.
+        let mut released: Vec<usize> = task.sources().collect();
         let mut cores: Vec<Vec<ScheduledSubtask>> = vec![Vec::new(); limits_ns.len()];
-        let mut idle = vec![true; cores.len()];
-        // By their finish.
-        let mut running: BinaryHeap<Reverse<(u64, usize, usize)>> = BinaryHeap::new();
         let mut start_ns = 0;
         loop {
-            let mut refused = Vec::new();
-            while idle.contains(&true)
-                && let Some(next) = ready.pop()
+            for next in core::mem::take(&mut released) {
+                ready.push((levels[next], Reverse(next)));
+            }
+            let finish_ns = |list: &[ScheduledSubtask]| list.last().map_or(0, |of| of.finish_ns);
+            let is_idle = |list: &[ScheduledSubtask]| finish_ns(list) <= start_ns;
+            let mut idle = cores.iter().filter(|list| is_idle(list)).count();
+            while idle > 0
+                && let Some((_, Reverse(subtask))) = ready.pop()
             {
-                let (_, Reverse(subtask)) = next;
                 // Some subtask executes at each instant so far, so this is at most the volume.
                 let finish_ns = start_ns + wcets_ns[subtask];
-                let mut places = idle.iter().zip(limits_ns);
-                match places.position(|(&idle, &limit_ns)| idle && finish_ns <= limit_ns) {
-                    Some(core) => {
-                        idle[core] = false;
-                        running.push(Reverse((finish_ns, subtask, core)));
-                        cores[core].push(ScheduledSubtask {
+                let mut places = cores.iter_mut().zip(limits_ns);
+                match places.find(|(list, limit_ns)| is_idle(list) && finish_ns <= **limit_ns) {
+                    Some((list, _)) => {
+                        idle -= 1;
+                        list.push(ScheduledSubtask {
                             subtask,
                             start_ns,
                             finish_ns,
@@ -87,23 +88,20 @@ impl ListSchedule {
                     }
                     // It only gets later, so no core will ever take it.
                     None if finish_ns > latest_ns => return None,
-                    None => refused.push(next),
+                    None => released.push(subtask),
                 }
             }
-            ready.extend(refused);
-            let Some(Reverse((finish_ns, ..))) = running.peek().copied() else {
-                return ready.is_empty().then_some(Self { cores });
+            let busy = cores.iter().map(|list| finish_ns(list));
+            let Some(next_ns) = busy.filter(|&ns| ns > start_ns).min() else {
+                return released.is_empty().then_some(Self { cores });
             };
-            start_ns = finish_ns;
-            while let Some(Reverse((finish_ns, subtask, core))) = running.peek().copied()
-                && finish_ns == start_ns
-            {
-                running.pop();
-                idle[core] = true;
-                for next in task.successors(subtask) {
+            start_ns = next_ns;
+            let ended = cores.iter().filter_map(|list| list.last());
+            for ended in ended.filter(|last| last.finish_ns == start_ns) {
+                for next in task.successors(ended.subtask) {
                     missing[next] -= 1;
                     if missing[next] == 0 {
-                        ready.push(urgency(next));
+                        released.push(next);
                     }
                 }
             }
@@ -158,9 +156,11 @@ impl ListSchedule {
     /// Returns an edge for each two neighbours of a list. With the DAG's own ones they make no
     /// cycle, as each goes to a later start.
     pub(super) fn edges(&self) -> Vec<(u32, u32)> {
-        let neighbours = self.cores.iter().flat_map(|list| list.windows(2));
-        let edges = neighbours.map(|pair| (to_u32(pair[0].subtask), to_u32(pair[1].subtask)));
-        edges.collect()
+        let mut edges = Vec::new();
+        for pair in self.cores.iter().flat_map(|list| list.windows(2)) {
+            edges.push((to_u32(pair[0].subtask), to_u32(pair[1].subtask)));
+        }
+        edges
     }
 }
 
