@@ -73,9 +73,8 @@ impl ReadyLines {
             pinned: 0,
             latest: None,
         };
-        let mut pins =
-            own_dags(task_set, cluster).filter_map(|vertex| vertices.get(vertex).pin.core());
-        if pins.next().is_some() {
+        let is_pinned = |vertex| vertices.get(vertex).pin.core().is_some();
+        if PINS && own_vertices(task_set, cluster).any(is_pinned) {
             lines.make_own(task_set, options.cores, cluster, vertices);
         }
         lines
@@ -92,7 +91,7 @@ impl ReadyLines {
     ) {
         let mut counts = vec![0; cores as usize];
         let mut places = vec![0; vertices.len()];
-        for vertex in own_dags(task_set, cluster) {
+        for vertex in own_vertices(task_set, cluster) {
             if let Some(core) = vertices.get(vertex).pin.core() {
                 places[vertex as usize] = to_u32(counts[core.index()]);
                 counts[core.index()] += 1;
@@ -210,7 +209,7 @@ impl ReadyLines {
 }
 
 /// Returns the vertices of a cluster's DAGs.
-fn own_dags(task_set: &TaskSet, cluster: ClusterId) -> impl Iterator<Item = u32> {
+fn own_vertices(task_set: &TaskSet, cluster: ClusterId) -> impl Iterator<Item = u32> {
     let dags = (0..).map(DagId).zip(task_set.dags());
     let own = dags.filter(move |(_, dag)| dag.cluster() == cluster);
     own.flat_map(|(id, dag)| (task_set.first_vertex(id)..).take(dag.subtasks().len()))
