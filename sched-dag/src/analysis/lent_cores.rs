@@ -1,7 +1,7 @@
 //! Cores that are lent: the time that an owner takes from them, and response times in the rest.
 //!
-//! A heavy DAG *owns* cores: it executes there by a [list schedule](ListSchedule), and nothing wins
-//! over it. What its lists leave is *lent* to a *group*: some cores, and DAGs that are its
+//! A heavy DAG *owns* cores: it executes there by a [list schedule](super::ListSchedule), and nothing
+//! wins over it. What its lists leave is *lent* to a *group*: some cores, and DAGs that are its
 //! *members*, the more urgent first by deadline. On cores of a group on which no owner's subtask
 //! executes, ready subtasks of its members do. Proofs are in `docs/analysis.md`, "Lent cores"; here
 //! in short.
@@ -123,7 +123,7 @@ pub(super) struct MemberTask<'a> {
 }
 
 /// How many terms of equations may be evaluated in one attempt, one for each core and member; a
-/// member that needs more is not proven. Ordinary sets need hundreds.
+/// member that needs more is not proven. Ordinary sets need hundreds or thousands.
 pub(super) const STEP_LIMIT: u32 = 1 << 16;
 
 impl<'a> MemberTask<'a> {
