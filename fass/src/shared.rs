@@ -28,5 +28,5 @@ pub use crate::api::uses::{ResettableUses, SubtaskBuilder, Uses};
 pub use crate::api::wire::{
     Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions,
 };
-pub use crate::api::wire_waits::{ReadUse, Reader, WriteUse, Writer};
+pub use crate::api::wire_waits::{ReadUse, WireReader, WireWriter, WriteUse};
 pub use crate::run::wire::Framing;

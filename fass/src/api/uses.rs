@@ -20,8 +20,8 @@
 //! | [`shutting_down`](crate::shared::shutting_down) | `Shutdown` | the end (C1 to C5) |
 //! | [`Wire::receiving`](crate::shared::Wire::receiving) | `Received<T>` | input |
 //! | [`Wire::sending`](crate::shared::Wire::sending) | `Sender` | output |
-//! | [`Wire::reading`](crate::shared::Wire::reading) | `Reader<T>` | a wait |
-//! | [`Wire::writing`](crate::shared::Wire::writing) | `Writer` | a wait |
+//! | [`Wire::reading`](crate::shared::Wire::reading) | `WireReader<T>` | a wait |
+//! | [`Wire::writing`](crate::shared::Wire::writing) | `WireWriter` | a wait |
 //! | [`Parameter::reading`](crate::shared::Parameter::reading) | `T` | input |
 //! | [`Device::asking`](crate::shared::Device::asking) | `Asker<Q, A>` | a wait |
 //!

@@ -38,7 +38,7 @@ impl Wire {
     ///
     /// ```
     /// use core::time::Duration;
-    /// use fass::shared::{Reader, Wire, Writer};
+    /// use fass::shared::{WireReader, Wire, WireWriter};
     /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
     /// use virtual_time::VirtualTime;
     ///
@@ -47,7 +47,7 @@ impl Wire {
     /// let dag = create_dag();
     /// dag.name("signal").jobs(2).period(ms(20)).relative_deadline(ms(20));
     /// let mut answers = [Ok(17), Err(fass::shared::TimedOut)].into_iter();
-    /// let ask = move |(input, output): (Reader<u8>, Writer)| {
+    /// let ask = move |(input, output): (WireReader<u8>, WireWriter)| {
     ///     let expected = answers.next();
     ///     async move {
     ///         output.write(b"signal?\n").await.expect("it is quick");
@@ -166,13 +166,13 @@ pub struct WriteUse(Device<(), ()>, Wire);
 ///
 /// See [`Wire::reading`].
 #[derive(Debug)]
-pub struct Reader<T>(Asker<(), T>);
+pub struct WireReader<T>(Asker<(), T>);
 
 /// The handle by which an async function writes bytes.
 ///
 /// See [`Wire::reading`].
 #[derive(Debug)]
-pub struct Writer(Asker<(), ()>, Wire);
+pub struct WireWriter(Asker<(), ()>, Wire);
 
 impl<T: Recordable + Send + Sync + 'static> ReadUse<T> {
     /// Records what is read, and a replay takes that, as of a [`Device`].
@@ -197,7 +197,7 @@ impl WriteUse {
     }
 }
 
-impl<T> Reader<T> {
+impl<T> WireReader<T> {
     /// Waits for the next packet, or until the limit of the wait.
     ///
     /// See [`Wire::reading`].
@@ -214,7 +214,7 @@ impl<T> Reader<T> {
     }
 }
 
-impl Writer {
+impl WireWriter {
     /// Writes bytes, and waits until the device has taken them, or until the limit of the wait.
     ///
     /// See [`Wire::reading`].
@@ -237,7 +237,7 @@ impl Writer {
 impl<T> sealed::Sealed for ReadUse<T> {}
 
 impl<T: Send + Sync + 'static> Uses for ReadUse<T> {
-    type Borrowed<'a> = Reader<T>;
+    type Borrowed<'a> = WireReader<T>;
     type Held = Asker<(), T>;
     type Guard<'a> = &'a Asker<(), T>;
 
@@ -250,32 +250,32 @@ impl<T: Send + Sync + 'static> Uses for ReadUse<T> {
     }
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        Reader(DeviceUse::borrow(guard))
+        WireReader(DeviceUse::borrow(guard))
     }
 }
 
 impl sealed::Sealed for WriteUse {}
 
 impl Uses for WriteUse {
-    type Borrowed<'a> = Writer;
-    type Held = Writer;
-    type Guard<'a> = &'a Writer;
+    type Borrowed<'a> = WireWriter;
+    type Held = WireWriter;
+    type Guard<'a> = &'a WireWriter;
 
-    fn hold(self, dag: &Dag, subtask: usize) -> Writer {
+    fn hold(self, dag: &Dag, subtask: usize) -> WireWriter {
         // First: whether it has gone is asked when it is on its way.
         let effect = SendCompletion(Arc::clone(&self.1.shared.outgoing));
         let mut draft = dag.draft.borrow_mut();
         draft.effects.push((subtask, Box::new(effect)));
         drop(draft);
-        Writer(self.0.asking().hold(dag, subtask), self.1)
+        WireWriter(self.0.asking().hold(dag, subtask), self.1)
     }
 
-    fn enter(held: &mut Writer) -> &Writer {
+    fn enter(held: &mut WireWriter) -> &WireWriter {
         held.1.shared.outgoing.discard_staged();
         held
     }
 
     fn borrow<'a, 'g>(guard: &'a mut Self::Guard<'g>) -> Self::Borrowed<'a> {
-        Writer(DeviceUse::borrow(&mut &guard.0), guard.1.clone())
+        WireWriter(DeviceUse::borrow(&mut &guard.0), guard.1.clone())
     }
 }

@@ -1,6 +1,6 @@
 //! The answers of a recorded device: written down, and given back in a replay.
 //!
-//! What a device answers crosses the edge of a DAG, and so does the time that it takes. Both are
+//! An answer of a device crosses the edge of a DAG, and so does the time that it takes. Both are
 //! written down when the instance has got the answer, or has not; as all that an instance finds,
 //! that goes to the platform when it is complete, or has failed. The answers of one job are one
 //! value: a list of the waits, each by its number, with how long the answer took and the answer. In

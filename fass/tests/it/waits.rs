@@ -9,7 +9,9 @@ use std::thread;
 use crate::no_allocation::counting::allocated;
 use crate::support::{PERIOD, answers, commit, named, panic_message};
 use fass::platform::{Request, SubtaskCode};
-use fass::shared::{Asker, Device, Raiser, Reader, Sample, TimedOut, Wire, Writer, create_device};
+use fass::shared::{
+    Asker, Device, Raiser, Sample, TimedOut, Wire, WireReader, WireWriter, create_device,
+};
 use fass::{Dag, create_dag, sleep, until};
 use sched_dag::DagId;
 use sched_dag::lifecycle::WaitId;
@@ -278,7 +280,7 @@ fn turn_while(
 #[test]
 fn bytes_that_come_or_go_as_a_wait_for_them_begins_end_it_once() {
     let (wire, dag) = (Wire::new("wire"), dag());
-    let ask = |(input, output): (Reader<usize>, Writer)| async move {
+    let ask = |(input, output): (WireReader<usize>, WireWriter)| async move {
         assert_eq!(input.read().await, Ok(1));
         assert_eq!(output.write(b"x").await, Ok(()));
     };

@@ -32,6 +32,7 @@
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
+mod calls;
 mod command;
 mod edge;
 mod job;

@@ -10,7 +10,8 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
 use fass::shared::{
-    Asker, DeviceDriver, Reader, Shutdown, Switch, Wire, Writer, create_device, shutting_down,
+    Asker, DeviceDriver, Shutdown, Switch, Wire, WireReader, WireWriter, create_device,
+    shutting_down,
 };
 use fass::{
     Dag, Occupation, OverrunPolicy, SubtaskAttributes, create_dag, execute_for, finish_create_dags,
@@ -132,7 +133,7 @@ pub(crate) fn wire(machine: &Machine) -> Result<(), AppError> {
     machine.options().finish(&["test", "input", "clusters"])?;
     let (answers, mut job) = (Arc::new(Answers::default()), 0_u64);
     let tally = Arc::clone(&answers);
-    let ask = move |(input, output): (Reader<u64>, Writer)| {
+    let ask = move |(input, output): (WireReader<u64>, WireWriter)| {
         let (tally, question) = (Arc::clone(&tally), job);
         job += 1;
         async move {

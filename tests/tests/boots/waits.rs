@@ -140,7 +140,7 @@ fn a_wait_costs_no_step_of_the_scheduler() {
     }
 }
 
-/// Whatever a busy host does to their times.
+/// In real time their number and order are held, not their times.
 #[test]
 fn each_wait_is_taken_in_real_time() {
     for (cores, clusters) in [(1, ""), (4, ""), (2, "clusters=1,1")] {

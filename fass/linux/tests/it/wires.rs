@@ -6,7 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use crate::support::{alone, mechanisms, ms};
-use fass::shared::{Reader, Received, Sender, TimedOut, Wire, WireOptions, Writer};
+use fass::shared::{Received, Sender, TimedOut, Wire, WireOptions, WireReader, WireWriter};
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Mechanism;
 
@@ -99,7 +99,7 @@ fn asking(wire: &Wire, jobs: u64) -> Dag {
     let dag = create_dag();
     dag.name("modem").jobs(jobs).in_flight(1);
     let mut questions = 0_u64..;
-    let ask = move |(input, output): (Reader<Option<u64>>, Writer)| {
+    let ask = move |(input, output): (WireReader<Option<u64>>, WireWriter)| {
         let question = questions.next().expect("they have no end");
         async move {
             let line = format!("{question}\n");

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::support::{commit, every, job_numbers, ms, named, taking};
 use fass::shared::{
-    Framing, Packet, Reader, Received, Sender, TimedOut, Wire, WireOptions, Writer,
+    Framing, Packet, Received, Sender, TimedOut, Wire, WireOptions, WireReader, WireWriter,
 };
 use fass::{Dag, create_dag, finish_create_dags, sleep};
 use virtual_time::{Report, Silent, VirtualTime};
@@ -230,7 +230,7 @@ fn responses_ms(report: &Report) -> Vec<u64> {
 fn a_read_ends_with_the_next_packet_or_at_its_limit() {
     let (seen, keep) = crate::support::Seen::shared();
     let (wire, dag) = (Wire::new("numbers"), every(20, "reading"));
-    let read = move |wire: Reader<Option<u32>>| {
+    let read = move |wire: WireReader<Option<u32>>| {
         let keep = keep.clone();
         async move { keep.add(wire.read().await) }
     };
@@ -269,7 +269,7 @@ fn a_write_ends_when_all_has_gone_and_what_finds_no_room_never_goes() {
         };
         let (wire, dag) = (Wire::with("out", options), every(20, "writing"));
         let mut bytes = [7, 9, 17].into_iter();
-        let write = move |wire: Writer| {
+        let write = move |wire: WireWriter| {
             let (keep, count) = (keep.clone(), bytes.next().unwrap_or(1));
             async move {
                 keep.add(wire.write(&vec![b'x'; count]).await);
@@ -313,7 +313,7 @@ fn a_replay_reads_and_writes_what_the_record_has_without_the_device() {
         dag.jobs(20).record::<u64>("job").record::<u64>("sum");
         let source = dag.source(job_numbers(1)).writes(&["job"]);
         source.register(taking("count", 1));
-        let ask = |(input, output): (Reader<Option<u32>>, Writer), (job,): (u64,)| async move {
+        let ask = |(input, output): (WireReader<Option<u32>>, WireWriter), (job,): (u64,)| async move {
             let written = output.write(format!("{job}?").as_bytes()).await;
             sleep(Duration::from_micros(job)).await;
             let first = input.read().within(ms(2)).await;
