@@ -81,6 +81,8 @@
 //!   ([`Switch`](shared::Switch)), and when it ends ([`Shutdown`](shared::Shutdown)).
 //! - What comes from outside and goes there while DAGs run passes a [`Wire`](shared::Wire), or is
 //!   a [`Parameter`](shared::Parameter).
+//! - A function may be async, and wait in its midst: as often as is stated, each time until a limit
+//!   at the latest, for a time, a [`Device`](shared::Device) or a [`Wire`](shared::Wire). Meanwhile it has no core.
 //! - After the commit the crate allocates nothing and takes no lock. Edges do no
 //!   locked read-modify-write; states and latest values do one or two a use. (What
 //!   functions and their messages' `clone` do is theirs.)
@@ -98,10 +100,10 @@
 //!
 //! Top to bottom: [`Dag`] takes registrations; the commit verifies them with `sched-dag` and makes
 //! of each function a [`SubtaskCode`](platform::SubtaskCode), one future that is polled once for
-//! each instance; the [`Platform`](platform::Platform) gets the [`Plan`](platform::Plan) and runs
+//! each instance, or, of a function that waits, one for each instance, polled once a turn; the [`Platform`](platform::Platform) gets the [`Plan`](platform::Plan) and runs
 //! bodies when its scheduler says so. Values travel in rings that have a slot for each job that may
 //! be in flight. The crate names no kernel and needs only `alloc`; its `unsafe` is in
-//! `run/cell/mod.rs`.
+//! `run/cell`.
 //!
 //! `docs/paper-map.md` relates the paper's figures 3 and 4 to this code.
 #![cfg_attr(not(test), no_std)]
@@ -126,4 +128,6 @@ pub use run::log;
 pub use run::message::{Message, MessageType, Unique};
 pub use run::topic::{Ports, Publisher, Subscriber};
 pub use run::tuple::{MulRecv, MulSend, Publishers, Subscribers, VecToPubs, VecToSubs};
+pub use run::turn::WaitFault;
+pub use run::waiting::{sleep, until};
 pub use sched_dag::{FaultLimit, OverrunPolicy, Policy, Preemption, SubtaskOrder};

@@ -6,7 +6,7 @@
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::ops::Range;
+use core::ops::{Add, Range};
 
 use crate::ids::{SubtaskId, to_u32};
 
@@ -147,12 +147,15 @@ impl Graph {
 
     /// Returns for each subtask the largest sum of weights along a path that begins with it.
     /// No sum may overflow.
-    pub(crate) fn levels(&self, weights: &[u64]) -> Vec<u64> {
-        let mut levels = vec![0_u64; weights.len()];
+    pub(crate) fn levels<W>(&self, weights: &[W]) -> Vec<W>
+    where
+        W: Copy + Default + Ord + Add<Output = W>,
+    {
+        let mut levels = vec![W::default(); weights.len()];
         for &subtask in self.topological_order.iter().rev() {
             let successors = self.successors.neighbours(subtask).iter();
             let rest = successors.map(|next| levels[next.index()]).max();
-            levels[subtask.index()] = weights[subtask.index()] + rest.unwrap_or(0);
+            levels[subtask.index()] = weights[subtask.index()] + rest.unwrap_or_default();
         }
         levels
     }

@@ -28,7 +28,7 @@ use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 pub struct Event {
     /// When, in nanoseconds from the run's epoch.
     pub time_ns: u64,
-    /// What.
+    /// The kind of it.
     pub what: EventKind,
     /// The core that it happened on, or that made the scheduler's step; of a
     /// [`Request`](EventKind::Request) the core that shall switch.
@@ -223,6 +223,10 @@ events! {
     /// The run enters a mode, whose number stands where the job's does. The event's DAG is 0
     /// and means nothing.
     Entered = "entered", Dag;
+    /// The instance gives its core up and begins a wait.
+    Wait = "wait", Core;
+    /// The wait of an instance ends, by an answer or by its limit.
+    Wake = "wake", Instance;
 }
 
 /// A text that is none of the words.
@@ -308,7 +312,7 @@ mod tests {
             assert_eq!(EventKind::from_number(number), Some(what));
             assert_eq!(what.to_string().parse(), Ok(what));
         }
-        assert_eq!(EventKind::from_number(23), None);
+        assert_eq!(EventKind::from_number(25), None);
         assert_eq!("Start".parse::<EventKind>(), Err(UnknownWord));
     }
 }

@@ -44,6 +44,10 @@
 //!   idles while an instance is ready. At one instant all completions come
 //!   first, then all releases, then one dispatch.
 //!
+//! A subtask may *wait*, between *segments* of its function: then its instance holds no core, and is
+//! not eligible until an answer or the wait's limit comes. The rules W1 to W7 stand in
+//! `scheduler/waits.rs`, their scenarios in `tests/scenarios/waits.txt`.
+//!
 //! A *sporadic* DAG's jobs are released by signals instead of the clock, at least
 //! T apart: the rules S1 to S4 stand in `scheduler/signals.rs`, their scenarios in
 //! `tests/scenarios/sharing.txt`. From its release on its job is a job like others.
@@ -132,9 +136,12 @@ pub use policy::{
 };
 pub use scheduler::{
     DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,
-    Scheduler,
+    Scheduler, TurnEnd,
 };
-pub use spec::{DagSpec, LatestSpec, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort};
+pub use spec::{
+    DagSpec, LatestSpec, MOST_WAITS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort,
+    WAITS, Wait,
+};
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;
 pub use verify::{

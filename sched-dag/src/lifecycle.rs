@@ -66,19 +66,21 @@
 //! - Signals are counted, so each is one.
 //! - Of a pause and a resumption of one DAG that wait, the later one counts, and so it is of modes;
 //!   an end counts more than a closing.
+//! - Of two answers to waits of one subtask the one to the later wait counts.
 //! - What is taken in one step is served in this order: DAG by DAG, the mode, the end.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::fmt;
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-use crate::ids::{ClusterId, DagId, ModeId};
+use crate::ids::{ClusterId, DagId, Instance, ModeId, SubtaskId};
 use crate::order::sorted;
 use crate::scheduler::Moment;
-use crate::task_set::TaskSet;
+use crate::spec::WAITS;
+use crate::task_set::{Dag, TaskSet};
 
-pub use crate::request::{ModeEntry, Request};
+pub use crate::request::{ModeEntry, Request, WaitId};
 
 /// The change that a request makes in a scheduler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -135,7 +137,7 @@ impl PendingRequests {
     pub fn new(dags: usize, lifecycle: Option<Box<dyn Lifecycle>>) -> Self {
         let room = lifecycle.as_ref().map(|lifecycle| lifecycle.room());
         let (others, changes) = room.unwrap_or_default();
-        let mut kept = Vec::with_capacity(dags.saturating_add(others).saturating_add(1));
+        let mut kept = Vec::with_capacity(dags.saturating_add(others).saturating_add(2));
         // So that what is paused at first is paused in the very first step, before any release.
         kept.extend(lifecycle.as_ref().map(|_| Request::Begin));
         Self {
@@ -145,7 +147,8 @@ impl PendingRequests {
         }
     }
 
-    /// Keeps a request until the next step.
+    /// Keeps a request until the next step: that of a function, which answers no wait but by a
+    /// letter.
     pub fn keep(&mut self, request: Request) {
         // Once is enough, and so the room is bounded: one place for each different request.
         if !self.kept.contains(&request) {
@@ -153,11 +156,37 @@ impl PendingRequests {
         }
     }
 
+    /// Keeps the request of a turn that ends in a wait, which is [taken](Self::take_wait) at once.
+    #[inline]
+    pub(crate) fn keep_wait(&mut self, request: Request) {
+        self.kept.push(request);
+    }
+
     /// Reports whether none is on its way: then a completion may be all of a step.
     #[inline]
     #[must_use]
     pub const fn are_none(&self) -> bool {
         self.kept.is_empty()
+    }
+
+    /// Takes the latest request, if it is for a wait, and returns the limit of that, which begins
+    /// now. The time of the job's release is asked for if the wait is until an instant of it.
+    #[inline]
+    pub(crate) fn take_wait(
+        &mut self,
+        now_ns: u64,
+        release_ns: impl FnOnce() -> u64,
+    ) -> Option<u64> {
+        let is_wait =
+            |request: &mut Request| matches!(request, Request::Wait(_) | Request::WaitUntil(_));
+        match self.kept.pop_if(is_wait)? {
+            Request::Wait(limit_ns) => Some(limit_ns),
+            Request::WaitUntil(after_ns) => {
+                let until_ns = release_ns().saturating_add(after_ns);
+                Some(until_ns.saturating_sub(now_ns))
+            }
+            _ => None,
+        }
     }
 
     /// Gives away the requests that `take` takes, which concern other schedulers only.
@@ -367,6 +396,9 @@ impl Lifecycle for LifecyclePlan {
             | Request::Signal(_)
             | Request::Close(_)
             | Request::End(_)
+            | Request::Wait(_)
+            | Request::WaitUntil(_)
+            | Request::Answer(_)
             | Request::Step => {}
         }
     }
@@ -426,6 +458,8 @@ struct DagMailbox {
     change: AtomicU32,
     /// [`NOTHING`], [`CLOSE`] or [`END`].
     end: AtomicU32,
+    /// By subtask that waits, the latest wait that has its answer, as [`wait_word`]; 0 for none.
+    answers: Box<[(SubtaskId, AtomicU64)]>,
 }
 
 /// Messages to a cluster about all of its DAGs.
@@ -476,6 +510,7 @@ pub fn divide(
                 signals: AtomicU32::new(0),
                 change: AtomicU32::new(NOTHING),
                 end: AtomicU32::new(NOTHING),
+                answers: if WAITS { answers(dag) } else { Box::default() },
             })
             .collect(),
         clusters: task_set
@@ -502,6 +537,7 @@ impl Mailboxes {
             | Request::Resume(dag)
             | Request::Close(dag)
             | Request::End(dag) => self.dags[dag.index()].cluster,
+            Request::Answer(wait) => self.dags[wait.instance.dag.index()].cluster,
             Request::Enter(..) => self.of_modes,
             Request::ShutDown => {
                 for (cluster, to) in (0..).map(ClusterId).zip(&self.clusters) {
@@ -512,7 +548,11 @@ impl Mailboxes {
                 }
                 return false;
             }
-            Request::Begin | Request::GoOn | Request::Step => return false,
+            Request::Begin
+            | Request::GoOn
+            | Request::Wait(_)
+            | Request::WaitUntil(_)
+            | Request::Step => return false,
         };
         if Some(to) == from {
             return false;
@@ -529,7 +569,19 @@ impl Mailboxes {
                 let place = &self.clusters[to.index()].mode;
                 place.store(packed(mode, entry), Ordering::Release);
             }
-            Request::ShutDown | Request::Begin | Request::GoOn | Request::Step => {}
+            Request::Answer(wait) if WAITS => {
+                let answers = &of(wait.instance.dag).answers;
+                let place = answers.iter().find(|of| of.0 == wait.instance.subtask);
+                // Of two, the older one comes too late: its instance waits for the other by now.
+                place.map(|of| of.1.fetch_max(wait_word(wait), Ordering::Release));
+            }
+            Request::ShutDown
+            | Request::Begin
+            | Request::GoOn
+            | Request::Wait(_)
+            | Request::WaitUntil(_)
+            | Request::Answer(_)
+            | Request::Step => {}
         }
         sent(to);
         true
@@ -554,6 +606,12 @@ impl Mailboxes {
                 END => take(Request::End(dag)),
                 _ => {}
             }
+            for (subtask, answer) in to.answers.iter().filter(|_| WAITS) {
+                let word = answer.swap(0, Ordering::Acquire);
+                let wait = wait_of(dag, *subtask, word);
+                wait.into_iter()
+                    .for_each(|wait| take(Request::Answer(wait)));
+            }
         }
         let to = &self.clusters[cluster.index()];
         if let Some((mode, entry)) = unpacked(to.mode.swap(NOTHING, Ordering::Acquire)) {
@@ -563,6 +621,25 @@ impl Mailboxes {
             take(Request::ShutDown);
         }
     }
+}
+
+/// Returns room for answers to the subtasks that wait.
+fn answers(dag: &Dag) -> Box<[(SubtaskId, AtomicU64)]> {
+    let numbered = (0..).map(SubtaskId).zip(dag.subtasks());
+    let waiting = numbered.filter(|(_, subtask)| !subtask.waits().is_empty());
+    waiting.map(|(id, _)| (id, AtomicU64::new(0))).collect()
+}
+
+/// Returns a word for a wait of a subtask, the larger the later, never 0.
+const fn wait_word(wait: WaitId) -> u64 {
+    (wait.instance.job << 8) | (wait.number as u64 + 1)
+}
+
+fn wait_of(dag: DagId, subtask: SubtaskId, word: u64) -> Option<WaitId> {
+    let job = word >> 8;
+    let number = u32::try_from(word & 0xff).ok()?.checked_sub(1)?;
+    let instance = Instance { dag, job, subtask };
+    Some(WaitId { instance, number })
 }
 
 /// Returns a word for a mode and how to enter it, which is not [`NOTHING`].

@@ -168,6 +168,8 @@ texts! {
         Heavy { volume_ns: u64, within_ns: u64 } =
             "its own, as a job is {:?} of work within {:?}",
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
+        /// Its subtasks wait, and no sum of loads tells what fits on a core with those.
+        Waits = "its own, as its subtasks wait";
         /// It is light: the cluster with the least load takes it.
         Light = "the emptiest one";
     }

@@ -1,6 +1,6 @@
 //! The changes that can be asked of a run. [`lifecycle`](crate::lifecycle) has the rules.
 
-use crate::ids::{DagId, ModeId};
+use crate::ids::{DagId, Instance, ModeId};
 
 /// A change that is asked of a run: by a function, with effect from its completion on, by another
 /// cluster, or from outside.
@@ -25,6 +25,14 @@ pub enum Request {
     /// Waiting requests may take effect. A driver asks for that in each step until they have,
     /// before all else.
     GoOn,
+    /// The instance that asks waits, for so many nanoseconds at most, instead of finishing. Always
+    /// the only request of its turn.
+    Wait(u64),
+    /// As [`Wait`](Self::Wait), until so many nanoseconds after the release of its job; for none if
+    /// that is past.
+    WaitUntil(u64),
+    /// A wait has its answer.
+    Answer(WaitId),
     /// Nothing but a step. An engine asks for that, lest a completion take the short way.
     Step,
 }
@@ -36,9 +44,24 @@ impl Request {
     pub const fn is_of_lifecycle(self) -> bool {
         !matches!(
             self,
-            Self::Signal(_) | Self::Close(_) | Self::End(_) | Self::Step
+            Self::Signal(_)
+                | Self::Close(_)
+                | Self::End(_)
+                | Self::Wait(_)
+                | Self::WaitUntil(_)
+                | Self::Answer(_)
+                | Self::Step
         )
     }
+}
+
+/// A wait of an instance. No two waits of a run have the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WaitId {
+    /// The instance that waits.
+    pub instance: Instance,
+    /// The number of the wait among those of the instance, from 0 on.
+    pub number: u32,
 }
 
 /// When a mode is entered.

@@ -89,8 +89,10 @@ pub const STACK_BYTES: RangeInclusive<u64> = 16 << 10..=1 << 20;
 pub struct SubtaskSpec {
     /// The name that messages use; may be empty, then messages say `subtask 0`.
     pub name: String,
-    /// The worst-case execution time, if known.
+    /// The worst-case execution time, if known: the sum over its segments, if it waits.
     pub wcet_ns: Option<u64>,
+    /// Its waits, in order: between n waits it has n + 1 segments.
+    pub waits: Vec<Wait>,
     /// The margin that it has over the longest call observed, in hundredths of that;
     /// `None`: it is stated.
     pub wcet_margin_percent: Option<u32>,
@@ -110,6 +112,23 @@ pub struct SubtaskSpec {
     pub inputs: Vec<TopicPort>,
     /// One port a return value, in order.
     pub outputs: Vec<TopicPort>,
+}
+
+/// Whether subtasks may wait: what the feature `waits` is for. A program without it has no
+/// instruction for waits.
+pub const WAITS: bool = cfg!(feature = "waits");
+
+/// The most waits that a subtask may state.
+pub const MOST_WAITS: usize = if WAITS { 254 } else { 0 };
+
+/// A wait of a subtask, which each of its instances takes once, and the segment that follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wait {
+    /// The time after which it ends without an answer; 0 is allowed.
+    pub limit_ns: u64,
+    /// The worst-case execution time of the segment that follows, if known: a part of
+    /// [`SubtaskSpec::wcet_ns`].
+    pub segment_ns: Option<u64>,
 }
 
 /// One end of a topic at a subtask: a typed, named edge bundle.

@@ -24,6 +24,7 @@ use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
+use crate::spec::{WAITS, Wait};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -79,6 +80,7 @@ pub struct StatePrecedence {
 pub struct Subtask {
     pub(crate) name: String,
     pub(crate) wcet_ns: Option<u64>,
+    pub(crate) waits: Box<[Wait]>,
     pub(crate) wcet_source: WcetSource,
     pub(crate) budget_ns: Option<u64>,
     pub(crate) stack_bytes: Option<u64>,
@@ -335,6 +337,35 @@ impl Subtask {
     #[must_use]
     pub const fn wcet_ns(&self) -> Option<u64> {
         self.wcet_ns
+    }
+
+    /// Returns its waits, in order.
+    #[must_use]
+    pub const fn waits(&self) -> &[Wait] {
+        if WAITS { &self.waits } else { &[] }
+    }
+
+    /// Returns the sum of its waits' limits.
+    #[must_use]
+    pub fn waiting_ns(&self) -> u64 {
+        self.waits().iter().map(|wait| wait.limit_ns).sum()
+    }
+
+    /// Returns the WCETs of its segments, if they are known; that of a subtask without waits is one.
+    #[must_use]
+    pub fn segments_ns(&self) -> Option<Vec<u64>> {
+        let later = self.waits().iter().map(|wait| wait.segment_ns);
+        let later = later.collect::<Option<Vec<u64>>>()?;
+        let first = self.wcet_ns?.checked_sub(later.iter().sum())?;
+        Some(core::iter::once(first).chain(later).collect())
+    }
+
+    /// Returns a time that none of its segments exceeds: the WCET of the longest one, or of all
+    /// together if that is all that is known.
+    #[must_use]
+    pub fn longest_segment_ns(&self) -> Option<u64> {
+        let segments = self.segments_ns();
+        segments.map_or(self.wcet_ns, |segments| segments.into_iter().max())
     }
 
     /// Returns the stack that it needs, in bytes, if the app stated one.

@@ -48,7 +48,7 @@ use crate::engine::{Engine, FaultCost, NextAction, PlatformPort, Run, SubtaskBod
 use crate::ids::{ClusterId, CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind, EventSubject};
 use crate::kept::Journal;
-use crate::lifecycle::{Lifecycle, LifecycleChange, PendingRequests, Request};
+use crate::lifecycle::{Lifecycle, LifecycleChange, PendingRequests, Request, WaitId};
 use crate::placement::NextWork;
 use crate::policy::SchedulerOptions;
 use crate::scheduler::{DriverNotice, Moment, Scheduler};
@@ -299,8 +299,9 @@ impl<B: SubtaskBody> VirtualTime<B> {
     fn serve(&mut self, request: Request, now: &mut VirtualInstant<'_, impl Workload<B>>) {
         let mut changes = Vec::new();
         match (request, &mut self.lifecycle) {
-            // A signal concerns one DAG, and no lifecycle.
+            // A signal concerns one DAG, as an answer does, and no lifecycle.
             (Request::Signal(dag), _) => _ = self.change(dag, request, now),
+            (Request::Answer(wait), _) => _ = self.change(wait.instance.dag, request, now),
             (_, Some(lifecycle)) => lifecycle.serve(request, &mut changes),
             (_, None) => {}
         }
@@ -364,13 +365,14 @@ impl<B: SubtaskBody> fmt::Debug for VirtualTime<B> {
 
 /// The behaviour of instances, and how long each executes.
 pub trait Workload<B = Instance> {
-    /// Returns the execution time of an instance in nanoseconds; 0 is allowed. Called once for
-    /// each instance, at its start. `None`: the run is [stopped](RunOutcome::Stopped) at once.
+    /// Returns the execution time of an instance in nanoseconds, up to its end or its next wait; 0
+    /// is allowed. Called once for each instance at its start, and again after each wait. `None`:
+    /// the run is [stopped](RunOutcome::Stopped) at once.
     fn execute(&mut self, body: &mut B, now_ns: u64) -> Option<u64>;
 
     /// Reports whether an instance fails, instead of finishing, when its
     /// execution time is over: then its DAG is ended, or its job dropped. Called once for each
-    /// instance, at its end.
+    /// instance, at its end, and where it would begin to wait.
     fn fails(&mut self, instance: Instance) -> bool {
         let _ = instance;
         false
@@ -386,6 +388,11 @@ pub trait Workload<B = Instance> {
     /// An instance has ended, what it publishes is published; or a fault ended it that costs this.
     fn ended(&mut self, instance: Instance, fault: Option<FaultCost>) {
         let _ = (instance, fault);
+    }
+
+    /// An instance has begun a wait, whose answer may be a [`Request::Answer`] from now on.
+    fn waits(&mut self, wait: WaitId, now_ns: u64) {
+        let _ = (wait, now_ns);
     }
 
     /// A job is released, skipped or completed, or a DAG ended.
@@ -487,6 +494,7 @@ impl<B: SubtaskBody, W: Workload<B>> PlatformPort<B> for VirtualInstant<'_, W> {
         EventKind::Completed,
     ];
     const SUSPENDS_LATER: bool = false;
+    const ANSWERS_AT_ONCE: bool = true;
 
     fn now_ns(&self) -> u64 {
         self.now_ns
@@ -560,13 +568,20 @@ impl<B: SubtaskBody> ClusterRun<B> {
         let instance = body.subject().instance();
         let vertex = engine.task_set.vertex(instance);
         let done = engine.complete((core, vertex), body, now_ns, is_alone, now);
-        now.workload.ended(instance, None);
+        let waits = matches!(done, NextAction::Step(Some(turn)) if turn.limit_ns.is_some());
+        if !waits {
+            now.workload.ended(instance, None);
+        }
         match done {
             NextAction::Run(body) => self.run(core, body, now_ns, now.begun_ns)?,
             NextAction::Look { .. } => self.go_on(core, now)?,
             NextAction::Step(ended) => {
-                if let Some(instance) = ended {
-                    engine.tell((now_ns, core), now, |moment| moment.complete(instance));
+                if let Some(turn) = ended {
+                    engine.tell((now_ns, core), now, |moment| moment.end_turn(turn));
+                }
+                if waits {
+                    now.workload
+                        .waits(engine.scheduler.latest_wait(vertex).0, now_ns);
                 }
                 return Ok(false);
             }
@@ -612,7 +627,9 @@ impl<B: SubtaskBody> ClusterRun<B> {
         let (engine, now_ns) = (&mut self.engine, now.now_ns);
         match engine.next(core, now) {
             NextWork::Nothing => Ok(()),
-            NextWork::Start(_, body) => self.run(core, body, now_ns, now.begun_ns),
+            NextWork::Start(_, body) | NextWork::Proceed(_, body) => {
+                self.run(core, body, now_ns, now.begun_ns)
+            }
             NextWork::Continue((left_ns, body)) => {
                 let vertex = engine.task_set.vertex(body.subject().instance());
                 engine.note(EventKind::Resume, core, vertex, now_ns);

@@ -1,7 +1,9 @@
 //! From a set to DAGs that execute for its times.
 //!
-//! Instances occupy their cores for their execution times.
+//! Instances occupy their cores for their execution times. Those that wait sleep meanwhile, as
+//! long as a simulated device takes to answer.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
@@ -82,8 +84,15 @@ fn build_dag(
     let subtasks = spec.subtasks.iter().zip(&described.subtasks).zip(seeds);
     let subtasks: Vec<UntypedSubtask> = subtasks
         .map(|((subtask, more), seed)| {
-            let mut attributes =
-                SubtaskAttributes::named(&subtask.name).wcet(time(subtask.wcet_ns));
+            let later_ns: u64 = subtask.waits.iter().filter_map(|of| of.segment_ns).sum();
+            let first_ns = subtask
+                .wcet_ns
+                .map(|wcet_ns| wcet_ns.saturating_sub(later_ns));
+            let mut attributes = SubtaskAttributes::named(&subtask.name).wcet(time(first_ns));
+            for wait in &subtask.waits {
+                let limit = time(Some(wait.limit_ns));
+                attributes = attributes.wait(limit).wcet(time(wait.segment_ns));
+            }
             if let Some(priority) = subtask.priority {
                 attributes = attributes.priority(priority.0);
             }
@@ -95,12 +104,9 @@ fn build_dag(
                 wcet_ns: subtask.wcet_ns.unwrap_or(0),
                 samples_ns: more.samples_ns.clone(),
                 seed,
+                waits: subtask.waits.to_vec(),
             };
-            let occupation = settings.occupation;
-            let execute = move |job| {
-                fass::execute_for(Duration::from_nanos(times.of_job(job)), occupation);
-            };
-            dag.register_untyped_subtask(execute, attributes)
+            register(&dag, times, settings.occupation, attributes)
         })
         .collect();
     for &(earlier, later) in &spec.edges {
@@ -112,6 +118,35 @@ fn build_dag(
         }
     }
     dag
+}
+
+fn register(
+    dag: &Dag,
+    times: Times,
+    occupation: Occupation,
+    attributes: SubtaskAttributes,
+) -> UntypedSubtask {
+    if times.waits.is_empty() {
+        let execute = move |job| {
+            fass::execute_for(Duration::from_nanos(times.of_job(job)), occupation);
+        };
+        return dag.register_untyped_subtask(execute, attributes);
+    }
+    let times = Arc::new(times);
+    let execute_and_wait = move |job| {
+        let times = Arc::clone(&times);
+        async move {
+            for number in 0.. {
+                let segment = Duration::from_nanos(times.of_segment(job, number));
+                fass::execute_for(segment, occupation);
+                match times.of_wait(job, number) {
+                    Some(ns) => fass::sleep(Duration::from_nanos(ns)).await,
+                    None => break,
+                }
+            }
+        }
+    };
+    dag.register_untyped_async_subtask(execute_and_wait, attributes)
 }
 
 #[cfg(test)]
@@ -154,6 +189,45 @@ mod tests {
         let responses: Vec<_> = responses.flatten().collect();
         assert_eq!(responses.len(), 6);
         assert!(responses.contains(&6_000_000), "{responses:?}");
+    }
+
+    #[test]
+    fn what_waits_leaves_its_core_and_stays_within_its_limits() {
+        let text = "dag eye period 20ms\nsubtask ask wcet 1ms wait 6ms wcet 2ms wait 0ns wcet 1ms\n\
+                    dag hand period 20ms offset 1ms\nsubtask move wcet 5ms\nend";
+        let file = parse(text).unwrap();
+        let responses = |execution| {
+            let settings = Settings {
+                execution,
+                seed: 1,
+                occupation: Occupation::Hold,
+                length: Length::Jobs(50),
+            };
+            let machine = VirtualTime::new().cores(1);
+            let dags = build(&file.sets[0], &settings);
+            finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).unwrap();
+            let report = machine.run();
+            assert_eq!(report.violations(), []);
+            let of = |dag: u32| {
+                let jobs = report.jobs.iter().filter(move |job| job.dag.0 == dag);
+                jobs.filter_map(|job| job.response_time_ns())
+                    .collect::<Vec<u64>>()
+            };
+            (of(0), of(1))
+        };
+        let (eye, hand) = responses(Execution::Wcet);
+        assert_eq!(
+            (eye, hand),
+            ([10_000_000; 50].to_vec(), [5_000_000; 50].to_vec())
+        );
+        let half = Execution::parse("uniform:0.5..0.5").unwrap();
+        let (eye, _) = responses(half);
+        // Half of 4 ms, and a wait until the answer, or the limit.
+        assert!(eye.iter().all(|ns| (2_000_000..=8_000_000).contains(ns)));
+        assert!(
+            eye.contains(&8_000_000) && eye.iter().any(|ns| *ns < 5_000_000),
+            "{eye:?}"
+        );
     }
 
     #[test]

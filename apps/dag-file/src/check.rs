@@ -66,6 +66,7 @@ fn line_of(set: &Set, fault: &DagFault) -> usize {
             edge_line(dag, ends).unwrap_or(dag.line)
         }),
         DagFault::WcetExceedsDeadline { dag, subtask, .. }
+        | DagFault::TooManyWaits { dag, subtask, .. }
         | DagFault::ZeroSinkDeadline { dag, sink: subtask }
         | DagFault::SinkDeadlineBeyondDag {
             dag, sink: subtask, ..
@@ -162,6 +163,23 @@ period 584000s\nsubtask a wcet 1ms
             );
             assert_eq!(found.len(), rows.len(), "{found:#?}");
         }
+    }
+
+    #[test]
+    fn too_many_waits_are_told_with_the_line_of_their_subtask() {
+        let waits = " wait 1ns wcet 1ns".repeat(255);
+        let text = format!("dag x period 9ms\nsubtask a wcet 1ms\nsubtask b wcet 1ms{waits}\nend");
+        let found = faults_on(CoreDivision::Undivided, &text, Length::Jobs(1));
+        let told = "line 3: subtask `b` of dag `x` states 255 waits, more than 254; split it";
+        assert_eq!(found, [told]);
+        // The limits of all waits of a DAG are summed up.
+        let text = "dag x period 9ms\nsubtask a wcet 1ms wait 10000000000s wcet 1ms wait \
+                    10000000000s wcet 1ms\nend";
+        let found = faults_on(CoreDivision::Undivided, text, Length::Jobs(1));
+        assert!(
+            found[0].starts_with("line 1: the sum of the limits"),
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -1,15 +1,22 @@
-//! How long an instance executes.
+//! How long an instance executes, and waits.
 //!
 //! The time that an instance draws follows from the seed, its set's position of the
 //! subtask and its job alone. So two policies, or two numbers of cores, get the
-//! same load.
+//! same load. Where a subtask waits, its segments divide the instance's time as they
+//! divide its WCET.
+//!
+//! A wait lasts until a simulated device answers, or to its limit. Where each instance
+//! takes its WCET, no device answers, which is the worst case of waits. Else the time of an
+//! answer is drawn, too: one of five comes beyond the limit.
 
 use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use common::random::{nth, scale};
 use replay::lines::quoted;
+use sched_dag::Wait;
 
 /// A millionth, the finest fraction of a WCET.
 const WHOLE: u64 = 1_000_000;
@@ -85,9 +92,40 @@ pub(crate) struct Times {
     pub(crate) wcet_ns: u64,
     pub(crate) samples_ns: Arc<[u64]>,
     pub(crate) seed: u64,
+    pub(crate) waits: Vec<Wait>,
 }
 
 impl Times {
+    /// Returns how long a segment of a job's instance executes, in nanoseconds.
+    pub(crate) fn of_segment(&self, job: u64, number: usize) -> u64 {
+        let (of_job, whole) = (
+            u128::from(self.of_job(job)),
+            u128::from(self.wcet_ns.max(1)),
+        );
+        let up_to = |segments: usize| {
+            let later = self.waits.get(segments - 1..).unwrap_or_default();
+            let later_ns: u64 = later.iter().filter_map(|wait| wait.segment_ns).sum();
+            let part = u128::from(self.wcet_ns.saturating_sub(later_ns));
+            // Rounded down at both ends, the segments add up to the whole, and as that is at most the
+            // WCET, none exceeds its own.
+            u64::try_from(of_job * part / whole).unwrap_or(u64::MAX)
+        };
+        let before = if number == 0 { 0 } else { up_to(number) };
+        up_to(number + 1) - before
+    }
+
+    /// Returns how long a job's instance waits behind a segment, in nanoseconds; `None` behind the
+    /// last one.
+    pub(crate) fn of_wait(&self, job: u64, number: usize) -> Option<u64> {
+        let limit_ns = self.waits.get(number)?.limit_ns;
+        if self.execution == Execution::Wcet {
+            return Some(limit_ns);
+        }
+        let drawn = nth(!self.seed, job.wrapping_mul(256) + number as u64);
+        let latest_ns = limit_ns.saturating_add(limit_ns / 4);
+        Some(scale(drawn, 0..=latest_ns).min(limit_ns))
+    }
+
     /// Returns how long a job's instance executes, in nanoseconds.
     pub(crate) fn of_job(&self, job: u64) -> u64 {
         let drawn = nth(self.seed, job);
@@ -143,6 +181,7 @@ mod tests {
             wcet_ns: 1_000_000,
             samples_ns: [10, 20, 30].into(),
             seed,
+            waits: Vec::new(),
         };
         let uniform = Execution::parse("uniform:0.5..0.75").unwrap();
         let draw = |seed| -> Vec<u64> {
@@ -164,5 +203,41 @@ mod tests {
         };
         assert_eq!(none.of_job(3), 1_000_000);
         assert_eq!(times(Execution::Wcet, 9).of_job(5), 1_000_000);
+    }
+    #[test]
+    fn segments_divide_the_time_and_devices_answer_in_time_or_not() {
+        let wait = |limit_ns, segment_ns| Wait {
+            limit_ns,
+            segment_ns: Some(segment_ns),
+        };
+        let times = |execution| Times {
+            execution: Execution::parse(execution).unwrap(),
+            wcet_ns: 1_000,
+            samples_ns: [501, 7].into(),
+            seed: 3,
+            waits: [wait(400, 301), wait(0, 99)].into(),
+        };
+        let of = |times: &Times, job| [0, 1, 2].map(|number| times.of_segment(job, number));
+        let wcet = times("wcet");
+        assert_eq!(of(&wcet, 5), [600, 301, 99]);
+        assert_eq!(
+            [0, 1, 2].map(|at| wcet.of_wait(5, at)),
+            [Some(400), Some(0), None]
+        );
+        for drawn in [times("uniform:0.2..1"), times("samples")] {
+            for job in 0..100 {
+                let segments = of(&drawn, job);
+                assert_eq!(segments.iter().sum::<u64>(), drawn.of_job(job));
+                let most = [600, 301, 99];
+                assert!(
+                    segments.iter().zip(most).all(|(ns, most)| *ns <= most),
+                    "{segments:?}"
+                );
+            }
+            let waits: Vec<_> = (0..1_000).filter_map(|job| drawn.of_wait(job, 0)).collect();
+            let late = waits.iter().filter(|ns| **ns == 400).count();
+            assert!((150..250).contains(&late), "{late}");
+            assert!(waits.iter().any(|ns| *ns < 40) && waits.iter().all(|ns| *ns <= 400));
+        }
     }
 }

@@ -63,8 +63,14 @@ fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
 }
 
 fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>) -> Result {
-    let wcet = Time(spec.wcet_ns.unwrap_or(0));
-    write!(out, "subtask {} wcet {wcet}", spec.name)?;
+    // Each part is written as the reader takes it: the rest of the WCET is the first segment's.
+    let later_ns: u64 = spec.waits.iter().filter_map(|wait| wait.segment_ns).sum();
+    let first = Time(spec.wcet_ns.unwrap_or(0).saturating_sub(later_ns));
+    write!(out, "subtask {} wcet {first}", spec.name)?;
+    for wait in &spec.waits {
+        let segment = Time(wait.segment_ns.unwrap_or(0));
+        write!(out, " wait {} wcet {segment}", Time(wait.limit_ns))?;
+    }
     if let Some(priority) = spec.priority {
         write!(out, " priority {}", priority.0)?;
     }

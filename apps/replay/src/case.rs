@@ -9,7 +9,11 @@
 //! dag T D O K nsub nedge        then, if there are clusters: in C; then nsub lines:  sub wcet prio e_0 .. e_{K-1}
 //!                               then nedge lines: edge u v
 //! sink v D_v                    for sinks with a deadline of their own, D_v <= D
+//! wait v n C_0 W_1 C_1 .. W_n C_n    for subtasks with waits: WCETs of segments, and limits
+//! act v k e_0 a_1 e_1 .. a_n e_n     after each of these, what each job k does: a segment's
+//!                               execution time, and how long after it the answer comes
 //! x dag job subtask start finish preemptions      (each instance once)
+//! s dag job subtask timeouts start_0 end_0 ..     (each instance of a subtask with waits once)
 //! j dag job release finish response missed(0/1)   (each job once)
 //! end
 //! ```
@@ -29,7 +33,7 @@ use alloc::vec::Vec;
 
 use sched_dag::{
     ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Instance, Policy,
-    Preemption, Priority, SubtaskId, SubtaskSpec, TaskSet, verify,
+    Preemption, Priority, SubtaskId, SubtaskSpec, TaskSet, Wait, verify,
 };
 
 use crate::lines::{Line, Lines, Malformed, cases, of_file, quoted};
@@ -53,6 +57,10 @@ pub struct Case {
     pub task_set: Arc<TaskSet>,
     /// The execution times: of each DAG, for each subtask that of each job.
     pub executions_ns: Vec<Vec<Vec<u64>>>,
+    /// The turns of each instance of a subtask with waits.
+    pub turns: BTreeMap<Instance, Vec<Turn>>,
+    /// When each of these is expected to take place.
+    pub turn_times: BTreeMap<Instance, TurnTimes>,
     /// The expected instances.
     pub instances: BTreeMap<Instance, InstanceTimes>,
     /// The expected jobs, by DAG and number.
@@ -68,6 +76,24 @@ pub struct InstanceTimes {
     pub finish_ns: u64,
     /// How many dispatches took its core away.
     pub preemptions: u64,
+}
+
+/// A turn of an instance: a segment, and the wait behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Turn {
+    /// How long it executes.
+    pub execution_ns: u64,
+    /// How long after it the answer to its wait comes; `None` behind the last segment.
+    pub answer_ns: Option<u64>,
+}
+
+/// The times of the turns of an instance.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TurnTimes {
+    /// How many of its waits ended by their limits.
+    pub timeouts: u64,
+    /// When each segment first executed, and when it had executed.
+    pub spans_ns: Vec<(u64, u64)>,
 }
 
 /// The times of a job.
@@ -90,13 +116,24 @@ pub struct JobTimes {
 /// [`Malformed`] for the first record that is not as described above, and for
 /// DAGs that cannot be committed.
 pub fn parse(text: &str) -> Result<Vec<Case>, Malformed> {
-    cases(text, |header, lines| {
-        let case = parse_case(header, lines)?;
-        let records = text.lines().take(lines.last()).skip(header.number - 1);
-        Ok(Case {
-            text: records.flat_map(|record| [record, "\n"]).collect(),
-            ..case
-        })
+    cases(text, |header, lines| parse_block(text, header, lines))
+}
+
+/// Reads the case of a text that begins with the record `header`.
+///
+/// # Errors
+///
+/// As [`parse`].
+pub fn parse_block(
+    text: &str,
+    header: &Line<'_>,
+    lines: &mut Lines<'_>,
+) -> Result<Case, Malformed> {
+    let case = parse_case(header, lines)?;
+    let records = text.lines().take(lines.last()).skip(header.number - 1);
+    Ok(Case {
+        text: records.flat_map(|record| [record, "\n"]).collect(),
+        ..case
     })
 }
 
@@ -122,9 +159,13 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
 
     let mut specs = Vec::new();
     let mut executions_ns = Vec::new();
-    for _ in 0..header.at_least_one(count)? {
+    let mut turns = BTreeMap::new();
+    for dag in (0..header.at_least_one(count)?).map(DagId) {
         let line = lines.expect("dag")?;
-        let (spec, of_dag_ns) = parse_dag(&line, lines, &clusters)?;
+        let (mut spec, of_dag_ns) = parse_dag(&line, lines, &clusters)?;
+        while let Some(line) = lines.next_if("wait") {
+            parse_waits(&line, lines, (dag, &mut spec), &of_dag_ns, &mut turns)?;
+        }
         commit(&line, core::slice::from_ref(&spec), &options)?;
         specs.push(spec);
         executions_ns.push(of_dag_ns);
@@ -140,6 +181,8 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<Case, Malforme
         preemption,
         task_set: Arc::new(task_set),
         executions_ns,
+        turns,
+        turn_times: BTreeMap::new(),
         instances: BTreeMap::new(),
         jobs: BTreeMap::new(),
     };
@@ -230,6 +273,60 @@ fn parse_subtask(line: &Line<'_>, jobs: u32) -> Result<(SubtaskSpec, Vec<u64>), 
     Ok((subtask, executions_ns))
 }
 
+/// Reads the waits of a subtask, and the turns of its instance in each job.
+fn parse_waits(
+    line: &Line<'_>,
+    lines: &mut Lines<'_>,
+    (dag, spec): (DagId, &mut DagSpec),
+    executions_ns: &[Vec<u64>],
+    turns: &mut BTreeMap<Instance, Vec<Turn>>,
+) -> Result<(), Malformed> {
+    let numbers: Vec<u64> = line.numbers(line.words.len())?;
+    let [_, count, _, pairs @ ..] = &numbers[..] else {
+        return Err(line.malformed("expected `wait v n C_0 W_1 C_1 ..`"));
+    };
+    let subtask = line.index("subtask", line.words[0], executions_ns.len())?;
+    let (pairs, rest) = pairs.as_chunks::<2>();
+    if pairs.is_empty() || pairs.len() as u64 != *count || !rest.is_empty() {
+        return Err(line.malformed(format!("expected {count} waits, each with its segment")));
+    }
+    let waits = &mut spec.subtasks[subtask].waits;
+    if !waits.is_empty() {
+        return Err(line.malformed(format!("subtask {subtask} has its waits already")));
+    }
+    // WCETs play no part in a schedule.
+    *waits = (pairs.iter())
+        .map(|&[limit_ns, _]| Wait {
+            limit_ns,
+            segment_ns: None,
+        })
+        .collect();
+    for (job, &execution_ns) in (0..).zip(&executions_ns[subtask]) {
+        let line = lines.expect("act")?;
+        let numbers: Vec<u64> = line.numbers(2 * pairs.len() + 3)?;
+        let named = [
+            line.index("subtask", line.words[0], executions_ns.len())? as u64,
+            numbers[1],
+        ];
+        if named != [subtask as u64, job] {
+            return Err(line.malformed(format!("expected `act {subtask} {job} ..`")));
+        }
+        let of_job = numbers[2..].chunks(2).map(|turn| Turn {
+            execution_ns: turn[0],
+            answer_ns: turn.get(1).copied(),
+        });
+        let of_job: Vec<Turn> = of_job.collect();
+        if of_job.iter().map(|turn| turn.execution_ns).sum::<u64>() != execution_ns {
+            return Err(line.malformed(format!(
+                "the segments of job {job} do not come to its execution time {execution_ns}"
+            )));
+        }
+        let subtask = SubtaskId(u32::try_from(subtask).unwrap_or(u32::MAX));
+        turns.insert(Instance { dag, job, subtask }, of_job);
+    }
+    Ok(())
+}
+
 /// Verifies DAGs that the record `line` begins.
 fn commit(
     line: &Line<'_>,
@@ -258,7 +355,13 @@ fn check_horizon(
     });
     let executions_ns = executions_ns.iter().flatten().flatten().copied();
     let busy_ns: u128 = executions_ns.map(u128::from).sum();
-    if last_release_ns.max().unwrap_or(0) + busy_ns > u128::from(u64::MAX) {
+    let waiting_ns = specs.iter().map(|spec| {
+        let waits = spec.subtasks.iter().flat_map(|subtask| &subtask.waits);
+        let of_job_ns: u128 = waits.map(|wait| u128::from(wait.limit_ns)).sum();
+        of_job_ns * u128::from(spec.jobs.unwrap_or(1))
+    });
+    let held_ns = busy_ns + waiting_ns.sum::<u128>();
+    if last_release_ns.max().unwrap_or(0) + held_ns > u128::from(u64::MAX) {
         return Err(header.malformed("the schedule may end after the last time that 64 bits hold"));
     }
     Ok(())
@@ -266,25 +369,12 @@ fn check_horizon(
 
 /// Reads what is expected of each instance and each job.
 fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malformed> {
-    let executions_ns = &case.executions_ns;
-    let dag_and_job = |line: &Line<'_>, dag: &str, job: &str| {
-        let dag = line.index("dag", dag, executions_ns.len())?;
-        let job = line.index("job", job, executions_ns[dag][0].len())?;
-        Ok::<_, Malformed>((dag, job as u64))
-    };
-    let id = |index| u32::try_from(index).unwrap_or(u32::MAX);
     loop {
         let line = lines.next_line().ok_or_else(|| lines.ended("`end`"))?;
         match line.kind {
             "x" => {
                 let [dag, job, subtask, start, finish, preemptions] = line.fixed()?;
-                let (dag, job) = dag_and_job(&line, dag, job)?;
-                let subtask = line.index("subtask", subtask, executions_ns[dag].len())?;
-                let instance = Instance {
-                    dag: DagId(id(dag)),
-                    job,
-                    subtask: SubtaskId(id(subtask)),
-                };
+                let instance = instance_of(&line, case, [dag, job, subtask])?;
                 let times = InstanceTimes {
                     start_ns: line.number(start)?,
                     finish_ns: line.number(finish)?,
@@ -292,38 +382,81 @@ fn parse_schedule(lines: &mut Lines<'_>, case: &mut Case) -> Result<(), Malforme
                 };
                 once(&line, case.instances.insert(instance, times))?;
             }
+            "s" => {
+                let numbers: Vec<u64> = line.numbers(line.words.len())?;
+                let [_, _, _, timeouts, spans @ ..] = &numbers[..] else {
+                    return Err(line.malformed("expected `s dag job subtask timeouts start_0 ..`"));
+                };
+                let of = [line.words[0], line.words[1], line.words[2]];
+                let instance = instance_of(&line, case, of)?;
+                let turns = case.turns.get(&instance).map_or(0, Vec::len);
+                if turns == 0 || 2 * turns != spans.len() {
+                    return Err(line.malformed(format!(
+                        "expected the spans of {turns} segments of {instance}"
+                    )));
+                }
+                let times = TurnTimes {
+                    timeouts: *timeouts,
+                    spans_ns: spans.chunks_exact(2).map(|of| (of[0], of[1])).collect(),
+                };
+                once(&line, case.turn_times.insert(instance, times))?;
+            }
             "j" => {
                 let [dag, job, release, finish, response, missed] = line.fixed()?;
-                let (dag, job) = dag_and_job(&line, dag, job)?;
+                // Each subtask has an instance of each job.
+                let Instance { dag, job, .. } = instance_of(&line, case, [dag, job, "0"])?;
                 let times = JobTimes {
                     release_ns: line.number(release)?,
                     finish_ns: line.number(finish)?,
                     response_ns: line.number(response)?,
                     missed: line.flag(missed)?,
                 };
-                once(&line, case.jobs.insert((DagId(id(dag)), job), times))?;
+                once(&line, case.jobs.insert((dag, job), times))?;
             }
             "end" => {
                 line.exactly(0)?;
-                let jobs: usize = executions_ns.iter().map(|dag| dag[0].len()).sum();
-                let instances: usize = executions_ns.iter().flatten().map(Vec::len).sum();
-                let instances = instances - case.instances.len();
-                let jobs = jobs - case.jobs.len();
-                if instances + jobs > 0 {
-                    return Err(line.malformed(format!(
-                        "the case ends without {instances} `x` records and {jobs} `j` records"
-                    )));
-                }
-                return Ok(());
+                return check_all_told(&line, case);
             }
             other => {
                 return Err(line.malformed(format!(
-                    "expected `x`, `j` or `end`, found {}",
+                    "expected `x`, `s`, `j` or `end`, found {}",
                     quoted(other)
                 )));
             }
         }
     }
+}
+
+/// Returns the instance that a record names by its DAG, job and subtask.
+fn instance_of(
+    line: &Line<'_>,
+    case: &Case,
+    [dag, job, subtask]: [&str; 3],
+) -> Result<Instance, Malformed> {
+    let id = |index| u32::try_from(index).unwrap_or(u32::MAX);
+    let dag = line.index("dag", dag, case.executions_ns.len())?;
+    let of_dag = &case.executions_ns[dag];
+    Ok(Instance {
+        dag: DagId(id(dag)),
+        job: line.index("job", job, of_dag[0].len())? as u64,
+        subtask: SubtaskId(id(line.index("subtask", subtask, of_dag.len())?)),
+    })
+}
+
+/// Refuses a case that ends without what is expected of some instance or job.
+fn check_all_told(end: &Line<'_>, case: &Case) -> Result<(), Malformed> {
+    let jobs: usize = case.executions_ns.iter().map(|dag| dag[0].len()).sum();
+    let instances: usize = case.executions_ns.iter().flatten().map(Vec::len).sum();
+    let instances = instances - case.instances.len();
+    let jobs = jobs - case.jobs.len();
+    let turns = case.turns.len() - case.turn_times.len();
+    if instances + jobs + turns > 0 {
+        return Err(end.malformed(format!(
+            "the case ends without {instances} `x` records, {turns} `s` records and {jobs} `j` \
+             records"
+        )));
+    }
+    Ok(())
 }
 
 /// Refuses a record that has replaced an earlier one.

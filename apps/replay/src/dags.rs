@@ -15,6 +15,9 @@
 //! the reference, completions of an instant come before its releases, and a
 //! deadline at the instant of the completion is met.
 //!
+//! A wait goes on to the end of a unit of time. Its limit on the machine is half a unit longer than
+//! the case's, for what the kernel takes; whether it ended by an answer or by its limit is not told.
+//!
 //! A unit of execution may begin with [`Computing`], after which the core is held for what
 //! is left of the unit. So functions that never wait are preempted in the middle of what
 //! they compute, and the schedule is still the reference's.
@@ -26,9 +29,9 @@ use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{Dag, Occupation, SubtaskAttributes, create_dag};
+use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
 use fork_join::Pace;
-use sched_dag::SubtaskId;
+use sched_dag::{DagId, Instance, SubtaskId};
 
 use crate::case::Case;
 
@@ -75,6 +78,18 @@ impl Scale {
         end_ns.saturating_sub(self.guard_ns).saturating_sub(ns)
     }
 
+    /// Returns how long a wait of so many units goes on that begins `ns` after time 0, at about the
+    /// end of a unit of time: to the end of one.
+    fn wait_at(self, ns: u64, units: u64) -> Duration {
+        let end = ns.saturating_add(self.unit_ns / 2) / self.unit_ns;
+        let end_ns = end.saturating_add(units).saturating_mul(self.unit_ns);
+        Duration::from_nanos(if units == 0 {
+            0
+        } else {
+            end_ns.saturating_sub(ns)
+        })
+    }
+
     /// Executes for `units` units, inside a subtask. The core is held meanwhile, but for what it
     /// computes.
     fn execute(self, units: u64, epoch: &Epoch, computing: Option<Computing>) {
@@ -111,7 +126,7 @@ pub fn build(
     computing: Option<Computing>,
 ) -> Result<Vec<Dag>, String> {
     let dags = case.task_set.dags().iter().zip(&case.executions_ns);
-    let dags = dags.enumerate();
+    let dags = (0..).zip(dags);
     dags.map(|(number, (model, executions_ns))| {
         let dag = create_dag();
         dag.name(&format!("{number}"))
@@ -124,16 +139,21 @@ pub fn build(
             dag.cluster(model.cluster().0);
         }
         let subtasks: Vec<_> = (model.subtasks().iter().zip(executions_ns))
-            .map(|(subtask, executions)| {
+            .zip((0..).map(SubtaskId))
+            .map(|((subtask, executions), id)| {
+                let attributes = SubtaskAttributes::default().priority(subtask.priority().0);
+                if !subtask.waits().is_empty() {
+                    let of_case = (case, DagId(number), id);
+                    return waiting(&dag, of_case, (scale, epoch, computing), attributes);
+                }
                 let (executions, epoch) = (executions.clone(), epoch.clone());
                 let execute = move |job| {
                     let units = usize::try_from(job).map_or(0, |job| executions[job]);
                     scale.execute(units, &epoch, computing);
                 };
-                let attributes = SubtaskAttributes::default().priority(subtask.priority().0);
-                dag.register_untyped_subtask(execute, attributes)
+                Ok(dag.register_untyped_subtask(execute, attributes))
             })
-            .collect();
+            .collect::<Result<_, String>>()?;
         for (later, id) in subtasks.iter().zip((0..).map(SubtaskId)) {
             for earlier in model.predecessors(id) {
                 dag.precede(&subtasks[earlier.index()], later);
@@ -146,6 +166,56 @@ pub fn build(
         Ok(dag)
     })
     .collect()
+}
+
+/// Registers a subtask with waits, whose device answers as the case says: a wait ends where it
+/// does, or at its limit.
+fn waiting(
+    dag: &Dag,
+    (case, id, subtask): (&Case, DagId, SubtaskId),
+    (scale, epoch, computing): (Scale, &Epoch, Option<Computing>),
+    mut attributes: SubtaskAttributes,
+) -> Result<UntypedSubtask, String> {
+    let waits = case.task_set.dag(id).subtask(subtask).waits();
+    for wait in waits {
+        // A wait goes on to a whole unit of time, from the guard before one.
+        let slack = Duration::from_nanos(scale.unit_ns / 2);
+        attributes = attributes.wait(scale.duration(wait.limit_ns)? + slack);
+    }
+    let limits = waits.iter().map(|wait| wait.limit_ns);
+    let of_job = |job| {
+        let instance = Instance {
+            dag: id,
+            job,
+            subtask,
+        };
+        let turns = case.turns[&instance].iter();
+        let limits = limits.clone().map(Some).chain([None]);
+        let waits = turns.zip(limits).map(|(turn, limit)| {
+            let units = turn.answer_ns.zip(limit);
+            (
+                turn.execution_ns,
+                units.map(|(answer, limit)| answer.min(limit)),
+            )
+        });
+        waits.collect::<Vec<_>>()
+    };
+    let jobs = case.task_set.dag(id).jobs().unwrap_or(0);
+    let turns: Arc<[_]> = (0..jobs).map(of_job).collect();
+    let epoch = epoch.clone();
+    let execute = move |job| {
+        let (turns, epoch) = (Arc::clone(&turns), epoch.clone());
+        async move {
+            let of_job = usize::try_from(job).map_or(&[][..], |job| &turns[job]);
+            for &(execution, wait) in of_job {
+                scale.execute(execution, &epoch, computing);
+                if let Some(units) = wait {
+                    fass::sleep(scale.wait_at(epoch.elapsed_ns(), units)).await;
+                }
+            }
+        }
+    };
+    Ok(dag.register_untyped_async_subtask(execute, attributes))
 }
 
 #[cfg(test)]

@@ -25,6 +25,6 @@ mod dags;
 pub mod lines;
 pub mod shown;
 
-pub use case::{Case, InstanceTimes, JobTimes, parse};
+pub use case::{Case, InstanceTimes, JobTimes, Turn, TurnTimes, parse, parse_block};
 pub use dags::{Computing, Epoch, Scale, build};
 pub use lines::{of_file, repeated};

@@ -144,13 +144,26 @@ pub fn cases<'a, Case>(
     text: &'a str,
     read: impl Fn(&Line<'a>, &mut Lines<'a>) -> Result<Case, Malformed>,
 ) -> Result<Vec<Case>, Malformed> {
+    blocks(text, &["case"], read)
+}
+
+/// Works like [`cases`] for a file in which a case may begin with any of these records.
+///
+/// # Errors
+///
+/// As [`cases`].
+pub fn blocks<'a, Case>(
+    text: &'a str,
+    kinds: &[&str],
+    read: impl Fn(&Line<'a>, &mut Lines<'a>) -> Result<Case, Malformed>,
+) -> Result<Vec<Case>, Malformed> {
     let mut lines = Lines::new(text);
     let mut cases = Vec::new();
     let mut names: BTreeMap<&str, usize> = BTreeMap::new();
     while let Some(line) = lines.next_line() {
-        if line.kind != "case" {
-            let found = quoted(line.kind);
-            return Err(line.malformed(format!("expected a `case` record, found {found}")));
+        if !kinds.contains(&line.kind) {
+            let (expected, found) = (kinds.join("` or `"), quoted(line.kind));
+            return Err(line.malformed(format!("expected a `{expected}` record, found {found}")));
         }
         cases.push(read(&line, &mut lines)?);
         // Every kind of case has its name first.
@@ -167,7 +180,7 @@ pub fn cases<'a, Case>(
         }
     }
     if cases.is_empty() {
-        return Err(lines.ended("a `case` record"));
+        return Err(lines.ended(&format!("a `{}` record", kinds.join("` or `"))));
     }
     Ok(cases)
 }

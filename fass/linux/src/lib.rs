@@ -31,11 +31,13 @@
 //!   preempted. Were it stopped, it could keep the allocator's lock from all others.
 //! - A function whose budget is exceeded is not ended, only its DAG is: its thread goes
 //!   on, as a normal one, until the function returns.
-//! - An instance that waits in mid-function (reads a file, locks a mutex) leaves its core to
-//!   what was demoted there, and to other programs. So does a non-preemptive one: what was
+//! - An instance that blocks in mid-function (reads a file, locks a mutex) leaves its core to
+//!   what was demoted there, and to other programs; an async one can ask for such a call
+//!   ([`blocking`](fn@blocking)), and wait. So does a non-preemptive one: what was
 //!   demoted there and ends meanwhile is reported when that one has ended, or when it is wanted.
 #![deny(unsafe_code)]
 
+mod blocking;
 mod control;
 mod edge;
 mod level;
@@ -52,6 +54,7 @@ mod sys;
 mod team;
 mod worker;
 
+pub use blocking::blocking;
 pub use control::{Control, EndSignals};
 pub use machine::{Connection, Linux, Mechanism, StartError, now_ns, own_core, processors};
 pub use platform::{Counts, Run};

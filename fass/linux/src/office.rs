@@ -8,12 +8,12 @@
 //! # The end
 //!
 //! A cluster whose DAGs are over *rests*, and a signal may set it going again. The run is over when
-//! all of them rest and no letter is on its way. Both are one count, of *reasons to go on*: a
-//! cluster for which there are letters adds to it as one that does not rest, and the writer of a
-//! letter has not come to rest when it has added that.
+//! all of them rest and no letter is on its way. Both are one count, of *reasons to go on*: each
+//! letter adds to it as a cluster that does not rest. It does so before it can be taken, as its
+//! writer may be a thread from outside, which may lose its processor at any instruction.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use sched_dag::lifecycle::{Mailboxes, Request};
 use sched_dag::{ClusterId, DagId, TaskSet};
@@ -43,8 +43,8 @@ pub(crate) struct Office {
 struct Door {
     /// Changes whenever that is to look at once.
     alarm: AtomicU32,
-    /// Whether there may be letters.
-    has_letters: AtomicBool,
+    /// How many letters may be there.
+    letters: AtomicU64,
 }
 
 impl Office {
@@ -91,29 +91,30 @@ impl Office {
     /// any level, so it must not take a scheduler's lock: it would lose its core with it.
     pub(crate) fn send(&self, from: Option<ClusterId>, request: Request) -> bool {
         self.letters.send(from, request, |cluster| {
-            let has_letters = &self.doors[cluster.index()].has_letters;
-            if !has_letters.swap(true, Ordering::AcqRel) {
-                self.reasons.fetch_add(1, Ordering::AcqRel);
-            }
+            self.reasons.fetch_add(1, Ordering::AcqRel);
+            let letters = &self.doors[cluster.index()].letters;
+            letters.fetch_add(1, Ordering::AcqRel);
             self.ring(cluster);
         })
     }
 
-    /// Reports whether a step of a cluster is to take letters, and that is a reason less to go on
-    /// once they are taken.
-    pub(crate) fn open(&self, cluster: ClusterId) -> bool {
-        let has_letters = &self.doors[cluster.index()].has_letters;
-        has_letters.load(Ordering::Relaxed) && has_letters.swap(false, Ordering::AcqRel)
+    /// Returns how many letters a step of a cluster is to take: so many reasons less to go on once
+    /// they are taken.
+    pub(crate) fn open(&self, cluster: ClusterId) -> u64 {
+        let letters = &self.doors[cluster.index()].letters;
+        match letters.load(Ordering::Relaxed) {
+            0 => 0,
+            _ => letters.swap(0, Ordering::AcqRel),
+        }
     }
 
     /// Reports whether there may be letters for a cluster.
     pub(crate) fn has_letters(&self, cluster: ClusterId) -> bool {
-        let has_letters = &self.doors[cluster.index()].has_letters;
-        has_letters.load(Ordering::Relaxed)
+        self.doors[cluster.index()].letters.load(Ordering::Relaxed) > 0
     }
 
-    /// Takes note, after a step of a cluster's release thread, of how often letters were taken, and
-    /// of whether all its DAGs are over. Reports whether the run is.
+    /// Takes note, after a step of a cluster's release thread, of how many letters were taken, and of
+    /// whether all its DAGs are over. Reports whether the run is.
     pub(crate) fn settle(&self, rests: &mut bool, is_finished: bool, opened: u64) -> bool {
         let mut lost = opened;
         match (*rests, is_finished) {
@@ -175,8 +176,8 @@ mod tests {
         assert!(!signal(0), "it is its own");
         assert!(signal(1) && signal(1));
         assert!(!office.settle(&mut first, true, 0), "there are letters");
-        assert!(office.open(there) && !office.open(there));
-        assert!(!office.settle(&mut second, false, 1), "it goes on");
+        assert_eq!([office.open(there), office.open(there)], [2, 0]);
+        assert!(!office.settle(&mut second, false, 2), "it goes on");
         assert!(office.settle(&mut second, true, 0));
     }
 }

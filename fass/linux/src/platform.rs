@@ -13,7 +13,7 @@ use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
 use fass::platform::{LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
 use sched_dag::engine::{self, ProvenBounds};
-use sched_dag::lifecycle::{self, Parts, PendingRequests, Request};
+use sched_dag::lifecycle::{self, Parts, PendingRequests, Request, WaitId};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
 
 use crate::control::{self, Control};
@@ -94,6 +94,13 @@ impl Platform for Host {
         }
     }
 
+    fn answer(&self, plan: u64, wait: WaitId) {
+        let is_its = |control: &Control| control.office.plan == plan;
+        if let Some(control) = control::latest().filter(is_its) {
+            control.office.send(None, Request::Answer(wait));
+        }
+    }
+
     fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {
         work(&mut edge::get());
     }
@@ -168,6 +175,7 @@ fn teams(plan: Plan, parts: Parts, threads: &Threads, office: &Arc<Office>) -> A
             state,
             office,
             (threads.polls, threads.skips_idle),
+            threads.terms.budget_factor,
         ))
     };
     clusters.map(team).collect()

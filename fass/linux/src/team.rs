@@ -20,6 +20,10 @@
 //! first sees the instance. So an instance ends after its budget, and no later than the
 //! shortest budget of all, and 20 us, after that. Its thread cannot be ended: it is demoted for
 //! good.
+//!
+//! An instance that waits may go on in another thread. So, of subtasks that wait, each worker reads
+//! its clock at both ends of a turn, and adds up what the instance has taken; at the end of a turn
+//! it sees for itself whether that is too much.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -28,7 +32,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use fass::platform::SubtaskRunner;
 use sched_dag::engine::{NextAction, PlatformPort as _};
-use sched_dag::{ClusterId, CoreId, Vertex};
+use sched_dag::{ClusterId, CoreId, Subtask, TaskSet, Vertex};
 
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
@@ -65,7 +69,34 @@ pub(crate) struct Team {
     pub(crate) hand_offs: AtomicU64,
     /// How often a worker was called, which is a wake of the kernel's.
     pub(crate) calls: AtomicU64,
+    /// By vertex, what its instance has taken; of no vertex if no subtask waits.
+    turns: Box<[TurnClock]>,
 }
+
+/// The processor time of an instance that waits.
+struct TurnClock {
+    /// How much those of its turns have taken that are over.
+    taken_ns: AtomicU64,
+    budget_ns: u64,
+}
+
+impl TurnClock {
+    /// Makes one for each vertex, if any may wait, with its budget, or so many of its WCETs.
+    fn all(task_set: &TaskSet, wcets: u64) -> Box<[Self]> {
+        let subtasks = || task_set.dags().iter().flat_map(|dag| dag.subtasks());
+        if subtasks().all(|subtask| subtask.waits().is_empty()) {
+            return Box::default();
+        }
+        let clock = |subtask: &Subtask| Self {
+            taken_ns: AtomicU64::new(0),
+            budget_ns: subtask.most_execution_ns(wcets),
+        };
+        subtasks().map(clock).collect()
+    }
+}
+
+/// The cause of a fault.
+const OVERRUN: &str = "its budget was exceeded";
 
 impl Team {
     /// Makes it; idle threads poll, and the run's time skips what would pass idly, or not.
@@ -73,9 +104,11 @@ impl Team {
         state: State,
         office: &Arc<Office>,
         (polls, skips_idle): (bool, bool),
+        budget_factor: u64,
     ) -> Self {
         let workers = state.seats.iter().map(|_| Worker::new(polls));
         Self {
+            turns: TurnClock::all(&state.engine.task_set, budget_factor),
             workers: workers.collect(),
             polls,
             skips_idle,
@@ -204,10 +237,32 @@ impl Team {
     #[inline]
     fn execute(&self, runner: &mut SubtaskRunner) -> Result<(), String> {
         edge::note_running(Some(runner.instance));
-        let body = AssertUnwindSafe(|| runner.run());
-        let outcome = catch_unwind(body).map_err(|panic| message(&*panic));
+        let body = AssertUnwindSafe(|| match self.turns.get(runner.vertex.index()) {
+            Some(clock) if runner.body.may_wait() => Self::take_turn(runner, clock),
+            _ => {
+                runner.run();
+                Ok(())
+            }
+        });
+        let outcome = catch_unwind(body).unwrap_or_else(|panic| Err(message(&*panic)));
         edge::note_running(None);
         outcome
+    }
+
+    /// Runs a turn of an instance, and adds what it takes to what the others have taken.
+    fn take_turn(runner: &mut SubtaskRunner, clock: &TurnClock) -> Result<(), String> {
+        let goes_on = runner.body.goes_on(runner.instance.job);
+        let before_ns = clock.taken_ns.load(Ordering::Relaxed);
+        let before_ns = if goes_on { before_ns } else { 0 };
+        clock.taken_ns.store(before_ns, Ordering::Relaxed);
+        let began_ns = sys::own_processor_time_ns();
+        runner.run();
+        let taken_ns = before_ns + sys::own_processor_time_ns().saturating_sub(began_ns);
+        clock.taken_ns.store(taken_ns, Ordering::Relaxed);
+        match taken_ns > clock.budget_ns {
+            true => Err(OVERRUN.into()),
+            false => Ok(()),
+        }
     }
 
     /// Reports that a worker's instance has ended, and finds what it does next.
@@ -270,7 +325,7 @@ impl Team {
                     NextAction::Step(ended) => {
                         let now_ns = port.now_ns();
                         engine.step((now_ns, core), &mut port, |moment| {
-                            ended.into_iter().for_each(|ended| moment.complete(ended));
+                            ended.into_iter().for_each(|turn| moment.end_turn(turn));
                         });
                         state_now.carry_out(workers);
                     }
@@ -388,8 +443,8 @@ fn message(panic: &(dyn std::any::Any + Send)) -> String {
 /// The latest look at an instance that has a budget.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
-    /// The subtask and the job.
-    what: Option<(Vertex, u64)>,
+    /// The subtask, the job, and what its earlier turns have taken.
+    what: Option<(Vertex, u64, u64)>,
     /// The processor time of its thread then.
     processor_ns: u64,
 }
@@ -432,11 +487,14 @@ impl Budgets {
             let (Some(processor_ns), true) = (processor_ns, budget_ns < u64::MAX) else {
                 continue;
             };
-            let what = Some((vertex, state.engine.scheduler.instance_of(vertex).job));
+            let job = state.engine.scheduler.instance_of(vertex).job;
+            let clock = team.turns.get(vertex.index());
+            let taken_ns = clock.map_or(0, |clock| clock.taken_ns.load(Ordering::Relaxed));
+            let what = Some((vertex, job, taken_ns));
             if seen.what != what {
                 *seen = Seen { what, processor_ns };
             }
-            let used_ns = processor_ns.saturating_sub(seen.processor_ns);
+            let used_ns = taken_ns + processor_ns.saturating_sub(seen.processor_ns);
             if used_ns > budget_ns {
                 *seen = Seen::default();
                 return Err(core);
@@ -564,7 +622,7 @@ impl Team {
         state.seats[number] = None;
         state.abandoned.push(number);
         state.replace(core, &self.workers);
-        let cause = "its budget was exceeded".to_owned();
+        let cause = OVERRUN.to_owned();
         state.fail(&self.workers, (core, vertex), None, (cause, true));
         state.report_left(core, &self.workers);
     }

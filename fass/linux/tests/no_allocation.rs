@@ -41,7 +41,13 @@ fn jobs_allocate_nothing_preempted_or_not() {
         long.period(ms(10)).relative_deadline(ms(10));
         let function = |_job| execute_for(Duration::from_millis(3), Occupation::Spin);
         long.register_untyped_subtask(function, named("long").priority(9));
-        finish_create_dags(&[dag, long]).unwrap();
+        let naps = create_dag();
+        naps.name("naps").jobs(JOBS);
+        naps.period(ms(2)).relative_deadline(ms(2));
+        let nap = || fass::sleep(Duration::from_micros(100));
+        let stated = named("nap").wait(Duration::from_micros(100));
+        naps.async_source(nap).register(stated);
+        finish_create_dags(&[dag, long, naps]).unwrap();
         let run = machine.run().unwrap();
         assert_eq!(run.violations().count(), 0);
         assert_eq!(run.counts().preemptions > 0, machine.is_preemptive());

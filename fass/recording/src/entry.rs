@@ -106,7 +106,7 @@ kinds! {
     /// ```
     /// assert_eq!(recording::Role::Source.name(), "source");
     /// ```
-    pub enum Role("what the values are: 0 source, 1 result, 2 sample, 3 state") {
+    pub enum Role("what the values are: 0 source, 1 result, 2 sample, 3 state, 4 answer") {
         /// A source returned them. A replay takes them.
         Source = "source",
         /// Another subtask returned them. A replay compares them.
@@ -119,6 +119,10 @@ kinds! {
         /// with a job takes what is recorded of it, and compares the others. Since version 5 of the
         /// format.
         State = "state",
+        /// A subtask waited for them, as answers of a device: the type is `[(u32, u64, T?)]`, of the
+        /// job's waits with their numbers, how many nanoseconds each answer took, and the answer, if
+        /// it came in time. A replay takes them. Since version 6 of the format.
+        Answer = "answer",
     }
 
     /// The kind of an entry.
@@ -164,7 +168,7 @@ impl Role {
 /// See [`Writer`](crate::Writer).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry<'v> {
-    /// What.
+    /// The kind of it.
     pub what: EntryKind,
     /// The number of the DAG.
     pub dag: u16,
@@ -273,6 +277,9 @@ crate::recordable! {
         pub ready_ns: u64,
         /// The DAGs, in the order of their numbers.
         pub dags: Vec<CommittedDag>,
+        /// The waits, those of a subtask in their order: DAG and subtask, the limit, and the WCET
+        /// of the segment that follows, if it is stated.
+        pub waits: Vec<(u32, u32, u64, Option<u64>)>,
     }
 
     /// A DAG of a [`Commit`].

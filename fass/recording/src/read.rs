@@ -205,7 +205,14 @@ impl<'b> Chunk<'b> {
                 let text = core::str::from_utf8(payload).map_err(|_| malformed);
                 text.map(Chunk::Text)
             }
-            COMMIT => Commit::from_bytes(payload).map(Chunk::Commit),
+            COMMIT => {
+                // In version 5 it ends before the waits: there are 0.
+                let without_waits = || [payload, &[0; 4]].concat();
+                let commit = Commit::from_bytes(payload);
+                let commit =
+                    commit.or_else(|wrong| Commit::from_bytes(&without_waits()).map_err(|_| wrong));
+                commit.map(Chunk::Commit)
+            }
             EVENTS => Events::read(payload).map(Chunk::Events),
             TIMES => Times::from_bytes(payload).map(Chunk::Times),
             END | CUT => return Ok(None),
@@ -241,7 +248,7 @@ impl Progress {
             return Err(Decoder::new(bytes).expected(mark));
         }
         let malformed =
-            input.expected("version 1 to 5 of recordings, which are those that are read");
+            input.expected("version 1 to 6 of recordings, which are those that are read");
         // A later version may have kinds that this code cannot check; an earlier one only lacks
         // some.
         if !(1..=VERSION).contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {

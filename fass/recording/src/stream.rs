@@ -30,8 +30,9 @@ pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 /// The version of the format that is written, of values included. Those before are read, too: the
 /// first has no entries of [`EntryKind::Clock`], and neither of
 /// [`EntryKind::Fault`]; those before 4 have no text, and
-/// those before 5 no commits, events and times, and no [states](crate::Role::State).
-pub const VERSION: u16 = 5;
+/// those before 5 no commits, events and times, and no [states](crate::Role::State); those before 6
+/// no [waits](Commit::waits) and no [answers](crate::Role::Answer).
+pub const VERSION: u16 = 6;
 
 /// The kinds of frames.
 pub(super) const HEADER: u8 = 1;

@@ -5,8 +5,8 @@
 
 /// Shows handles to people who debug: as what they are, and of what.
 macro_rules! shown_as {
-    ($Handle:ident $(<$T:ident>)?, |$of:ident| $what:expr) => {
-        impl $(<$T>)? core::fmt::Debug for $Handle $(<$T>)? {
+    ($Handle:ident $(<$($T:ident),+>)?, |$of:ident| $what:expr) => {
+        impl $(<$($T),+>)? core::fmt::Debug for $Handle $(<$($T),+>)? {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
                 let $of = self;
                 f.debug_tuple(stringify!($Handle)).field(&$what).finish()
@@ -16,6 +16,7 @@ macro_rules! shown_as {
 }
 
 pub(crate) mod dag;
+pub(crate) mod device;
 pub(crate) mod latest;
 pub(crate) mod lifecycle;
 pub(crate) mod parameter;
@@ -26,4 +27,6 @@ pub(crate) mod state;
 pub(crate) mod subtask;
 pub(crate) mod topics;
 pub(crate) mod uses;
+pub(crate) mod waiting;
 pub(crate) mod wire;
+pub(crate) mod wire_waits;

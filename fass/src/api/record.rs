@@ -12,7 +12,7 @@ use crate::run::line::TopicEdge;
 use crate::run::message::Message;
 use crate::run::record::RecordedTopic;
 
-static EDGE: TopicEdge = TopicEdge {
+pub(super) static EDGE: TopicEdge = TopicEdge {
     crosses: || expect_installed().crosses(),
     has_results: || expect_installed().results_cross(),
     open: |dag, graph, channels| expect_installed().open_channels(dag, graph, channels, BEGIN),

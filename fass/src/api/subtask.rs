@@ -33,7 +33,7 @@ use sched_dag::SubtaskLabel;
 use super::dag::Dag;
 use crate::draft::{DagDraft, NamedTopics, SubtaskAttributes};
 use crate::run::message::MessageType;
-use crate::run::subtask::{MakeBody, defer};
+use crate::run::subtask::{MakeBody, defer, defer_untyped};
 use crate::run::tuple::{VecToPubs, VecToSubs};
 
 /// A subtask whose function is known, to be registered by [`register`](Self::register).
@@ -65,6 +65,7 @@ pub struct Subtask<'d> {
     dag: &'d Dag,
     body: MakeBody,
     is_replaceable: bool,
+    may_wait: bool,
     reads: &'d [&'d str],
     writes: &'d [&'d str],
     /// The types of its inputs and of its outputs, by functions: an image has little room.
@@ -106,6 +107,7 @@ impl<'d> Subtask<'d> {
             dag,
             body,
             is_replaceable: false,
+            may_wait: false,
             reads: &[],
             writes: &[],
             types: [Args::input_types, Ret::output_types],
@@ -116,6 +118,13 @@ impl<'d> Subtask<'d> {
     pub(super) fn replaceable(self) -> Self {
         Self {
             is_replaceable: true,
+            ..self
+        }
+    }
+
+    pub(super) fn waiting(self) -> Self {
+        Self {
+            may_wait: true,
             ..self
         }
     }
@@ -158,9 +167,12 @@ impl<'d> Subtask<'d> {
     #[track_caller]
     pub(super) fn register_labelled(self, attributes: SubtaskAttributes) -> SubtaskLabel {
         let mut draft = self.dag.open();
+        let subtask = draft.spec.subtasks.len();
         if self.is_replaceable {
-            let subtask = draft.spec.subtasks.len();
             draft.replaceable.push(subtask);
+        }
+        if self.may_wait {
+            draft.waiting.push(subtask);
         }
         let [inputs, outputs] = self.types.map(|types| types());
         let ends = NamedTopics {
@@ -244,7 +256,7 @@ impl Dag {
         F: FnMut(u64) + Send + 'static,
     {
         UntypedSubtask {
-            subtask: self.open().register_untyped(f, attributes),
+            subtask: self.open().register_untyped(defer_untyped(f), attributes),
             draft: Rc::clone(&self.draft),
         }
     }

@@ -13,9 +13,10 @@
 //!   the receiver is the source of a sporadic DAG, each packet raises its signal.
 //! - What an instance sends goes when it is complete (R3), all of it or nothing, in the order
 //!   of jobs. Of an instance that fails nothing goes.
-//! - Nobody waits: not the device for the receiver, nor the sender for the device. Bytes
-//!   that find no room are lost, as a whole packet, or all that an instance has sent, and the
-//!   newest: those that were there stay. Losses are counted ([`Wire::counts`]).
+//! - Nobody waits, but an async function that [reads or writes](super::wire_waits): not the device
+//!   for the receiver, nor the sender for the device. Bytes that find no room are lost, as a whole
+//!   packet, or all that an instance has sent, and the newest: those that were there stay. Losses
+//!   are counted ([`Wire::counts`]).
 //! - The decoder runs in the receiver's instance. If it panics, that is contained as if
 //!   the function had.
 //!
@@ -32,7 +33,7 @@ use alloc::sync::Arc;
 use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use sched_dag::DagId;
+use sched_dag::{DagId, WAITS};
 
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
@@ -85,13 +86,16 @@ use crate::run::wire::{Framing, SendCompletion, WireInput, WireOutput};
 /// ```
 #[derive(Clone)]
 pub struct Wire {
-    shared: Arc<WireState>,
+    pub(super) shared: Arc<WireState>,
 }
 
-struct WireState {
+pub(super) struct WireState {
     name: String,
-    incoming: WireInput,
-    outgoing: Arc<WireOutput>,
+    pub(super) incoming: Arc<WireInput>,
+    pub(super) outgoing: Arc<WireOutput>,
+    /// Tells the subtask that waits for a packet, or for bytes to have gone, if there is one.
+    pub(super) on_packet: SetOnce<Box<dyn Fn() + Send + Sync>>,
+    pub(super) on_gone: SetOnce<Box<dyn Fn() + Send + Sync>>,
     is_received: AtomicBool,
     is_sent_on: AtomicBool,
     /// The signal that its packets raise, if a sporadic DAG begins with them.
@@ -167,12 +171,14 @@ impl Wire {
         Self {
             shared: Arc::new(WireState {
                 name: name.into(),
-                incoming: WireInput::new(
+                incoming: Arc::new(WireInput::new(
                     options.framing,
                     options.longest_bytes,
                     options.room_bytes,
-                ),
+                )),
                 outgoing: Arc::new(WireOutput::new(options.room_bytes)),
+                on_packet: SetOnce::new(),
+                on_gone: SetOnce::new(),
                 is_received: AtomicBool::new(false),
                 is_sent_on: AtomicBool::new(false),
                 signal: SetOnce::new(),
@@ -192,7 +198,7 @@ impl Wire {
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
     pub fn receiving<T>(&self, decode: fn(&[u8]) -> Option<T>) -> ReceiveUse<T> {
-        self.claim(&self.shared.is_received, "receives");
+        self.claim_in();
         ReceiveUse {
             wire: self.clone(),
             decode,
@@ -209,8 +215,20 @@ impl Wire {
     #[must_use = "a use has no effect until a subtask is registered with it"]
     #[track_caller]
     pub fn sending(&self) -> SendUse {
-        self.claim(&self.shared.is_sent_on, "sends");
+        self.claim_out();
         SendUse(self.clone())
+    }
+
+    /// Claims the way in.
+    #[track_caller]
+    pub(super) fn claim_in(&self) {
+        self.claim(&self.shared.is_received, "receives");
+    }
+
+    /// Claims the way out.
+    #[track_caller]
+    pub(super) fn claim_out(&self) {
+        self.claim(&self.shared.is_sent_on, "sends");
     }
 
     #[track_caller]
@@ -252,6 +270,9 @@ impl Wire {
     /// For platforms, which have one place that calls this. It may be an interrupt handler.
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
         let is_whole = self.shared.incoming.arrive(bytes, now_ns);
+        if let Some(tell) = self.shared.on_packet.get().filter(|_| WAITS && is_whole) {
+            tell();
+        }
         let signal = self.shared.signal.get().filter(|_| is_whole)?;
         signal.get()
     }
@@ -269,7 +290,17 @@ impl Wire {
     /// For platforms, which have one place that calls this.
     #[must_use]
     pub fn depart(&self) -> Option<u8> {
-        self.shared.outgoing.take_byte()
+        let outgoing = &self.shared.outgoing;
+        let byte = outgoing.take_byte()?;
+        if let Some(tell) = self
+            .shared
+            .on_gone
+            .get()
+            .filter(|_| WAITS && outgoing.is_empty())
+        {
+            tell();
+        }
+        Some(byte)
     }
 }
 

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use sched_dag::{Activation, DagId, OnFault, SubtaskSpec, TaskSet};
+use sched_dag::{Activation, DagId, OnFault, SubtaskSpec, TaskSet, WAITS};
 
 use super::answer::CommitAnswers;
 use crate::draft::DagDraft;
@@ -71,6 +71,7 @@ pub(crate) fn tie(
                 order: verified.topological_order(),
                 recorded: of_dag,
                 samples: &samples[id.index()],
+                devices: &draft.devices,
                 states: &draft.states,
             };
             any.open_all(&of_dag, &mut lines)
@@ -111,6 +112,9 @@ pub(crate) fn tie(
         // Last, so that what is put around a body is around all that it does.
         if let (Some(any), Some(around)) = (any, around) {
             any.attach(around, &mut bodies);
+        }
+        if WAITS {
+            bodies.iter_mut().for_each(SubtaskCode::hold_effects);
         }
         bodies
     })

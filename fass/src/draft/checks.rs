@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::ptr;
 
-use sched_dag::{DagId, DagLabel, OnFault, SubtaskSpec};
+use sched_dag::{DagId, DagLabel, OnFault, SubtaskSpec, WAITS};
 
 use super::DagDraft;
 use super::fault::Fault;
@@ -30,6 +30,9 @@ pub(crate) fn check_dag(
 ) {
     check_others(drafts, draft, label, faults);
     check_replaceable(draft, label, faults);
+    if WAITS {
+        check_waits(draft, label, faults);
+    }
     check_inputs(draft, label, faults);
 }
 
@@ -91,6 +94,27 @@ fn check_replaceable(draft: &DagDraft, label: &DagLabel, faults: &mut Vec<Fault>
                 state: state.name.clone(),
             });
         }
+    }
+}
+
+/// Adds what is wrong with waits: functions that cannot take them, and devices that several ask.
+fn check_waits(draft: &DagDraft, dag: &DagLabel, faults: &mut Vec<Fault>) {
+    for (number, subtask) in draft.spec.subtasks.iter().enumerate() {
+        if subtask.waits.is_empty() || draft.waiting.contains(&number) {
+            continue;
+        }
+        let (dag, subtask) = (dag.clone(), draft.label(number));
+        faults.push(match draft.replaceable.contains(&number) {
+            true => Fault::ReplaceableWaits { dag, subtask },
+            false => Fault::CannotWait { dag, subtask },
+        });
+    }
+    for (subtask, device) in &draft.asked_twice {
+        faults.push(Fault::DeviceAskedTwice {
+            dag: dag.clone(),
+            subtask: draft.label(*subtask),
+            device: device.clone(),
+        });
     }
 }
 
@@ -294,6 +318,18 @@ pub(crate) fn check_recorded(drafts: &Drafts, faults: &mut Vec<Fault>) {
                  sources, or none"
             );
             add("source_partly_recorded", text);
+        }
+        let asks = draft.devices.iter().filter(|_| WAITS);
+        for (subtask, device) in asks.filter(|(subtask, _)| !is_source(*subtask)) {
+            if device.line().is_none() {
+                let (subtask, device) = (draft.label(*subtask), device.name());
+                let text = format!(
+                    "{subtask} of {dag} asks device `{device}`, whose answers are not recorded, and \
+                     a replay could not give them, though topic `{first}` of a source is; record \
+                     both, or neither"
+                );
+                add("answers_not_recorded", text);
+            }
         }
         let samples = draft.samples.iter();
         for (subtask, latest, _) in samples.filter(|(subtask, ..)| !is_source(*subtask)) {

@@ -116,6 +116,20 @@ worded! {
             "state_without_reset",
             "{subtask} of {dag} has another function for after a fault, and the state `{state}`, \
              which it uses, no other value; give it one by `reset_to`";
+        /// A subtask states waits, and its function is not async.
+        CannotWait { dag: DagLabel, subtask: SubtaskLabel } = "cannot_wait",
+            "{subtask} of {dag} states waits, and its function is not async; register an async \
+             one, or state no waits";
+        /// A subtask states waits, and has another function for after a fault.
+        ReplaceableWaits { dag: DagLabel, subtask: SubtaskLabel } = "replaceable_waits",
+            "{subtask} of {dag} states waits, and has another function for after a fault, which \
+             could not have the place of a future that the fault has ended; register an async one \
+             alone, or state no waits";
+        /// A device is asked by more than one subtask.
+        DeviceAskedTwice { dag: DagLabel, subtask: SubtaskLabel, device: String } =
+            "device_asked_twice",
+            "{subtask} of {dag} asks device `{device}`, which another subtask asks; make a device \
+             for each";
         /// The commit is to find the clusters, and a DAG gets no cores.
         NotAssigned(error: LaunchError) = "not_assigned", "{error}";
         /// The DAG demands a proof that it meets its deadlines, and there is none, for that

@@ -23,15 +23,16 @@ use core::time::Duration;
 use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{
     Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel, SubtaskSpec,
-    TopicPort,
+    TopicPort, WAITS, Wait,
 };
 
+use crate::run::answers::AnyDevice;
 use crate::run::effect::{Effect, InstanceRequests, RequestKind, RequestTarget, Wish};
 use crate::run::latest::AnyLatest;
 use crate::run::line::KeptState;
 use crate::run::message::MessageType;
 use crate::run::record::AnyRecorded;
-use crate::run::subtask::{MakeBody, defer_untyped};
+use crate::run::subtask::MakeBody;
 use fault::Fault;
 
 /// Makes of all drafts of a commit what serves their requests.
@@ -92,6 +93,12 @@ pub(crate) struct DagDraft {
     pub(crate) effects: Vec<(usize, Box<dyn Effect>)>,
     /// The subtasks whose functions can be replaced.
     pub(crate) replaceable: Vec<usize>,
+    /// The subtasks whose functions are async.
+    pub(crate) waiting: Vec<usize>,
+    /// The devices that subtasks ask.
+    pub(crate) devices: Vec<(usize, Arc<dyn AnyDevice>)>,
+    /// The devices that several subtasks ask: each further one, and the device's name.
+    pub(crate) asked_twice: Vec<(usize, String)>,
     /// The states that are made anew after faults, and by what.
     pub(crate) resets: Vec<(usize, ProvideResets)>,
     /// Which DAG it is, for others that send it signals, or pause it.
@@ -169,14 +176,15 @@ impl DagDraft {
     }
 
     /// Adds a subtask without types and returns its position.
-    pub(crate) fn register_untyped<F>(&mut self, f: F, attributes: SubtaskAttributes) -> usize
-    where
-        F: FnMut(u64) + Send + 'static,
-    {
+    pub(crate) fn register_untyped(
+        &mut self,
+        body: MakeBody,
+        attributes: SubtaskAttributes,
+    ) -> usize {
         let subtask = self.next_label(&attributes);
         let spec = self.specify(&subtask, attributes);
         self.spec.subtasks.push(spec);
-        self.make_bodies.push(defer_untyped(f));
+        self.make_bodies.push(body);
         subtask.id.index()
     }
 
@@ -186,11 +194,23 @@ impl DagDraft {
         // A duration that does not fit into nanoseconds becomes a fault of the commit, not a panic
         // here.
         let wcet_ns = wcet.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
+        // Without the feature their number is enough: the verification refuses any.
+        let mut waits = alloc::vec![Wait::default(); attributes.waits.len()];
+        for (wait, (limit, segment)) in waits.iter_mut().zip(attributes.waits).filter(|_| WAITS) {
+            wait.limit_ns = self.convert(limit, Some(subtask), "wait").unwrap_or(0);
+            wait.segment_ns = segment.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
+        }
+        // The sum; where a part is missing, the verification says so.
+        let later_ns = waits
+            .iter()
+            .filter_map(|wait| wait.segment_ns.filter(|_| WAITS));
+        let wcet_ns = wcet_ns.map(|first_ns| later_ns.fold(first_ns, u64::saturating_add));
         let budget = attributes.budget;
         let budget_ns = budget.and_then(|budget| self.convert(budget, Some(subtask), "budget"));
         SubtaskSpec {
             name: attributes.name,
             wcet_ns,
+            waits,
             budget_ns,
             stack_bytes: attributes.stack_bytes,
             priority: attributes.priority.map(Priority),
@@ -333,6 +353,7 @@ impl DagDraft {
     }
 
     /// Converts a duration, or notes that it is too long.
+    #[inline(never)]
     fn convert(
         &mut self,
         duration: Duration,
@@ -406,6 +427,8 @@ pub struct SubtaskAttributes {
     pub(crate) name: String,
     pub(crate) priority: Option<u32>,
     pub(crate) wcet: Option<Duration>,
+    /// The limits of its waits, and the WCETs of the segments behind them.
+    waits: Vec<(Duration, Option<Duration>)>,
     pub(crate) budget: Option<Duration>,
     stack_bytes: Option<u64>,
     non_preemptive: bool,
@@ -436,9 +459,31 @@ impl SubtaskAttributes {
     /// Sets the worst-case execution time: the longest that one instance
     /// executes, preemption not counted.
     ///
-    /// At most `u64::MAX` nanoseconds; a longer one is a fault at commit.
+    /// At most `u64::MAX` nanoseconds; a longer one is a fault at commit. After a
+    /// [`wait`](Self::wait) it is that of the segment which follows that wait, and only what
+    /// executes counts.
     pub fn wcet(mut self, wcet: Duration) -> Self {
-        self.wcet = Some(wcet);
+        let segment = self.waits.last_mut().map(|(_, segment)| segment);
+        *segment.unwrap_or(&mut self.wcet) = Some(wcet);
+        self
+    }
+
+    /// Adds a wait, with the time after which it ends at the latest, whatever a device does.
+    ///
+    /// Each instance of an [async subtask](crate::Dag::register_async_subtask) takes its waits one
+    /// after the other, each once; what it executes between them are its *segments*. Their WCETs are
+    /// stated where they stand, of all segments or of none. An app whose subtasks wait is built with
+    /// `fass`' feature `waits`:
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::SubtaskAttributes;
+    ///
+    /// let ms = Duration::from_millis;
+    /// let attributes = SubtaskAttributes::named("ask").wcet(ms(1)).wait(ms(3)).wcet(ms(1));
+    /// ```
+    pub fn wait(mut self, limit: Duration) -> Self {
+        self.waits.push((limit, None));
         self
     }
 

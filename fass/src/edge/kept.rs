@@ -159,7 +159,20 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
                 ..of_dag(dag)
             })
             .collect(),
+        waits: waits(task_set),
     }
+}
+
+fn waits(task_set: &TaskSet) -> Vec<(u32, u32, u64, Option<u64>)> {
+    let mut all = Vec::new();
+    for (dag, of_dag) in (0..).zip(task_set.dags()) {
+        for (subtask, of_subtask) in (0..).zip(of_dag.subtasks()) {
+            for wait in of_subtask.waits() {
+                all.push((dag, subtask, wait.limit_ns, wait.segment_ns));
+            }
+        }
+    }
+    all
 }
 
 fn of_dag(dag: &Dag) -> CommittedDag {

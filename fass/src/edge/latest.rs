@@ -232,7 +232,7 @@ impl LatestJobs {
         let mut places = Vec::with_capacity(channels.len());
         for channel in channels {
             let count = match channel.role {
-                Role::Source | Role::Sample | Role::State => count,
+                Role::Source | Role::Sample | Role::State | Role::Answer => count,
                 // A replay computes results itself.
                 Role::Result => 0,
             };

@@ -13,6 +13,7 @@ use core::fmt;
 use core::time::Duration;
 
 use recording::Channel;
+use sched_dag::lifecycle::WaitId;
 use sched_dag::{DagId, TaskSet};
 
 use crate::Occupation;
@@ -95,6 +96,19 @@ pub trait Platform: Sync {
     fn raise(&self, plan: u64, dag: DagId) {
         let _ = (plan, dag);
         panic!("this platform takes no signals from outside; raise them in subtasks");
+    }
+
+    /// Takes the answer to a wait of the plan with a number, from outside all subtasks
+    /// ([`DeviceDriver::answer`](crate::shared::DeviceDriver::answer)), and passes it to the scheduler
+    /// of the wait's DAG as a [`Request::Answer`]; does nothing if that plan is not, or no longer,
+    /// there. Must not wait.
+    ///
+    /// # Panics
+    ///
+    /// On a platform that does not define this.
+    fn answer(&self, plan: u64, wait: WaitId) {
+        let _ = (plan, wait);
+        panic!("this platform takes no answers of devices; let no subtask wait for one");
     }
 
     /// Lends `work` what the platform keeps at its edge, under its lock; a platform that keeps

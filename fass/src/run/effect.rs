@@ -37,6 +37,12 @@ pub(crate) trait Effect: Send {
     /// to be told.
     fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request));
 
+    /// Does what is to be done at the end of a turn that ends in a wait. Reports whether it waits
+    /// for something that is there.
+    fn wait(&mut self, _ended_ns: u64) -> bool {
+        false
+    }
+
     /// Does what is to be done for an instance that has failed.
     fn fail(&mut self, _failed_ns: u64) {}
 }

@@ -5,9 +5,10 @@
 //! Nothing in here knows how a DAG is built or verified, and nothing allocates once the
 //! commit has made it.
 
+pub(crate) mod answers;
 #[allow(
     unsafe_code,
-    reason = "the four cells of job slots, shared values and records"
+    reason = "the cells of job slots, shared values and records, and the waker of turns"
 )]
 pub(crate) mod cell;
 pub(crate) mod effect;
@@ -21,4 +22,6 @@ pub(crate) mod replaceable;
 pub(crate) mod subtask;
 pub(crate) mod topic;
 pub(crate) mod tuple;
+pub(crate) mod turn;
+pub(crate) mod waiting;
 pub(crate) mod wire;

@@ -10,11 +10,12 @@ use alloc::vec::Vec;
 use sched_dag::engine::{Alternate, ProvenBounds};
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::{Lifecycle, Request};
-use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, WAITS, engine};
 
 use super::effect::{Effect, MutedEffect};
 use super::latest::Staleness;
 use super::line::LineOf;
+use super::turn::{TurnEffects, TurnState};
 
 /// A committed set of DAGs, ready to be scheduled.
 ///
@@ -115,6 +116,11 @@ pub(crate) trait PolledSubtask: Send {
     /// Gives the function up, and the states that it used: the next turn is another one's.
     fn replace(&mut self) {}
 
+    /// Returns the state of its turns, if it may wait.
+    fn turn(&self) -> Option<&Arc<TurnState>> {
+        None
+    }
+
     /// Gives back what it has, after a fault: all but what the app's function owns, of which no
     /// destructor can be called.
     fn forget(self: Box<Self>);
@@ -124,14 +130,19 @@ pub(crate) trait PolledSubtask: Send {
 struct JobPreview<F> {
     subtask: Box<dyn PolledSubtask>,
     look: F,
+    /// The job that was given up last.
+    passed: u64,
 }
 
 impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
     fn take_turn(&mut self, job: u64) {
-        match (self.look)(job) {
-            true => self.subtask.take_turn(job),
-            false => self.subtask.discard(job),
+        // Once for each job, in the first turn of its instance.
+        let goes_on = WAITS && self.turn().is_some_and(|turn| turn.is_of(job));
+        if self.passed != job && (goes_on || (self.look)(job)) {
+            return self.subtask.take_turn(job);
         }
+        self.passed = job;
+        pass(&mut *self.subtask, job);
     }
 
     fn discard(&mut self, job: u64) {
@@ -146,8 +157,19 @@ impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
         self.subtask.replace();
     }
 
+    fn turn(&self) -> Option<&Arc<TurnState>> {
+        self.subtask.turn()
+    }
+
     fn forget(self: Box<Self>) {
         self.subtask.forget();
+    }
+}
+
+/// Takes a turn of a job whose function is not called.
+fn pass(subtask: &mut dyn PolledSubtask, job: u64) {
+    if !WAITS || subtask.turn().is_none_or(|turn| turn.pass(job)) {
+        subtask.discard(job);
     }
 }
 
@@ -190,10 +212,44 @@ impl SubtaskCode {
         self.effects.extend(effects);
     }
 
-    /// Runs the subtask's part of job `job` to its end.
+    /// Lets what it has of effects happen when its instances have finished, if it may wait.
+    pub(crate) fn hold_effects(&mut self) {
+        if let Some(turn) = self.turn() {
+            let turn = Arc::clone(turn);
+            let real = core::mem::take(&mut self.effects);
+            let held = TurnEffects::new(turn, real);
+            self.effects.push(Box::new(held));
+        }
+    }
+
+    /// Returns the state of its turns, if it may wait.
+    fn turn(&self) -> Option<&Arc<TurnState>> {
+        WAITS.then(|| self.subtask.turn()).flatten()
+    }
+
+    /// Reports whether its instances may wait.
+    #[must_use]
+    pub fn may_wait(&self) -> bool {
+        self.turn().is_some()
+    }
+
+    /// Reports whether the instance of a job has begun and not finished: it has a further turn.
+    #[must_use]
+    pub fn goes_on(&self, job: u64) -> bool {
+        self.turn().is_some_and(|turn| turn.is_of(job))
+    }
+
+    /// Takes note, before the next turn, of how the wait has ended in which its instance was.
+    pub fn wake(&mut self, has_timed_out: bool) {
+        if let Some(turn) = self.turn() {
+            turn.wake(has_timed_out);
+        }
+    }
+
+    /// Runs the subtask's part of job `job` to its end, or to its next wait.
     ///
     /// Returns after the function has returned and its outputs are in their
-    /// slots. Polls the subtask's future exactly once. Does not allocate (the
+    /// slots, or when [`complete`](Self::complete) will ask for a wait. Polls the subtask's future exactly once. Does not allocate (the
     /// function itself may).
     ///
     /// The caller calls [`complete`](Self::complete) afterwards, reports the
@@ -253,7 +309,11 @@ impl SubtaskCode {
     /// Has each job looked at before its turn: it is given up where `look` returns false.
     pub(crate) fn before(mut self, look: impl FnMut(u64) -> bool + Send + 'static) -> Self {
         let subtask = self.subtask;
-        self.subtask = Box::new(JobPreview { subtask, look });
+        self.subtask = Box::new(JobPreview {
+            subtask,
+            look,
+            passed: NO_JOB,
+        });
         self
     }
 
@@ -276,6 +336,12 @@ impl SubtaskCode {
     #[must_use]
     pub fn has_effects(&self) -> bool {
         !self.effects.is_empty()
+    }
+
+    /// Takes a turn of job `job` without its function, in the place of [`run`](Self::run): the last
+    /// one gives up its inputs, and those before it end in the stated waits, of no time.
+    pub fn pass_over(&mut self, job: u64) {
+        pass(&mut *self.subtask, job);
     }
 
     /// Gives up the inputs of job `job` that have arrived, instead of running it.
@@ -394,6 +460,10 @@ impl engine::SubtaskBody for SubtaskRunner {
 
     fn discard(&mut self, job: u64) {
         self.body.discard(job);
+    }
+
+    fn wake(&mut self, has_timed_out: bool) {
+        self.body.wake(has_timed_out);
     }
 
     #[inline]

@@ -20,14 +20,16 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use recording::{Channel, Recordable, Role, Schema};
 use sched_dag::wcets::graph_hash;
-use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
+use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort, WAITS};
 
+use super::answers::AnyDevice;
 use super::effect::Effect;
 use super::latest::{AnyLatest, LatestEntry, LatestSlot, Probe, SharedLatest};
 use super::line::{ChannelState, InstanceOutputs, KeptState, LineOf, TopicEdge};
 use super::message::{Message, MessageType};
 use super::plan::{PolledSubtask, SubtaskCode};
 use super::topic::{DagWiring, Ports, Publisher, Relay, Wrap};
+use super::turn::TurnState;
 
 /// A recorded topic while DAGs are built.
 pub(crate) struct RecordedTopic<T> {
@@ -106,6 +108,13 @@ pub(crate) trait AnyRecorded: AnyLatest {
                 around.push((sample.subtask, looking(line, look)));
             }
         }
+        for (subtask, device) in of.devices.iter().filter(|_| WAITS) {
+            if let Some((schema, line)) = device.line() {
+                let way = (schema, Arc::clone(&line));
+                open(*subtask, Role::Answer, device.name(), way, None);
+                around.push((*subtask, finding(line)));
+            }
+        }
         for (position, of_state) in of.states {
             let state = &spec.states[*position];
             let changes = |subtask: &usize| {
@@ -171,9 +180,9 @@ pub(crate) trait AnyRecorded: AnyLatest {
         // The commit has made sure that all of them are recorded.
         let outputs = source.outputs.iter().filter_map(|port| find(&port.topic));
         let outputs = outputs.map(|recorded| recorded.replayed(&mut ports));
-        Some(SubtaskCode::new(Box::new(ReplayedSource(
-            outputs.collect(),
-        ))))
+        let outputs = outputs.collect();
+        let turn = Arc::new(TurnState::new(wiring.waits(subtask)));
+        Some(SubtaskCode::new(Box::new(ReplayedSource { outputs, turn })))
     }
 }
 
@@ -185,6 +194,8 @@ pub(crate) struct OfDag<'d> {
     pub(crate) order: &'d [SubtaskId],
     pub(crate) recorded: &'d [Rc<dyn AnyRecorded>],
     pub(crate) samples: &'d [SampledValue],
+    /// The devices that its subtasks ask.
+    pub(crate) devices: &'d [(usize, Arc<dyn AnyDevice>)],
     /// Its recorded states, by their positions.
     pub(crate) states: &'d [(usize, Arc<KeptState>)],
 }
@@ -312,11 +323,21 @@ impl<T: Message + Recordable> Relay<T> for TopicTap<T> {
 }
 
 /// A source that is not called.
-struct ReplayedSource(Vec<Replayed>);
+struct ReplayedSource {
+    outputs: Vec<Replayed>,
+    /// It takes its waits all the same.
+    turn: Arc<TurnState>,
+}
 
 impl PolledSubtask for ReplayedSource {
     fn take_turn(&mut self, job: u64) {
-        self.0.iter_mut().for_each(|send| send(job));
+        if !WAITS || self.turn.pass(job) {
+            self.outputs.iter_mut().for_each(|send| send(job));
+        }
+    }
+
+    fn turn(&self) -> Option<&Arc<TurnState>> {
+        Some(&self.turn)
     }
 
     fn discard(&mut self, _job: u64) {}
@@ -382,13 +403,18 @@ type Around = Box<dyn FnOnce(SubtaskCode) -> SubtaskCode>;
 
 /// Has a subtask look for something before each turn, and the line give away what it has found.
 fn looking(line: Arc<ChannelState>, look: impl Fn(u64) + Send + 'static) -> Around {
-    let found: Box<dyn Effect> = Box::new(InstanceOutputs(line));
+    let found = finding(line);
     let look = move |job| {
         look(job);
         true
     };
-    Box::new(|body| {
-        let mut body = body.before(look);
+    Box::new(|body| found(body.before(look)))
+}
+
+/// Has the line give away what a subtask finds.
+fn finding(line: Arc<ChannelState>) -> Around {
+    let found: Box<dyn Effect> = Box::new(InstanceOutputs(line));
+    Box::new(|mut body| {
         body.add_effects([found]);
         body
     })

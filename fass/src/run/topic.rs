@@ -18,7 +18,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::Any;
 
-use sched_dag::{DagSpec, sorted_by_key};
+use sched_dag::{DagSpec, WAITS, Wait, sorted_by_key};
 
 use super::cell::{Reader, Writer, ring};
 use super::latest::{AnyLatest, Stage};
@@ -192,6 +192,8 @@ pub(crate) struct DagWiring {
     /// For each latest value its topic, and where the writer puts it: a
     /// `Vec<Box<dyn Stage<T>>>`; or what shall stand between, a [`Wrap<T>`].
     stages: Vec<(String, Box<dyn Any>)>,
+    /// For each subtask its waits.
+    waits: Vec<Vec<Wait>>,
 }
 
 impl DagWiring {
@@ -232,7 +234,16 @@ impl DagWiring {
             stages: (latest.iter())
                 .map(|latest| (latest.topic().into(), latest.stages()))
                 .collect(),
+            waits: (spec.subtasks.iter())
+                .filter(|_| WAITS)
+                .map(|subtask| subtask.waits.to_vec())
+                .collect(),
         }
+    }
+
+    /// Returns the waits that a subtask states.
+    pub(crate) fn waits(&self, subtask: usize) -> &[Wait] {
+        self.waits.get(subtask).map_or(&[], Vec::as_slice)
     }
 
     /// Returns the ends of the edges that lead to an untyped subtask, and from it. Compiled with

@@ -6,3 +6,4 @@ mod diagnostics;
 mod no_allocation;
 mod paper;
 mod support;
+mod waits;

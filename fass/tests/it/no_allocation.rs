@@ -5,7 +5,7 @@
 //! and unique messages, 16 arguments, more than one job in flight, discards.
 
 #[path = "../../../sched-dag/tests/it/counting.rs"]
-mod counting;
+pub(crate) mod counting;
 
 use core::time::Duration;
 use std::sync::Arc;

@@ -7,6 +7,7 @@
 //! other recorded values are compared.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 use fass::edge::{self, Replay};
 use fass::edge::{LatestJobs, RecordedValue};
@@ -29,6 +30,8 @@ pub(crate) struct Edge {
     values: RefCell<Vec<Kept>>,
     /// Times that the running instance was told, if they are recorded.
     told: RefCell<Option<Told>>,
+    /// How many times each instance was told before its wait.
+    told_before: RefCell<BTreeMap<Instance, usize>>,
     /// The inputs of the last jobs, if not all is kept.
     latest: RefCell<Option<LatestJobs>>,
     replay: RefCell<Option<Replay>>,
@@ -50,6 +53,8 @@ struct Told {
     answers: Vec<u64>,
     /// Those of the recorded run.
     recorded: Vec<u64>,
+    /// How many of these were for earlier turns.
+    before: usize,
 }
 
 /// Returns an entry without its value, of a job whose release is not known yet.
@@ -187,15 +192,17 @@ impl Edge {
         self.committed.replace(Some(record));
     }
 
-    /// Begins an instance.
-    pub(crate) fn start_instance(&self, instance: Instance) {
+    /// Begins a turn of an instance, its first or a later one.
+    pub(crate) fn start_turn(&self, instance: Instance, is_later: bool) {
         let of_dag = |channel: &Channel| usize::from(channel.dag) == instance.dag.index();
         // Only for DAGs of which something is recorded: the others are never replayed.
         let is_noted = self.header.borrow().channels.iter().any(of_dag);
         let recorded = self.of_replay(|replay| replay.clock(instance).map(<[u64]>::to_vec));
+        let before = self.told_before.borrow_mut().remove(&instance);
         self.told.replace(is_noted.then(|| Told {
             answers: Vec::new(),
             recorded: recorded.unwrap_or_default(),
+            before: before.filter(|_| is_later).unwrap_or(0),
         }));
     }
 
@@ -203,22 +210,32 @@ impl Edge {
     /// recorded.
     pub(crate) fn answer_ns(&self, now_ns: u64) -> u64 {
         let mut told = self.told.borrow_mut();
-        let Some(Told { answers, recorded }) = &mut *told else {
+        let Some(told) = &mut *told else {
             return now_ns;
         };
+        let place = told.before + told.answers.len();
         // By its place among the answers. A function that asks more often than it did is told this
         // run's time.
-        let answer_ns = recorded.get(answers.len()).copied().unwrap_or(now_ns);
-        answers.push(answer_ns);
+        let answer_ns = told.recorded.get(place).copied().unwrap_or(now_ns);
+        told.answers.push(answer_ns);
         answer_ns
     }
 
-    /// Ends an instance, which began then.
-    pub(crate) fn finish_instance(&self, instance: Instance, start_ns: u64) {
-        let told = self.told.take().map(|told| told.answers);
-        let Some(answers) = told.filter(|answers| !answers.is_empty()) else {
+    /// Ends a turn of an instance, which began then, and which a wait and others follow or not.
+    pub(crate) fn finish_turn(&self, instance: Instance, start_ns: u64, goes_on: bool) {
+        let Some(Told {
+            answers, before, ..
+        }) = self.told.take()
+        else {
             return;
         };
+        if goes_on {
+            let told = before + answers.len();
+            self.told_before.borrow_mut().insert(instance, told);
+        }
+        if answers.is_empty() {
+            return;
+        }
         let mut values = self.values.borrow_mut();
         if let Some(latest) = self.latest.borrow().as_ref() {
             // Times are kept as long as the inputs of their jobs, so memory does not grow with the

@@ -35,6 +35,7 @@
 mod command;
 mod edge;
 mod job;
+mod machine;
 mod platform;
 mod report;
 mod settings;
@@ -54,8 +55,8 @@ pub use sched_dag::{
 pub use command::replay_command;
 pub use edge::Divergence;
 pub use job::{JobShown, Passed, SubtaskShown, Value};
-use platform::Machine;
-pub use platform::RunError;
+use machine::Machine;
+pub use machine::RunError;
 pub use report::{DagReport, InstanceRecord, JobRecord, PanicRecord, Report};
 pub use sched_dag::journal::{Event, EventKind};
 use settings::Settings;

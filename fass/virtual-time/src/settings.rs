@@ -176,8 +176,13 @@ pub enum Silent {
 }
 
 impl Silent {
-    /// Returns how long a call takes, in nanoseconds.
-    pub(crate) fn of_call_ns(self, instance: Instance, wcet_ns: Option<u64>) -> u64 {
+    /// Returns how long a segment of a call takes, in nanoseconds. Of a subtask whose WCET is known
+    /// in all only, the first segment takes it.
+    pub(crate) fn of_call_ns(self, instance: Instance, segment: usize, subtask: &Subtask) -> u64 {
+        let wcet_ns = match subtask.segments_ns() {
+            Some(segments_ns) => segments_ns.get(segment).copied(),
+            None => subtask.wcet_ns().filter(|_| segment == 0),
+        };
         let wcet_ns = wcet_ns.unwrap_or(0);
         match self {
             Self::NoTime => 0,
@@ -185,6 +190,7 @@ impl Silent {
             Self::Drawn { seed } => {
                 let Instance { dag, subtask, job } = instance;
                 let numbers = [dag.0.into(), subtask.0.into(), job].into_iter();
+                let numbers = numbers.chain((1..).take(segment));
                 let drawn = numbers.fold(nth(seed, 0), |drawn, n| nth(drawn ^ n, 0));
                 // At least 1 ns, so that a call which has a WCET takes time; without a WCET it is
                 // 0.

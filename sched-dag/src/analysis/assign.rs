@@ -3,7 +3,7 @@
 //!
 //! This is federated scheduling (the papers are named below). A DAG is *heavy* if a job of
 //! it is more work than one core does by its deadline, or by the next release if that comes
-//! first; it gets a cluster of as many cores as its multi-path bound needs, or the order that may
+//! first, or if subtasks of it wait; it gets a cluster of as many cores as its multi-path bound needs, or the order that may
 //! be fixed for it. The others are
 //! *light*: clusters of one core each take them, the densest first, each where the sum of
 //! densities is least (worst fit), so that what room there is, is left on every core. A core
@@ -61,10 +61,10 @@ texts! {
             "its longest path takes {:?}, and a job has {:?} until its deadline or the next \
              release; shorten the path, or lengthen both",
             Duration::from_nanos(*length_ns), Duration::from_nanos(*within_ns);
-        /// It is heavy, and the cores that are left are too few.
+        /// It is heavy, or waits, and the cores that are left are too few.
         TooHeavy { left: u32 } =
-            "a job is more work than one core does in time, and too few cores are left: {left}; \
-             add cores, or lengthen its deadline and period";
+            "a job needs cores of its own to be in time, and too few are left: {left}; add cores, or \
+             lengthen its deadline and period";
         /// It is light, and no core has room for it, of those that heavy DAGs leave.
         NoRoom { left: u32 } =
             "no core has room for it, of those that heavy DAGs leave: {left}; add cores, or \
@@ -76,7 +76,7 @@ texts! {
 ///
 /// # Errors
 ///
-/// The first DAG that gets no cores: heavy ones in the order of the commit, then light ones,
+/// The first DAG that gets no cores: heavy and waiting ones in the order of the commit, then light ones,
 /// the densest first.
 pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(), NotAssigned> {
     let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
@@ -97,13 +97,13 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
     for (dag, task) in tasks.iter().enumerate() {
         let (volume_ns, within_ns) = density(task);
         // One core is enough for it, so it may share one; those are packed when it is known what
-        // the heavy ones leave.
-        if volume_ns <= within_ns {
+        // the heavy ones leave. What waits has cores of its own: a sum of densities is no test of it.
+        if volume_ns <= within_ns && !task.has_waits() {
             light.push(dag);
             continue;
         }
         // No number of cores shortens the longest path, so this is told apart from a lack of them.
-        let length_ns = task.length_ns();
+        let length_ns = task.span_ns();
         if length_ns > within_ns {
             let too_long = AssignmentFailure::TooLong {
                 length_ns,
@@ -121,9 +121,12 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         let Some(count) = (1..=left).find(is_enough) else {
             return Err(refused(dag, AssignmentFailure::TooHeavy { left }));
         };
-        let why = AssignmentReason::Heavy {
-            volume_ns,
-            within_ns,
+        let why = match volume_ns > within_ns {
+            true => AssignmentReason::Heavy {
+                volume_ns,
+                within_ns,
+            },
+            false => AssignmentReason::Waits,
         };
         of_dags[dag] = (ClusterId(to_u32(sizes.len())), why);
         sizes.push(count);
@@ -193,10 +196,10 @@ pub struct Federation {
 }
 
 /// Assigns cores by Graham's bound, or returns `None` if that does not succeed
-/// or a DAG has `D > T`.
+/// or a DAG has `D > T` or waits.
 #[must_use]
 pub fn federated(tasks: &[&Task], cores: u32) -> Option<Federation> {
-    if !constrained(tasks, cores) {
+    if !constrained(tasks, cores) || tasks.iter().any(|task| task.has_waits()) {
         return None;
     }
     let mut left = cores;
@@ -242,7 +245,9 @@ mod tests {
     use super::{federated, *};
     use crate::analysis::{Overheads, Task};
     use crate::task_set::Dag;
-    use crate::{CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskSpec};
+    use crate::{
+        CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskSpec, Wait,
+    };
 
     /// A DAG of as many subtasks side by side as there are WCETs, with a deadline.
     fn parallel(wcets_ns: &[u64], deadline_ns: u64) -> DagSpec {
@@ -320,6 +325,21 @@ mod tests {
         assert_eq!(sizes(&assigned(&[dag.clone()], 4).unwrap()), [3]);
         dag.order = crate::SubtaskOrder::Fixed;
         assert_eq!(sizes(&assigned(&[dag], 4).unwrap()), [2]);
+    }
+
+    #[test]
+    fn what_waits_gets_cores_of_its_own() {
+        let mut waits = parallel(&[2, 4], 10);
+        waits.subtasks[0].waits.push(Wait {
+            limit_ns: 6,
+            segment_ns: Some(1),
+        });
+        // Work of 6 within 10, but on one core it may take 12: it needs two.
+        let found = assigned(&[parallel(&[1], 10), waits], 4).unwrap();
+        assert_eq!(sizes(&found), [2, 1]);
+        let whys = found.dags().iter().map(Dag::why_there);
+        let expected = [AssignmentReason::Light, AssignmentReason::Waits];
+        assert!(whys.eq(expected.map(Some)));
     }
 
     #[test]

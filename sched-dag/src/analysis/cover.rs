@@ -20,7 +20,7 @@ use super::task::Task;
 
 /// How many subtasks and edges, summed over the chains, are looked at for exact covers, and
 /// for peeled ones beyond the second.
-const STEPS: usize = 1 << 17;
+pub(super) const STEPS: usize = 1 << 17;
 
 /// One chain: the subtasks of a path, each with whether the chain takes it.
 pub(super) type CoverChain = Vec<(usize, bool)>;

@@ -12,6 +12,7 @@ use alloc::vec::Vec;
 use super::cover::parallelism_covers_and_parts;
 use super::one_core::{Blocking, largest};
 use super::task::Task;
+use super::waiting::beside_span;
 use super::workload::{InterferingWorkload, WorkloadBursts, WorkloadSegment};
 
 /// Which interference the multi-path equations count; each is a bound, the later the tighter.
@@ -30,8 +31,11 @@ pub enum InterferenceBound {
 pub(super) struct GraphSummary {
     /// The most cores that one job can use, at least 1 and at most all.
     pub(super) parallelism: u64,
-    /// The most work of 1, 2, .. disjoint chains, for as many as there are cores.
+    /// The most work of 1, 2, .. disjoint chains, for as many as there are cores; waits count as
+    /// work.
     pub(super) covers: Vec<u64>,
+    /// The least that is left for `m`, `m - 1`, .. cores beside the span, by any form.
+    pub(super) left: Vec<u64>,
     /// The work of some disjoint chains.
     chains: Vec<u64>,
     /// The longest executions, which may block others where subtasks keep their cores.
@@ -41,12 +45,19 @@ pub(super) struct GraphSummary {
 
 impl GraphSummary {
     pub(super) fn of(task: &Task, cores: u32) -> Self {
-        let (parallelism, covers, chains) = parallelism_covers_and_parts(task, cores);
+        let (parallelism, mut covers, chains) = parallelism_covers_and_parts(task, cores);
+        let mut largest_ns = largest(task.wcets_ns(), cores);
+        if task.has_waits() {
+            covers = super::cover::covers(task.oblivious(), covers.len());
+            let segments_ns = task.waits().iter().map(|waits| waits.longest_segment_ns);
+            largest_ns = largest(&segments_ns.collect::<Vec<u64>>(), cores);
+        }
         Self {
             parallelism,
+            left: beside_span(task, &covers, cores),
             covers,
             chains,
-            largest_ns: largest(task.wcets_ns(), cores),
+            largest_ns,
             unblocked: Blocking::none(task),
         }
     }
@@ -57,6 +68,9 @@ pub(super) struct DelaySources {
     /// The workloads of DAGs that may outrank it.
     pub(super) others: Vec<InterferingDag>,
     pub(super) blocking: Blocking,
+    /// Where the blocked DAG waits, what is left of it on all cores beside its span, with the
+    /// blocking along the path: then no other form holds.
+    pub(super) left_and_blocking: Option<u128>,
     pub(super) bursts: WorkloadBursts,
 }
 

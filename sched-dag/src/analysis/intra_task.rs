@@ -28,14 +28,14 @@ pub const PATH_LIMIT: u32 = 4096;
 /// Bounds the response time of one job alone, its subtasks given by descending
 /// priority.
 ///
-/// `None`: does not apply (no cores, `order` does not name each subtask once,
+/// `None`: does not apply (no cores, waits, `order` does not name each subtask once,
 /// or contradicts precedence) or takes too long (more than [`PATH_LIMIT`]
 /// paths or [`SUBTASK_LIMIT`] subtasks).
 #[must_use]
 pub fn intra_task(task: &Task, order: &[usize], cores: u32) -> Option<u64> {
     let count = task.subtask_count();
     let ranks = ranks(task, order)?;
-    if cores == 0 || paths(task) > PATH_LIMIT {
+    if cores == 0 || task.has_waits() || paths(task) > PATH_LIMIT {
         return None;
     }
     let words = count.div_ceil(64);

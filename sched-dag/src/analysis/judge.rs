@@ -34,15 +34,14 @@
 //! A response time beyond `in_flight` periods would meet the overrun policy;
 //! it does not count as proven.
 //!
+//! Where subtasks *wait* (`waiting`), of a DAG or of one that may delay it, directly or through
+//! others, jobs must not overlap: a bound beyond the period does not count as proven, the DAG's
+//! own or that of another in its equation. The tests for one core, by utilisation and by intra-task
+//! priorities have no term for waits and are not asked, nor is the equation of single sinks.
+//!
 //! A DAG that cannot be analysed, because it lacks a WCET for example, takes
 //! those with it that it may delay, directly or through others. What is left
 //! is analysed without it: whatever it does, it cannot delay these.
-//!
-//! # Which DAG may delay which
-//!
-//! It depends on the policy, on the priorities and on which subtasks can be
-//! preempted, not on any execution time; so it is known also for DAGs that
-//! cannot be analysed. See `judge` for why each case is sound.
 //!
 //! # Bounds for single sinks, where a job's bound is known
 //!
@@ -72,9 +71,11 @@ use super::interference::DelaySources;
 use super::intra_task::{SUBTASK_LIMIT, intra_task};
 use super::one_core::{DagDemand, DueDemand, ResponseEquation, demand};
 use super::pipelined::{PipelineTerms, STEP_LIMIT, SolverFailure};
+use super::ranks::{PreemptionMix, RankRelation};
 use super::set::{BoundFailure, EquationSet, EvaluationBudget, constrained};
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
+use super::waiting::Rounding;
 use super::workload::WorkloadBursts;
 use super::{
     AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason, SchedulabilityTest,
@@ -261,7 +262,8 @@ impl<'a> AnalysisInput<'a> {
     fn by_priorities(&self, dag: usize) -> Option<u64> {
         let (task, cores) = (self.tasks[dag], self.settings.cores);
         let subtasks = self.dag(dag).subtasks();
-        if self.relation.preemption != PreemptionMix::All
+        if self.set.waits_enter(dag)
+            || self.relation.preemption != PreemptionMix::All
             || self.settings.policy != Policy::StaticPriority
             || subtasks.len() > SUBTASK_LIMIT
             || !self.is_alone(dag)
@@ -269,8 +271,7 @@ impl<'a> AnalysisInput<'a> {
             return None;
         }
         let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
-        let covers = &self.set.shapes[dag].covers;
-        let others = multi_path::alone(task, covers, cores.into())?;
+        let others = multi_path::alone(task, &self.set.shapes[dag].left, cores, Rounding::Up)?;
         let limit = task.relative_deadline_ns().min(task.period_ns());
         let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
         // Long steps of the scheduler are in no equation of this test, so they are added to it.
@@ -287,6 +288,11 @@ impl<'a> AnalysisInput<'a> {
         for (dag, figures) in self.set.figures.iter_mut().enumerate() {
             figures.younger_may_win = self.relation.younger_may_win(dag);
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
+        }
+        if self.set.has_waits() {
+            let tasks = self.tasks;
+            let with_waits = self.relation.closure(&|dag| tasks[dag].has_waits());
+            self.set.forbid_overlap(with_waits);
         }
         self.set.known = match (self.settings.cores, self.settings.policy) {
             (1, Policy::StaticPriority) => responses(self),
@@ -322,10 +328,12 @@ impl<'a> AnalysisInput<'a> {
     /// Returns the utilisation test that accepts the whole set, if one does.
     fn vouching_test(&self) -> Option<SchedulabilityTest> {
         let (tasks, cores) = (self.tasks, self.settings.cores);
-        // These tests know neither blocking, nor sinks' own deadlines, nor overheads that grow.
+        // These tests know neither blocking, nor sinks' own deadlines, nor overheads that grow, nor
+        // waits.
         let applies = self.relation.preemption == PreemptionMix::All
             && !self.relation.ranks_sinks
-            && self.set.bursts.are_none();
+            && self.set.bursts.are_none()
+            && !self.set.has_waits();
         if !applies || !constrained(tasks, cores) {
             return None;
         }
@@ -361,7 +369,16 @@ impl<'a> AnalysisInput<'a> {
             BoundFailure::Other(other) => NotProvenReason::DelayedBy {
                 dag: self.id(other),
             },
+            BoundFailure::Overlapping => NotProvenReason::NoBoundByPeriod,
             BoundFailure::Own(SolverFailure::Limit) => NotProvenReason::Limit,
+            BoundFailure::Own(SolverFailure::BeyondDeadline) if self.set.waits_enter(dag) => {
+                let (span_ns, limit_ns) = (task.span_ns(), self.set.figures[dag].limit_ns());
+                match (span_ns > limit_ns, limit_ns < task.relative_deadline_ns()) {
+                    (true, _) => NotProvenReason::SpanBeyondLimit { span_ns, limit_ns },
+                    (false, true) => NotProvenReason::NoBoundByPeriod,
+                    (false, false) => NotProvenReason::NoBound,
+                }
+            }
             BoundFailure::Own(SolverFailure::BeyondDeadline)
                 // A job may wait for room until its deadline has passed, however fast the others
                 // are.
@@ -473,104 +490,6 @@ fn first_unknown(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option
     unknown.next()
 }
 
-/// The relation between the DAGs of a commit, by their positions.
-#[derive(Clone, Debug)]
-pub(super) struct RankRelation {
-    policy: Policy,
-    pub(super) preemption: PreemptionMix,
-    /// Per DAG the most and the least urgent priority, as numbers.
-    priorities: Vec<(u32, u32)>,
-    /// Whether subtasks of one job may have different deadlines, under EDF.
-    pub(super) ranks_sinks: bool,
-}
-
-/// Which subtasks can be preempted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum PreemptionMix {
-    All,
-    None,
-    Some,
-}
-
-impl RankRelation {
-    /// Makes the relation between those that are at the positions `own`.
-    pub(super) fn new(dags: &[Dag], own: &[usize], policy: Policy, preemption: Preemption) -> Self {
-        let has_sink_deadlines =
-            |&dag: &usize| dags[dag].least_deadline_ns() != dags[dag].relative_deadline_ns();
-        Self {
-            policy,
-            preemption: mixture(dags, own, preemption),
-            priorities: dags.iter().map(priority_range).collect(),
-            ranks_sinks: policy == Policy::Edf && own.iter().any(has_sink_deadlines),
-        }
-    }
-
-    /// Returns the relation between some of the DAGs, by their positions among
-    /// these. The others still are on the machine: what can be preempted stays.
-    pub(super) fn among(&self, members: &[usize]) -> Self {
-        Self {
-            priorities: members.iter().map(|&dag| self.priorities[dag]).collect(),
-            ..*self
-        }
-    }
-
-    /// Reports whether an instance of `other` may win a core that an instance
-    /// of `dag` waits for.
-    pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
-        other != dag
-            && match (self.policy, self.preemption) {
-                (Policy::Edf, _) | (_, PreemptionMix::Some) => true,
-                (Policy::StaticPriority, _) => self.ranks(other)[0] < self.ranks(dag)[1],
-            }
-    }
-
-    /// Reports whether `dag` may have to wait for `other`, be it only because
-    /// an instance of `other` keeps its core.
-    fn may_delay(&self, other: usize, dag: usize) -> bool {
-        other != dag && (self.preemption != PreemptionMix::All || self.may_outrank(other, dag))
-    }
-
-    /// Returns the most and the least urgent priority of a DAG among all; the smaller wins.
-    pub(super) fn ranks(&self, dag: usize) -> [(u32, usize); 2] {
-        let (most, least) = self.priorities[dag];
-        [(most, dag), (least, dag)]
-    }
-
-    /// Reports whether a younger job of a DAG may win over an older one.
-    pub(super) fn younger_may_win(&self, dag: usize) -> bool {
-        let (most, least) = self.priorities[dag];
-        let unequal = match self.policy {
-            Policy::StaticPriority => most != least,
-            // It may have a subtask that leads to a more urgent sink.
-            Policy::Edf => self.ranks_sinks,
-        };
-        unequal || self.preemption != PreemptionMix::All
-    }
-}
-
-fn priority_range(dag: &Dag) -> (u32, u32) {
-    let numbers = || dag.subtasks().iter().map(|subtask| subtask.priority().0);
-    (numbers().min().unwrap_or(0), numbers().max().unwrap_or(0))
-}
-
-fn mixture(dags: &[Dag], own: &[usize], preemption: Preemption) -> PreemptionMix {
-    let mut subtasks = own.iter().flat_map(|&dag| dags[dag].subtasks());
-    let keeps = |non_preemptive: bool| non_preemptive || preemption == Preemption::Disabled;
-    let Some(first) = subtasks
-        .next()
-        .map(|first| keeps(first.is_non_preemptive()))
-    else {
-        return PreemptionMix::All;
-    };
-    if subtasks.any(|other| keeps(other.is_non_preemptive()) != first) {
-        PreemptionMix::Some
-    } else if first {
-        PreemptionMix::None
-    } else {
-        PreemptionMix::All
-    }
-}
-
 /// Returns the DAGs of a case as their response times on one core need them.
 pub(super) fn loads(case: &AnalysisInput<'_>) -> Vec<DagDemand> {
     let loads = case.tasks.iter().enumerate().map(|(dag, task)| DagDemand {
@@ -599,6 +518,9 @@ fn responses(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
         });
     }
     let known = (0..loads.len()).map(|dag| {
+        if case.set.waits_enter(dag) {
+            return None;
+        }
         let others = ResponseEquation::of(loads, bursts, dag).others;
         let are_known = others.iter().all(|&other| found[other].is_some());
         found[dag].filter(|_| are_known && !case.is_alone(dag))
@@ -611,7 +533,10 @@ pub(super) fn are_in_time(case: &AnalysisInput<'_>) -> bool {
     let fit =
         |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
     let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
-    applies && (0..case.tasks.len()).all(fit) && demand(&all_dues(case), &case.set.bursts).is_some()
+    applies
+        && !case.set.has_waits()
+        && (0..case.tasks.len()).all(fit)
+        && demand(&all_dues(case), &case.set.bursts).is_some()
 }
 
 /// Returns the demands of all DAGs.
@@ -705,6 +630,9 @@ pub(super) fn equations<'a>(
     let sinks = model.sinks().iter().zip(reaches);
     sinks.map(move |(&sink, reach)| {
         let equation = || {
+            if set.waits_enter(dag) {
+                return None;
+            }
             let deadline_ns = model.subtask(sink).relative_deadline_ns();
             let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
             let delays = set.delays(dag, deadline_ns, responses, may_outrank).ok()?;

@@ -13,12 +13,14 @@
 //! | `task`, `graph` | length, volume, bottom levels | |
 //! | `cover` | the most work of disjoint chains, and the width, by a flow | Ahuja 1993; Dilworth |
 //! | `multi_path` | one job of a DAG at a time, alone or among others | derived here |
+//! | `waiting`, `whole_units` | the same of subtasks that wait | derived here |
 //! | `intra_task` | one DAG alone, by its subtasks' priorities | He 2019 |
 //! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
 //! | `set` | the equations of all DAGs, solved exactly | |
 //! | `one_core` | response times and demand on one core; subtasks that keep their core | Joseph and Pandya 1986; Baruah 1990 |
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `utilisation` | utilisation tests | Li 2014; Bonifaci 2013 |
+//! | `ranks` | which DAG may delay which | |
 //! | `judge`, `overheads` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
 //! | `fixed_order` | orders that the commit fixes | Graham 1969 |
@@ -71,9 +73,12 @@ mod multi_path;
 mod one_core;
 mod overheads;
 mod pipelined;
+mod ranks;
 mod set;
 mod task;
 mod utilisation;
+mod waiting;
+mod whole_units;
 mod witness;
 mod workload;
 
@@ -94,8 +99,9 @@ pub use judge::answer;
 pub use multi_path::multi_path;
 pub use overheads::{OverheadSource, Overheads};
 pub use set::{multi_path_edf, multi_path_fp};
-pub use task::{Task, TaskError};
+pub use task::{SubtaskWaits, Task, TaskError};
 pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
+pub use whole_units::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
 pub use witness::witness;
 
 /// Under what conditions the DAGs will run.
@@ -218,6 +224,16 @@ texts! {
         InFlightTooFew { in_flight: u32 } =
             "no test bounds its response time by {in_flight} periods, the most jobs that it may \
              have in flight; allow more, or relax the load";
+        /// Subtasks wait, and the longest path with its waits exceeds the deadline or the period.
+        SpanBeyondLimit { span_ns: u64, limit_ns: u64 } =
+            "its longest path with all waits takes {:?}, more than its deadline or period of {:?}; \
+             lower the limits or lengthen both",
+            Duration::from_nanos(*span_ns), Duration::from_nanos(*limit_ns);
+        /// Subtasks wait, and no test bounds the response time by the period, or that of a DAG
+        /// which may delay this one by its own.
+        NoBoundByPeriod =
+            "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \
+             by the period; add cores, raise its priority or lengthen the period";
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

@@ -30,30 +30,43 @@ use super::cover::covers;
 use super::interference::{DelaySources, InterferenceBound};
 use super::pipelined::SolverFailure;
 use super::task::Task;
+use super::waiting::{Rounding, beside_span};
 use super::workload::WorkloadSegment;
+use crate::ids::to_u32;
+use crate::spec::WAITS;
 
 /// Bounds the response time of one job alone on `cores` cores; `None` without cores.
 #[must_use]
 pub fn multi_path(task: &Task, cores: u32) -> Option<u64> {
     let most = usize::try_from(cores).ok()?;
-    alone(task, &covers(task, most), cores.into())
+    let covers = covers(task.oblivious(), most);
+    alone(
+        task,
+        &beside_span(task, &covers, cores),
+        cores,
+        Rounding::Up,
+    )
 }
 
-/// Bounds the response time of one job alone, with covers at hand.
-pub(super) fn alone(task: &Task, covers: &[u64], cores: u64) -> Option<u64> {
-    let left = (0..cores).zip(covers);
-    let left = left.map(|(j, cover)| (task.volume_ns() - cover).div_ceil(cores - j));
+/// Bounds the response time of one job alone, by what is left beside its span.
+pub(super) fn alone(task: &Task, left: &[u64], cores: u32, rounding: Rounding) -> Option<u64> {
+    let cores = u64::from(cores);
+    let left = (0..cores).zip(left);
+    let left = left.map(|(j, &left)| rounding.divide(left, cores - j));
     // A DAG without subtasks has no chain, and takes no time.
     let waiting = left.min().or((cores > 0).then_some(0))?;
-    Some(task.length_ns() + waiting)
+    task.span_ns().checked_add(waiting)
 }
 
-/// The terms of one DAG in its equations, with `j` from 0 to one less than the covers.
+/// The terms of one DAG in its equations.
 pub(super) struct MultiPathEquations<'a> {
     pub(super) task: &'a Task,
+    /// As in the DAG's [`GraphSummary`](super::interference::GraphSummary).
     pub(super) covers: &'a [u64],
+    pub(super) left: &'a [u64],
     pub(super) cores: usize,
     pub(super) clip: InterferenceBound,
+    pub(super) rounding: Rounding,
     /// The longest response time that is of use, at most a period.
     pub(super) limit_ns: u64,
 }
@@ -75,12 +88,12 @@ impl MultiPathEquations<'_> {
         start_ns: u64,
         steps: &mut u64,
     ) -> Result<u64, SolverFailure> {
-        let start = alone(self.task, self.covers, self.cores as u64);
-        let length = self.task.length_ns();
-        let mut window = start_ns.max(start.unwrap_or(0)).max(length);
+        let start = alone(self.task, self.left, to_u32(self.cores), self.rounding);
+        let span = self.task.span_ns();
+        let mut window = start_ns.max(start.unwrap_or(0)).max(span);
         while window <= self.limit_ns {
             *steps = steps.checked_sub(1).ok_or(SolverFailure::Limit)?;
-            let waiting = u128::from(window - length);
+            let waiting = u128::from(window - span);
             let forms = self.forms(delays, window);
             let lacks = forms.map(|form| form.busy.lacks(form.cores, waiting));
             // Without subtasks there are no forms, and nothing to wait for.
@@ -93,7 +106,7 @@ impl MultiPathEquations<'_> {
         Err(SolverFailure::BeyondDeadline)
     }
 
-    /// Returns the forms at a window of at least the length.
+    /// Returns the forms at a window of at least the span.
     pub(super) fn forms(
         &self,
         delays: &DelaySources,
@@ -102,31 +115,46 @@ impl MultiPathEquations<'_> {
         let DelaySources {
             others,
             blocking,
+            left_and_blocking,
             bursts,
         } = delays;
-        let times = (window_ns, window_ns - self.task.length_ns());
-        let mut plain = vec![WorkloadSegment::NONE; self.covers.len()];
+        let left_and_blocking = left_and_blocking.filter(|_| WAITS);
+        let oblivious = self.task.oblivious();
+        let times = (window_ns, window_ns - oblivious.length_ns());
+        let mut plain = vec![WorkloadSegment::NONE; self.left.len()];
         let mut clipped = plain.clone();
         for other in others {
             other.add_to(times, self.clip, self.cores, &mut plain, &mut clipped);
         }
         // Alone, or without a clip, both forms are one.
         let has_clipped = !others.is_empty() && self.clip != InterferenceBound::Window;
-        let sums = plain.into_iter().zip(clipped).enumerate();
-        sums.flat_map(move |(j, (plain, clipped))| {
-            let left = u128::from(self.task.volume_ns() - self.covers[j]);
-            let form = |is_clipped: bool, own: u128, sum: WorkloadSegment| {
-                let blocked = blocking.during(self.cores, j, is_clipped);
-                let sum = sum.and(bursts.on(self.cores - j, window_ns));
-                let value = sum.value.saturating_add(own).saturating_add(blocked);
-                WaitInequality {
-                    cores: (self.cores - j) as u128,
-                    is_clipped,
-                    busy: WorkloadSegment { value, ..sum },
-                }
+        let form = move |j: usize, is_clipped: bool, own: u128, sum: WorkloadSegment| {
+            let sum = sum.and(bursts.on(self.cores - j, window_ns));
+            let (cores, value) = ((self.cores - j) as u128, sum.value.saturating_add(own));
+            let value = match is_clipped {
+                true => value,
+                false => self.rounding.of(value, cores),
             };
-            let clipped = has_clipped.then(|| form(true, left.max(1), clipped));
-            core::iter::once(form(false, left, plain)).chain(clipped)
+            WaitInequality {
+                cores,
+                is_clipped,
+                busy: WorkloadSegment { value, ..sum },
+            }
+        };
+        let count = left_and_blocking.map_or(self.left.len(), |_| 1);
+        let sums = plain.into_iter().zip(clipped).enumerate().take(count);
+        sums.flat_map(move |(j, (plain, clipped))| {
+            let with_blocking = |own: u128, is_clipped| {
+                own.saturating_add(blocking.during(self.cores, j, is_clipped))
+            };
+            let left = || with_blocking(self.left[j].into(), false);
+            let first = form(j, false, left_and_blocking.unwrap_or_else(left), plain);
+            let cover = self.covers.get(j).filter(|_| has_clipped);
+            let clipped = cover.filter(|_| left_and_blocking.is_none()).map(|cover| {
+                let left = u128::from(oblivious.volume_ns() - cover).max(1);
+                form(j, true, with_blocking(left, true), clipped)
+            });
+            core::iter::once(first).chain(clipped)
         })
     }
 }

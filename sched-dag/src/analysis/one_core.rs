@@ -297,7 +297,7 @@ impl Blocking {
     }
 
     /// Returns the sum of the `count` largest subtasks.
-    fn sum(&self, count: usize) -> u128 {
+    pub(super) fn sum(&self, count: usize) -> u128 {
         let last = count.min(self.largest.len()).checked_sub(1);
         last.map_or(0, |last| self.largest[last])
     }

@@ -26,7 +26,9 @@ use super::interference::{DelaySources, GraphSummary, InterferenceBound, Interfe
 use super::multi_path::{MultiPathEquations, alone};
 use super::pipelined::{OWN_STEPS, PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::task::Task;
+use super::waiting::{Rounding, with_blocking};
 use super::workload::{InterferingWorkload, WorkloadBursts};
+use crate::spec::WAITS;
 
 /// DAGs with what enters their equations.
 pub(super) struct EquationSet<'a> {
@@ -41,6 +43,11 @@ pub(super) struct EquationSet<'a> {
     /// Which interference counts.
     pub(super) clip: InterferenceBound,
     pub(super) bursts: WorkloadBursts,
+    pub(super) rounding: Rounding,
+    /// Whether the forms are those of subtasks that wait; see [`Self::has_waits`].
+    pub(super) is_of_waits: bool,
+    /// By DAG, whether waits enter its equations; empty: of none.
+    with_waits: Vec<bool>,
     /// Bounds that are known already, by DAG.
     pub(super) known: Vec<Option<u64>>,
 }
@@ -63,6 +70,8 @@ pub(super) enum BoundFailure {
     Own(SolverFailure),
     /// This DAG may outrank it and has no bound itself.
     Other(usize),
+    /// Jobs of a DAG that may outrank it may overlap, and waits enter.
+    Overlapping,
 }
 
 impl<'a> EquationSet<'a> {
@@ -84,8 +93,30 @@ impl<'a> EquationSet<'a> {
             keep_cores: false,
             clip: InterferenceBound::Chains,
             bursts: WorkloadBursts::default(),
+            rounding: Rounding::Up,
+            is_of_waits: tasks.iter().any(|task| task.has_waits()),
+            with_waits: Vec::new(),
             known: alloc::vec![None; tasks.len()],
         }
+    }
+
+    /// Reports whether subtasks wait.
+    pub(super) const fn has_waits(&self) -> bool {
+        WAITS && self.is_of_waits
+    }
+
+    /// Accepts no response time beyond a period of those DAGs that waits enter: the forms with
+    /// waits are of jobs that do not overlap.
+    pub(super) fn forbid_overlap(&mut self, with_waits: Vec<bool>) {
+        for (figures, _) in (self.figures.iter_mut().zip(&with_waits)).filter(|(_, with)| **with) {
+            figures.allow_in_flight(1);
+        }
+        self.with_waits = with_waits;
+    }
+
+    /// Reports whether a DAG's subtasks wait, or those of a DAG that may delay it.
+    pub(super) fn waits_enter(&self, dag: usize) -> bool {
+        self.has_waits() && self.with_waits.get(dag) == Some(&true)
     }
 
     /// Solves the equations, visiting the DAGs in `order`: any will do, and the highest priority
@@ -133,13 +164,13 @@ impl<'a> EquationSet<'a> {
     fn visit(
         &self,
         dag: usize,
-        delays: Result<DelaySources, usize>,
+        delays: Result<DelaySources, BoundFailure>,
         solution: &mut DagSolution,
         steps: &mut EvaluationBudget,
     ) {
         let start_ns = solution.responses[dag].unwrap_or(0);
         let after = match delays {
-            Err(other) => Err(BoundFailure::Other(other)),
+            Err(failure) => Err(failure),
             Ok(delays) => (self.respond(dag, &delays, start_ns, steps)).map_err(|why| {
                 solution.first_failing.get_or_insert((dag, why));
                 BoundFailure::Own(why)
@@ -176,8 +207,10 @@ impl<'a> EquationSet<'a> {
         MultiPathEquations {
             task: self.tasks[dag],
             covers: &self.shapes[dag].covers,
+            left: &self.shapes[dag].left,
             cores: self.cores as usize,
             clip: self.clip,
+            rounding: self.rounding,
             limit_ns: figures.limit_ns().min(self.tasks[dag].period_ns()),
         }
     }
@@ -185,7 +218,14 @@ impl<'a> EquationSet<'a> {
     /// Returns the known bound, or that of a job alone, below which no solution lies: from
     /// there on the workloads only grow.
     fn start(&self, dag: usize) -> Option<u64> {
-        let alone = || alone(self.tasks[dag], &self.shapes[dag].covers, self.cores.into());
+        let alone = || {
+            alone(
+                self.tasks[dag],
+                &self.shapes[dag].left,
+                self.cores,
+                self.rounding,
+            )
+        };
         self.known[dag].or_else(alone)
     }
 
@@ -197,8 +237,8 @@ impl<'a> EquationSet<'a> {
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Option<Vec<u64>> {
         let mut steps = EvaluationBudget::of(self.tasks.len());
-        let mut bounds: Vec<u64> = (self.known.iter().zip(self.tasks))
-            .map(|(known, task)| known.unwrap_or(task.relative_deadline_ns()))
+        let mut bounds: Vec<u64> = (self.known.iter().zip(&self.figures))
+            .map(|(known, figures)| known.unwrap_or(figures.limit_ns()))
             .collect();
         let mut has_round = false;
         loop {
@@ -227,13 +267,13 @@ impl<'a> EquationSet<'a> {
         dag: usize,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<DelaySources, usize> {
+    ) -> Result<DelaySources, BoundFailure> {
         let deadline_ns = self.tasks[dag].relative_deadline_ns();
         self.delays(dag, deadline_ns, responses, may_outrank)
     }
 
     /// Returns the sources of delay of a DAG's work that is due at a relative deadline, its job or
-    /// one sink of it; or the first DAG that may outrank it and has no bound.
+    /// one sink of it; or the first DAG that may outrank it and has no bound that is of use.
     ///
     /// A DAG that may outrank this one counts with its jobs that are due by then, where that
     /// is a limit, and else in full. A DAG that does not count in full may block.
@@ -243,14 +283,17 @@ impl<'a> EquationSet<'a> {
         deadline_ns: u64,
         responses: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
-    ) -> Result<DelaySources, usize> {
+    ) -> Result<DelaySources, BoundFailure> {
         let limit_ns = self.deadlines_limit.then_some(deadline_ns);
         let (mut others, mut blocking_ns) = (Vec::new(), Vec::new());
         for other in (0..self.tasks.len()).filter(|&other| other != dag) {
             let outranks = may_outrank(other, dag);
             if outranks {
                 // Without the other's response its carry-in is unknown, and so is this bound.
-                let response = responses[other].ok_or(other)?;
+                let response = responses[other].ok_or(BoundFailure::Other(other))?;
+                if self.waits_enter(dag) && response > self.tasks[other].period_ns() {
+                    return Err(BoundFailure::Overlapping);
+                }
                 others.push(self.other(other, response, limit_ns));
             }
             // What outranks is in the interference already, except under EDF, where a later job of
@@ -259,12 +302,27 @@ impl<'a> EquationSet<'a> {
                 blocking_ns.extend_from_slice(&self.shapes[other].largest_ns);
             }
         }
-        let blocking = (self.shapes[dag].unblocked).by(&blocking_ns, self.cores);
-        Ok(DelaySources {
+        Ok(self.delays_by(dag, others, &blocking_ns))
+    }
+
+    /// Returns the sources of delay of a DAG: workloads, and longest segments that may block it.
+    fn delays_by(
+        &self,
+        dag: usize,
+        others: Vec<InterferingDag>,
+        blocking_ns: &[u64],
+    ) -> DelaySources {
+        let blocking = (self.shapes[dag].unblocked).by(blocking_ns, self.cores);
+        let (task, rounding) = (self.tasks[dag], self.rounding);
+        let is_coupled = WAITS && (task.has_waits() || rounding == Rounding::Down);
+        let left_and_blocking = (is_coupled && !blocking_ns.is_empty())
+            .then(|| with_blocking(task, self.cores, &blocking));
+        DelaySources {
             others,
             blocking,
+            left_and_blocking,
             bursts: self.bursts.clone(),
-        })
+        }
     }
 
     /// Describes what a DAG with a response-time bound may execute next to another one.
@@ -325,6 +383,9 @@ pub(super) fn constrained(tasks: &[&Task], cores: u32) -> bool {
 pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Option<Vec<u64>> {
     let mut set = (cores > 0).then(|| EquationSet::new(tasks, cores))?;
     set.clip = clip;
+    if tasks.iter().any(|task| task.has_waits()) {
+        set.forbid_overlap(alloc::vec![true; tasks.len()]);
+    }
     let order: Vec<usize> = (0..tasks.len()).collect();
     let solution = set.solve(&order, |other, dag| other < dag);
     solution.responses.into_iter().collect()

@@ -13,6 +13,12 @@
 //! descending rank is the list order of HLF, "highest level first" (T. C. Hu, Operations
 //! Research 9(6), 1961).
 //!
+//! A subtask may *wait* between its segments. Its WCET is then the sum of its segments', and
+//! three more numbers are known: the sum of the limits of its waits, their number, and its
+//! longest segment, which is the longest that it keeps a core. The *span* is the largest sum of
+//! WCETs and limits along a path: it is the length of the *oblivious* task, of which each
+//! subtask executes while it waits.
+//!
 //! No WCET is 0. All tests here count the work that delays a subtask, and one without
 //! any would be delayed by what they do not count: say a subtask of WCET 0 becomes
 //! ready at the very end of a busy period, as the last one of its job. All of the work
@@ -23,9 +29,11 @@ use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cmp::Reverse;
+use core::ops::Add;
 
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
+use crate::spec::WAITS;
 use crate::task_set::{Dag, Subtask};
 use crate::worded::texts;
 
@@ -39,6 +47,26 @@ pub struct Task {
     pub(super) graph: Graph,
     volume_ns: u64,
     length_ns: u64,
+    /// `None`: no subtask waits.
+    waits: Option<Box<TaskWaits>>,
+}
+
+/// The waits of a task's subtasks, by subtask, and the task with all waits executed.
+#[derive(Clone, Debug)]
+struct TaskWaits {
+    of_subtasks: Box<[SubtaskWaits]>,
+    oblivious: Task,
+}
+
+/// The waits of one subtask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SubtaskWaits {
+    /// The number of its waits.
+    pub count: u32,
+    /// The sum of their limits, in nanoseconds.
+    pub limits_ns: u64,
+    /// The WCET of its longest segment, in nanoseconds; without waits that of the subtask.
+    pub longest_segment_ns: u64,
 }
 
 texts! {
@@ -51,6 +79,10 @@ texts! {
             subtask.0;
         /// The sum of the WCETs (with overheads, if any were added) exceeds `u64`.
         VolumeOverflow = "the sum of the WCETs exceeds 64 bits of nanoseconds; lower them";
+        /// The sum of the WCETs and of the limits of waits exceeds `u64`.
+        WaitsOverflow =
+            "the sum of the WCETs and of the limits of waits exceeds 64 bits of nanoseconds; lower \
+             them";
         /// The period is 0.
         ZeroPeriod = "the period is 0; give a positive one";
         /// The relative deadline is 0.
@@ -100,7 +132,7 @@ impl Task {
         Self::assemble(period_ns, relative_deadline_ns, wcets_ns, graph)
     }
 
-    /// Makes a task from a verified DAG, adding `overhead_ns` to each WCET.
+    /// Makes a task from a verified DAG, adding `overhead_ns` to the WCET of each segment.
     ///
     /// See `Overheads` for what the overhead stands for.
     ///
@@ -108,7 +140,8 @@ impl Task {
     ///
     /// [`MissingWcet`](TaskError::MissingWcet) for the first subtask without one
     /// above 0, whatever the overhead, or
-    /// [`VolumeOverflow`](TaskError::VolumeOverflow).
+    /// [`VolumeOverflow`](TaskError::VolumeOverflow) or
+    /// [`WaitsOverflow`](TaskError::WaitsOverflow).
     pub fn from_dag(dag: &Dag, overhead_ns: u64) -> Result<Self, TaskError> {
         let charge = |(subtask, of): (u32, &Subtask)| {
             let (subtask, wcet_ns) = (SubtaskId(subtask), of.wcet_ns());
@@ -121,9 +154,71 @@ impl Task {
         let wcets_ns = wcets_ns.collect::<Result<Vec<u64>, _>>()?;
         let (period_ns, deadline_ns) = (dag.period_ns(), dag.relative_deadline_ns());
         let task = Self::assemble(period_ns, deadline_ns, wcets_ns, dag.graph.clone())?;
-        Ok(Self {
+        let task = Self {
             least_deadline_ns: dag.least_deadline_ns(),
             ..task
+        };
+        let mut subtasks = dag.subtasks().iter();
+        match subtasks.all(|of| of.waits().is_empty()) {
+            true => Ok(task),
+            false => task.charge_segments(dag, overhead_ns),
+        }
+    }
+
+    /// Adds the waits of a verified DAG, and `overhead_ns` for each segment but the first.
+    fn charge_segments(mut self, dag: &Dag, overhead_ns: u64) -> Result<Self, TaskError> {
+        for (wcet_ns, of) in self.wcets_ns.iter_mut().zip(dag.subtasks()) {
+            let charged_ns = overhead_ns.checked_mul(of.waits().len() as u64);
+            let charged_ns = charged_ns.and_then(|charged_ns| charged_ns.checked_add(*wcet_ns));
+            *wcet_ns = charged_ns.ok_or(TaskError::VolumeOverflow)?;
+        }
+        let (period_ns, deadline_ns) = (self.period_ns, self.relative_deadline_ns);
+        let task = Self::assemble(period_ns, deadline_ns, self.wcets_ns.into(), self.graph)?;
+        let waits = dag.subtasks().iter().map(|of| SubtaskWaits {
+            count: to_u32(of.waits().len()),
+            limits_ns: of.waiting_ns(),
+            // No longer than the WCET, to which as much is added, if not more.
+            longest_segment_ns: of.longest_segment_ns().unwrap_or(0) + overhead_ns,
+        });
+        let least_deadline_ns = self.least_deadline_ns;
+        let task = Self {
+            least_deadline_ns,
+            ..task
+        };
+        task.with_waits(waits.collect())
+    }
+
+    /// Returns the task with waits of its subtasks, by their position.
+    ///
+    /// # Errors
+    ///
+    /// [`WaitsOverflow`](TaskError::WaitsOverflow).
+    ///
+    /// # Panics
+    ///
+    /// If `waits` has not as many entries as there are subtasks, or a longest segment exceeds the
+    /// WCET of its subtask.
+    pub fn with_waits(self, waits: Vec<SubtaskWaits>) -> Result<Self, TaskError> {
+        assert_eq!(
+            waits.len(),
+            self.subtask_count(),
+            "the waits are by subtask"
+        );
+        let whole_ns = self.wcets_ns.iter().zip(&waits).map(|(&wcet_ns, of)| {
+            assert!(of.longest_segment_ns <= wcet_ns, "a segment is a part");
+            let whole_ns = wcet_ns.checked_add(of.limits_ns);
+            whole_ns.ok_or(TaskError::WaitsOverflow)
+        });
+        let whole_ns = whole_ns.collect::<Result<Vec<u64>, _>>()?;
+        let (period_ns, deadline_ns) = (self.period_ns, self.relative_deadline_ns);
+        let oblivious = Self::assemble(period_ns, deadline_ns, whole_ns, self.graph.clone());
+        let waits = TaskWaits {
+            of_subtasks: waits.into(),
+            oblivious: oblivious.map_err(|_| TaskError::WaitsOverflow)?,
+        };
+        Ok(Self {
+            waits: Some(Box::new(waits)),
+            ..self
         })
     }
 
@@ -151,6 +246,7 @@ impl Task {
             graph,
             volume_ns,
             length_ns: 0,
+            waits: None,
         };
         task.length_ns = task.bottom_levels().into_iter().max().unwrap_or(0);
         Ok(task)
@@ -228,16 +324,37 @@ impl Task {
     /// Returns a longest path for the given weights; ties go to the smallest
     /// position.
     ///
-    /// The weights replace the WCETs and must sum to at most `u64::MAX`.
+    /// The weights replace the WCETs, and their sum must not overflow.
     ///
     /// # Panics
     ///
     /// If `weights` has not as many entries as there are subtasks.
     #[must_use]
-    pub fn longest_path(&self, weights: &[u64]) -> Vec<usize> {
+    pub fn longest_path<W>(&self, weights: &[W]) -> Vec<usize>
+    where
+        W: Copy + Default + Ord + Add<Output = W>,
+    {
         let levels = self.graph.levels(weights);
+        self.descend(&levels, 0..levels.len())
+    }
+
+    /// Returns a longest path that begins with a source, which is another one only where weights
+    /// are 0.
+    pub(super) fn longest_complete_path<W>(&self, weights: &[W]) -> Vec<usize>
+    where
+        W: Copy + Default + Ord + Add<Output = W>,
+    {
+        self.descend(&self.graph.levels(weights), self.sources())
+    }
+
+    /// Returns the path that goes on from the first of the highest level to the next one.
+    fn descend<W: Copy + Ord>(
+        &self,
+        levels: &[W],
+        first: impl Iterator<Item = usize>,
+    ) -> Vec<usize> {
         let rank = |&subtask: &usize| (levels[subtask], Reverse(subtask));
-        let mut at = (0..levels.len()).max_by_key(rank);
+        let mut at = first.max_by_key(rank);
         let mut path = Vec::new();
         while let Some(subtask) = at {
             path.push(subtask);
@@ -263,6 +380,33 @@ impl Task {
     #[must_use]
     pub const fn length_ns(&self) -> u64 {
         self.length_ns
+    }
+
+    /// Reports whether a subtask waits.
+    #[must_use]
+    pub const fn has_waits(&self) -> bool {
+        WAITS && self.waits.is_some()
+    }
+
+    /// Returns the waits by subtask; empty if no subtask waits.
+    #[must_use]
+    pub fn waits(&self) -> &[SubtaskWaits] {
+        let waits = self.waits.as_ref().filter(|_| WAITS);
+        waits.map_or(&[], |waits| &waits.of_subtasks)
+    }
+
+    /// Returns the task in which the waits are executed, for their limits; without waits that is
+    /// this one.
+    #[must_use]
+    pub fn oblivious(&self) -> &Self {
+        let waits = self.waits.as_ref().filter(|_| WAITS);
+        waits.map_or(self, |waits| &waits.oblivious)
+    }
+
+    /// Returns the span: the largest sum of WCETs and of limits of waits along a path.
+    #[must_use]
+    pub fn span_ns(&self) -> u64 {
+        self.oblivious().length_ns
     }
 }
 

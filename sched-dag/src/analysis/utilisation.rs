@@ -50,7 +50,7 @@ use super::set::constrained;
 use super::task::Task;
 use crate::order::sort;
 
-/// Tests global EDF. `None`: does not apply (a DAG has `D != T`, or there are
+/// Tests global EDF. `None`: does not apply (a DAG has `D != T` or waits, or there are
 /// no cores); `Some(false)`: not proven.
 #[must_use]
 pub fn gedf_capacity(tasks: &[&Task], cores: u32) -> Option<bool> {
@@ -64,7 +64,7 @@ pub fn gedf_capacity(tasks: &[&Task], cores: u32) -> Option<bool> {
     })
 }
 
-/// Tests global RM. `None`: does not apply (a DAG has `D != T`, or there are no
+/// Tests global RM. `None`: does not apply (a DAG has `D != T` or waits, or there are no
 /// cores); `Some(false)`: not proven.
 #[must_use]
 pub fn grm_capacity(tasks: &[&Task], cores: u32) -> Option<bool> {
@@ -84,7 +84,7 @@ fn accepts(
     reaches: impl Fn(i128, i128) -> Option<bool>,
 ) -> Option<bool> {
     let implicit = |task: &&Task| task.relative_deadline_ns() == task.period_ns();
-    if cores == 0 || !tasks.iter().all(implicit) {
+    if cores == 0 || !tasks.iter().all(implicit) || tasks.iter().any(|task| task.has_waits()) {
         return None;
     }
     let reaches = |numerator: u128, denominator: u128| {
@@ -107,13 +107,13 @@ fn accepts(
     Some(short && light)
 }
 
-/// Tests global EDF (Theorem 21).
+/// Tests global EDF (Theorem 21); refuses DAGs that wait.
 #[must_use]
 pub fn bonifaci_edf(tasks: &[&Task], cores: u32) -> bool {
     is_light(tasks, 3, 2 * u128::from(cores) + 1, 6)
 }
 
-/// Tests global DM (Theorem 23 if `D <= T` for every DAG, else Theorem 22).
+/// Tests global DM (Theorem 23 if `D <= T` for every DAG, else Theorem 22); refuses DAGs that wait.
 #[must_use]
 pub fn bonifaci_dm(tasks: &[&Task], cores: u32) -> bool {
     let m = u128::from(cores);
@@ -132,7 +132,9 @@ fn is_light(tasks: &[&Task], part: u128, numerator: u128, denominator: u128) -> 
         let shorter = task.period_ns().min(task.relative_deadline_ns());
         (task.volume_ns(), shorter)
     };
-    tasks.iter().all(short)
+    let waits = |task: &&Task| task.has_waits();
+    !tasks.iter().any(waits)
+        && tasks.iter().all(short)
         && Ratio::sum(tasks.iter().map(density))
             .is_some_and(|sum| sum.at_most(numerator, denominator))
 }

@@ -12,6 +12,7 @@
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
 //! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
 //! edge FROM TO
+//! wait SUBTASK WCET LIMIT WCET ..             of segments and waits, likewise
 //! due SUBTASK DEADLINE                        of a sink that is due before its job
 //! hash FNV_1A                                 of all above
 //!
@@ -21,6 +22,8 @@
 //!
 //! bound DAG R paths CHAINS CORES LEFT BLOCKED BUSY
 //! bound DAG R waiting CHAINS CORES LEFT BLOCKED BUSY
+//! bound DAG R reserved CHAINS CORES LEFT BUSY     of subtasks that wait, as the next one
+//! bound DAG R blocked LEFT BUSY
 //! chain SUBTASK..                             as `cover`
 //! other DAG R CORES W CLIPPED                 clipped only if `waiting`
 //!
@@ -56,12 +59,13 @@ use super::intra_task::each_path;
 use super::judge::{self, AnalysisInput, with_case};
 use super::one_core::{ResponseEquation, demand};
 use super::pipelined::{PipelineTerms, STEP_LIMIT};
+use super::waiting::reserved;
 use super::workload::WorkloadBursts;
 use super::{AnalysisSettings, DagBound, SchedulabilityTest};
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::to_u32;
 use crate::policy::{Policy, Preemption};
-use crate::task_set::{Dag, TaskSet};
+use crate::task_set::{Dag, Subtask, TaskSet};
 
 /// Writes a witness for the bounds that [`answer()`](super::answer()) gives; where the cores
 /// are divided, one for each cluster, with its DAGs counted from 0.
@@ -184,6 +188,9 @@ impl WitnessText {
             for (from, to) in edges {
                 self.line(format_args!("edge {from} {to}"));
             }
+            for (id, subtask) in dag.subtasks().iter().enumerate() {
+                self.waits(id, subtask);
+            }
             for &sink in dag.sinks() {
                 let deadline_ns = dag.subtask(sink).relative_deadline_ns();
                 if deadline_ns < dag.relative_deadline_ns() {
@@ -191,6 +198,20 @@ impl WitnessText {
                 }
             }
         }
+    }
+
+    fn waits(&mut self, id: usize, subtask: &Subtask) {
+        let limits_ns = subtask.waits().iter().map(|wait| wait.limit_ns);
+        if limits_ns.len() == 0 {
+            return;
+        }
+        let segments_ns = subtask.segments_ns();
+        let segments_ns = segments_ns.unwrap_or(alloc::vec![0; limits_ns.len() + 1]);
+        let later = limits_ns.zip(&segments_ns[1..]);
+        let later = later.flat_map(|(limit_ns, &segment_ns)| [limit_ns, segment_ns]);
+        let times = core::iter::once(segments_ns[0]).chain(later);
+        let numbers = core::iter::once(id as i128).chain(times.map(i128::from));
+        self.list("wait", numbers);
     }
 
     fn graph(&mut self, case: &AnalysisInput<'_>, dag: usize) {
@@ -279,7 +300,7 @@ impl WitnessText {
     ) {
         let (id, task) = (case.members[dag], case.tasks[dag]);
         let equations = case.set.equations(dag);
-        let waiting = bound_ns - task.length_ns();
+        let waiting = bound_ns - task.span_ns();
         let enough = |cores: u128| cores * u128::from(waiting);
         let mut forms = equations.forms(delays, bound_ns);
         let Some(form) = forms.find(|form| form.busy.value <= enough(form.cores)) else {
@@ -287,16 +308,36 @@ impl WitnessText {
         };
         let (cores, busy) = (form.cores, form.busy.value);
         let chains = equations.cores + 1 - usize::try_from(cores).unwrap_or(0);
-        let word = if form.is_clipped { "waiting" } else { "paths" };
-        let left = task.volume_ns() - equations.covers[chains - 1];
-        let left = if form.is_clipped { left.max(1) } else { left };
-        let blocked = delays
-            .blocking
-            .during(equations.cores, chains - 1, form.is_clipped);
-        self.line(format_args!(
-            "bound {id} {bound_ns} {word} {chains} {cores} {left} {blocked} {busy}"
-        ));
-        self.chains("chain", &covering(task, equations.covers.len(), chains));
+        let by_cover = equations.covers.get(chains - 1).map(|cover| {
+            let left = task.oblivious().volume_ns() - cover;
+            if form.is_clipped { left.max(1) } else { left }
+        });
+        let own = equations.left[chains - 1];
+        match (delays.left_and_blocking, by_cover) {
+            (Some(left), _) => {
+                self.line(format_args!("bound {id} {bound_ns} blocked {left} {busy}"))
+            }
+            (None, Some(left)) if form.is_clipped || left == own => {
+                let word = if form.is_clipped { "waiting" } else { "paths" };
+                let blocked = delays
+                    .blocking
+                    .during(equations.cores, chains - 1, form.is_clipped);
+                self.line(format_args!(
+                    "bound {id} {bound_ns} {word} {chains} {cores} {left} {blocked} {busy}"
+                ));
+                let most = equations.covers.len();
+                self.chains("chain", &covering(task.oblivious(), most, chains));
+            }
+            _ => {
+                let chains = chains - 1;
+                self.line(format_args!(
+                    "bound {id} {bound_ns} reserved {chains} {cores} {own} {busy}"
+                ));
+                let reserved = reserved(task, case.set.cores).into_iter();
+                let reserved = reserved.skip(1).take(chains).map(|with| with.chain);
+                self.chains("chain", &reserved.collect::<Vec<_>>());
+            }
+        }
         for other in listed {
             let count = usize::try_from(cores).unwrap_or(usize::MAX);
             let (count, [all, clipped]) = other.workloads.on((bound_ns, waiting), count);

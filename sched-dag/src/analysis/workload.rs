@@ -45,7 +45,8 @@
 //! `E(L) = sum over all DAGs on them of ((L + late + carry) / T + 1) burst` (floor)
 //!
 //! with two bursts a job: `ready` for each source, with `carry = 0`, and `ready` for all that
-//! one completion makes ready beyond [`WIDE`], with `carry = D`, until which jobs complete. Steps
+//! one completion makes ready beyond [`WIDE`], and for each wait, with `carry = D`, until which
+//! jobs complete. Steps
 //! follow one another, and each loss counts in one of them. A release that waits
 //! for steps before its own is late, at most by `late = charge + E(late)` with `late = 0` on
 //! the right.
@@ -301,9 +302,14 @@ impl WorkloadBursts {
         for dag in dags {
             let ids = (0..).map(SubtaskId).take(dag.subtasks().len());
             let beyond = ids.map(|id| dag.successors(id).len().saturating_sub(WIDE));
+            // Any number of waits may end at once, whenever their jobs are not complete.
+            let wakes = dag.subtasks().iter().map(|subtask| subtask.waits().len());
             let period = u128::from(dag.period_ns());
             let deadline = u128::from(dag.relative_deadline_ns());
-            for (carry, count) in [(0, dag.sources().len()), (deadline, beyond.sum())] {
+            for (carry, count) in [
+                (0, dag.sources().len()),
+                (deadline, beyond.chain(wakes).sum::<usize>()),
+            ] {
                 let takes = count as u128 * u128::from(settings.overheads.ready_ns);
                 let same = |other: &&mut [u128; 3]| other[..2] == [period, carry];
                 match bursts.repeated.iter_mut().find(same) {

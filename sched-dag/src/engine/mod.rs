@@ -27,12 +27,13 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::DerefMut;
 
-use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex};
+use crate::ids::{ClusterId, CoreId, DagId, Vertex};
 use crate::journal::{EventKind, EventSubject};
 use crate::kept::Journal;
 use crate::lifecycle::{Mailboxes, PendingRequests, Request};
 use crate::placement::{NextWork, Placement};
-use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler};
+use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd};
+use crate::spec::WAITS;
 use crate::task_set::{Dag, TaskSet};
 
 pub use crate::engine::run::{ProvenBounds, Run, RunCounts};
@@ -197,9 +198,15 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         // Something else belongs to this instant, so the whole step has to be taken.
         if !is_alone || !self.requests.are_none() {
+            if WAITS && let Some(limit_ns) = self.take_wait(vertex, finish_ns) {
+                // Asked here, so that the port need not lie in memory for those that do not wait.
+                let is_alone = is_alone && !port.has_letters();
+                return self.wait((core, vertex), body, (finish_ns, limit_ns), is_alone, port);
+            }
             let instance = self.scheduler.instance_of(vertex);
             self.placement.finish(core.index(), vertex, body);
-            return NextAction::Step(Some(instance));
+            let limit_ns = None;
+            return NextAction::Step(Some(TurnEnd { instance, limit_ns }));
         }
         let (done, is_unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
         if let HandOff::To(next, decision) = done {
@@ -242,8 +249,66 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         NextAction::Look { is_rescheduled }
     }
 
-    /// Takes note that an instance has finished that no core has any more; it ran last on `core`.
-    /// It finished at the first time, and the instant is the second.
+    /// Takes note that the turn of a core's instance has ended in a wait, which may be all of the
+    /// instant, too. Apart, as most sets have none.
+    #[cold]
+    #[inline(never)]
+    fn wait<C: PlatformPort<B>>(
+        &mut self,
+        (core, vertex): (CoreId, Vertex),
+        mut body: B,
+        (ended_ns, limit_ns): (u64, u64),
+        is_alone: bool,
+        port: &mut C,
+    ) -> NextAction<B> {
+        port.wait(core, &mut body, ended_ns);
+        let done = match is_alone && !C::ANSWERS_AT_ONCE && self.requests.are_none() {
+            true => (self.scheduler).wait_shortly(ended_ns, core, vertex, limit_ns),
+            false => None,
+        };
+        if let Some(HandOff::To(next, _)) = done
+            && next == vertex
+        {
+            body.wake(true);
+            let (log, subject) = (&mut self.scheduler.log, body.subject());
+            let wait = (EventKind::Wait, ended_ns, subject);
+            let wake = (EventKind::Wake, log.now_ns(), subject);
+            let resume = (EventKind::Resume, port.proceed(core, &mut body), subject);
+            log.journal.write_all(core, [wait, wake, resume]);
+            return NextAction::Run(body);
+        }
+        self.placement.wait(core.index(), vertex, body);
+        match done {
+            None => {
+                let instance = self.scheduler.instance_of(vertex);
+                let limit_ns = Some(limit_ns);
+                return NextAction::Step(Some(TurnEnd { instance, limit_ns }));
+            }
+            Some(HandOff::To(next, _)) => self.placement.set_target(core, Some(next)),
+            Some(HandOff::Idle | HandOff::Open) => {}
+        }
+        let is_rescheduled = self.scheduler.log.take_job_event();
+        NextAction::Look { is_rescheduled }
+    }
+
+    /// Ends the wait whose limit has come, at an instant and on a core, and gives its instance an
+    /// idle core. Reports whether that is all of the instant; if not, the step has to be taken.
+    #[inline]
+    pub fn wake(&mut self, (now_ns, here): (u64, CoreId), port: &mut impl PlatformPort<B>) -> bool {
+        let is_alone = WAITS && self.requests.are_none() && !port.has_letters();
+        let woken = match is_alone {
+            true => self.scheduler.wake_shortly(now_ns, here),
+            false => None,
+        };
+        if let Some((core, vertex)) = woken {
+            self.placement.set_target(core, Some(vertex));
+            port.retarget(core);
+        }
+        woken.is_some()
+    }
+
+    /// Takes note that a turn of an instance has ended that no core has any more; it ran last on
+    /// `core`. It ended at the first time, and the instant is the second.
     pub fn complete_parked(
         &mut self,
         (core, vertex): (CoreId, Vertex),
@@ -251,11 +316,28 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         (finish_ns, now_ns): (u64, u64),
         port: &mut impl PlatformPort<B>,
     ) {
-        let body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
-        self.placement.finish_parked(vertex, body);
+        let mut body = Self::publish(&mut self.requests, body, port.on_clock(finish_ns));
         let instance = self.scheduler.instance_of(vertex);
+        let limit_ns = self.take_wait(vertex, finish_ns);
+        match limit_ns {
+            Some(_) if WAITS => {
+                port.wait(core, &mut body, finish_ns);
+                self.placement.wait(core.index(), vertex, body);
+            }
+            _ => self.placement.finish_parked(vertex, body),
+        }
+        let turn = TurnEnd { instance, limit_ns };
         // By the whole step: its core runs something else by now, so it passes on to nobody.
-        self.step((now_ns, core), port, |moment| moment.complete(instance));
+        self.step((now_ns, core), port, |moment| moment.end_turn(turn));
+    }
+
+    /// Takes the request of a turn that has ended in a wait, and returns the limit of that.
+    #[inline]
+    fn take_wait(&mut self, vertex: Vertex, now_ns: u64) -> Option<u64> {
+        let release_ns = || self.scheduler.release_ns(vertex);
+        WAITS
+            .then(|| self.requests.take_wait(now_ns, release_ns))
+            .flatten()
     }
 
     /// Returns the cost of a fault of the vertex' instance if it comes now.
@@ -338,8 +420,26 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             // The port reads the clock as late as it can, right before the function is called.
             let start_ns = port.start(core, body);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
+        } else if WAITS && let NextWork::Proceed(vertex, body) = &mut next {
+            self.proceed((core, *vertex), body, port);
         }
         next
+    }
+
+    /// Has a core go on with an instance that has waited. Apart, as most sets have none.
+    #[cold]
+    #[inline(never)]
+    fn proceed(
+        &mut self,
+        (core, vertex): (CoreId, Vertex),
+        body: &mut B,
+        port: &mut impl PlatformPort<B>,
+    ) {
+        let (_, has_timed_out) = self.scheduler.latest_wait(vertex);
+        body.wake(has_timed_out);
+        let subject = body.subject();
+        let resume_ns = port.proceed(core, body);
+        (self.scheduler.log.journal).write(core, EventKind::Resume, resume_ns, subject);
     }
 
     /// Takes a core's instance away, if it has one, and returns the core that has been waiting for
@@ -353,7 +453,10 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     /// A body that goes and comes stays in a register.
     #[inline]
     fn publish(requests: &mut PendingRequests, mut body: B, finish_ns: u64) -> B {
-        body.complete(finish_ns, &mut |request| requests.keep(request));
+        body.complete(finish_ns, &mut |request| match request {
+            Request::Wait(_) | Request::WaitUntil(_) if WAITS => requests.keep_wait(request),
+            _ => requests.keep(request),
+        });
         body
     }
 
@@ -374,6 +477,9 @@ impl<B: SubtaskBody, P> Engine<B, P> {
                 && let Some(instance) = notice.event.instance()
             {
                 let vertex = self.task_set.vertex(instance);
+                if WAITS {
+                    self.placement.cancel_wait(vertex);
+                }
                 self.undiscarded.push((vertex, instance.job));
             }
         }
@@ -437,14 +543,20 @@ pub trait SubtaskBody {
     /// Returns its instance as events are written of it.
     fn subject(&self) -> EventSubject;
 
-    /// Gives up the inputs that have arrived for a job which it will not run.
+    /// Gives up the inputs that have arrived for a job which it will not run, or what is left of
+    /// one in which it has waited.
     fn discard(&mut self, job: u64);
+
+    /// Learns, before its instance goes on, whether the wait has ended by its limit.
+    fn wake(&mut self, has_timed_out: bool) {
+        let _ = has_timed_out;
+    }
 
     /// Reports whether a completion has effects besides the scheduler's.
     fn has_effects(&self) -> bool;
 
-    /// Publishes these effects, and passes on what the function asks of the run. The time is that
-    /// of the clock which functions read.
+    /// Publishes these effects, and passes on what the function asks of the run; of a turn that ends
+    /// in a wait that is [`Request::Wait`] alone. The time is that of the clock which functions read.
     fn complete(&mut self, finish_ns: u64, ask: &mut dyn FnMut(Request));
 
     /// Returns the alternate that takes over if a fault ends the function.
@@ -470,6 +582,10 @@ impl<D: DerefMut<Target: SubtaskBody>> SubtaskBody for D {
 
     fn discard(&mut self, job: u64) {
         (**self).discard(job);
+    }
+
+    fn wake(&mut self, has_timed_out: bool) {
+        (**self).wake(has_timed_out);
     }
 
     #[inline]
@@ -522,6 +638,10 @@ pub trait PlatformPort<B> {
     /// Whether a core gives up what it runs some time after it was asked to.
     const SUSPENDS_LATER: bool = true;
 
+    /// Whether a wait may have its answer at the instant at which it begins: then the instant is
+    /// not over by that.
+    const ANSWERS_AT_ONCE: bool = false;
+
     /// Returns the time, in nanoseconds since the run's epoch.
     fn now_ns(&self) -> u64;
 
@@ -532,6 +652,17 @@ pub trait PlatformPort<B> {
 
     /// A core begins with a body as soon as the engine's lock is free. Returns when.
     fn start(&mut self, core: CoreId, body: &mut B) -> u64;
+
+    /// The instance of a body gives its core up and begins a wait: a turn of it has ended then.
+    fn wait(&mut self, core: CoreId, body: &mut B, ended_ns: u64) {
+        let _ = (core, body, ended_ns);
+    }
+
+    /// A core goes on with a body whose wait has ended, as it [starts](Self::start) one. Returns
+    /// when.
+    fn proceed(&mut self, core: CoreId, body: &mut B) -> u64 {
+        self.start(core, body)
+    }
 
     /// Forwards a request to the other clusters that it concerns, and reports whether it does not
     /// concern this one.
@@ -572,9 +703,9 @@ pub enum NextAction<B> {
         /// Whether the time of the next event may have changed.
         is_rescheduled: bool,
     },
-    /// A step has to be taken first: one in which this instance completes, or else one that goes
-    /// on with the instant in hand.
-    Step(Option<Instance>),
+    /// A step has to be taken first: one in which this turn ends, or else one that goes on with the
+    /// instant in hand.
+    Step(Option<TurnEnd>),
 }
 
 /// The cost of a fault.

@@ -12,7 +12,8 @@
 //! # Memory
 //!
 //! Its memory is taken at commit: as much as the events of all jobs can need (a newly
-//! ready instance preempts at most one other, so an instance has at most six events),
+//! ready instance preempts at most one other, so an instance has at most six events, and
+//! five more for each wait),
 //! or a quarter of what is free, if that is less, or no job is the last: the times that
 //! are computed from it after the run take up to half as much again. When it is
 //! full, the oldest event makes way for each new one. Before it goes, it is counted in
@@ -322,7 +323,10 @@ impl Journal {
 fn events_of<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> Option<usize> {
     let of_dag = |dag: &Dag| {
         // Released, due, queued or skipped, aborted, missed, completed, signalled.
+        let waits: usize = dag.subtasks().iter().map(|of| of.waits().len()).sum();
+        let of_waits = waits.checked_mul(5)?;
         let a_job = dag.subtasks().len().checked_mul(6)?.checked_add(7)?;
+        let a_job = a_job.checked_add(of_waits)?;
         let jobs = dag.jobs()?.saturating_sub(dag.first_job());
         let jobs = usize::try_from(jobs).ok()?;
         jobs.checked_mul(a_job)?.checked_add(1)

@@ -46,8 +46,10 @@ impl MeasuredCosts {
             };
             let core = event.core.0 as usize;
             match event.what {
-                EventKind::Ready | EventKind::Suspend => waiting.push((instance, event.time_ns)),
-                EventKind::Finish => {
+                EventKind::Ready | EventKind::Suspend | EventKind::Wake => {
+                    waiting.push((instance, event.time_ns))
+                }
+                EventKind::Finish | EventKind::Wait => {
                     free_ns.resize(free_ns.len().max(core + 1), 0);
                     free_ns[core] = event.time_ns;
                 }

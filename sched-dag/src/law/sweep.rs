@@ -25,6 +25,7 @@ use core::ops::Range;
 
 use crate::ids::{CoreId, DagId, Instance};
 use crate::policy::{Policy, Preemption, SchedulerOptions};
+use crate::spec::WAITS;
 use crate::task_set::TaskSet;
 
 /// The key of R5: the smaller one goes first. No two instances have the same.
@@ -78,6 +79,8 @@ pub enum DispatchState {
     Running(CoreId),
     /// It waits for a core and has started.
     Suspended,
+    /// It has started, and its wait has not ended.
+    Waiting,
     /// It has finished, or will never run.
     Over,
 }
@@ -235,6 +238,10 @@ impl<'m> DispatchSweep<'m> {
             }
             DispatchState::Suspended => {
                 self.waiting.insert(key, since);
+                // It begins a segment, whose core it keeps.
+                if WAITS && self.model.keeps_its_core(instance) {
+                    self.unstarted.insert(key);
+                }
             }
             DispatchState::Running(core) => {
                 self.running.insert(key, core);
@@ -242,7 +249,7 @@ impl<'m> DispatchSweep<'m> {
                     self.started.push((key, core, self.events));
                 }
             }
-            DispatchState::Absent | DispatchState::Over => {}
+            DispatchState::Absent | DispatchState::Waiting | DispatchState::Over => {}
         }
     }
 

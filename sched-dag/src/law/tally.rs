@@ -277,7 +277,9 @@ impl DagTally {
                 }
             }
             EventKind::Resume => times.since_ns = event.time_ns,
-            EventKind::Suspend => times.executed_ns += event.time_ns.saturating_sub(times.since_ns),
+            EventKind::Suspend | EventKind::Wait => {
+                times.executed_ns += event.time_ns.saturating_sub(times.since_ns)
+            }
             EventKind::Finish => {
                 let last_ns = event.time_ns.saturating_sub(times.since_ns);
                 let executed_ns = times.executed_ns + last_ns;

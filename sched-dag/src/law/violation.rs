@@ -10,7 +10,9 @@
 use core::fmt::{self, Display};
 
 use DetectionTime::{At, By};
-use Rule::{AndJoin, CompletionBoundary, Dispatch, JobCompletion, OneCore, OneLife, Release};
+use Rule::{
+    AndJoin, CompletionBoundary, Dispatch, JobCompletion, OneCore, OneLife, Release, Waiting,
+};
 
 use super::sweep::{DispatchBreach, DispatchFault, DispatchState};
 use crate::ids::{CoreId, DagId, Instance, named};
@@ -34,6 +36,8 @@ texts! {
         JobCompletion = "R4 completion";
         /// R5: the instances with the smallest keys run.
         Dispatch = "R5 dispatch";
+        /// W1 and W2: an instance takes the waits that its subtask states, each within its limit.
+        Waiting = "W1 waiting";
         /// An instance becomes ready, starts and finishes once, is suspended and resumed in
         /// turns, and is on one core at a time.
         OneLife = "one life";
@@ -168,6 +172,14 @@ worded! {
             "never_missed", (JobCompletion, At(*end_ns)),
             "{} is not missed although its deadline {deadline_ns} ns has passed",
             names.job(*dag, *job);
+        /// W1: a wait ended later than its limit lets it.
+        WaitBeyondLimit { event: Event, since_ns: u64, limit_ns: u64 } =
+            "wait_beyond_limit", (Waiting, By(event)),
+            ", which began at {since_ns} ns and has a limit of {limit_ns} ns";
+        /// W1: an instance began a wait more than its subtask states, or finished without one.
+        OtherWaits { event: Event, waits: usize, stated: usize } =
+            "other_waits", (Waiting, By(event)),
+            " after {waits} waits, and its subtask states {stated}";
         /// R5: an instance waited although a core was idle, or ran an instance that it outranks
         /// and could have replaced.
         PassedOver(wrong: DispatchBreach) = "passed_over", (Dispatch, At(shown_ns(wrong))),
@@ -273,6 +285,8 @@ impl NamedSubject<'_> {
                 EventKind::Suspend => f.write_str("is suspended"),
                 EventKind::Resume => f.write_str("is resumed"),
                 EventKind::Finish => f.write_str("finishes"),
+                EventKind::Wait => f.write_str("begins to wait"),
+                EventKind::Wake => f.write_str("ends its wait"),
                 EventKind::Restarted => f.write_str("is replaced"),
                 what => write!(f, "is {what}"),
             }
@@ -363,6 +377,7 @@ pub(super) fn does(stage: DispatchState) -> impl Display {
         DispatchState::Ready => f.write_str("is ready and has not started"),
         DispatchState::Running(core) => write!(f, "runs on core {}", core.0),
         DispatchState::Suspended => f.write_str("is suspended"),
+        DispatchState::Waiting => f.write_str("waits"),
         DispatchState::Over => f.write_str("is over already"),
     })
 }

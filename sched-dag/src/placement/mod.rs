@@ -18,6 +18,7 @@
 use alloc::boxed::Box;
 
 use crate::ids::{CoreId, Vertex};
+use crate::spec::WAITS;
 
 /// Where a subtask's body is.
 #[derive(Debug)]
@@ -26,6 +27,8 @@ enum BodyState<Body, Parked> {
     Resting(Body),
     /// With the core whose current instance it is.
     Running,
+    /// In the table: its instance waits, or is in line again, and needs no context.
+    Waiting(Body),
     /// On the stack of a context that does not run.
     Suspended(Parked),
     /// Not here: its instance was ended, or another scheduler has it.
@@ -39,6 +42,8 @@ pub enum NextWork<Body, Parked> {
     Nothing,
     /// It starts an instance of this subtask.
     Start(Vertex, Body),
+    /// It goes on with the instance of this subtask, whose wait has ended.
+    Proceed(Vertex, Body),
     /// It goes on with this context.
     Continue(Parked),
 }
@@ -94,6 +99,25 @@ impl<Body, Parked> Placement<Body, Parked> {
         self.seats[core].current = NOTHING;
         self.put(vertex, body);
         self.forget_target(core, vertex);
+    }
+
+    /// Notes that an instance waits, which was the current one of core `core` or has been parked.
+    pub fn wait(&mut self, core: usize, vertex: Vertex, body: Body) {
+        if self.seats[core].current == vertex {
+            self.seats[core].current = NOTHING;
+        }
+        *self.body_state(vertex) = BodyState::Waiting(body);
+        self.forget_target(core, vertex);
+    }
+
+    /// Notes that the instance which waits, if the subtask has one, was cancelled.
+    pub fn cancel_wait(&mut self, vertex: Vertex) {
+        let place = self.body_state(vertex);
+        if let BodyState::Waiting(_) = place
+            && let BodyState::Waiting(body) = core::mem::replace(place, BodyState::Lost)
+        {
+            *place = BodyState::Resting(body);
+        }
     }
 
     /// Puts the body of an instance that has run to rest.
@@ -206,9 +230,10 @@ impl<Body, Parked> Placement<Body, Parked> {
         let place = self.body_state(vertex);
         let next = match core::mem::replace(place, BodyState::Running) {
             BodyState::Resting(body) => NextWork::Start(vertex, body),
+            BodyState::Waiting(body) if WAITS => NextWork::Proceed(vertex, body),
             BodyState::Suspended(context) => NextWork::Continue(context),
             // The core that still has it will say when it no longer has.
-            BodyState::Running => return NextWork::Nothing,
+            BodyState::Running | BodyState::Waiting(_) => return NextWork::Nothing,
             // The subtask of an ended DAG: nothing of it is to run.
             BodyState::Lost => {
                 *place = BodyState::Lost;

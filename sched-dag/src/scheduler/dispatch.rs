@@ -37,6 +37,10 @@
 //! idle last is taken first. Virtual time goes either way, the short one where
 //! exactly one instance finishes; so its tests hold both to one law.
 //!
+//! A wait ends a turn by the same short way ([`Scheduler::wait_shortly`]). One of no time makes its
+//! own instance ready, and no other. A limit that comes while a core is idle concerns that core
+//! ([`Scheduler::wake_shortly`]).
+//!
 //! # The cores
 //!
 //! Idle cores form a stack: the core that has become idle last is taken first.
@@ -292,7 +296,7 @@ impl Scheduler {
 
     /// Gives a core the first in line.
     #[inline]
-    fn give_first(&mut self, core: CoreId) -> HandOff {
+    pub(super) fn give_first(&mut self, core: CoreId) -> HandOff {
         match self.ready.pop() {
             Some(key) => HandOff::To(Vertex(key.vertex()), self.give(core, key)),
             None => HandOff::Idle,
@@ -343,13 +347,13 @@ impl CoreTable {
 
     /// Reports whether any core is idle.
     #[inline]
-    const fn any_idle(&self) -> bool {
+    pub(super) const fn any_idle(&self) -> bool {
         !self.idle.is_empty()
     }
 
     /// Returns an idle core, which the caller gives an instance.
     #[inline]
-    fn take_idle(&mut self) -> Option<CoreId> {
+    pub(super) fn take_idle(&mut self) -> Option<CoreId> {
         self.idle.pop()
     }
 

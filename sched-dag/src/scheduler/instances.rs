@@ -11,6 +11,7 @@ use super::vertices::{InstancePhase, Vertex, VertexTable};
 use super::{DagPhase, EventLog, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
+use crate::spec::WAITS;
 
 impl Scheduler {
     /// Ends an instance that has started.
@@ -86,6 +87,9 @@ impl Scheduler {
     /// that thereby would become ready.
     #[inline]
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64) {
+        if WAITS {
+            self.cancel_waits(dag, sequence);
+        }
         let state = &self.dags[dag.index()];
         // In topological order each vertex is looked at after its predecessors, so none becomes
         // ready behind the loop's back.
@@ -129,7 +133,7 @@ impl Scheduler {
     /// ready when this one has been taken out. So each round of the loop ends
     /// another instance in flight.
     #[inline]
-    fn end_all(&mut self) {
+    pub(super) fn end_all(&mut self) {
         // A stack in memory of its own, not recursion: a chain may be 100,000 subtasks long.
         while let Some(vertex) = self.ending.pop() {
             self.end_one(vertex);

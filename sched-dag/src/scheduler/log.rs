@@ -26,8 +26,8 @@ pub struct EventLog {
     pub(super) now_ns: u64,
     /// The core that makes the scheduler's step.
     pub here: CoreId,
-    /// Whether anything has happened to a job as a whole.
-    has_job_event: bool,
+    /// Whether anything has happened to a job as a whole, or a wait has begun.
+    pub(super) has_job_event: bool,
     /// Jobs of DAGs with a limit that have ended.
     pub jobs_ended: u64,
     /// By bits of [`EventKind`], which events are kept as notices.
@@ -97,7 +97,8 @@ impl EventLog {
         core::mem::swap(&mut self.notices, room);
     }
 
-    /// Reports whether anything has happened to a job as a whole since it was last asked.
+    /// Reports whether anything has happened to a job as a whole, or a wait has begun, since it was
+    /// last asked.
     #[inline]
     pub const fn take_job_event(&mut self) -> bool {
         core::mem::replace(&mut self.has_job_event, false)

@@ -47,6 +47,7 @@ mod phase;
 mod ready_queue;
 mod signals;
 mod vertices;
+mod waits;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -61,11 +62,12 @@ use crate::scheduler::jobs::JobTable;
 use crate::scheduler::phase::SurvivedFaults;
 use crate::scheduler::ready_queue::{IndexedHeap, ReadyQueue};
 use crate::scheduler::vertices::VertexTable;
+use crate::scheduler::waits::WaitTable;
 use crate::task_set::{Dag, TaskSet};
 
 pub use crate::scheduler::dispatch::{Decision, HandOff};
 pub use crate::scheduler::log::{DriverNotice, EventLog};
-pub use crate::scheduler::moment::Moment;
+pub use crate::scheduler::moment::{Moment, TurnEnd};
 pub use crate::scheduler::phase::{DagPhase, DagSnapshot};
 
 /// The state of all jobs in flight.
@@ -85,8 +87,10 @@ pub struct Scheduler {
     /// a core has become idle since then that the next instance in line may need.
     fresh: u32,
     cores: CoreTable,
-    /// When something happens to each DAG without a completion.
+    /// When something happens to each DAG without a completion, and behind the DAGs, when each
+    /// wait ends at the latest.
     timers: IndexedHeap<u64>,
+    waits: WaitTable,
     /// The least of these times, at hand for each completion; `u64::MAX` also if there
     /// is none.
     quiet_until_ns: u64,
@@ -165,7 +169,8 @@ impl Scheduler {
                 }
             })
             .collect();
-        let mut timers = IndexedHeap::new(dags.len());
+        let waits = WaitTable::new(&task_set);
+        let mut timers = IndexedHeap::new(dags.len() + waits.len());
         for (index, (dag, state)) in dags.iter().zip(&states).enumerate() {
             if let Some(event_ns) = state.jobs.next_event_ns(dag, 0) {
                 timers.set(index, event_ns);
@@ -182,6 +187,7 @@ impl Scheduler {
             cores: CoreTable::new(options.cores),
             quiet_until_ns: earliest_ns(&timers),
             timers,
+            waits,
             ending: Vec::with_capacity(longest.unwrap_or(0)),
             // A dispatch names a core at most twice: to preempt and to start.
             decisions: Vec::with_capacity(2 * options.cores as usize),
@@ -364,7 +370,7 @@ impl Hash for Scheduler {
     fn hash<H: Hasher>(&self, state: &mut H) {
         // The least time is that of the timers, and between instants nothing is ending.
         (self.log.now_ns, &self.dags, &self.vertices, &self.ready).hash(state);
-        (self.fresh, &self.cores, &self.timers).hash(state);
+        (self.fresh, &self.cores, &self.timers, &self.waits).hash(state);
     }
 }
 

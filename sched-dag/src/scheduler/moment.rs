@@ -4,6 +4,7 @@ use super::{Decision, Scheduler};
 use crate::ids::{CoreId, DagId, Instance, ModeId, to_u32};
 use crate::journal::EventKind;
 use crate::request::Request;
+use crate::spec::WAITS;
 
 /// One instant, in which completions are still taken.
 #[derive(Debug)]
@@ -12,6 +13,16 @@ pub struct Moment<'s> {
     scheduler: &'s mut Scheduler,
     /// When the driver says that it is, which another core may have been later than.
     told_ns: u64,
+}
+
+/// The end of a *turn*: of what an instance executes from its start, or the end of a wait, to
+/// its finish, or the next wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TurnEnd {
+    /// The instance.
+    pub instance: Instance,
+    /// If it waits, for how long at most, in nanoseconds; `None`: it has finished.
+    pub limit_ns: Option<u64>,
 }
 
 impl Scheduler {
@@ -26,11 +37,15 @@ impl Scheduler {
             Request::Resume(dag) => self.resume(dag),
             Request::Close(dag) => self.close(dag),
             Request::End(dag) => self.end_dag(dag),
+            Request::Answer(wait) if WAITS => self.answer(wait),
             // These concern the run, not one DAG; the engine serves them.
             Request::Enter(..)
             | Request::ShutDown
             | Request::Begin
             | Request::GoOn
+            | Request::Wait(_)
+            | Request::WaitUntil(_)
+            | Request::Answer(_)
             | Request::Step => {}
         }
     }
@@ -59,6 +74,25 @@ impl<'s> Moment<'s> {
             .log
             .on_this(EventKind::Finish, self.told_ns, instance);
         self.scheduler.finish(instance);
+    }
+
+    /// Takes note that a turn of an instance has ended: it finishes, or waits (W1). As with
+    /// [`complete`](Self::complete), it need not run any more in the scheduler's eyes.
+    ///
+    /// # Panics
+    ///
+    /// As [`complete`](Self::complete), or if it waits and its subtask states no waits.
+    #[inline]
+    pub fn end_turn(&mut self, turn: TurnEnd) {
+        match turn.limit_ns {
+            Some(limit_ns) if WAITS => {
+                let (log, told_ns) = (&mut self.scheduler.log, self.told_ns);
+                log.on_this(EventKind::Wait, told_ns, turn.instance);
+                let limit_ns = told_ns.saturating_add(limit_ns);
+                self.scheduler.begin_wait(turn.instance, limit_ns);
+            }
+            _ => self.complete(turn.instance),
+        }
     }
 
     /// Takes note that an instance has ended by a fault, and ends its DAG.

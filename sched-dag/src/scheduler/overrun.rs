@@ -43,12 +43,16 @@ use super::Scheduler;
 use crate::ids::DagId;
 use crate::journal::EventKind;
 use crate::policy::OverrunPolicy;
+use crate::spec::WAITS;
 
 impl Scheduler {
     /// Releases all jobs of a DAG that are due, and notices deadlines that have
-    /// passed.
+    /// passed. A number behind the DAGs' is that of a wait's timer.
     #[inline]
     pub(super) fn serve(&mut self, dag: DagId) {
+        if WAITS && dag.index() >= self.dags.len() {
+            return self.time_out(dag.index());
+        }
         // Mostly what is due is a release, and the job before it has ended.
         if !self.dags[dag.index()].jobs.are_at_rest() {
             // Deadlines before releases: a late job may be the one that blocks the next.
@@ -133,6 +137,9 @@ impl Scheduler {
 
     #[inline]
     fn make_room(&mut self, dag: DagId) {
+        if WAITS {
+            self.time_out_due();
+        }
         let state = &mut self.dags[dag.index()];
         // All in flight are cut already, so room is on its way: aborting more would cost jobs and
         // bring nothing.

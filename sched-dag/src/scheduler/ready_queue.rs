@@ -405,6 +405,11 @@ impl<K: Ord + Copy> IndexedHeap<K> {
         self.entries.first().copied()
     }
 
+    /// Returns the key of an item, if it is in.
+    pub(super) fn key_of(&self, item: usize) -> Option<K> {
+        self.entries.get(self.positions[item]).map(|(key, _)| *key)
+    }
+
     /// Puts an item into the heap, or gives it another key.
     #[inline]
     pub(super) fn set(&mut self, item: usize, key: K) {

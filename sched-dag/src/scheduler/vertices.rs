@@ -38,8 +38,10 @@ pub(super) enum InstancePhase {
     Ready,
     /// It executes.
     Running(CoreId),
-    /// It has started and lost its core.
+    /// It has started, and is in line for a core: it lost its own, or its wait has ended.
     Preempted,
+    /// It has started, and waits for something else than a core.
+    Waiting,
 }
 
 /// One subtask, in one cache line.

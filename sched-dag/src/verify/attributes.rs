@@ -15,7 +15,7 @@ use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
-use crate::spec::{DagSpec, STACK_BYTES};
+use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES, WAITS};
 
 /// Checks the attributes of the whole commit.
 pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
@@ -139,7 +139,16 @@ fn check_times(page: &mut DagFindings<'_, '_>) {
     let mut wcets_ns = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
     let volume = wcets_ns.try_fold(0_u64, u64::checked_add);
     let volume = volume.is_none().then_some(OverflowingTime::Volume);
-    for time in deadline.into_iter().chain(volume) {
+    let waits = || {
+        spec.subtasks
+            .iter()
+            .flat_map(|subtask| subtask.waits.iter())
+            .filter(|_| WAITS)
+    };
+    let mut limits_ns = waits().map(|wait| wait.limit_ns);
+    let waiting = limits_ns.try_fold(0_u64, u64::checked_add);
+    let waiting = waiting.is_none().then_some(OverflowingTime::Waits);
+    for time in deadline.into_iter().chain(volume).chain(waiting) {
         page.fault(|dag| DagFault::TimeOverflow { dag, time });
     }
 }
@@ -176,6 +185,7 @@ fn check_subtasks(page: &mut DagFindings<'_, '_>) {
             }
             _ => {}
         }
+        check_segments(page, index);
         if let Some(bytes) = stated.stack_bytes
             && !STACK_BYTES.contains(&bytes)
         {
@@ -198,6 +208,39 @@ fn check_subtasks(page: &mut DagFindings<'_, '_>) {
                 });
             }
         }
+    }
+}
+
+/// Checks the WCETs of a subtask's segments: all are given or none is, and each is above 0.
+fn check_segments(page: &mut DagFindings<'_, '_>, index: usize) {
+    let stated = &page.spec.subtasks[index];
+    let count = stated.waits.len();
+    if count > MOST_WAITS {
+        let subtask = page.subtask(index);
+        page.fault(|dag| DagFault::TooManyWaits {
+            dag,
+            subtask,
+            count,
+        });
+        return;
+    }
+    if !WAITS {
+        return;
+    }
+    let given = stated.waits.iter().filter_map(|wait| wait.segment_ns);
+    let (count, later_ns) = (
+        given.clone().count(),
+        given.clone().try_fold(0, u64::checked_add),
+    );
+    let first_ns = later_ns.and_then(|later_ns| stated.wcet_ns?.checked_sub(later_ns));
+    let are_sound = match count {
+        // Of the sum alone, as observed, nothing follows for the segments.
+        0 => true,
+        _ => count == stated.waits.len() && first_ns > Some(0) && given.min() > Some(0),
+    };
+    if !are_sound {
+        let subtask = page.subtask(index);
+        page.fault(|dag| DagFault::SegmentsPartlyGiven { dag, subtask });
     }
 }
 

@@ -14,7 +14,7 @@ use super::label::{
 };
 use crate::ids::ClusterId;
 use crate::policy::Priority;
-use crate::spec::STACK_BYTES;
+use crate::spec::{MOST_WAITS, STACK_BYTES, WAITS};
 use crate::{MAX_ARITY, worded};
 
 worded! {
@@ -171,6 +171,14 @@ worded! {
         } = "wcet_exceeds_deadline",
             "{subtask} of {dag} has a WCET of {:?}, longer than the relative deadline of {:?}; \
              shorten it or extend the deadline", ns(*wcet_ns), ns(*relative_deadline_ns);
+        /// A subtask that waits, some of whose segments have a WCET, or one of 0.
+        SegmentsPartlyGiven { dag: DagLabel, subtask: SubtaskLabel } = "segments_partly_given",
+            "{subtask} of {dag} waits, and not each of its segments has a WCET above 0; give one to \
+             each, or to none";
+        /// More waits of a subtask than are told apart.
+        TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
+            "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; {}",
+            if WAITS { "split it" } else { "build it with `fass`' feature `waits`" };
         /// A stack that is too small or too large.
         StackOutOfRange { dag: DagLabel, subtask: SubtaskLabel, bytes: u64 } =
             "stack_out_of_range",
@@ -297,6 +305,8 @@ pub enum OverflowingTime {
     LastDeadline,
     /// The sum of the WCETs of all subtasks.
     Volume,
+    /// The sum of the limits of all waits.
+    Waits,
 }
 
 impl TopicSide {
@@ -320,6 +330,7 @@ impl OverflowingTime {
                 "lower the number of jobs, the period or the offset",
             ],
             Self::Volume => ["the sum of the WCETs", "lower the WCETs"],
+            Self::Waits => ["the sum of the limits of waits", "lower the limits"],
         }
     }
 }

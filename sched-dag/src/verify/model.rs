@@ -1,16 +1,18 @@
 //! From specs without fault to the model.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::attributes::in_flight;
 use super::fault::DagFault;
 use super::{CommitOptions, VerifyFindings};
+
 use crate::graph::Graph;
 use crate::ids::SubtaskId;
 use crate::order::sort_by_key;
 use crate::policy::Priority;
 use crate::priorities::ranks;
-use crate::spec::DagSpec;
+use crate::spec::{DagSpec, WAITS};
 use crate::task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
@@ -97,6 +99,11 @@ fn build_dag(
         .map(|(index, subtask)| Subtask {
             name: subtask.name.clone(),
             wcet_ns: subtask.wcet_ns,
+            waits: if WAITS {
+                subtask.waits.as_slice().into()
+            } else {
+                Box::default()
+            },
             wcet_source: match (subtask.wcet_ns, subtask.wcet_margin_percent) {
                 (None, _) => WcetSource::None,
                 (_, None) => WcetSource::Stated,

@@ -2,7 +2,7 @@
 //!
 //! The commits of a record become one `digraph` in the DOT language: a
 //! cluster for each DAG with its period and deadline; a box for each subtask with
-//! its WCET and priority; an arrow for each edge, with the topic and the message's
+//! its WCET, waits and priority; an arrow for each edge, with the topic and the message's
 //! type, dotted where a state makes the edge. A topic whose latest value is sampled
 //! has a note of its own, with a dashed arrow to each subtask, of any DAG, that
 //! samples it.
@@ -126,6 +126,12 @@ impl Dag<'_> {
         if let Some(wcet_ns) = subtask.wcet_ns {
             label += &format!("\nWCET {}", briefly(wcet_ns));
         }
+        for &(dag, of, limit_ns, segment_ns) in &self.commit.told.waits {
+            if (dag, of as usize) == (self.number, number) {
+                label += &format!("\nwaits up to {}", briefly(limit_ns));
+                label += &segment_ns.map_or(String::new(), |ns| format!(", then {}", briefly(ns)));
+            }
+        }
         // Under EDF the priority has no effect.
         if !self.commit.told.is_edf {
             label += &format!("\npriority {}", subtask.priority);
@@ -209,7 +215,12 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
         }];
         eye.states = vec![("map".into(), 1, 2)];
         eye.samples = vec![(0, 0, 0, Some(12_000_000)), (2, 0, 0, None)];
-        let told = Commit { is_edf, ..told };
+        let waits = vec![(0, 0, 3_000_000, Some(400_000)), (0, 2, 0, None)];
+        let told = Commit {
+            is_edf,
+            waits,
+            ..told
+        };
         let mut committed = Committed::new(0, told).expect("it is right");
         // A commit refuses both, but a picture can show them.
         committed.told.dags[0].name = "the \"eye\"".into();
@@ -222,9 +233,9 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
 
     const DRAWN: &str = r#"  subgraph cluster_c0_d0 {
     label="the \"eye\"\nT = 25 ms, D = 100 ms, O = 500 ns\n20 jobs, 5 in flight, overrun: queue";
-    c0_d0_s0 [label="camera\nWCET 1 ms\npriority 1"];
+    c0_d0_s0 [label="camera\nWCET 1 ms\nwaits up to 3 ms, then 400 us\npriority 1"];
     c0_d0_s1 [label="subtask 1\npriority 2\nnon-preemptive"];
-    c0_d0_s2 [label="fuse\npriority 3"];
+    c0_d0_s2 [label="fuse\nwaits up to 0 ns\npriority 3"];
     c0_d0_s0 -> c0_d0_s1 [label="frame: Arc<[Frame]>"];
     c0_d0_t0 [shape=note, label="frame: Arc<[Frame]>"];
     c0_d0_s0 -> c0_d0_t0 [style=dashed];

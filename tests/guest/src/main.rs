@@ -25,6 +25,7 @@ mod storm;
 #[allow(unsafe_code, reason = "registers that the compiler would spill")]
 mod upper_halves;
 mod values;
+mod waits;
 
 use faults::crimes::{Crime, Unpunished};
 use kernel::{AppError, Machine};
@@ -62,6 +63,10 @@ const TESTS: &[(&str, Test)] = &[
     ("talkative", single::talkative),
     ("unnoticed", single::unnoticed),
     ("values", values::run),
+    ("waits", waits::run),
+    ("waits_cost", waits::cost),
+    ("waits_faults", waits::faults),
+    ("waits_wire", waits::wire),
 ];
 
 fn main(machine: &Machine) -> Result<(), AppError> {

@@ -15,17 +15,18 @@ use fass::commit::{Commit, CommitError, ConstructionPolicy, finish_create_dags_w
 use fass::shared::{Latest, Mode, Modes, Signal, State, Uses, shutting_down};
 use fass::{Dag, Occupation, SubtaskAttributes, VecToPubs, VecToSubs, create_dag, execute_for};
 
-use crate::dag::{DagText, Replaced, SubtaskText, Use};
+use crate::dag::{DagText, Replaced, SubtaskText, Use, of_call};
+use crate::waiting::{self, ScenarioDevice};
 use crate::{Calls, Scenario};
 
 /// Tuples that a subtask takes.
-trait Inputs: VecToSubs {
+pub(crate) trait Inputs: VecToSubs + Send {
     /// Returns the first value, and whether the others are the same.
     fn first(self) -> Option<(u64, bool)>;
 }
 
 /// Tuples that a subtask returns.
-trait Outputs: VecToPubs {
+pub(crate) trait Outputs: VecToPubs {
     fn of(value: u64) -> Self;
 }
 
@@ -68,7 +69,7 @@ macro_rules! inputs {
 inputs!(()(a)(a b)(a b c)(a b c d));
 
 /// The steps of a subtask's functions in a call; one follows another that has failed.
-struct Step {
+pub(crate) struct Step {
     takes: Vec<Duration>,
     /// A budget is one of processor time, so it is exceeded only by what computes.
     how: Occupation,
@@ -100,13 +101,23 @@ impl Step {
 
     /// Does it, where `act` is what else it may do.
     fn call<I: Inputs, O: Outputs>(&self, inputs: I, act: impl FnOnce(u64, bool)) -> O {
-        let call = self.calls.fetch_add(1, Relaxed);
-        let takes = usize::try_from(call)
-            .ok()
-            .and_then(|call| self.takes.get(call));
-        let takes = takes.or(self.takes.last()).copied().unwrap_or_default();
-        execute_for(takes, self.how);
+        let call = self.begin();
         act(call, self.when.contains(&call));
+        self.end(call, inputs)
+    }
+
+    /// Begins a call, up to its first wait, and returns its number.
+    pub(crate) fn begin(&self) -> u64 {
+        let call = self.calls.fetch_add(1, Relaxed);
+        self.execute(&self.takes, call);
+        call
+    }
+
+    pub(crate) fn execute(&self, takes: &[Duration], call: u64) {
+        execute_for(of_call(takes, call).unwrap_or_default(), self.how);
+    }
+
+    pub(crate) fn end<I: Inputs, O: Outputs>(&self, call: u64, inputs: I) -> O {
         if self.fails.contains(&call) {
             self.of_all.failed.fetch_add(1, Relaxed);
             panic!("call {call} fails, as it is to");
@@ -131,6 +142,8 @@ struct Building<'a> {
     modes: &'a BTreeMap<String, Mode>,
     latest: &'a BTreeMap<String, Latest<Whole>>,
     states: BTreeMap<String, State<u64>>,
+    /// The devices that its subtasks ask.
+    devices: &'a mut Vec<ScenarioDevice>,
 }
 
 impl Building<'_> {
@@ -157,6 +170,10 @@ impl Building<'_> {
                 .register(attributes);
         }
         let place = (inputs, outputs, attributes);
+        if !subtask.waits.is_empty() {
+            let device = waiting::register::<I, O>(dag, subtask, place, step);
+            return self.devices.push(device);
+        }
         match &subtask.uses {
             Use::Nothing if subtask.due.is_some() => {
                 let due = subtask.due.unwrap_or_default();
@@ -263,6 +280,9 @@ fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
     if let Some(budget) = subtask.budget {
         attributes = attributes.budget(budget);
     }
+    for wait in &subtask.waits {
+        attributes = attributes.wait(wait.limit);
+    }
     if subtask.is_non_preemptive {
         attributes = attributes.non_preemptive();
     }
@@ -300,7 +320,7 @@ impl DagText {
 }
 
 impl Scenario {
-    /// Builds the DAGs and commits them, in the order of the text.
+    /// Builds the DAGs and commits them, in the order of the text. No device answers.
     ///
     /// # Errors
     ///
@@ -310,6 +330,20 @@ impl Scenario {
     ///
     /// If the text names what it does not state.
     pub fn commit(&self) -> Result<Commit, CommitError> {
+        self.commit_with(drop)
+    }
+
+    /// Likewise, where `connect` takes each device that is asked.
+    ///
+    /// # Errors
+    ///
+    /// As [`commit`](Self::commit).
+    ///
+    /// # Panics
+    ///
+    /// As [`commit`](Self::commit).
+    pub fn commit_with(&self, connect: impl FnMut(ScenarioDevice)) -> Result<Commit, CommitError> {
+        let mut devices = Vec::new();
         let (mut dags, mut signals) = (BTreeMap::new(), BTreeMap::new());
         self.calls.returned.store(0, Relaxed);
         self.calls.failed.store(0, Relaxed);
@@ -347,6 +381,7 @@ impl Scenario {
                 modes: &modes,
                 latest: &latest,
                 states: BTreeMap::new(),
+                devices: &mut devices,
             };
             for subtask in &text.subtasks {
                 let (inputs, is_read) = text.shape(subtask);
@@ -354,6 +389,7 @@ impl Scenario {
                 building.register_shaped(subtask, inputs, writes);
             }
         }
+        devices.into_iter().for_each(connect);
         let all: Vec<Dag> = (self.dags.iter())
             .map(|text| dags[&text.name].clone())
             .collect();

@@ -43,12 +43,17 @@ pub struct DagText {
 /// the number of the call in which it is done `raises DAG N,N`, `pauses DAG N,N` and then
 /// `resumes DAG N,N`, `enters MODE N` or `enters-idle MODE N`, `ends-run N`.
 ///
+/// One that waits has for each wait `wait LIMIT then TIMES`, or `wait LIMIT answered TIMES then
+/// TIMES`: it asks a device, which answers after these times, and then executes for those. Without
+/// `answered` it sleeps until the limit. In real time no device answers.
+///
 /// `TIMES` are how long its first calls take, separated by `/`; the last of them is that of all
 /// others.
 #[derive(Clone, Debug, Default)]
 pub struct SubtaskText {
     pub(crate) name: String,
     pub(crate) takes: Vec<Duration>,
+    pub(crate) waits: Vec<WaitText>,
     pub(crate) after: Vec<String>,
     /// Its priority, if it is not the one that its DAG's deadline gives it.
     pub priority: Option<u32>,
@@ -64,6 +69,41 @@ pub struct SubtaskText {
     pub(crate) uses: Use,
     /// The calls in which it does what it may.
     pub(crate) when: Vec<u64>,
+}
+
+/// A wait of a subtask.
+#[derive(Clone, Debug)]
+pub(crate) struct WaitText {
+    pub(crate) limit: Duration,
+    /// When a device answers in the first calls; none if it sleeps.
+    pub(crate) answered: Vec<Duration>,
+    /// How long the segment behind it takes in the first calls.
+    pub(crate) takes: Vec<Duration>,
+}
+
+impl WaitText {
+    /// Reads `LIMIT then TIMES`, or `LIMIT answered TIMES then TIMES`.
+    fn read(words: &mut Words<'_>) -> Result<Self, String> {
+        let limit = time(words)?;
+        let answered = match words.next_if_eq(&"answered") {
+            Some(_) => times(words)?,
+            None => vec![],
+        };
+        match words.next() {
+            Some("then") => Ok(Self {
+                limit,
+                answered,
+                takes: times(words)?,
+            }),
+            _ => Err("a wait is `wait LIMIT then TIMES`".into()),
+        }
+    }
+}
+
+/// Returns the time of a call, where the first calls have these.
+pub(crate) fn of_call(times: &[Duration], call: u64) -> Option<Duration> {
+    let call = usize::try_from(call).unwrap_or(usize::MAX);
+    times.get(call).or(times.last()).copied()
 }
 
 /// Which function follows one that has failed.
@@ -107,6 +147,11 @@ fn time(words: &mut Words<'_>) -> Result<Duration, String> {
 
 fn numbers(words: &mut Words<'_>) -> Result<Vec<u64>, String> {
     value(words)?.split([',', '/']).map(number).collect()
+}
+
+fn times(words: &mut Words<'_>) -> Result<Vec<Duration>, String> {
+    let numbers = numbers(words)?.into_iter();
+    Ok(numbers.map(Duration::from_millis).collect())
 }
 
 impl DagText {
@@ -159,9 +204,7 @@ impl DagText {
         let mut words = line.split_whitespace().peekable();
         let mut subtask = SubtaskText {
             name: value(&mut words)?.into(),
-            takes: (numbers(&mut words)?.into_iter())
-                .map(Duration::from_millis)
-                .collect(),
+            takes: times(&mut words)?,
             ..SubtaskText::default()
         };
         let of_others: Vec<String> = self.subtasks.iter().map(|of| of.name.clone()).collect();
@@ -196,6 +239,7 @@ impl DagText {
                         return Err("`after` names no subtask that stands before".into());
                     }
                 }
+                "wait" => subtask.waits.push(WaitText::read(words)?),
                 "priority" => subtask.priority = Some(number(value(words)?)?),
                 "wcet" => subtask.wcet = Some(time(words)?),
                 "budget" => subtask.budget = Some(time(words)?),

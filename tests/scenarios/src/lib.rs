@@ -45,6 +45,7 @@ pub mod build;
 pub mod dag;
 pub mod judge;
 mod random;
+mod waiting;
 
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
@@ -53,6 +54,8 @@ use alloc::{format, vec};
 use core::sync::atomic::AtomicU64;
 
 use dag::{DagText, Use};
+
+pub use waiting::ScenarioDevice;
 
 /// The unit of times in a scenario: a millisecond.
 pub const UNIT_NS: u64 = 1_000_000;
@@ -67,6 +70,7 @@ pub const SUITE: &[(&str, &str)] = &[
     ("overrun", include_str!("../overrun.txt")),
     ("rules", include_str!("../rules.txt")),
     ("sharing", include_str!("../sharing.txt")),
+    ("waits", include_str!("../waits.txt")),
 ];
 
 /// The DAG that runs next to a scenario in a cluster.

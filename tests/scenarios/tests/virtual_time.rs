@@ -20,7 +20,8 @@ fn run(scenario: &Scenario, judge: impl FnOnce(&Report) -> Vec<String>) -> Vec<S
     if !scenario.clusters.is_empty() {
         machine = machine.clusters(&scenario.clusters);
     }
-    if let Some(judged) = scenario.judge_commit(scenario.commit()) {
+    let answers = |device| machine.answers(device, |after, _job| [(after, ())]);
+    if let Some(judged) = scenario.judge_commit(scenario.commit_with(answers)) {
         return judged;
     }
     let report = machine.run();

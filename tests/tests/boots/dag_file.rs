@@ -79,6 +79,27 @@ fn generated_dags_run_without_violation_within_their_bounds() {
 }
 
 #[test]
+fn what_waits_leaves_its_core_to_others_within_all_bounds() {
+    let file = system::workspace().join("apps/dag-file/examples/accelerator.dag");
+    let text = fs::read_to_string(file).expect("an example");
+    for words in [
+        "cores=0 policy=edf execution=uniform:0.3..1 seed=3",
+        "cores=0,1 policy=static",
+        "policy=static",
+    ] {
+        let words = format!("jobs=20 overheads_ns=1000,10000,4000,1000 {words}");
+        let outcome = run(&text, &words);
+        outcome
+            .line("dag_set")
+            .has([("violations", 0), ("allocations", 0)]);
+        for dag in outcome.lines("dag_run") {
+            dag.has([("completed", 20), ("deadline_misses", 0)]);
+            assert!(dag.number("tightness_permille") <= 1000, "{}", dag.text);
+        }
+    }
+}
+
+#[test]
 fn overheads_that_the_kernel_measures_are_charged_hold_and_are_the_same_again() {
     // A fork wider than the cores, and a DAG that preempts it.
     let branches: String = (0..6)

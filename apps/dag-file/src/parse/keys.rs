@@ -45,6 +45,16 @@ impl<'l, 'a> Keys<'l, 'a> {
         Ok(Some(key))
     }
 
+    /// Takes the next word if it is this one.
+    pub(super) fn next_if(&mut self, word: &str) -> bool {
+        let mut ahead = self.rest.clone();
+        let is_it = ahead.next() == Some(&word);
+        if is_it {
+            self.rest = ahead;
+        }
+        is_it
+    }
+
     pub(super) fn value(&mut self, key: &str) -> Result<&'a str, Malformed> {
         let value = self.rest.next().copied();
         value.ok_or_else(|| self.line.malformed(format!("`{key}` lacks its value")))
@@ -53,6 +63,15 @@ impl<'l, 'a> Keys<'l, 'a> {
     pub(super) fn time_ns(&mut self, key: &str) -> Result<u64, Malformed> {
         let word = self.value(key)?;
         parse_ns(word).map_err(|message| self.line.malformed(format!("{key}: {message}")))
+    }
+
+    /// Reads the WCET of a subtask, or of a segment.
+    pub(super) fn wcet_ns(&mut self) -> Result<u64, Malformed> {
+        match self.time_ns("wcet")? {
+            0 => Err(self
+                .malformed("wcet: it is 0, and whatever executes takes time; give at least 1ns")),
+            wcet_ns => Ok(wcet_ns),
+        }
     }
 
     pub(super) fn number(&mut self, key: &str) -> Result<u32, Malformed> {
@@ -67,6 +86,10 @@ impl<'l, 'a> Keys<'l, 'a> {
                 u32::MAX
             ))),
         }
+    }
+
+    pub(super) fn malformed(&self, reason: impl Into<String>) -> Malformed {
+        self.line.malformed(reason)
     }
 
     pub(super) fn unknown(&self, key: &str, known: &str) -> Malformed {

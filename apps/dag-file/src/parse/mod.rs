@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use replay::lines::{Line, Lines, Malformed, quoted};
 use replay::repeated;
 use replay::shown::is_seen;
-use sched_dag::{ClusterId, DagSpec, OverrunPolicy, Priority, SubtaskOrder, SubtaskSpec};
+use sched_dag::{ClusterId, DagSpec, OverrunPolicy, Priority, SubtaskOrder, SubtaskSpec, Wait};
 
 use keys::Keys;
 
@@ -340,7 +340,12 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
     let mut samples_ns: Arc<[u64]> = Arc::default();
     while let Some(key) = keys.next_key()? {
         match key {
-            "wcet" => spec.wcet_ns = Some(keys.time_ns(key)?),
+            "wcet" => read_segments(&mut keys, &mut spec)?,
+            "wait" => {
+                let message = "`wait` stands between two segments, as in `wcet 1ms wait 3ms wcet \
+                               1ms`; move it";
+                return Err(line.malformed(message));
+            }
             "priority" => spec.priority = Some(Priority(keys.number(key)?)),
             "non-preemptive" => spec.non_preemptive = true,
             "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
@@ -354,7 +359,8 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
             other => {
                 return Err(keys.unknown(
                     other,
-                    "`wcet`, `priority`, `non-preemptive`, `deadline`, `samples`",
+                    "`wcet`, after it any `wait` and `wcet`, `priority`, `non-preemptive`, \
+                     `deadline`, `samples`",
                 ));
             }
         }
@@ -363,10 +369,6 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
         let message = format!("subtask {} has no wcet; add `wcet 3ms`", quoted(&spec.name));
         return Err(line.malformed(message));
     };
-    if wcet_ns == 0 {
-        let message = "wcet: it is 0, and whatever executes takes time; give at least 1ns";
-        return Err(line.malformed(message));
-    }
     if let Some(sample) = samples_ns.iter().find(|&&sample_ns| sample_ns > wcet_ns) {
         return Err(line.malformed(format!(
             "the sample {} is longer than the wcet {}; raise the wcet, or drop the sample",
@@ -379,6 +381,32 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
         samples_ns,
     };
     Ok((spec, subtask))
+}
+
+/// Reads the WCET, or those of the first segment and, behind a limit each, of further ones.
+fn read_segments(keys: &mut Keys<'_, '_>, spec: &mut SubtaskSpec) -> Result<(), Malformed> {
+    let mut sum_ns = keys.wcet_ns()?;
+    while keys.next_if("wait") {
+        let limit_ns = keys.time_ns("wait")?;
+        if !keys.next_if("wcet") {
+            let limit = Time(limit_ns);
+            return Err(keys.malformed(format!(
+                "no segment follows `wait {limit}`; add one, as in `wait {limit} wcet 1ms`"
+            )));
+        }
+        let segment_ns = keys.wcet_ns()?;
+        sum_ns = sum_ns.checked_add(segment_ns).ok_or_else(|| {
+            let why = "wcet: the segments together are more than 64 bits of nanoseconds hold; shorten \
+                       one";
+            keys.malformed(why)
+        })?;
+        spec.waits.push(Wait {
+            limit_ns,
+            segment_ns: Some(segment_ns),
+        });
+    }
+    spec.wcet_ns = Some(sum_ns);
+    Ok(())
 }
 
 #[cfg(test)]

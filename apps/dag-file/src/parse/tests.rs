@@ -16,7 +16,7 @@ edge grab -> show
 
 set second
 dag alone period 1s
-subtask only wcet 1ns
+subtask only wcet 1ns wait 0ns wcet 2ms wait 3ms wcet 1us priority 1 # two waits
 end
 ";
 
@@ -38,11 +38,19 @@ fn a_file_is_read_and_written_back() {
     let alone = &file.sets[1].dags[0];
     assert_eq!(alone.spec.relative_deadline_ns, Some(1_000_000_000));
 
+    let waits = alone.spec.subtasks[0].waits.iter();
+    let waits: Vec<_> = waits.map(|wait| (wait.limit_ns, wait.segment_ns)).collect();
+    assert_eq!(waits, [(0, Some(2_000_000)), (3_000_000, Some(1_000))]);
+    // The WCET is that of all segments.
+    assert_eq!(alone.spec.subtasks[0].wcet_ns, Some(2_001_001));
+
     let written = file.to_string();
     assert_eq!(parse(&written).unwrap().to_string(), written);
     let kept = "dag camera period 25ms deadline 100ms offset 1ms overrun skip order fixed in-flight 4\n\
                 subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms\n";
     assert!(written.contains(kept), "{written}");
+    let waits = "subtask only wcet 1ns wait 0ns wcet 2ms wait 3ms wcet 1us priority 1\n";
+    assert!(written.contains(waits), "{written}");
 }
 
 #[test]
@@ -73,6 +81,14 @@ dag x period 1ms in-flight 4294967296 => in-flight: `4294967296` is no whole num
 {dag}subtask a wcet 1ms nice 3 => line 2: unknown key `nice`; a subtask has `wcet`,
 {dag}subtask a wcet 1ms samples 1us,2ms => line 2: the sample 2ms is longer than the wcet 1ms
 {dag}subtask a wcet 0ns => line 2: wcet: it is 0, and
+{dag}subtask a wcet 1ms wait 3ms => line 2: no segment follows `wait 3ms`; add one, as in `wait 3ms wcet 1ms`
+{dag}subtask a wcet 1ms wait 3ms priority 1 wcet 1ms => line 2: no segment follows `wait 3ms`
+{dag}subtask a wait 3ms wcet 1ms => line 2: `wait` stands between two segments, as in
+{dag}subtask a wcet 1ms wait => line 2: `wait` lacks its value
+{dag}subtask a wcet 1ms wait -1ms wcet 1ms => line 2: wait: `-1ms` is negative
+{dag}subtask a wcet 1ms wait 3ms wcet 0ms => line 2: wcet: it is 0, and
+{dag}subtask a wcet 1ms wait 3ms wcet 1ms wcet 1ms => line 2: `wcet` stands here twice
+{dag}subtask a wcet 10000000000s wait 0s wcet 10000000000s => line 2: wcet: the segments together are more than
 {dag}dag y period 1ms => line 2: dag `x` of line 1 ends here without a subtask
 {dag}{a}{a} => line 3: subtask `a` stands here twice, first on line 2
 {dag}{a}edge a -> b => line 3: no subtask `b` stands before this line

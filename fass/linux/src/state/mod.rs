@@ -73,7 +73,8 @@ pub(crate) struct State {
     pub(crate) seats: Box<[Option<CoreId>]>,
     /// By worker, the core to whose processor it is pinned.
     pinned: Box<[Option<CoreId>]>,
-    /// By worker, when its instance last went on after it had lost its core, on the clock.
+    /// By worker, on the clock, the time before which its instance does not end: when that last went
+    /// on after it had lost its core, or another thread's step was written down as of the core.
     resumed_ns: Box<[u64]>,
     /// The core and vertex from which a worker that reports an end has just taken the processor.
     interrupted: Option<(CoreId, Vertex)>,
@@ -83,7 +84,7 @@ pub(crate) struct State {
     pub(crate) spare: Vec<Number>,
     /// Workers whose instance has exceeded its budget. They are never used again.
     pub(crate) abandoned: Vec<Number>,
-    /// How often letters were taken that the release thread has not settled yet.
+    /// How many letters were taken that the release thread has not settled yet.
     pub(crate) opened: u64,
     pub(crate) faults: Vec<Fault>,
     /// The cores that have to look for work.
@@ -168,9 +169,9 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     }
 
     fn take_letters(&mut self) -> Option<&Mailboxes> {
-        let has_letters = self.office.open(self.cluster);
-        *self.opened += u64::from(has_letters);
-        has_letters.then_some(&self.office.letters)
+        let letters = self.office.open(self.cluster);
+        *self.opened += letters;
+        (letters > 0).then_some(&self.office.letters)
     }
 }
 
@@ -272,6 +273,8 @@ impl State {
         let (engine, mut port) = self.parts(workers);
         let (now_ns, here) = (port.now_ns(), engine.scheduler.log.here);
         engine.step((now_ns, here), &mut port, event);
+        let worker = self.active[here.index()];
+        self.resumed_ns[worker] = self.resumed_ns[worker].max(self.time.on_clock(now_ns));
         self.carry_out(workers);
     }
 
@@ -394,7 +397,7 @@ impl State {
         };
         let (engine, mut port) = self.parts(workers);
         match engine.next(core, &mut port) {
-            NextWork::Start(_, runner) => Some(runner),
+            NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => Some(runner),
             NextWork::Continue(parked) => {
                 self.seats[me] = None;
                 self.spare.push(me);
@@ -416,7 +419,8 @@ impl State {
 
 impl State {
     /// Returns when the instance of a worker has ended whose function returned at a time. If it
-    /// lost its core and got it back before it could say so, it ends there.
+    /// lost its core and got it back before it could say so, it ends there; or with a step that was
+    /// taken before.
     pub(crate) fn end_of(&self, worker: Number, returned_ns: u64) -> u64 {
         returned_ns.max(self.resumed_ns[worker])
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fass::{Preemption, SubtaskAttributes, create_dag, finish_create_dags};
+use sched_dag::journal::EventKind;
 use sched_dag::law::{self, JudgeOptions};
 use sched_dag::lifecycle::Request;
 use sched_dag::{CoreId, DagId};
@@ -99,6 +100,18 @@ impl Stage {
                 assert_eq!(next.is_err(), what == "end-in-vain", "{step}");
                 self.go_on(worker, next.ok().flatten());
             }
+            // Its worker reports that, behind another thread that has had the lock, for a signal.
+            "end-behind" => {
+                let (worker, runner) = self.running.remove(name).unwrap();
+                let finish_ns = sys::now_ns();
+                team.workers[worker].report(None);
+                let mut state = team.lock();
+                state.step(&team.workers, |moment| {
+                    moment.serve(Request::Signal(DagId(1)));
+                });
+                let next = team.report(worker, state, runner, Ok(()), finish_ns);
+                self.go_on(worker, next);
+            }
             // Its worker looks whether it reports what it has left, which it does with a core.
             "look" => {
                 let worker = self.began[name];
@@ -146,6 +159,11 @@ impl Stage {
             journal.events(),
         ));
         assert!(found.is_empty(), "{found:?}");
+        for core in (0..options.cores).map(CoreId) {
+            let times = journal.events().filter(|event| event.core == core);
+            let in_order = times.filter(|event| event.what != EventKind::Request);
+            assert!(in_order.is_sorted_by_key(|event| event.time_ns));
+        }
         let events = journal.events().filter(|event| event.what.is_of_machine());
         let line = |event: sched_dag::journal::Event| {
             let subtask = event.subtask.unwrap().0;
@@ -158,7 +176,7 @@ impl Stage {
 /// Cores; whether `urgent` keeps its core, or both; the steps; the story.
 type Case = (u32, &'static [bool], &'static str, &'static str);
 
-const CASES: [Case; 7] = [
+const CASES: [Case; 8] = [
     // One that has returned, and waits for the scheduler's lock, ends before the parked one.
     (
         1,
@@ -197,6 +215,13 @@ const CASES: [Case; 7] = [
          end low, end urgent",
         "start first 0, start low 0, suspend low 0, start urgent 0, finish first 0, \
          resume low 0, finish low 0, start low 1, finish low 1, finish urgent 0",
+    ),
+    // A step before its report is not behind its end.
+    (
+        2,
+        &[false, true],
+        "begin low, end-behind low, end low",
+        "start low 0, finish low 0, start low 1, finish low 1",
     ),
     // A parked one that fails takes no core from any.
     (

@@ -5,4 +5,5 @@ mod lives;
 mod recordings;
 #[path = "../support/mod.rs"]
 mod support;
+mod waits;
 mod wires;

@@ -6,7 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use crate::support::{alone, mechanisms, ms};
-use fass::shared::{Received, Sender, Wire, WireOptions};
+use fass::shared::{Received, Sender, TimedOut, Wire, WireOptions, WireReader, WireWriter};
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Mechanism;
 
@@ -92,4 +92,61 @@ fn what_is_sent_last_goes_when_the_connection_ends_and_losses_are_counted() {
     assert!(counts.lost_packets > 0, "{counts:?}");
     assert_eq!(sent.len() as u64, counts.sent_bytes);
     assert!(sent.lines().all(|line| line == "1"), "{sent}");
+}
+
+/// A DAG that writes a question, and reads the answer, which to each third one does not come.
+fn asking(wire: &Wire, jobs: u64) -> Dag {
+    let dag = create_dag();
+    dag.name("modem").jobs(jobs).in_flight(1);
+    let mut questions = 0_u64..;
+    let ask = move |(input, output): (WireReader<Option<u64>>, WireWriter)| {
+        let question = questions.next().expect("they have no end");
+        async move {
+            let line = format!("{question}\n");
+            assert_eq!(output.write(line.as_bytes()).await, Ok(()));
+            if question % 3 == 2 {
+                let answer = input.read().within(ms(20)).await;
+                assert_eq!(answer, Err(TimedOut));
+            } else {
+                let answer = input.read().await;
+                assert_eq!(answer, Ok(Some(question * question)));
+            }
+        }
+    };
+    dag.period(ms(2)).relative_deadline(ms(2));
+    let uses = dag.using((wire.reading(number), wire.writing()));
+    // However busy the host is.
+    let minute = Duration::from_secs(60);
+    let named = SubtaskAttributes::named("ask").wait(minute).wait(minute);
+    uses.async_source(ask).register(named);
+    dag
+}
+
+#[test]
+fn a_function_waits_until_its_question_has_gone_and_for_the_answer() {
+    for mechanism in mechanisms() {
+        let alone = alone(1, mechanism);
+        let wire = Wire::new("modem");
+        finish_create_dags(&[asking(&wire, 12)]).expect("it is sound");
+        let (input, mut answers) = io::pipe().expect("a pipe");
+        let (questions, output) = io::pipe().expect("a pipe");
+        let connection = (alone.machine)
+            .connect(&wire, input, output)
+            .expect("threads");
+        let modem = thread::spawn(move || {
+            for question in BufReader::new(questions).lines() {
+                let question: u64 = question.expect("it is text").parse().expect("a number");
+                if question % 3 != 2 {
+                    writeln!(answers, "{}", question * question).expect("it is read");
+                }
+            }
+        });
+        let run = alone.machine.run().expect("it is committed");
+        drop(connection);
+        modem.join().expect("all questions are right");
+        assert_eq!(run.faults(), []);
+        assert_eq!(run.statistics("modem").completed, 12);
+        assert_eq!(run.violations().count(), 0);
+        assert_eq!(wire.counts().packets, 8);
+    }
 }

@@ -8,6 +8,8 @@ use std::time::Duration;
 
 use fass::{Dag, Occupation, Preemption, SubtaskAttributes, create_dag, execute_for};
 use linux::{Linux, Mechanism, Run};
+use sched_dag::CoreId;
+use sched_dag::journal::EventKind;
 use sched_dag::law::Violation;
 
 /// Returns the mechanisms that this computer has, and names them: with `sched_ext` if our policy
@@ -79,6 +81,12 @@ pub(crate) fn breaches(run: &Run) -> Vec<Violation> {
     for event in run.journal().events() {
         let own = task_set.cores_of(task_set.dag(event.dag).cluster(), run.options().cores);
         assert!(own.contains(&event.core.0), "{event:?} is not on {own:?}");
+    }
+    for core in (0..run.options().cores).map(CoreId) {
+        let of_core = run.journal().events().filter(|event| event.core == core);
+        // These two are about another time.
+        let own = of_core.filter(|of| !matches!(of.what, EventKind::Request | EventKind::Due));
+        assert!(own.is_sorted_by_key(|event| event.time_ns), "{core:?}");
     }
     let bound_ns = match run.options().preemption {
         Preemption::Enabled => 1_000_000_000,

@@ -230,10 +230,10 @@ fn foreign_and_newer_files_are_told() {
     let foreign = "at byte 0: expected the mark of a recording, 0x89 and `FASSREC`";
     assert_eq!(said(b""), foreign);
     assert_eq!(said(b"sample,upper_acc_x\n0,1.5\n"), foreign);
-    let newer = [&MAGIC[..], &[6, 0]].concat();
+    let newer = [&MAGIC[..], &(VERSION + 1).to_le_bytes()].concat();
     assert_eq!(
         said(&newer),
-        "at byte 8: expected version 1 to 5 of recordings, which are those that are read"
+        "at byte 8: expected version 1 to 6 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);

@@ -58,10 +58,10 @@ impl Replay {
             let before = before.filter(|before| is_same(before, channel)).count();
             match others.nth(before) {
                 Some((_, other)) if other.schema != *schema => {
-                    let kind = if other.role == Role::State {
-                        "state"
-                    } else {
-                        "topic"
+                    let kind = match other.role {
+                        Role::State => "state",
+                        Role::Answer => "device",
+                        Role::Source | Role::Result | Role::Sample => "topic",
                     };
                     return Err(format!(
                         "{kind} `{topic}` was recorded with values of type {}, and is of type \
@@ -108,7 +108,7 @@ impl Replay {
                 Role::Source => true,
                 // A DAG whose sources only sample is released with what they found.
                 Role::Sample => is_source(channel) && !has_sources(),
-                Role::Result | Role::State => false,
+                Role::Result | Role::State | Role::Answer => false,
             }
         };
         let inputs: Vec<bool> = channels.iter().map(is_input).collect();

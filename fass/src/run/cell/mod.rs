@@ -1,4 +1,5 @@
-//! The cells in which the crate's `unsafe` lives; one of them, of records, is in a file of its own.
+//! The cells in which the crate's `unsafe` lives; that of records, and the waker of turns, are in
+//! files of their own.
 //!
 //! # The slot ring
 //!
@@ -56,6 +57,7 @@
 //! > conflicting one does.
 
 pub(crate) mod outbox;
+pub(crate) mod turn;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;

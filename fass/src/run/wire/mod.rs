@@ -228,6 +228,11 @@ impl WireInput {
         true
     }
 
+    /// Reports whether no packet is there.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.ring.waiting(self.mark()) == 0
+    }
+
     /// Returns a mark between the packets that are there and those that come later.
     pub(crate) fn mark(&self) -> usize {
         self.ring.written()
@@ -290,8 +295,8 @@ impl WireOutput {
         self.is_lost.store(false, Ordering::Relaxed);
     }
 
-    /// Puts bytes behind what the instance has sent already.
-    pub(crate) fn stage(&self, bytes: &[u8]) {
+    /// Puts bytes behind what the instance has sent already. Reports whether there was room for all.
+    pub(crate) fn stage(&self, bytes: &[u8]) -> bool {
         let staged = self.staged.load(Ordering::Relaxed);
         // Once a byte has found no room, none is put any more: a packet with a hole is worse than
         // none.
@@ -300,6 +305,20 @@ impl WireOutput {
         }
         let staged = staged.saturating_add(bytes.len());
         self.staged.store(staged, Ordering::Relaxed);
+        !self.is_lost.load(Ordering::Relaxed)
+    }
+
+    /// Shows what the instance has sent, or loses it.
+    fn show_staged(&self) {
+        let staged = self.staged.load(Ordering::Relaxed);
+        if self.is_lost.load(Ordering::Relaxed) {
+            self.lost.add(staged);
+        } else {
+            self.ring.show(staged);
+            self.sent.add(staged);
+        }
+        // The next instance begins with nothing staged.
+        self.discard_staged();
     }
 
     /// Takes the next byte that is to go.
@@ -324,16 +343,12 @@ pub(crate) struct SendCompletion(pub(crate) Arc<WireOutput>);
 
 impl Effect for SendCompletion {
     fn happen(&mut self, _completed_ns: u64, _ask: &mut dyn FnMut(Request)) {
-        let outgoing = &*self.0;
-        let staged = outgoing.staged.load(Ordering::Relaxed);
-        if outgoing.is_lost.load(Ordering::Relaxed) {
-            outgoing.lost.add(staged);
-        } else {
-            outgoing.ring.show(staged);
-            outgoing.sent.add(staged);
-        }
-        // The next instance begins with nothing staged.
-        outgoing.discard_staged();
+        self.0.show_staged();
+    }
+
+    fn wait(&mut self, _ended_ns: u64) -> bool {
+        self.0.show_staged();
+        false
     }
 }
 

@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "not every test program uses every helper")]
 
 use core::time::Duration;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::sync::OnceLock;
@@ -13,11 +13,13 @@ use fass::platform::RunConfig;
 use fass::platform::{LaunchError, Plan, Platform, SubtaskCode};
 use fass::{Dag, Occupation, Policy};
 use fass::{Preemption, SubtaskAttributes};
+use sched_dag::lifecycle::WaitId;
 
 pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 
 thread_local! {
     static PLAN: RefCell<Option<Plan>> = const { RefCell::new(None) };
+    static ANSWER: Cell<Option<WaitId>> = const { Cell::new(None) };
     static MEANWHILE: RefCell<Option<Box<dyn FnOnce()>>> = const { RefCell::new(None) };
 }
 
@@ -34,6 +36,9 @@ impl Platform for Keeper {
         0
     }
     fn execute_for(&self, _: Duration, _: Occupation) {}
+    fn answer(&self, _: u64, wait: WaitId) {
+        ANSWER.set(Some(wait));
+    }
     fn launch(&self, plan: Plan) -> Result<(), LaunchError> {
         PLAN.with_borrow_mut(|kept| match kept {
             Some(_) => Err(LaunchError::new("a plan is kept already; take it first")),
@@ -49,6 +54,11 @@ impl Platform for Keeper {
 pub(crate) fn install() {
     static IS_OURS: OnceLock<bool> = OnceLock::new();
     assert!(IS_OURS.get_or_init(|| fass::platform::install(&Keeper).is_ok()));
+}
+
+/// Takes the wait that a device has answered last.
+pub(crate) fn answers() -> Option<WaitId> {
+    ANSWER.take()
 }
 
 pub(crate) fn named(name: &str) -> SubtaskAttributes {

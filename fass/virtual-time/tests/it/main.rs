@@ -10,4 +10,5 @@ mod parameters;
 mod recordings;
 mod replays;
 mod support;
+mod waits;
 mod wires;

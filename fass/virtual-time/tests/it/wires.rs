@@ -2,11 +2,14 @@
 
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
 
 use crate::support::{commit, every, job_numbers, ms, named, taking};
-use fass::shared::{Framing, Packet, Received, Sender, Wire, WireOptions};
-use fass::{Dag, create_dag, finish_create_dags};
-use virtual_time::{Silent, VirtualTime};
+use fass::shared::{
+    Framing, Packet, Received, Sender, TimedOut, Wire, WireOptions, WireReader, WireWriter,
+};
+use fass::{Dag, create_dag, finish_create_dags, sleep};
+use virtual_time::{Report, Silent, VirtualTime};
 
 fn number(packet: &[u8]) -> Option<u32> {
     str::from_utf8(packet).ok()?.parse().ok()
@@ -203,7 +206,9 @@ fn each_end_of_a_wire_has_one_subtask_and_a_source_receives() {
         *message(&|| _ = wire.receiving(number)),
         "another subtask receives on wire `radio`; let that one do it, or make another wire"
     );
+    assert!(message(&|| _ = wire.reading(number)).starts_with("another subtask receives"));
     assert!(message(&|| _ = wire.sending()).starts_with("another subtask sends on wire"));
+    assert!(message(&|| _ = wire.writing()).starts_with("another subtask sends"));
     let dag = create_dag();
     let receive = |_: Received<'_, u32>, _: (u32,)| ();
     let using = dag.name("far").using(Wire::new("radio").receiving(number));
@@ -213,4 +218,144 @@ fn each_end_of_a_wire_has_one_subtask_and_a_source_receives() {
     let refused = finish_create_dags(&[dag]).unwrap_err().to_string();
     let said = "subtask `late` of dag `far` is no source and receives on wire `radio`; ";
     assert!(refused.contains(said), "{refused}");
+}
+
+/// The response times of jobs in milliseconds.
+fn responses_ms(report: &Report) -> Vec<u64> {
+    let times_ns = report.jobs.iter().filter_map(|job| job.response_time_ns());
+    times_ns.map(|ns| ns / 1_000_000).collect()
+}
+
+#[test]
+fn a_read_ends_with_the_next_packet_or_at_its_limit() {
+    let (seen, keep) = crate::support::Seen::shared();
+    let (wire, dag) = (Wire::new("numbers"), every(20, "reading"));
+    let read = move |wire: WireReader<Option<u32>>| {
+        let keep = keep.clone();
+        async move { keep.add(wire.read().await) }
+    };
+    let using = dag.jobs(8).using(wire.reading(number));
+    let read = using.async_source(read);
+    read.register(taking("read", 1).wait(ms(5)).wcet(ms(1)));
+    let machine = VirtualTime::new().silent(Silent::Wcet);
+    commit(&[dag]);
+    let arrivals: [(u64, &[u8]); 8] = [
+        (3, b"0\n"),
+        (27, b"2"), // too late for job 1, so of job 2
+        (28, b"\n"),
+        (66, b"3\n"), // at the instant of the limit
+        (83, b"x\n5\n\n"),
+        (121, b"\n\n6\n"),
+        (140, b"7\n"), // while the function has not begun to read
+        (150, b"8\n9\n"),
+    ];
+    arrive(&machine, &wire, &arrivals);
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert_eq!(responses_ms(&report), [4, 7, 2, 7, 4, 2, 2, 2]);
+    let read = [Some(0), None, Some(2), Some(3)];
+    let mut read: Vec<_> = read.map(|read| read.map(Some).ok_or(TimedOut)).into();
+    read.extend([Ok(None), Ok(Some(5)), Ok(Some(6)), Ok(Some(7))]);
+    assert_eq!(seen.all(), read);
+}
+
+#[test]
+fn a_write_ends_when_all_has_gone_and_what_finds_no_room_never_goes() {
+    for is_connected in [true, false] {
+        let (seen, keep) = crate::support::Seen::shared();
+        let options = WireOptions {
+            room_bytes: 16,
+            ..WireOptions::default()
+        };
+        let (wire, dag) = (Wire::with("out", options), every(20, "writing"));
+        let mut bytes = [7, 9, 17].into_iter();
+        let write = move |wire: WireWriter| {
+            let (keep, count) = (keep.clone(), bytes.next().unwrap_or(1));
+            async move {
+                keep.add(wire.write(&vec![b'x'; count]).await);
+                assert_ne!(count, 1, "after the wait, and no other byte goes");
+                let _ = wire.write(b"").await;
+            }
+        };
+        let write = dag.jobs(4).using(wire.writing()).async_source(write);
+        write.register(named("write").wait(ms(5)).wait(ms(2)));
+        let machine = VirtualTime::new().contain_panics();
+        let machine = match is_connected {
+            true => machine.connect(&wire),
+            false => machine,
+        };
+        commit(&[dag]);
+        let report = machine.run();
+        assert_eq!(report.violations(), []);
+        assert_eq!(report.panics.len(), 1);
+        let counts = wire.counts();
+        match is_connected {
+            true => {
+                assert_eq!(responses_ms(&report), [0, 0, 5, 0]);
+                assert_eq!(seen.all(), [Ok(()), Ok(()), Err(TimedOut), Ok(())]);
+                assert_eq!(machine.sent(&wire), [b'x'; 17], "not those of the third");
+                assert_eq!((counts.sent_bytes, counts.unsent_bytes), (17, 17));
+            }
+            false => {
+                assert_eq!(responses_ms(&report), [7, 7, 7, 5]);
+                assert_eq!(seen.all(), [Err(TimedOut); 4]);
+                assert_eq!((counts.sent_bytes, counts.unsent_bytes), (16, 18));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_replay_reads_and_writes_what_the_record_has_without_the_device() {
+    // A modem that answers late, or not at all.
+    let build = |wire: &Wire| {
+        let dag = every(20, "modem");
+        dag.jobs(20).record::<u64>("job").record::<u64>("sum");
+        let source = dag.source(job_numbers(1)).writes(&["job"]);
+        source.register(taking("count", 1));
+        let ask = |(input, output): (WireReader<Option<u32>>, WireWriter), (job,): (u64,)| async move {
+            let written = output.write(format!("{job}?").as_bytes()).await;
+            sleep(Duration::from_micros(job)).await;
+            let first = input.read().within(ms(2)).await;
+            let second = input.read().await;
+            let of = |read: Result<Option<u32>, _>| read.map_or(77, Option::unwrap_or_default);
+            let time = fass::now_ns();
+            (u64::from(of(first) + 1_000 * of(second)) + time + u64::from(written.is_ok()),)
+        };
+        let uses = (wire.reading(number).record(), wire.writing().record());
+        let ask = dag.using(uses).async_subtask(ask);
+        let stated = named("ask").wait(ms(1)).wait(ms(1)).wait(ms(5));
+        let ask = ask.reads(&["job"]).writes(&["sum"]);
+        ask.register(stated.wait(ms(5)));
+        let sink = dag.subtask(|_: (u64,)| ()).reads(&["sum"]);
+        sink.register(named("sink"));
+        commit(&[dag]);
+    };
+    let wire = Wire::new("modem");
+    let machine = VirtualTime::new().connect(&wire);
+    build(&wire);
+    for number in 0..33_u64 {
+        let time = Duration::from_micros(number * 11_003 % 400_000);
+        machine.arrive_at(&wire, time, format!("{number}\n").as_bytes());
+    }
+    let recorded = machine.run();
+    assert_eq!(recorded.violations(), []);
+    let sent = machine.sent(&wire);
+    let recording = machine.recording();
+
+    let wire = Wire::new("modem");
+    let machine = VirtualTime::new().connect(&wire);
+    let machine = machine.replay(&recording).expect("it is whole");
+    build(&wire);
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert_eq!((report.divergence.as_ref(), report.uncompared), (None, 0));
+    assert_eq!(report.compared, 20);
+    assert_eq!((machine.sent(&wire), wire.counts().packets), (sent, 0));
+    let of_ask = |report: &Report| {
+        let all = report.dag("modem").subtask("ask").into_iter();
+        let finishes = all.map(|instance| instance.finish_ns);
+        finishes.collect::<Vec<_>>()
+    };
+    assert_eq!(of_ask(&recorded), of_ask(&report));
 }

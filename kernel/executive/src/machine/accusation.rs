@@ -5,8 +5,8 @@
 //! such interrupt has an accusation, however late the host lets the core run.
 //!
 //! That interrupts are disabled at an answer proves little: the host may have stopped the core
-//! within a few instructions of the kernel that disable them. By the next answer it has left
-//! these, and has taken an interrupt. So it counts how often a core has answered without
+//! within the kernel's instructions that disable them. Some answers later it has left these,
+//! and has taken an interrupt. So it counts how often a core has answered without
 //! having taken one.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};

@@ -126,8 +126,9 @@ extern "C" fn handle_interrupt(registers: *mut Registers) -> *mut Registers {
 }
 
 /// With so many answers in a row at which its interrupts are disabled, an accused core has
-/// disabled them for good.
-const LAST_ANSWER: u32 = 2;
+/// disabled them for good. On a busy host, a line to the serial port may outlast several: it is
+/// written with interrupts disabled, and a core runs there for some milliseconds an answer.
+const LAST_ANSWER: u32 = 8;
 
 /// Handles one exception and returns the registers to resume, or null for those of the code
 /// that was interrupted.

@@ -7,7 +7,8 @@ use fass::Occupation;
 use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
 use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig};
-use sched_dag::DagId;
+use sched_dag::lifecycle::WaitId;
+use sched_dag::{DagId, WAITS};
 
 use super::{edge, execution, occupation, record, stacks};
 use crate::machine::spinlock::SpinLock;
@@ -86,6 +87,12 @@ impl Platform for Kernel {
 
     fn raise(&self, plan: u64, dag: DagId) {
         execution::raise(plan, dag);
+    }
+
+    fn answer(&self, plan: u64, wait: WaitId) {
+        if WAITS {
+            execution::answer(plan, wait);
+        }
     }
 
     fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {

@@ -8,7 +8,7 @@
 //! The run goes on: it may be no more than a long computation.
 //!
 //! Between two looks nothing is counted, so this costs a run nothing. It also sees
-//! less: an instance that was preempted in between counts as if it had not been.
+//! less: an instance that was preempted in between, or has waited, counts as if it had not.
 //!
 //! # Cores that watch each other: a core that takes no interrupts is noticed
 //!
@@ -18,7 +18,7 @@
 //! [`QUIET_NS`] while it runs something is sent one; if it has taken none for
 //! [`SILENT_NS`], it is accused at each look, by a non-maskable interrupt. If interrupts turn
 //! out to be enabled there, it was the host that did not let it run, and it goes on. If they
-//! are disabled at two looks in a row, it reports where it is, and ends the run.
+//! are disabled at eight looks in a row, it reports where it is, and ends the run.
 //!
 //! A machine of one core has nobody to notice.
 

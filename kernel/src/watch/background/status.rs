@@ -209,7 +209,7 @@ impl CoreLoads {
                 let to_ns = self.stopped_ns[core].take().unwrap_or(time_ns);
                 self.busy_ns[core] += to_ns.saturating_sub(time_ns);
             }
-            EventKind::Suspend | EventKind::Finish | EventKind::Ended => {
+            EventKind::Suspend | EventKind::Wait | EventKind::Finish | EventKind::Ended => {
                 self.stopped_ns[core] = Some(time_ns);
             }
             _ => return,
@@ -302,13 +302,16 @@ mod tests {
             (120, EventKind::Suspend),
             (120, EventKind::Ready),
             (150, EventKind::Resume),
-            (160, EventKind::Ended),
+            (160, EventKind::Wait),
+            (165, EventKind::Wake),
+            (166, EventKind::Resume),
+            (170, EventKind::Ended),
             (195, EventKind::Start),
         ];
-        // 90..120 from 100 on, 150..160, and 195 up to the end.
-        assert_eq!(load(&events, 100, 200), 350);
+        // 90..120 from 100 on, 150..160, 166..170, and 195 up to the end.
+        assert_eq!(load(&events, 100, 200), 390);
         // From 10 on, where the journal begins.
-        assert_eq!(load(&events, 0, 200), 55_000 / 190);
+        assert_eq!(load(&events, 0, 200), 59_000 / 190);
         assert_eq!(load(&events, 170, 190), 0);
     }
 

@@ -10,6 +10,7 @@ use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, EventKind};
 use crate::policy::{OnFault, SchedulerOptions};
+use crate::spec::WAITS;
 use crate::task_set::TaskSet;
 
 /// The findings about R5 in a journal.
@@ -131,11 +132,24 @@ fn before(
 
 /// Returns the instances on a core of another cluster, or that lost a core that they keep.
 fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
+    let mut suspended = BTreeSet::new();
     let found = events.filter_map(|event| {
         if event.what.is_of_machine() && !model.cores.contains(&event.core.0) {
             return Some(Violation::OutsideItsCluster { event });
         }
-        let lost = event.what == EventKind::Resume && model.keeps_its_core(event.instance()?);
+        let instance = (event.instance()).filter(|of| model.keeps_its_core(*of))?;
+        let lost = match event.what {
+            EventKind::Suspend if WAITS => {
+                suspended.insert(instance);
+                false
+            }
+            // After a wait it is resumed, too, on any core: that it has given up itself (W5).
+            EventKind::Resume => {
+                let dag = model.task_set.dag(instance.dag);
+                dag.subtask(instance.subtask).waits().is_empty() || suspended.remove(&instance)
+            }
+            _ => false,
+        };
         lost.then_some(Violation::LostItsCore { event })
     });
     found.collect()

@@ -37,6 +37,7 @@ use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind};
 use crate::policy::OnFault;
+use crate::spec::{WAITS, Wait};
 use crate::task_set::TaskSet;
 use jobs::JobState;
 
@@ -253,6 +254,8 @@ struct InstanceLife {
     finish: Option<StepTime>,
     /// When it was cancelled, or ended by a fault.
     dropped: Option<StepTime>,
+    /// How many waits it has begun, and when the latest one.
+    waits: (usize, u64),
 }
 
 impl InstanceLife {
@@ -263,6 +266,35 @@ impl InstanceLife {
             ready: None,
             finish: None,
             dropped: None,
+            waits: (0, 0),
+        }
+    }
+
+    /// Takes note of a wait, or of the finish, and says what is wrong with the waits: W1 and W2.
+    fn wait(&mut self, event: &Event, stated: &[Wait], terms: JudgeOptions) -> Option<Violation> {
+        let (event, (waits, since_ns)) = (*event, self.waits);
+        let other = Violation::OtherWaits {
+            event,
+            waits,
+            stated: stated.len(),
+        };
+        match event.what {
+            EventKind::Wait => {
+                self.waits = (waits + 1, event.time_ns);
+                (waits == stated.len()).then_some(other)
+            }
+            EventKind::Finish => (waits < stated.len()).then_some(other),
+            EventKind::Wake => {
+                let limit_ns = stated.get(waits.checked_sub(1)?)?.limit_ns;
+                let latest_ns = since_ns.saturating_add(limit_ns);
+                let is_late = event.time_ns > latest_ns.saturating_add(terms.tolerance_ns);
+                is_late.then_some(Violation::WaitBeyondLimit {
+                    event,
+                    since_ns,
+                    limit_ns,
+                })
+            }
+            _ => None,
         }
     }
 
@@ -309,6 +341,8 @@ fn is_allowed(stage: DispatchState, event: &Event) -> bool {
         // Whichever core finds the fault, or ends the DAG, ends the instance.
         | (DispatchState::Running(_) | DispatchState::Suspended, EventKind::Ended) => true,
         (DispatchState::Running(core), EventKind::Suspend | EventKind::Finish) => core == event.core,
+        (DispatchState::Running(core), EventKind::Wait) => WAITS && core == event.core,
+        (DispatchState::Waiting, EventKind::Wake | EventKind::Cancelled) => WAITS,
         _ => false,
     }
 }
@@ -318,7 +352,8 @@ pub(super) const fn stage_after(event: &Event) -> DispatchState {
     match event.what {
         EventKind::Ready => DispatchState::Ready,
         EventKind::Start | EventKind::Resume => DispatchState::Running(event.core),
-        EventKind::Suspend => DispatchState::Suspended,
+        EventKind::Suspend | EventKind::Wake => DispatchState::Suspended,
+        EventKind::Wait => DispatchState::Waiting,
         _ => DispatchState::Over,
     }
 }
@@ -328,7 +363,8 @@ pub(super) const fn stage_before(event: &Event) -> DispatchState {
     match event.what {
         EventKind::Start => DispatchState::Ready,
         EventKind::Resume => DispatchState::Suspended,
-        EventKind::Suspend | EventKind::Finish | EventKind::Ended => {
+        EventKind::Wake => DispatchState::Waiting,
+        EventKind::Suspend | EventKind::Wait | EventKind::Finish | EventKind::Ended => {
             DispatchState::Running(event.core)
         }
         _ => DispatchState::Absent,
@@ -345,6 +381,7 @@ impl JournalReplay<'_> {
         let moment = self.moment(event);
         let is_known = self.find_job(event);
         let ends_its_dag = self.task_set.dag(instance.dag).on_fault() == OnFault::EndDag;
+        let (task_set, terms) = (self.task_set, self.terms);
         let of_dag = self.dag(instance.dag);
         of_dag.is_ended |= event.what == EventKind::Ended && ends_its_dag;
         let is_ended = of_dag.is_ended;
@@ -359,10 +396,14 @@ impl JournalReplay<'_> {
             job.cut.get_or_insert(moment);
         }
         let is_uncut = job.cut.is_none() && !is_ended && !job.is_partial;
+        let is_partial = job.is_partial;
         let life = job.life_from(instance.subtask, first);
         let ready_ns = life.ready.map(|ready| ready.time_ns);
         let out_of_turn = life.note(event, moment);
+        let stated = task_set.dag(instance.dag).subtask(instance.subtask).waits();
+        let waited = WAITS.then(|| life.wait(event, stated, terms)).flatten();
         self.found.extend(out_of_turn);
+        self.found.extend(waited.filter(|_| !is_partial));
         let event = *event;
         if event.what == EventKind::Restarted {
             let beyond_limit = self.beyond_limit(event);

@@ -7,7 +7,7 @@
 use std::fs;
 
 use sched_dag::analysis::{AnalysisSettings, answer};
-use sched_dag::{DagSpec, Policy, Preemption, Priority, SubtaskSpec, TaskSet};
+use sched_dag::{DagSpec, Policy, Preemption, Priority, SubtaskSpec, TaskSet, Wait};
 
 use super::random::Sample;
 use super::simulate::spec;
@@ -147,6 +147,13 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
                 ..SubtaskSpec::default()
             }),
             ("edge", Some(dag)) => dag.edges.push((index(1), index(2))),
+            ("wait", Some(dag)) => {
+                let waits = (3..words.len()).step_by(2).map(|at| Wait {
+                    limit_ns: number(at),
+                    segment_ns: Some(number(at + 1)).filter(|&ns| ns > 0),
+                });
+                dag.subtasks[index(1)].waits = waits.collect();
+            }
             ("due", Some(dag)) => {
                 dag.subtasks[index(1)].relative_deadline_ns = Some(number(2));
             }

@@ -10,6 +10,7 @@ mod kinds;
 mod one_core;
 mod random;
 mod simulate;
+mod waits;
 mod witnesses;
 mod worked;
 

@@ -4,7 +4,7 @@ use common::random::Random;
 use sched_dag::analysis::{AnalysisSettings, Overheads};
 use sched_dag::{
     Activation, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagSpec, Policy,
-    Preemption, SubtaskOrder, TaskSet, verify,
+    Preemption, SubtaskOrder, TaskSet, Wait, verify,
 };
 
 use super::drawn::set;
@@ -123,6 +123,29 @@ fn draw_sinks(random: &mut Random, spec: &mut DagSpec) {
     for (position, subtask) in spec.subtasks.iter_mut().enumerate() {
         if spec.edges.iter().all(|&(from, _)| from != position) && !random.once_in(3) {
             subtask.relative_deadline_ns = Some(random.within(least..=deadline));
+        }
+    }
+}
+
+/// Gives some subtasks waits, whose segments may be unknown.
+pub(crate) fn draw_waits(random: &mut Random, specs: &mut [DagSpec]) {
+    for spec in specs {
+        let room = spec
+            .period_ns
+            .unwrap_or(8)
+            .min(spec.relative_deadline_ns.unwrap_or(8))
+            / 8;
+        for subtask in &mut spec.subtasks {
+            let mut left_ns = subtask.wcet_ns.unwrap_or(0);
+            let are_known = !random.once_in(5);
+            while random.once_in(4) && left_ns > 1 {
+                let segment_ns = random.within(1..=left_ns - 1);
+                left_ns -= segment_ns;
+                subtask.waits.push(Wait {
+                    limit_ns: random.within(0..=room),
+                    segment_ns: are_known.then_some(segment_ns),
+                });
+            }
         }
     }
 }

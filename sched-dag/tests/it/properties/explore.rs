@@ -1,13 +1,14 @@
 //! Every order of events in a tiny set: each state's steps, each state once.
 //!
 //! From the first state on each step that a driver may take is taken: time goes on, at once or past
-//! what was due; of the instances that have started one or two complete or fail, on their core or
-//! after they have lost it; a DAG is ended, closed, paused or resumed, or gets a signal.
+//! what was due; of the instances that have started one or two complete, wait or fail, on their core
+//! or after they have lost it; a wait has its answer, or another one has one; a DAG is ended, closed,
+//! paused or resumed, or gets a signal.
 
 use std::collections::HashSet;
 
 use sched_dag::DagId;
-use sched_dag::lifecycle::Request;
+use sched_dag::lifecycle::{Request, WaitId};
 
 use super::walk::{Step, Walk};
 use crate::support::set::Set;
@@ -19,7 +20,10 @@ const LATE_NS: u64 = 3;
 pub(crate) fn explore(set: &Set) -> Result<usize, String> {
     let of_dag = |dag: &sched_dag::DagSpec| {
         let last = dag.jobs? - 1;
-        Some(dag.offset_ns + dag.period_ns? * last + dag.relative_deadline_ns? + 1)
+        let waits = dag.subtasks.iter().flat_map(|subtask| &subtask.waits);
+        let waits_ns: u64 = waits.map(|wait| wait.limit_ns).sum();
+        let most_ns = dag.relative_deadline_ns?.max(1 + waits_ns * (last + 1));
+        Some(dag.offset_ns + dag.period_ns? * last + most_ns + 1)
     };
     // Then nothing but completions can happen any more.
     let last_ns = set.specs.iter().filter_map(of_dag).max().unwrap_or(0);
@@ -32,7 +36,8 @@ pub(crate) fn explore(set: &Set) -> Result<usize, String> {
     while let Some((walk, way, disturbances)) = open.pop() {
         let mut is_last = true;
         for steps in steps(&walk, disturbances < most_disturbances) {
-            let is_disturbance = |step: &&Step| !matches!(step, Step::Complete(_));
+            let is_disturbance =
+                |step: &&Step| !matches!(step, Step::Complete(_) | Step::Ask(Request::Answer(_)));
             let disturbances = disturbances + steps.iter().filter(is_disturbance).count();
             let times_ns = [0, 1, LATE_NS].map(|later_ns| walk.now_ns + later_ns);
             for now_ns in times_ns {
@@ -75,6 +80,11 @@ fn steps(walk: &Walk<'_>, may_disturb: bool) -> Vec<Vec<Step>> {
         if may_disturb {
             steps.extend([vec![Step::Fail(one)], vec![Step::Replace(one)]]);
         }
+    }
+    for wait in walk.waits.present() {
+        let (instance, number) = (wait.instance, wait.number + 1);
+        let answers = [wait, WaitId { instance, number }].map(Request::Answer);
+        steps.extend(answers.map(|answer| vec![Step::Ask(answer)]));
     }
     if may_disturb {
         for dag in (0..).map(DagId).take(walk.set.specs.len()) {

@@ -1,23 +1,26 @@
 //! The scheduler against its rules, on random sets of DAGs and in every order of events.
 //!
 //! The rules are judged by the law ([`sched_dag::law`]), which shares no code with the scheduler,
-//! and where that does not judge by `releases.rs`. `walk.rs` is the driver. That the law
-//! finds what is wrong is shown in `tests/rules/journal.rs`.
+//! and where that does not judge by `releases.rs` and `waits.rs`. `walk.rs` is the driver. That the
+//! law finds what is wrong is shown in `tests/it/journal.rs`.
 //!
 //! Each set comes from a seed. More or other sets: `SCHED_DAG_SETS=100000 SCHED_DAG_SEED=7 cargo
 //! test -p sched-dag --test it properties`.
 
+mod devices;
 mod explore;
 mod releases;
+mod waits;
 mod walk;
 
 use crate::support::set::{self, Set};
 use crate::support::{Script, driver, number};
 use common::random::Random;
+use devices::Counts;
 use releases::SAID;
 use sched_dag::journal::EventKind;
 use sched_dag::law::{JudgeOptions, dispatch_violations, violations};
-use sched_dag::lifecycle::Request;
+use sched_dag::lifecycle::{Request, WaitId};
 use sched_dag::{DagId, Instance};
 use walk::{Step, Walk};
 
@@ -84,6 +87,18 @@ fn steps(walk: &Walk<'_>, random: &mut Random, is_late: bool, is_calm: bool) -> 
     };
     let mut steps = Vec::new();
     for _ in 0..random.within(0..=2) {
+        let present: Vec<WaitId> = walk.waits.present().collect();
+        if !present.is_empty() && random.chance(30) {
+            let mut wait = present[random.index(present.len())];
+            // Some answer another wait of the instance, or one of another job.
+            match random.index(6) {
+                0 => wait.number ^= 1,
+                1 => wait.instance.job ^= 1,
+                _ => {}
+            }
+            steps.push(Step::Ask(Request::Answer(wait)));
+            continue;
+        }
         let kind = random.within(0..=if is_calm { 69 } else { 99 });
         if kind < 70 && !may_end.is_empty() {
             let instance = may_end.swap_remove(random.index(may_end.len()));
@@ -141,7 +156,8 @@ fn every_order_of_events_keeps_the_rules() {
 
 #[test]
 fn virtual_time_keeps_the_rules_where_instances_fail() {
-    check(3_000, set::draw_disturbed, |set, random| {
+    let draw = |random: &mut Random| set::draw_disturbed(random).without_waits();
+    check(3_000, draw, |set, random| {
         let mut signals: Vec<(u64, Request)> = Vec::new();
         let dags = (0..).map(DagId).take(set.specs.len());
         for dag in dags.filter(|&dag| set.is_sporadic(dag)) {
@@ -163,4 +179,32 @@ fn virtual_time_keeps_the_rules_where_instances_fail() {
             Some(first) => Err(first.to_string()),
         }
     });
+}
+
+#[test]
+fn virtual_time_keeps_the_rules_where_instances_wait() {
+    let mut counts = Counts::default();
+    check(3_000, set::draw_waiting, |set, random| {
+        devices::judge(set, random, &mut counts)
+    });
+    println!("{counts:?}");
+    if number("SCHED_DAG_SETS", 3_000) >= 3_000 {
+        let least = counts.ends.iter().chain([&counts.of_no_length]).min();
+        assert!(least > Some(&100), "something is rare: {counts:?}");
+    }
+}
+
+/// `cargo test --release -p sched-dag --test it a_million -- --ignored --nocapture`
+#[test]
+#[ignore = "takes minutes where it is not optimized"]
+fn a_million_jobs_with_waits_keep_the_rules() {
+    let (mut counts, mut seed) = (Counts::default(), number("SCHED_DAG_SEED", 1));
+    while counts.jobs < 1_000_000 {
+        let mut random = Random::new(seed);
+        let set = set::draw_waiting(&mut random);
+        let judged = devices::judge(&set, &mut random, &mut counts);
+        judged.unwrap_or_else(|found| panic!("seed {seed}: {found}\n{set:?}"));
+        seed += 1;
+    }
+    println!("up to seed {seed}: {counts:?}");
 }

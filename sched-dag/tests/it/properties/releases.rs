@@ -14,8 +14,8 @@ use sched_dag::{
     Scheduler,
 };
 
-/// The kinds of reports that are judged here.
-pub(crate) const SAID: [EventKind; 13] = [
+/// The kinds of reports that are judged here, and that of ended waits.
+pub(crate) const SAID: [EventKind; 14] = [
     EventKind::Released,
     EventKind::Queued,
     EventKind::Skipped,
@@ -29,6 +29,7 @@ pub(crate) const SAID: [EventKind; 13] = [
     EventKind::Restarted,
     EventKind::Signalled,
     EventKind::Dropped,
+    EventKind::Wake,
 ];
 
 /// A job in flight.

@@ -2,11 +2,13 @@
 //!
 //! Here happens what a driver in virtual time does not meet: several dispatches at one time, a
 //! driver that comes late, ends of instances that have lost their core meanwhile, ends of several in
-//! any order, faults, ends, pauses and closings at any time. The journal is judged by the law
-//! ([`Walk::judged`]); what that does not judge, by [`Releases`] after each instant.
+//! any order, faults, ends, pauses and closings at any time, answers to waits, in time or not. The
+//! journal is judged by the law ([`Walk::judged`]); what that does not judge, by [`Releases`] and,
+//! of waits, by [`Waits`], after each instant.
 //!
-//! Each end that is the last thing of an instant is told by [`Scheduler::pass_on`], and the long way
-//! by a copy, too: both have to come to the same.
+//! Each end that is the last thing of an instant is told by [`Scheduler::pass_on`], or
+//! [`Scheduler::wait_shortly`], and the long way by a copy, too: both have to come to the same. So
+//! have [`Scheduler::wake_shortly`] and a dispatch.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -16,15 +18,19 @@ use sched_dag::law::{
     JobRecord, JudgeOptions, RunRecord, Violation, dispatch_violations, violations,
 };
 use sched_dag::lifecycle::Request;
-use sched_dag::{CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler};
+use sched_dag::{
+    CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler, TurnEnd,
+};
 
 use super::releases::{Releases, SAID};
+use super::waits::Waits;
 use crate::support::set::Set;
 use crate::support::{pass_on, scheduler};
 
 /// A step at an instant before its releases.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Step {
+    /// It ends a turn: it waits, as often as its subtask states, and then completes.
     Complete(Instance),
     Fail(Instance),
     /// It fails, and another function is there.
@@ -45,6 +51,7 @@ pub(crate) struct Walk<'s> {
     /// The idle cores; the last one has to be taken first.
     idle: Vec<CoreId>,
     releases: Vec<Releases>,
+    pub(crate) waits: Waits,
     /// Whether it has come later than it should, or an end after a core was lost.
     is_late: bool,
 }
@@ -53,7 +60,7 @@ impl<'s> Walk<'s> {
     pub(crate) fn new(set: &'s Set) -> Self {
         let mut scheduler = scheduler(&set.specs(), set.options);
         scheduler.log.journal = Journal::growing();
-        scheduler.hear(SAID);
+        scheduler.hear(SAID.into_iter().chain([EventKind::Cancelled]));
         let cores = set.options.cores;
         Self {
             set,
@@ -63,6 +70,7 @@ impl<'s> Walk<'s> {
             preempted: Vec::new(),
             idle: (0..cores).rev().map(CoreId).collect(),
             releases: set.specs.iter().map(Releases::new).collect(),
+            waits: Waits::default(),
             is_late: false,
         }
     }
@@ -94,6 +102,7 @@ impl<'s> Walk<'s> {
         let mut hasher = DefaultHasher::new();
         self.scheduler.hash(&mut hasher);
         (&self.releases, &self.cores, &self.preempted).hash(&mut hasher);
+        self.waits.hash(&mut hasher);
         hasher.finish()
     }
 
@@ -110,11 +119,13 @@ impl<'s> Walk<'s> {
                 }
                 step => self.take(step),
             }
-            self.hear()?;
+            self.hear(decisions.is_some())?;
         }
-        let end = |scheduler: &mut Scheduler| scheduler.at(now_ns).dispatch().to_vec();
-        let decisions = decisions.unwrap_or_else(|| end(&mut self.scheduler));
-        self.hear()?;
+        let decisions = match decisions {
+            Some(decisions) => decisions,
+            None => self.end()?,
+        };
+        self.hear(true)?;
         self.carry_out(&decisions)?;
         for (core, running) in (0..).map(CoreId).zip(&self.cores) {
             if self.scheduler.running(core) != *running {
@@ -126,6 +137,10 @@ impl<'s> Walk<'s> {
             if suspended > dag.most_suspended() {
                 return Err(format!("{suspended} instances of {id:?} are suspended"));
             }
+        }
+        let is_cut = |it: Instance| self.releases[it.dag.index()].is_cut(it.job);
+        if let Some(instance) = self.waits.overdue(now_ns, is_cut) {
+            return Err(format!("{instance:?} still waits"));
         }
         let next_ns = self.scheduler.next_event_ns();
         if next_ns.is_some_and(|next_ns| next_ns <= now_ns) {
@@ -154,6 +169,11 @@ impl<'s> Walk<'s> {
                     Request::Close(dag) => (dag, EventKind::Closed),
                     Request::End(dag) => (dag, EventKind::DagEnded),
                     Request::Signal(dag) => (dag, EventKind::Signalled),
+                    Request::Answer(wait) => {
+                        self.waits.answer(wait);
+                        self.scheduler.at(self.now_ns).serve(request);
+                        return;
+                    }
                     _ => unreachable!("it is not asked of a scheduler"),
                 };
                 releases[dag.index()].ask(answer);
@@ -162,9 +182,13 @@ impl<'s> Walk<'s> {
         if let Step::Complete(instance) | Step::Fail(instance) | Step::Replace(instance) = step {
             self.scheduler.log.here = self.leave(instance);
         }
+        let limit_ns = match step {
+            Step::Complete(instance) => self.waits.begin(self.set, instance, self.now_ns),
+            _ => None,
+        };
         let mut moment = self.scheduler.at(self.now_ns);
         match step {
-            Step::Complete(instance) => moment.complete(instance),
+            Step::Complete(instance) => moment.end_turn(TurnEnd { instance, limit_ns }),
             Step::Fail(instance) => moment.fail(instance),
             Step::Replace(instance) => moment.fail_replaceable(instance),
             Step::Ask(request) => moment.serve(request),
@@ -185,18 +209,34 @@ impl<'s> Walk<'s> {
         core
     }
 
-    /// Completes an instance and ends the instant by the short way; and, on copies, by the long
+    /// Ends a turn of an instance, and the instant, by the short way; and, on copies, by the long
     /// one, and by the short one of a core that does not run it any more.
     fn pass_on(&mut self, instance: Instance) -> Result<Vec<Decision>, String> {
         let core = self.leave(instance);
+        let limit_ns = self.waits.begin(self.set, instance, self.now_ns);
+        let turn = TurnEnd { instance, limit_ns };
         let mut long = self.scheduler.clone();
         long.log.here = core;
-        long.at(self.now_ns).complete(instance);
+        long.at(self.now_ns).end_turn(turn);
         let expected = long.at(self.now_ns).dispatch().to_vec();
         let mut elsewhere = self.scheduler.clone();
         let other = CoreId(instance.subtask.0 % self.set.options.cores);
-        end_shortly(&mut elsewhere, self.now_ns, other, instance);
-        let decisions = end_shortly(&mut self.scheduler, self.now_ns, core, instance);
+        if end_shortly(&mut elsewhere, self.now_ns, other, turn).is_none() {
+            let _ = elsewhere.at(self.now_ns).dispatch();
+        }
+        let decisions = match end_shortly(&mut self.scheduler, self.now_ns, core, turn) {
+            Some((decisions, goes_on)) => {
+                if goes_on {
+                    let now_ns = (self.now_ns, false);
+                    self.waits.takes(EventKind::Wake, instance, now_ns, false);
+                }
+                decisions
+            }
+            None => {
+                self.hear(false)?;
+                self.scheduler.at(self.now_ns).dispatch().to_vec()
+            }
+        };
         if seen(&elsewhere) != seen(&long) || seen(&self.scheduler) != seen(&long) {
             return Err(format!("the short way of {instance:?} is not the long one"));
         }
@@ -208,14 +248,42 @@ impl<'s> Walk<'s> {
         }
     }
 
-    /// Hands what the scheduler tells to the judges of releases.
-    fn hear(&mut self) -> Result<(), String> {
+    /// Ends the instant, and, on a copy, by the short way of a wait whose limit has come.
+    fn end(&mut self) -> Result<Vec<Decision>, String> {
+        let (now_ns, mut shortly) = (self.now_ns, self.scheduler.clone());
+        let woken = shortly.wake_shortly(now_ns, shortly.log.here);
+        let found = match woken {
+            Some((core, vertex)) => vec![Decision {
+                what: EventKind::Resume,
+                core,
+                instance: shortly.instance_of(vertex),
+            }],
+            None => shortly.at(now_ns).dispatch().to_vec(),
+        };
+        let decisions = self.scheduler.at(now_ns).dispatch().to_vec();
+        match found == decisions && seen(&shortly) == seen(&self.scheduler) {
+            true => Ok(decisions),
+            false => Err(format!("the short way wakes {found:?}, not {decisions:?}")),
+        }
+    }
+
+    /// Hands what the scheduler tells to the judges of releases and of waits; `is_end`: the instant
+    /// ends.
+    fn hear(&mut self, is_end: bool) -> Result<(), String> {
         let mut notices = Vec::new();
         self.scheduler.log.exchange_notices(&mut notices);
         for notice in &notices {
             let dag = notice.event.dag.index();
-            let spec = &self.set.specs[dag];
-            if !self.releases[dag].takes(spec, notice, self.now_ns) {
+            let is_right = match notice.event.instance() {
+                Some(instance) if notice.event.what != EventKind::Restarted => {
+                    let is_cut = self.releases[dag].is_cut(instance.job);
+                    let now_ns = (self.now_ns, is_end);
+                    self.waits
+                        .takes(notice.event.what, instance, now_ns, is_cut)
+                }
+                _ => self.releases[dag].takes(&self.set.specs[dag], notice, self.now_ns),
+            };
+            if !is_right {
                 return Err(format!("no rule allows {notice:?}"));
             }
         }
@@ -240,6 +308,10 @@ impl<'s> Walk<'s> {
                     match self.preempted.iter().position(|it| *it == instance) {
                         Some(at) => {
                             self.preempted.remove(at);
+                            let is_resumed = decision.what == EventKind::Resume;
+                            (EventKind::Resume, is_free && is_resumed)
+                        }
+                        None if self.waits.go_on(instance) => {
                             let is_resumed = decision.what == EventKind::Resume;
                             (EventKind::Resume, is_free && is_resumed)
                         }
@@ -321,29 +393,50 @@ fn is_of_lateness(violation: &Violation) -> bool {
     match violation {
         Violation::Unpunctual { .. }
         | Violation::StillQueued { .. }
-        | Violation::MissedLate { .. } => true,
+        | Violation::MissedLate { .. }
+        | Violation::WaitBeyondLimit { .. } => true,
         Violation::OutOfTurn { event, stage } => {
-            event.what == EventKind::Finish && *stage == DispatchState::Suspended
+            matches!(event.what, EventKind::Finish | EventKind::Wait)
+                && *stage == DispatchState::Suspended
         }
         _ => false,
     }
 }
 
-/// Ends an instance by the short way, and the instant.
+/// Ends a turn by the short way, and the instant if that is all of it. Reports also whether the core
+/// goes on with the instance after a wait of which the scheduler has written nothing down.
 fn end_shortly(
     scheduler: &mut Scheduler,
     now_ns: u64,
     core: CoreId,
-    instance: Instance,
-) -> Vec<Decision> {
-    let vertex = scheduler.vertex(instance);
-    match pass_on(scheduler, now_ns, core, vertex) {
+    turn: TurnEnd,
+) -> Option<(Vec<Decision>, bool)> {
+    let vertex = scheduler.vertex(turn.instance);
+    let done = match turn.limit_ns {
+        None => pass_on(scheduler, now_ns, core, vertex),
+        Some(limit_ns) => match scheduler.wait_shortly(now_ns, core, vertex, limit_ns) {
+            Some(done) => done,
+            None => {
+                scheduler.log.here = core;
+                scheduler.at(now_ns).end_turn(turn);
+                HandOff::Open
+            }
+        },
+    };
+    match done {
         HandOff::To(next, decision) => {
             assert_eq!(scheduler.vertex(decision.instance), next);
-            vec![decision]
+            let goes_on = next == vertex && turn.limit_ns.is_some();
+            for what in [EventKind::Wait, EventKind::Wake] {
+                if goes_on {
+                    let log = &mut scheduler.log;
+                    log.on_core(core, what, now_ns, turn.instance);
+                }
+            }
+            Some((vec![decision], goes_on))
         }
-        HandOff::Idle => Vec::new(),
-        HandOff::Open => scheduler.at(now_ns).dispatch().to_vec(),
+        HandOff::Idle => Some((Vec::new(), false)),
+        HandOff::Open => None,
     }
 }
 

@@ -1,9 +1,10 @@
 //! Random sets of DAGs: all that a run depends on comes from one seed.
 
 use common::random::Random;
+use sched_dag::lifecycle::WaitId;
 use sched_dag::{
     Activation, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,
-    Priority, SchedulerOptions, SubtaskSpec,
+    Priority, SchedulerOptions, SubtaskSpec, Wait,
 };
 
 use super::shuffled_edges;
@@ -68,13 +69,22 @@ pub(crate) fn draw(random: &mut Random, overruns: Overruns) -> Set {
     set
 }
 
-/// Draws a set with sporadic DAGs, too.
+/// Draws a set with sporadic DAGs, too, and every other one with waits.
 pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
     let overruns = match random.chance(40) {
         true => Overruns::Never,
         false => Overruns::Often,
     };
-    with_sporadic(draw(random, overruns), random)
+    let set = with_sporadic(draw(random, overruns), random);
+    match random.chance(50) {
+        true => with_waits(set, random),
+        false => set,
+    }
+}
+
+/// Draws a set in which subtasks wait.
+pub(crate) fn draw_waiting(random: &mut Random) -> Set {
+    with_waits(draw_disturbed(random), random)
 }
 
 /// Draws a set of at most three subtasks.
@@ -83,9 +93,37 @@ pub(crate) fn draw_tiny(random: &mut Random) -> Set {
         let set = draw_within(random, &TINY, Overruns::Often);
         let subtasks = set.specs.iter().map(|spec| spec.subtasks.len());
         if subtasks.sum::<usize>() <= 3 {
-            return with_sporadic(set, random);
+            let mut set = with_sporadic(set, random);
+            // Of every third one the first subtask waits, once.
+            if random.once_in(3) {
+                let limit_ns = random.within(0..=1);
+                set.specs[0].subtasks[0].waits.push(wait(limit_ns));
+            }
+            return set;
         }
     }
+}
+
+/// A wait whose segments have no WCET.
+const fn wait(limit_ns: u64) -> Wait {
+    Wait {
+        limit_ns,
+        segment_ns: None,
+    }
+}
+
+/// Gives 40 of 100 subtasks up to three waits, every fifth of which has a limit of 0.
+fn with_waits(mut set: Set, random: &mut Random) -> Set {
+    let subtasks = set.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
+    for subtask in subtasks {
+        let waits = random.within(1..=3) * u64::from(random.chance(40));
+        let draw = |_| match random.once_in(5) {
+            true => wait(0),
+            false => wait(random.within(1..=12)),
+        };
+        subtask.waits = (0..waits).map(draw).collect();
+    }
+    set
 }
 
 fn with_sporadic(mut set: Set, random: &mut Random) -> Set {
@@ -173,6 +211,13 @@ impl Set {
         self.specs.clone()
     }
 
+    /// Returns it with subtasks that do not wait.
+    pub(crate) fn without_waits(mut self) -> Self {
+        let subtasks = self.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
+        subtasks.for_each(|subtask| subtask.waits.clear());
+        self
+    }
+
     /// Reports whether a DAG takes signals.
     pub(crate) fn is_sporadic(&self, dag: DagId) -> bool {
         self.specs[dag.index()].activation == Activation::Sporadic
@@ -188,6 +233,44 @@ impl Set {
             true => 0,
             false => execution_ns,
         }
+    }
+
+    /// Returns how long an instance waits at most, if it has that wait: the limit that its subtask
+    /// states, or less in one of four.
+    pub(crate) fn limit_ns(&self, wait: WaitId) -> Option<u64> {
+        let Instance { dag, subtask, .. } = wait.instance;
+        let waits = &self.specs[dag.index()].subtasks[subtask.index()].waits;
+        let stated_ns = waits.get(wait.number as usize)?.limit_ns;
+        let mut random = self.of_wait(wait);
+        Some(match random.once_in(4) {
+            true => random.within(0..=stated_ns),
+            false => stated_ns,
+        })
+    }
+
+    /// Returns after what time a wait has its answer: at once, before its limit, at the limit or
+    /// beyond it.
+    pub(crate) fn answer_ns(&self, wait: WaitId) -> u64 {
+        let limit_ns = self.limit_ns(wait).expect("it is a wait");
+        let mut random = self.of_wait(wait);
+        random.number();
+        random.number();
+        match random.index(4) {
+            0 => 0,
+            1 => random.within(0..=limit_ns),
+            2 => limit_ns,
+            _ => limit_ns + random.within(1..=9),
+        }
+    }
+
+    /// Reports whether a wait has its answer twice, which one of five has.
+    pub(crate) fn answers_twice(&self, wait: WaitId) -> bool {
+        self.of_wait(wait).once_in(5)
+    }
+
+    /// Returns what is drawn for one wait.
+    fn of_wait(&self, wait: WaitId) -> Random {
+        Random::new(self.of(wait.instance).number() ^ u64::from(wait.number))
     }
 
     /// Reports whether an instance fails, which one of 50 does.

@@ -285,11 +285,12 @@ fn length(options: &Parsed) -> Length {
     }
 }
 
-/// Returns the number of records of a set in a run: its jobs and instances.
+/// Returns the number of records of a set in a run: its jobs, instances and waits.
 fn records(set: &Set, length: Length) -> u64 {
     let of = |dag: &FileDag| {
         let jobs = length.jobs(&dag.spec);
-        jobs.saturating_mul(dag.subtasks.len() as u64 + 1)
+        let waits: usize = dag.spec.subtasks.iter().map(|of| of.waits.len()).sum();
+        jobs.saturating_mul((dag.subtasks.len() + waits) as u64 + 1)
     };
     set.dags.iter().map(of).fold(0, u64::saturating_add)
 }
@@ -324,7 +325,7 @@ fn memory_mib(file: &DagFile, length: Length, cores: u64) -> u64 {
 const MOST_S: u64 = 86_400;
 
 /// Returns the time limit of a run in seconds: two minutes, the time from the first release to the
-/// last, the time that all jobs would take on one core, and a second for every 500 records.
+/// last, the time that all jobs would take on one core and wait, and a second for every 500 records.
 fn limit_s(file: &DagFile, length: Length) -> u64 {
     const NS_PER_S: u128 = 1_000_000_000;
     // In 128 bits: periods and numbers of jobs come from a file and may be of any size.
@@ -335,7 +336,9 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
         for FileDag { spec, .. } in &set.dags {
             let jobs = u128::from(length.jobs(spec));
             let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
-            let of_job_ns: u128 = wcets.map(u128::from).sum();
+            let waits = spec.subtasks.iter().flat_map(|subtask| &subtask.waits);
+            let each_ns = wcets.chain(waits.map(|wait| wait.limit_ns));
+            let of_job_ns: u128 = each_ns.map(u128::from).sum();
             let period_ns = u128::from(spec.period_ns.unwrap_or(0));
             let last_ns =
                 period_ns.saturating_mul(jobs.saturating_sub(1)) + u128::from(spec.offset_ns);
@@ -441,6 +444,7 @@ mod tests {
         let yaml = std::fs::read_to_string(data.join("rd-gen/chain_03.yaml")).unwrap();
         let json = r#"{"graphs":[{"name":"g","c":[0,3,4,0],"edges":[[0,1],[1,2],[2,3]],"optimal":{"2":7}}]}"#;
         let ours = rd_gen::read(&yaml, "x", 1000).unwrap().to_string();
+        let ours = ours.replacen(" wcet ", " wcet 2us wait 3ms wcet ", 3);
         type Read = fn(&str) -> Result<DagFile, Vec<Malformed>>;
         let readers: [(&str, Read); 3] = [
             (&yaml, |text| rd_gen::read(text, "x", 1000)),
@@ -493,6 +497,12 @@ mod tests {
     fn the_limit_has_room_for_real_time_and_is_a_day_at_most_if_nobody_says_how_long() {
         assert_eq!(limit_s(&file(1), Length::Jobs(101)), 120 + 100);
         assert!(limit_s(&file(1), Length::Jobs(u64::MAX)) > MOST_S);
+        // A job may wait for as long as its limits say.
+        let text = "dag x period 1s\nsubtask a wcet 1ms wait 3s wcet 1ms\nend";
+        assert_eq!(
+            limit_s(&parse(text).unwrap(), Length::Jobs(101)),
+            120 + 100 + 303
+        );
         // DAGs of a set run side by side, sets one after the other.
         let dag = |name: &str| format!("dag {name} period 10s\nsubtask a wcet 1s\n");
         let text = format!("set one\n{}{}set two\n{}end", dag("x"), dag("y"), dag("z"));

@@ -50,7 +50,7 @@ pub struct BoundsCase {
 }
 
 /// The computed quantities: name in the file, and value.
-type Quantities = Vec<(String, String)>;
+pub(super) type Quantities = Vec<(String, String)>;
 
 /// The quantities of a DAG and of a set, by kind of file. Each case has each of them once, but the
 /// last one of a DAG once for each number of cores.
@@ -114,7 +114,7 @@ fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<BoundsCase, Ma
     })
 }
 
-fn parse_task(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
+pub(super) fn parse_task(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
     let header = lines.expect("dag")?;
     let [period, deadline, subtasks, edge_count] = header.fixed()?;
     let (period_ns, deadline_ns) = (header.number(period)?, header.number(deadline)?);
@@ -215,7 +215,10 @@ pub fn check(case: &BoundsCase) -> Result<(), String> {
     compare(&case.quantities, |what| compute(what, &tasks, case.cores))
 }
 
-fn compare(quantities: &Quantities, compute: impl Fn(&str) -> String) -> Result<(), String> {
+pub(super) fn compare(
+    quantities: &Quantities,
+    compute: impl Fn(&str) -> String,
+) -> Result<(), String> {
     for (what, expected) in quantities {
         let computed = compute(what);
         if *expected != computed {
@@ -284,7 +287,7 @@ fn words_of(federation: &Federation) -> String {
     format!("{}{}", federation.light.len(), heavy.collect::<String>())
 }
 
-fn list<T: ToString>(values: &[T]) -> String {
+pub(super) fn list<T: ToString>(values: &[T]) -> String {
     let words: Vec<String> = values.iter().map(T::to_string).collect();
     words.join(" ")
 }

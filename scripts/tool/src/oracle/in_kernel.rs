@@ -34,8 +34,8 @@ use std::time::Duration;
 use replay::{Case, Epoch, Scale, build};
 use sched_dag::law::RunRecord;
 
-use super::schedules::{self, Deviation, compare};
-use super::{equal, read};
+use super::schedules::{Deviation, compare, compare_turns};
+use super::{Parse, equal, read};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::outcome::{Outcome, boot};
 use crate::progress::Progress;
@@ -81,14 +81,14 @@ Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused
 ",
 };
 
-/// Runs the command with the words after `schedules`.
-pub(super) fn command(words: &[OsString]) -> ExitCode {
-    IN_KERNEL.carry_out(words, run_files)
+/// Runs the command with the words after the kind, whose files `parse` reads.
+pub(super) fn command(words: &[OsString], parse: Parse<Case>) -> ExitCode {
+    IN_KERNEL.carry_out(words, |options| run_files(options, parse))
 }
 
-fn run_files(options: &Parsed) -> Result<ExitCode, Refusal> {
+fn run_files(options: &Parsed, parse: Parse<Case>) -> Result<ExitCode, Refusal> {
     let settings = settings(options);
-    let mut cases = read(options.files(), schedules::parse).map_err(Refusal::Usage)?;
+    let mut cases = read(options.files(), parse).map_err(Refusal::Usage)?;
     let most_cores = options.number("cores-up-to").unwrap_or(MOST_CORES);
     let all = cases.len();
     // The number of those left out is printed, so that they do not pass unseen.
@@ -371,7 +371,9 @@ fn compare_run(
     let events = run.events.iter().copied();
     let record = RunRecord::of_events(&run.task_set, true, events).ok_or("too many jobs")?;
     let (unit_ns, tolerance_ns) = (settings.scale().unit_ns, settings.tolerance_ns());
-    let deviation = compare(case, &run.task_set, &record, unit_ns, tolerance_ns)?;
+    let whole = compare(case, &run.task_set, &record, unit_ns, tolerance_ns)?;
+    let events = run.events.iter().copied();
+    let deviation = whole.and(compare_turns(case, events, unit_ns, tolerance_ns)?);
     for what in ["violations", "allocations"] {
         equal(
             "the guest itself",

@@ -8,7 +8,8 @@
 //! - [`bounds`]: the analysis at commit;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
-//! - [`synchronizer`]: the policies of the publish/subscribe baseline.
+//! - [`synchronizer`]: the policies of the publish/subscribe baseline;
+//! - [`waiting`]: schedules and bounds of subtasks that wait, in one file.
 //!
 //! One kind reads no files: it simulates random sets that the analysis accepts (`responses`).
 
@@ -18,6 +19,7 @@ pub(crate) mod older_bounds;
 mod responses;
 pub mod schedules;
 pub mod synchronizer;
+pub mod waiting;
 
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -45,13 +47,14 @@ static ORACLE: Menu = Menu {
             responses::command;
         "schedules": "starts, finishes, preemptions, response times and misses", |words| {
             if words.iter().any(|word| word == "--in-kernel") {
-                return in_kernel::command(words);
+                return in_kernel::command(words, schedules::parse);
             }
             run_files(words, &SCHEDULES, schedules::parse, schedules::check, |case| &case.name)
         };
         "synchronizer": "sets that ExactTime and ApproximateTime emit, and what they drop", |words| {
             run_files(words, &SYNCHRONIZER, synchronizer::parse, synchronizer::check, |case| &case.name)
         };
+        "waiting": "schedules and bounds of subtasks that wait", waiting::command;
     },
     notes: NOTES,
 };

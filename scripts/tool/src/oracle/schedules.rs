@@ -9,9 +9,12 @@
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
+use sched_dag::engine::SubtaskBody;
+use sched_dag::journal::{Event, EventKind, EventSubject};
 use sched_dag::law::{InstanceRecord, JobRecord, RunRecord};
-use sched_dag::virtual_time::{ExecutionTimes, RunOutcome, VirtualTime};
-use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, TaskSet};
+use sched_dag::lifecycle::{Request, WaitId};
+use sched_dag::virtual_time::{RunOutcome, VirtualTime, Workload};
+use sched_dag::{DagId, Instance, JobOutcome, SchedulerOptions, SubtaskId, TaskSet};
 
 pub use ::replay::{Case, parse};
 
@@ -54,12 +57,14 @@ pub fn check(case: &Case) -> Result<(), String> {
         preemption: case.preemption,
         cores: case.cores.min(useful),
     };
-    let mut run = VirtualTime::new(&case.task_set, options).recording();
-    let end = run.run(&mut ExecutionTimes(|instance: Instance| {
-        let times = &case.executions_ns[instance.dag.index()][instance.subtask.index()];
-        times[usize::try_from(instance.job).expect("few jobs")]
-    }));
-    match end {
+    let bodies = case_bodies(case);
+    let mut run = VirtualTime::of_bodies(&case.task_set, options, bodies, &[]).recording();
+    let mut workload = CaseWorkload {
+        case,
+        answers: Vec::new(),
+        timeouts: BTreeMap::new(),
+    };
+    match run.run(&mut workload) {
         RunOutcome::Finished => {}
         RunOutcome::TimeReached | RunOutcome::Stopped => {
             return Err("the replay stopped early".to_owned());
@@ -72,7 +77,158 @@ pub fn check(case: &Case) -> Result<(), String> {
     }
     let events = run.events().into_iter();
     let record = RunRecord::of_events(&case.task_set, true, events).ok_or("too many jobs")?;
-    compare(case, &case.task_set, &record, 1, 0).map(drop)
+    compare(case, &case.task_set, &record, 1, 0)?;
+    compare_turns(case, run.events(), 1, 0)?;
+    for (instance, expected) in &case.turn_times {
+        let found = workload.timeouts.get(instance).copied().unwrap_or(0);
+        equal(instance, "time-outs", expected.timeouts, found)?;
+    }
+    Ok(())
+}
+
+/// Stands for the function of a subtask, of which only the turns matter.
+struct CaseBody {
+    instance: Instance,
+    limits_ns: Vec<u64>,
+    /// The turn that it is at, from 0 on.
+    turn: usize,
+    /// Whether the wait before it has ended by its limit.
+    has_timed_out: bool,
+}
+
+/// Returns the bodies of a case's subtasks.
+fn case_bodies(case: &Case) -> impl Iterator<Item = CaseBody> {
+    let dags = (0..).map(DagId).zip(case.task_set.dags());
+    dags.flat_map(|(dag, model)| {
+        let subtasks = (0..).map(SubtaskId).zip(model.subtasks());
+        subtasks.map(move |(id, subtask)| CaseBody {
+            instance: Instance {
+                dag,
+                job: 0,
+                subtask: id,
+            },
+            limits_ns: subtask.waits().iter().map(|wait| wait.limit_ns).collect(),
+            turn: 0,
+            has_timed_out: false,
+        })
+    })
+}
+
+impl SubtaskBody for CaseBody {
+    type Alternate = ();
+
+    fn set_job(&mut self, job: u64) {
+        self.instance.job = job;
+        (self.turn, self.has_timed_out) = (0, false);
+    }
+
+    fn subject(&self) -> EventSubject {
+        EventSubject::of(self.instance)
+    }
+
+    fn discard(&mut self, _: u64) {}
+
+    fn wake(&mut self, has_timed_out: bool) {
+        self.turn += 1;
+        self.has_timed_out = has_timed_out;
+    }
+
+    fn has_effects(&self) -> bool {
+        !self.limits_ns.is_empty()
+    }
+
+    fn complete(&mut self, _: u64, ask: &mut dyn FnMut(Request)) {
+        if let Some(&limit_ns) = self.limits_ns.get(self.turn) {
+            ask(Request::Wait(limit_ns));
+        }
+    }
+
+    fn alternate(&self) -> Option<()> {
+        None
+    }
+
+    fn replace(&mut self) {}
+}
+
+/// Executes as a case says, and answers as its devices do.
+struct CaseWorkload<'c> {
+    case: &'c Case,
+    /// The answers that are on their way, and when they come.
+    answers: Vec<(u64, WaitId)>,
+    /// How many waits of each instance have ended by their limits.
+    timeouts: BTreeMap<Instance, u64>,
+}
+
+impl Workload<CaseBody> for CaseWorkload<'_> {
+    fn execute(&mut self, body: &mut CaseBody, _: u64) -> Option<u64> {
+        let instance = body.instance;
+        if body.has_timed_out {
+            *self.timeouts.entry(instance).or_default() += 1;
+        }
+        if let Some(turns) = self.case.turns.get(&instance) {
+            return Some(turns[body.turn].execution_ns);
+        }
+        let times = &self.case.executions_ns[instance.dag.index()][instance.subtask.index()];
+        Some(times[usize::try_from(instance.job).expect("few jobs")])
+    }
+
+    fn waits(&mut self, wait: WaitId, now_ns: u64) {
+        let turn = &self.case.turns[&wait.instance][wait.number as usize];
+        let answer_ns = turn.answer_ns.and_then(|ns| now_ns.checked_add(ns));
+        self.answers.extend(answer_ns.map(|ns| (ns, wait)));
+    }
+
+    fn next_request_ns(&self) -> Option<u64> {
+        self.answers.iter().map(|answer| answer.0).min()
+    }
+
+    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
+        let due = self.answers.iter().position(|answer| answer.0 <= now_ns);
+        due.map(|place| Request::Answer(self.answers.swap_remove(place).1))
+    }
+}
+
+/// Compares the turns of a case's instances with the events of a run, as [`compare`] does the rest.
+///
+/// # Errors
+///
+/// The first difference, in one line.
+pub fn compare_turns(
+    case: &Case,
+    events: impl IntoIterator<Item = Event>,
+    unit_ns: u64,
+    tolerance_ns: u64,
+) -> Result<Deviation, String> {
+    let mut found = BTreeMap::<Instance, Vec<[Option<u64>; 2]>>::new();
+    for event in events {
+        let Some(instance) = event.instance().filter(|of| case.turns.contains_key(of)) else {
+            continue;
+        };
+        let spans = found.entry(instance).or_default();
+        let time_ns = Some(event.time_ns);
+        match (event.what, spans.last_mut()) {
+            (EventKind::Start, _) => spans.push([time_ns, None]),
+            (EventKind::Resume, Some([_, Some(_)])) => spans.push([time_ns, None]),
+            (EventKind::Wait | EventKind::Finish, Some([_, end])) => *end = time_ns,
+            _ => {}
+        }
+    }
+    let mut near = Near {
+        unit_ns,
+        tolerance_ns,
+        deviation: Deviation::default(),
+    };
+    for (instance, expected) in &case.turn_times {
+        let spans = found.get(instance).map_or(&[][..], |spans| spans);
+        let (wanted, there) = (expected.spans_ns.len() as u64, spans.len() as u64);
+        equal(instance, "segments", wanted, there)?;
+        for ((number, wanted), span) in (0..).zip(&expected.spans_ns).zip(spans) {
+            let place = format!("{instance} segment {number}");
+            near.check(&place, "start", wanted.0, span[0])?;
+            near.check(&place, "end", wanted.1, span[1])?;
+        }
+    }
+    Ok(near.deviation)
 }
 
 /// Compares a case with the record of a run in which a unit of its time took `unit_ns`. Starts,

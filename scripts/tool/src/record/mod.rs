@@ -16,7 +16,7 @@ use sched_dag::law::JudgeOptions;
 use sched_dag::{
     Activation, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, CoreId, DagId, DagSpec,
     FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskId,
-    SubtaskSpec, TaskSet, verify,
+    SubtaskSpec, TaskSet, Wait, verify,
 };
 
 use crate::protocol::{Transcript, read_line};
@@ -338,14 +338,25 @@ impl Committed {
                 told.cores
             )));
         }
-        let specs: Result<_, String> = told.dags.iter().map(spec).collect();
+        let specs: Result<Vec<_>, String> = told.dags.iter().map(spec).collect();
+        let mut specs = specs.map_err(in_commit)?;
+        for &(dag, subtask, limit_ns, segment_ns) in &told.waits {
+            let dag = specs.get_mut(DagId(dag).index());
+            let place = dag.and_then(|dag| dag.subtasks.get_mut(SubtaskId(subtask).index()));
+            let place = place.ok_or_else(|| in_commit("a wait is of no subtask".into()))?;
+            let wait = Wait {
+                limit_ns,
+                segment_ns,
+            };
+            place.waits.push(wait);
+        }
         let clusters = match &told.clusters[..] {
             [] => CoreDivision::Undivided,
             sizes => CoreDivision::Of(sizes.to_vec()),
         };
         let mut committed = Self {
             number,
-            specs: specs.map_err(in_commit)?,
+            specs,
             task_set: TaskSet::default(),
             told,
         };

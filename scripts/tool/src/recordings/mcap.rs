@@ -123,6 +123,7 @@ fn channels(header: &Header) -> Vec<(u8, Vec<u8>)> {
         let found = match channel.role {
             Role::Sample => "/sampled",
             Role::State => "/state",
+            Role::Answer => "/answers",
             Role::Source | Role::Result => "",
         };
         let topic = format!("/{}/{}{found}", dag(channel.dag), channel.topic);

@@ -304,6 +304,7 @@ pub(super) fn tables(recording: &Recording<'_>) -> Vec<(String, String)> {
         let found = match channel.role {
             Role::Sample => ".sampled",
             Role::State => ".state",
+            Role::Answer => ".answers",
             Role::Source | Role::Result => "",
         };
         let name = format!("{}.{}{found}", plain(dag), plain(&channel.topic));

@@ -567,6 +567,8 @@ struct History {
     dropped_ns: Option<u64>,
     /// The times on a core.
     slices: Vec<Slice>,
+    /// When each wait began and ended; `None`: it went on when the trace ended.
+    waits: Vec<(u64, Option<u64>)>,
     suspensions: u64,
 }
 
@@ -641,10 +643,11 @@ fn complete_from_ns(run: &Run) -> u64 {
     if run.lost == 0 {
         return 0;
     }
-    // Finishes and due times may be dated before their writing; the others bear the time at which
-    // they were written, so every lost event is older.
+    // Ends of turns and due times may be dated before their writing; the others bear the time at
+    // which they were written, so every lost event is older.
+    let is_dated_back = |what| matches!(what, EventKind::Finish | EventKind::Wait | EventKind::Due);
     let mut events = run.events.iter();
-    let first = events.find(|event| !matches!(event.what, EventKind::Finish | EventKind::Due));
+    let first = events.find(|event| !is_dated_back(event.what));
     // Other events of that very instant may be lost.
     first.map_or(u64::MAX, |first| first.time_ns.saturating_add(1))
 }
@@ -668,13 +671,19 @@ impl History {
         self.finish_ns.or(self.dropped_ns)
     }
 
+    /// Returns the wait that ended a stretch of execution, if one did.
+    fn wait_after(&self, slice: Slice) -> Option<(u64, Option<u64>)> {
+        let mut waits = self.waits.iter().copied();
+        waits.find(|(from_ns, _)| slice.to_ns == Some(*from_ns))
+    }
+
     fn note(&mut self, event: &Event, is_lossy: bool, from_ns: u64) {
         let time_ns = event.time_ns;
         // A resumption needs no such start: it begins a slice by itself.
         let is_first = self.slices.is_empty() && self.start_ns.is_none();
         let ran = matches!(
             event.what,
-            EventKind::Suspend | EventKind::Finish | EventKind::Ended
+            EventKind::Suspend | EventKind::Wait | EventKind::Finish | EventKind::Ended
         );
         if is_lossy && is_first && ran {
             // Its start is lost: it has run since before the trace.
@@ -683,6 +692,9 @@ impl History {
         // Any later event of the instance ends the slice; a second one does not move its end.
         if let Some(slice) = self.slices.last_mut() {
             slice.to_ns.get_or_insert(time_ns);
+        }
+        if let Some((_, to_ns)) = self.waits.last_mut() {
+            to_ns.get_or_insert(time_ns);
         }
         let place = match event.what {
             EventKind::Ready => &mut self.ready_ns,
@@ -693,6 +705,9 @@ impl History {
         };
         place.get_or_insert(time_ns);
         self.suspensions += u64::from(event.what == EventKind::Suspend);
+        if event.what == EventKind::Wait {
+            self.waits.push((time_ns, None));
+        }
         if matches!(event.what, EventKind::Start | EventKind::Resume) {
             self.begin_slice(event.core, time_ns);
         }

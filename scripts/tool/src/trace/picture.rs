@@ -2,8 +2,9 @@
 //!
 //! At the top stands each graph: a box for each subtask with its WCET, and an arrow for each
 //! edge. Below are the first jobs on a common axis of time: a row for each core with what it
-//! executed, in the colour of its subtask; then a row for each DAG with the response time of each
-//! job, its proven bound and its deadline.
+//! executed, in the colour of its subtask, and below that a thin bar for each wait of what has left
+//! the core; then a row for each DAG with the response time of each job, its proven bound and its
+//! deadline.
 //!
 //! Coordinates are whole pixels, so that a run whose times differ by less than that has the same
 //! picture, byte by byte. Pages keep such pictures, and tests draw them again.
@@ -155,7 +156,9 @@ impl<'v> Picture<'v> {
             layers[layer].push(subtask);
         }
         let tallest = layers.iter().map(Vec::len).max().unwrap_or(0) as u64;
-        let (width, height) = (BOX.0 + GAP.0, BOX.1 + GAP.1);
+        let waits = model.subtasks().iter().any(|of| of.waiting_ns() > 0);
+        let box_height = BOX.1 + if waits { 16 } else { 0 };
+        let (width, height) = (BOX.0 + GAP.0, box_height + GAP.1);
         let mut corners = vec![(0, 0); model.subtasks().len()];
         for (x, layer) in (0..).zip(&layers) {
             let above = (tallest - layer.len() as u64) * height / 2;
@@ -168,8 +171,8 @@ impl<'v> Picture<'v> {
             for successor in model.successors(subtask) {
                 let to = corners[successor.0 as usize];
                 let style = "stroke=\"#333333\"";
-                let end = (to.0, to.1 + BOX.1 / 2);
-                self.line((from.0 + BOX.0, from.1 + BOX.1 / 2), end, style);
+                let end = (to.0, to.1 + box_height / 2);
+                self.line((from.0 + BOX.0, from.1 + box_height / 2), end, style);
                 let (x, y) = end;
                 let _ = writeln!(
                     self.svg,
@@ -178,12 +181,14 @@ impl<'v> Picture<'v> {
             }
         }
         for (subtask, &(x, y)) in (0..).map(SubtaskId).zip(&corners) {
-            self.rect((x, y), BOX, self.colour(dag, subtask));
+            self.rect((x, y), (BOX.0, box_height), self.colour(dag, subtask));
             let model = model.subtask(subtask);
-            self.text((x + BOX.0 / 2, y + 17), "middle", model.name());
-            if let Some(wcet_ns) = model.wcet_ns() {
-                let wcet = format!("WCET {}", time(wcet_ns));
-                self.text((x + BOX.0 / 2, y + 33), "middle", &wcet);
+            let wcet = model.wcet_ns().map(|ns| format!("WCET {}", time(ns)));
+            let waits = Some(model.waiting_ns()).filter(|ns| *ns > 0);
+            let waits = waits.map(|ns| format!("waits {}", time(ns)));
+            let lines = [Some(model.name().into()), wcet, waits];
+            for (row, line) in (0..).zip(lines.into_iter().flatten()) {
+                self.text((x + BOX.0 / 2, y + 17 + 16 * row), "middle", &line);
             }
         }
         y + tallest * height
@@ -210,6 +215,10 @@ impl<'v> Picture<'v> {
                 self.rect((from, top), (width, ROW - 6), colour);
                 if width > LETTER * name.len() as u64 {
                     self.text((from + width / 2, top + 17), "middle", name);
+                }
+                if let Some((_, until_ns)) = history.wait_after(*slice) {
+                    let until = self.x(until_ns.unwrap_or(self.end_ns).min(self.end_ns));
+                    self.rect((to, top + ROW - 7), ((until - to).max(1), 4), colour);
                 }
             }
         }

@@ -2,10 +2,12 @@
 
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use replay::{Epoch, Scale, build};
-use tool::oracle::schedules::{Case, Deviation, check, compare, parse};
+use tool::oracle::schedules::{Case, Deviation, check, compare, compare_turns, parse};
+use tool::oracle::waiting::{self, WaitingCase};
 use virtual_time::VirtualTime;
 
 const PUBLIC: &str = include_str!("../../../../tests/oracle/schedules.txt");
+const WITH_WAITS: &str = include_str!("../../../../tests/oracle/waiting.txt");
 const CLUSTERS: &str = include_str!("../../../../tests/oracle/clusters.txt");
 
 /// One core, a chain of two, two jobs that overlap.
@@ -34,10 +36,26 @@ fn all_public_schedules_agree() {
     for (text, count) in [(PUBLIC, 40), (CLUSTERS, 30)] {
         let cases = parse(text).expect("the file is well formed");
         assert_eq!(cases.len(), count);
-        for case in &cases {
-            assert_eq!(check(case), Ok(()), "{}", case.name);
-            assert_eq!(built(case, 0, 0), Ok(Deviation::default()), "{}", case.name);
-        }
+        assert_cases_agree(&cases);
+    }
+}
+
+#[test]
+fn all_public_schedules_with_waits_agree() {
+    let blocks = waiting::parse(WITH_WAITS).expect("the file is well formed");
+    let schedules = blocks.into_iter().filter_map(|block| match block {
+        WaitingCase::Schedule(case) => Some(*case),
+        WaitingCase::Bounds(_) => None,
+    });
+    let cases: Vec<Case> = schedules.collect();
+    assert_eq!(cases.len(), 40);
+    assert_cases_agree(&cases);
+}
+
+fn assert_cases_agree(cases: &[Case]) {
+    for case in cases {
+        assert_eq!(check(case), Ok(()), "{}", case.name);
+        assert_eq!(built(case, 0, 0), Ok(Deviation::default()), "{}", case.name);
     }
 }
 
@@ -57,6 +75,7 @@ fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, Str
     finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("any graph is right");
     let report = machine.run();
     assert_eq!(report.violations(), []);
+    compare_turns(case, report.events.iter().copied(), 1000, tolerance_ns)?;
     compare(case, report.task_set(), report.record(), 1000, tolerance_ns)
 }
 
@@ -129,7 +148,7 @@ x 0 0 1 1 5 0 | x 0 0 0 1 5 0 | 7 | twice
 x 0 0 1 1 5 0 | x 0 2 1 1 5 0 | 7 | no job 2
 x 0 0 1 1 5 0 | x 1 0 1 1 5 0 | 7 | no dag 1
 j 0 1 4 10 6 1 | j 0 1 4 10 6 2 | 11 | expected 0 or 1
-j 0 1 4 10 6 1 | k 0 1 4 10 6 1 | 11 | expected `x`, `j` or `end`
+j 0 1 4 10 6 1 | k 0 1 4 10 6 1 | 11 | expected `x`, `s`, `j` or `end`
 end\n |  | 12 | the file ends";
 
 #[test]
@@ -142,6 +161,65 @@ fn malformed_files_are_refused_with_their_line() {
         assert!(malformed.reason.contains(reason), "{to}: {malformed}");
     }
     assert_eq!(parse("").expect_err("no case").line, 1);
+}
+
+/// One core, and a subtask that waits above another one; its answer comes at the limit.
+const WAITING: &str = "case waiting 1 0 1 2
+dag 20 20 0 1 1 0
+sub 3 0 3
+wait 0 1 2 3 1
+act 0 0 2 3 1
+dag 20 20 0 1 1 0
+sub 4 1 4
+x 0 0 0 0 6 0
+x 1 0 0 2 7 1
+s 0 0 0 0 0 2 5 6
+j 0 0 0 6 6 0
+j 1 0 0 7 7 0
+end
+";
+
+/// Parts of the waiting case, their replacement, and the first difference, if any.
+const WAITS: &str =
+    "act 0 0 2 3 1 | act 0 0 2 4 1 | dag 0 job 0 subtask 0: time-outs: expected 0, found 1
+act 0 0 2 3 1 | act 0 0 2 2 1 | dag 0 job 0 subtask 0: finish: expected 6, found 5
+s 0 0 0 0 0 2 5 6 | s 0 0 0 1 0 2 5 6 | dag 0 job 0 subtask 0: time-outs: expected 1, found 0
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 4 6 | dag 0 job 0 subtask 0 segment 1: start: expected 4, found 5
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 3 5 6 | dag 0 job 0 subtask 0 segment 0: end: expected 3, found 2
+x 1 0 0 2 7 1 | x 1 0 0 2 7 0 | dag 1 job 0 subtask 0: preemptions: expected 0, found 1";
+
+/// Parts of the waiting case, their replacement, and the line and the reason of the refusal.
+const MALFORMED_WAITS: &str = r"wait 0 1 2 3 1 | wait 0 0 2 | 4 | expected 0 waits
+wait 0 1 2 3 1 | wait 0 1 2 3 | 4 | expected 1 waits, each with its segment
+wait 0 1 2 3 1 | wait 0 2 2 3 1 | 4 | expected 2 waits
+wait 0 1 2 3 1 | wait 1 1 2 3 1 | 4 | no subtask 1
+wait 0 1 2 3 1 | wait 0 1 2 18446744073709551615 1 | 1 | may end after
+act 0 0 2 3 1 | act 0 1 2 3 1 | 5 | expected `act 0 0 ..`
+act 0 0 2 3 1 | act 0 0 1 3 1 | 5 | do not come to its execution time 3
+act 0 0 2 3 1 | act 0 0 2 3 1\nwait 0 1 2 3 1 | 6 | has its waits already
+act 0 0 2 3 1 | act 0 0 2 3 | 5 | takes 5 words
+act 0 0 2 3 1\n |  | 5 | expected a `act` record
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 5 | 10 | the spans of 2 segments
+s 0 0 0 0 0 2 5 6 | s 1 0 0 0 0 2 5 6 | 10 | the spans of 0 segments
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 5 6\ns 0 0 0 0 0 2 5 6 | 11 | twice
+s 0 0 0 0 0 2 5 6\n |  | 12 | 1 `s` records";
+
+#[test]
+fn waits_agree_and_their_first_difference_is_named() {
+    let checked = |text: &str| check(&parse(text).expect("well formed")[0]);
+    assert_eq!(checked(WAITING), Ok(()));
+    for row in WAITS.lines() {
+        let [from, to, difference] = split(row);
+        let found = checked(&WAITING.replace(from, to));
+        assert_eq!(found, Err(difference.to_owned()), "{to}");
+    }
+    for row in MALFORMED_WAITS.lines() {
+        let row = row.replace(r"\n", "\n");
+        let [from, to, line, reason] = split(&row);
+        let malformed = parse(&WAITING.replacen(from, to, 1)).expect_err(to);
+        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
+        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
+    }
 }
 
 #[test]

@@ -5,8 +5,8 @@
 
 use std::time::Duration;
 
-use fass::shared::{Latest, Modes, Parameter, Sample, Uses};
-use fass::{Dag, FaultLimit, SubtaskAttributes, Unique, create_dag, finish_create_dags};
+use fass::shared::{Asker, Latest, Modes, Parameter, Sample, Uses, create_device};
+use fass::{Dag, FaultLimit, Subtask, SubtaskAttributes, Unique, create_dag, finish_create_dags};
 
 /// A fault's name and what builds the DAGs with that fault.
 type Case = (&'static str, fn() -> Vec<Dag>);
@@ -225,6 +225,48 @@ pub(crate) const CASES: &[Case] = &[
             .register(attributes("store"));
         vec![dag]
     }),
+    // Waits.
+    ("cannot_wait", || {
+        let read = attributes("read").wait(PERIOD / 2);
+        waiting(|dag| dag.source(|| (1_u32,)), read)
+    }),
+    ("replaceable_waits", || {
+        let read = attributes("read").wait(PERIOD / 2);
+        let dags = waiting(|dag| dag.restarting(|| |()| (1_u32,)), read);
+        dags[0].survive_faults(FAULT_LIMIT);
+        dags
+    }),
+    ("segments_partly_given", || {
+        let read = attributes("read").wait(PERIOD / 2).wcet(PERIOD / 4);
+        let sleep = || async { (1_u32,) };
+        waiting(|dag| dag.async_source(sleep), read)
+    }),
+    ("answers_not_recorded", || {
+        let (accelerator, _driver) = create_device::<u32, u32>("accelerator");
+        let dag = dag("lidar: > read > points");
+        dag.record::<u32>("points");
+        let store = dag.using(accelerator.asking());
+        let store = store.subtask(|_: Asker<u32, u32>, (_,): (u32,)| ());
+        let store = store.reads(&["points"]).due(PERIOD);
+        store.register(attributes("store"));
+        vec![dag]
+    }),
+    ("too_many_waits", || {
+        let read = (0..255).fold(attributes("read"), |read, _| read.wait(PERIOD / 300));
+        waiting(|dag| dag.async_source(|| async { (1_u32,) }), read)
+    }),
+    ("device_asked_twice", || {
+        let (accelerator, _driver) = create_device::<u32, u32>("accelerator");
+        let dag = dag("lidar:");
+        let read = dag.period(PERIOD).using(accelerator.asking());
+        let read = read.source(|_: Asker<u32, u32>| (1_u32,));
+        read.writes(&["points"]).register(attributes("read"));
+        let store = dag.using(accelerator.asking());
+        let store = store.subtask(|_: Asker<u32, u32>, (_,): (u32,)| ());
+        let store = store.reads(&["points"]).due(PERIOD);
+        store.register(attributes("store"));
+        vec![dag]
+    }),
     ("replaced_in_vain", || {
         let dag = dag("lidar: > read > points");
         let store = dag.restarting(|| |(_,): (u32,)| ());
@@ -414,6 +456,17 @@ fn with(dag: Dag, subtasks: &str) -> Vec<Dag> {
 /// A DAG without fault: a source, a topic, a sink.
 fn sound(name: &str, topic: &str) -> Dag {
     dag(&format!("{name}: > read > {topic}; {topic} > store >"))
+}
+
+/// A DAG whose source has these attributes.
+fn waiting(
+    source: impl for<'d> FnOnce(&'d Dag) -> Subtask<'d>,
+    read: SubtaskAttributes,
+) -> Vec<Dag> {
+    let dag = dag("lidar:");
+    dag.period(PERIOD);
+    source(&dag).writes(&["points"]).register(read);
+    with(dag, "points > store >")
 }
 
 fn changed(change: impl FnOnce(&Dag)) -> Vec<Dag> {

@@ -7,9 +7,10 @@ mod cases;
 
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 use cases::{CASES, PERIOD};
-use fass::finish_create_dags;
+use fass::{WaitFault, finish_create_dags};
 use harness::fault_page::{self, documented_faults, is_said_by, table};
 use harness::markdown::page;
 use sched_dag::analysis::{NotProvenReason, TaskError};
@@ -190,6 +191,37 @@ fn every_kind_of_fault_has_an_entry() {
 }
 
 #[test]
+fn every_fault_of_a_wait_is_listed() {
+    let (ns, asked) = (Duration::from_nanos(5), Duration::from_nanos(7));
+    let said = [
+        WaitFault::TooMany { stated: 1 },
+        WaitFault::LeftOut {
+            taken: 1,
+            stated: 2,
+        },
+        WaitFault::TooLong {
+            number: 0,
+            asked,
+            limit: ns,
+        },
+        WaitFault::TwoAtOnce,
+        WaitFault::NotAwaited,
+        WaitFault::Foreign,
+        WaitFault::Outside,
+    ];
+    let codes: Vec<&str> = said.iter().map(WaitFault::code).collect();
+    assert_eq!(codes, WaitFault::CODES);
+    let documented = table("| panic | what is behind it |");
+    assert_eq!(documented.len(), said.len());
+    let (file, below) = ("docs/errors.md", "| panic | what is behind it |");
+    for (said, text) in said.iter().map(WaitFault::to_string).zip(&documented) {
+        if !is_said_by(&said, text) {
+            Golden { file, below, text }.assert_is(&with_dots(&said));
+        }
+    }
+}
+
+#[test]
 fn every_text_ends_in_a_remedy() {
     for (fault, text) in documented_faults() {
         let has_remedy = text.contains("; ");
@@ -263,9 +295,17 @@ fn every_reason_against_a_proof_is_listed() {
             NotProvenReason::Overload => NotProvenReason::DelayedBy { dag: DagId(1) },
             NotProvenReason::DelayedBy { .. } => NotProvenReason::NoBound,
             NotProvenReason::NoBound => NotProvenReason::InFlightTooFew { in_flight: 2 },
-            NotProvenReason::InFlightTooFew { .. } => NotProvenReason::Limit,
+            NotProvenReason::InFlightTooFew { .. } => NotProvenReason::SpanBeyondLimit {
+                span_ns: 5,
+                limit_ns: 4,
+            },
+            NotProvenReason::SpanBeyondLimit { .. } => NotProvenReason::NoBoundByPeriod,
+            NotProvenReason::NoBoundByPeriod => NotProvenReason::Limit,
             NotProvenReason::Limit => NotProvenReason::NoCores,
             NotProvenReason::NoCores => NotProvenReason::Unknown(TaskError::VolumeOverflow),
+            NotProvenReason::Unknown(TaskError::VolumeOverflow) => {
+                NotProvenReason::Unknown(TaskError::WaitsOverflow)
+            }
             NotProvenReason::Unknown(_) => return None,
         })
     };

@@ -45,8 +45,8 @@ pub use status::{
 };
 pub use status::{control, nominal_end_ns, task_set};
 use step::RequestQueue;
+pub use step::{answer, raise, raise_in_interrupt};
 pub use step::{complete, fail, find_work, interrupt};
-pub use step::{raise, raise_in_interrupt};
 
 /// The next work of a core.
 pub enum CoreWork {

@@ -49,19 +49,21 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     /// between a stamp and what it says.
     #[inline(always)]
     fn start(&mut self, _: CoreId, loan: &mut RunnerLoan) -> u64 {
-        let core = this_core::get();
-        note_running(core, Some(loan.subject()));
-        let now_ns = clock::now_ns();
-        let budget_end_ns = match loan.budget_ns {
+        begin_turn(loan, loan.budget_ns)
+    }
+
+    /// The time in which it waits is not of its budget.
+    fn wait(&mut self, _: CoreId, loan: &mut RunnerLoan, ended_ns: u64) {
+        let ended_ns = self.on_clock(ended_ns);
+        loan.budget_left_ns = match this_core::get().context().budget_end_ns() {
             u64::MAX => u64::MAX,
-            budget_ns => {
-                let end_ns = now_ns.saturating_add(budget_ns);
-                timer::set_no_later(core, Alarm::Budget, end_ns);
-                end_ns
-            }
+            end_ns => end_ns.saturating_sub(ended_ns),
         };
-        core.context().set_budget_end(budget_end_ns);
-        instance_time_ns(now_ns)
+    }
+
+    #[inline]
+    fn proceed(&mut self, _: CoreId, loan: &mut RunnerLoan) -> u64 {
+        begin_turn(loan, loan.budget_left_ns)
     }
 
     #[inline]
@@ -94,6 +96,25 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     }
 }
 
+/// This core begins with a turn of a runner's instance, which may execute for so long. Returns when,
+/// on the run's time.
+#[inline(always)]
+fn begin_turn(loan: &RunnerLoan, budget_ns: u64) -> u64 {
+    let core = this_core::get();
+    note_running(core, Some(loan.subject()));
+    let now_ns = clock::now_ns();
+    let budget_end_ns = match budget_ns {
+        u64::MAX => u64::MAX,
+        budget_ns => {
+            let end_ns = now_ns.saturating_add(budget_ns);
+            timer::set_no_later(core, Alarm::Budget, end_ns);
+            end_ns
+        }
+    };
+    core.context().set_budget_end(budget_end_ns);
+    instance_time_ns(now_ns)
+}
+
 /// A subtask's [runner](fass::platform::SubtaskRunner), and what running an instance of it takes here.
 ///
 /// There is one for each subtask, as a subtask has one started instance at a time
@@ -103,6 +124,8 @@ pub struct CoreRunner {
     cluster: &'static ClusterState,
     /// The time that an instance may execute for, `u64::MAX` if there is no limit.
     pub(super) budget_ns: u64,
+    /// The rest of that when its instance began to wait.
+    budget_left_ns: u64,
 }
 
 impl CoreRunner {
@@ -144,6 +167,7 @@ pub(super) fn runners(
         CoreRunner {
             cluster: cluster::nth(dag.cluster().index()),
             budget_ns: subtask.most_execution_ns(budget_factor),
+            budget_left_ns: 0,
             inner,
         }
     })

@@ -12,12 +12,12 @@
 use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
-use sched_dag::engine::FaultCost;
+use sched_dag::engine::{FaultCost, PlatformPort as _};
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::Request;
-use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet};
+use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet, WAITS};
 
-use super::cluster::{self, CoreSet, FIRST_SEAT};
+use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT};
 use super::{ClusterRun, RunnerLoan, divided};
 use crate::machine::clock;
 use crate::machine::spinlock::SpinLock;
@@ -150,15 +150,15 @@ pub fn nominal_end_ns() -> Option<u64> {
 
 /// Makes a change to a DAG, in a step of its scheduler.
 pub fn control(dag: DagId, change: fn(DagId) -> Request) {
-    serve(None, dag, change(dag));
+    serve(None, divided::of_dag(dag), change(dag));
 }
 
-/// Serves a request to a DAG in a step of its scheduler; one to the DAG of the plan with a number
-/// only if that is the one which runs, and as of time 0 if it has not begun.
+/// Serves a request in a step of a cluster's scheduler, or leaves it for the cluster that it
+/// concerns; one to the plan with a number only if that is the one which runs, and as of time 0 if
+/// it has not begun.
 ///
 /// This is the only such step, so that the scheduler is known by its address in it, too.
-pub(super) fn serve(plan: Option<u64>, dag: DagId, request: Request) {
-    let cluster = divided::of_dag(dag);
+pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: Request) {
     let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {
         return;
@@ -171,6 +171,10 @@ pub(super) fn serve(plan: Option<u64>, dag: DagId, request: Request) {
         _ => {}
     }
     let mut woken = CoreSet::default();
+    if WAITS && execution.parts(&mut woken).1.forward(request) {
+        drop(place);
+        return woken.wake();
+    }
     let seat = cluster::visit(cluster);
     execution.step(clock::now_ns(), &mut woken, |moment| moment.serve(request));
     this_core::get().place.store(seat, Ordering::Relaxed);

@@ -19,6 +19,7 @@ use core::sync::atomic::Ordering;
 use fass::platform::{Plan, Request};
 use sched_dag::engine::{Engine, NextAction};
 use sched_dag::journal::{EventKind, EventSubject};
+use sched_dag::lifecycle::WaitId;
 use sched_dag::placement::NextWork;
 use sched_dag::{CoreId, DagId, Instance, Moment};
 
@@ -27,7 +28,7 @@ use super::letters::Letters;
 use super::loans::RunnerLoan;
 use super::port::{SmpPort, here, instance_time_ns, seat, since_epoch};
 use super::status::{self, note_running};
-use super::{ClusterRun, CoreWork, EPOCH_NS};
+use super::{ClusterRun, CoreWork, EPOCH_NS, divided};
 use crate::machine::abandoned::AbandonedContext;
 use crate::machine::context::Parked;
 use crate::machine::interrupt::Interrupted;
@@ -72,6 +73,18 @@ impl ClusterRun {
         let (engine, mut port) = self.parts(woken);
         engine.tell((instant_ns, core), &mut port, event);
         self.end_step(now_ns, woken);
+    }
+
+    /// Ends the wait whose limit has come, if that is all of a step, and reports whether it is.
+    #[inline]
+    fn wake(&mut self, now_ns: u64, woken: &mut CoreSet) -> bool {
+        let (may_hand_off, instant) = (self.may_hand_off, (since_epoch(now_ns), here()));
+        let (engine, mut port) = self.parts(woken);
+        let is_all = may_hand_off && engine.wake(instant, &mut port);
+        if is_all {
+            self.announce(woken);
+        }
+        is_all
     }
 
     #[inline]
@@ -137,7 +150,7 @@ impl ClusterRun {
         let mut none = CoreSet::default();
         let (engine, mut port) = self.parts(&mut none);
         match engine.next(here, &mut port) {
-            NextWork::Start(_, runner) => CoreWork::Run(runner),
+            NextWork::Start(_, runner) | NextWork::Proceed(_, runner) => CoreWork::Run(runner),
             NextWork::Continue(context) => {
                 self.note_resumed(core, &context, clock::now_ns());
                 note_running(core, self.current(here.index()).map(EventSubject::of));
@@ -274,7 +287,7 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
             is_rescheduled: true,
         } => execution.announce(&mut woken),
         NextAction::Step(ended) => execution.step(finish_ns, &mut woken, |moment| {
-            ended.into_iter().for_each(|ended| moment.complete(ended));
+            ended.into_iter().for_each(|turn| moment.end_turn(turn));
         }),
     }
     let work = execution.find_work(core);
@@ -320,7 +333,7 @@ pub fn interrupt(interrupted: &mut Interrupted, now_ns: u64, is_event: bool) {
         return;
     };
     let mut woken = CoreSet::default();
-    if is_event || cluster.may_have_letters() {
+    if (is_event || cluster.may_have_letters()) && !execution.wake(now_ns, &mut woken) {
         execution.step(now_ns, &mut woken, |_| ());
     }
     if !section::puts_off(core, now_ns)
@@ -388,5 +401,16 @@ pub fn raise(plan: u64, dag: DagId) {
 /// Takes a signal from outside, like [`raise`], in an interrupt or where one could be: interrupts
 /// are disabled.
 pub fn raise_in_interrupt(plan: u64, dag: DagId) {
-    status::serve(Some(plan), dag, Request::Signal(dag));
+    status::serve(Some(plan), divided::of_dag(dag), Request::Signal(dag));
+}
+
+/// Takes the answer to a wait of the plan with a number, from wherever it comes: an instance, an
+/// interrupt's handler, or the background. One for another cluster is a letter.
+pub fn answer(plan: u64, wait: WaitId) {
+    let were_enabled = interrupt_flag::disable();
+    let cluster = cluster::cluster_of(this_core::get());
+    status::serve(Some(plan), cluster, Request::Answer(wait));
+    if were_enabled {
+        interrupt_flag::enable();
+    }
 }

@@ -2,7 +2,8 @@
 //!
 //! A commit is a line `static 2` or `edf 1`, with the number of cores, and a line for each DAG:
 //! `fork T=100 D=90 O=10 flight=2: a/0 b/1 c/2/10 d/3; 0>1 0>2 1>3 2>3`, with `sporadic` after the
-//! name if it is; a subtask has its name, its priority and, if known, its WCET. Events are lines
+//! name if it is; a subtask has its name, its priority and, if known, its WCET. A line `wait 0.2 30`
+//! states a wait of a subtask, by DAG and subtask, with its limit. Events are lines
 //! such as `24 start c1 0.0.2`: time in ns, word, core, and DAG, job and subtask if it has one. A
 //! line `lost 2` before them states the number of earlier events that are lost.
 
@@ -26,14 +27,25 @@ fn number<T: std::str::FromStr>(text: &str) -> T {
 pub(crate) fn commit(text: &str) -> Commit {
     let lines = lines_of(text);
     let (policy, cores) = lines[0].split_once(' ').expect("policy and cores");
+    let (waits, dags): (Vec<&str>, Vec<_>) =
+        (lines[1..].iter()).partition(|line| line.starts_with("wait "));
     Commit {
         is_edf: policy == "edf",
         is_preemptive: true,
         cores: number(cores),
         charge_ns: Some(0),
-        dags: lines[1..].iter().map(|line| dag(line)).collect(),
+        dags: dags.into_iter().map(dag).collect(),
+        waits: waits.into_iter().map(wait).collect(),
         ..Commit::default()
     }
+}
+
+fn wait(line: &str) -> (u32, u32, u64, Option<u64>) {
+    let [_, of, limit_ns] = line.split(' ').collect::<Vec<_>>()[..] else {
+        panic!("`{line}` is no wait");
+    };
+    let (dag, subtask) = of.split_once('.').expect(line);
+    (number(dag), number(subtask), number(limit_ns), None)
 }
 
 fn dag(line: &str) -> CommittedDag {

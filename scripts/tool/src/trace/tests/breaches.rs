@@ -270,6 +270,47 @@ fn a_preemption_is_measured_from_the_latest_request() {
     assert_eq!((overtaken.count(), overtaken.max()), (1, 30));
 }
 
+/// `low` waits twice, and `high` runs meanwhile.
+const WAITS: &str = "
+0 released c0 1.0
+0 ready c0 1.0.0
+2 start c0 1.0.0
+20 wait c0 1.0.0
+50 released c0 0.0
+50 ready c0 0.0.0
+52 start c0 0.0.0
+53 wake c0 1.0.0
+80 finish c0 0.0.0
+80 completed c0 0.0
+82 resume c0 1.0.0
+99 wait c0 1.0.0
+99 wake c0 1.0.0
+99 resume c0 1.0.0
+120 finish c0 1.0.0
+120 completed c0 1.0
+";
+
+#[test]
+fn w1_an_instance_takes_its_waits_each_within_its_limit() {
+    let waits = format!("{TWO}\nwait 1.0 30\nwait 1.0 0");
+    let rows = "
+=
+53 wake -> 55 wake c0 1.0.0
+=
+53 wake -> 56 wake c0 1.0.0
+= at 56 ns, W1 waiting: subtask `l` of dag `low` job 0 ends its wait on core 0, which began at 20 ns and has a limit of 30 ns
+99 wait -> 
+99 wake -> 
+99 resume -> 
+= at 120 ns, W1 waiting: subtask `l` of dag `low` job 0 finishes on core 0 after 1 waits, and its subtask states 2
+82 resume -> 86 resume c0 1.0.0
+= at 80 ns, R5 dispatch: subtask `l` of dag `low` job 0 should run and waits 6 ns while core 0 is idle";
+    assert_each(&waits, WAITS, rows);
+    let one = format!("{TWO}\nwait 1.0 30");
+    let more = "= at 99 ns, W1 waiting: subtask `l` of dag `low` job 0 begins to wait on core 0 after 1 waits, and its subtask states 1";
+    assert_each(&one, WAITS, more);
+}
+
 const CHAIN: &str = "
 static 2
 chain T=100 D=100 O=0: a/0 b/1; 0>1";

@@ -11,8 +11,7 @@
 //!   for one;
 //! - a group for each DAG: its releases, deadlines and misses as instants, a slice for each job
 //!   from its nominal release to its completion, and for each subtask the slices of its instances
-//!   from readiness to their end, with their executions inside;
-//!   they executed inside;
+//!   from readiness to their end, with their executions and waits inside;
 //! - if the trace breaks a rule, a group `breaches` with an instant for each breach.
 //!
 //! Flows lead along each edge of the graph from an instance's finish to the start of its successor
@@ -265,6 +264,7 @@ fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut TrackWrit
     };
     let ends = match slice.to_ns {
         None => "after the trace",
+        Some(_) if history.wait_after(slice).is_some() => "wait",
         Some(_) if !is_last => "suspend",
         Some(_) if history.finish_ns.is_some() => "finish",
         Some(_) if history.dropped_ns.is_some() => "fault",
@@ -451,6 +451,10 @@ fn draw_subtask(
             let args = Object::new().number("core", slice.core.0).into_text();
             let name = format!("on core {}", slice.core.0);
             draw_piece(view, (instance, index), (&name, &args), flows, track);
+            if let Some((from_ns, to_ns)) = history.wait_after(*slice) {
+                track.begin_slice(from_ns, "waits", "{}");
+                track.end_slice(to_ns.unwrap_or(view.end_ns));
+            }
         }
         track.end_slice(over_ns.unwrap_or(view.end_ns));
     }

@@ -183,6 +183,47 @@ fn a_dag_shows_its_jobs_its_subtasks_and_what_was_missed() {
     assert_drawn(&diamond(), "releases, deadlines: ", moments);
 }
 
+#[test]
+fn a_wait_ends_a_piece_and_is_shown_in_its_subtask() {
+    let waits = "
+0 released c0 0.0
+1 ready c0 0.0.0
+2 start c0 0.0.0
+40 wait c0 0.0.0
+60 wake c1 0.0.0
+61 resume c1 0.0.0
+70 wait c1 0.0.0
+90 cancelled c0 0.0.0
+1000 ready c0 0.1.0
+1001 start c0 0.1.0
+1010 wait c0 0.1.0
+1100 missed c0 0.0";
+    let run = run_of(HEADER, waits);
+    let on_core = "
+        a/s #0 2..40, start to wait
+        a/s #1 1001..1010, start to wait";
+    assert_drawn(&run, "core 0: ", on_core);
+    assert_drawn(&run, "core 1: ", "\na/s #0 61..70, resume to wait");
+    let of_subtask = "
+        ready #0 1
+        #0 1..90
+        on core 0 2..40
+        waits 40..60
+        on core 1 61..70
+        waits 70..90
+        ready #1 1000
+        #1 1000..1100
+        on core 0 1001..1010
+        waits 1010..1100";
+    assert_drawn(&run, "s: ", of_subtask);
+
+    let stated = format!("{HEADER}\nwait 0.0 30\nwait 0.0 20");
+    let svg = picture::draw(&run_of(&stated, waits), 1).expect("it has a job");
+    assert_eq!(svg.matches(">waits 50 ns<").count(), 1, "{svg}");
+    // Job 1 has no release.
+    assert_eq!(svg.matches(" height=\"4\"").count(), 2, "{svg}");
+}
+
 /// Each is drawn twice: between cores, and between the DAGs' own tracks.
 #[test]
 fn an_arrow_leads_along_each_edge_whose_ends_ran() {

@@ -1,0 +1,67 @@
+//! Calls that may block, for subtasks that wait: a device that is a thread of the host.
+//!
+//! A function that reads a file, or asks another program, would keep its core from whatever needs
+//! it. An async one asks a device instead, whose driver makes the call in a thread of its own, of no
+//! level. So it may be late where the cores are busy, and delays nobody; and the wait ends at its
+//! limit, whatever the call does.
+
+use std::thread;
+use std::time::Duration;
+
+use fass::shared::{Device, create_device};
+
+/// How long the thread waits at most until it looks whether the device is still used.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Makes a device of a call that may block: each question is answered by `call`, one after the other,
+/// in a thread that lasts as long as the device is used. Of what is asked while a call goes on, the
+/// latest question counts.
+///
+/// # Panics
+///
+/// If the system has no thread for it.
+///
+/// ```
+/// use std::time::Duration;
+/// use fass::shared::Asker;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+///
+/// let ms = Duration::from_millis;
+/// let host = linux::blocking("host", |name: &'static str| std::fs::read_to_string(name).ok());
+/// let machine = linux::Linux::new(1, linux::Mechanism::Normal).unwrap();
+/// let dag = create_dag();
+/// dag.name("load").jobs(2).period(ms(50)).relative_deadline(ms(50));
+/// let read = |host: Asker<&'static str, Option<String>>| async move {
+///     match host.ask("/proc/loadavg").await {
+///         Ok(load) => assert!(load.is_some()),
+///         Err(late) => println!("{late}"),
+///     }
+/// };
+/// let read = dag.using(host.asking()).async_source(read);
+/// read.register(SubtaskAttributes::named("read").wait(ms(20)));
+/// finish_create_dags(&[dag]).unwrap();
+/// assert_eq!(machine.run().unwrap().statistics("load").completed, 2);
+/// ```
+pub fn blocking<Q, A>(name: &str, mut call: impl FnMut(Q) -> A + Send + 'static) -> Device<Q, A>
+where
+    Q: Send + Sync + 'static,
+    A: Send + Sync + 'static,
+{
+    let (device, mut driver) = create_device(name);
+    let serve = move || {
+        let own = thread::current();
+        driver.on_question(move || own.unpark());
+        while driver.is_used() {
+            match driver.question() {
+                // One that comes too late is of no use to anybody.
+                Some((ticket, question)) => drop(driver.answer(ticket, call(question))),
+                None => thread::park_timeout(LOOK),
+            }
+        }
+    };
+    let builder = thread::Builder::new().name(format!("fass-{name}"));
+    let _ = builder
+        .spawn(serve)
+        .expect("the system has a thread for each device");
+    device
+}

@@ -1,0 +1,294 @@
+//! The turns of a subtask that waits: what each asks for, and whether it may.
+//!
+//! A *turn* is what an instance executes from its start, or the end of a wait, to its finish, or
+//! the next wait. How it ends is told by one poll of the instance's future. That is ready: then the
+//! instance has finished, and its outputs go out. Or it is pending: then one future of ours has
+//! begun one wait in it. The completion of such a turn asks for that wait, and causes nothing else.
+//!
+//! The waits of a subtask are stated: their number, and the limit of each. An instance that waits
+//! otherwise panics with a [`WaitFault`].
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
+use core::time::Duration;
+
+use sched_dag::lifecycle::Request;
+use sched_dag::{Wait, worded};
+
+use super::effect::Effect;
+
+worded! {
+    /// A fault of an instance that does not wait as its subtask states. Its text is the message of
+    /// the instance's panic.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, WaitFault, create_dag, finish_create_dags, sleep};
+    ///
+    /// let machine = virtual_time::VirtualTime::new().contain_panics();
+    /// let (dag, period) = (create_dag(), Duration::from_millis(10));
+    /// dag.name("nap").jobs(1).relative_deadline(period);
+    /// let nap = || async {
+    ///     sleep(Duration::from_millis(4)).await;
+    /// };
+    /// let limit = Duration::from_millis(3);
+    /// let attributes = SubtaskAttributes::named("nap").wait(limit);
+    /// dag.register_periodic_async_subtask(nap, [], period, attributes);
+    /// finish_create_dags(&[dag]).unwrap();
+    ///
+    /// let message = &machine.run().panics[0].message;
+    /// let asked = Duration::from_millis(4);
+    /// assert_eq!(*message, WaitFault::TooLong { number: 0, asked, limit }.to_string());
+    /// ```
+    pub enum WaitFault {
+        /// The function begins a wait beyond those that its subtask states.
+        TooMany { stated: usize } = "wait_too_many",
+            "a wait too many: the function begins one more than the {} that its subtask \
+             states; state it by `wait`, or leave it out", stated;
+        /// The function has returned after fewer waits than its subtask states.
+        LeftOut { taken: u32, stated: usize } = "wait_left_out",
+            "a wait left out: the function has returned after {} of the {} waits that \
+             its subtask states; take each, one of no time if there is nothing to wait for, or \
+             state fewer", taken, stated;
+        /// A wait, of that number from 0 on, asks for more than its limit.
+        TooLong { number: u32, asked: Duration, limit: Duration } = "wait_too_long",
+            "a wait too long: wait {} asks for {:?}, and its limit is {:?}; ask \
+             for less, or state a longer limit", number, asked, limit;
+        /// The future begins a second wait in one turn.
+        TwoAtOnce = "two_waits_at_once",
+            "two waits at once: the function begins a wait before the last one has ended; await \
+             one after the other";
+        /// The future has returned in the turn in which it has begun a wait.
+        NotAwaited = "wait_not_awaited",
+            "a wait not awaited: the function has returned and dropped a wait that it has begun; \
+             await it to its end";
+        /// The future is pending, and no wait of ours is the reason.
+        Foreign = "foreign_wait",
+            "a foreign wait: the function awaits what is none of its subtask's waits, and nothing \
+             would end that; await `sleep`, `until`, a device's answer or a wire";
+        /// A wait of ours is begun by something else than the future of a subtask.
+        Outside = "wait_outside",
+            "a wait outside: it is polled by something else than the future of a subtask; await it \
+             in the function of an async subtask";
+    }
+}
+
+impl WaitFault {
+    #[cold]
+    pub(crate) fn raise(self) -> ! {
+        panic!("{self}")
+    }
+}
+
+/// The end that a wait of ours asks for.
+#[derive(Clone, Copy)]
+pub(crate) enum WaitEnd {
+    /// The stated limit.
+    Limit,
+    /// So many nanoseconds after it has begun.
+    After(u64),
+    /// So many, or the stated limit if that is less.
+    AtMost(u64),
+    /// So many nanoseconds after the release of the job.
+    SinceRelease(u64),
+}
+
+/// The turn asks for no wait.
+const NONE: u8 = 0;
+/// It asks for one of so many nanoseconds.
+const AFTER: u8 = 1;
+/// It asks for one until so many nanoseconds after the release.
+const SINCE_RELEASE: u8 = 2;
+
+/// No job.
+const NO_JOB: u64 = u64::MAX;
+
+/// The waits of a subtask, and how far its instance has come in them. Its users take turns, by the
+/// word of the scheduler: the instance while it executes, its completion, the end of its wait. So
+/// nothing in here needs an order.
+pub(crate) struct TurnState {
+    /// The stated limits.
+    limits_ns: Box<[u64]>,
+    /// The job of the instance that has started and not returned.
+    job: AtomicU64,
+    /// How many waits it has begun.
+    begun: AtomicU32,
+    /// [`NONE`], [`AFTER`] or [`SINCE_RELEASE`], and how many nanoseconds.
+    asks: AtomicU8,
+    asked_ns: AtomicU64,
+    has_timed_out: AtomicBool,
+    /// So much after the release it is at least.
+    reached_ns: AtomicU64,
+}
+
+impl TurnState {
+    pub(crate) fn new(waits: &[Wait]) -> Self {
+        Self {
+            limits_ns: waits.iter().map(|wait| wait.limit_ns).collect(),
+            job: AtomicU64::new(NO_JOB),
+            begun: AtomicU32::new(0),
+            asks: AtomicU8::new(NONE),
+            asked_ns: AtomicU64::new(0),
+            has_timed_out: AtomicBool::new(false),
+            reached_ns: AtomicU64::new(0),
+        }
+    }
+
+    /// Reports whether the instance of a job has started and not returned.
+    pub(crate) fn is_of(&self, job: u64) -> bool {
+        self.job.load(Ordering::Relaxed) == job
+    }
+
+    pub(crate) fn start(&self, job: u64) {
+        // An instance before it may have been cancelled, or have failed, at any of its waits.
+        self.job.store(job, Ordering::Relaxed);
+        self.begun.store(0, Ordering::Relaxed);
+        self.asks.store(NONE, Ordering::Relaxed);
+        self.reached_ns.store(0, Ordering::Relaxed);
+    }
+
+    /// Returns the job and the number of waits that it has begun.
+    pub(crate) fn latest(&self) -> (u64, u32) {
+        let (job, begun) = (&self.job, &self.begun);
+        (job.load(Ordering::Relaxed), begun.load(Ordering::Relaxed))
+    }
+
+    /// Reports whether the present turn has begun a wait.
+    pub(crate) fn is_asking(&self) -> bool {
+        self.asks.load(Ordering::Relaxed) != NONE
+    }
+
+    /// Begins the next wait.
+    #[inline(always)]
+    pub(crate) fn begin(&self, end: WaitEnd) {
+        let number = self.begun.load(Ordering::Relaxed);
+        let stated = self.limits_ns.len();
+        let Some(&limit_ns) = self.limits_ns.get(number as usize) else {
+            WaitFault::TooMany { stated }.raise()
+        };
+        if self.is_asking() {
+            WaitFault::TwoAtOnce.raise()
+        }
+        let reached_ns = self.reached_ns.load(Ordering::Relaxed);
+        // An instant of the job is judged by what is certain, not by the present time: so it is a
+        // fault in each run, or in none.
+        let (asks, asked_ns, most_ns) = match end {
+            WaitEnd::Limit => (AFTER, limit_ns, limit_ns),
+            WaitEnd::After(ns) => (AFTER, ns, ns),
+            WaitEnd::AtMost(ns) => (AFTER, ns.min(limit_ns), limit_ns),
+            WaitEnd::SinceRelease(ns) => (SINCE_RELEASE, ns, ns.saturating_sub(reached_ns)),
+        };
+        if most_ns > limit_ns {
+            let [asked, limit] = [most_ns, limit_ns].map(Duration::from_nanos);
+            WaitFault::TooLong {
+                number,
+                asked,
+                limit,
+            }
+            .raise()
+        }
+        self.begun.store(number + 1, Ordering::Relaxed);
+        self.asked_ns.store(asked_ns, Ordering::Relaxed);
+        self.asks.store(asks, Ordering::Relaxed);
+        if asks == SINCE_RELEASE {
+            let reached_ns = reached_ns.max(asked_ns);
+            self.reached_ns.store(reached_ns, Ordering::Relaxed);
+        }
+    }
+
+    /// Ends a turn whose future is pending.
+    pub(crate) fn expect_wait(&self) {
+        if !self.is_asking() {
+            WaitFault::Foreign.raise()
+        }
+    }
+
+    /// Ends the last turn.
+    pub(crate) fn finish(&self) {
+        if self.is_asking() {
+            WaitFault::NotAwaited.raise()
+        }
+        // Fewer would be harmless to the bound, but a replay and the law count on each.
+        let (taken, stated) = (self.begun.load(Ordering::Relaxed), self.limits_ns.len());
+        if (taken as usize) < stated {
+            WaitFault::LeftOut { taken, stated }.raise()
+        }
+        self.job.store(NO_JOB, Ordering::Relaxed);
+    }
+
+    /// Takes a turn of a job whose function is not called, and reports whether it is the last one:
+    /// each stated wait is taken, for no time.
+    pub(crate) fn pass(&self, job: u64) -> bool {
+        // The job's first turn is told by the job alone, as in a turn that calls the function.
+        if !self.is_of(job) {
+            self.start(job);
+        }
+        let is_last = self.latest().1 as usize == self.limits_ns.len();
+        match is_last {
+            true => self.finish(),
+            false => self.begin(WaitEnd::AtMost(0)),
+        }
+        is_last
+    }
+
+    /// Takes what the turn that has ended asks for, if it has not finished.
+    fn take_request(&self) -> Option<Request> {
+        let ns = self.asked_ns.load(Ordering::Relaxed);
+        let asks = self.asks.load(Ordering::Relaxed);
+        self.asks.store(NONE, Ordering::Relaxed);
+        match asks {
+            NONE => None,
+            AFTER => Some(Request::Wait(ns)),
+            _ => Some(Request::WaitUntil(ns)),
+        }
+    }
+
+    /// Reports whether the latest wait has ended by its limit.
+    pub(crate) fn has_timed_out(&self) -> bool {
+        self.has_timed_out.load(Ordering::Relaxed)
+    }
+
+    /// Learns how the wait has ended, before the next turn.
+    pub(crate) fn wake(&self, has_timed_out: bool) {
+        self.has_timed_out.store(has_timed_out, Ordering::Relaxed);
+    }
+}
+
+/// The effects of a subtask that waits: the real ones, which happen when it has finished.
+pub(crate) struct TurnEffects {
+    turn: Arc<TurnState>,
+    real: Vec<Box<dyn Effect>>,
+}
+
+impl TurnEffects {
+    pub(crate) fn new(turn: Arc<TurnState>, real: Vec<Box<dyn Effect>>) -> Self {
+        Self { turn, real }
+    }
+}
+
+impl Effect for TurnEffects {
+    fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request)) {
+        match self.turn.take_request() {
+            None => {
+                let real = self.real.iter_mut();
+                real.for_each(|effect| effect.happen(completed_ns, ask));
+            }
+            Some(request) => {
+                // All are asked, as each has something to post when a wait begins.
+                let mut is_there = false;
+                for effect in &mut self.real {
+                    is_there |= effect.wait(completed_ns);
+                }
+                // It is a wait all the same: the instance gives its core up.
+                ask(if is_there { Request::Wait(0) } else { request });
+            }
+        }
+    }
+
+    fn fail(&mut self, failed_ns: u64) {
+        let real = self.real.iter_mut();
+        real.for_each(|effect| effect.fail(failed_ns));
+    }
+}

@@ -1,0 +1,736 @@
+//! Subtasks that wait: the exact schedules, what a device answers and when, and each fault.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use crate::support::{MS, Seen, commit, every, job_numbers, ms, named, run, taking, work};
+use common::random::Random;
+use fass::shared::{Asker, DeviceDriver, Shutdown, Switch, TimedOut, create_device, shutting_down};
+use fass::{
+    Dag, OverrunPolicy, Preemption, SubtaskAttributes, WaitFault, create_dag, sleep, until,
+};
+use virtual_time::{Report, VirtualTime};
+
+/// A DAG of one subtask of that name, whose segments take so long, with sleeps between: in
+/// milliseconds, first a segment, then each sleep with the segment behind it.
+fn sleeper(name: &str, priority: u32, first: u64, rest: &'static [(u64, u64)]) -> Dag {
+    let dag = every(100, name);
+    dag.jobs(1);
+    let stated = rest.iter().fold(taking(name, first), |stated, of| {
+        stated.wait(ms(of.0)).wcet(ms(of.1))
+    });
+    let f = move || async move {
+        for (time, _) in rest {
+            sleep(ms(*time)).await;
+        }
+    };
+    dag.async_source(f).register(stated.priority(priority));
+    dag
+}
+
+/// Returns what cores did, by milliseconds, such as `2 wait a`.
+fn executions(report: &Report) -> Vec<String> {
+    let shown = report.event_lines().into_iter().filter_map(|line| {
+        let mut words = line.split(' ');
+        let at_ns: u64 = words.next()?.parse().ok()?;
+        let (what, of) = (words.next()?, words.next()?.split('[').next()?);
+        let on_core = ["start", "suspend", "resume", "finish", "wait"].contains(&what);
+        on_core.then(|| format!("{} {what} {of}", at_ns / MS))
+    });
+    shown.collect()
+}
+
+fn responses_ms(report: &Report, dag: &str) -> Vec<u64> {
+    let jobs = report.dag(dag).jobs();
+    jobs.filter_map(|job| Some(job.response_time_ns()? / MS))
+        .collect()
+}
+
+#[test]
+fn a_wait_gives_the_core_up_and_what_wakes_preempts() {
+    let both = || [sleeper("a", 0, 2, &[(3, 1)]), sleeper("b", 1, 4, &[])];
+    let report = run(&VirtualTime::new(), &both());
+    let expected = [
+        "0 start a",
+        "2 wait a",
+        "2 start b",
+        "5 suspend b",
+        "5 resume a",
+        "6 finish a",
+        "6 resume b",
+        "7 finish b",
+    ];
+    assert_eq!(executions(&report), expected);
+    let machine = VirtualTime::new().preemption(Preemption::Disabled);
+    let expected = [
+        "0 start a",
+        "2 wait a",
+        "2 start b",
+        "6 finish b",
+        "6 resume a",
+        "7 finish a",
+    ];
+    assert_eq!(executions(&run(&machine, &both())), expected);
+}
+
+#[test]
+fn a_wait_of_no_time_is_a_point_of_dispatch() {
+    let machine = VirtualTime::new().preemption(Preemption::Disabled);
+    let urgent = sleeper("b", 0, 3, &[]);
+    urgent.offset(ms(1));
+    let report = run(&machine, &[sleeper("a", 1, 2, &[(0, 2)]), urgent]);
+    let expected = [
+        "0 start a",
+        "2 wait a",
+        "2 start b",
+        "5 finish b",
+        "5 resume a",
+        "7 finish a",
+    ];
+    assert_eq!(executions(&report), expected);
+}
+
+#[test]
+fn what_wakes_at_a_release_competes_by_its_key() {
+    for (priorities, response_ms) in [([0, 1], 6), ([1, 0], 8)] {
+        let machine = VirtualTime::new().preemption(Preemption::Disabled);
+        let other = sleeper("b", priorities[1], 2, &[]);
+        other.offset(ms(4));
+        let report = run(
+            &machine,
+            &[sleeper("a", priorities[0], 1, &[(3, 2)]), other],
+        );
+        assert_eq!(responses_ms(&report, "a"), [response_ms]);
+    }
+}
+
+#[test]
+fn the_next_job_stays_behind_one_that_waits() {
+    let dag = create_dag();
+    dag.name("slow")
+        .jobs(4)
+        .period(ms(4))
+        .relative_deadline(ms(100));
+    let attributes = taking("slow", 1).wait(ms(5)).wcet(ms(1));
+    dag.async_source(|| sleep(ms(5))).register(attributes);
+    let report = run(&VirtualTime::new().cores(2), &[dag]);
+    assert_eq!(responses_ms(&report, "slow"), [7, 10, 13, 16]);
+}
+
+#[test]
+fn nothing_is_seen_of_an_instance_before_it_has_returned() {
+    let dag = every(20, "pair");
+    dag.jobs(2);
+    let latest = dag.latest::<u64>("time");
+    let (kept, keep) = Seen::shared();
+    let source = move || async move {
+        work(1);
+        sleep(ms(4)).await;
+        (fass::now_ns() / MS,)
+    };
+    let source = dag.async_source(source).writes(&["time"]);
+    source.register(named("source").wait(ms(5)));
+    let sink = move |(time,): (u64,)| keep.add((time, fass::now_ns() / MS));
+    dag.subtask(sink).reads(&["time"]).register(named("sink"));
+    let reader = every(4, "reader");
+    reader.jobs(3);
+    let (samples, sample) = Seen::shared();
+    let read = move |of: Option<fass::shared::Sample<'_, u64>>| sample.add(of.map(|of| *of.value));
+    let read = reader.using(latest.sample()).source(read);
+    read.register(named("read").priority(9));
+    let report = run(&VirtualTime::new().cores(2), &[dag, reader]);
+    assert_eq!(kept.all(), [(5, 5), (25, 25)]);
+    assert_eq!(samples.all(), [None, None, Some(5)], "at 0, 4 and 8 ms");
+    assert_eq!(report.dag("pair").subtask("source")[0].execution_ns, MS);
+}
+
+#[test]
+fn an_instant_of_the_job_counts_from_its_release() {
+    let urgent = sleeper("b", 0, 3, &[]);
+    let dag = every(20, "a");
+    dag.jobs(2);
+    let f = || async {
+        until(ms(5)).await;
+        until(ms(5)).await; // which is past
+        until(ms(9)).await;
+    };
+    let attributes = taking("a", 1).priority(1);
+    let attributes = attributes.wait(ms(5)).wcet(ms(1)).wait(ms(0)).wcet(ms(1));
+    dag.async_source(f)
+        .register(attributes.wait(ms(4)).wcet(ms(1)));
+    let report = run(&VirtualTime::new(), &[urgent, dag]);
+    // It starts 3 ms late in its first job, and that changes nothing.
+    assert_eq!(responses_ms(&report, "a"), [10, 10]);
+}
+
+/// Asks a device in each of 5 jobs, whose answers come when `answers` says, and returns what the
+/// function got, and the response times in milliseconds. The limit is 5 ms, segments take 1 ms.
+fn asking(
+    answers: impl FnMut(u64, u64) -> Vec<(Duration, u64)> + 'static,
+) -> (Vec<Result<u64, TimedOut>>, Vec<u64>) {
+    let (device, driver) = create_device::<u64, u64>("accelerator");
+    let (kept, keep) = Seen::shared();
+    let dag = every(20, "ask");
+    dag.jobs(5);
+    let mut job = 0;
+    let ask = move |device: Asker<u64, u64>| {
+        let (asked, keep) = (job, keep.clone());
+        job += 1;
+        async move { keep.add(device.ask(asked * 10).await) }
+    };
+    let ask = dag.using(device.asking()).async_source(ask);
+    ask.register(taking("ask", 1).wait(ms(5)).wcet(ms(1)));
+    let machine = VirtualTime::new();
+    commit(&[dag]);
+    machine.answers(driver, answers);
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    (kept.all(), responses_ms(&report, "ask"))
+}
+
+#[test]
+fn an_answer_ends_a_wait_and_its_limit_does_at_the_latest() {
+    let mut after_ms = [0, 3, 5, 6, 2].into_iter();
+    let (got, responses) = asking(move |question, job| {
+        assert_eq!(question, job * 10);
+        after_ms
+            .next()
+            .map(|after_ms| (ms(after_ms), question + 1))
+            .into_iter()
+            .collect()
+    });
+    // One at the very instant of the limit counts.
+    assert_eq!(got, [Ok(1), Ok(11), Ok(21), Err(TimedOut), Ok(41)]);
+    assert_eq!(responses, [2, 5, 7, 7, 4]);
+}
+
+#[test]
+fn a_device_that_answers_twice_late_or_never_changes_nothing_else() {
+    let (got, responses) = asking(|question, job| match job {
+        0 => vec![(ms(2), question), (ms(2), 99), (ms(4), 98)],
+        // In the midst of the wait of the next job.
+        1 => vec![(ms(22), 97)],
+        3 => vec![],
+        _ => vec![(ms(4), question)],
+    });
+    let expected = [Ok(0), Err(TimedOut), Ok(20), Err(TimedOut), Ok(40)];
+    assert_eq!((got, responses), (expected.into(), vec![4, 7, 6, 7, 6]));
+}
+
+#[test]
+fn a_call_may_shorten_a_limit_and_several_devices_are_several_waits() {
+    let (slow, slow_driver) = create_device::<(), u8>("slow");
+    let (fast, fast_driver) = create_device::<(), u8>("fast");
+    let dag = every(20, "two");
+    dag.jobs(1);
+    type Both = (Asker<(), u8>, Asker<(), u8>);
+    let ask = |(slow, fast): Both| async move {
+        assert_eq!(slow.ask(()).within(ms(2)).await, Err(TimedOut));
+        assert_eq!(fast.ask(()).await, Ok(7));
+        assert_eq!(slow.ask(()).await, Ok(8));
+    };
+    let ask = dag.using((slow.asking(), fast.asking())).async_source(ask);
+    ask.register(named("two").wait(ms(4)).wait(ms(4)).wait(ms(4)));
+    let machine = VirtualTime::new();
+    commit(&[dag]);
+    machine.answers(slow_driver, |(), _| Some((ms(3), 8)));
+    machine.answers(fast_driver, |(), _| Some((ms(2), 7)));
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert_eq!(responses_ms(&report, "two"), [7]);
+}
+
+/// Returns the message of the panic of an async source in its first job.
+fn fault<Fut>(stated: SubtaskAttributes, f: impl FnMut() -> Fut + Send + 'static) -> String
+where
+    Fut: Future<Output = ()> + Send + 'static,
+{
+    let machine = VirtualTime::new().contain_panics();
+    let dag = every(20, "faulty");
+    dag.jobs(2).async_source(f).register(stated);
+    let report = run(&machine, &[dag]);
+    let [panic] = &report.panics[..] else {
+        panic!("{:?}", report.panics);
+    };
+    assert_eq!(report.dag("faulty").statistics().completed, 0);
+    panic.message.clone()
+}
+
+/// Polls a future once, and drops it.
+async fn poll_once(future: impl Future<Output = ()>) {
+    let mut future = Some(Box::pin(future));
+    std::future::poll_fn(|context| {
+        let future = future.take().expect("once");
+        _ = { future }.as_mut().poll(context);
+        std::task::Poll::Ready(())
+    })
+    .await;
+}
+
+/// Passes a clone of the waker on.
+async fn by_another_waker(future: impl Future<Output = ()>) {
+    let mut future = Box::pin(future);
+    std::future::poll_fn(|context| {
+        let waker = context.waker().clone();
+        waker.wake_by_ref();
+        future
+            .as_mut()
+            .poll(&mut std::task::Context::from_waker(&waker))
+    })
+    .await;
+}
+
+#[test]
+fn each_wait_that_is_not_as_stated_is_a_fault_with_a_name() {
+    let stated = || named("faulty").wait(ms(3));
+    let cases = [
+        (
+            fault(stated(), || async {
+                sleep(ms(1)).await;
+                sleep(ms(1)).await;
+            }),
+            WaitFault::TooMany { stated: 1 },
+        ),
+        (
+            fault(stated().wait(ms(1)), || sleep(ms(1))),
+            WaitFault::LeftOut {
+                taken: 1,
+                stated: 2,
+            },
+        ),
+        (
+            fault(stated(), || sleep(ms(4))),
+            WaitFault::TooLong {
+                number: 0,
+                asked: ms(4),
+                limit: ms(3),
+            },
+        ),
+        (
+            fault(stated().wait(ms(3)), || async {
+                until(ms(2)).await;
+                until(ms(6)).await;
+            }),
+            WaitFault::TooLong {
+                number: 1,
+                asked: ms(4),
+                limit: ms(3),
+            },
+        ),
+        (
+            fault(stated().wait(ms(3)), || async {
+                poll_once(sleep(ms(1))).await;
+                sleep(ms(1)).await;
+            }),
+            WaitFault::TwoAtOnce,
+        ),
+        (
+            fault(stated(), || poll_once(sleep(ms(1)))),
+            WaitFault::NotAwaited,
+        ),
+        (fault(stated(), std::future::pending), WaitFault::Foreign),
+        (
+            fault(stated(), || by_another_waker(sleep(ms(1)))),
+            WaitFault::Outside,
+        ),
+    ];
+    let mut codes = Vec::new();
+    for (message, expected) in cases {
+        assert_eq!(message, expected.to_string());
+        codes.push(expected.code());
+    }
+    codes.dedup();
+    assert_eq!(codes, WaitFault::CODES);
+}
+
+#[test]
+fn what_cannot_wait_or_is_asked_twice_is_a_fault_of_the_commit() {
+    let machine = VirtualTime::new();
+    let dag = every(20, "wrong");
+    let (device, _driver) = create_device::<(), ()>("sonar");
+    let ask = |sonar: Asker<(), ()>| async move { _ = sonar.ask(()).await };
+    for name in ["one", "two"] {
+        let ask = dag.using(device.asking()).async_source(ask);
+        ask.register(named(name).wait(ms(1)));
+    }
+    dag.source(|| ()).register(named("plain").wait(ms(1)));
+    dag.survive_faults(fass::FaultLimit {
+        faults: 1,
+        window: 1,
+        in_all: 1,
+    });
+    let anew = dag.restarting(|| |()| ());
+    anew.register(named("anew").wait(ms(1)));
+    let partly = taking("partly", 1).wait(ms(1)).wait(ms(1)).wcet(ms(1));
+    dag.async_source(|| sleep(ms(1))).register(partly);
+    let construction = fass::commit::ConstructionPolicy {
+        sources: fass::commit::CountLimit::Several,
+        sinks: fass::commit::CountLimit::Several,
+        parts: fass::commit::CountLimit::Several,
+        ..fass::commit::ConstructionPolicy::paper()
+    };
+    let error = fass::commit::finish_create_dags_with(&[dag], construction);
+    let error = error.expect_err("four subtasks are wrong");
+    assert_eq!(
+        error.to_string(),
+        "subtask `plain` of dag `wrong` states waits, and its function is not async; register an \
+         async one, or state no waits\n\
+         subtask `anew` of dag `wrong` states waits, and has another function for after a fault, \
+         which could not have the place of a future that the fault has ended; register an async \
+         one alone, or state no waits\n\
+         subtask `two` of dag `wrong` asks device `sonar`, which another subtask asks; make a \
+         device for each\n\
+         subtask `partly` of dag `wrong` waits, and not each of its segments has a WCET above 0; \
+         give one to each, or to none"
+    );
+    drop(machine);
+}
+
+/// Counts how often one was dropped.
+struct Dropped(Arc<AtomicUsize>);
+
+impl Drop for Dropped {
+    fn drop(&mut self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn the_future_of_an_aborted_job_is_dropped_and_its_wait_taken_back() {
+    let drops = Arc::<AtomicUsize>::default();
+    let (kept, keep) = Seen::shared();
+    let dag = every(10, "abort");
+    dag.jobs(4).in_flight(1).overrun(OverrunPolicy::Abort);
+    let (dropped, mut job) = (Arc::clone(&drops), 0);
+    let f = move || {
+        keep.add((job, dropped.load(Ordering::Relaxed)));
+        let (held, long) = (Dropped(Arc::clone(&dropped)), job == 1);
+        job += 1;
+        async move {
+            sleep(if long { ms(30) } else { ms(2) }).await;
+            drop(held);
+        }
+    };
+    dag.async_source(f)
+        .register(taking("f", 1).wait(ms(30)).wcet(ms(1)));
+    let report = run(&VirtualTime::new(), &[dag]);
+    // Job 1 is aborted in its wait, at the release of job 2.
+    let counts = report.dag("abort").statistics();
+    assert_eq!((counts.completed, counts.aborts), (3, 1));
+    assert_eq!(responses_ms(&report, "abort"), [4, 10, 4, 4]);
+    assert_eq!(kept.all(), [(0, 0), (1, 1), (2, 2), (3, 3)]);
+    assert_eq!(drops.load(Ordering::Relaxed), 4);
+}
+
+#[test]
+fn a_fault_that_costs_a_job_ends_the_waits_of_that_job() {
+    let machine = VirtualTime::new().cores(2).contain_panics();
+    let drops = Arc::<AtomicUsize>::default();
+    let dag = every(20, "both");
+    dag.jobs(3).survive_faults(fass::FaultLimit {
+        faults: 1,
+        window: 1,
+        in_all: 1,
+    });
+    dag.source(job_numbers(0))
+        .writes(&["go"])
+        .register(named("go"));
+    let (kept, keep) = Seen::shared();
+    let held = Arc::clone(&drops);
+    let waits = move |(job,): (u64,)| {
+        let (held, keep) = (Dropped(Arc::clone(&held)), keep.clone());
+        keep.add((job, held.0.load(Ordering::Relaxed)));
+        async move {
+            sleep(ms(5)).await;
+            drop(held);
+            (job,)
+        }
+    };
+    let waits = dag.async_subtask(waits).reads(&["go"]).writes(&["a"]);
+    waits.register(named("waits").wait(ms(5)));
+    let fails = || {
+        |(job,): (u64,)| {
+            work(3);
+            assert_ne!(job, 1, "worn out");
+            (job,)
+        }
+    };
+    let fails = dag.restarting(fails).reads(&["go"]).writes(&["b"]);
+    fails.register(named("fails"));
+    let sink = |(a, b): (u64, u64)| assert_eq!(a, b);
+    dag.subtask(sink).reads(&["a", "b"]).register(named("sink"));
+    let report = run(&machine, &[dag]);
+    let counts = report.dag("both").statistics();
+    assert_eq!((counts.completed, counts.failed), (2, 1));
+    // The future of job 1 is dropped by job 2, before its function is called.
+    assert_eq!(kept.all(), [(0, 0), (1, 1), (2, 2)]);
+    assert_eq!(drops.load(Ordering::Relaxed), 3);
+}
+
+#[test]
+fn a_fault_while_others_wait_ends_their_dag() {
+    let machine = VirtualTime::new().cores(2).contain_panics();
+    let drops = Arc::<AtomicUsize>::default();
+    let dag = every(20, "both");
+    dag.jobs(3);
+    dag.source(|| (1,)).writes(&["go"]).register(named("go"));
+    let (held, turns) = (Arc::clone(&drops), Seen::shared());
+    let keep = turns.1;
+    let waits = move |(_,): (i32,)| {
+        let (held, keep) = (Dropped(Arc::clone(&held)), keep.clone());
+        async move {
+            sleep(ms(5)).await;
+            keep.add(());
+            drop(held);
+            (1,)
+        }
+    };
+    let waits = dag.async_subtask(waits).reads(&["go"]).writes(&["a"]);
+    waits.register(taking("waits", 1).wait(ms(5)).wcet(ms(1)));
+    let fails = |(_,): (i32,)| -> (i32,) {
+        work(3);
+        panic!("worn out")
+    };
+    let fails = dag.subtask(fails).reads(&["go"]).writes(&["b"]);
+    fails.register(named("fails"));
+    let sink = |_: (i32, i32)| ();
+    dag.subtask(sink).reads(&["a", "b"]).register(named("sink"));
+    let report = run(&machine, &[dag]);
+    assert_eq!(report.end_ns, 3 * MS, "nothing waits any more");
+    assert_eq!((report.panics.len(), turns.0.all().len()), (1, 0));
+    drop(machine);
+    assert_eq!(drops.load(Ordering::Relaxed), 1, "with the subtask");
+}
+
+#[test]
+fn a_budget_counts_what_all_segments_execute() {
+    let machine = VirtualTime::new().contain_panics();
+    let dag = every(50, "budget");
+    dag.jobs(2);
+    let mut job = 0;
+    let f = move || {
+        let takes = [2, 3][job];
+        job += 1;
+        async move {
+            work(takes);
+            sleep(ms(20)).await;
+            work(2);
+        }
+    };
+    let attributes = named("f").budget(ms(4)).wait(ms(20));
+    dag.async_source(f).register(attributes);
+    let report = run(&machine, &[dag]);
+    assert_eq!(report.dag("budget").statistics().completed, 1);
+    assert_eq!(
+        report.panics[0].message,
+        "executed for more than its budget of 4ms"
+    );
+    assert_eq!(report.end_ns, 74 * MS, "3 and 1 after a wait of 20");
+}
+
+#[test]
+fn an_async_function_may_do_without_waits() {
+    let dag = every(10, "plain");
+    dag.jobs(2);
+    let source = dag.async_source(|| async { (3,) }).writes(&["three"]);
+    source.register(taking("source", 1));
+    let sink = |(three,): (i32,)| async move { assert_eq!(three, 3) };
+    let sink = dag.async_subtask(sink).reads(&["three"]);
+    sink.register(taking("sink", 1));
+    let report = run(&VirtualTime::new(), &[dag]);
+    assert_eq!(responses_ms(&report, "plain"), [2, 2]);
+}
+
+#[test]
+fn an_untyped_subtask_waits_between_its_edges() {
+    let dag = every(20, "untyped");
+    dag.jobs(3);
+    let (kept, keep) = Seen::shared();
+    let said = keep.clone();
+    let first = dag.register_untyped_async_subtask(
+        move |job| {
+            let keep = keep.clone();
+            async move {
+                sleep(ms(job)).await;
+                keep.add((job, "first"));
+            }
+        },
+        taking("first", 1).wait(ms(5)).wcet(ms(1)),
+    );
+    let second = move |job| said.add((job, "second"));
+    let second = dag.register_untyped_subtask(second, taking("second", 1));
+    dag.precede(&first, &second);
+    let report = run(&VirtualTime::new(), &[dag]);
+    assert_eq!(responses_ms(&report, "untyped"), [3, 4, 5]);
+    let expected = (0..3).flat_map(|job| [(job, "first"), (job, "second")]);
+    assert_eq!(kept.all(), expected.collect::<Vec<_>>());
+}
+
+#[test]
+fn segments_take_their_own_wcets_or_less() {
+    let report = |silent| {
+        let machine = VirtualTime::new().silent(silent);
+        run(&machine, &[sleeper("a", 0, 4, &[(3, 1), (2, 5)])])
+    };
+    let full = report(virtual_time::Silent::Wcet);
+    assert_eq!(responses_ms(&full, "a"), [15]);
+    let drawn = report(virtual_time::Silent::Drawn { seed: 5 });
+    let executed_ns = drawn.instances[0].execution_ns;
+    assert!((3..10 * MS).contains(&executed_ns), "{executed_ns}");
+    // A new draw for each segment, and the same again.
+    let again = report(virtual_time::Silent::Drawn { seed: 5 });
+    assert_eq!(again.events, drawn.events);
+}
+
+/// Commits a camera that asks an accelerator twice in a job, and asks for the time between its
+/// waits; and returns the driver's end. The function fails at an answer of 13.
+fn camera() -> DeviceDriver<u64, u64> {
+    let (device, driver) = create_device::<u64, u64>("accelerator");
+    device.record();
+    let dag = every(20, "camera");
+    dag.jobs(40).record::<u64>("frame").record::<u64>("found");
+    let source = dag.source(job_numbers(1)).writes(&["frame"]);
+    source.register(named("take"));
+    let ask = |device: Asker<u64, u64>, (frame,): (u64,)| async move {
+        let first = device.ask(frame).within(ms(3)).await;
+        let between_ns = fass::now_ns();
+        sleep(Duration::from_micros(frame * 10)).await;
+        let second = device.ask(frame + 1).await;
+        let of = |answer: Result<u64, TimedOut>| answer.unwrap_or(99);
+        assert!(frame != 30 || first != Ok(13), "worn out");
+        (of(first) + 1_000 * of(second) + 1_000_000 * (between_ns + fass::now_ns()),)
+    };
+    let ask = dag.using(device.asking()).async_subtask(ask);
+    let stated = taking("ask", 1).wait(ms(4)).wcet(ms(1));
+    let stated = stated.wait(ms(1)).wcet(ms(1)).wait(ms(4)).wcet(ms(1));
+    let ask = ask.reads(&["frame"]).writes(&["found"]);
+    ask.register(stated);
+    let sink = dag.subtask(|_: (u64,)| ()).reads(&["found"]);
+    sink.register(named("sink"));
+    commit(&[dag]);
+    driver
+}
+
+#[test]
+fn a_replay_computes_the_same_without_the_device_in_the_same_time() {
+    for last in [40, 30] {
+        let machine = VirtualTime::new().contain_panics();
+        let driver = camera();
+        let mut random = Random::new(last);
+        machine.answers(driver, move |question, job| {
+            let number = if job == last {
+                13
+            } else {
+                question + random.within(0..=90)
+            };
+            let after = Duration::from_micros(random.within(0..=6_000));
+            let after = if job == last { ms(1) } else { after };
+            random.chance(90).then_some((after, number))
+        });
+        let recorded = machine.run();
+        assert_eq!(recorded.violations(), []);
+        let recording = machine.recording();
+        let replaying = VirtualTime::new().contain_panics();
+        let machine = replaying.replay(&recording).expect("it is whole");
+        let mut driver = camera();
+        let report = machine.run();
+        assert_eq!(report.violations(), []);
+        assert!(driver.question().is_none());
+        assert_eq!((report.divergence.as_ref(), report.uncompared), (None, 0));
+        assert_eq!(report.compared, last);
+        // The source takes no time now, and what failed is cut by the recording.
+        let of_both = [&recorded, &report].map(|report| {
+            let all = report.dag("camera").subtask("ask").into_iter();
+            let all = all.filter(|of| of.instance.job < last);
+            let times = all.filter_map(|of| Some(of.finish_ns? - of.start_ns?));
+            times.collect::<Vec<_>>()
+        });
+        assert_eq!(of_both[0], of_both[1]);
+        assert_eq!(report.panics.len(), usize::from(last == 30));
+    }
+}
+
+#[test]
+fn an_answer_is_shown_among_what_its_subtask_takes() {
+    let machine = VirtualTime::new();
+    let driver = camera();
+    machine.answers(driver, |question, _| {
+        (question % 2 == 0).then_some((ms(2), 5))
+    });
+    let shown = machine.until("camera", 1).expect("it ends");
+    let shown = shown.to_string();
+    let expected = r"takes `accelerator`: [[0,0,null],[2,2000000,5]]";
+    assert!(shown.contains(expected), "{shown}");
+}
+
+#[test]
+fn a_pause_and_the_end_of_a_run_wait_no_longer_than_the_limit() {
+    let (device, _driver) = create_device::<(), ()>("deaf");
+    let dag = every(10, "asks");
+    let ask = |device: Asker<(), ()>| async move {
+        assert_eq!(device.ask(()).await, Err(TimedOut));
+    };
+    let ask = dag.using(device.asking()).async_source(ask);
+    ask.register(taking("ask", 1).wait(ms(6)).wcet(ms(1)));
+    let operator = create_dag();
+    operator.name("operator").relative_deadline(ms(10));
+    let mut presses = 0;
+    let act = move |(mut asks, mut all): (Switch<'_>, Shutdown<'_>)| {
+        presses += 1;
+        match presses {
+            1 => asks.pause(),
+            2 => asks.resume(),
+            _ => all.request(),
+        }
+    };
+    let button = operator.sporadic(ms(1));
+    let act = operator
+        .using((dag.switching(), shutting_down()))
+        .source(act);
+    act.register(named("act"));
+    let machine = VirtualTime::new();
+    commit(&[dag, operator]);
+    // In the midst of the waits of jobs 0 and 3.
+    for at_ms in [4, 25, 34] {
+        machine.raise_at(&button, ms(at_ms));
+    }
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    assert_eq!(responses_ms(&report, "asks"), [8, 8]);
+    assert_eq!(report.dag("asks").statistics().skips, 2);
+    assert_eq!(report.end_ns, 38 * MS);
+}
+
+#[test]
+fn a_recorded_source_that_waits_is_replayed() {
+    let commit_source = |salt: u64| {
+        let dag = every(10, "slow");
+        dag.jobs(5).record::<u64>("number").record::<u64>("twice");
+        let mut number = salt;
+        let source = move || {
+            number += 1;
+            async move {
+                sleep(ms(3)).await;
+                (number,)
+            }
+        };
+        let source = dag.async_source(source).writes(&["number"]);
+        source.register(taking("source", 1).wait(ms(3)).wcet(ms(1)));
+        let twice = |(number,): (u64,)| (2 * number,);
+        let twice = dag.subtask(twice).reads(&["number"]).writes(&["twice"]);
+        twice.register(named("twice"));
+        let sink = dag.subtask(|_: (u64,)| ()).reads(&["twice"]);
+        sink.register(named("sink"));
+        commit(&[dag]);
+    };
+    let machine = VirtualTime::new();
+    commit_source(7);
+    machine.run();
+    let recording = machine.recording();
+    let machine = VirtualTime::new().replay(&recording).expect("it is whole");
+    commit_source(70);
+    let report = machine.run();
+    assert_eq!((report.compared, report.divergence.as_ref()), (5, None));
+    assert_eq!(report.violations(), []);
+}

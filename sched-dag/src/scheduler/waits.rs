@@ -1,0 +1,305 @@
+//! Waits: instances that have started, hold no core and are not eligible until something has come.
+//!
+//! A subtask may wait between segments of its function: for a time, for a device, for bytes. Each
+//! wait has a *limit*, so that it ends whatever a device does. The rules, whose scenarios in
+//! `tests/scenarios/waits.txt` bear their numbers:
+//!
+//! - **W1, waiting.** From the end of a segment to the end of its wait the instance is not eligible
+//!   and holds no core. Waits do not queue: each instance has a timer and a limit of its own.
+//! - **W2, the end.** A wait ends with its answer, and at its limit at the latest; an answer at the
+//!   instant of the limit is one. At that instant the instance is eligible again, with the key that
+//!   it had, on any core of its cluster.
+//! - **W3, what a wait is not.** It is no finish: it releases no edge, completes no job, and the
+//!   subtask's next instance stays behind it (R2 to R4).
+//! - **W4, one instant.** Of one instant come first the segments that end, then the waits that end,
+//!   those of 0 that have just begun among them, then the releases, then one dispatch.
+//! - **W5, without preemption.** What keeps its core keeps it to the end of its segment. A wait,
+//!   also one of 0, gives it up.
+//! - **W6, cut jobs.** No instance of a job that is cut waits: it is cancelled when the job is cut,
+//!   or where it would begin to wait.
+//! - **W7, late answers.** An answer names the wait that it is for; to any other it is nothing.
+//!
+//! A wait that begins costs its DAG's timers a step of a heap, and so does its end.
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use super::vertices::InstancePhase;
+use super::{Decision, HandOff, Scheduler, earliest_ns};
+use crate::ids::{CoreId, DagId, Instance, Vertex};
+use crate::journal::EventKind;
+use crate::request::WaitId;
+use crate::spec::WAITS;
+use crate::task_set::TaskSet;
+
+/// The vertices that may wait, and the latest wait of each.
+#[derive(Clone, Debug, Default, Hash)]
+pub(super) struct WaitTable {
+    /// Ascending.
+    vertices: Box<[u32]>,
+    latest: Box<[LatestWait]>,
+}
+
+#[derive(Clone, Copy, Debug, Hash)]
+struct LatestWait {
+    /// The job that it is of; `u64::MAX` for none.
+    job: u64,
+    /// Its number among the waits of its instance, from 0 on.
+    number: u32,
+    has_timed_out: bool,
+}
+
+impl WaitTable {
+    pub(super) fn new(task_set: &TaskSet) -> Self {
+        if !WAITS {
+            return Self::default();
+        }
+        let dags = (0..).map(DagId).zip(task_set.dags());
+        let vertices: Vec<u32> = dags
+            .flat_map(|(id, dag)| {
+                let numbered = (task_set.first_vertex(id)..).zip(dag.subtasks());
+                let waiting = numbered.filter(|(_, subtask)| !subtask.waits().is_empty());
+                waiting.map(|(vertex, _)| vertex)
+            })
+            .collect();
+        let none = LatestWait {
+            job: u64::MAX,
+            number: 0,
+            has_timed_out: false,
+        };
+        Self {
+            latest: vertices.iter().map(|_| none).collect(),
+            vertices: vertices.into(),
+        }
+    }
+
+    /// Returns the number of vertices that may wait, each of which has a timer.
+    pub(super) const fn len(&self) -> usize {
+        if WAITS { self.vertices.len() } else { 0 }
+    }
+
+    #[inline]
+    fn place(&self, vertex: u32) -> usize {
+        let place = self.vertices.binary_search(&vertex);
+        place.expect("the subtask states its waits")
+    }
+
+    /// Gives a number to the wait that an instance begins, and returns where that of its vertex is.
+    #[inline]
+    fn begin(&mut self, vertex: u32, job: u64) -> usize {
+        let place = self.place(vertex);
+        let latest = &mut self.latest[place];
+        latest.number = match latest.job == job {
+            true => latest.number + 1,
+            false => 0,
+        };
+        latest.job = job;
+        place
+    }
+}
+
+impl Scheduler {
+    /// Begins the wait of an instance that has started (W1), which ends at `limit_ns` at the latest.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn begin_wait(&mut self, instance: Instance, limit_ns: u64) {
+        let number = self.take_off(instance, "waits");
+        let vertex = self.vertices.get_mut(number);
+        vertex.phase = InstancePhase::Waiting;
+        let jobs = &self.dags[vertex.dag.index()].jobs;
+        let is_cut = jobs.job(vertex.progress).cut.is_some();
+        let place = self.waits.begin(number, instance.job);
+        // W6: nothing is left for which it could be worth waiting.
+        if is_cut {
+            self.cancel_wait(number);
+            self.end_all();
+            return;
+        }
+        self.set_limit(place, limit_ns);
+    }
+
+    /// Begins the wait of the instance which `core` has been given last, whose turn has ended at
+    /// `now_ns`, and gives the core the first in line. `None`, and nothing is changed, if more is to
+    /// be decided at this instant (the module `dispatch` says what may be): then the driver ends the
+    /// turn, and the instant, as ever. A time earlier than one before counts as that one.
+    ///
+    /// If the core goes on with the instance, as its wait is of no time and it is the first in line,
+    /// neither the wait nor its end is written down. No answer may come at this instant.
+    ///
+    /// # Panics
+    ///
+    /// If the subtask states no waits.
+    #[inline]
+    pub fn wait_shortly(
+        &mut self,
+        now_ns: u64,
+        core: CoreId,
+        vertex: Vertex,
+        limit_ns: u64,
+    ) -> Option<HandOff> {
+        let instant_ns = self.log.now_ns.max(now_ns);
+        let waiting = self.vertices.get_mut(vertex.0);
+        let job = self.dags[waiting.dag.index()].jobs.job(waiting.progress);
+        let is_alone = self.fresh == 0 && instant_ns < self.quiet_until_ns && job.cut.is_none();
+        if !is_alone || waiting.phase != InstancePhase::Running(core) {
+            return None;
+        }
+        let (key, instance) = (self.cores.running(core)?, waiting.present_instance());
+        let place = self.waits.begin(vertex.0, instance.job);
+        (self.log.now_ns, self.log.here) = (instant_ns, core);
+        let limit_ns = now_ns.saturating_add(limit_ns);
+        if limit_ns > instant_ns {
+            waiting.phase = InstancePhase::Waiting;
+            self.log.on_this(EventKind::Wait, now_ns, instance);
+            self.set_limit(place, limit_ns);
+        } else {
+            // W4: it ends where it begins, and then competes for its own core.
+            self.waits.latest[place].has_timed_out = true;
+            let is_first = |first| key < first;
+            if self.ready.is_empty() || self.ready.peek().is_none_or(is_first) {
+                let what = EventKind::Resume;
+                let decision = Decision {
+                    what,
+                    core,
+                    instance,
+                };
+                return Some(HandOff::To(vertex, decision));
+            }
+            waiting.phase = InstancePhase::Preempted;
+            self.log.on_this(EventKind::Wait, now_ns, instance);
+            self.log.of_instance(EventKind::Wake, instance);
+            self.ready.insert(key);
+        }
+        let done = self.give_first(core);
+        if done == HandOff::Idle {
+            self.cores.free(core);
+        }
+        Some(done)
+    }
+
+    /// Ends the wait whose limit comes first, if it has come by `now_ns`, and gives its instance an
+    /// idle core. `None` if that is not all of the instant, of which this may be a part: the step
+    /// is to be taken as ever. No request is to be served.
+    #[inline]
+    pub fn wake_shortly(&mut self, now_ns: u64, here: CoreId) -> Option<(CoreId, Vertex)> {
+        let (limit_ns, timer) = self.timers.peek()?;
+        let place = timer.checked_sub(self.dags.len())?;
+        // Where a core is idle, nothing is in line.
+        if self.fresh != 0 || limit_ns > now_ns || !self.cores.any_idle() {
+            return None;
+        }
+        (self.log.now_ns, self.log.here) = (self.log.now_ns.max(now_ns), here);
+        self.end_wait(place, true);
+        if self.log.now_ns >= self.quiet_until_ns {
+            return None;
+        }
+        self.fresh = 0;
+        let (key, core) = (self.ready.pop()?, self.cores.take_idle()?);
+        let _ = self.give(core, key);
+        Some((core, Vertex(key.vertex())))
+    }
+
+    #[inline]
+    fn set_limit(&mut self, place: usize, limit_ns: u64) {
+        self.timers.set(self.dags.len() + place, limit_ns);
+        self.quiet_until_ns = self.quiet_until_ns.min(limit_ns);
+        self.log.has_job_event = true;
+    }
+
+    /// Takes the answer for a wait (W7).
+    pub(super) fn answer(&mut self, wait: WaitId) {
+        let number = self.vertex(wait.instance).0;
+        let vertex = self.vertices.get(number);
+        if vertex.phase != InstancePhase::Waiting || vertex.job != wait.instance.job {
+            return;
+        }
+        let place = self.waits.place(number);
+        if self.waits.latest[place].number == wait.number {
+            self.end_wait(place, false);
+        }
+    }
+
+    /// Ends the wait whose limit has come, by the number of its timer behind those of the DAGs.
+    #[cold]
+    #[inline]
+    pub(super) fn time_out(&mut self, timer: usize) {
+        self.end_wait(timer - self.dags.len(), true);
+    }
+
+    /// Ends all waits whose limit has come, before a release of this instant cuts a job (W4).
+    pub(super) fn time_out_due(&mut self) {
+        for place in 0..self.waits.len() {
+            let limit_ns = self.timers.key_of(self.dags.len() + place);
+            if limit_ns.is_some_and(|limit_ns| limit_ns <= self.log.now_ns) {
+                self.end_wait(place, true);
+            }
+        }
+    }
+
+    /// Makes a waiting instance eligible again (W2).
+    #[inline]
+    fn end_wait(&mut self, place: usize, has_timed_out: bool) {
+        let number = self.waits.vertices[place];
+        self.waits.latest[place].has_timed_out = has_timed_out;
+        self.timers.remove(self.dags.len() + place);
+        self.quiet_until_ns = earliest_ns(&self.timers);
+        let vertex = self.vertices.get_mut(number);
+        // As one that was preempted, it has started and is in line for a core.
+        vertex.phase = InstancePhase::Preempted;
+        let job = self.dags[vertex.dag.index()].jobs.job(vertex.progress);
+        self.ready.insert(self.ready.key(number, vertex, || job));
+        self.log.of_instance(EventKind::Wake, vertex.instance(job));
+        self.fresh += 1;
+    }
+
+    /// Cancels the instances of a DAG that wait, of the job with a sequence number (of all jobs if
+    /// that is `u64::MAX`); their successors are to be told by [`end_all`](Self::end_all).
+    pub(super) fn cancel_waits(&mut self, dag: DagId, sequence: u64) {
+        for place in 0..self.waits.len() {
+            let number = self.waits.vertices[place];
+            let vertex = self.vertices.get(number);
+            let is_meant = sequence == u64::MAX || vertex.progress == sequence;
+            if vertex.dag == dag && vertex.phase == InstancePhase::Waiting && is_meant {
+                self.cancel_wait(number);
+            }
+        }
+    }
+
+    /// Cancels a waiting instance, whose job is cut.
+    fn cancel_wait(&mut self, number: u32) {
+        let place = self.waits.place(number);
+        self.timers.remove(self.dags.len() + place);
+        self.quiet_until_ns = earliest_ns(&self.timers);
+        let vertex = self.vertices.get_mut(number);
+        vertex.phase = InstancePhase::Absent;
+        let instance = vertex.present_instance();
+        self.log.of_instance(EventKind::Cancelled, instance);
+        self.ending.push(number);
+    }
+
+    /// Returns when the job was released whose instance a vertex has.
+    #[must_use]
+    pub(crate) fn release_ns(&self, vertex: Vertex) -> u64 {
+        let vertex = self.vertices.get(vertex.0);
+        let jobs = &self.dags[vertex.dag.index()].jobs;
+        jobs.job(vertex.progress).release_ns
+    }
+
+    /// Returns the latest wait of a vertex, and whether it has ended by its limit.
+    ///
+    /// # Panics
+    ///
+    /// If the subtask states no waits.
+    #[must_use]
+    pub fn latest_wait(&self, vertex: Vertex) -> (WaitId, bool) {
+        let latest = self.waits.latest[self.waits.place(vertex.0)];
+        // Where a cut job does not wait (W6), the subtask may have the next job's instance by now.
+        let instance = Instance {
+            job: latest.job,
+            ..self.instance_of(vertex)
+        };
+        let number = latest.number;
+        let wait = WaitId { instance, number };
+        (wait, latest.has_timed_out)
+    }
+}

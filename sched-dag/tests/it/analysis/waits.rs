@@ -1,0 +1,139 @@
+//! The answer for DAGs whose subtasks wait, and for those next to them.
+
+use std::slice;
+
+use sched_dag::analysis::{
+    AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, answer,
+};
+use sched_dag::{DagId, DagSpec, Policy, Preemption, SubtaskOrder, Wait};
+
+use super::simulate::{commit, spec};
+use super::{DIAMOND, FP, settings};
+
+const EDF: (Policy, Preemption) = (Policy::Edf, Preemption::Enabled);
+
+/// Lets a subtask wait, for so long at most, before a last segment.
+fn waiting(mut spec: DagSpec, subtask: usize, limit_ns: u64, segment_ns: u64) -> DagSpec {
+    spec.subtasks[subtask].waits.push(Wait {
+        limit_ns,
+        segment_ns: Some(segment_ns),
+    });
+    spec
+}
+
+fn answered(specs: &[DagSpec], settings: &AnalysisSettings) -> AnalysisResult {
+    answer(&commit(specs, settings.policy, settings.cores), settings)
+}
+
+fn bounds(answer: &AnalysisResult) -> Vec<Option<u64>> {
+    let bounds = answer.bounds.iter();
+    bounds.map(|bound| Some((*bound)?.bound_ns)).collect()
+}
+
+#[test]
+fn a_job_alone_has_the_least_bound_of_all_forms() {
+    let one = waiting(spec(99, 99, &[1, 4, 5, 1], &DIAMOND, 0), 1, 4, 1);
+    for kind in [FP, EDF, (Policy::StaticPriority, Preemption::Disabled)] {
+        let on = |cores| bounds(&answered(slice::from_ref(&one), &settings(kind, cores)))[0];
+        // On one core all of the work and the waits of the path.
+        assert_eq!([1, 2, 4].map(on), [Some(15), Some(10), Some(10)]);
+    }
+}
+
+#[test]
+fn each_segment_is_charged() {
+    let mut with = settings(FP, 2);
+    with.overheads = Overheads {
+        context_switch_ns: 2,
+        dispatch_ns: 1,
+        interrupt_ns: 3,
+        ready_ns: 0,
+    };
+    let twice = waiting(waiting(spec(100, 100, &[10], &[], 0), 0, 7, 3), 0, 5, 3);
+    assert_eq!(
+        bounds(&answered(slice::from_ref(&twice), &with)),
+        [Some(22 + 3 * 8)]
+    );
+    // Any number of waits may end at once: two, of this job and of the one before.
+    with.overheads.ready_ns = 1;
+    assert_eq!(
+        bounds(&answered(&[twice], &with)),
+        [Some(22 + 3 * 8 + 1 + 2 * 2)]
+    );
+}
+
+#[test]
+fn longest_segments_block_and_each_wait_may_be_blocked() {
+    let chain = [(0, 1), (1, 2)];
+    let high = waiting(spec(100, 100, &[1, 2, 1], &chain, 0), 1, 0, 1);
+    let low = waiting(spec(100, 100, &[3, 5, 2], &[], 1), 1, 9, 3);
+    let kind = (Policy::StaticPriority, Preemption::Disabled);
+    let answer = answered(&[high, low], &settings(kind, 2));
+    let bound = answer.bounds[0].unwrap();
+    let expected = (13, SchedulabilityTest::NonPreemptive);
+    assert_eq!((bound.bound_ns, bound.test), expected);
+}
+
+#[test]
+fn what_outranks_a_dag_that_waits_is_bounded_as_without_it() {
+    let low = waiting(spec(50, 50, &[6], &[], 1), 0, 9, 3);
+    let answer = answered(&[spec(20, 20, &[12], &[], 0), low], &settings(FP, 1));
+    let tests = answer.bounds.iter().map(|bound| bound.unwrap().test);
+    let expected = [SchedulabilityTest::Alone, SchedulabilityTest::FixedPriority];
+    assert_eq!(tests.collect::<Vec<_>>(), expected);
+    // Two jobs of the other one fit into the window, and one is carried in.
+    assert_eq!(bounds(&answer), [Some(12), Some(39)]);
+}
+
+#[test]
+fn each_dag_without_a_bound_has_its_reason() {
+    let reason = |specs: &[DagSpec], kind, cores| {
+        let answer = answered(specs, &settings(kind, cores));
+        (answer.reasons.last().copied().flatten(), answer)
+    };
+    let long = waiting(spec(10, 40, &[2], &[], 0), 0, 20, 1);
+    let beyond = NotProvenReason::SpanBeyondLimit {
+        span_ns: 22,
+        limit_ns: 10,
+    };
+    assert_eq!(reason(&[long], FP, 4).0, Some(beyond));
+
+    let high = spec(20, 20, &[12], &[], 0);
+    let late = waiting(spec(30, 90, &[4], &[], 1), 0, 5, 1);
+    let by_period = Some(NotProvenReason::NoBoundByPeriod);
+    assert_eq!(reason(&[high.clone(), late.clone()], FP, 1).0, by_period);
+    // What it may delay is held to its period, too.
+    let last = spec(30, 90, &[4], &[], 2);
+    let behind = Some(NotProvenReason::DelayedBy { dag: DagId(1) });
+    assert_eq!(reason(&[high, late, last], FP, 1).0, behind);
+
+    let chain = spec(10, 30, &[6, 6, 6], &[(0, 1), (1, 2)], 0);
+    let below = waiting(spec(100, 100, &[2], &[], 1), 0, 20, 1);
+    let (why, answer) = reason(&[chain, below], FP, 4);
+    assert_eq!((why, bounds(&answer)[0]), (by_period, Some(21)));
+}
+
+#[test]
+fn tests_of_whole_sets_are_not_asked() {
+    // Nearly all of one core, which only its demand proves; and light DAGs that only their
+    // capacity proves.
+    let full = [spec(6, 6, &[3], &[], 0), spec(9, 9, &[4], &[], 0)];
+    let settings = settings(EDF, 1);
+    assert!(answered(&full, &settings).is_proven());
+    let [first, second] = full;
+    let with_wait = [first, waiting(second, 0, 0, 1)];
+    assert!(!answered(&with_wait, &settings).is_proven());
+}
+
+#[test]
+fn an_order_is_fixed_as_if_waits_were_executed() {
+    let mut spec = spec(100, 100, &[3, 3, 2, 2, 2], &[], 0);
+    spec.order = SubtaskOrder::Fixed;
+    let spec = waiting(spec, 0, 2, 1);
+    let settings = settings(EDF, 2);
+    let mut task_set = commit(&[spec], settings.policy, settings.cores);
+    let free = bounds(&answer(&task_set, &settings))[0];
+    sched_dag::analysis::fix_orders(&mut task_set, &settings);
+    let fixed = bounds(&answer(&task_set, &settings))[0];
+    assert_eq!((free, fixed), (Some(10), Some(7)));
+}

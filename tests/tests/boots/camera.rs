@@ -1,0 +1,51 @@
+//! A camera that asks an accelerator, recorded on the machine and on Linux: the same values wherever
+//! that is replayed, without the accelerator.
+
+use std::fs;
+use std::sync::atomic::Ordering::Relaxed;
+
+use camera::{Conduct, Detection, build};
+use fass::finish_create_dags;
+use tool::system;
+use virtual_time::VirtualTime;
+
+const FRAMES: u64 = 20;
+
+/// Runs it with these words, and returns how many frames were answered and how many were not, and
+/// how many values were compared.
+fn run(words: &str) -> ([u64; 2], Option<u64>) {
+    let words = format!("--jobs {FRAMES} {words}");
+    let words: Vec<&str> = words.split_whitespace().collect();
+    let transcript = harness::run("camera", &words);
+    let number = |kind, name| transcript.of_kind(kind).next()?.number_at(name);
+    assert_eq!(number("camera", "allocations"), Some(0));
+    assert!(matches!(number("replayed", "uncompared"), None | Some(0)));
+    let frames = ["answered", "late"].map(|name| number("camera", name).expect("the app's line"));
+    (frames, number("replayed", "compared"))
+}
+
+#[test]
+fn answers_that_the_machine_or_linux_recorded_are_replayed_on_both_and_on_the_host() {
+    for place in ["--cores 2", "--on linux --cores 1"] {
+        let log = system::new_log("camera").expect("a folder for logs");
+        let file = log.with_extension("rec");
+        let name = file.to_string_lossy();
+        let (frames, _) = run(&format!("{place} --record {name}"));
+        assert_eq!(frames.iter().sum::<u64>(), FRAMES);
+        // Another seed, or one that is silent: the accelerator would do something else.
+        for place in ["--cores 1 --seed 2", "--cores 4", "--on linux --cores 2"] {
+            let silent = "--append accelerator=silent";
+            let replayed = run(&format!("{place} {silent} --replay {name}"));
+            assert_eq!(replayed, (frames, Some(FRAMES)), "{place}");
+        }
+        let bytes = fs::read(&file).expect("the recording");
+        let _ = fs::remove_file(&file);
+        let machine = VirtualTime::new().replay(&bytes).expect("it is whole");
+        let (dags, counts) = build(FRAMES, 1, Conduct::Silent, Detection::Asks);
+        finish_create_dags(&dags).expect("they are the DAGs that were recorded");
+        let report = machine.run();
+        assert_eq!((report.compared, report.divergence), (FRAMES, None));
+        let counts = [&counts.answered, &counts.late].map(|count| count.load(Relaxed));
+        assert_eq!(counts, frames);
+    }
+}
