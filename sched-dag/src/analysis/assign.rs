@@ -115,7 +115,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         let is_enough = |&count: &u32| {
             let fixed = || fixed_order::shorter(task, count).filter(|_| allows);
             multi_path(task, count).is_some_and(|ns| ns <= within_ns)
-                || fixed().is_some_and(|(_, length_ns)| length_ns <= within_ns)
+                || fixed().is_some_and(|schedule| schedule.length_ns() <= within_ns)
         };
         // The least number that proves it, since light DAGs share what is left.
         let Some(count) = (1..=left).find(is_enough) else {

@@ -23,7 +23,8 @@
 //! | `ranks` | which DAG may delay which | |
 //! | `judge`, `overheads` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
-//! | `fixed_order` | orders that the commit fixes | Graham 1969 |
+//! | `list_schedule`, `fixed_order` | orders that the commit fixes | Graham 1969 |
+//! | `lending`, `lent_cores` | heavy DAGs that lend what their orders leave | derived here |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -61,7 +62,7 @@
 //!   cluster is analysed by itself.
 //! - The form of overlapping jobs rests on the argument given in its module and on that
 //!   evidence, not on a reviewed proof. The multi-path bound is proven in
-//!   `docs/multi-path-bound.md`.
+//!   `docs/multi-path-bound.md`, waits and lent cores in `docs/analysis.md`.
 
 mod assign;
 mod cover;
@@ -69,6 +70,9 @@ mod fixed_order;
 mod interference;
 mod intra_task;
 mod judge;
+mod lending;
+mod lent_cores;
+mod list_schedule;
 mod multi_path;
 mod one_core;
 mod overheads;
@@ -96,6 +100,9 @@ pub use fixed_order::fix_orders;
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;
+pub use lending::{CoreOwner, LendingAnswer, LendingAttempt, LendingPlan, LentGroup, lend};
+pub use lent_cores::CoreSupply;
+pub use list_schedule::{ListSchedule, ScheduledSubtask};
 pub use multi_path::multi_path;
 pub use overheads::{OverheadSource, Overheads};
 pub use set::{multi_path_edf, multi_path_fp};

@@ -5,6 +5,7 @@
 //! failed`. The exit code is 0 if none failed, 1 if some did, and 2 if a file is malformed, which
 //! is reported with its line number, and then nothing is compared.
 //!
+//! - [`assignment`]: cores that are owned and lent;
 //! - [`bounds`]: the analysis at commit;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
@@ -13,6 +14,7 @@
 //!
 //! One kind reads no files: it simulates random sets that the analysis accepts (`responses`).
 
+pub mod assignment;
 pub mod bounds;
 pub mod in_kernel;
 pub(crate) mod older_bounds;
@@ -40,6 +42,9 @@ static ORACLE: Menu = Menu {
     word: "KIND",
     about: "Compares reference cases with what this project computes.",
     choices: choices! {
+        "assignment": "attempts, owners, orders, busy times, groups and bounds of lent cores", |words| {
+            run_files(words, &ASSIGNMENT, assignment::parse, assignment::check, |case| &case.name)
+        };
         "bounds": "lengths, widths, response-time bounds and verdicts", |words| {
             run_files(words, &BOUNDS, bounds::parse, bounds::check, |case| &case.name)
         };
@@ -70,6 +75,15 @@ const FILES: Option<(Takes, &str)> = Some((
     Takes::File("FILE..."),
     "Reference files, as in tests/oracle.",
 ));
+
+static ASSIGNMENT: Command = Command {
+    invocation: "./scripts/oracle assignment",
+    about: "Compares how cores are divided among DAGs that own and DAGs that share them, with \
+            orders, busy times and bounds, with the division by lent cores.",
+    positional: FILES,
+    options: &[],
+    notes: NOTES,
+};
 
 static BOUNDS: Command = Command {
     invocation: "./scripts/oracle bounds",

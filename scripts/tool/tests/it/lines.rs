@@ -12,8 +12,9 @@ use crate::support::{assert_refused, call, command, folder, refusal};
 
 /// Every command, by the words that name it.
 const COMMANDS: &str = "run, boot, test, new-app, check-trace, trace, recording, soak, bench, \
-    bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle bounds, \
-    oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer, oracle waiting";
+    bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle assignment, \
+    oracle bounds, oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer, \
+    oracle waiting";
 
 /// Runs the tool with the other ends of both its outputs closed; returns its exit code.
 fn code_without_readers(line: &str) -> Option<i32> {
