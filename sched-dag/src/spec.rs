@@ -101,6 +101,8 @@ pub struct SubtaskSpec {
     pub budget_ns: Option<u64>,
     /// The stack that it needs, in bytes, of [`STACK_BYTES`]; `None`: the driver's choice.
     pub stack_bytes: Option<u64>,
+    /// The core of its cluster that alone executes it, counted from 0; `None`: any.
+    pub core: Option<u32>,
     /// The static priority; `None`: derived from the graph.
     pub priority: Option<Priority>,
     /// Whether a started instance keeps its core although preemption is on.
@@ -117,6 +119,9 @@ pub struct SubtaskSpec {
 /// Whether subtasks may wait: what the feature `waits` is for. A program without it has no
 /// instruction for waits.
 pub const WAITS: bool = cfg!(feature = "waits");
+
+/// Whether subtasks may be pinned to a core: what the feature `pins` is for, as [`WAITS`].
+pub const PINS: bool = cfg!(feature = "pins");
 
 /// The most waits that a subtask may state.
 pub const MOST_WAITS: usize = if WAITS { 254 } else { 0 };

@@ -24,7 +24,7 @@ use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
-use crate::spec::{WAITS, Wait};
+use crate::spec::{PINS, WAITS, Wait};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -84,6 +84,7 @@ pub struct Subtask {
     pub(crate) wcet_source: WcetSource,
     pub(crate) budget_ns: Option<u64>,
     pub(crate) stack_bytes: Option<u64>,
+    pub(crate) core: Option<u32>,
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
     pub(crate) relative_deadline_ns: u64,
@@ -280,6 +281,13 @@ impl Dag {
         &self.subtasks[subtask.index()]
     }
 
+    /// Returns the first subtask that is pinned to a core.
+    pub(crate) fn first_pinned(&self) -> Option<SubtaskId> {
+        let mut subtasks = (0..).map(SubtaskId).zip(&self.subtasks);
+        let found = subtasks.find(|(_, subtask)| subtask.core().is_some());
+        found.map(|(id, _)| id)
+    }
+
     /// Returns the subtasks without predecessor, ascending, never empty.
     #[must_use]
     pub fn sources(&self) -> &[SubtaskId] {
@@ -387,6 +395,12 @@ impl Subtask {
         let wcet_ns = self.wcet_ns.filter(|_| wcets > 0);
         let limit_ns = wcet_ns.map(|wcet_ns| wcet_ns.saturating_mul(wcets));
         self.budget_ns.or(limit_ns).unwrap_or(u64::MAX)
+    }
+
+    /// Returns the core of its cluster that alone executes it, counted from 0; `None`: any.
+    #[must_use]
+    pub const fn core(&self) -> Option<u32> {
+        if PINS { self.core } else { None }
     }
 
     /// Returns the static priority, given or derived from the graph.

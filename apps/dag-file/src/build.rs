@@ -96,6 +96,9 @@ fn build_dag(
             if let Some(priority) = subtask.priority {
                 attributes = attributes.priority(priority.0);
             }
+            if let Some(core) = subtask.core {
+                attributes = attributes.core(core);
+            }
             if subtask.non_preemptive {
                 attributes = attributes.non_preemptive();
             }

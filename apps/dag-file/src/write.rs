@@ -74,6 +74,9 @@ fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>
     if let Some(priority) = spec.priority {
         write!(out, " priority {}", priority.0)?;
     }
+    if let Some(core) = spec.core {
+        write!(out, " core {core}")?;
+    }
     if spec.non_preemptive {
         out.write_str(" non-preemptive")?;
     }

@@ -280,6 +280,9 @@ crate::recordable! {
         /// The waits, those of a subtask in their order: DAG and subtask, the limit, and the WCET
         /// of the segment that follows, if it is stated.
         pub waits: Vec<(u32, u32, u64, Option<u64>)>,
+        /// The subtasks that are pinned: DAG and subtask, and the core of their cluster. Since
+        /// version 7 of the format.
+        pub pins: Vec<(u32, u32, u32)>,
     }
 
     /// A DAG of a [`Commit`].

@@ -34,7 +34,7 @@ use super::set::constrained;
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, sort_largest_first};
 use super::{AnalysisSettings, fixed_order};
-use crate::ids::{ClusterId, DagId, to_u32};
+use crate::ids::{ClusterId, DagId, SubtaskId, to_u32};
 use crate::policy::AssignmentReason;
 use crate::task_set::TaskSet;
 use crate::worded::texts;
@@ -54,6 +54,10 @@ texts! {
     pub enum AssignmentFailure {
         /// It states a cluster, and the clusters are not made yet.
         Stated = "it states a cluster, and the commit is to make them; leave its cluster out";
+        /// A subtask is pinned to a core of a cluster that is not made yet.
+        Pinned { subtask: SubtaskId } =
+            "subtask {} is pinned to a core, and the commit is to make the clusters; leave its core \
+             out", subtask.0;
         /// Its need of cores is not known.
         Unknown(error: TaskError) = "{error}";
         /// A path of it, overheads included, takes longer than a job has, on any number of cores.
@@ -85,6 +89,9 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
     for (dag, model) in task_set.dags().iter().enumerate() {
         if model.states_cluster() {
             return Err(refused(dag, AssignmentFailure::Stated));
+        }
+        if let Some(subtask) = model.first_pinned() {
+            return Err(refused(dag, AssignmentFailure::Pinned { subtask }));
         }
         let task = overhead_ns.and_then(|overhead_ns| Task::from_dag(model, overhead_ns));
         tasks.push(task.map_err(|error| refused(dag, AssignmentFailure::Unknown(error)))?);

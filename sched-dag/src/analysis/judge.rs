@@ -456,7 +456,7 @@ fn analysable(
             .and_then(|overhead_ns| Task::from_dag(&dags[dag], overhead_ns));
         reasons[dag] = match &task {
             _ if settings.cores == 0 => Some(NotProvenReason::NoCores),
-            Ok(_) => None,
+            Ok(_) => (dags[dag].first_pinned()).map(|subtask| NotProvenReason::Pinned { subtask }),
             Err(error) => Some(NotProvenReason::Unknown(*error)),
         };
         tasks[dag] = task.ok();
@@ -468,7 +468,9 @@ fn analysable(
     while let Some(&other) = unknown.get(seen) {
         seen += 1;
         known.retain(|&dag| {
-            let is_delayed = relation.may_delay(other, dag);
+            // What is pinned goes before all that is not, and keeps its core from it.
+            let is_pinned = dags[other].first_pinned().is_some();
+            let is_delayed = is_pinned || relation.may_delay(other, dag);
             if is_delayed {
                 reasons[dag] = Some(NotProvenReason::DelayedBy { dag: dag_id(other) });
                 unknown.push(dag);

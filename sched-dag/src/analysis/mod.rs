@@ -241,6 +241,10 @@ texts! {
         NoBoundByPeriod =
             "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \
              by the period; add cores, raise its priority or lengthen the period";
+        /// A subtask is pinned to a core, and no test knows such ones.
+        Pinned { subtask: SubtaskId } =
+            "subtask {} is pinned to a core, and no test covers that; leave its core out to have the \
+             DAG analysed", subtask.0;
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

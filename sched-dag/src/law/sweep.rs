@@ -1,8 +1,9 @@
 //! R5: did the right instances run?
 //!
 //! At every instant the rule says which instances *should* run: with m cores, those
-//! that have started and keep their core, and of all others that are eligible those
-//! with the smallest keys, until m are reached. An eligible instance that should run
+//! that have started and keep their core; on each other core for which pinned ones are
+//! eligible, of these the one with the smallest key; and of all others that are eligible
+//! those with the smallest keys, until m are reached. An eligible instance that should run
 //! and does not is *owed* a core. In virtual time that never lasts. On a machine it is
 //! never 0: the scheduler is told, decides, and interrupts a core. So it is a breach
 //! only if it lasts for longer than a stated *bound*. The blame is what was the case
@@ -10,7 +11,7 @@
 //!
 //! Besides, at the start of an instance that will keep its core: those of higher
 //! priority that have been waiting for longer than the bound must have idle cores to
-//! go to. Without that, a wrong choice would show no longer than it takes to make. Where times
+//! go to, and none of them may be pinned to its core. Without that, a wrong choice would show no longer than it takes to make. Where times
 //! are exact, so must those that wait since an earlier event, be it of the same instant.
 //!
 //! A sweep takes changes one after the other and keeps only what waits and what
@@ -25,7 +26,7 @@ use core::ops::Range;
 
 use crate::ids::{CoreId, DagId, Instance};
 use crate::policy::{Policy, Preemption, SchedulerOptions};
-use crate::spec::WAITS;
+use crate::spec::{PINS, WAITS};
 use crate::task_set::TaskSet;
 
 /// The key of R5: the smaller one goes first. No two instances have the same.
@@ -58,6 +59,13 @@ impl DispatchModel<'_> {
             }
         };
         (urgency, instance)
+    }
+
+    /// Returns the core that an instance is pinned to.
+    pub(super) fn pin(&self, instance: Instance) -> Option<CoreId> {
+        let dag = self.task_set.dag(instance.dag);
+        let core = dag.subtask(instance.subtask).core()?;
+        Some(CoreId(self.cores.start + core))
     }
 
     /// Reports whether a started instance keeps its core until it finishes.
@@ -147,8 +155,8 @@ pub(super) struct DispatchSweep<'m> {
     model: &'m DispatchModel<'m>,
     bound_ns: u64,
     now_ns: u64,
-    /// How many cores there are of which it is known what they do.
-    pub(super) known_cores: usize,
+    /// The cores of which it is known what they do.
+    pub(super) known_cores: BTreeSet<CoreId>,
     /// How many events there were.
     events: u64,
     /// Since when each waits, and since which event.
@@ -177,7 +185,7 @@ impl<'m> DispatchSweep<'m> {
             model,
             bound_ns,
             now_ns,
-            known_cores: 0,
+            known_cores: BTreeSet::new(),
             events: 0,
             waiting: BTreeMap::new(),
             running: BTreeMap::new(),
@@ -256,12 +264,14 @@ impl<'m> DispatchSweep<'m> {
     /// Judges what is the case from now until then.
     fn settle(&mut self, until_ns: u64) {
         // A core that has not been seen yet may not be there: only seen ones count.
-        let idle = self.known_cores.saturating_sub(self.running.len());
+        let claims = self.claims();
+        let claimed = claims.keys().filter(|core| self.is_idle(core)).count();
+        let idle = (self.known_cores.len()).saturating_sub(self.running.len() + claimed);
         for place in 0..self.started.len() {
             let wrong = self.out_of_turn(self.started[place], idle);
             self.wrong.extend(wrong);
         }
-        let should_run = self.should_run();
+        let should_run = self.should_run(&claims);
         let past = |key: &Key| !should_run.contains(key);
         let over: Vec<Key> = self.owed.keys().copied().filter(past).collect();
         for key in over {
@@ -269,14 +279,22 @@ impl<'m> DispatchSweep<'m> {
                 self.close(key, &owed);
             }
         }
-        for (rank, key) in should_run.iter().enumerate() {
+        let mut rank = 0;
+        for key in &should_run {
+            let has_idle_core = match self.model.pin(key.1) {
+                Some(core) => self.is_idle(&core),
+                None => {
+                    rank += 1;
+                    rank <= idle
+                }
+            };
             let since_ns = self.owed.get(key).map_or(self.now_ns, |owed| owed.since_ns);
             // The first look beyond the bound decides; finding a culprit costs a walk over all
             // cores.
             let has_blame = self.owed.get(key).is_some_and(|owed| owed.blame.is_some());
             let exceeds = since_ns.saturating_add(self.bound_ns) < until_ns;
-            let blame = (exceeds && !has_blame).then(|| self.blame(rank < idle));
-            let finds_idle_core = rank < idle && self.fresh.contains(key);
+            let blame = (exceeds && !has_blame).then(|| self.blame(*key, has_idle_core, &claims));
+            let finds_idle_core = has_idle_core && self.fresh.contains(key);
             let owed = self.owed.entry(*key).or_insert(OwedDispatch {
                 since_ns,
                 finds_idle_core,
@@ -288,20 +306,52 @@ impl<'m> DispatchSweep<'m> {
         self.started.clear();
     }
 
-    /// Returns the waiting instances that should run, in the order of keys.
-    fn should_run(&self) -> Vec<Key> {
-        let (mut free, mut owed) = (self.known_cores, Vec::new());
+    fn is_idle(&self, core: &CoreId) -> bool {
+        self.running.values().all(|busy| busy != core)
+    }
+
+    /// Returns the pinned instance that should run on each core for which one is eligible, and that
+    /// no instance keeps.
+    fn claims(&self) -> BTreeMap<CoreId, Key> {
+        let mut claims = BTreeMap::new();
+        if !PINS {
+            return claims;
+        }
+        for key in self.waiting.keys().chain(self.running.keys()) {
+            if let Some(core) = self.model.pin(key.1)
+                && self.known_cores.contains(&core)
+            {
+                let first = claims.entry(core).or_insert(*key);
+                *first = (*first).min(*key);
+            }
+        }
+        let kept = (self.running.iter()).filter(|(key, _)| self.model.keeps_its_core(key.1));
+        for (_, core) in kept {
+            claims.remove(core);
+        }
+        claims
+    }
+
+    /// Returns the waiting instances that should run: the pinned ones, and then, in the order of
+    /// keys, the others.
+    fn should_run(&self, claims: &BTreeMap<CoreId, Key>) -> Vec<Key> {
+        let claimed = claims.values().filter(|key| self.waiting.contains_key(key));
+        let mut owed: Vec<Key> = claimed.copied().collect();
+        let mut free = self.known_cores.len().saturating_sub(claims.len());
         let mut movable = Vec::new();
         for key in self.running.keys() {
             // It has its core whatever waits, so the others share those that are left.
             if self.model.keeps_its_core(key.1) {
                 free = free.saturating_sub(1);
-            } else {
+            } else if self.model.pin(key.1).is_none() {
                 movable.push(*key);
             }
         }
         let mut movable = movable.into_iter().peekable();
-        let mut waiting = self.waiting.keys().copied().peekable();
+        let waiting = self.waiting.keys().copied();
+        let mut waiting = waiting
+            .filter(|key| self.model.pin(key.1).is_none())
+            .peekable();
         for _ in 0..free {
             match (waiting.peek(), movable.peek()) {
                 // One that runs and goes first has its core by right.
@@ -319,17 +369,21 @@ impl<'m> DispatchSweep<'m> {
     }
 
     /// Says what runs instead of an instance that is owed a core.
-    fn blame(&self, is_idle: bool) -> DispatchFault {
+    fn blame(&self, owed: Key, is_idle: bool, claims: &BTreeMap<CoreId, Key>) -> DispatchFault {
+        let pin = self.model.pin(owed.1);
         let mut running = self.running.iter().rev();
-        let movable = running.find(|(key, _)| !self.model.keeps_its_core(key.1));
+        let movable = running.find(|(key, core)| match pin {
+            Some(pin) => **core == pin,
+            None => !self.model.keeps_its_core(key.1) && self.model.pin(key.1).is_none(),
+        });
         match movable {
             // The least urgent one is blamed: it is the one that a dispatch would have preempted.
             Some((key, core)) if !is_idle => DispatchFault::Runs(key.1, *core),
             _ => {
-                let is_busy = |core: &CoreId| self.running.values().any(|busy| busy == core);
+                let is_left = |core: &CoreId| self.is_idle(core) && !claims.contains_key(core);
                 let cores = self.model.cores.start..;
-                let mut cores = cores.take(self.known_cores).map(CoreId);
-                DispatchFault::Idle(cores.find(|core| !is_busy(core)))
+                let mut cores = cores.take(self.known_cores.len()).map(CoreId);
+                DispatchFault::Idle(pin.or_else(|| cores.find(is_left)))
             }
         }
     }
@@ -363,11 +417,23 @@ impl<'m> DispatchSweep<'m> {
             return None;
         }
         // On a machine the one may have become ready when the other was chosen already.
-        let mut before = (self.waiting.range(..key)).filter(|(_, (since_ns, event))| {
+        let is_before = |(since_ns, event): &(u64, u64)| {
             let longest_ns = self.now_ns.saturating_sub(*since_ns);
             longest_ns > self.bound_ns || self.bound_ns == 0 && *event < start
-        });
-        let (first, (since_ns, _)) = before.nth(idle)?;
+        };
+        let pin = self.model.pin(key.1);
+        let of_line = |line: Option<CoreId>| {
+            let before = self
+                .waiting
+                .iter()
+                .filter(move |(_, since)| is_before(since));
+            before.filter(move |(other, _)| self.model.pin(other.1) == line)
+        };
+        // On its core what is pinned goes first, and what is not goes after all of that.
+        let goes_first = |(other, _): &(&Key, _)| pin.is_none() || **other < key;
+        let mut pinned = of_line(Some(core)).filter(goes_first);
+        let mut others = of_line(None).take_while(|(other, _)| pin.is_none() && **other < key);
+        let (first, (since_ns, _)) = pinned.next().or_else(|| others.nth(idle))?;
         Some(DispatchBreach::OutOfTurn {
             started: key.1,
             core,

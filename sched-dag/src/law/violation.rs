@@ -187,6 +187,9 @@ worded! {
         /// R5: an instance was on a core that is not its cluster's.
         OutsideItsCluster { event: Event } = "outside_its_cluster", (Dispatch, By(event)),
             ", outside its cluster";
+        /// R5: an instance was on another core than the one that it is pinned to.
+        OffItsCore { event: Event, core: CoreId } = "off_its_core", (Dispatch, By(event)),
+            ", and is pinned to core {}", core.0;
         /// R5: an instance that keeps its core lost it.
         LostItsCore { event: Event } = "lost_its_core", (Dispatch, By(event)),
             " although it keeps its core until it finishes";

@@ -27,6 +27,7 @@ use core::ops::Range;
 use super::jobs::Job;
 use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
 use crate::policy::Preemption;
+use crate::spec::PINS;
 use crate::task_set::TaskSet;
 
 /// The phase of a subtask's next instance.
@@ -42,6 +43,25 @@ pub(super) enum InstancePhase {
     Preempted,
     /// It has started, and waits for something else than a core.
     Waiting,
+}
+
+/// The core of its cluster that alone executes a subtask, if there is one. Without the feature
+/// `pins` there is none, known when it is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Pin(u16);
+
+impl Pin {
+    const NONE: Self = Self(u16::MAX);
+
+    fn new(core: Option<u32>) -> Self {
+        let core = core.map(|core| u16::try_from(core).expect("verified to be in range"));
+        core.map_or(Self::NONE, Self)
+    }
+
+    #[inline]
+    pub(super) fn core(self) -> Option<CoreId> {
+        (PINS && self != Self::NONE).then(|| CoreId(self.0.into()))
+    }
 }
 
 /// One subtask, in one cache line.
@@ -63,6 +83,7 @@ pub(super) struct Vertex {
     /// Whether the end of its instance is told to its successors and to nobody else:
     /// it has some, its job is the only one in flight, and is not cut.
     pub(super) only_passes_on: bool,
+    pub(super) pin: Pin,
     /// The initial value of a counter.
     initial: u32,
     /// Its counter, if it has one slot.
@@ -73,6 +94,8 @@ pub(super) struct Vertex {
     /// Where its successors begin and end.
     successors: [u32; 2],
 }
+
+const _: () = assert!(size_of::<Vertex>() == 64, "one cache line");
 
 /// All subtasks.
 #[derive(Clone, Debug, Hash)]
@@ -111,6 +134,7 @@ impl VertexTable {
                     is_preemptible: preemption == Preemption::Enabled
                         && !attributes.is_non_preemptive(),
                     only_passes_on: false,
+                    pin: Pin::new(attributes.core()),
                     initial,
                     counter: initial,
                     counters: to_u32(counters.len()),
@@ -247,6 +271,12 @@ impl VertexTable {
 }
 
 impl Vertex {
+    /// Reports whether an instance in its cluster's line may take its core from it.
+    #[inline]
+    pub(super) fn yields_to_the_cluster(&self) -> bool {
+        self.is_preemptible && self.pin.core().is_none()
+    }
+
     /// Returns the vertex's part of a job.
     #[inline]
     pub(super) const fn instance(&self, job: &Job) -> Instance {

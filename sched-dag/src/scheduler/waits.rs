@@ -141,6 +141,9 @@ impl Scheduler {
         let waiting = self.vertices.get_mut(vertex.0);
         let job = self.dags[waiting.dag.index()].jobs.job(waiting.progress);
         let is_alone = self.fresh == 0 && instant_ns < self.quiet_until_ns && job.cut.is_none();
+        // One that is not pinned might go on with another core then.
+        let own = self.ready.peek_own(core);
+        let is_alone = is_alone && (own.is_none() || waiting.pin.core().is_some());
         if !is_alone || waiting.phase != InstancePhase::Running(core) {
             return None;
         }
@@ -156,7 +159,11 @@ impl Scheduler {
             // W4: it ends where it begins, and then competes for its own core.
             self.waits.latest[place].has_timed_out = true;
             let is_first = |first| key < first;
-            if self.ready.is_empty() || self.ready.peek().is_none_or(is_first) {
+            let is_next = match waiting.pin.core() {
+                Some(_) => own.is_none_or(is_first),
+                None => self.ready.is_empty() || self.ready.peek().is_none_or(is_first),
+            };
+            if is_next {
                 let what = EventKind::Resume;
                 let decision = Decision {
                     what,
@@ -168,7 +175,7 @@ impl Scheduler {
             waiting.phase = InstancePhase::Preempted;
             self.log.on_this(EventKind::Wait, now_ns, instance);
             self.log.of_instance(EventKind::Wake, instance);
-            self.ready.insert(key);
+            self.ready.insert(waiting.pin, key);
         }
         let done = self.give_first(core);
         if done == HandOff::Idle {
@@ -185,7 +192,9 @@ impl Scheduler {
         let (limit_ns, timer) = self.timers.peek()?;
         let place = timer.checked_sub(self.dags.len())?;
         // Where a core is idle, nothing is in line.
-        if self.fresh != 0 || limit_ns > now_ns || !self.cores.any_idle() {
+        let pin = self.vertices.get(self.waits.vertices[place]).pin;
+        let is_pinned = pin.core().is_some();
+        if self.fresh != 0 || limit_ns > now_ns || !self.cores.any_idle() || is_pinned {
             return None;
         }
         (self.log.now_ns, self.log.here) = (self.log.now_ns.max(now_ns), here);
@@ -247,7 +256,8 @@ impl Scheduler {
         // As one that was preempted, it has started and is in line for a core.
         vertex.phase = InstancePhase::Preempted;
         let job = self.dags[vertex.dag.index()].jobs.job(vertex.progress);
-        self.ready.insert(self.ready.key(number, vertex, || job));
+        let key = self.ready.key(number, vertex, || job);
+        self.ready.insert(vertex.pin, key);
         self.log.of_instance(EventKind::Wake, vertex.instance(job));
         self.fresh += 1;
     }

@@ -15,7 +15,7 @@ use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
-use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES, WAITS};
+use crate::spec::{DagSpec, MOST_WAITS, PINS, STACK_BYTES, WAITS};
 
 /// Checks the attributes of the whole commit.
 pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
@@ -327,6 +327,31 @@ fn check_clusters(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
                 });
             }
             _ => {}
+        }
+        check_cores(options, &mut page);
+    }
+}
+
+/// Checks the cores that subtasks of a DAG are pinned to.
+fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
+    let sizes = options.clusters.sizes();
+    let cluster = page.spec.cluster.unwrap_or_default();
+    let cores = match sizes.is_empty() {
+        true => options.cores,
+        // A cluster that there is not is a fault of its own.
+        false => sizes.get(cluster.index()).copied().unwrap_or(u32::MAX),
+    };
+    // The scheduler keeps them in 16 bits.
+    let most = if PINS { cores.min(u16::MAX.into()) } else { 0 };
+    for (index, stated) in page.spec.subtasks.iter().enumerate() {
+        if let Some(core) = stated.core.filter(|&core| core >= most) {
+            let subtask = page.subtask(index);
+            page.fault(|dag| DagFault::CoreOutOfRange {
+                dag,
+                subtask,
+                core,
+                cores,
+            });
         }
     }
 }

@@ -10,7 +10,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::label::{
-    DagLabel, SubtaskLabel, list, members, ns, one_up_to, own_input, question, ring, undivided,
+    DagLabel, SubtaskLabel, list, members, ns, one_up_to, own_input, pinnable, question, ring,
+    undivided,
 };
 use crate::ids::ClusterId;
 use crate::policy::Priority;
@@ -179,6 +180,10 @@ worded! {
         TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
             "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; {}",
             if WAITS { "split it" } else { "build it with `fass`' feature `waits`" };
+        /// A subtask that is pinned to a core which its cluster does not have.
+        CoreOutOfRange { dag: DagLabel, subtask: SubtaskLabel, core: u32, cores: u32 } =
+            "core_out_of_range",
+            "{subtask} of {dag} is pinned to core {core}, and {}", pinnable(*cores);
         /// A stack that is too small or too large.
         StackOutOfRange { dag: DagLabel, subtask: SubtaskLabel, bytes: u64 } =
             "stack_out_of_range",

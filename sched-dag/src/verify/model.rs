@@ -111,6 +111,7 @@ fn build_dag(
             },
             budget_ns: subtask.budget_ns,
             stack_bytes: subtask.stack_bytes,
+            core: subtask.core,
             priority: match ranks.get(index) {
                 Some(rank) => Priority(priority_base + rank),
                 None => subtask.priority.expect("given to all subtasks of the DAG"),

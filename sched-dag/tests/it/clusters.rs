@@ -11,7 +11,7 @@ use sched_dag::journal::Event;
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
     ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, CoreId, DagId, DagSpec, Instance,
-    Policy, SchedulerOptions, SubtaskId, TaskSet, verify,
+    Policy, Preemption, SchedulerOptions, SubtaskId, TaskSet, verify,
 };
 
 use crate::support::set::{self, Set};
@@ -62,6 +62,16 @@ fn a_cluster_runs_as_if_it_were_alone() {
             let cluster = u32::try_from(random.index(sizes.len())).expect("few clusters");
             spec.cluster = Some(ClusterId(cluster));
         }
+        // What keeps its core delays what is pinned to that, so which core it has would matter.
+        let keeps = specs.iter().flat_map(|spec| &spec.subtasks);
+        let keeps = keeps.filter(|of| of.non_preemptive).count() > 0;
+        let has_pins = set.options.preemption == Preemption::Enabled && !keeps;
+        for spec in specs.iter_mut().filter(|_| has_pins) {
+            let cores = spec.cluster.map_or(1, |cluster| sizes[cluster.index()]);
+            for subtask in &mut spec.subtasks {
+                subtask.core = random.chance(40).then(|| random.within(0..=cores - 1));
+            }
+        }
         let all: Vec<u32> = (0..).take(specs.len()).collect();
         let divided = commit(&specs, set.options, CoreDivision::Of(sizes.clone()));
         let together = events(&set, &divided, set.options.cores, &all);
@@ -81,6 +91,12 @@ fn a_cluster_runs_as_if_it_were_alone() {
             };
             let same = |event: Event, first: u32| {
                 assert!((first..first + cores).contains(&event.core.0), "{event:?}");
+                let pin = (event.instance().filter(|_| event.what.is_of_machine()))
+                    .and_then(|of| divided.dag(of.dag).subtask(of.subtask).core());
+                assert!(
+                    pin.is_none_or(|pin| first + pin == event.core.0),
+                    "{event:?}"
+                );
                 // Which of them it is may depend on the driver's calls.
                 let core = CoreId(0);
                 Event { core, ..event }
@@ -153,6 +169,23 @@ fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
     );
     let begins = |line: &&str| line.starts_with("machine 1 ");
     assert_eq!(witness.lines().filter(begins).count(), 2, "one for each");
+}
+
+#[test]
+fn no_test_covers_pinned_subtasks_and_what_shares_their_cores() {
+    let mut specs = three();
+    specs[2].subtasks[0].wcet_ns = Some(1);
+    assert!(answer(&specs).0.is_proven());
+    // The less urgent of two: on its core it goes first all the same.
+    specs[2].subtasks[0].core = Some(0);
+    let (answer, _) = answer(&specs);
+    assert_eq!(answer.bounds[0].unwrap().bound_ns, 6);
+    let pinned = NotProvenReason::Pinned {
+        subtask: SubtaskId(0),
+    };
+    let behind = NotProvenReason::DelayedBy { dag: DagId(2) };
+    assert_eq!(answer.reasons, [None, Some(behind), Some(pinned)]);
+    assert_eq!(answer.first_failing.unwrap().dag, DagId(2));
 }
 
 #[test]

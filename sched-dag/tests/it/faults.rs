@@ -120,6 +120,14 @@ fn numbers_have_limits() {
          stack_out_of_range `fuse`...16383 bytes
          stack_out_of_range `brake`...1048577 bytes",
     );
+    let pinned = drive(|spec| {
+        let subtasks = spec.subtasks.iter_mut().zip([1, 2, u32::MAX]);
+        subtasks.for_each(|(subtask, core)| subtask.core = Some(core));
+    });
+    refused(&[pinned]).must_say(
+        "core_out_of_range `fuse` of dag `drive`...core 2...has 2, counted from 0
+         core_out_of_range `brake`...core 4294967295",
+    );
     for (wcet_ns, deadline_ns, said) in [
         (20_000_001, 20_000_000, "`fuse`...20.000001ms...20ms"),
         (51, 50, "`fuse`...51ns...50ns"),

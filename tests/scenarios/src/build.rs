@@ -283,6 +283,9 @@ fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
     for wait in &subtask.waits {
         attributes = attributes.wait(wait.limit);
     }
+    if let Some(core) = subtask.core {
+        attributes = attributes.core(core);
+    }
     if subtask.is_non_preemptive {
         attributes = attributes.non_preemptive();
     }

@@ -37,7 +37,7 @@ pub struct DagText {
 }
 
 /// A subtask: `NAME TIMES`, then any of
-/// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `non-preemptive`,
+/// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `core N`, `non-preemptive`,
 /// `fails N,N` (in these of its calls, from 0), `restarts` or `falls-back` (what replaces it after
 /// a fault), `updates STATE`, `reads STATE`, `samples NAME` (a subtask of another DAG), and with
 /// the number of the call in which it is done `raises DAG N,N`, `pauses DAG N,N` and then
@@ -61,6 +61,7 @@ pub struct SubtaskText {
     /// How long a call of it may compute.
     pub budget: Option<Duration>,
     pub(crate) due: Option<Duration>,
+    pub(crate) core: Option<u32>,
     pub(crate) is_non_preemptive: bool,
     /// Whether it computes and does not hold its core; one with a budget does so in any case.
     pub computes: bool,
@@ -244,6 +245,7 @@ impl DagText {
                 "wcet" => subtask.wcet = Some(time(words)?),
                 "budget" => subtask.budget = Some(time(words)?),
                 "due" => subtask.due = Some(time(words)?),
+                "core" => subtask.core = Some(number(value(words)?)?),
                 "non-preemptive" => subtask.is_non_preemptive = true,
                 "fails" => subtask.fails = numbers(words)?,
                 "restarts" => subtask.replaced = Replaced::Anew,

@@ -347,6 +347,7 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
                 return Err(line.malformed(message));
             }
             "priority" => spec.priority = Some(Priority(keys.number(key)?)),
+            "core" => spec.core = Some(keys.number(key)?),
             "non-preemptive" => spec.non_preemptive = true,
             "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
             "samples" => {
@@ -359,8 +360,8 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
             other => {
                 return Err(keys.unknown(
                     other,
-                    "`wcet`, after it any `wait` and `wcet`, `priority`, `non-preemptive`, \
-                     `deadline`, `samples`",
+                    "`wcet`, after it any `wait` and `wcet`, `priority`, `core`, \
+                     `non-preemptive`, `deadline`, `samples`",
                 ));
             }
         }

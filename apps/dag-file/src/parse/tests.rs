@@ -10,7 +10,7 @@ const GOOD: &str = "\
 # Two sets.
 set first
 dag camera period 25ms deadline 100ms offset 1ms overrun skip order fixed in-flight 4 # all keys
-subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms
+subtask grab wcet 3ms priority 5 core 1 non-preemptive samples 1ms,2ms
 subtask show wcet 500us priority 6 deadline 30ms
 edge grab -> show
 
@@ -47,7 +47,7 @@ fn a_file_is_read_and_written_back() {
     let written = file.to_string();
     assert_eq!(parse(&written).unwrap().to_string(), written);
     let kept = "dag camera period 25ms deadline 100ms offset 1ms overrun skip order fixed in-flight 4\n\
-                subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms\n";
+                subtask grab wcet 3ms priority 5 core 1 non-preemptive samples 1ms,2ms\n";
     assert!(written.contains(kept), "{written}");
     let waits = "subtask only wcet 1ns wait 0ns wcet 2ms wait 3ms wcet 1us priority 1\n";
     assert!(written.contains(waits), "{written}");

@@ -233,7 +233,7 @@ fn foreign_and_newer_files_are_told() {
     let newer = [&MAGIC[..], &(VERSION + 1).to_le_bytes()].concat();
     assert_eq!(
         said(&newer),
-        "at byte 8: expected version 1 to 6 of recordings, which are those that are read"
+        "at byte 8: expected version 1 to 7 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);

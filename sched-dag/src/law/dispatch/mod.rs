@@ -65,20 +65,21 @@ fn of_cluster(
     DispatchReport { violations, waits }: &mut DispatchReport,
 ) {
     let cores = model.cores.clone();
-    let (mut known, before) = match terms.is_whole {
+    let (known, before) = match terms.is_whole {
         true => (cores.map(CoreId).collect(), BTreeMap::new()),
         false => before(cores, events.clone()),
     };
     let mut sweep = DispatchSweep::new(model, terms.tolerance_ns, first_ns, waits);
     // A core that no event has named yet may have run anything, so nothing is held against it.
-    sweep.known_cores = known.len();
+    sweep.known_cores = known;
     for (instance, stage) in before {
         sweep.enter(instance, stage);
     }
     for event in events.clone() {
         sweep.go_on_to(event.time_ns);
-        let is_new = event.what.is_of_machine() && known.insert(event.core);
-        sweep.known_cores += usize::from(is_new);
+        if event.what.is_of_machine() {
+            sweep.known_cores.insert(event.core);
+        }
         // An instance's end is the DAG's too, unless the DAG survives faults.
         let ends_its_dag = model.task_set.dag(event.dag).on_fault() == OnFault::EndDag;
         if event.what == EventKind::DagEnded || event.what == EventKind::Ended && ends_its_dag {
@@ -130,12 +131,18 @@ fn before(
     (busy.collect(), first_of_instance)
 }
 
-/// Returns the instances on a core of another cluster, or that lost a core that they keep.
+/// Returns the instances on a core that is not theirs, by cluster or pin, or that lost a core that they keep.
 fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
     let mut suspended = BTreeSet::new();
     let found = events.filter_map(|event| {
         if event.what.is_of_machine() && !model.cores.contains(&event.core.0) {
             return Some(Violation::OutsideItsCluster { event });
+        }
+        if event.what.is_of_machine()
+            && let Some(core) = event.instance().and_then(|of| model.pin(of))
+            && core != event.core
+        {
+            return Some(Violation::OffItsCore { event, core });
         }
         let instance = (event.instance()).filter(|of| model.keeps_its_core(*of))?;
         let lost = match event.what {

@@ -9,12 +9,18 @@ use crate::{CommitOptions, CoreDivision, DagSpec, Priority, SubtaskSpec, verify}
 /// DAGs of one subtask each in these clusters, DAG 0 the most urgent; the last one's subtask
 /// cannot be preempted if `keeps`.
 pub(in crate::law) fn dags(clusters: &[u32], keeps: bool) -> TaskSet {
+    pinned(clusters, keeps, &[])
+}
+
+/// The same, the subtasks of the first DAGs pinned to these cores of their clusters.
+fn pinned(clusters: &[u32], keeps: bool, pins: &[Option<u32>]) -> TaskSet {
     let spec = |(dag, &cluster): (u32, &u32)| DagSpec {
         period_ns: Some(100),
         relative_deadline_ns: Some(50 + u64::from(dag)),
         cluster: Some(ClusterId(cluster)),
         subtasks: vec![SubtaskSpec {
             priority: Some(Priority(dag)),
+            core: pins.get(dag as usize).copied().flatten(),
             non_preemptive: keeps && dag as usize + 1 == clusters.len(),
             ..SubtaskSpec::default()
         }],
@@ -153,4 +159,57 @@ fn r5_holds_within_each_cluster() {
     });
     let outside = outside.each_ref().map(String::as_str);
     must(&three, 2, "0 0 5: 0@0 0-4, 1@1 0-5, 2@1 5-7", &outside);
+}
+
+#[test]
+fn r5_lets_pinned_instances_go_first_on_their_core() {
+    // DAG 2, the least urgent, takes core 0 from DAG 0, which takes core 1 from DAG 1.
+    let last = pinned(&[0, 0, 0], false, &[None, None, Some(0)]);
+    let right = "0 0 4: 0@0 0-4, 1@1 0-4, 2@0 4-6, 0@1 4-9, 1@0 6-9";
+    must(&last, 2, right, &[]);
+    let waits = passed_over(4, 2, 5, "core 0 runs subtask 0 of dag 0 job 0");
+    must(&last, 2, "0 0 4: 0@0 0-9, 1@1 0-9, 2@0 9-12", &[&waits]);
+    // DAG 1 is the one that has to go.
+    let wrong_one = passed_over(4, 0, 2, "core 1 runs subtask 0 of dag 1 job 0");
+    let ran = "0 0 4: 0@0 0-4, 1@1 0-9, 2@0 4-6, 0@0 6-9";
+    must(&last, 2, ran, &[&wrong_one]);
+    // An idle core is not idle for one that is pinned to another.
+    must(&last, 2, "0 9 0: 2@0 0-4, 0@1 0-4, 1@0 9-12", &[]);
+    let both = pinned(&[0, 0], false, &[Some(1), Some(1)]);
+    must(&both, 2, "0 0: 0@1 0-4, 1@1 4-9", &[]);
+    let order = passed_over(0, 0, 4, "core 1 runs subtask 0 of dag 1 job 0");
+    must(&both, 2, "0 0: 1@1 0-4, 0@1 4-9", &[&order]);
+    let idle = passed_over(0, 0, 2, "core 1 is idle");
+    must(&both, 2, "0 0: 0@1 2-4, 1@1 4-9", &[&idle]);
+    // While core 1 waits for that, core 0 is idle for what is not pinned.
+    let one = pinned(&[0, 0], false, &[Some(1)]);
+    let of_other = passed_over(0, 1, 4, "core 0 is idle");
+    must(&one, 2, "0 0: 0@1 0-4, 1@0 4-9", &[&of_other]);
+}
+
+#[test]
+fn r5_judges_cores_and_starts_of_pinned_instances() {
+    let off = |dag, core, pin| {
+        [(0, "starts"), (4, "finishes")].map(|(at_ns, what)| {
+            format!(
+                "at {at_ns} ns, R5 dispatch: subtask 0 of dag {dag} job 0 {what} on core {core}, \
+                 and is pinned to core {pin}"
+            )
+        })
+    };
+    let one = pinned(&[0, 0], false, &[Some(1)]);
+    let found = off(0, 0, 1);
+    let found = found.each_ref().map(String::as_str);
+    must(&one, 2, "0 4: 0@0 0-4, 1@1 4-9", &found);
+    // A core of its cluster is meant.
+    let second = pinned(&[0, 0, 1], false, &[None, None, Some(0)]);
+    must(&second, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 2-5", &[]);
+    // What keeps its core keeps it from pinned ones, but starts after them.
+    let keeps = pinned(&[0, 0], true, &[Some(0)]);
+    must(&keeps, 1, "2 0: 1@0 0-4, 0@0 4-9", &[]);
+    let least = pinned(&[0, 0], true, &[None, Some(0)]);
+    must(&least, 1, "0 0: 1@0 0-4, 0@0 4-9", &[]);
+    let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 1 job 0 starts on core 0 and keeps it, \
+                  although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
+    must(&keeps, 1, "0 0: 1@0 0-4, 0@0 4-9", &[chosen]);
 }

@@ -69,13 +69,16 @@ pub(crate) fn draw(random: &mut Random, overruns: Overruns) -> Set {
     set
 }
 
-/// Draws a set with sporadic DAGs, too, and every other one with waits.
+/// Draws a set with sporadic DAGs, too, and every other one with waits, or pins, or both.
 pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
     let overruns = match random.chance(40) {
         true => Overruns::Never,
         false => Overruns::Often,
     };
-    let set = with_sporadic(draw(random, overruns), random);
+    let mut set = with_sporadic(draw(random, overruns), random);
+    if random.chance(50) {
+        set = with_pins(set, random);
+    }
     match random.chance(50) {
         true => with_waits(set, random),
         false => set,
@@ -98,6 +101,9 @@ pub(crate) fn draw_tiny(random: &mut Random) -> Set {
             if random.once_in(3) {
                 let limit_ns = random.within(0..=1);
                 set.specs[0].subtasks[0].waits.push(wait(limit_ns));
+            }
+            if random.chance(50) {
+                set = with_pins(set, random);
             }
             return set;
         }
@@ -122,6 +128,18 @@ fn with_waits(mut set: Set, random: &mut Random) -> Set {
             false => wait(random.within(1..=12)),
         };
         subtask.waits = (0..waits).map(draw).collect();
+    }
+    set
+}
+
+/// Pins subtasks to cores: some in three of four sets, all in the others.
+fn with_pins(mut set: Set, random: &mut Random) -> Set {
+    let percent = random.one_of(&[20, 50, 80, 100]);
+    let cores = set.options.cores.min(4);
+    let subtasks = set.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
+    for subtask in subtasks {
+        let core = random.within(0..=cores - 1);
+        subtask.core = random.chance(percent).then_some(core);
     }
     set
 }

@@ -350,6 +350,12 @@ impl Committed {
             };
             place.waits.push(wait);
         }
+        for &(dag, subtask, core) in &told.pins {
+            let dag = specs.get_mut(DagId(dag).index());
+            let place = dag.and_then(|dag| dag.subtasks.get_mut(SubtaskId(subtask).index()));
+            let place = place.ok_or_else(|| in_commit("a pin is of no subtask".into()))?;
+            place.core = Some(core);
+        }
         let clusters = match &told.clusters[..] {
             [] => CoreDivision::Undivided,
             sizes => CoreDivision::Of(sizes.to_vec()),

@@ -164,6 +164,9 @@ pub(crate) const CASES: &[Case] = &[
         given.register_sink_subtask(|(_,): (u32,)| (), vec!["echoes"], PERIOD, of("store"));
         vec![given, sound("lidar", "points")]
     }),
+    ("core_out_of_range", || {
+        read_by("lidar", "points", attributes("read").core(9))
+    }),
     ("stack_out_of_range", || {
         read_by("lidar", "points", attributes("read").stack_bytes(4096))
     }),

@@ -300,7 +300,8 @@ fn every_reason_against_a_proof_is_listed() {
                 limit_ns: 4,
             },
             NotProvenReason::SpanBeyondLimit { .. } => NotProvenReason::NoBoundByPeriod,
-            NotProvenReason::NoBoundByPeriod => NotProvenReason::Limit,
+            NotProvenReason::NoBoundByPeriod => NotProvenReason::Pinned { subtask },
+            NotProvenReason::Pinned { .. } => NotProvenReason::Limit,
             NotProvenReason::Limit => NotProvenReason::NoCores,
             NotProvenReason::NoCores => NotProvenReason::Unknown(TaskError::VolumeOverflow),
             NotProvenReason::Unknown(TaskError::VolumeOverflow) => {
