@@ -36,6 +36,9 @@ pub struct DagSpec {
     pub order: SubtaskOrder,
     /// The cluster whose cores run it; `None` where they are not divided.
     pub cluster: Option<ClusterId>,
+    /// The cores of its cluster that execute those of its subtasks that state none, counted from
+    /// 0; empty: all. DAGs of a cluster have the same ones, or none in common.
+    pub affinity: Vec<u32>,
     /// The number of jobs to release; `None`: without end.
     pub jobs: Option<u64>,
     /// The subtasks in the order of their registration.

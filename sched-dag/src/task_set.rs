@@ -53,6 +53,7 @@ pub struct Dag {
     pub(crate) overrun: OverrunPolicy,
     pub(crate) on_fault: OnFault,
     pub(crate) cluster: Option<ClusterId>,
+    pub(crate) affinity: Box<[u32]>,
     pub(crate) why_there: Option<AssignmentReason>,
     pub(crate) order: SubtaskOrder,
     pub(crate) first_job: u64,
@@ -531,6 +532,13 @@ impl Dag {
     #[must_use]
     pub const fn why_there(&self) -> Option<AssignmentReason> {
         self.why_there
+    }
+
+    /// Returns the cores of its cluster that execute those of its subtasks that are not pinned,
+    /// ascending, counted from 0; empty: all.
+    #[must_use]
+    pub const fn affinity(&self) -> &[u32] {
+        if PINS { &self.affinity } else { &[] }
     }
 
     /// Reports whether a cluster is stated, or chosen.

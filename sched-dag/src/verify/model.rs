@@ -139,6 +139,7 @@ fn build_dag(
         overrun: spec.overrun,
         on_fault: spec.on_fault,
         cluster: spec.cluster,
+        affinity: spec.affinity.as_slice().into(),
         order: spec.order,
         why_there: None,
         first_job: 0,
