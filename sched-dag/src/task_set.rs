@@ -91,6 +91,12 @@ pub struct Subtask {
     pub(crate) relative_deadline_ns: u64,
 }
 
+/// The graph of a DAG, and the core of each subtask.
+pub(crate) struct FixedOrder {
+    graph: Graph,
+    cores: Vec<Option<u32>>,
+}
+
 impl TaskSet {
     /// Lets a DAG lose no job, for a replay: due releases queue, whatever it has stated. It has
     /// these jobs only, as its recording does; those before them are not released.
@@ -101,16 +107,29 @@ impl TaskSet {
         dag.jobs = Some(dag.jobs.map_or(jobs.end, |stated| stated.min(jobs.end)));
     }
 
-    /// Returns a DAG's graph with more edges, which close no cycle.
-    pub(crate) fn with_edges(&self, dag: DagId, edges: &[(u32, u32)]) -> Graph {
-        let stated = &self.dag(dag).graph;
-        let edges = [&stated.successors.edges(), edges].concat();
-        Graph::new(stated.len(), &edges)
+    /// Returns the order of a DAG with more edges, which close no cycle, its subtasks pinned to
+    /// these cores of its cluster; none: as they are.
+    pub(crate) fn ordered(&self, dag: DagId, edges: &[(u32, u32)], cores: &[u32]) -> FixedOrder {
+        let stated = self.dag(dag);
+        let edges = [&stated.graph.successors.edges(), edges].concat();
+        let pinned = cores.iter().copied().map(Some);
+        let cores = match cores {
+            [] => stated.subtasks.iter().map(Subtask::core).collect(),
+            _ => pinned.collect(),
+        };
+        FixedOrder {
+            graph: Graph::new(stated.subtasks.len(), &edges),
+            cores,
+        }
     }
 
-    /// Exchanges the graph of a DAG of which no sink has a deadline of its own.
-    pub(crate) fn exchange(&mut self, dag: DagId, graph: &mut Graph) {
-        core::mem::swap(&mut self.dags[dag.index()].graph, graph);
+    /// Exchanges the order of a DAG of which no sink has a deadline of its own.
+    pub(crate) fn exchange(&mut self, dag: DagId, order: &mut FixedOrder) {
+        let dag = &mut self.dags[dag.index()];
+        core::mem::swap(&mut dag.graph, &mut order.graph);
+        for (subtask, core) in dag.subtasks.iter_mut().zip(&mut order.cores) {
+            core::mem::swap(&mut subtask.core, core);
+        }
     }
 
     /// Counts the subtasks of verified DAGs.
@@ -483,6 +502,27 @@ impl TaskSet {
         for (dag, (cluster, why)) in self.dags.iter_mut().zip(of_dags) {
             (dag.cluster, dag.why_there) = (Some(*cluster), Some(*why));
         }
+    }
+
+    /// Lets a DAG execute on these cores of its cluster only.
+    pub(crate) fn confine(&mut self, dag: DagId, cores: Vec<u32>) {
+        self.dags[dag.index()].affinity = cores.into();
+    }
+
+    /// Returns the cores that may execute a DAG, ascending, on a machine of `all`.
+    #[must_use]
+    pub fn cores_of_dag(&self, dag: DagId, all: u32) -> Vec<u32> {
+        let dag = self.dag(dag);
+        let cluster = self.cores_of(dag.cluster(), all);
+        let is_its = |core: &u32| {
+            let within = Some(core - cluster.start);
+            let is_pinned = dag.subtasks.iter().any(|subtask| subtask.core() == within);
+            let is_free = dag.subtasks.iter().any(|subtask| subtask.core().is_none());
+            let affinity = dag.affinity();
+            is_pinned
+                || is_free && (affinity.is_empty() || affinity.iter().any(|of| Some(*of) == within))
+        };
+        cluster.clone().filter(is_its).collect()
     }
 
     /// Reports whether the cores are divided into clusters.

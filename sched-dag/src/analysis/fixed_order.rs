@@ -4,7 +4,8 @@
 //! ready subtask with the longest remaining path first, and none preempted. Add an edge from each
 //! subtask to the next one on its core. Each core's subtasks are then a chain, so the DAG is no
 //! wider than the cores; alone, no ready subtask ever waits, and the response time is at most the
-//! length of the new graph: that of the schedule. Shorter execution times make no difference to
+//! length of the new graph: that of the schedule. Where subtasks can be pinned, each is to its core
+//! of the schedule, if the answer is better with that; then it is so among others, too. Shorter execution times make no difference to
 //! that, as they would to the schedule.
 //!
 //! Among others that can be worse: the path is longer, and what interferes with it may come
@@ -25,6 +26,7 @@ use super::task::Task;
 use super::{AnalysisResult, AnalysisSettings};
 use crate::ids::{DagId, to_u32};
 use crate::policy::SubtaskOrder;
+use crate::spec::PINS;
 use crate::task_set::{Dag, TaskSet};
 
 /// Fixes the order of each DAG that allows it, where that proves more: a shorter bound of it,
@@ -45,23 +47,33 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &AnalysisSettings) {
         let Some(schedule) = schedule else {
             continue;
         };
-        let mut precedence = task_set.with_edges(dag, &schedule.edges());
-        let before = free.take().unwrap_or_else(|| answer(task_set, settings));
-        task_set.exchange(dag, &mut precedence);
-        let after = answer(task_set, settings);
-        // The answer is kept for the next DAG: an analysis of all is the dear part of this loop.
-        if is_better(dag, &after, &before) {
-            free = Some(after);
-        } else {
-            task_set.exchange(dag, &mut precedence);
-            free = Some(before);
+        let mut best = free.take().unwrap_or_else(|| answer(task_set, settings));
+        // On a core of its own each subtask also keeps off what shares the cluster.
+        let pinned = if PINS { schedule.places() } else { Vec::new() };
+        for cores in [&pinned[..], &[]] {
+            let mut order = task_set.ordered(dag, &schedule.edges(), cores);
+            task_set.exchange(dag, &mut order);
+            let after = answer(task_set, settings);
+            if is_better(dag, &after, &best) {
+                best = after;
+                break;
+            }
+            task_set.exchange(dag, &mut order);
+            if !PINS {
+                break;
+            }
         }
+        // The answer is kept for the next DAG: an analysis of all is the dear part of this loop.
+        free = Some(best);
     }
 }
 
 /// Reports whether an order of a DAG's subtasks may be fixed.
 pub(super) fn allows(dag: &Dag) -> bool {
-    dag.order == SubtaskOrder::Fixed && dag.least_deadline_ns() == dag.relative_deadline_ns()
+    let is_free = dag.first_pinned().is_none() && dag.affinity().is_empty();
+    is_free
+        && dag.order == SubtaskOrder::Fixed
+        && dag.least_deadline_ns() == dag.relative_deadline_ns()
 }
 
 /// Returns a schedule that is shorter than the bound of one job alone.

@@ -70,6 +70,7 @@ use alloc::vec::Vec;
 use super::interference::DelaySources;
 use super::intra_task::{SUBTASK_LIMIT, intra_task};
 use super::one_core::{DagDemand, DueDemand, ResponseEquation, demand};
+use super::pinned::{self, PinnedCluster};
 use super::pipelined::{PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::ranks::{PreemptionMix, RankRelation};
 use super::set::{BoundFailure, EquationSet, EvaluationBudget, constrained};
@@ -150,6 +151,14 @@ pub(super) fn with_case(
     work(&case, reasons);
 }
 
+/// By DAG of a case, its bound or why it has none; and the first that has none for a reason of its
+/// own.
+pub(super) type CaseBounds = (
+    Vec<Option<DagBound>>,
+    Vec<Option<NotProvenReason>>,
+    Option<usize>,
+);
+
 /// The DAGs that can be analysed, and what follows from their attributes.
 pub(super) struct AnalysisInput<'a> {
     /// All DAGs of the commit.
@@ -162,8 +171,10 @@ pub(super) struct AnalysisInput<'a> {
     pub(super) settings: &'a AnalysisSettings,
     pub(super) relation: RankRelation,
     /// The most urgent DAG first.
-    order: Vec<usize>,
+    pub(super) order: Vec<usize>,
     pub(super) set: EquationSet<'a>,
+    /// Where subtasks are pinned, what follows from that; then no equation of the set is asked.
+    pub(super) pinned: Option<PinnedCluster>,
 }
 
 impl<'a> AnalysisInput<'a> {
@@ -187,9 +198,14 @@ impl<'a> AnalysisInput<'a> {
             relation,
             order,
             set: EquationSet::new(tasks, settings.cores),
+            pinned: None,
         };
-        case.set.bursts = WorkloadBursts::of(own.iter().map(|&dag| &all[dag]), settings);
-        case.complete();
+        let own = own.iter().map(|&dag| &all[dag]);
+        case.set.bursts = WorkloadBursts::of(own.clone(), settings);
+        match pinned::is_pinned(own) {
+            true => case.pinned = Some(PinnedCluster::of(&case)),
+            false => case.complete(),
+        }
         case
     }
 
@@ -204,31 +220,10 @@ impl<'a> AnalysisInput<'a> {
     /// Answers for the jobs of the DAGs of this case, by their positions in it; names
     /// them by their positions in the commit.
     pub(super) fn verdict(&self) -> AnalysisResult {
-        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
-        let solution = self.set.solve(&self.order, may_outrank);
-        let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
-            .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
-            .collect();
-        let demand = || are_in_time(self).then_some(SchedulabilityTest::Demand);
-        // Tests that vouch for the whole set, but give no response times, are asked last: their
-        // bound is the deadline.
-        if bounds.iter().any(Option::is_none)
-            && let Some(test) = self.vouching_test().or_else(demand)
-        {
-            for (bound, task) in bounds.iter_mut().zip(self.tasks) {
-                bound.get_or_insert(DagBound {
-                    bound_ns: task.relative_deadline_ns(),
-                    test,
-                });
-            }
-        }
-        let mut reasons: Vec<Option<NotProvenReason>> = (bounds.iter().enumerate())
-            .map(|(dag, bound)| match bound {
-                Some(_) => None,
-                None => solution.failures[dag].map(|failure| self.reason(dag, failure)),
-            })
-            .collect();
-        let mut first = solution.first_failing.map(|(dag, _)| dag);
+        let (bounds, mut reasons, mut first) = match &self.pinned {
+            Some(cluster) => cluster.bounds(self),
+            None => self.solved(),
+        };
         if reasons.iter().any(Option::is_some) {
             for (dag, reason) in self.certain().into_iter().rev() {
                 if bounds[dag].is_none() {
@@ -248,6 +243,35 @@ impl<'a> AnalysisInput<'a> {
             reasons,
             first_failing,
         }
+    }
+
+    /// Solves the equations of the set, and asks what vouches for what they leave open.
+    fn solved(&self) -> CaseBounds {
+        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
+        let solution = self.set.solve(&self.order, may_outrank);
+        let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
+            .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
+            .collect();
+        let demand = || are_in_time(self).then_some(SchedulabilityTest::Demand);
+        // Tests that vouch for the whole set, but give no response times, are asked last: their
+        // bound is the deadline.
+        if bounds.iter().any(Option::is_none)
+            && let Some(test) = self.vouching_test().or_else(demand)
+        {
+            for (bound, task) in bounds.iter_mut().zip(self.tasks) {
+                bound.get_or_insert(DagBound {
+                    bound_ns: task.relative_deadline_ns(),
+                    test,
+                });
+            }
+        }
+        let reasons = (bounds.iter().enumerate()).map(|(dag, bound)| match bound {
+            Some(_) => None,
+            None => solution.failures[dag].map(|failure| self.reason(dag, failure)),
+        });
+        let reasons = reasons.collect();
+        let first = solution.first_failing.map(|(dag, _)| dag);
+        (bounds, reasons, first)
     }
 
     /// Reports whether a DAG has all cores whenever it needs them.
@@ -456,7 +480,7 @@ fn analysable(
             .and_then(|overhead_ns| Task::from_dag(&dags[dag], overhead_ns));
         reasons[dag] = match &task {
             _ if settings.cores == 0 => Some(NotProvenReason::NoCores),
-            Ok(_) => (dags[dag].first_pinned()).map(|subtask| NotProvenReason::Pinned { subtask }),
+            Ok(_) => None,
             Err(error) => Some(NotProvenReason::Unknown(*error)),
         };
         tasks[dag] = task.ok();
@@ -468,7 +492,7 @@ fn analysable(
     while let Some(&other) = unknown.get(seen) {
         seen += 1;
         known.retain(|&dag| {
-            // What is pinned goes before all that is not, and keeps its core from it.
+            // What is pinned goes before all that is not.
             let is_pinned = dags[other].first_pinned().is_some();
             let is_delayed = is_pinned || relation.may_delay(other, dag);
             if is_delayed {
@@ -589,6 +613,8 @@ fn bound(case: &AnalysisInput<'_>, verdict: &mut AnalysisResult, bounds: &mut [V
         let solved = equations(case, dag, &responses).map(|(sink, equation)| {
             let solved = equation
                 .and_then(|(figures, delays)| figures.solve(&delays, 0, &mut { STEP_LIMIT }).ok());
+            let pinned = || (case.pinned.as_ref()?).finish_ns(case, dag, sink);
+            let solved = solved.or_else(pinned);
             let deadline_ns = case.dag(dag).subtask(sink).relative_deadline_ns();
             solved.or(is_met.then_some(deadline_ns))
         });
@@ -632,7 +658,7 @@ pub(super) fn equations<'a>(
     let sinks = model.sinks().iter().zip(reaches);
     sinks.map(move |(&sink, reach)| {
         let equation = || {
-            if set.waits_enter(dag) {
+            if case.pinned.is_some() || set.waits_enter(dag) {
                 return None;
             }
             let deadline_ns = model.subtask(sink).relative_deadline_ns();
@@ -649,15 +675,9 @@ pub(super) fn equations<'a>(
 
 /// Returns the longest path to each sink, in their order.
 fn lengths_ns(task: &Task, model: &Dag) -> Vec<u64> {
-    let mut lengths_ns: Vec<u64> = task.wcets_ns().to_vec();
-    for subtask in task.topological_order() {
-        for next in task.successors(subtask) {
-            let through_ns = lengths_ns[subtask] + task.wcets_ns()[next];
-            lengths_ns[next] = lengths_ns[next].max(through_ns);
-        }
-    }
+    let finishes_ns = task.finishes_ns();
     let sinks = model.sinks().iter();
-    sinks.map(|sink| lengths_ns[sink.index()]).collect()
+    sinks.map(|sink| finishes_ns[sink.index()]).collect()
 }
 
 /// Completes the bounds of a DAG's sinks by that of its jobs, and returns the first sink

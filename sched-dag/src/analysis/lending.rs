@@ -26,27 +26,15 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT};
+use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT, parts_per_million};
 use super::list_schedule::ListSchedule;
 use super::set::constrained;
 use super::task::Task;
 use super::utilisation::sort_largest_first;
+use crate::ids::{ClusterId, DagId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
-
-/// The ways in which cores are divided, in the order in which they are tried.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LendingAttempt {
-    /// All DAGs share all cores; none owns any.
-    Whole,
-    /// Light DAGs are placed by density, the densest first.
-    ByDensity,
-    /// Light DAGs are placed by deadline, the shortest first.
-    ByDeadline,
-    /// As [`ByDensity`](Self::ByDensity), with squeezed lists.
-    SqueezedByDensity,
-    /// As [`ByDeadline`](Self::ByDeadline), with squeezed lists.
-    SqueezedByDeadline,
-}
+use crate::policy::{AssignmentReason, LendingAttempt};
+use crate::task_set::TaskSet;
 
 /// A heavy DAG on cores of its own.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -89,6 +77,113 @@ pub struct LendingAnswer {
     pub plan: Option<LendingPlan>,
     /// For each attempt that failed, the position of the DAG for which it found no place.
     pub failed: Vec<usize>,
+}
+
+impl LendingPlan {
+    /// Divides the cores of a task set so: cores that owners and groups connect are a cluster.
+    ///
+    /// Cores are counted anew, those of a cluster in a row; cores that nobody uses come last.
+    pub(super) fn divide(&self, task_set: &mut TaskSet, tasks: &[&Task]) {
+        let clusters = self.clusters();
+        let place = |core: usize| {
+            let mut clusters = clusters.iter().enumerate();
+            let found = clusters.find_map(|(cluster, cores)| {
+                let within = cores.iter().position(|&of| of == core)?;
+                Some((ClusterId(to_u32(cluster)), to_u32(within)))
+            });
+            found.expect("owners and groups make the clusters")
+        };
+        let mut of_dags = vec![(ClusterId(0), AssignmentReason::Light); tasks.len()];
+        for owner in &self.owners {
+            let (cluster, first) = place(owner.first_core);
+            let cores = owner.schedule.places().into_iter().map(|core| first + core);
+            let dag = DagId(to_u32(owner.dag));
+            let mut order =
+                task_set.ordered(dag, &owner.schedule.edges(), &cores.collect::<Vec<_>>());
+            task_set.exchange(dag, &mut order);
+            let task = tasks[owner.dag];
+            let own = owner.first_core..owner.first_core + owner.schedule.cores.len();
+            let why = AssignmentReason::Owner {
+                attempt: self.attempt,
+                volume_ns: task.volume_ns(),
+                within_ns: task.relative_deadline_ns(),
+                left_percent: self.left_percent(&own.collect::<Vec<_>>(), tasks),
+            };
+            of_dags[owner.dag] = (cluster, why);
+        }
+        for group in &self.groups {
+            let (cluster, _) = place(group.cores[0]);
+            let left_percent = self.left_percent(&group.cores, tasks);
+            let attempt = self.attempt;
+            let why = match attempt {
+                LendingAttempt::Whole => AssignmentReason::Whole { left_percent },
+                _ => AssignmentReason::Member {
+                    attempt,
+                    left_percent,
+                },
+            };
+            let mut cores: Vec<u32> = group.cores.iter().map(|&core| place(core).1).collect();
+            cores.sort_unstable();
+            for &(dag, _) in &group.members {
+                of_dags[dag] = (cluster, why);
+                if cores.len() < clusters[cluster.index()].len() {
+                    task_set.confine(DagId(to_u32(dag)), cores.clone());
+                }
+            }
+        }
+        let sizes: Vec<u32> = clusters.iter().map(|cores| to_u32(cores.len())).collect();
+        task_set.divide(&sizes, &of_dags);
+    }
+
+    /// Returns the cores of each cluster, ascending.
+    fn clusters(&self) -> Vec<Vec<usize>> {
+        let mut clusters: Vec<Vec<usize>> = Vec::new();
+        let own = self.owners.iter().map(|owner| {
+            let first = owner.first_core;
+            (first..first + owner.schedule.cores.len()).collect()
+        });
+        for cores in own.chain(self.groups.iter().map(|group| group.cores.clone())) {
+            let (met, mut apart): (Vec<_>, Vec<_>) = (clusters.into_iter())
+                .partition(|cluster| cluster.iter().any(|core| cores.contains(core)));
+            let mut all: Vec<usize> = met.concat();
+            all.extend(
+                cores
+                    .iter()
+                    .filter(|&core| !all.contains(core))
+                    .collect::<Vec<_>>(),
+            );
+            all.sort_unstable();
+            apart.push(all);
+            clusters = apart;
+        }
+        sorted_by_key(clusters.len(), |place| clusters[place][0])
+            .into_iter()
+            .map(|place| clusters[place].clone())
+            .collect()
+    }
+
+    /// Returns how much of the time of some cores, in hundredths, is left by their owners and by
+    /// the members of groups on them.
+    fn left_percent(&self, cores: &[usize], tasks: &[&Task]) -> u32 {
+        let mut taken: u64 = cores
+            .iter()
+            .map(|&core| self.supplies[core].taken_ppm())
+            .sum();
+        for group in &self.groups {
+            let shared = group
+                .cores
+                .iter()
+                .filter(|core| cores.contains(core))
+                .count() as u64;
+            let members = group.members.iter().map(|&(dag, _)| tasks[dag]);
+            let load = members.map(|task| parts_per_million(task.volume_ns(), task.period_ns()));
+            // Members take from their cores alike.
+            taken += (load.sum::<u64>() * shared).div_ceil(group.cores.len() as u64);
+        }
+        let all = 1_000_000 * cores.len() as u64;
+        let left = all.saturating_sub(taken) / (10_000 * cores.len() as u64);
+        u32::try_from(left).unwrap_or(100)
+    }
 }
 
 /// Divides cores among DAGs by the analysis of lent cores in `docs/analysis.md`.

@@ -85,6 +85,12 @@ impl CoreSupply {
         self.busiest(window_ns).0
     }
 
+    /// Returns the part of its time that the owner takes, in millionths, rounded up.
+    pub(super) fn taken_ppm(&self) -> u64 {
+        let job_ns = self.tails.first().map_or(0, |tail| tail.work_ns);
+        parts_per_million(job_ns, self.period_ns)
+    }
+
     /// Returns that time, and by how much it grows at once with the window, one for one.
     fn busiest(&self, window_ns: u64) -> (u64, u64) {
         let job_ns = self.tails.first().map_or(0, |tail| tail.work_ns);
@@ -111,6 +117,12 @@ impl CoreSupply {
             span: (more > 0).then_some(more.into()),
         }
     }
+}
+
+/// Returns a part of a period in millionths, rounded up; no more than `u64::MAX`.
+pub(super) fn parts_per_million(work_ns: u64, period_ns: u64) -> u64 {
+    let parts = (u128::from(work_ns) * 1_000_000).div_ceil(u128::from(period_ns));
+    u64::try_from(parts).unwrap_or(u64::MAX)
 }
 
 /// A DAG as a member of groups.

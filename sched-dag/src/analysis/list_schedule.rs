@@ -153,6 +153,17 @@ impl ListSchedule {
         finishes_ns.max().unwrap_or(0)
     }
 
+    /// Returns the core of each subtask.
+    pub(super) fn places(&self) -> Vec<u32> {
+        let mut places = vec![0; self.cores.iter().map(Vec::len).sum()];
+        for (core, list) in self.cores.iter().enumerate() {
+            for of in list {
+                places[of.subtask] = to_u32(core);
+            }
+        }
+        places
+    }
+
     /// Returns an edge for each two neighbours of a list. With the DAG's own ones they make no
     /// cycle, as each goes to a later start.
     pub(super) fn edges(&self) -> Vec<(u32, u32)> {

@@ -76,6 +76,7 @@ mod list_schedule;
 mod multi_path;
 mod one_core;
 mod overheads;
+mod pinned;
 mod pipelined;
 mod ranks;
 mod set;
@@ -100,7 +101,7 @@ pub use fixed_order::fix_orders;
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;
-pub use lending::{CoreOwner, LendingAnswer, LendingAttempt, LendingPlan, LentGroup, lend};
+pub use lending::{CoreOwner, LendingAnswer, LendingPlan, LentGroup, lend};
 pub use lent_cores::CoreSupply;
 pub use list_schedule::{ListSchedule, ScheduledSubtask};
 pub use multi_path::multi_path;
@@ -173,6 +174,10 @@ texts! {
         OneCore = "response times on one core (Joseph and Pandya 1986)";
         /// Processor demand of one core under EDF; the bound is the deadline itself.
         Demand = "processor demand of one core (Baruah et al. 1990)";
+        /// The longest path in the order that pins and edges fix: nothing else can delay it.
+        Owner = "an order of its own on each core";
+        /// The rest of cores that owners lend, under fixed priorities.
+        Member = "what owners leave of its cores";
         /// Capacity augmentation for EDF or RM; the bound is the deadline itself.
         Capacity = "capacity augmentation (Li et al. 2014)";
         /// Speed-up tests for EDF or DM; the bound is the deadline itself.
@@ -241,10 +246,16 @@ texts! {
         NoBoundByPeriod =
             "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \
              by the period; add cores, raise its priority or lengthen the period";
-        /// A subtask is pinned to a core, and no test knows such ones.
+        /// A subtask is pinned to a core, and not as an owner's are.
         Pinned { subtask: SubtaskId } =
-            "subtask {} is pinned to a core, and no test covers that; leave its core out to have the \
-             DAG analysed", subtask.0;
+            "subtask {} is pinned to a core, and the test for that needs cores that no other DAG is \
+             pinned to, all subtasks of the DAG pinned, and an edge from each to the next one on \
+             its core; see to these, or leave the cores out", subtask.0;
+        /// It shares a cluster with pinned subtasks, on terms that their test does not cover.
+        BesidePinned =
+            "subtasks of its cluster are pinned, and the test for that needs deadlines within periods, \
+             preemption, no waits, no overhead `ready`, and in each group of DAGs static priorities \
+             that rank whole DAGs; see to these, or leave the cores out";
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

@@ -6,7 +6,9 @@
 use std::sync::Arc;
 
 use common::random::Random;
-use sched_dag::analysis::{self, AnalysisResult, AnalysisSettings, NotProvenReason, Overheads};
+use sched_dag::analysis::{
+    self, AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest,
+};
 use sched_dag::journal::Event;
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
@@ -172,16 +174,31 @@ fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
 }
 
 #[test]
-fn no_test_covers_pinned_subtasks_and_what_shares_their_cores() {
+fn bounds_of_pinned_subtasks_need_an_order_on_cores_of_their_own() {
     let mut specs = three();
     specs[2].subtasks[0].wcet_ns = Some(1);
-    assert!(answer(&specs).0.is_proven());
-    // The less urgent of two: on its core it goes first all the same.
+    let before = answer(&specs).0;
+    assert!(before.is_proven());
+    // On its core it goes first, whatever the deadlines.
     specs[2].subtasks[0].core = Some(0);
+    let owned = answer(&specs).0;
+    let bounds = owned.bounds.iter().map(|bound| {
+        let bound = bound.as_ref().unwrap();
+        (bound.bound_ns, bound.test)
+    });
+    let (first, other) = (before.bounds[0].unwrap(), before.bounds[1].unwrap());
+    let expected = [
+        (first.bound_ns, first.test),
+        (other.bound_ns, SchedulabilityTest::Member),
+        (1, SchedulabilityTest::Owner),
+    ];
+    assert_eq!(bounds.collect::<Vec<_>>(), expected);
+    // No edge says which of two goes first.
+    let again = specs[2].subtasks[0].clone();
+    specs[2].subtasks.push(again);
     let (answer, _) = answer(&specs);
-    assert_eq!(answer.bounds[0].unwrap().bound_ns, 6);
     let pinned = NotProvenReason::Pinned {
-        subtask: SubtaskId(0),
+        subtask: SubtaskId(1),
     };
     let behind = NotProvenReason::DelayedBy { dag: DagId(2) };
     assert_eq!(answer.reasons, [None, Some(behind), Some(pinned)]);

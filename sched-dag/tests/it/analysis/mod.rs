@@ -7,6 +7,7 @@
 mod drawn;
 mod forged;
 mod kinds;
+mod lent;
 mod one_core;
 mod random;
 mod simulate;

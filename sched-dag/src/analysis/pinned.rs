@@ -1,0 +1,225 @@
+//! Response times where subtasks are pinned: owners by their orders, others in what these leave.
+//!
+//! A DAG whose subtasks are all pinned, no other's to the same cores, is an *owner* of these
+//! cores. If those on one core follow one another by edges, nothing ever delays it: each
+//! subtask finishes at the length of the longest path to it, or earlier. A DAG without pinned
+//! subtasks is a *member* of the group of its cores, with all that have the same ones, and executes
+//! in what the owners leave ([`lent_cores`](super::lent_cores), whose proofs these bounds rest on).
+//!
+//! This is how a commit reads what [`lend`](super::lend()) has divided, and also what a person has
+//! pinned: nothing is taken over from the division but cores and edges.
+//!
+//! Assumes, of all DAGs of the cluster: `D <= T`, and subtasks that can be preempted and do not
+//! wait; no overhead that grows with the number of instances that become ready at once. Of the
+//! members of a group that are several: a static priority that outranks DAG by DAG.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::judge::{AnalysisInput, CaseBounds};
+use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT};
+use super::list_schedule::ScheduledSubtask;
+use super::ranks::PreemptionMix;
+use super::set::constrained;
+use super::{DagBound, NotProvenReason, SchedulabilityTest};
+use crate::ids::{SubtaskId, to_u32};
+use crate::order::sort_by_key;
+use crate::spec::PINS;
+use crate::task_set::Dag;
+
+/// Reports whether cores of a cluster with these DAGs are told apart.
+pub(super) fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
+    let is_told = |dag: &Dag| dag.first_pinned().is_some() || !dag.affinity().is_empty();
+    PINS && dags.any(is_told)
+}
+
+/// The owners and groups of a cluster.
+pub(super) struct PinnedCluster {
+    /// By core, what its owner leaves.
+    pub(super) supplies: Vec<CoreSupply>,
+    /// By core, its list: subtasks of one DAG of the case.
+    pub(super) lists: Vec<Vec<ScheduledSubtask>>,
+    /// By core, the DAG of the case that is pinned to it.
+    pub(super) owners: Vec<Option<usize>>,
+    /// By DAG of the case, why it can be neither an owner nor a member.
+    refusals: Vec<Option<NotProvenReason>>,
+}
+
+impl PinnedCluster {
+    pub(super) fn of(case: &AnalysisInput<'_>) -> Self {
+        let cores = case.settings.cores as usize;
+        let mut cluster = Self {
+            supplies: vec![CoreSupply::UNOWNED; cores],
+            lists: vec![Vec::new(); cores],
+            owners: vec![None; cores],
+            refusals: vec![None; case.members.len()],
+        };
+        for dag in 0..case.members.len() {
+            cluster.refusals[dag] = cluster.enter(case, dag).err();
+        }
+        for core in 0..cores {
+            if let Some(owner) = cluster.owners[core]
+                && cluster.refusals[owner].is_none()
+            {
+                let period_ns = case.tasks[owner].period_ns();
+                cluster.supplies[core] = CoreSupply::of(period_ns, &cluster.lists[core]);
+            }
+        }
+        cluster
+    }
+
+    /// Enters the lists of an owner; an error says why a DAG is neither that nor a member.
+    fn enter(&mut self, case: &AnalysisInput<'_>, dag: usize) -> Result<(), NotProvenReason> {
+        let (subtasks, task) = (case.dag(dag).subtasks(), case.tasks[dag]);
+        let is_pinned = |subtask: &usize| subtasks[*subtask].core().is_some();
+        let mut pinned: Vec<usize> = (0..subtasks.len()).filter(is_pinned).collect();
+        let finishes_ns = task.finishes_ns();
+        // No WCET is 0, so an edge leads to a later finish.
+        sort_by_key(&mut pinned, |subtask| finishes_ns[subtask]);
+        let is_whole = pinned.is_empty() || pinned.len() == subtasks.len();
+        for subtask in pinned {
+            let core = subtasks[subtask].core().map_or(0, |core| core as usize);
+            let owner = *self.owners[core].get_or_insert(dag);
+            let list = &mut self.lists[core];
+            let follows =
+                |last: &ScheduledSubtask| task.successors(last.subtask).any(|next| next == subtask);
+            if !is_whole || owner != dag || !list.last().is_none_or(follows) {
+                let subtask = SubtaskId(to_u32(subtask));
+                return Err(NotProvenReason::Pinned { subtask });
+            }
+            list.push(ScheduledSubtask {
+                subtask,
+                start_ns: finishes_ns[subtask] - task.wcets_ns()[subtask],
+                finish_ns: finishes_ns[subtask],
+            });
+        }
+        let is_covered = case.relation.preemption == PreemptionMix::All
+            && case.set.bursts.are_none()
+            && !case.set.has_waits()
+            && constrained(case.tasks, case.settings.cores);
+        is_covered
+            .then_some(())
+            .ok_or(NotProvenReason::BesidePinned)
+    }
+
+    /// Bounds the responses of owners, and then those of members, the most urgent first.
+    pub(super) fn bounds(&self, case: &AnalysisInput<'_>) -> CaseBounds {
+        let count = case.members.len();
+        let mut found: Vec<Option<Result<DagBound, NotProvenReason>>> = vec![None; count];
+        for dag in (0..count).filter(|&dag| !is_member(case, dag)) {
+            let task = case.tasks[dag];
+            let length_ns = task.length_ns();
+            found[dag] = Some(match self.refusals[dag] {
+                Some(reason) => Err(reason),
+                None if length_ns > task.relative_deadline_ns() => {
+                    Err(NotProvenReason::LengthBeyondDeadline { length_ns })
+                }
+                None => Ok(DagBound {
+                    bound_ns: length_ns,
+                    test: SchedulabilityTest::Owner,
+                }),
+            });
+        }
+        let mut steps = STEP_LIMIT;
+        for &dag in case.order.iter().filter(|&&dag| is_member(case, dag)) {
+            let refusal = self.refusals[dag].map_or(Ok(()), Err);
+            let terms = refusal.and_then(|()| self.terms(case, dag, &found));
+            found[dag] = Some(terms.and_then(|terms| {
+                let response = terms.respond(&mut steps);
+                let bound_ns = response.ok_or(NotProvenReason::NoBound)?;
+                Ok(DagBound {
+                    bound_ns,
+                    test: SchedulabilityTest::Member,
+                })
+            }));
+        }
+        let bounds = found.iter().map(|found| (*found)?.ok());
+        let reasons: Vec<Option<NotProvenReason>> =
+            found.iter().map(|found| (*found)?.err()).collect();
+        let is_own = |dag: &usize| {
+            let reason = reasons[*dag];
+            reason.is_some_and(|reason| !matches!(reason, NotProvenReason::DelayedBy { .. }))
+        };
+        let first = case.order.iter().copied().find(is_own);
+        (bounds.collect(), reasons, first)
+    }
+
+    /// Returns the terms of a member's equation.
+    pub(super) fn terms<'a>(
+        &'a self,
+        case: &AnalysisInput<'a>,
+        dag: usize,
+        found: &[Option<Result<DagBound, NotProvenReason>>],
+    ) -> Result<MemberTerms<'a>, NotProvenReason> {
+        let delayed = |other: usize| NotProvenReason::DelayedBy {
+            dag: case.id(other),
+        };
+        let cores = self.group(case, dag);
+        for owner in cores.iter().filter_map(|&core| self.owners[core]) {
+            if !matches!(found[owner], Some(Ok(_))) {
+                return Err(delayed(owner));
+            }
+        }
+        let of = |dag: usize| MemberTask::of(case.tasks[dag], to_u32(cores.len()));
+        let mut above = Vec::new();
+        let affinity = case.dag(dag).affinity();
+        for (other, bound) in found.iter().enumerate() {
+            let shares = is_member(case, other) && case.dag(other).affinity() == affinity;
+            if !shares || !case.relation.may_outrank(other, dag) {
+                continue;
+            }
+            match bound {
+                Some(Ok(bound)) => above.push((other, of(other), bound.bound_ns)),
+                Some(Err(_)) => return Err(delayed(other)),
+                // Each of the two may outrank the other.
+                None => return Err(NotProvenReason::BesidePinned),
+            }
+        }
+        Ok(MemberTerms {
+            own: of(dag),
+            cores: cores.iter().map(|&core| &self.supplies[core]).collect(),
+            above,
+        })
+    }
+
+    /// Returns the cores of a member's group.
+    pub(super) fn group(&self, case: &AnalysisInput<'_>, dag: usize) -> Vec<usize> {
+        match case.dag(dag).affinity() {
+            [] => (0..self.supplies.len()).collect(),
+            cores => cores.iter().map(|&core| core as usize).collect(),
+        }
+    }
+
+    /// Returns when an owner's subtask finishes after the release.
+    pub(super) fn finish_ns(
+        &self,
+        case: &AnalysisInput<'_>,
+        dag: usize,
+        subtask: SubtaskId,
+    ) -> Option<u64> {
+        let core = case.dag(dag).subtask(subtask).core()?;
+        let mut list = self.lists[core as usize].iter();
+        let found = list.find(|of| of.subtask == subtask.index());
+        found.map(|of| of.finish_ns)
+    }
+}
+
+/// A member's equation.
+pub(super) struct MemberTerms<'a> {
+    pub(super) own: MemberTask<'a>,
+    pub(super) cores: Vec<&'a CoreSupply>,
+    /// The more urgent members, by their positions in the case, with their bounds.
+    pub(super) above: Vec<(usize, MemberTask<'a>, u64)>,
+}
+
+impl MemberTerms<'_> {
+    fn respond(&self, steps: &mut u32) -> Option<u64> {
+        let above = self.above.iter().map(|(_, of, bound_ns)| (of, *bound_ns));
+        let above: Vec<(&MemberTask<'_>, u64)> = above.collect();
+        self.own.respond(&self.cores, &above, steps)
+    }
+}
+
+fn is_member(case: &AnalysisInput<'_>, dag: usize) -> bool {
+    case.dag(dag).first_pinned().is_none()
+}
