@@ -195,7 +195,7 @@ texts! {
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
         /// It shares what the owners of some cores leave.
         Member { attempt: LendingAttempt, left_percent: u32 } =
-            "the first with room for it beside their owners, with {left_percent} % of them left \
+            "the first with room for it, with {left_percent} % of them left \
              ({attempt})";
         /// Its subtasks wait, and no sum of loads tells what fits on a core with those.
         Waits = "its own, as its subtasks wait";

@@ -131,7 +131,7 @@ pub(super) struct MemberTask<'a> {
     /// The most cores that one job can use, as far as there are any.
     parallelism: u64,
     /// The most work of 1, 2, .. disjoint chains.
-    covers: Vec<u64>,
+    pub(super) covers: Vec<u64>,
 }
 
 /// How many terms of equations may be evaluated in one attempt, one for each core and member; a
@@ -199,6 +199,23 @@ impl<'a> MemberTask<'a> {
         window_ns: u64,
     ) -> Option<u128> {
         let waiting_ns = window_ns - self.task.length_ns();
+        let lacks = self.forms(cores, above, window_ns).map(|form| {
+            let works = form.works.iter().copied();
+            let all = works.fold(WorkloadSegment::NONE, WorkloadSegment::and);
+            all.lacks(form.free as u128, waiting_ns.into())
+        });
+        // Without subtasks there are no forms, and nothing to wait for.
+        lacks.min().flatten()
+    }
+
+    /// Returns the forms of the equation on several cores, for a window.
+    pub(super) fn forms<'c>(
+        &'c self,
+        cores: &'c [&CoreSupply],
+        above: &'c [(&Self, u64)],
+        window_ns: u64,
+    ) -> impl Iterator<Item = LentForm> + 'c {
+        let waiting_ns = window_ns - self.task.length_ns();
         let all_waiting = WorkloadSegment {
             value: waiting_ns.into(),
             slope: 1,
@@ -213,24 +230,38 @@ impl<'a> MemberTask<'a> {
             ];
         }
         let forms = (1..=cores.len()).rev().zip(&self.covers);
-        let lacks = forms.flat_map(|(free, &cover)| {
-            let [mut plain, mut clipped] = busy;
-            let left = u128::from(self.task.volume_ns() - cover);
-            plain.value += left;
-            clipped.value += left.max(1);
+        forms.flat_map(move |(free, &cover)| {
+            let left = self.task.volume_ns() - cover;
+            let own = |left: u64| WorkloadSegment {
+                value: left.into(),
+                ..WorkloadSegment::NONE
+            };
+            let [mut plain, mut clipped] =
+                [[own(left), busy[0]], [own(left.max(1)), busy[1]]].map(Vec::from);
             for &(other, response_ns) in above {
                 let used = other.parallelism.min(free as u64);
                 let (task, volume_ns) = (other.task, other.task.volume_ns());
                 let workload = InterferingWorkload::new(task, volume_ns, response_ns, used, used);
                 let in_window = workload.at(window_ns);
-                plain = plain.and(in_window);
-                clipped = clipped.and(in_window.least(workload.over(waiting_ns)));
+                plain.push(in_window);
+                clipped.push(in_window.least(workload.over(waiting_ns)));
             }
-            [plain, clipped].map(|work| work.lacks(free as u128, waiting_ns.into()))
-        });
-        // Without subtasks there are no forms, and nothing to wait for.
-        lacks.min().flatten()
+            [(false, plain), (true, clipped)].map(|(is_clipped, works)| LentForm {
+                free,
+                is_clipped,
+                works,
+            })
+        })
     }
+}
+
+/// One form of the equation on several cores.
+pub(super) struct LentForm {
+    /// The number of cores beside the chains.
+    pub(super) free: usize,
+    pub(super) is_clipped: bool,
+    /// What is beside the chains, what owners execute, and what each more urgent member does.
+    pub(super) works: Vec<WorkloadSegment>,
 }
 
 #[cfg(test)]

@@ -105,42 +105,41 @@ impl PinnedCluster {
     /// Bounds the responses of owners, and then those of members, the most urgent first.
     pub(super) fn bounds(&self, case: &AnalysisInput<'_>) -> CaseBounds {
         let count = case.members.len();
-        let mut found: Vec<Option<Result<DagBound, NotProvenReason>>> = vec![None; count];
-        for dag in (0..count).filter(|&dag| !is_member(case, dag)) {
-            let task = case.tasks[dag];
-            let length_ns = task.length_ns();
-            found[dag] = Some(match self.refusals[dag] {
-                Some(reason) => Err(reason),
-                None if length_ns > task.relative_deadline_ns() => {
-                    Err(NotProvenReason::LengthBeyondDeadline { length_ns })
-                }
-                None => Ok(DagBound {
-                    bound_ns: length_ns,
-                    test: SchedulabilityTest::Owner,
-                }),
-            });
+        let (mut bounds, mut reasons) = (vec![None; count], self.refusals.clone());
+        let owned = (0..count).filter(|&dag| self.refusals[dag].is_none() && !is_member(case, dag));
+        for dag in owned {
+            let (task, length_ns) = (case.tasks[dag], case.tasks[dag].length_ns());
+            match length_ns > task.relative_deadline_ns() {
+                true => reasons[dag] = Some(NotProvenReason::LengthBeyondDeadline { length_ns }),
+                false => bounds[dag] = Some(length_ns),
+            }
         }
         let mut steps = STEP_LIMIT;
         for &dag in case.order.iter().filter(|&&dag| is_member(case, dag)) {
-            let refusal = self.refusals[dag].map_or(Ok(()), Err);
-            let terms = refusal.and_then(|()| self.terms(case, dag, &found));
-            found[dag] = Some(terms.and_then(|terms| {
-                let response = terms.respond(&mut steps);
-                let bound_ns = response.ok_or(NotProvenReason::NoBound)?;
-                Ok(DagBound {
-                    bound_ns,
-                    test: SchedulabilityTest::Member,
-                })
-            }));
+            if self.refusals[dag].is_some() {
+                continue;
+            }
+            let response = self.terms(case, dag, &bounds).and_then(|terms| {
+                let response = terms.own.respond(&terms.cores, &terms.above(), &mut steps);
+                response.ok_or(NotProvenReason::NoBound)
+            });
+            match response {
+                Ok(bound_ns) => bounds[dag] = Some(bound_ns),
+                Err(reason) => reasons[dag] = Some(reason),
+            }
         }
-        let bounds = found.iter().map(|found| (*found)?.ok());
-        let reasons: Vec<Option<NotProvenReason>> =
-            found.iter().map(|found| (*found)?.err()).collect();
         let is_own = |dag: &usize| {
             let reason = reasons[*dag];
             reason.is_some_and(|reason| !matches!(reason, NotProvenReason::DelayedBy { .. }))
         };
         let first = case.order.iter().copied().find(is_own);
+        let bounds = bounds.iter().enumerate().map(|(dag, bound_ns)| {
+            let test = match is_member(case, dag) {
+                true => SchedulabilityTest::Member,
+                false => SchedulabilityTest::Owner,
+            };
+            bound_ns.map(|bound_ns| DagBound { bound_ns, test })
+        });
         (bounds.collect(), reasons, first)
     }
 
@@ -149,31 +148,30 @@ impl PinnedCluster {
         &'a self,
         case: &AnalysisInput<'a>,
         dag: usize,
-        found: &[Option<Result<DagBound, NotProvenReason>>],
+        responses: &[Option<u64>],
     ) -> Result<MemberTerms<'a>, NotProvenReason> {
         let delayed = |other: usize| NotProvenReason::DelayedBy {
             dag: case.id(other),
         };
         let cores = self.group(case, dag);
         for owner in cores.iter().filter_map(|&core| self.owners[core]) {
-            if !matches!(found[owner], Some(Ok(_))) {
+            if responses[owner].is_none() {
                 return Err(delayed(owner));
             }
         }
         let of = |dag: usize| MemberTask::of(case.tasks[dag], to_u32(cores.len()));
         let mut above = Vec::new();
         let affinity = case.dag(dag).affinity();
-        for (other, bound) in found.iter().enumerate() {
+        for (other, &response_ns) in responses.iter().enumerate() {
             let shares = is_member(case, other) && case.dag(other).affinity() == affinity;
             if !shares || !case.relation.may_outrank(other, dag) {
                 continue;
             }
-            match bound {
-                Some(Ok(bound)) => above.push((other, of(other), bound.bound_ns)),
-                Some(Err(_)) => return Err(delayed(other)),
-                // Each of the two may outrank the other.
-                None => return Err(NotProvenReason::BesidePinned),
+            if case.relation.may_outrank(dag, other) {
+                return Err(NotProvenReason::BesidePinned);
             }
+            let response_ns = response_ns.ok_or_else(|| delayed(other))?;
+            above.push((other, of(other), response_ns));
         }
         Ok(MemberTerms {
             own: of(dag),
@@ -183,7 +181,7 @@ impl PinnedCluster {
     }
 
     /// Returns the cores of a member's group.
-    pub(super) fn group(&self, case: &AnalysisInput<'_>, dag: usize) -> Vec<usize> {
+    fn group(&self, case: &AnalysisInput<'_>, dag: usize) -> Vec<usize> {
         match case.dag(dag).affinity() {
             [] => (0..self.supplies.len()).collect(),
             cores => cores.iter().map(|&core| core as usize).collect(),
@@ -212,11 +210,10 @@ pub(super) struct MemberTerms<'a> {
     pub(super) above: Vec<(usize, MemberTask<'a>, u64)>,
 }
 
-impl MemberTerms<'_> {
-    fn respond(&self, steps: &mut u32) -> Option<u64> {
-        let above = self.above.iter().map(|(_, of, bound_ns)| (of, *bound_ns));
-        let above: Vec<(&MemberTask<'_>, u64)> = above.collect();
-        self.own.respond(&self.cores, &above, steps)
+impl<'a> MemberTerms<'a> {
+    pub(super) fn above(&self) -> Vec<(&MemberTask<'a>, u64)> {
+        let above = self.above.iter();
+        above.map(|(_, of, bound_ns)| (of, *bound_ns)).collect()
     }
 }
 

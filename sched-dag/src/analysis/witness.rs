@@ -13,6 +13,8 @@
 //! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
 //! edge FROM TO
 //! wait SUBTASK WCET LIMIT WCET ..             of segments and waits, likewise
+//! pin SUBTASK CORE                            of the cluster, counted from 0
+//! affinity CORE..                             of those that are not pinned; without it all
 //! due SUBTASK DEADLINE                        of a sink that is due before its job
 //! hash FNV_1A                                 of all above
 //!
@@ -38,6 +40,11 @@
 //! demand BUSY TIME..                          before all bounds, if it proves some
 //! bound DAG R demand
 //!
+//! bound DAG R owner FINISH..                  by subtask, from the release on
+//! bound DAG R sequence OWNED                  of a member, on one core
+//! bound DAG R lent CHAINS CLIPPED LEFT OWNED  of a member, on several; OWNED: by their owners
+//! chain SUBTASK.. / other DAG R WORK          as above
+//!
 //! bound DAG R priorities CORES
 //! path SUBTASK..                              each path of the DAG
 //!
@@ -49,6 +56,7 @@
 //! `cover` lines show that a DAG is no wider than there are of them; without any it may use
 //! all cores. `part` lines are disjoint chains, for the clipped form.
 
+use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{self, Write};
@@ -57,6 +65,7 @@ use super::cover::{CoverChain, covering, heaviest, peel};
 use super::interference::{DelaySources, InterferingDag};
 use super::intra_task::each_path;
 use super::judge::{self, AnalysisInput, with_case};
+use super::lent_cores::LentForm;
 use super::one_core::{ResponseEquation, demand};
 use super::pipelined::{PipelineTerms, STEP_LIMIT};
 use super::waiting::reserved;
@@ -191,6 +200,15 @@ impl WitnessText {
             for (id, subtask) in dag.subtasks().iter().enumerate() {
                 self.waits(id, subtask);
             }
+            for (id, subtask) in dag.subtasks().iter().enumerate() {
+                if let Some(core) = subtask.core() {
+                    self.line(format_args!("pin {id} {core}"));
+                }
+            }
+            if !dag.affinity().is_empty() {
+                let cores = dag.affinity().iter().map(|&core| core.into());
+                self.list("affinity", cores);
+            }
             for &sink in dag.sinks() {
                 let deadline_ns = dag.subtask(sink).relative_deadline_ns();
                 if deadline_ns < dag.relative_deadline_ns() {
@@ -253,6 +271,8 @@ impl WitnessText {
             SchedulabilityTest::Demand => self.line(format_args!("bound {id} {bound_ns} demand")),
             SchedulabilityTest::OneCore => self.response(case, dag, bound_ns),
             SchedulabilityTest::IntraTask => self.priorities(case, dag, bound_ns),
+            SchedulabilityTest::Owner => self.owner(case, dag, bound_ns),
+            SchedulabilityTest::Member => self.member(case, dag, bound_ns, responses),
             _ => {
                 let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
                 let Ok(delays) = case.set.delays_of_job(dag, responses, may_outrank) else {
@@ -385,6 +405,57 @@ impl WitnessText {
         for (back, window) in (0..).zip(windows) {
             let own = response.own_work(back, window);
             self.line(format_args!("window {window} {own}"));
+        }
+    }
+
+    fn owner(&mut self, case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) {
+        let id = case.members[dag];
+        let finishes_ns = case.tasks[dag].finishes_ns();
+        let finishes = finishes_ns.iter().map(|&ns| i128::from(ns));
+        self.list(&format!("bound {id} {bound_ns} owner"), finishes);
+        for &sink in case.dag(dag).sinks() {
+            let finish_ns = finishes_ns[sink.index()];
+            if finish_ns < bound_ns {
+                self.line(format_args!("sink {id} {} {finish_ns} 0", sink.0));
+            }
+        }
+    }
+
+    fn member(
+        &mut self,
+        case: &AnalysisInput<'_>,
+        dag: usize,
+        bound_ns: u64,
+        responses: &[Option<u64>],
+    ) {
+        let (id, task) = (case.members[dag], case.tasks[dag]);
+        let cluster = case.pinned.as_ref();
+        let Some(Ok(terms)) = cluster.map(|of| of.terms(case, dag, responses)) else {
+            return;
+        };
+        if let [core] = terms.cores[..] {
+            let owned = core.busy_ns(bound_ns);
+            return self.line(format_args!("bound {id} {bound_ns} sequence {owned}"));
+        }
+        let waiting = u128::from(bound_ns - task.length_ns());
+        let above = terms.above();
+        let mut forms = terms.own.forms(&terms.cores, &above, bound_ns);
+        let all = |form: &LentForm| form.works.iter().map(|work| work.value).sum::<u128>();
+        let Some(form) = forms.find(|form| all(form) <= form.free as u128 * waiting) else {
+            return;
+        };
+        let (chains, clipped) = (terms.cores.len() + 1 - form.free, u8::from(form.is_clipped));
+        let [left, owned, others @ ..] = &form.works[..] else {
+            return;
+        };
+        let (left, owned) = (left.value, owned.value);
+        self.line(format_args!(
+            "bound {id} {bound_ns} lent {chains} {clipped} {left} {owned}"
+        ));
+        self.chains("chain", &covering(task, terms.own.covers.len(), chains));
+        for ((other, _, response_ns), work) in terms.above.iter().zip(others) {
+            let id = case.members[*other];
+            self.line(format_args!("other {id} {response_ns} {}", work.value));
         }
     }
 

@@ -31,24 +31,28 @@ fn dag(random: &mut Random, priority: u32) -> DagSpec {
     dag
 }
 
+/// Returns DAGs, and for how many cores; the one with the shorter deadline is the more urgent.
+pub(super) fn set(random: &mut Random) -> (Vec<DagSpec>, u32) {
+    let cores = 2 + u32::try_from(random.index(4)).expect("few");
+    let count = 2 + random.index(4);
+    let mut specs: Vec<DagSpec> = (0..count).map(|_| dag(random, 0)).collect();
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by_key(|&dag| specs[dag].relative_deadline_ns);
+    for (rank, &dag) in (0..).zip(&order) {
+        for subtask in &mut specs[dag].subtasks {
+            subtask.priority = Some(Priority(rank));
+        }
+    }
+    (specs, cores)
+}
+
 #[test]
 fn divided_sets_keep_their_bounds() {
     let sets = number("LENT_SETS", 2_000);
     let (mut by_attempt, mut groups, mut refused) = ([0_u64; 5], 0_u64, 0_u64);
     for seed in 1..=sets {
         let mut random = Random::new(seed);
-        let cores = 2 + u32::try_from(random.index(4)).expect("few");
-        let mut specs: Vec<DagSpec> = (0..2 + random.index(4))
-            .map(|_| dag(&mut random, 0))
-            .collect();
-        // As the deadlines rank them, ties by position.
-        let mut order: Vec<usize> = (0..specs.len()).collect();
-        order.sort_by_key(|&dag| specs[dag].relative_deadline_ns);
-        for (rank, &dag) in (0..).zip(&order) {
-            for subtask in &mut specs[dag].subtasks {
-                subtask.priority = Some(Priority(rank));
-            }
-        }
+        let (specs, cores) = set(&mut random);
         let settings = settings(FP, cores);
         let mut task_set = commit(&specs, Policy::StaticPriority, cores);
         if assign(&mut task_set, &settings).is_err() {
@@ -73,7 +77,9 @@ fn divided_sets_keep_their_bounds() {
         );
         for _ in 0..5 {
             let breach = breach(&task_set, &settings, &answer, &mut random);
-            let places: Vec<_> = (task_set.dags().iter()).map(|dag| (dag.cluster(), dag.affinity().to_vec(), dag.why_there())).collect();
+            let places: Vec<_> = (task_set.dags().iter())
+                .map(|dag| (dag.cluster(), dag.affinity().to_vec(), dag.why_there()))
+                .collect();
             assert_eq!(breach, None, "seed {seed}: {places:?}");
         }
     }
