@@ -32,10 +32,10 @@
 //! - Everything is recorded, so memory grows with the length of a run.
 #![forbid(unsafe_code)]
 
-mod calls;
 mod command;
 mod edge;
 mod job;
+mod machine;
 mod platform;
 mod report;
 mod settings;
@@ -55,8 +55,8 @@ pub use sched_dag::{
 pub use command::replay_command;
 pub use edge::Divergence;
 pub use job::{JobShown, Passed, SubtaskShown, Value};
-use platform::Machine;
-pub use platform::RunError;
+use machine::Machine;
+pub use machine::RunError;
 pub use report::{DagReport, InstanceRecord, JobRecord, PanicRecord, Report};
 pub use sched_dag::journal::{Event, EventKind};
 use settings::Settings;

@@ -26,7 +26,7 @@ use crate::oracle::bounds::{Quantities, compare, list, parse_task};
 
 /// One task set with the values expected of it.
 #[derive(Debug)]
-pub struct BoundsCase {
+pub struct WaitingBounds {
     /// The case's name.
     pub name: String,
     cores: u32,
@@ -67,7 +67,7 @@ const OF_SET: [&str; 6] = [
 /// # Errors
 ///
 /// [`Malformed`] for the first record that is not as described above.
-pub fn parse(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<BoundsCase, Malformed> {
+pub fn parse(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<WaitingBounds, Malformed> {
     let [name, cores, count] = header.fixed()?;
     let (cores, count) = (header.cores(cores)?, header.at_least_one(count)?);
     let dags = (0..count).map(|_| parse_dag(lines));
@@ -82,7 +82,7 @@ pub fn parse(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<BoundsCase, Mal
         quantities.push((name.to_owned(), value));
     }
     lines.expect("end")?.exactly(0)?;
-    Ok(BoundsCase {
+    Ok(WaitingBounds {
         name: name.to_owned(),
         cores,
         dags,
@@ -196,7 +196,7 @@ fn parse_waits(lines: &mut Lines<'_>, task: Task) -> Result<Task, Malformed> {
 /// # Errors
 ///
 /// The first difference, in one line.
-pub fn check(case: &BoundsCase) -> Result<(), String> {
+pub fn check(case: &WaitingBounds) -> Result<(), String> {
     for (index, dag) in case.dags.iter().enumerate() {
         compare(&dag.quantities, |what| compute_of_dag(what, &dag.task))
             .and_then(|()| {

@@ -39,7 +39,7 @@ pub enum WaitingCase {
     /// A schedule.
     Schedule(Box<Case>),
     /// Bounds of a set.
-    Bounds(bounds::BoundsCase),
+    Bounds(bounds::WaitingBounds),
 }
 
 /// Reads all blocks of a file.

@@ -1,0 +1,560 @@
+//! A virtual machine: the time, the edge of a run, what is to come, and the plan that runs.
+//!
+//! A machine keeps its session; while that runs, it is taken out of there, so that a function's
+//! calls into the platform meet nothing borrowed but the settings, which no function changes.
+//!
+//! Bytes arrive at their times, between the completions and the releases of that instant, as
+//! signals do. Bytes that an instance sends are gone at its completion: no device is slow here, so
+//! only an instance that sends more than its wire has room for loses bytes.
+//!
+//! # A plan while it runs
+//!
+//! The driver is `sched_dag::virtual_time`, the one loop in virtual time, which has the engine
+//! with the bodies and the journal; it asks for the execution time of each instance at its start.
+//! [`Calls`] answers by running the instance's real body and adding up what it executed. Why a run
+//! could not go on is a [`RunError`].
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use fass::edge::Replay;
+use fass::log::LogLine;
+use fass::platform::{Plan, SubtaskRunner};
+use fass::shared::Wire;
+use sched_dag::engine::{Alternate, FaultCost};
+use sched_dag::journal::EventKind;
+use sched_dag::lifecycle::{Request, WaitId};
+use sched_dag::virtual_time::{RunOutcome, VirtualTime as Driver, Workload};
+use sched_dag::{
+    Dag, DagId, DagLabel, DriverNotice, Instance, SchedulerOptions, SubtaskLabel, TaskSet,
+};
+
+use crate::edge::Edge;
+use crate::nanoseconds;
+use crate::report::{PanicRecord, Report};
+use crate::settings::Settings;
+
+/// One thread's virtual machine: the time, the edge of the run, and
+/// what is to come.
+#[derive(Default)]
+pub(crate) struct Machine {
+    pub(crate) settings: RefCell<Settings>,
+    /// The edge, which records and replays.
+    pub(crate) edge: Edge,
+    /// The wires that are connected, and what has been sent on each.
+    pub(crate) connected: RefCell<Vec<(Wire, Vec<u8>)>>,
+    /// The time that functions are told: the start of the instance and what it
+    /// has executed.
+    pub(crate) now_ns: Cell<u64>,
+    /// The time that the running function has executed; `None` outside functions.
+    pub(crate) executed_ns: Cell<Option<u64>>,
+    /// The instance of the running function.
+    pub(crate) running: Cell<Option<Instance>>,
+    /// The lines of the log so far.
+    pub(crate) logs: RefCell<Vec<LogLine>>,
+    /// The devices that answer.
+    pub(crate) devices: RefCell<Vec<Answering>>,
+    /// Arrivals to come, by time and in the order in which they were made.
+    arrivals: RefCell<BTreeMap<(u64, u64), Arrival>>,
+    /// How much of that there has been.
+    count: Cell<u64>,
+    pub(crate) session: RefCell<Option<Session>>,
+    /// The number of the launched plan.
+    pub(crate) plan: Cell<Option<u64>>,
+    pub(crate) has_launched: Cell<bool>,
+}
+
+impl fmt::Debug for Machine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Machine").finish_non_exhaustive()
+    }
+}
+
+/// Something that comes from outside of the scheduler at an instant.
+pub(crate) enum Arrival {
+    Request(Request),
+    Bytes(Wire, Vec<u8>),
+    /// A device gives an answer.
+    Answer(Box<dyn FnOnce()>),
+}
+
+/// Looks for a question of a device, and notes the answers to it.
+type Answering = Box<dyn FnMut(&Machine, u64)>;
+
+impl Machine {
+    /// Notes a signal of a plan; one of another plan does nothing.
+    pub(crate) fn raise_at(&self, time_ns: u64, (plan, dag): (u64, DagId)) {
+        if self.plan.get() == Some(plan) {
+            self.signal_at(time_ns, dag);
+        }
+    }
+
+    /// Notes a signal to a DAG of the launched plan; in a replay all signals are recorded ones.
+    pub(crate) fn signal_at(&self, time_ns: u64, dag: DagId) {
+        if !self.edge.is_replay() {
+            self.keep(time_ns, Arrival::Request(Request::Signal(dag)));
+        }
+    }
+
+    /// Notes the next signal of a replay, which comes not before `now_ns`. One follows when the one
+    /// before it has led to something, for else it would be dropped where functions take longer
+    /// than they took.
+    pub(crate) fn follow_signal(&self, dag: DagId, now_ns: u64) {
+        let next_ns = self.edge.of_replay(|replay| replay.next_signal_ns(dag));
+        if let Some(time_ns) = next_ns {
+            self.keep(time_ns.max(now_ns), Arrival::Request(Request::Signal(dag)));
+        }
+    }
+
+    /// Notes what comes at a time.
+    pub(crate) fn keep(&self, time_ns: u64, arrival: Arrival) {
+        let place = self.count.get();
+        self.count.set(place + 1);
+        self.arrivals.borrow_mut().insert((time_ns, place), arrival);
+    }
+
+    /// Returns the time of the next request, or of bytes that may raise a signal.
+    fn next_request_ns(&self) -> Option<u64> {
+        let arrivals = self.arrivals.borrow();
+        arrivals.first_key_value().map(|(&(time_ns, _), _)| time_ns)
+    }
+
+    /// Takes the next request that is due by `now_ns`.
+    fn take_request(&self, now_ns: u64) -> Option<Request> {
+        loop {
+            self.next_request_ns().filter(|&at_ns| at_ns <= now_ns)?;
+            let ((at_ns, _), arrival) = self.arrivals.borrow_mut().pop_first()?;
+            match arrival {
+                Arrival::Request(request) => return Some(request),
+                Arrival::Bytes(wire, bytes) => {
+                    // An answer to a wait, if it is one, comes now.
+                    self.now_ns.set(now_ns);
+                    if let Some((_, dag)) = wire.arrive(&bytes, at_ns) {
+                        // As an arrival of this instant, which a later round takes, behind those
+                        // that are due already.
+                        self.signal_at(now_ns, dag);
+                    }
+                }
+                Arrival::Answer(give) => {
+                    self.now_ns.set(now_ns);
+                    give();
+                }
+            }
+        }
+    }
+
+    /// Takes what has been sent on wires.
+    pub(crate) fn collect(&self) {
+        for (wire, sent) in self.connected.borrow_mut().iter_mut() {
+            sent.extend(std::iter::from_fn(|| wire.depart()));
+        }
+    }
+}
+
+/// A plan that runs, or can go on running.
+#[derive(Debug)]
+pub(crate) struct Session {
+    driver: Driver<SubtaskRunner>,
+    calls: Calls,
+    /// Whether a function may end the run.
+    may_shut_down: bool,
+    /// Up to when it has run.
+    until_ns: u64,
+}
+
+fn dags(task_set: &TaskSet) -> impl Iterator<Item = (DagId, &Dag)> + Clone {
+    (0..).map(DagId).zip(task_set.dags())
+}
+
+impl Session {
+    pub(crate) fn new(plan: Plan, options: SchedulerOptions, machine: &Rc<Machine>) -> Self {
+        let task_set: Arc<TaskSet> = plan.task_set;
+        // In a replay, the first signal of each; the others follow one by one.
+        for (dag, _) in dags(&task_set).filter(|(_, model)| model.is_sporadic()) {
+            machine.follow_signal(dag, 0);
+        }
+        let bodies = SubtaskRunner::all(&task_set, plan.bodies);
+        let driver = Driver::of_bodies(&task_set, options, bodies, &plan.after_fault);
+        Self {
+            may_shut_down: (plan.lifecycle.as_ref()).is_some_and(|life| life.may_shut_down()),
+            driver: driver.with_lifecycle(plan.lifecycle).recording(),
+            calls: Calls::new(&task_set, machine),
+            until_ns: 0,
+        }
+    }
+
+    /// Returns the number of the DAG of this name.
+    fn find(&self, name: &str) -> Result<DagId, RunError> {
+        let dags = dags(&self.calls.task_set);
+        let mut of_name = dags.clone().filter(|(_, dag)| dag.name() == name);
+        of_name.next().map(|(dag, _)| dag).ok_or_else(|| {
+            let there = dags.map(|(_, dag)| format!("`{}`", dag.name()));
+            RunError::NoSuchDag {
+                name: name.into(),
+                there: there.collect::<Vec<String>>().join(", "),
+            }
+        })
+    }
+
+    /// Runs for a duration, or to the end; in either case not beyond the end of a job.
+    pub(crate) fn run(
+        &mut self,
+        duration: Option<Duration>,
+        until: Option<(&str, u64)>,
+    ) -> Result<Report, RunError> {
+        let machine = Rc::clone(&self.calls.machine);
+        let until_ns = match duration {
+            Some(duration) => self.until_ns.saturating_add(nanoseconds(duration)),
+            None => u64::MAX,
+        };
+        if duration.is_none() && until.is_none() {
+            self.require_end()?;
+        }
+        let until = until.map(|(dag, job)| Ok((self.find(dag)?, job)));
+        let until = until.transpose()?;
+        self.calls.until = until;
+        // An earlier call may have come beyond that job: then nothing is left to be run.
+        self.calls.has_arrived = until.is_some_and(|(dag, last)| {
+            let run = self.driver.run_so_far();
+            let mut jobs = run.record().numbered(dag);
+            jobs.any(|(job, times)| job >= last && times.ended_ns.is_some())
+        });
+        let end = self.driver.run_until(until_ns, &mut self.calls);
+        let now_ns = self.driver.now_ns();
+        // What has no event any more has run as far as it was asked to.
+        let (clock_ns, reached_ns) = match end {
+            RunOutcome::TimeReached => (until_ns, until_ns),
+            RunOutcome::Finished | RunOutcome::TimeOverflow(_) => (now_ns, until_ns),
+            RunOutcome::Stopped => (now_ns, now_ns),
+        };
+        // Between two calls the clock stands here: an arrival at an earlier time comes at once.
+        machine.now_ns.set(clock_ns);
+        self.until_ns = reached_ns;
+        let is_over = end == RunOutcome::Finished;
+        let outcome = (machine.edge).of_replay(|replay| replay.outcome(is_over));
+        let (run, calls) = (self.driver.run_so_far(), &self.calls);
+        let report = Report {
+            panics: calls.panics.clone(),
+            degraded: calls.degraded.clone(),
+            is_late: machine.settings.borrow().late.most_ns > 0,
+            ..Report::new(
+                run,
+                now_ns,
+                &calls.executed_ns,
+                &machine.logs.borrow(),
+                outcome,
+            )
+        };
+        if let Some(PanicRecord { instance, message }) = self.calls.panic.take() {
+            let (dag, subtask) = self.labels(instance);
+            return Err(RunError::Panicked {
+                dag,
+                subtask,
+                job: instance.job,
+                message,
+                report: Box::new(report),
+            });
+        }
+        if let RunOutcome::TimeOverflow(instance) = end {
+            let ((dag, subtask), job) = (self.labels(instance), instance.job);
+            return Err(RunError::TimeOverflow { dag, subtask, job });
+        }
+        Ok(report)
+    }
+
+    fn labels(&self, Instance { dag, subtask, .. }: Instance) -> (DagLabel, SubtaskLabel) {
+        let task_set = &self.calls.task_set;
+        (task_set.label(dag), task_set.subtask_label(dag, subtask))
+    }
+
+    fn require_end(&self) -> Result<(), RunError> {
+        let task_set = &self.calls.task_set;
+        let is_endless = |dag: &Dag| dag.jobs().is_none() && !dag.is_sporadic();
+        match dags(task_set).find(|(_, dag)| is_endless(dag)) {
+            Some((dag, _)) if !self.may_shut_down => Err(RunError::Endless {
+                dag: task_set.label(dag),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the recording of the run so far.
+    pub(crate) fn recording(&self) -> Vec<u8> {
+        let edge = &self.calls.machine.edge;
+        edge.recording(&self.driver.run_so_far())
+    }
+}
+
+/// The message of a fault that a test asked for.
+const FAULT: &str = "a fault that was asked for";
+
+/// The workload of the driver: the functions of the bodies, and what is known of their calls
+/// besides the events.
+#[derive(Debug)]
+struct Calls {
+    pub(crate) task_set: Arc<TaskSet>,
+    pub(crate) machine: Rc<Machine>,
+    /// How long each instance has executed so far.
+    pub(crate) executed_ns: BTreeMap<Instance, u64>,
+    /// The instances that have waited, with the segment that each executes next.
+    segments: BTreeMap<Instance, usize>,
+    /// The contained panics.
+    pub(crate) panics: Vec<PanicRecord>,
+    /// For each DAG whether a subtask of it has fallen back.
+    pub(crate) degraded: Vec<bool>,
+    /// The panic that fails the run and stops it.
+    pub(crate) panic: Option<PanicRecord>,
+    /// The job with whose end the run stops.
+    pub(crate) until: Option<(DagId, u64)>,
+    /// Whether it has ended.
+    pub(crate) has_arrived: bool,
+}
+
+impl Calls {
+    pub(crate) fn new(task_set: &Arc<TaskSet>, machine: &Rc<Machine>) -> Self {
+        Self {
+            task_set: Arc::clone(task_set),
+            machine: Rc::clone(machine),
+            executed_ns: BTreeMap::new(),
+            segments: BTreeMap::new(),
+            panics: Vec::new(),
+            degraded: vec![false; task_set.dags().len()],
+            panic: None,
+            until: None,
+            has_arrived: false,
+        }
+    }
+
+    /// Calls a function, or fails in its place. The error is the message of its panic.
+    fn call(&self, runner: &mut SubtaskRunner, fails: bool) -> Result<(), String> {
+        // Unwind safety: a body that panicked is never run again, and the
+        // machine's cells hold plain numbers.
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            if fails {
+                runner.body.discard(runner.instance.job);
+                resume_unwind(Box::new(FAULT));
+            }
+            runner.run();
+        }));
+        result.map_err(|payload| {
+            let text = payload.downcast_ref::<String>().map(String::as_str);
+            let text = text.or_else(|| payload.downcast_ref::<&str>().copied());
+            text.unwrap_or("(a payload that is no text)").to_owned()
+        })
+    }
+}
+
+impl Workload<SubtaskRunner> for Calls {
+    fn execute(&mut self, runner: &mut SubtaskRunner, now_ns: u64) -> Option<u64> {
+        let (machine, instance) = (Rc::clone(&self.machine), runner.instance);
+        let passes_over = |replay: &mut Replay| replay.passes_over(instance);
+        if machine.edge.of_replay(passes_over) {
+            runner.body.pass_over(instance.job);
+            return Some(0);
+        }
+        machine.now_ns.set(now_ns);
+        machine.executed_ns.set(Some(0));
+        machine.running.set(Some(instance));
+        let is_later = runner.body.goes_on(instance.job);
+        machine.edge.start_turn(instance, is_later);
+        let settings = machine.settings.borrow();
+        let mut faults = settings.faults.iter();
+        let fails = faults.any(|fault| fault.is(instance, &self.task_set));
+        let mut result = self.call(runner, fails);
+        let goes_on = runner.body.goes_on(instance.job);
+        machine.edge.finish_turn(instance, now_ns, goes_on);
+        machine.running.set(None);
+        let mut executed_ns = machine.executed_ns.take().unwrap_or(0);
+        let subtask = self.task_set.dag(instance.dag).subtask(instance.subtask);
+        // A function that panics has executed what it said until then. One that is to fail was not
+        // called, so the time of a silent call passes before its fault.
+        let segment = self.segments.remove(&instance).unwrap_or(0);
+        if executed_ns == 0 && (result.is_ok() || fails) {
+            executed_ns = settings.silent.of_call_ns(instance, segment, subtask);
+        }
+        let before_ns = self.executed_ns.get(&instance).copied().unwrap_or(0);
+        // The function has run to its end, but nobody may see what it did beyond its budget.
+        let budget_ns = subtask.most_execution_ns(0).saturating_sub(before_ns);
+        if executed_ns > budget_ns {
+            executed_ns = budget_ns;
+            let budget = Duration::from_nanos(before_ns + budget_ns);
+            result = Err(format!("executed for more than its budget of {budget:?}"));
+        }
+        if let Err(message) = result {
+            runner.body.failed(now_ns);
+            let panic = PanicRecord { instance, message };
+            if !settings.contains_panics {
+                // The driver stops: no function is called after a panic that fails the run.
+                self.panic = Some(panic);
+                return None;
+            }
+            self.panics.push(panic);
+            if machine.edge.is_replayed(instance.dag) {
+                // What it cuts is recorded, and is passed over.
+                if let Some(next) = runner.body.replacement().filter(Alternate::is_there) {
+                    self.degraded[instance.dag.index()] |= next.is_fallback();
+                    runner.body.replace();
+                }
+                let task_set = &self.task_set;
+                let cut = |replay: &mut Replay| replay.cut_behind(instance, task_set);
+                machine.edge.of_replay(cut);
+            }
+        }
+        let in_all_ns = before_ns.saturating_add(executed_ns);
+        self.executed_ns.insert(instance, in_all_ns);
+        Some(executed_ns)
+    }
+
+    fn fails(&mut self, instance: Instance) -> bool {
+        let mut panics = self.panics.iter();
+        // Of a DAG in a replay, recorded cuts say what a fault cost; to the scheduler none has
+        // failed.
+        !self.machine.edge.is_replayed(instance.dag)
+            && panics.any(|panic| panic.instance == instance)
+    }
+
+    fn ended(&mut self, instance: Instance, fault: Option<FaultCost>) {
+        self.degraded[instance.dag.index()] |= fault == Some(FaultCost::Degraded);
+        self.machine.collect();
+    }
+
+    fn waits(&mut self, wait: WaitId, now_ns: u64) {
+        self.segments
+            .insert(wait.instance, wait.number as usize + 1);
+        let machine = &*self.machine;
+        machine.now_ns.set(now_ns);
+        machine.collect();
+        let mut devices = machine.devices.borrow_mut();
+        devices.iter_mut().for_each(|look| look(machine, now_ns));
+    }
+
+    fn hear(&mut self, notice: &DriverNotice) {
+        let event = &notice.event;
+        let ended = match event.what {
+            EventKind::Released => None,
+            // All jobs of it.
+            EventKind::DagEnded => Some(u64::MAX),
+            _ => Some(event.job),
+        };
+        self.has_arrived |=
+            // A release ends no job: `None` is less than any number.
+            (self.until).is_some_and(|(dag, job)| dag == event.dag && Some(job) <= ended);
+        // In a replay, a signal follows when the one before it has led to something.
+        if let EventKind::Released | EventKind::Skipped = event.what {
+            self.machine.follow_signal(event.dag, event.time_ns);
+        }
+    }
+
+    fn request(&mut self, request: Request, now_ns: u64) {
+        match request {
+            Request::Signal(dag) => self.machine.signal_at(now_ns, dag),
+            _ => self.machine.keep(now_ns, Arrival::Request(request)),
+        }
+    }
+
+    fn next_request_ns(&self) -> Option<u64> {
+        self.machine.next_request_ns()
+    }
+
+    fn take_request(&mut self, now_ns: u64) -> Option<Request> {
+        self.machine.take_request(now_ns)
+    }
+
+    fn late_ns(&self, due_ns: u64) -> u64 {
+        self.machine.settings.borrow().late.of_interrupt_ns(due_ns)
+    }
+
+    fn stops(&self) -> bool {
+        self.has_arrived
+    }
+}
+
+/// Why a run in virtual time ended early, or could not begin.
+///
+/// ```
+/// use virtual_time::{RunError, VirtualTime};
+///
+/// let machine = VirtualTime::new(); // and nothing is committed
+/// assert!(matches!(machine.try_run(), Err(RunError::NothingToRun)));
+/// ```
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum RunError {
+    /// Nothing has been committed on this thread since the machine was made, or
+    /// an earlier run has failed.
+    NothingToRun,
+    /// A run to the end was asked for, but this DAG has no end.
+    Endless {
+        /// The DAG.
+        dag: DagLabel,
+    },
+    /// A subtask's function panicked, and the machine was not told to
+    /// [contain](crate::VirtualTime::contain_panics) that. No function runs
+    /// after it.
+    Panicked {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The job.
+        job: u64,
+        /// The panic's message.
+        message: String,
+        /// The report of the run up to the panic.
+        report: Box<Report>,
+    },
+    /// A job of a DAG was asked for that is not in the commit.
+    NoSuchDag {
+        /// The name.
+        name: String,
+        /// Those that are there.
+        there: String,
+    },
+    /// An instance would finish after `u64::MAX` nanoseconds.
+    TimeOverflow {
+        /// The DAG.
+        dag: DagLabel,
+        /// The subtask.
+        subtask: SubtaskLabel,
+        /// The job.
+        job: u64,
+    },
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NothingToRun => f.write_str(
+                "there is nothing to run; commit DAGs on this thread after making the `VirtualTime`",
+            ),
+            Self::Endless { dag } => write!(
+                f,
+                "{dag} has no limit of jobs, so its run has no end; set `jobs` or use `run_for`"
+            ),
+            Self::Panicked {
+                dag,
+                subtask,
+                job,
+                message,
+                ..
+            } => write!(f, "{subtask} of {dag} panicked in job {job}: {message}"),
+            Self::NoSuchDag { name, there } => {
+                write!(f, "there is no dag `{name}`; there are {there}")
+            }
+            Self::TimeOverflow { dag, subtask, job } => write!(
+                f,
+                "{subtask} of {dag} would finish job {job} after {} ns, the last time there is; \
+                 execute for less",
+                u64::MAX
+            ),
+        }
+    }
+}
+
+impl Error for RunError {}
