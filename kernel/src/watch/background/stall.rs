@@ -18,7 +18,7 @@
 //! [`QUIET_NS`] while it runs something is sent one; if it has taken none for
 //! [`SILENT_NS`], it is accused at each look, by a non-maskable interrupt. If interrupts turn
 //! out to be enabled there, it was the host that did not let it run, and it goes on. If they
-//! are disabled at eight looks in a row, it reports where it is, and ends the run.
+//! are disabled at several looks in a row, it reports where it is, and ends the run.
 //!
 //! A machine of one core has nobody to notice.
 
