@@ -301,10 +301,11 @@ impl Dag {
         &self.subtasks[subtask.index()]
     }
 
-    /// Returns the first subtask that is pinned to a core.
+    /// Returns the first subtask that not every core of the cluster may execute.
     pub(crate) fn first_pinned(&self) -> Option<SubtaskId> {
         let mut subtasks = (0..).map(SubtaskId).zip(&self.subtasks);
-        let found = subtasks.find(|(_, subtask)| subtask.core().is_some());
+        let has_affinity = !self.affinity().is_empty();
+        let found = subtasks.find(|(_, subtask)| has_affinity || subtask.core().is_some());
         found.map(|(id, _)| id)
     }
 

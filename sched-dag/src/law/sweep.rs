@@ -3,7 +3,8 @@
 //! At every instant the rule says which instances *should* run: with m cores, those
 //! that have started and keep their core; on each other core for which pinned ones are
 //! eligible, of these the one with the smallest key; and of all others that are eligible
-//! those with the smallest keys, until m are reached. An eligible instance that should run
+//! those with the smallest keys, until m are reached. Where DAGs have affinities, the last
+//! holds for each group of cores by itself, and for the instances of its DAGs. An eligible instance that should run
 //! and does not is *owed* a core. In virtual time that never lasts. On a machine it is
 //! never 0: the scheduler is told, decides, and interrupts a core. So it is a breach
 //! only if it lasts for longer than a stated *bound*. The blame is what was the case
@@ -37,11 +38,22 @@ pub(super) struct DispatchModel<'a> {
     pub(super) task_set: &'a TaskSet,
     pub(super) options: &'a SchedulerOptions,
     pub(super) cores: Range<u32>,
+    /// The affinities of its DAGs, each once.
+    pub(super) groups: Vec<&'a [u32]>,
     /// When sporadic jobs were due.
     pub(super) due_ns: BTreeMap<(DagId, u64), u64>,
 }
 
-impl DispatchModel<'_> {
+/// The cores that may execute an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place<'a> {
+    /// The one that it is pinned to.
+    Core(CoreId),
+    /// Those of its DAG's affinity.
+    Group(&'a [u32]),
+}
+
+impl<'a> DispatchModel<'a> {
     /// Returns an instance's place in the order of dispatch. Static priority: (priority, DAG,
     /// job, subtask). EDF: the deadline instead, that of the most urgent sink that the subtask
     /// reaches.
@@ -61,11 +73,19 @@ impl DispatchModel<'_> {
         (urgency, instance)
     }
 
-    /// Returns the core that an instance is pinned to.
-    pub(super) fn pin(&self, instance: Instance) -> Option<CoreId> {
+    /// Returns the cores that may execute an instance.
+    pub(super) fn place(&self, instance: Instance) -> Place<'a> {
         let dag = self.task_set.dag(instance.dag);
-        let core = dag.subtask(instance.subtask).core()?;
-        Some(CoreId(self.cores.start + core))
+        match dag.subtask(instance.subtask).core() {
+            Some(core) => Place::Core(CoreId(self.cores.start + core)),
+            None => Place::Group(dag.affinity()),
+        }
+    }
+
+    /// Reports whether a core is one of an affinity.
+    pub(super) fn is_of(&self, group: &[u32], core: CoreId) -> bool {
+        let number = core.0.checked_sub(self.cores.start);
+        group.is_empty() || number.is_some_and(|number| group.contains(&number))
     }
 
     /// Reports whether a started instance keeps its core until it finishes.
@@ -265,29 +285,19 @@ impl<'m> DispatchSweep<'m> {
     fn settle(&mut self, until_ns: u64) {
         // A core that has not been seen yet may not be there: only seen ones count.
         let claims = self.claims();
-        let claimed = claims.keys().filter(|core| self.is_idle(core)).count();
-        let idle = (self.known_cores.len()).saturating_sub(self.running.len() + claimed);
         for place in 0..self.started.len() {
-            let wrong = self.out_of_turn(self.started[place], idle);
+            let wrong = self.out_of_turn(self.started[place], &claims);
             self.wrong.extend(wrong);
         }
         let should_run = self.should_run(&claims);
-        let past = |key: &Key| !should_run.contains(key);
+        let past = |key: &Key| should_run.iter().all(|(owed, _)| owed != key);
         let over: Vec<Key> = self.owed.keys().copied().filter(past).collect();
         for key in over {
             if let Some(owed) = self.owed.remove(&key) {
                 self.close(key, &owed);
             }
         }
-        let mut rank = 0;
-        for key in &should_run {
-            let has_idle_core = match self.model.pin(key.1) {
-                Some(core) => self.is_idle(&core),
-                None => {
-                    rank += 1;
-                    rank <= idle
-                }
-            };
+        for &(ref key, has_idle_core) in &should_run {
             let since_ns = self.owed.get(key).map_or(self.now_ns, |owed| owed.since_ns);
             // The first look beyond the bound decides; finding a culprit costs a walk over all
             // cores.
@@ -310,6 +320,18 @@ impl<'m> DispatchSweep<'m> {
         self.running.values().all(|busy| busy != core)
     }
 
+    /// Returns how many of these cores are of a group.
+    fn count<'c>(&self, group: &[u32], cores: impl Iterator<Item = &'c CoreId>) -> usize {
+        cores.filter(|core| self.model.is_of(group, **core)).count()
+    }
+
+    /// Returns how many cores of a group are idle and not claimed.
+    fn idle(&self, group: &[u32], claims: &BTreeMap<CoreId, Key>) -> usize {
+        let claimed = claims.keys().filter(|core| self.is_idle(core));
+        let taken = self.count(group, self.running.values().chain(claimed));
+        (self.count(group, self.known_cores.iter())).saturating_sub(taken)
+    }
+
     /// Returns the pinned instance that should run on each core for which one is eligible, and that
     /// no instance keeps.
     fn claims(&self) -> BTreeMap<CoreId, Key> {
@@ -318,7 +340,7 @@ impl<'m> DispatchSweep<'m> {
             return claims;
         }
         for key in self.waiting.keys().chain(self.running.keys()) {
-            if let Some(core) = self.model.pin(key.1)
+            if let Place::Core(core) = self.model.place(key.1)
                 && self.known_cores.contains(&core)
             {
                 let first = claims.entry(core).or_insert(*key);
@@ -332,49 +354,58 @@ impl<'m> DispatchSweep<'m> {
         claims
     }
 
-    /// Returns the waiting instances that should run: the pinned ones, and then, in the order of
-    /// keys, the others.
-    fn should_run(&self, claims: &BTreeMap<CoreId, Key>) -> Vec<Key> {
-        let claimed = claims.values().filter(|key| self.waiting.contains_key(key));
-        let mut owed: Vec<Key> = claimed.copied().collect();
-        let mut free = self.known_cores.len().saturating_sub(claims.len());
-        let mut movable = Vec::new();
-        for key in self.running.keys() {
-            // It has its core whatever waits, so the others share those that are left.
-            if self.model.keeps_its_core(key.1) {
-                free = free.saturating_sub(1);
-            } else if self.model.pin(key.1).is_none() {
-                movable.push(*key);
-            }
+    /// Returns the waiting instances that should run, and whether a core is idle for each: the
+    /// pinned ones, and then, group by group in the order of keys, the others.
+    fn should_run(&self, claims: &BTreeMap<CoreId, Key>) -> Vec<(Key, bool)> {
+        let claimed = claims.iter();
+        let claimed = claimed.filter(|(_, key)| self.waiting.contains_key(key));
+        let mut owed: Vec<_> = claimed
+            .map(|(core, key)| (*key, self.is_idle(core)))
+            .collect();
+        for group in &self.model.groups {
+            self.add_owed(group, claims, &mut owed);
         }
-        let mut movable = movable.into_iter().peekable();
-        let waiting = self.waiting.keys().copied();
-        let mut waiting = waiting
-            .filter(|key| self.model.pin(key.1).is_none())
+        owed
+    }
+
+    /// Adds those of a group.
+    fn add_owed(&self, group: &[u32], claims: &BTreeMap<CoreId, Key>, owed: &mut Vec<(Key, bool)>) {
+        let is_of_it = |key: &Key| self.model.place(key.1) == Place::Group(group);
+        let kept = (self.running.iter()).filter(|(key, _)| self.model.keeps_its_core(key.1));
+        // It has its core whatever waits, so the others share those that are left.
+        let taken = self.count(group, claims.keys().chain(kept.map(|(_, core)| core)));
+        let free = self.count(group, self.known_cores.iter());
+        let movable = self.running.keys().filter(|key| is_of_it(key));
+        let mut movable = movable
+            .filter(|key| !self.model.keeps_its_core(key.1))
             .peekable();
-        for _ in 0..free {
+        let mut waiting = self.waiting.keys().filter(|key| is_of_it(key)).peekable();
+        let mut idle = self.idle(group, claims);
+        for _ in taken..free {
             match (waiting.peek(), movable.peek()) {
                 // One that runs and goes first has its core by right.
                 (Some(waits), Some(runs)) if runs < waits => {
                     movable.next();
                 }
                 (Some(waits), _) => {
-                    owed.push(*waits);
+                    owed.push((**waits, idle > 0));
+                    idle = idle.saturating_sub(1);
                     waiting.next();
                 }
                 (None, _) => break,
             }
         }
-        owed
     }
 
     /// Says what runs instead of an instance that is owed a core.
     fn blame(&self, owed: Key, is_idle: bool, claims: &BTreeMap<CoreId, Key>) -> DispatchFault {
-        let pin = self.model.pin(owed.1);
+        let place = self.model.place(owed.1);
         let mut running = self.running.iter().rev();
-        let movable = running.find(|(key, core)| match pin {
-            Some(pin) => **core == pin,
-            None => !self.model.keeps_its_core(key.1) && self.model.pin(key.1).is_none(),
+        let movable = running.find(|(key, core)| match place {
+            Place::Core(pin) => **core == pin,
+            Place::Group(_) => {
+                !self.model.keeps_its_core(key.1) && self.model.place(key.1) == place
+            }
         });
         match movable {
             // The least urgent one is blamed: it is the one that a dispatch would have preempted.
@@ -383,7 +414,12 @@ impl<'m> DispatchSweep<'m> {
                 let is_left = |core: &CoreId| self.is_idle(core) && !claims.contains_key(core);
                 let cores = self.model.cores.start..;
                 let mut cores = cores.take(self.known_cores.len()).map(CoreId);
-                DispatchFault::Idle(pin.or_else(|| cores.find(is_left)))
+                DispatchFault::Idle(match place {
+                    Place::Core(pin) => Some(pin),
+                    Place::Group(group) => {
+                        cores.find(|core| self.model.is_of(group, *core) && is_left(core))
+                    }
+                })
             }
         }
     }
@@ -411,7 +447,7 @@ impl<'m> DispatchSweep<'m> {
     fn out_of_turn(
         &self,
         (key, core, start): (Key, CoreId, u64),
-        idle: usize,
+        claims: &BTreeMap<CoreId, Key>,
     ) -> Option<DispatchBreach> {
         if !self.model.keeps_its_core(key.1) {
             return None;
@@ -421,19 +457,23 @@ impl<'m> DispatchSweep<'m> {
             let longest_ns = self.now_ns.saturating_sub(*since_ns);
             longest_ns > self.bound_ns || self.bound_ns == 0 && *event < start
         };
-        let pin = self.model.pin(key.1);
-        let of_line = |line: Option<CoreId>| {
+        let of_place = |place: Place<'m>| {
             let before = self
                 .waiting
                 .iter()
                 .filter(move |(_, since)| is_before(since));
-            before.filter(move |(other, _)| self.model.pin(other.1) == line)
+            before.filter(move |(other, _)| self.model.place(other.1) == place)
         };
         // On its core what is pinned goes first, and what is not goes after all of that.
-        let goes_first = |(other, _): &(&Key, _)| pin.is_none() || **other < key;
-        let mut pinned = of_line(Some(core)).filter(goes_first);
-        let mut others = of_line(None).take_while(|(other, _)| pin.is_none() && **other < key);
-        let (first, (since_ns, _)) = pinned.next().or_else(|| others.nth(idle))?;
+        let mut pinned = of_place(Place::Core(core));
+        let found = match self.model.place(key.1) {
+            Place::Core(_) => pinned.find(|(other, _)| **other < key),
+            place @ Place::Group(group) => pinned.next().or_else(|| {
+                let mut others = of_place(place).take_while(|(other, _)| **other < key);
+                others.nth(self.idle(group, claims))
+            }),
+        };
+        let (first, (since_ns, _)) = found?;
         Some(DispatchBreach::OutOfTurn {
             started: key.1,
             core,

@@ -50,7 +50,7 @@ impl Scheduler {
                 // No vertex keeps its key: it is absolute, so it comes out as when it was put in
                 // line.
                 let key = (self.ready).key(number, vertex, || jobs.job(vertex.progress));
-                self.ready.remove(vertex.pin, key);
+                self.ready.remove(vertex.line, key);
             }
             _ => panic!("{instance} {event} and has not started; complete each once, or fail it"),
         }
@@ -102,7 +102,7 @@ impl Scheduler {
             if vertex.phase == InstancePhase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
                 let key = self.ready.key(number, vertex, || job);
-                self.ready.remove(vertex.pin, key);
+                self.ready.remove(vertex.line, key);
                 self.log
                     .of_instance(EventKind::Cancelled, vertex.instance(job));
                 vertex.phase = InstancePhase::Absent;
@@ -269,6 +269,6 @@ pub(super) fn line_up(
 ) {
     vertex.phase = InstancePhase::Ready;
     vertex.job = job.number;
-    ready.insert(vertex.pin, ready.key(number, vertex, || job));
+    ready.insert(vertex.line, ready.key(number, vertex, || job));
     log.of_instance(EventKind::Ready, vertex.instance(job));
 }

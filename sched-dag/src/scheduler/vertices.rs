@@ -45,22 +45,38 @@ pub(super) enum InstancePhase {
     Waiting,
 }
 
-/// The core of its cluster that alone executes a subtask, if there is one. Without the feature
-/// `pins` there is none, known when it is compiled.
+/// The line that a subtask's instances come into: its core's, its group's, or the cluster's, which
+/// without the feature `pins` it is, known when it is compiled.
+///
+/// That of a core is twice the core; that of a group twice the first core of the group, and 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Pin(u16);
+pub(super) struct LineId(pub(super) u16);
 
-impl Pin {
-    const NONE: Self = Self(u16::MAX);
+impl LineId {
+    pub(super) const CLUSTER: Self = Self(u16::MAX);
 
-    fn new(core: Option<u32>) -> Self {
-        let core = core.map(|core| u16::try_from(core).expect("verified to be in range"));
-        core.map_or(Self::NONE, Self)
+    fn new(pin: Option<u32>, affinity: &[u32]) -> Self {
+        match (pin, affinity) {
+            (Some(core), _) => Self::of_core(CoreId(core)),
+            (None, [first, ..]) => Self(Self::of_core(CoreId(*first)).0 + 1),
+            (None, []) => Self::CLUSTER,
+        }
     }
 
     #[inline]
+    pub(super) fn of_core(core: CoreId) -> Self {
+        Self(2 * u16::try_from(core.0).expect("verified to be in range"))
+    }
+
+    #[inline]
+    pub(super) fn is_cluster(self) -> bool {
+        !PINS || self == Self::CLUSTER
+    }
+
+    /// Returns the core that it is of.
+    #[inline]
     pub(super) fn core(self) -> Option<CoreId> {
-        (PINS && self != Self::NONE).then(|| CoreId(self.0.into()))
+        (PINS && self.0.is_multiple_of(2)).then(|| CoreId(u32::from(self.0) / 2))
     }
 }
 
@@ -83,7 +99,7 @@ pub(super) struct Vertex {
     /// Whether the end of its instance is told to its successors and to nobody else:
     /// it has some, its job is the only one in flight, and is not cut.
     pub(super) only_passes_on: bool,
-    pub(super) pin: Pin,
+    pub(super) line: LineId,
     /// The initial value of a counter.
     initial: u32,
     /// Its counter, if it has one slot.
@@ -134,7 +150,7 @@ impl VertexTable {
                     is_preemptible: preemption == Preemption::Enabled
                         && !attributes.is_non_preemptive(),
                     only_passes_on: false,
-                    pin: Pin::new(attributes.core()),
+                    line: LineId::new(attributes.core(), dag.affinity()),
                     initial,
                     counter: initial,
                     counters: to_u32(counters.len()),
@@ -271,10 +287,10 @@ impl VertexTable {
 }
 
 impl Vertex {
-    /// Reports whether an instance in its cluster's line may take its core from it.
+    /// Reports whether an instance that is not pinned may take its core from it.
     #[inline]
-    pub(super) fn yields_to_the_cluster(&self) -> bool {
-        self.is_preemptible && self.pin.core().is_none()
+    pub(super) fn yields_to_the_unpinned(&self) -> bool {
+        self.is_preemptible && self.line.core().is_none()
     }
 
     /// Returns the vertex's part of a job.

@@ -156,13 +156,13 @@ pub(super) fn one_up_to(clusters: usize) -> impl Display {
     fmt::from_fn(move |f| write!(f, "state one up to cluster {}", clusters.saturating_sub(1)))
 }
 
-/// Returns to which cores of a cluster of so many a subtask can be pinned.
-pub(super) fn pinnable(cores: u32) -> impl Display {
+/// Returns which cores can be stated in a cluster of so many.
+pub(super) fn counted_from_0(cores: u32) -> impl Display {
     fmt::from_fn(move |f| match cores {
-        _ if !PINS => f.write_str("nothing is; build it with `fass`' feature `pins`"),
+        _ if !PINS => f.write_str("no core can be stated; build it with `fass`' feature `pins`"),
         _ => write!(
             f,
-            "its cluster has {cores}, counted from 0; pin it to one of these"
+            "its cluster has {cores}, counted from 0; state one of these"
         ),
     })
 }

@@ -5,13 +5,13 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::replay::{stage_after, stage_before};
-use super::sweep::{DispatchModel, DispatchState, DispatchSweep, WaitCounts};
+use super::sweep::{DispatchModel, DispatchState, DispatchSweep, Place, WaitCounts};
 use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, EventKind};
 use crate::policy::{OnFault, SchedulerOptions};
 use crate::spec::WAITS;
-use crate::task_set::TaskSet;
+use crate::task_set::{Dag, TaskSet};
 
 /// The findings about R5 in a journal.
 #[derive(Clone, Debug, Default)]
@@ -42,10 +42,16 @@ pub fn judge_dispatch(
         let is_of_it = |event: &Event| task_set.dag(event.dag).cluster() == cluster;
         let events = events.clone().filter(is_of_it);
         let due = events.clone().filter(|event| event.what == EventKind::Due);
+        let own = task_set
+            .dags()
+            .iter()
+            .filter(|dag| dag.cluster() == cluster);
+        let groups: BTreeSet<&[u32]> = own.map(Dag::affinity).collect();
         let mut model = DispatchModel {
             task_set,
             options,
             cores: task_set.cores_of(cluster, options.cores),
+            groups: groups.into_iter().collect(),
             due_ns: BTreeMap::new(),
         };
         for event in due {
@@ -131,7 +137,8 @@ fn before(
     (busy.collect(), first_of_instance)
 }
 
-/// Returns the instances on a core that is not theirs, by cluster or pin, or that lost a core that they keep.
+/// Returns the instances on a core that is not theirs, by cluster, pin or affinity, or that lost a
+/// core that they keep.
 fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
     let mut suspended = BTreeSet::new();
     let found = events.filter_map(|event| {
@@ -139,10 +146,17 @@ fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -
             return Some(Violation::OutsideItsCluster { event });
         }
         if event.what.is_of_machine()
-            && let Some(core) = event.instance().and_then(|of| model.pin(of))
-            && core != event.core
+            && let Some(of) = event.instance()
         {
-            return Some(Violation::OffItsCore { event, core });
+            match model.place(of) {
+                Place::Core(core) if core != event.core => {
+                    return Some(Violation::OffItsCore { event, core });
+                }
+                Place::Group(group) if !model.is_of(group, event.core) => {
+                    return Some(Violation::OutsideItsAffinity { event });
+                }
+                _ => {}
+            }
         }
         let instance = (event.instance()).filter(|of| model.keeps_its_core(*of))?;
         let lost = match event.what {

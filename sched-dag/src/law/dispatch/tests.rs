@@ -14,10 +14,18 @@ pub(in crate::law) fn dags(clusters: &[u32], keeps: bool) -> TaskSet {
 
 /// The same, the subtasks of the first DAGs pinned to these cores of their clusters.
 fn pinned(clusters: &[u32], keeps: bool, pins: &[Option<u32>]) -> TaskSet {
+    placed(clusters, keeps, pins, &[])
+}
+
+/// The same, and the first DAGs with these affinities, if any, on four cores.
+fn placed(clusters: &[u32], keeps: bool, pins: &[Option<u32>], affinities: &[&[u32]]) -> TaskSet {
     let spec = |(dag, &cluster): (u32, &u32)| DagSpec {
         period_ns: Some(100),
         relative_deadline_ns: Some(50 + u64::from(dag)),
         cluster: Some(ClusterId(cluster)),
+        affinity: affinities
+            .get(dag as usize)
+            .map_or(vec![], |of| of.to_vec()),
         subtasks: vec![SubtaskSpec {
             priority: Some(Priority(dag)),
             core: pins.get(dag as usize).copied().flatten(),
@@ -27,7 +35,8 @@ fn pinned(clusters: &[u32], keeps: bool, pins: &[Option<u32>]) -> TaskSet {
         ..DagSpec::default()
     };
     let specs: Vec<DagSpec> = (0..).zip(clusters).map(spec).collect();
-    let options = CommitOptions::new(Policy::StaticPriority, 2);
+    let cores = if affinities.is_empty() { 2 } else { 4 };
+    let options = CommitOptions::new(Policy::StaticPriority, cores);
     let options = match clusters.contains(&1) {
         true => options.with_clusters(CoreDivision::Of(vec![1, 1])),
         false => options,
@@ -212,4 +221,43 @@ fn r5_judges_cores_and_starts_of_pinned_instances() {
     let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 1 job 0 starts on core 0 and keeps it, \
                   although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
     must(&keeps, 1, "0 0: 1@0 0-4, 0@0 4-9", &[chosen]);
+}
+
+#[test]
+fn r5_judges_each_group_of_cores_by_itself() {
+    // DAGs 0 and 1 on cores 0 and 2, DAG 2 on core 1, DAG 3 the owner of core 0.
+    let pins = [None, None, None, Some(0)];
+    let lent = placed(&[0; 4], false, &pins, &[&[2, 0], &[0, 2], &[1], &[]]);
+    // DAG 0 gives way to the owner, and DAG 1 to it, though it is more urgent than DAG 2.
+    let right = "0 0 0 4: 0@0 0-4, 1@2 0-4, 2@1 0-9, 3@0 4-6, 0@2 4-7, 1@0 6-9";
+    must(&lent, 3, right, &[]);
+    let wrong_one = passed_over(4, 0, 2, "core 2 runs subtask 0 of dag 1 job 0");
+    let ran = "0 0 0 4: 0@0 0-4, 1@2 0-9, 2@1 0-9, 3@0 4-6, 0@0 6-9";
+    must(&lent, 3, ran, &[&wrong_one]);
+    // Core 1 is not idle for DAG 1, and core 0 is, whatever runs elsewhere.
+    must(&lent, 3, "0 0 0 0: 3@0 0-4, 0@2 0-4, 1@2 4-9, 2@1 0-2", &[]);
+    let inside = passed_over(4, 1, 5, "core 0 is idle");
+    let ran = "0 0 0 0: 3@0 0-4, 0@2 0-9, 1@0 9-12, 2@1 0-2";
+    must(&lent, 3, ran, &[&inside]);
+    let idle = passed_over(0, 2, 2, "core 1 is idle");
+    let ran = "0 0 0 9: 0@0 0-9, 1@2 0-9, 2@1 2-4, 3@0 9-12";
+    must(&lent, 3, ran, &[&idle]);
+    let away = [(0, "starts"), (4, "finishes")].map(|(at_ns, what)| {
+        format!(
+            "at {at_ns} ns, R5 dispatch: subtask 0 of dag 1 job 0 {what} on core 3, to which its \
+             DAG has no affinity"
+        )
+    });
+    let away = away.each_ref().map(String::as_str);
+    let ran = "0 0 0 4: 0@0 0-4, 1@3 0-4, 2@1 0-4, 3@0 4-9";
+    must(&lent, 4, ran, &away);
+    // What keeps its core starts after the more urgent of its group, though another core is idle.
+    let keeps = placed(&[0; 3], true, &[], &[&[0], &[1], &[0]]);
+    must(&keeps, 2, "0 0 0: 0@0 0-4, 2@0 4-9, 1@1 0-9", &[]);
+    let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 2 job 0 starts on core 0 and keeps it, \
+                  although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
+    must(&keeps, 2, "0 9 0: 2@0 0-4, 0@0 4-9, 1@1 9-12", &[chosen]);
+    // Cores of its cluster are meant.
+    let second = placed(&[0, 1, 1], false, &[None, None, Some(0)], &[&[], &[], &[]]);
+    must(&second, 2, "0 0 2: 0@0 0-4, 1@1 0-2, 2@1 2-5, 1@1 5-6", &[]);
 }

@@ -50,13 +50,12 @@ impl Eligible {
     ) -> BTreeSet<Instance> {
         let mut order: Vec<Instance> = self.instances.iter().copied().collect();
         order.sort_by_key(|&of| {
-            let is_bound = (kept.contains_key(&of), pin(task_set, of).is_some());
+            let is_bound = (kept.contains_key(&of), pin(set, of).is_some());
             (!is_bound.0, !is_bound.1, self.key(set, task_set, of))
         });
-        let cores = |of: Instance| match (kept.get(&of), pin(task_set, of)) {
-            (Some(core), _) => core.0..core.0 + 1,
-            (None, Some(core)) => core..core + 1,
-            (None, None) => 0..set.options.cores,
+        let cores = |of: Instance| match kept.get(&of) {
+            Some(core) => vec![core.0],
+            None => cores_of(set, of),
         };
         let mut of_cores: BTreeMap<u32, Instance> = BTreeMap::new();
         for of in order {
@@ -83,7 +82,7 @@ impl Eligible {
 /// Finds a core for an instance, moving others where that helps; reports whether there is one.
 fn place(
     of: Instance,
-    cores: &impl Fn(Instance) -> std::ops::Range<u32>,
+    cores: &impl Fn(Instance) -> Vec<u32>,
     tried: &mut BTreeSet<u32>,
     of_cores: &mut BTreeMap<u32, Instance>,
 ) -> bool {
@@ -104,8 +103,17 @@ fn place(
 }
 
 /// Returns the core that an instance is pinned to.
-pub(crate) fn pin(task_set: &TaskSet, of: Instance) -> Option<u32> {
-    task_set.dag(of.dag).subtask(of.subtask).core()
+fn pin(set: &Set, of: Instance) -> Option<u32> {
+    set.specs[of.dag.index()].subtasks[of.subtask.index()].core
+}
+
+/// Returns the cores that may execute an instance.
+pub(crate) fn cores_of(set: &Set, of: Instance) -> Vec<u32> {
+    match (pin(set, of), &set.specs[of.dag.index()].affinity[..]) {
+        (Some(core), _) => vec![core],
+        (None, []) => (0..set.options.cores).collect(),
+        (None, affinity) => affinity.to_vec(),
+    }
 }
 
 /// Reports whether an instance, once it has a core, keeps it.

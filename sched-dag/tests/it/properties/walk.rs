@@ -23,7 +23,7 @@ use sched_dag::{
     CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler, TurnEnd,
 };
 
-use super::pins::{Eligible, keeps_its_core, pin};
+use super::pins::{Eligible, cores_of, keeps_its_core};
 use super::releases::{Releases, SAID};
 use super::waits::Waits;
 use crate::support::set::Set;
@@ -217,8 +217,7 @@ impl<'s> Walk<'s> {
         let Some((core, runs)) = core else {
             self.is_late = true;
             self.preempted.retain(|preempted| *preempted != instance);
-            let pin = pin(self.scheduler.task_set(), instance);
-            return CoreId(pin.unwrap_or(0));
+            return CoreId(cores_of(self.set, instance)[0]);
         };
         *runs = None;
         self.idle.push(core);
@@ -319,18 +318,15 @@ impl<'s> Walk<'s> {
                     (EventKind::Suspend, place.take() == Some(instance))
                 }
                 _ => {
-                    let pin = pin(self.scheduler.task_set(), instance).map(CoreId);
+                    let may_be = cores_of(self.set, instance);
+                    // The last one that is idle of those that it may be on.
                     let mut idle = self.idle.iter();
-                    // The last one that is idle, or the one that is pinned to.
-                    let at = match pin {
-                        Some(pin) => idle.position(|idle| *idle == pin),
-                        None => self.idle.len().checked_sub(1),
-                    };
+                    let at = idle.rposition(|idle| may_be.contains(&idle.0));
                     let free = match freed.take() {
                         Some(freed) => Some(freed),
                         None => at.map(|at| self.idle.remove(at)),
                     };
-                    let is_free = free == Some(core) && pin.is_none_or(|pin| pin == core);
+                    let is_free = free == Some(core) && may_be.contains(&core.0);
                     let is_free = is_free && place.replace(instance).is_none();
                     match self.preempted.iter().position(|it| *it == instance) {
                         Some(at) => {

@@ -132,9 +132,13 @@ fn with_waits(mut set: Set, random: &mut Random) -> Set {
     set
 }
 
-/// Pins subtasks to cores: some in three of four sets, all in the others.
+/// Pins subtasks to cores: some in four of five sets, all in the others; every other set has
+/// affinities, too.
 fn with_pins(mut set: Set, random: &mut Random) -> Set {
-    let percent = random.one_of(&[20, 50, 80, 100]);
+    let percent = random.one_of(&[0, 20, 50, 80, 100]);
+    if random.chance(50) {
+        with_affinities(&mut set.specs, set.options.cores, random);
+    }
     let cores = set.options.cores.min(4);
     let subtasks = set.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
     for subtask in subtasks {
@@ -142,6 +146,24 @@ fn with_pins(mut set: Set, random: &mut Random) -> Set {
         subtask.core = random.chance(percent).then_some(core);
     }
     set
+}
+
+/// Gives each DAG the cores of one of up to three groups, in any order, some of them twice.
+pub(crate) fn with_affinities(specs: &mut [DagSpec], cores: u32, random: &mut Random) {
+    let mut groups = vec![Vec::new(); 4];
+    for core in 0..cores {
+        let group = random.index(4);
+        groups[group].insert(0, core);
+        groups[group].extend(random.once_in(4).then_some(core));
+    }
+    // The cores of the last one are left to what is pinned to them.
+    groups.swap_remove(3);
+    groups.retain(|group| !group.is_empty());
+    if !groups.is_empty() {
+        for spec in specs {
+            spec.affinity = groups[random.index(groups.len())].clone();
+        }
+    }
 }
 
 fn with_sporadic(mut set: Set, random: &mut Random) -> Set {
