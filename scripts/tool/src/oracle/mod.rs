@@ -150,7 +150,7 @@ fn run_files<Case>(
 }
 
 /// Reads the cases of all files, at least one.
-fn read<'f, Case>(
+pub(crate) fn read<'f, Case>(
     names: impl ExactSizeIterator<Item = &'f Path> + Clone,
     parse: Parse<Case>,
 ) -> Result<Vec<Case>, String> {
