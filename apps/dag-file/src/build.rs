@@ -74,6 +74,7 @@ fn build_dag(
         .offset(time(Some(spec.offset_ns)))
         .overrun(spec.overrun)
         .order(spec.order)
+        .affinity(&spec.affinity)
         .jobs(settings.length.jobs(spec));
     if let Some(jobs) = spec.in_flight {
         dag.in_flight(jobs);

@@ -206,14 +206,15 @@ impl<'b> Chunk<'b> {
                 text.map(Chunk::Text)
             }
             COMMIT => {
-                // In version 6 it ends before the pins, and in version 5 before the waits: there are 0.
+                // In version 6 it ends before pins and affinities, and in version 5 before the waits:
+                // there are 0.
                 let of_before = |lacks: usize| {
-                    let bytes = [payload, &[0; 8][..lacks]].concat();
+                    let bytes = [payload, &[0; 12][..lacks]].concat();
                     Commit::from_bytes(&bytes).ok()
                 };
                 let commit = Commit::from_bytes(payload);
                 let commit =
-                    commit.or_else(|wrong| of_before(4).or_else(|| of_before(8)).ok_or(wrong));
+                    commit.or_else(|wrong| of_before(8).or_else(|| of_before(12)).ok_or(wrong));
                 commit.map(Chunk::Commit)
             }
             EVENTS => Events::read(payload).map(Chunk::Events),

@@ -32,7 +32,7 @@ pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 /// [`EntryKind::Fault`]; those before 4 have no text, and
 /// those before 5 no commits, events and times, and no [states](crate::Role::State); those before 6
 /// no [waits](Commit::waits) and no [answers](crate::Role::Answer); those before 7 no
-/// [pins](Commit::pins).
+/// [pins](Commit::pins) and [affinities](Commit::affinities).
 pub const VERSION: u16 = 7;
 
 /// The kinds of frames.

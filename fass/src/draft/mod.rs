@@ -513,7 +513,7 @@ impl SubtaskAttributes {
     ///
     /// No other core executes it, and on that core it goes before all subtasks that are not pinned,
     /// whatever their priorities; these share the cores that have nothing pinned to do. An app that
-    /// pins subtasks is built with `fass`' feature `pins`. No test of the analysis covers it.
+    /// pins subtasks is built with `fass`' feature `pins`. See [`crate::Dag::affinity`].
     pub fn core(mut self, core: u32) -> Self {
         self.core = Some(core);
         self

@@ -161,6 +161,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
             .collect(),
         waits: waits(task_set),
         pins: pins(task_set),
+        affinities: affinities(task_set),
     }
 }
 
@@ -172,6 +173,12 @@ fn pins(task_set: &TaskSet) -> Vec<(u32, u32, u32)> {
         }
     }
     all
+}
+
+fn affinities(task_set: &TaskSet) -> Vec<(u32, Vec<u32>)> {
+    let dags = (0..).zip(task_set.dags()).filter(|_| PINS);
+    let of_dags = dags.map(|(dag, of_dag)| (dag, of_dag.affinity().to_vec()));
+    of_dags.filter(|(_, cores)| !cores.is_empty()).collect()
 }
 
 fn waits(task_set: &TaskSet) -> Vec<(u32, u32, u64, Option<u64>)> {

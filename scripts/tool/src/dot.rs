@@ -115,6 +115,9 @@ impl Dag<'_> {
             _ => "abort",
         };
         label += &format!("\n{jobs}, {} in flight, overrun: {overrun}", dag.in_flight);
+        for (_, cores) in (self.commit.told.affinities.iter()).filter(|of| of.0 == self.number) {
+            label += &format!("\naffinity: {cores:?}");
+        }
         label
     }
 
@@ -225,6 +228,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
             is_edf,
             waits,
             pins: vec![(0, 1, 1)],
+            affinities: vec![(0, vec![0])],
             ..told
         };
         let mut committed = Committed::new(0, told).expect("it is right");
@@ -238,7 +242,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
     }
 
     const DRAWN: &str = r#"  subgraph cluster_c0_d0 {
-    label="the \"eye\"\nT = 25 ms, D = 100 ms, O = 500 ns\n20 jobs, 5 in flight, overrun: queue";
+    label="the \"eye\"\nT = 25 ms, D = 100 ms, O = 500 ns\n20 jobs, 5 in flight, overrun: queue\naffinity: [0]";
     c0_d0_s0 [label="camera\nWCET 1 ms\nwaits up to 3 ms, then 400 us\npriority 1"];
     c0_d0_s1 [label="subtask 1\npriority 2\ncore 1\nnon-preemptive"];
     c0_d0_s2 [label="fuse\nwaits up to 0 ns\npriority 3"];

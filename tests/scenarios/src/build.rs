@@ -297,7 +297,7 @@ impl DagText {
     fn begin(&self) -> (Dag, Option<Signal>) {
         let dag = create_dag();
         dag.name(&self.name).overrun(self.overrun).order(self.order);
-        dag.offset(self.offset);
+        dag.offset(self.offset).affinity(&self.affinity);
         dag.relative_deadline(self.deadline.unwrap_or(self.period));
         if self.jobs > 0 {
             let all = u32::try_from(self.jobs).unwrap_or(u32::MAX);

@@ -12,8 +12,8 @@ use crate::number;
 
 /// A DAG: `NAME`, then any of
 /// `period T` or `sporadic T`, `deadline T`, `offset T`, `jobs N`, `in-flight N`,
-/// `overrun queue|skip|abort`, `order fixed`, `survives FAULTS/WINDOW/ALL`, `cluster N`, `paused`,
-/// `on-fault DAG`.
+/// `overrun queue|skip|abort`, `order fixed`, `survives FAULTS/WINDOW/ALL`, `cluster N`,
+/// `affinity N,N`, `paused`, `on-fault DAG`.
 ///
 /// It has one job, unless that is said (`jobs 0`: no end), and room for all of its jobs.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +29,7 @@ pub struct DagText {
     pub(crate) order: SubtaskOrder,
     pub(crate) survives: Option<FaultLimit>,
     pub(crate) cluster: Option<u32>,
+    pub(crate) affinity: Vec<u32>,
     pub(crate) is_paused: bool,
     /// The DAG that a fault releases.
     pub(crate) on_fault: Option<String>,
@@ -146,13 +147,13 @@ fn time(words: &mut Words<'_>) -> Result<Duration, String> {
     Ok(Duration::from_millis(number(value(words)?)?))
 }
 
-fn numbers(words: &mut Words<'_>) -> Result<Vec<u64>, String> {
+fn numbers<N: core::str::FromStr>(words: &mut Words<'_>) -> Result<Vec<N>, String> {
     value(words)?.split([',', '/']).map(number).collect()
 }
 
 fn times(words: &mut Words<'_>) -> Result<Vec<Duration>, String> {
-    let numbers = numbers(words)?.into_iter();
-    Ok(numbers.map(Duration::from_millis).collect())
+    let numbers: Vec<u64> = numbers(words)?;
+    Ok(numbers.into_iter().map(Duration::from_millis).collect())
 }
 
 impl DagText {
@@ -193,6 +194,7 @@ impl DagText {
                     });
                 }
                 "cluster" => dag.cluster = Some(number(value(words)?)?),
+                "affinity" => dag.affinity = numbers(words)?,
                 "paused" => dag.is_paused = true,
                 "on-fault" => dag.on_fault = Some(value(words)?.into()),
                 _ => return Err(format!("`{key}` is no word of a dag")),

@@ -356,6 +356,11 @@ impl Committed {
             let place = place.ok_or_else(|| in_commit("a pin is of no subtask".into()))?;
             place.core = Some(core);
         }
+        for (dag, cores) in &told.affinities {
+            let place = specs.get_mut(DagId(*dag).index());
+            let place = place.ok_or_else(|| in_commit("an affinity is of no dag".into()))?;
+            place.affinity.clone_from(cores);
+        }
         let clusters = match &told.clusters[..] {
             [] => CoreDivision::Undivided,
             sizes => CoreDivision::Of(sizes.to_vec()),

@@ -167,6 +167,9 @@ pub(crate) const CASES: &[Case] = &[
     ("core_out_of_range", || {
         read_by("lidar", "points", attributes("read").core(9))
     }),
+    ("affinity_out_of_range", || {
+        changed(|dag| _ = dag.affinity(&[0, 9]))
+    }),
     ("stack_out_of_range", || {
         read_by("lidar", "points", attributes("read").stack_bytes(4096))
     }),
