@@ -301,12 +301,14 @@ impl Dag {
         &self.subtasks[subtask.index()]
     }
 
-    /// Returns the first subtask that not every core of the cluster may execute.
-    pub(crate) fn first_pinned(&self) -> Option<SubtaskId> {
-        let mut subtasks = (0..).map(SubtaskId).zip(&self.subtasks);
-        let has_affinity = !self.affinity().is_empty();
-        let found = subtasks.find(|(_, subtask)| has_affinity || subtask.core().is_some());
-        found.map(|(id, _)| id)
+    /// Reports whether subtasks are pinned to cores.
+    pub(crate) fn is_pinned(&self) -> bool {
+        self.subtasks.iter().any(|subtask| subtask.core().is_some())
+    }
+
+    /// Reports whether there are subtasks that not every core of the cluster may execute.
+    pub(crate) fn is_confined(&self) -> bool {
+        self.is_pinned() || !self.affinity().is_empty()
     }
 
     /// Returns the subtasks without predecessor, ascending, never empty.

@@ -36,7 +36,7 @@ use super::set::constrained;
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, sort_largest_first};
 use super::{AnalysisSettings, answer, fixed_order};
-use crate::ids::{ClusterId, DagId, SubtaskId, to_u32};
+use crate::ids::{ClusterId, DagId, to_u32};
 use crate::policy::{AssignmentReason, LendingAttempt, Policy, Preemption};
 use crate::spec::PINS;
 use crate::task_set::{Dag, Subtask, TaskSet};
@@ -60,10 +60,10 @@ texts! {
     pub enum AssignmentFailure {
         /// It states a cluster, and the clusters are not made yet.
         Stated = "it states a cluster, and the commit is to make them; leave its cluster out";
-        /// A subtask is pinned to a core of a cluster that is not made yet.
-        Pinned { subtask: SubtaskId } =
-            "subtask {} is pinned to a core, and the commit is to make the clusters; leave its core \
-             out", subtask.0;
+        /// It states cores of a cluster that is not made yet.
+        Confined =
+            "it states cores of a cluster, and the commit is to make the clusters; leave its affinity \
+             and the cores of its subtasks out";
         /// Its need of cores is not known.
         Unknown(error: TaskError) = "{error}";
         /// A path of it, overheads included, takes longer than a job has, on any number of cores.
@@ -96,8 +96,8 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         if model.states_cluster() {
             return Err(refused(dag, AssignmentFailure::Stated));
         }
-        if let Some(subtask) = model.first_pinned() {
-            return Err(refused(dag, AssignmentFailure::Pinned { subtask }));
+        if model.is_confined() {
+            return Err(refused(dag, AssignmentFailure::Confined));
         }
         let task = overhead_ns.and_then(|overhead_ns| Task::from_dag(model, overhead_ns));
         tasks.push(task.map_err(|error| refused(dag, AssignmentFailure::Unknown(error)))?);

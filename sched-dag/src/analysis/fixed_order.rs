@@ -70,7 +70,7 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &AnalysisSettings) {
 
 /// Reports whether an order of a DAG's subtasks may be fixed.
 pub(super) fn allows(dag: &Dag) -> bool {
-    let is_free = dag.first_pinned().is_none() && dag.affinity().is_empty();
+    let is_free = !dag.is_confined();
     is_free
         && dag.order == SubtaskOrder::Fixed
         && dag.least_deadline_ns() == dag.relative_deadline_ns()

@@ -493,7 +493,7 @@ fn analysable(
         seen += 1;
         known.retain(|&dag| {
             // What is pinned goes before all that is not.
-            let is_pinned = dags[other].first_pinned().is_some();
+            let is_pinned = dags[other].is_pinned();
             let is_delayed = is_pinned || relation.may_delay(other, dag);
             if is_delayed {
                 reasons[dag] = Some(NotProvenReason::DelayedBy { dag: dag_id(other) });

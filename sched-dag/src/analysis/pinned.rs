@@ -29,8 +29,7 @@ use crate::task_set::Dag;
 
 /// Reports whether cores of a cluster with these DAGs are told apart.
 pub(super) fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
-    let is_told = |dag: &Dag| dag.first_pinned().is_some() || !dag.affinity().is_empty();
-    PINS && dags.any(is_told)
+    PINS && dags.any(Dag::is_confined)
 }
 
 /// The owners and groups of a cluster.
@@ -218,5 +217,5 @@ impl<'a> MemberTerms<'a> {
 }
 
 fn is_member(case: &AnalysisInput<'_>, dag: usize) -> bool {
-    case.dag(dag).first_pinned().is_none()
+    !case.dag(dag).is_pinned()
 }

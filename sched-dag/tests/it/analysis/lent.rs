@@ -3,8 +3,7 @@
 //! Random sets with heavy DAGs are divided by the commit's own assignment. The analysis of what
 //! came of it, which knows only cores and edges, must prove each DAG; and no job may respond later
 //! than its bound, with full and with shortened execution times, in phase or not, periodic or by
-//! signals. Each
-//! set that is divided has some 400 jobs. `LENT_SETS=n` draws n sets in place of 2,000.
+//! signals. Each set that is divided has 400 jobs and more. `LENT_SETS=n` draws n sets in place of 2,000.
 
 use common::random::Random;
 use sched_dag::analysis::{answer, assign};
@@ -85,7 +84,9 @@ fn divided_sets_keep_their_bounds() {
     }
     println!("by attempt {by_attempt:?}, with parts of clusters {groups}, refused {refused}");
     if sets >= 2_000 {
-        assert!(by_attempt.iter().all(|&count| count > 0), "{by_attempt:?}");
+        // The last attempt alone accepts one set in 1,200.
+        let often = if sets >= 20_000 { 5 } else { 4 };
+        assert!(!by_attempt[..often].contains(&0), "{by_attempt:?}");
         assert!(groups > 20 && refused > 20, "{groups} {refused}");
     }
 }
