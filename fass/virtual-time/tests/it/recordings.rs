@@ -4,11 +4,10 @@
 
 use std::ops::AddAssign;
 
-use crate::support::{commit, every, job_numbers, ms, named, run, taking, ticking, work};
-use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use crate::support::{commit, every, job_numbers, ms, named, run, ticking};
 use fass::shared::{Raiser, Sample, State};
 use fass::{Dag, create_dag, finish_create_dags};
-use recording::{Channel, Chunk, Entry, EntryKind, Recording, Role, Writer, to_bytes};
+use recording::{Channel, Entry, EntryKind, Recording, Role, Writer, to_bytes};
 use virtual_time::{JobShown, Passed, Report, RunError, SubtaskShown, Value, VirtualTime};
 
 /// A source that counts on.
@@ -355,75 +354,6 @@ fn a_recording_that_does_not_fit_is_refused() {
     // Results that are recorded no more are counted.
     let report = replay(&whole, &[demo("demo", &["in"])]);
     assert_eq!((report.compared, report.uncompared), (0, 3));
-}
-
-/// A heavy DAG that the commit makes an owner of two cores, and three light ones, of which two share
-/// what is left of these. Each source returns what it has returned before, and one more.
-fn lending(from: u64, demands_proof: bool) -> Vec<Dag> {
-    let wcets = [("heavy", 4), ("light", 3), ("lighter", 2), ("lightest", 1)];
-    let dags = wcets.map(|(name, time)| {
-        let (dag, branches) = (every(10, name), if name == "heavy" { 3 } else { 1 });
-        dag.jobs(5).record::<u64>(name);
-        let mut count = counting(from);
-        let source = dag.source(move || {
-            work(1);
-            count()
-        });
-        source.writes(&[name]).register(taking("source", 1));
-        for branch in 0..branches {
-            let output = format!("{name} {branch}");
-            dag.record::<u64>(&output);
-            let pass = move |(n,): (u64,)| {
-                work(time);
-                (n ^ branch,)
-            };
-            let subtask = taking(&format!("pass {branch}"), time);
-            dag.register_subtask(pass, vec![name], vec![&*output], subtask);
-        }
-        if demands_proof {
-            dag.demand_proof();
-        }
-        dag
-    });
-    dags.into()
-}
-
-#[test]
-fn what_the_commit_divides_is_recorded_and_divided_again_by_a_replay() {
-    let run = |machine: &VirtualTime, dags: &[Dag]| {
-        let commit = finish_create_dags_with(dags, ConstructionPolicy::any_graph());
-        assert!(commit.expect("nothing is wrong").first_unproven().is_none());
-        let report = machine.run();
-        assert_eq!(report.violations(), []);
-        report
-    };
-    let committed = |bytes: &[u8]| {
-        let recording = Recording::read(bytes).expect("whole");
-        let mut chunks = recording.chunks();
-        chunks.find_map(|chunk| match chunk {
-            Chunk::Commit(commit) => Some(commit),
-            _ => None,
-        })
-    };
-    for demands_proof in [false, true] {
-        let machine = || match demands_proof {
-            false => VirtualTime::new().cores(3).assign_clusters(),
-            true => VirtualTime::new().cores(3),
-        };
-        let recorder = machine();
-        run(&recorder, &lending(0, demands_proof));
-        let bytes = recorder.recording();
-        let commit = committed(&bytes).expect("it was committed");
-        // The owner, and the one that executes on what it leaves of core 1.
-        assert_eq!((&commit.clusters[..], commit.pins.len()), (&[2, 1][..], 4));
-        assert_eq!(commit.affinities, [(1, vec![1])]);
-        drop(recorder);
-
-        let machine = machine().replay(&bytes).expect("whole");
-        let report = run(&machine, &lending(7, demands_proof));
-        assert_eq!((report.divergence, report.uncompared), (None, 0));
-        assert_eq!(committed(&machine.recording()), Some(commit));
-    }
 }
 
 #[test]
