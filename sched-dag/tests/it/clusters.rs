@@ -48,6 +48,25 @@ fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[u32]) -> 
     run.events.iter().map(named).collect()
 }
 
+/// Pins subtasks of a set, and in clusters of several cores leaves the last one to what is pinned
+/// to it, if they are to be in groups.
+fn state_cores(specs: &mut [DagSpec], sizes: &[u32], has_groups: bool, random: &mut Random) {
+    // What keeps its core delays what is pinned to that, so which core it has would matter.
+    let mut all = specs.iter().flat_map(|spec| &spec.subtasks);
+    if all.any(|subtask| subtask.non_preemptive) {
+        return;
+    }
+    for spec in specs {
+        let cores = spec.cluster.map_or(1, |cluster| sizes[cluster.index()]);
+        for subtask in &mut spec.subtasks {
+            subtask.core = random.chance(40).then(|| random.within(0..=cores - 1));
+        }
+        if has_groups && cores > 1 {
+            spec.affinity = (0..cores - 1).collect();
+        }
+    }
+}
+
 #[test]
 fn a_cluster_runs_as_if_it_were_alone() {
     let (count, first_seed) = (number("CLUSTERED", 400), number("CLUSTER_SEED", 1));
@@ -64,19 +83,8 @@ fn a_cluster_runs_as_if_it_were_alone() {
             let cluster = u32::try_from(random.index(sizes.len())).expect("few clusters");
             spec.cluster = Some(ClusterId(cluster));
         }
-        // What keeps its core delays what is pinned to that, so which core it has would matter.
-        let keeps = specs.iter().flat_map(|spec| &spec.subtasks);
-        let keeps = keeps.filter(|of| of.non_preemptive).count() > 0;
-        let has_pins = set.options.preemption == Preemption::Enabled && !keeps;
-        for spec in specs.iter_mut().filter(|_| has_pins) {
-            let cores = spec.cluster.map_or(1, |cluster| sizes[cluster.index()]);
-            for subtask in &mut spec.subtasks {
-                subtask.core = random.chance(40).then(|| random.within(0..=cores - 1));
-            }
-            // In each cluster of several cores the last one is left to what is pinned to it.
-            if seed % 2 == 0 && cores > 1 {
-                spec.affinity = (0..cores - 1).collect();
-            }
+        if set.options.preemption == Preemption::Enabled {
+            state_cores(&mut specs, &sizes, seed % 2 == 0, &mut random);
         }
         let all: Vec<u32> = (0..).take(specs.len()).collect();
         let divided = commit(&specs, set.options, CoreDivision::Of(sizes.clone()));
