@@ -2,14 +2,14 @@
 //! that needs several and single cores for the others.
 //!
 //! Under static priorities the cores are divided as [`lend`](super::lend()) does, if subtasks can be
-//! pinned and that proves all DAGs. Else this is federated scheduling (the papers are named below). A DAG is *heavy* if a job of
-//! it is more work than one core does by its deadline, or by the next release if that comes
-//! first, or if subtasks of it wait; it gets a cluster of as many cores as its multi-path bound needs, or the order that may
-//! be fixed for it. The others are
-//! *light*: clusters of one core each take them, the densest first, each where the sum of
-//! densities is least (worst fit), so that what room there is, is left on every core. A core
-//! takes light DAGs up to a sum of 1, which is enough for EDF and no proof for static
-//! priorities. Whatever is assigned, the analysis of each cluster has the last word.
+//! pinned and that proves all DAGs. Else this is federated scheduling (the papers are named below).
+//! A DAG is *heavy* if a job of it is more work than one core does by its deadline, or by the next
+//! release if that comes first, or if subtasks of it wait; it gets a cluster of as many cores as its
+//! multi-path bound needs, or the order that may be fixed for it. The others are *light*: clusters
+//! of one core each take them, the densest first, each where the sum of densities is least (worst
+//! fit), so that what room there is, is left on every core. A core takes light DAGs up to a sum of
+//! 1, which is enough for EDF and no proof for static priorities. Whatever is assigned, the analysis
+//! of each cluster has the last word.
 //!
 //! # Federated scheduling: cores of its own for each DAG that needs several
 //!
@@ -30,11 +30,12 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use super::lending::{LendingAnswer, lend};
+use super::lending::{LendingAnswer, lend_amid};
 use super::multi_path::multi_path;
 use super::set::constrained;
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, sort_largest_first};
+use super::workload::WorkloadBursts;
 use super::{AnalysisSettings, answer, fixed_order};
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::policy::{AssignmentReason, LendingAttempt, Policy, Preemption};
@@ -102,7 +103,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         let task = overhead_ns.and_then(|overhead_ns| Task::from_dag(model, overhead_ns));
         tasks.push(task.map_err(|error| refused(dag, AssignmentFailure::Unknown(error)))?);
     }
-    let attempts = match lend_cores(task_set, &tasks, settings) {
+    let attempts = match lend_cores(task_set, settings) {
         None => None,
         Some(Ok(())) => return Ok(()),
         Some(Err(failed)) => failed.try_into().ok(),
@@ -118,7 +119,6 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
 /// failed.
 fn lend_cores(
     task_set: &mut TaskSet,
-    tasks: &[Task],
     settings: &AnalysisSettings,
 ) -> Option<Result<(), Vec<DagId>>> {
     let is_plain = |dag: &Dag| {
@@ -129,13 +129,20 @@ fn lend_cores(
     let applies = PINS
         && settings.policy == Policy::StaticPriority
         && settings.preemption == Preemption::Enabled
-        && settings.overheads.ready_ns == 0
         && task_set.dags().iter().all(is_plain);
     if !applies {
         return None;
     }
+    let with_moves = AnalysisSettings {
+        overheads: settings.overheads.with_moves(),
+        ..*settings
+    };
+    let overhead_ns = (with_moves.overheads).of_an_instance_ns(settings.preemption)?;
+    let tasks = (task_set.dags().iter()).map(|dag| Task::from_dag(dag, overhead_ns).ok());
+    let tasks: Vec<Task> = tasks.collect::<Option<_>>()?;
     let tasks: Vec<&Task> = tasks.iter().collect();
-    let LendingAnswer { plan, failed } = lend(&tasks, settings.cores)?;
+    let bursts = WorkloadBursts::of(task_set.dags().iter(), &with_moves);
+    let LendingAnswer { plan, failed } = lend_amid(&bursts, &tasks, settings.cores)?;
     let Some(plan) = plan else {
         let failed = failed.into_iter().map(|dag| DagId(to_u32(dag)));
         return Some(Err(failed.collect()));

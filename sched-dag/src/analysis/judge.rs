@@ -104,10 +104,8 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
     for cluster in task_set.clusters() {
         let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
         let own: Vec<usize> = own.collect();
-        let settings = AnalysisSettings {
-            cores: to_u32(task_set.cores_of(cluster, settings.cores).len()),
-            ..*settings
-        };
+        let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
+        let settings = pinned::of_cluster(settings, cores, own.iter().map(|&dag| &dags[dag]));
         let first_failing = &mut answer.first_failing;
         with_case(
             dags,

@@ -31,6 +31,7 @@ use super::list_schedule::ListSchedule;
 use super::set::constrained;
 use super::task::Task;
 use super::utilisation::sort_largest_first;
+use super::workload::WorkloadBursts;
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
 use crate::policy::{AssignmentReason, LendingAttempt};
@@ -191,21 +192,30 @@ impl LendingPlan {
 /// `None` if it does not apply: there is no core, a DAG has `D > T`, or a subtask waits.
 #[must_use]
 pub fn lend(tasks: &[&Task], cores: u32) -> Option<LendingAnswer> {
+    lend_amid(&WorkloadBursts::default(), tasks, cores)
+}
+
+/// As [`lend`], with long steps of the scheduler.
+pub(super) fn lend_amid(
+    bursts: &WorkloadBursts,
+    tasks: &[&Task],
+    cores: u32,
+) -> Option<LendingAnswer> {
     if !constrained(tasks, cores) || tasks.iter().any(|task| task.has_waits()) {
         return None;
     }
-    let members = tasks.iter().map(|task| MemberTask::of(task, cores));
+    let members = (tasks.iter()).map(|task| MemberTask::of(task, cores, bursts));
     let members: Vec<MemberTask<'_>> = members.collect();
     let count = cores as usize;
     let (mut owners, mut late, mut failed) = (Vec::new(), Vec::new(), Vec::new());
     for attempt in LendingAttempt::ALL {
         match attempt {
-            LendingAttempt::ByDensity => (owners, late) = own_cores(tasks, count),
-            LendingAttempt::SqueezedByDensity => squeeze(tasks, &mut owners),
+            LendingAttempt::ByDensity => (owners, late) = own_cores(bursts, tasks, count),
+            LendingAttempt::SqueezedByDensity => squeeze(bursts, tasks, &mut owners),
             // The owners of the attempt before, and none at first.
             _ => {}
         }
-        let mut placement = Placement::of(&members, &owners, count);
+        let mut placement = Placement::of(bursts, &members, &owners, count);
         let placed = match attempt {
             LendingAttempt::Whole => placement.share_all(),
             _ => placement.place_all(late.iter().copied().chain(attempt.light(tasks))),
@@ -257,8 +267,19 @@ const fn is_heavy(task: &Task) -> bool {
     task.volume_ns() > task.relative_deadline_ns()
 }
 
+/// Returns by how much an owner's subtasks are late at most, and when its lists have to end for that.
+fn late_and_limit_ns(bursts: &WorkloadBursts, task: &Task) -> (u64, u64) {
+    let deadline_ns = task.relative_deadline_ns();
+    let late_ns = u64::try_from(bursts.during(deadline_ns.into())).unwrap_or(u64::MAX);
+    (late_ns, deadline_ns.saturating_sub(late_ns))
+}
+
 /// Gives heavy DAGs cores of their own, and returns those for which too few are left.
-fn own_cores(tasks: &[&Task], cores: usize) -> (Vec<CoreOwner>, Vec<usize>) {
+fn own_cores(
+    bursts: &WorkloadBursts,
+    tasks: &[&Task],
+    cores: usize,
+) -> (Vec<CoreOwner>, Vec<usize>) {
     let mut heavy: Vec<usize> = (0..tasks.len())
         .filter(|&dag| is_heavy(tasks[dag]))
         .collect();
@@ -267,10 +288,11 @@ fn own_cores(tasks: &[&Task], cores: usize) -> (Vec<CoreOwner>, Vec<usize>) {
     });
     let (mut owners, mut late, mut first_core) = (Vec::new(), Vec::new(), 0);
     for dag in heavy {
-        let (task, deadline_ns) = (tasks[dag], tasks[dag].relative_deadline_ns());
-        let least = usize::try_from(task.volume_ns().div_ceil(deadline_ns)).unwrap_or(usize::MAX);
+        let (task, (_, limit_ns)) = (tasks[dag], late_and_limit_ns(bursts, tasks[dag]));
+        let least = task.volume_ns().div_ceil(limit_ns.max(1));
+        let least = usize::try_from(least).unwrap_or(usize::MAX);
         let most = task.subtask_count().min(cores - first_core);
-        let on = |count| ListSchedule::within(task, &vec![deadline_ns; count]);
+        let on = |count| ListSchedule::within(task, &vec![limit_ns; count]);
         match (least..=most).find_map(on) {
             Some(schedule) => {
                 let count = schedule.cores.len();
@@ -287,10 +309,10 @@ fn own_cores(tasks: &[&Task], cores: usize) -> (Vec<CoreOwner>, Vec<usize>) {
     (owners, late)
 }
 
-fn squeeze(tasks: &[&Task], owners: &mut [CoreOwner]) {
+fn squeeze(bursts: &WorkloadBursts, tasks: &[&Task], owners: &mut [CoreOwner]) {
     for CoreOwner { dag, schedule, .. } in owners {
-        let deadline_ns = tasks[*dag].relative_deadline_ns();
-        *schedule = schedule.squeezed(tasks[*dag], deadline_ns);
+        let (_, limit_ns) = late_and_limit_ns(bursts, tasks[*dag]);
+        *schedule = schedule.squeezed(tasks[*dag], limit_ns);
     }
 }
 
@@ -304,13 +326,19 @@ struct Placement<'a> {
 }
 
 impl<'a> Placement<'a> {
-    fn of(members: &'a [MemberTask<'a>], owners: &[CoreOwner], cores: usize) -> Self {
+    fn of(
+        bursts: &WorkloadBursts,
+        members: &'a [MemberTask<'a>],
+        owners: &[CoreOwner],
+        cores: usize,
+    ) -> Self {
         let mut supplies = vec![CoreSupply::UNOWNED; cores];
         for owner in owners {
-            let period_ns = members[owner.dag].task.period_ns();
+            let task = members[owner.dag].task;
+            let (late_ns, _) = late_and_limit_ns(bursts, task);
             let own = supplies[owner.first_core..].iter_mut();
             for (supply, list) in own.zip(&owner.schedule.cores) {
-                *supply = CoreSupply::of(period_ns, list);
+                *supply = CoreSupply::of(task.period_ns(), list, late_ns);
             }
         }
         Self {

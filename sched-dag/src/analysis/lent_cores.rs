@@ -23,6 +23,9 @@
 //! - `(q - j) x >= B_j + sum of busy(r) + sum of W_h(r)`, or
 //! - `(q - j) x >= max(1, B_j) + sum of min(busy(r), x) + sum of W_h(r) clipped to x`.
 //!
+//! *Long steps* (bursts, in `workload`) take `E(r)` from every core. An owner's subtasks are late by
+//! as much then, so its lists are shifted; and `E(r)`, or `(q - j) E(r)`, is added on the right.
+//!
 //! Assumes: `D <= T` for all, subtasks that can be preempted and do not wait, and bounds that all
 //! owners and more urgent members keep. Releases may be sporadic.
 //!
@@ -34,7 +37,7 @@ use alloc::vec::Vec;
 use super::cover::parallelism_covers_and_parts;
 use super::list_schedule::ScheduledSubtask;
 use super::task::Task;
-use super::workload::{InterferingWorkload, WorkloadSegment};
+use super::workload::{InterferingWorkload, WorkloadBursts, WorkloadSegment};
 use crate::ids::to_u32;
 
 /// The time that one core supplies besides its owner's subtasks.
@@ -63,13 +66,14 @@ impl CoreSupply {
         tails: Vec::new(),
     };
 
-    /// Describes a core with the list of an owner, which ends within its period.
-    pub(super) fn of(period_ns: u64, list: &[ScheduledSubtask]) -> Self {
+    /// Describes a core with the list of an owner, whose subtasks are late by so much at most; even
+    /// then it ends within its period.
+    pub(super) fn of(period_ns: u64, list: &[ScheduledSubtask], late_ns: u64) -> Self {
         let mut work_ns = 0;
         let tails = list.iter().rev().map(|of| {
             work_ns += of.finish_ns - of.start_ns;
             ListTail {
-                start_ns: of.start_ns,
+                start_ns: of.start_ns + late_ns,
                 work_ns,
             }
         });
@@ -132,6 +136,7 @@ pub(super) struct MemberTask<'a> {
     parallelism: u64,
     /// The most work of 1, 2, .. disjoint chains.
     pub(super) covers: Vec<u64>,
+    bursts: &'a WorkloadBursts,
 }
 
 /// How many terms of equations may be evaluated in one attempt, one for each core and member; a
@@ -139,12 +144,13 @@ pub(super) struct MemberTask<'a> {
 pub(super) const STEP_LIMIT: u32 = 1 << 16;
 
 impl<'a> MemberTask<'a> {
-    pub(super) fn of(task: &'a Task, cores: u32) -> Self {
+    pub(super) fn of(task: &'a Task, cores: u32, bursts: &'a WorkloadBursts) -> Self {
         let (parallelism, covers, _) = parallelism_covers_and_parts(task, cores);
         Self {
             task,
             parallelism,
             covers,
+            bursts,
         }
     }
 
@@ -182,7 +188,9 @@ impl<'a> MemberTask<'a> {
             value: u128::from(work_ns) * u128::from(jobs),
             ..WorkloadSegment::NONE
         };
-        let own = core.at(window_ns).and(steady(self.task.volume_ns(), 1));
+        let lost = self.bursts.on(1, window_ns);
+        let own = core.at(window_ns).and(lost);
+        let own = own.and(steady(self.task.volume_ns(), 1));
         let all = above.iter().fold(own, |sum, (other, _)| {
             let jobs = window_ns.div_ceil(other.task.period_ns());
             sum.and(steady(other.task.volume_ns(), jobs))
@@ -246,6 +254,9 @@ impl<'a> MemberTask<'a> {
                 plain.push(in_window);
                 clipped.push(in_window.least(workload.over(waiting_ns)));
             }
+            let lost = self.bursts.on(free, window_ns);
+            plain.push(lost);
+            clipped.push(lost);
             [(false, plain), (true, clipped)].map(|(is_clipped, works)| LentForm {
                 free,
                 is_clipped,
@@ -260,13 +271,15 @@ pub(super) struct LentForm {
     /// The number of cores beside the chains.
     pub(super) free: usize,
     pub(super) is_clipped: bool,
-    /// What is beside the chains, what owners execute, and what each more urgent member does.
+    /// What is beside the chains, what owners execute, what each more urgent member does, and what
+    /// long steps take.
     pub(super) works: Vec<WorkloadSegment>,
 }
 
 #[cfg(test)]
 mod tests {
     use super::{CoreSupply, MemberTask, STEP_LIMIT};
+    use crate::analysis::workload::WorkloadBursts;
     use crate::analysis::{ScheduledSubtask, Task};
     use common::random::Random;
 
@@ -277,17 +290,20 @@ mod tests {
             start_ns,
             finish_ns,
         });
-        CoreSupply::of(period_ns, &list.collect::<Vec<_>>())
+        CoreSupply::of(period_ns, &list.collect::<Vec<_>>(), 0)
     }
 
     fn bound(task: &Task, cores: &[&CoreSupply], above: &[(&Task, u64)]) -> Option<u64> {
-        let count = u32::try_from(cores.len()).unwrap();
+        let (count, no_bursts) = (
+            u32::try_from(cores.len()).unwrap(),
+            WorkloadBursts::default(),
+        );
         let above = above
             .iter()
-            .map(|&(task, ns)| (MemberTask::of(task, count), ns));
+            .map(|&(task, ns)| (MemberTask::of(task, count, &no_bursts), ns));
         let above: Vec<_> = above.collect();
         let above: Vec<_> = above.iter().map(|(member, ns)| (member, *ns)).collect();
-        MemberTask::of(task, count).respond(cores, &above, &mut STEP_LIMIT.clone())
+        MemberTask::of(task, count, &no_bursts).respond(cores, &above, &mut STEP_LIMIT.clone())
     }
 
     #[test]
@@ -347,11 +363,12 @@ mod tests {
         let unit = 1_000_000_000;
         let task = |wcet_ns| Task::new(20 * unit, 20 * unit, vec![wcet_ns], &[]).unwrap();
         let supply = owned(10 * unit, &[(0, 3 * unit)]);
-        let mut steps = 20;
+        let (mut steps, no_bursts) = (20, WorkloadBursts::default());
         // From some window on the owner takes what the window gains, up to the end of its list.
         let (short, long) = (task(5 * unit), task(7 * unit + 1));
-        let several = MemberTask::of(&short, 2).respond(&[&supply, &supply], &[], &mut steps);
-        let one = MemberTask::of(&long, 1).respond(&[&supply], &[], &mut steps);
+        let several =
+            MemberTask::of(&short, 2, &no_bursts).respond(&[&supply, &supply], &[], &mut steps);
+        let one = MemberTask::of(&long, 1, &no_bursts).respond(&[&supply], &[], &mut steps);
         assert_eq!((several, one), (Some(8 * unit), Some(13 * unit + 1)));
     }
 
@@ -377,7 +394,8 @@ mod tests {
         for cores in [&[&supply][..], &[&supply, &supply]] {
             assert_eq!(bound(&large, cores, &[(&often, 1)]), None);
         }
-        let member = MemberTask::of(&large, 1);
+        let no_bursts = WorkloadBursts::default();
+        let member = MemberTask::of(&large, 1, &no_bursts);
         assert_eq!(member.respond(&[&CoreSupply::UNOWNED], &[], &mut 0), None);
         let alone = member.respond(&[&CoreSupply::UNOWNED], &[], &mut 1);
         assert_eq!(alone, Some(u64::MAX));

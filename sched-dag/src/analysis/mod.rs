@@ -254,8 +254,8 @@ texts! {
         /// It shares a cluster with pinned subtasks, on terms that their test does not cover.
         BesidePinned =
             "subtasks of its cluster are pinned, and the test for that needs deadlines within periods, \
-             preemption, no waits, no overhead `ready`, and in each group of DAGs static priorities \
-             that rank whole DAGs; see to these, or leave the cores out";
+             preemption, no waits, and in each group of DAGs static priorities that rank whole DAGs; \
+             see to these, or leave the cores out";
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

@@ -10,8 +10,7 @@
 //! pinned: nothing is taken over from the division but cores and edges.
 //!
 //! Assumes, of all DAGs of the cluster: `D <= T`, and subtasks that can be preempted and do not
-//! wait; no overhead that grows with the number of instances that become ready at once. Of the
-//! members of a group that are several: a static priority that outranks DAG by DAG.
+//! wait. Of the members of a group that are several: a static priority that outranks DAG by DAG.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -21,7 +20,7 @@ use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT};
 use super::list_schedule::ScheduledSubtask;
 use super::ranks::PreemptionMix;
 use super::set::constrained;
-use super::{DagBound, NotProvenReason, SchedulabilityTest};
+use super::{AnalysisSettings, DagBound, NotProvenReason, SchedulabilityTest};
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::sort_by_key;
 use crate::spec::PINS;
@@ -30,6 +29,23 @@ use crate::task_set::Dag;
 /// Reports whether cores of a cluster with these DAGs are told apart.
 pub(super) fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
     PINS && dags.any(Dag::is_confined)
+}
+
+/// Returns the settings for a cluster of so many cores, with these DAGs.
+pub(super) fn of_cluster<'a>(
+    settings: &AnalysisSettings,
+    cores: u32,
+    dags: impl Iterator<Item = &'a Dag>,
+) -> AnalysisSettings {
+    let overheads = match is_pinned(dags) {
+        true => settings.overheads.with_moves(),
+        false => settings.overheads,
+    };
+    AnalysisSettings {
+        cores,
+        overheads,
+        ..*settings
+    }
 }
 
 /// The owners and groups of a cluster.
@@ -59,9 +75,12 @@ impl PinnedCluster {
         for core in 0..cores {
             if let Some(owner) = cluster.owners[core]
                 && cluster.refusals[owner].is_none()
+                && let Some(bound_ns) = owner_bound_ns(case, owner)
             {
-                let period_ns = case.tasks[owner].period_ns();
-                cluster.supplies[core] = CoreSupply::of(period_ns, &cluster.lists[core]);
+                let task = case.tasks[owner];
+                let late_ns = bound_ns - task.length_ns();
+                let supply = CoreSupply::of(task.period_ns(), &cluster.lists[core], late_ns);
+                cluster.supplies[core] = supply;
             }
         }
         cluster
@@ -93,7 +112,6 @@ impl PinnedCluster {
             });
         }
         let is_covered = case.relation.preemption == PreemptionMix::All
-            && case.set.bursts.are_none()
             && !case.set.has_waits()
             && constrained(case.tasks, case.settings.cores);
         is_covered
@@ -108,10 +126,11 @@ impl PinnedCluster {
         let owned = (0..count).filter(|&dag| self.refusals[dag].is_none() && !is_member(case, dag));
         for dag in owned {
             let (task, length_ns) = (case.tasks[dag], case.tasks[dag].length_ns());
-            match length_ns > task.relative_deadline_ns() {
-                true => reasons[dag] = Some(NotProvenReason::LengthBeyondDeadline { length_ns }),
-                false => bounds[dag] = Some(length_ns),
-            }
+            bounds[dag] = owner_bound_ns(case, dag);
+            reasons[dag] = match length_ns > task.relative_deadline_ns() {
+                true => Some(NotProvenReason::LengthBeyondDeadline { length_ns }),
+                false => bounds[dag].is_none().then_some(NotProvenReason::NoBound),
+            };
         }
         let mut steps = STEP_LIMIT;
         for &dag in case.order.iter().filter(|&&dag| is_member(case, dag)) {
@@ -145,7 +164,7 @@ impl PinnedCluster {
     /// Returns the terms of a member's equation.
     pub(super) fn terms<'a>(
         &'a self,
-        case: &AnalysisInput<'a>,
+        case: &'a AnalysisInput<'_>,
         dag: usize,
         responses: &[Option<u64>],
     ) -> Result<MemberTerms<'a>, NotProvenReason> {
@@ -158,7 +177,7 @@ impl PinnedCluster {
                 return Err(delayed(owner));
             }
         }
-        let of = |dag: usize| MemberTask::of(case.tasks[dag], to_u32(cores.len()));
+        let of = |dag| MemberTask::of(case.tasks[dag], to_u32(cores.len()), &case.set.bursts);
         let mut above = Vec::new();
         let affinity = case.dag(dag).affinity();
         for (other, &response_ns) in responses.iter().enumerate() {
@@ -187,7 +206,7 @@ impl PinnedCluster {
         }
     }
 
-    /// Returns when an owner's subtask finishes after the release.
+    /// Returns when an owner's subtask finishes after the release, at the latest.
     pub(super) fn finish_ns(
         &self,
         case: &AnalysisInput<'_>,
@@ -197,7 +216,7 @@ impl PinnedCluster {
         let core = case.dag(dag).subtask(subtask).core()?;
         let mut list = self.lists[core as usize].iter();
         let found = list.find(|of| of.subtask == subtask.index());
-        found.map(|of| of.finish_ns)
+        case.set.bursts.after(found?.finish_ns)
     }
 }
 
@@ -214,6 +233,13 @@ impl<'a> MemberTerms<'a> {
         let above = self.above.iter();
         above.map(|(_, of, bound_ns)| (of, *bound_ns)).collect()
     }
+}
+
+/// Returns when the last of an owner's subtasks finishes, if that is in time.
+fn owner_bound_ns(case: &AnalysisInput<'_>, dag: usize) -> Option<u64> {
+    let task = case.tasks[dag];
+    let bound_ns = case.set.bursts.after(task.length_ns());
+    bound_ns.filter(|&bound_ns| bound_ns <= task.relative_deadline_ns())
 }
 
 fn is_member(case: &AnalysisInput<'_>, dag: usize) -> bool {

@@ -67,6 +67,7 @@ use super::intra_task::each_path;
 use super::judge::{self, AnalysisInput, with_case};
 use super::lent_cores::LentForm;
 use super::one_core::{ResponseEquation, demand};
+use super::pinned;
 use super::pipelined::{PipelineTerms, STEP_LIMIT};
 use super::waiting::reserved;
 use super::workload::WorkloadBursts;
@@ -84,8 +85,9 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
         let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
         let place = task_set.is_divided().then_some(cluster);
         let place = place.map(|cluster| (cluster.0, task_set.clusters().count()));
-        let settings = AnalysisSettings { cores, ..*settings };
-        whole(&task_set.part(cluster), place, &settings)
+        let dags = task_set.part(cluster);
+        let settings = pinned::of_cluster(settings, cores, dags.iter());
+        whole(&dags, place, &settings)
     });
     parts.collect()
 }
@@ -414,8 +416,10 @@ impl WitnessText {
         let finishes = finishes_ns.iter().map(|&ns| i128::from(ns));
         self.list(&format!("bound {id} {bound_ns} owner"), finishes);
         for &sink in case.dag(dag).sinks() {
-            let finish_ns = finishes_ns[sink.index()];
-            if finish_ns < bound_ns {
+            let cluster = case.pinned.as_ref();
+            if let Some(finish_ns) = cluster.and_then(|of| of.finish_ns(case, dag, sink))
+                && finish_ns < bound_ns
+            {
                 self.line(format_args!("sink {id} {} {finish_ns} 0", sink.0));
             }
         }

@@ -104,7 +104,9 @@ fn every_divided_set_has_a_witness_and_no_altered_one_passes() {
     for seed in 1..=number("WITNESS_SETS", 300) {
         let (specs, cores) = lent::set(&mut Random::new(seed));
         let mut task_set = commit(&specs, Policy::StaticPriority, cores);
-        let settings = settings(FP, cores);
+        let mut settings = settings(FP, cores);
+        settings.overheads.interrupt_ns = u64::from(seed % 4 == 1);
+        settings.overheads.ready_ns = u64::from(seed % 4 == 2);
         if assign(&mut task_set, &settings).is_err() {
             continue;
         }
