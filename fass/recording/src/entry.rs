@@ -286,6 +286,8 @@ crate::recordable! {
         /// The DAGs with an affinity, and the cores of their cluster that alone execute what of them is
         /// not pinned. Since version 7, too.
         pub affinities: Vec<(u32, Vec<u32>)>,
+        /// So much more is charged where subtasks are pinned. Since version 7, too.
+        pub move_ns: u64,
     }
 
     /// A DAG of a [`Commit`].

@@ -206,15 +206,15 @@ impl<'b> Chunk<'b> {
                 text.map(Chunk::Text)
             }
             COMMIT => {
-                // In version 6 it ends before pins and affinities, and in version 5 before the waits:
-                // there are 0.
+                // In version 6 it ends before the pins, and in version 5 before the waits: all that
+                // follows is 0.
                 let of_before = |lacks: usize| {
-                    let bytes = [payload, &[0; 12][..lacks]].concat();
+                    let bytes = [payload, &[0; 20][..lacks]].concat();
                     Commit::from_bytes(&bytes).ok()
                 };
                 let commit = Commit::from_bytes(payload);
                 let commit =
-                    commit.or_else(|wrong| of_before(8).or_else(|| of_before(12)).ok_or(wrong));
+                    commit.or_else(|wrong| of_before(16).or_else(|| of_before(20)).ok_or(wrong));
                 commit.map(Chunk::Commit)
             }
             EVENTS => Events::read(payload).map(Chunk::Events),

@@ -162,6 +162,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
         waits: waits(task_set),
         pins: pins(task_set),
         affinities: affinities(task_set),
+        move_ns: overheads.of_a_move_ns(options.preemption),
     }
 }
 

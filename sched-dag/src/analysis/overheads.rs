@@ -9,7 +9,7 @@
 //!   preempts at most one other, when it becomes ready, so the one that
 //!   preempts is charged. The switches back to the preempted instance are the
 //!   preempting one's second switch. Where subtasks are pinned, an instance may in addition
-//!   [move](Overheads::with_moves) one other, and pays for that, too.
+//!   [move](Overheads::of_a_move_ns) one other, and pays for that, too.
 //!
 //! These are of a step in which few instances become ready. For each one that does, `ready` is
 //! what it adds to a step, whatever is then delayed: `workload` has that term of the bounds.
@@ -93,12 +93,22 @@ impl Overheads {
         }
     }
 
-    /// Returns them where subtasks are pinned: an instance that preempts there may move another one
-    /// to a core of its group, which preempts a third one.
-    pub(super) fn with_moves(self) -> Self {
+    /// Returns what each instance is charged besides where subtasks are pinned: one that preempts
+    /// there may move another one to a core of its group, which preempts a third one.
+    #[must_use]
+    pub fn of_a_move_ns(&self, preemption: Preemption) -> u64 {
         let switches = self.context_switch_ns.saturating_mul(2);
+        match preemption {
+            Preemption::Enabled => switches.saturating_add(self.interrupt_ns),
+            Preemption::Disabled => 0,
+        }
+    }
+
+    /// Returns them where subtasks are pinned.
+    pub(super) fn with_moves(self) -> Self {
+        let move_ns = self.of_a_move_ns(Preemption::Enabled);
         Self {
-            interrupt_ns: self.interrupt_ns.saturating_mul(2).saturating_add(switches),
+            interrupt_ns: self.interrupt_ns.saturating_add(move_ns),
             ..self
         }
     }

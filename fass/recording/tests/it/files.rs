@@ -47,6 +47,7 @@ fn commit() -> Commit {
         }],
         pins: vec![(0, 0, 1)],
         affinities: vec![(0, vec![0, 2])],
+        move_ns: 7,
         ..Commit::default()
     }
 }
@@ -309,7 +310,7 @@ fn a_commit_of_a_version_before_has_no_waits_or_pins() {
         ..Commit::default()
     };
     // Versions 5 and 6 end it before the numbers of these, and no version elsewhere.
-    for (lacks, is_one) in [(12, true), (8, true), (4, false), (9, false)] {
+    for (lacks, is_one) in [(20, true), (16, true), (12, false), (17, false)] {
         let mut bytes = Stream::begin(Vec::new()).end();
         let end = bytes.split_off(10);
         let payload = to_bytes(&commit);

@@ -400,11 +400,13 @@ impl Committed {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,
-            // The record has two numbers only, which is all that the analysis derives from
+            // The record has three numbers only, which is all that the analysis derives from
             // overheads.
             overheads: Overheads {
                 // `None` is a charge without an end: no bound must come out here either.
-                dispatch_ns: self.told.charge_ns.unwrap_or(u64::MAX),
+                dispatch_ns: (self.told.charge_ns)
+                    .map_or(u64::MAX, |ns| ns.saturating_sub(self.told.move_ns)),
+                interrupt_ns: self.told.move_ns,
                 ready_ns: self.told.ready_ns,
                 ..Overheads::default()
             },
