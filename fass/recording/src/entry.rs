@@ -283,9 +283,9 @@ crate::recordable! {
         /// The subtasks that are pinned: DAG and subtask, and the core of their cluster. Since
         /// version 7 of the format.
         pub pins: Vec<(u32, u32, u32)>,
-        /// The DAGs with an affinity, and the cores of their cluster that alone execute what of them is
+        /// The affinities: a DAG, and one of the cores of its cluster that alone execute what of it is
         /// not pinned. Since version 7, too.
-        pub affinities: Vec<(u32, Vec<u32>)>,
+        pub affinities: Vec<(u32, u32)>,
         /// So much more is charged where subtasks are pinned. Since version 7, too.
         pub move_ns: u64,
     }

@@ -176,10 +176,11 @@ fn pins(task_set: &TaskSet) -> Vec<(u32, u32, u32)> {
     all
 }
 
-fn affinities(task_set: &TaskSet) -> Vec<(u32, Vec<u32>)> {
+fn affinities(task_set: &TaskSet) -> Vec<(u32, u32)> {
     let dags = (0..).zip(task_set.dags()).filter(|_| PINS);
-    let of_dags = dags.map(|(dag, of_dag)| (dag, of_dag.affinity().to_vec()));
-    of_dags.filter(|(_, cores)| !cores.is_empty()).collect()
+    let cores =
+        dags.flat_map(|(dag, of_dag)| of_dag.affinity().iter().map(move |core| (dag, *core)));
+    cores.collect()
 }
 
 fn waits(task_set: &TaskSet) -> Vec<(u32, u32, u64, Option<u64>)> {

@@ -115,7 +115,9 @@ impl Dag<'_> {
             _ => "abort",
         };
         label += &format!("\n{jobs}, {} in flight, overrun: {overrun}", dag.in_flight);
-        for (_, cores) in (self.commit.told.affinities.iter()).filter(|of| of.0 == self.number) {
+        let of_dag = (self.commit.told.affinities.iter()).filter(|of| of.0 == self.number);
+        let cores: Vec<u32> = of_dag.map(|of| of.1).collect();
+        if !cores.is_empty() {
             label += &format!("\naffinity: {cores:?}");
         }
         label
@@ -228,7 +230,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
             is_edf,
             waits,
             pins: vec![(0, 1, 1)],
-            affinities: vec![(0, vec![0])],
+            affinities: vec![(0, 0)],
             ..told
         };
         let mut committed = Committed::new(0, told).expect("it is right");

@@ -89,7 +89,7 @@ fn a_divided_set_is_recorded_replayed_and_judged() {
         };
         let told = &committed.told;
         assert_eq!((&told.clusters[..], told.pins.len()), (&[2, 1][..], 4));
-        assert_eq!(told.affinities, [(1, vec![1])]);
+        assert_eq!(told.affinities, [(1, 1)]);
         let bounds = told.dags.iter().map(|dag| dag.bound_ns);
         let expected = DAGS.map(|(_, _, ms)| Some(ms * 1_000_000));
         assert_eq!(bounds.collect::<Vec<_>>(), expected);
@@ -102,7 +102,7 @@ fn a_divided_set_is_recorded_replayed_and_judged() {
 
         // By another affinity the same run is wrong, and the bound another one.
         let told = Commit {
-            affinities: vec![(1, vec![0])],
+            affinities: vec![(1, 0)],
             ..told.clone()
         };
         let other = Committed::new(0, told).expect("it is sound");

@@ -46,7 +46,7 @@ fn commit() -> Commit {
             ..CommittedDag::default()
         }],
         pins: vec![(0, 0, 1)],
-        affinities: vec![(0, vec![0, 2])],
+        affinities: vec![(0, 0), (0, 2)],
         move_ns: 7,
         ..Commit::default()
     }

@@ -356,10 +356,10 @@ impl Committed {
             let place = place.ok_or_else(|| in_commit("a pin is of no subtask".into()))?;
             place.core = Some(core);
         }
-        for (dag, cores) in &told.affinities {
-            let place = specs.get_mut(DagId(*dag).index());
+        for &(dag, core) in &told.affinities {
+            let place = specs.get_mut(DagId(dag).index());
             let place = place.ok_or_else(|| in_commit("an affinity is of no dag".into()))?;
-            place.affinity.clone_from(cores);
+            place.affinity.push(core);
         }
         let clusters = match &told.clusters[..] {
             [] => CoreDivision::Undivided,
