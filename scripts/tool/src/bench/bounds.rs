@@ -49,7 +49,7 @@ static COMMAND: Command = Command {
         /// The numbers of cores.
         "cores": Takes::numbers(1..=64), or "4,8,16";
         /// Random sets for each number of cores, utilization and kind of deadlines.
-        "sets": Takes::number(1..=1_000_000), or "60";
+        "sets": Takes::number(1..=1_000_000), or "200";
         /// The seed of all random sets.
         "seed": Takes::number(0..=u64::MAX), or "1";
         /// The folder for acceptance.csv and acceptance.svg.
@@ -62,7 +62,8 @@ scheduling; lent, heavy DAGs with a fixed order that lend their idle time; fluid
 last one is of a scheduler that no machine has. A small set has 2 to 5 DAGs of 2 to 8 subtasks on 2
 to 4 cores, with D from the longest path to T, and is one of 100 for each of --sets.
 
-Exit code: 0 counted; 1 a set was proven before and is not now; 2 the command line is refused.
+Exit code: 0 counted; 1 a file cannot be read or written, or a small set was proven before and is
+not now; 2 the command line is refused.
 ",
 };
 
@@ -90,12 +91,9 @@ impl BoundsPlan {
         Ok(Self {
             files,
             cores: options.numbers("cores"),
-            sets: options.number("sets").unwrap_or(60),
-            seed: options.number("seed").unwrap_or(1),
-            out: options
-                .path("out")
-                .unwrap_or(Path::new("target/bounds"))
-                .into(),
+            sets: options.number("sets").unwrap_or_default(),
+            seed: options.number("seed").unwrap_or_default(),
+            out: options.path("out").unwrap_or(Path::new("")).into(),
         })
     }
 }
@@ -129,7 +127,7 @@ fn measure(plan: &BoundsPlan) -> Result<bool, String> {
 }
 
 /// Returns the options and settings for any graphs.
-fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
+pub(super) fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
     let options = CommitOptions::new(policy, cores);
     let settings = AnalysisSettings {
         policy,
