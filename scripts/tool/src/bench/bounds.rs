@@ -27,7 +27,7 @@ use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskOrder, verify,
 };
 
-use super::acceptance;
+use super::acceptance::{self, SetFile};
 use super::frame::by_plan;
 use crate::dag_file::stg;
 use crate::files;
@@ -62,14 +62,14 @@ scheduling; lent, heavy DAGs with a fixed order that lend their idle time; fluid
 last one is of a scheduler that no machine has. A small set has 2 to 5 DAGs of 2 to 8 subtasks on 2
 to 4 cores, with D from the longest path to T, and is one of 100 for each of --sets.
 
-Exit code: 0 counted; 1 a file cannot be read or written, or a small set was proven before and is
-not now; 2 the command line is refused.
+Exit code: 0 counted; 1 a small set was proven before and is not now; 2 the command line or a file
+is refused.
 ",
 };
 
 /// The plan of a measurement.
 struct BoundsPlan {
-    files: Vec<PathBuf>,
+    files: Vec<SetFile>,
     cores: Vec<u32>,
     sets: u64,
     seed: u64,
@@ -79,17 +79,17 @@ struct BoundsPlan {
 impl BoundsPlan {
     fn new(options: &Parsed) -> Result<Self, String> {
         options.check_distinct(&["cores"])?;
-        let files: Vec<PathBuf> = options.files().map(Path::to_path_buf).collect();
         if let Some(name) = options.given_of(&["cores", "sets", "seed", "out"])
-            && !files.is_empty()
+            && options.files().len() > 0
         {
             return Err(format!(
                 "`--{name}` is for random sets; leave it or the files out"
             ));
         }
+        files::check_once(options.files())?;
         (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
         Ok(Self {
-            files,
+            files: (options.files().map(SetFile::read)).collect::<Result<_, _>>()?,
             cores: options.numbers("cores"),
             sets: options.number("sets").unwrap_or_default(),
             seed: options.number("seed").unwrap_or_default(),
@@ -107,8 +107,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 fn measure(plan: &BoundsPlan) -> Result<bool, String> {
     if !plan.files.is_empty() {
         let _lasting = Lasting::new("counting sets");
-        let files = plan.files.iter().map(PathBuf::as_path);
-        print!("{}", acceptance::of_files(files)?);
+        print!("{}", acceptance::of_files(&plan.files));
         return Ok(true);
     }
     print!(

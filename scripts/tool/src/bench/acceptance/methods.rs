@@ -30,6 +30,7 @@ pub(super) struct Method {
     pub(super) accepts: fn(&[&Task], u32) -> bool,
 }
 
+/// The methods, in the order of columns, curves and legend.
 pub(super) const METHODS: [Method; 5] = [
     Method {
         name: "graham",
@@ -328,6 +329,19 @@ mod tests {
             assert_eq!(by(virtually_federated, &tasks, 1), fits, "{period} {wcet}");
             assert!(by(virtually_federated, &tasks, 2));
         }
+        // The third goes to the second on the fuller core, and leaves the first room for the last.
+        let of = |volume, period| dag(volume, volume, period, period);
+        let tasks = [of(3, 10), of(8, 11), of(2, 12), of(8, 13)];
+        assert!(by(virtually_federated, &tasks, 2));
+    }
+
+    #[test]
+    fn the_densest_light_dag_takes_what_a_heavy_one_leaves() {
+        // Budgets of 40 and 2: the second leaves 36 of 40 to the 35, and the third core has 4 + 30.
+        let of = |volume| dag(volume, volume, 40, 40);
+        let tasks = [dag(42, 20, 40, 40), of(4), of(35), of(30)];
+        assert!(by(virtually_federated, &tasks, 3));
+        assert!(!by(virtually_federated, &tasks, 2));
     }
 
     #[test]

@@ -20,7 +20,8 @@ use common::random::{Random, nth};
 use sched_dag::analysis::Task;
 
 use crate::files;
-use crate::oracle::{self, assignment};
+use crate::oracle;
+use crate::oracle::assignment::{self, AssignmentCase};
 use crate::output::Table;
 use crate::progress::Progress;
 use methods::METHODS;
@@ -151,35 +152,45 @@ fn table(points: &[Point]) -> String {
     table.text()
 }
 
-/// Counts the sets of files, which are as the oracle's of assignments, with or without answers;
-/// returns a table with a row for each file.
-///
-/// # Errors
-///
-/// In words: a file that cannot be read, or a set that no method is for.
-pub(super) fn of_files<'f>(
-    files: impl ExactSizeIterator<Item = &'f Path> + Clone,
-) -> Result<String, String> {
+/// The sets of a file, which is as the oracle's of assignments, with or without answers.
+pub(super) struct SetFile {
+    name: String,
+    sets: Vec<AssignmentCase>,
+}
+
+impl SetFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    ///
+    /// In words: it cannot be read, or no method is for one of its sets.
+    pub(super) fn read(path: &Path) -> Result<Self, String> {
+        let name = files::shown_path(path);
+        let sets = oracle::read([path].into_iter(), assignment::parse_sets)?;
+        let is_beyond = |task: &Task| task.relative_deadline_ns() > task.period_ns();
+        match sets.iter().find(|set| set.tasks.iter().any(is_beyond)) {
+            None => Ok(Self { name, sets }),
+            Some(set) => Err(format!(
+                "{name}: case {}: a DAG has D > T, which no method here covers; leave the case out",
+                set.name
+            )),
+        }
+    }
+}
+
+/// Counts the sets of files; returns a table with a row for each file.
+pub(super) fn of_files(files: &[SetFile]) -> String {
     let columns = format!("sets:6|{}|  file:<6", columns());
     let mut table = Table::new("sets accepted, in percent\n", &columns);
-    files::check_once(files.clone())?;
-    for file in files {
-        let name = files::shown_path(file);
+    for SetFile { name, sets } in files {
         let mut tally = Tally::default();
-        for set in oracle::read([file].into_iter(), assignment::parse_sets)? {
-            let is_covered = |task: &Task| task.relative_deadline_ns() <= task.period_ns();
-            if !set.tasks.iter().all(is_covered) {
-                return Err(format!(
-                    "{name}: case {}: a DAG has D > T, which no method here covers; leave it out",
-                    set.name
-                ));
-            }
+        for set in sets {
             tally.add(&set.tasks, set.cores);
         }
-        let sets = [tally.sets.to_string()].into_iter();
-        table.cells(sets.chain(tally.shares()).chain([format!("  {name}")]));
+        let shares = tally.shares().chain([format!("  {name}")]);
+        table.cells([tally.sets.to_string()].into_iter().chain(shares));
     }
-    Ok(table.text())
+    table.text()
 }
 
 #[cfg(test)]
