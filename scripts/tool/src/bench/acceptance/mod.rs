@@ -33,12 +33,12 @@ const STEP: usize = 5;
 
 /// Sets that were counted, and how many of them each method accepts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Tally {
+struct AcceptanceCounts {
     sets: u64,
     accepted: [u64; METHODS.len()],
 }
 
-impl Tally {
+impl AcceptanceCounts {
     /// Counts a set, in which no DAG has `D > T`.
     fn add(&mut self, tasks: &[Task], cores: u32) {
         let tasks: Vec<&Task> = tasks.iter().collect();
@@ -62,7 +62,7 @@ struct Point {
     deadlines: Deadlines,
     /// The utilization in percent of the cores.
     percent: u64,
-    tally: Tally,
+    counts: AcceptanceCounts,
 }
 
 /// Counts sets at all points, writes `acceptance.csv` and `acceptance.svg` into a folder, and
@@ -93,7 +93,7 @@ fn points(cores: &[u32]) -> Vec<Point> {
                 cores,
                 deadlines,
                 percent,
-                tally: Tally::default(),
+                counts: AcceptanceCounts::default(),
             }));
         }
     }
@@ -108,7 +108,7 @@ impl Point {
         let mut random = Random::new(nth(seed, kind));
         for _ in 0..sets {
             let set = draw(&mut random, self.cores, self.percent, self.deadlines);
-            self.tally.add(&set, self.cores);
+            self.counts.add(&set, self.cores);
         }
     }
 
@@ -125,7 +125,7 @@ fn csv(points: &[Point]) -> String {
     let methods = METHODS.each_ref().map(|method| method.name).join(",");
     let mut text = format!("cores,deadlines,utilization,sets,{methods}\n");
     for point in points {
-        let (kind, Tally { sets, accepted }) = (point.kind().join(","), point.tally);
+        let (kind, AcceptanceCounts { sets, accepted }) = (point.kind().join(","), point.counts);
         let counts = accepted.map(|count| count.to_string()).join(",");
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "{kind},{sets},{counts}");
@@ -147,7 +147,7 @@ fn table(points: &[Point]) -> String {
     let columns = format!("cores:5|deadlines:13|U / m:7|{}", columns());
     let mut table = Table::new(title, &columns);
     for point in points {
-        table.cells(point.kind().into_iter().chain(point.tally.shares()));
+        table.cells(point.kind().into_iter().chain(point.counts.shares()));
     }
     table.text()
 }
@@ -183,12 +183,12 @@ pub(super) fn of_files(files: &[SetFile]) -> String {
     let columns = format!("sets:6|{}|  file:<6", columns());
     let mut table = Table::new("sets accepted, in percent\n", &columns);
     for SetFile { name, sets } in files {
-        let mut tally = Tally::default();
+        let mut counts = AcceptanceCounts::default();
         for set in sets {
-            tally.add(&set.tasks, set.cores);
+            counts.add(&set.tasks, set.cores);
         }
-        let shares = tally.shares().chain([format!("  {name}")]);
-        table.cells([tally.sets.to_string()].into_iter().chain(shares));
+        let shares = counts.shares().chain([format!("  {name}")]);
+        table.cells([counts.sets.to_string()].into_iter().chain(shares));
     }
     table.text()
 }
@@ -206,8 +206,8 @@ mod tests {
     fn counted() -> Vec<Point> {
         let mut points = points(&[2, 4]);
         for (nth, point) in (0..).zip(&mut points) {
-            point.tally.sets = 200;
-            point.tally.accepted = [nth, 2 * nth, 100, 200 - nth, 200];
+            point.counts.sets = 200;
+            point.counts.accepted = [nth, 2 * nth, 100, 200 - nth, 200];
         }
         points
     }
@@ -287,12 +287,12 @@ mod tests {
             };
             implicit.count(6, seed);
             constrained.count(6, seed);
-            [implicit.tally, constrained.tally]
+            [implicit.counts, constrained.counts]
         };
         assert_eq!(drawn(&[2, 4], 80, 1), drawn(&[4], 80, 1));
         assert_ne!(drawn(&[4], 80, 1), drawn(&[4], 80, 2));
         // All methods accept a light load.
-        let all = Tally {
+        let all = AcceptanceCounts {
             sets: 6,
             accepted: [6; METHODS.len()],
         };
@@ -347,10 +347,15 @@ mod tests {
         let bare = assignment::parse_sets(&bare.join("\n")).unwrap();
         assert_eq!((sets.len(), bare.len()), (60, 60));
         for ((set, bare), expected) in sets.iter().zip(&bare).zip(expected) {
-            let mut tally = Tally::default();
-            tally.add(&bare.tasks, bare.cores);
+            let mut counts = AcceptanceCounts::default();
+            counts.add(&bare.tasks, bare.cores);
             let is_accepted = expected != "attempt -";
-            assert_eq!(tally.accepted[LENT], u64::from(is_accepted), "{}", set.name);
+            assert_eq!(
+                counts.accepted[LENT],
+                u64::from(is_accepted),
+                "{}",
+                set.name
+            );
             assert_eq!(
                 is_committed(&set.tasks, set.cores),
                 is_accepted,

@@ -32,7 +32,7 @@ const LOWEST: usize = 3;
 /// Draws points, which are in the order of their cores, deadlines and utilizations.
 pub(super) fn draw(points: &[Point]) -> String {
     let mut svg = Svg::default();
-    let sets = points.first().map_or(0, |point| point.tally.sets);
+    let sets = points.first().map_or(0, |point| point.counts.sets);
     let title = format!("Random sets of DAGs that a method accepts, of {sets} a point");
     svg.text((CORNER.0, 24), "start", &title);
     legend(&mut svg);
@@ -87,9 +87,17 @@ fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point]) {
     svg.text((right, bottom + 34), "end", "utilization / m");
     let others = (0..METHODS.len()).filter(|method| *method != LOWEST);
     for method in [LOWEST].into_iter().chain(others) {
-        let ends = curve.iter().map(|Point { percent, tally, .. }| {
-            format!("{} {}", x(*percent), y(tally.accepted[method], tally.sets))
-        });
+        let ends = curve.iter().map(
+            |Point {
+                 percent, counts, ..
+             }| {
+                format!(
+                    "{} {}",
+                    x(*percent),
+                    y(counts.accepted[method], counts.sets)
+                )
+            },
+        );
         let path = format!("M{}", ends.collect::<Vec<_>>().join(" L"));
         svg.path(&path, &format!("fill=\"none\" {}", STYLES[method]));
     }
