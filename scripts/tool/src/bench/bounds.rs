@@ -27,7 +27,7 @@ use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskOrder, verify,
 };
 
-use super::acceptance;
+use super::acceptance::{self, SetFile};
 use super::frame::by_plan;
 use crate::dag_file::stg;
 use crate::files;
@@ -49,7 +49,7 @@ static COMMAND: Command = Command {
         /// The numbers of cores.
         "cores": Takes::numbers(1..=64), or "4,8,16";
         /// Random sets for each number of cores, utilization and kind of deadlines.
-        "sets": Takes::number(1..=1_000_000), or "60";
+        "sets": Takes::number(1..=1_000_000), or "200";
         /// The seed of all random sets.
         "seed": Takes::number(0..=u64::MAX), or "1";
         /// The folder for acceptance.csv and acceptance.svg.
@@ -62,13 +62,14 @@ scheduling; lent, heavy DAGs with a fixed order that lend their idle time; fluid
 last one is of a scheduler that no machine has. A small set has 2 to 5 DAGs of 2 to 8 subtasks on 2
 to 4 cores, with D from the longest path to T, and is one of 100 for each of --sets.
 
-Exit code: 0 counted; 1 a set was proven before and is not now; 2 the command line is refused.
+Exit code: 0 counted; 1 a small set was proven before and is not now; 2 the command line or a file
+is refused.
 ",
 };
 
 /// The plan of a measurement.
 struct BoundsPlan {
-    files: Vec<PathBuf>,
+    files: Vec<SetFile>,
     cores: Vec<u32>,
     sets: u64,
     seed: u64,
@@ -78,24 +79,21 @@ struct BoundsPlan {
 impl BoundsPlan {
     fn new(options: &Parsed) -> Result<Self, String> {
         options.check_distinct(&["cores"])?;
-        let files: Vec<PathBuf> = options.files().map(Path::to_path_buf).collect();
         if let Some(name) = options.given_of(&["cores", "sets", "seed", "out"])
-            && !files.is_empty()
+            && options.files().len() > 0
         {
             return Err(format!(
                 "`--{name}` is for random sets; leave it or the files out"
             ));
         }
+        files::check_once(options.files())?;
         (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
         Ok(Self {
-            files,
+            files: (options.files().map(SetFile::read)).collect::<Result<_, _>>()?,
             cores: options.numbers("cores"),
-            sets: options.number("sets").unwrap_or(60),
-            seed: options.number("seed").unwrap_or(1),
-            out: options
-                .path("out")
-                .unwrap_or(Path::new("target/bounds"))
-                .into(),
+            sets: options.number("sets").unwrap_or_default(),
+            seed: options.number("seed").unwrap_or_default(),
+            out: options.path("out").unwrap_or(Path::new("")).into(),
         })
     }
 }
@@ -109,8 +107,7 @@ pub(super) fn run(words: &[OsString]) -> ExitCode {
 fn measure(plan: &BoundsPlan) -> Result<bool, String> {
     if !plan.files.is_empty() {
         let _lasting = Lasting::new("counting sets");
-        let files = plan.files.iter().map(PathBuf::as_path);
-        print!("{}", acceptance::of_files(files)?);
+        print!("{}", acceptance::of_files(&plan.files));
         return Ok(true);
     }
     print!(
@@ -129,7 +126,7 @@ fn measure(plan: &BoundsPlan) -> Result<bool, String> {
 }
 
 /// Returns the options and settings for any graphs.
-fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
+pub(super) fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
     let options = CommitOptions::new(policy, cores);
     let settings = AnalysisSettings {
         policy,

@@ -39,56 +39,45 @@ pub struct AssignmentCase {
 ///
 /// [`Malformed`] for the first record that is not as described above.
 pub fn parse(text: &str) -> Result<Vec<AssignmentCase>, Malformed> {
-    cases(text, parse_case)
+    cases(text, |header, lines| parse_case(header, lines, true))
 }
 
-/// Reads all sets of a file in which nothing need be expected of them.
+/// Works like [`parse`] for a file in which a case may end after its DAGs.
 ///
 /// # Errors
 ///
 /// As [`parse`].
 pub(crate) fn parse_sets(text: &str) -> Result<Vec<AssignmentCase>, Malformed> {
-    cases(text, |header, lines| {
-        let mut set = parse_set(header, lines)?;
-        if lines.clone().next_if("end").is_none() {
-            set.records = parse_records(lines)?;
-        }
-        lines.expect("end")?.exactly(0)?;
-        Ok(set)
-    })
+    cases(text, |header, lines| parse_case(header, lines, false))
 }
 
-fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<AssignmentCase, Malformed> {
-    let mut case = parse_set(header, lines)?;
-    case.records = parse_records(lines)?;
-    lines.expect("end")?.exactly(0)?;
-    Ok(case)
-}
-
-/// Reads the set of a case.
-fn parse_set(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<AssignmentCase, Malformed> {
+/// Reads a case, which may lack what is expected of it unless it `is_answered`.
+fn parse_case(
+    header: &Line<'_>,
+    lines: &mut Lines<'_>,
+    is_answered: bool,
+) -> Result<AssignmentCase, Malformed> {
     let [name, cores, count] = header.fixed()?;
     let (cores, count) = (header.cores(cores)?, header.at_least_one(count)?);
     let tasks = (0..count).map(|_| parse_task(lines));
+    let tasks = tasks.collect::<Result<Vec<_>, Malformed>>()?;
+    let mut records = Vec::new();
+    if is_answered || lines.clone().next_if("attempt").is_some() {
+        for kind in ["attempt", "failed"] {
+            records.push(record(&lines.expect(kind)?)?);
+        }
+        let kinds = ["own", "order", "busy", "guest"];
+        while let Some(line) = kinds.iter().find_map(|kind| lines.next_if(kind)) {
+            records.push(record(&line)?);
+        }
+    }
+    lines.expect("end")?.exactly(0)?;
     Ok(AssignmentCase {
         name: name.to_owned(),
         cores,
-        tasks: tasks.collect::<Result<_, Malformed>>()?,
-        records: Vec::new(),
+        tasks,
+        records,
     })
-}
-
-/// Reads what is expected of a set.
-fn parse_records(lines: &mut Lines<'_>) -> Result<Vec<String>, Malformed> {
-    let mut records = Vec::new();
-    for kind in ["attempt", "failed"] {
-        records.push(record(&lines.expect(kind)?)?);
-    }
-    let kinds = ["own", "order", "busy", "guest"];
-    while let Some(line) = kinds.iter().find_map(|kind| lines.next_if(kind)) {
-        records.push(record(&line)?);
-    }
-    Ok(records)
 }
 
 /// Checks the form of a record, and returns it in normal form: spellings such as `007` are equal.
@@ -182,7 +171,7 @@ fn of_owner(owner: &CoreOwner, plan: &LendingPlan, period_ns: u64) -> Vec<String
 
 #[cfg(test)]
 mod tests {
-    use super::{check, parse};
+    use super::{check, parse, parse_sets};
 
     const FILE: &str = include_str!("../../../../tests/oracle/lent.txt");
 
@@ -308,6 +297,18 @@ mod tests {
         ] {
             let error = parse(&altered(from, to)).unwrap_err();
             assert_eq!((error.line, error.reason.as_str()), (line, reason), "{to}");
+        }
+    }
+
+    #[test]
+    fn a_set_needs_no_answer_where_none_is_compared() {
+        let set = "case a 2 1\ndag 9 8 1 0\nwcet 3\n";
+        let sets = parse_sets(&format!("{set}end\n")).unwrap();
+        assert_eq!((sets.len(), sets[0].cores, sets[0].tasks.len()), (1, 2, 1));
+        for end in ["", "own 0 1 0 1\nend\n", "attempt 0\nend\n"] {
+            let error = parse_sets(&format!("{set}{end}")).unwrap_err();
+            let line = 4 + usize::from(end.starts_with("attempt"));
+            assert_eq!(error.line, line, "{end}");
         }
     }
 }

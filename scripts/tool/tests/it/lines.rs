@@ -89,6 +89,7 @@ tset | fass-tool: unknown SUBCOMMAND `tset`; did you mean `test`?
 run --app dag-file --mode deterministic | run: app `dag-file` runs the DAGs of a file; name one by `--dag FILE`
 run --execution wcet | `--execution` needs `--dag FILE`
 bench bounds --cores 2,2 | `--cores`: `2` stands twice
+bench bounds sets.txt --seed 2 | bench bounds: `--seed` is for random sets; leave it or the files out
 bench native --only join,join | `--only`: `join` stands twice
 bench join-latency --once --mode threads | `--once`
 new-app | new-app: which name? give one, such as `./scripts/new-app brake-assist`

@@ -20,27 +20,44 @@ use sched_dag::analysis::{
     InterferenceBound, ListSchedule, Task, federated, lend, multi_path, multi_path_fp,
 };
 
-/// The methods: the name in a table and a CSV file, and the one in a picture.
-pub(super) const METHODS: [(&str, &str); 5] = [
-    ("graham", "federated, Graham's bound"),
-    ("multi_path", "federated, multi-path, or G-FP"),
-    ("v_fed", "virtually-federated"),
-    ("lent", "lent cores (here)"),
-    ("fluid", "fluid"),
-];
-
-/// Returns whether each method accepts a set; `None` if a DAG has `D > T`.
-pub(super) fn accepted(tasks: &[Task], cores: u32) -> Option<[bool; METHODS.len()]> {
-    let tasks: Vec<&Task> = tasks.iter().collect();
-    let lent = lend(&tasks, cores)?;
-    Some([
-        federated(&tasks, cores).is_some(),
-        by_multi_path(&tasks, cores),
-        virtually_federated(&tasks, cores),
-        lent.plan.is_some(),
-        fluid(&tasks, cores),
-    ])
+/// A test of whether DAGs with `D <= T` can be executed on a number of cores.
+pub(super) struct Method {
+    /// The name in a table and a CSV file.
+    pub(super) name: &'static str,
+    /// The name in a picture.
+    pub(super) title: &'static str,
+    /// Returns whether a set is accepted.
+    pub(super) accepts: fn(&[&Task], u32) -> bool,
 }
+
+/// The methods, in the order of columns, curves and legend.
+pub(super) const METHODS: [Method; 5] = [
+    Method {
+        name: "graham",
+        title: "federated, Graham's bound",
+        accepts: |tasks, cores| federated(tasks, cores).is_some(),
+    },
+    Method {
+        name: "multi_path",
+        title: "federated, multi-path, or G-FP",
+        accepts: by_multi_path,
+    },
+    Method {
+        name: "v_fed",
+        title: "virtually-federated",
+        accepts: virtually_federated,
+    },
+    Method {
+        name: "lent",
+        title: "lent cores (here)",
+        accepts: |tasks, cores| lend(tasks, cores).is_some_and(|answer| answer.plan.is_some()),
+    },
+    Method {
+        name: "fluid",
+        title: "fluid",
+        accepts: fluid,
+    },
+];
 
 const fn is_heavy(task: &Task) -> bool {
     task.volume_ns() > task.relative_deadline_ns()
@@ -300,11 +317,7 @@ mod tests {
         let from_the_end: Vec<Task> = tasks.iter().rev().cloned().collect();
         assert!(by(virtually_federated, &from_the_end, 7));
         // Federated scheduling needs 5, 2 and 2 cores for the heavy ones alone.
-        assert!(!by(
-            |tasks, cores| federated(tasks, cores).is_some(),
-            &tasks,
-            9
-        ));
+        assert!(!by(METHODS[0].accepts, &tasks, 9));
     }
 
     #[test]
@@ -316,6 +329,19 @@ mod tests {
             assert_eq!(by(virtually_federated, &tasks, 1), fits, "{period} {wcet}");
             assert!(by(virtually_federated, &tasks, 2));
         }
+        // The third goes to the second on the fuller core, and leaves the first room for the last.
+        let of = |volume, period| dag(volume, volume, period, period);
+        let tasks = [of(3, 10), of(8, 11), of(2, 12), of(8, 13)];
+        assert!(by(virtually_federated, &tasks, 2));
+    }
+
+    #[test]
+    fn the_densest_light_dag_takes_what_a_heavy_one_leaves() {
+        // Budgets of 40 and 2: the second leaves 36 of 40 to the 35, and the third core has 4 + 30.
+        let of = |volume| dag(volume, volume, 40, 40);
+        let tasks = [dag(42, 20, 40, 40), of(4), of(35), of(30)];
+        assert!(by(virtually_federated, &tasks, 3));
+        assert!(!by(virtually_federated, &tasks, 2));
     }
 
     #[test]
@@ -342,25 +368,33 @@ mod tests {
 
     #[test]
     fn each_method_accepts_what_it_should() {
-        // On two cores the lists of 4, 3 and 4 leave what the light DAG needs if they are squeezed,
-        // and a budget of 10 and 1 leaves it, too.
-        let heavy = Task::new(10, 10, vec![4, 4, 3], &[]).unwrap();
-        let light = Task::new(12, 9, vec![2, 4], &[(0, 1)]).unwrap();
-        let both = [heavy, light];
-        assert_eq!(accepted(&both, 1), Some([false; 5]));
-        let expected = [false, false, true, true, true];
-        assert_eq!(accepted(&both, 2), Some(expected));
-        // With three cores the heavy one gets two, the light one the third.
-        assert_eq!(accepted(&both, 3), Some([true; 5]));
-        // Two paths of 9 leave a core for the 3: Graham's bound counts one path, and needs 4 cores.
-        let of = |wcets, deadline| [Task::new(20, deadline, wcets, &[]).unwrap()];
-        let expected = [false, true, false, true, true];
-        assert_eq!(accepted(&of(vec![9, 9, 3], 12), 2), Some(expected));
-        // Only an order of the subtasks is done by 7, as it is not any one that comes.
-        let expected = [false, false, false, true, true];
-        assert_eq!(accepted(&of(vec![3, 3, 2, 2, 2], 7), 2), Some(expected));
-        assert_eq!(accepted(&of(vec![3, 3, 2, 2, 2], 7), 3), Some([true; 5]));
-        let beyond = Task::new(8, 9, vec![2], &[]).unwrap();
-        assert_eq!(accepted(&[beyond], 2), None);
+        let free = |period, deadline, wcets| Task::new(period, deadline, wcets, &[]).unwrap();
+        let heavy = || free(10, 10, vec![4, 4, 3]);
+        let light = || Task::new(12, 9, vec![2, 4], &[(0, 1)]).unwrap();
+        let wide = || free(100, 10, vec![1; 6]);
+        for (tasks, cores, expected) in [
+            // On two cores the lists of 4, 3 and 4 leave what the light DAG needs if they are
+            // squeezed, and a budget of 10 and 1 leaves it, too. With three cores the heavy one gets
+            // two, the light one the third.
+            (vec![heavy(), light()], 1, [0, 0, 0, 0, 0]),
+            (vec![heavy(), light()], 2, [0, 0, 1, 1, 1]),
+            (vec![heavy(), light()], 3, [1, 1, 1, 1, 1]),
+            // Two paths of 9 leave a core for the 3: Graham's bound counts one path, and needs
+            // ceil(12 / 3) cores.
+            (vec![free(20, 12, vec![9, 9, 3])], 2, [0, 1, 0, 1, 1]),
+            (vec![free(20, 12, vec![9, 9, 3])], 4, [1, 1, 1, 1, 1]),
+            // Only an order of the subtasks is done by 7: 3, 2 and 2 next to 3 and 2.
+            (vec![free(20, 7, vec![3, 3, 2, 2, 2])], 2, [0, 0, 0, 1, 1]),
+            (vec![free(20, 7, vec![3, 3, 2, 2, 2])], 3, [1, 1, 1, 1, 1]),
+            // Two of three light ones would be on one core, with 12 in 10; side by side on both the
+            // third has 1 + ceil((5 + 12) / 2) = 10.
+            (vec![wide(), wide(), wide()], 2, [0, 1, 0, 1, 1]),
+            // The volume of four is 24 in 10, more than two cores do.
+            (vec![wide(), wide(), wide(), wide()], 2, [0, 0, 0, 0, 0]),
+        ] {
+            let of: Vec<&Task> = tasks.iter().collect();
+            let accepted = METHODS.map(|method| u8::from((method.accepts)(&of, cores)));
+            assert_eq!(accepted, expected, "{cores} cores, {tasks:?}");
+        }
     }
 }

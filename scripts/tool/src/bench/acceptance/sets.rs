@@ -80,10 +80,13 @@ fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) ->
         Deadlines::Implicit => period,
         Deadlines::Constrained => random.within(length..=period),
     };
-    let edges = (0..graph.subtask_count())
-        .flat_map(|from| graph.successors(from).map(move |to| (from, to)));
-    let edges: Vec<(usize, usize)> = edges.collect();
-    Task::new(period, deadline, graph.wcets_ns().to_vec(), &edges).ok()
+    Task::new(period, deadline, graph.wcets_ns().to_vec(), &edges(graph)).ok()
+}
+
+/// Returns the edges of a graph.
+pub(super) fn edges(graph: &Task) -> Vec<(usize, usize)> {
+    let of = |from| graph.successors(from).map(move |to| (from, to));
+    (0..graph.subtask_count()).flat_map(of).collect()
 }
 
 /// Draws a graph with WCETs.
