@@ -215,7 +215,7 @@ pub(super) fn lend_amid(
             // The owners of the attempt before, and none at first.
             _ => {}
         }
-        let mut placement = Placement::of(bursts, &members, &owners, count);
+        let mut placement = MemberPlacing::of(bursts, &members, &owners, count);
         let placed = match attempt {
             LendingAttempt::Whole => placement.share_all(),
             _ => placement.place_all(late.iter().copied().chain(attempt.light(tasks))),
@@ -317,7 +317,7 @@ fn squeeze(bursts: &WorkloadBursts, tasks: &[&Task], owners: &mut [CoreOwner]) {
 }
 
 /// Members on what the owners leave, as far as they are placed.
-struct Placement<'a> {
+struct MemberPlacing<'a> {
     members: &'a [MemberTask<'a>],
     supplies: Vec<CoreSupply>,
     groups: Vec<LentGroup>,
@@ -325,7 +325,7 @@ struct Placement<'a> {
     steps: u32,
 }
 
-impl<'a> Placement<'a> {
+impl<'a> MemberPlacing<'a> {
     fn of(
         bursts: &WorkloadBursts,
         members: &'a [MemberTask<'a>],

@@ -271,7 +271,7 @@ pub(super) struct LentForm {
     /// The number of cores beside the chains.
     pub(super) free: usize,
     pub(super) is_clipped: bool,
-    /// What is beside the chains, what owners execute, what each more urgent member does, and what
+    /// The work beside the chains, that of owners and of each more urgent member, and the time that
     /// long steps take.
     pub(super) works: Vec<WorkloadSegment>,
 }

@@ -21,10 +21,11 @@
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `utilisation` | utilisation tests | Li 2014; Bonifaci 2013 |
 //! | `ranks` | which DAG may delay which | |
-//! | `judge`, `overheads` | the verdict at commit, also for sinks with deadlines of their own | |
+//! | `case`, `overheads` | the DAGs of a cluster that can be analysed, with what they are charged | |
+//! | `judge` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
 //! | `list_schedule`, `fixed_order` | orders that the commit fixes | Graham 1969 |
-//! | `lending`, `lent_cores` | heavy DAGs that lend what their orders leave | derived here |
+//! | `lending`, `lent_cores`, `pinned` | heavy DAGs that lend what their orders leave | derived here |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -65,6 +66,7 @@
 //!   `docs/multi-path-bound.md`, waits and lent cores in `docs/analysis.md`.
 
 mod assign;
+mod case;
 mod cover;
 mod fixed_order;
 mod interference;

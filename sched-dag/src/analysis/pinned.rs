@@ -15,38 +15,14 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::judge::{AnalysisInput, CaseBounds};
+use super::case::{AnalysisInput, CaseBounds};
 use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT};
 use super::list_schedule::ScheduledSubtask;
 use super::ranks::PreemptionMix;
 use super::set::constrained;
-use super::{AnalysisSettings, DagBound, NotProvenReason, SchedulabilityTest};
+use super::{DagBound, NotProvenReason, SchedulabilityTest};
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::sort_by_key;
-use crate::spec::PINS;
-use crate::task_set::Dag;
-
-/// Reports whether cores of a cluster with these DAGs are told apart.
-pub(super) fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
-    PINS && dags.any(Dag::is_confined)
-}
-
-/// Returns the settings for a cluster of so many cores, with these DAGs.
-pub(super) fn of_cluster<'a>(
-    settings: &AnalysisSettings,
-    cores: u32,
-    dags: impl Iterator<Item = &'a Dag>,
-) -> AnalysisSettings {
-    let overheads = match is_pinned(dags) {
-        true => settings.overheads.with_moves(),
-        false => settings.overheads,
-    };
-    AnalysisSettings {
-        cores,
-        overheads,
-        ..*settings
-    }
-}
 
 /// The owners and groups of a cluster.
 pub(super) struct PinnedCluster {

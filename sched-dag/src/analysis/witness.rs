@@ -61,13 +61,14 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{self, Write};
 
+use super::case::{AnalysisInput, all_dues, are_in_time, loads, of_cluster, with_case};
 use super::cover::{CoverChain, covering, heaviest, peel};
 use super::interference::{DelaySources, InterferingDag};
 use super::intra_task::each_path;
-use super::judge::{self, AnalysisInput, with_case};
+use super::judge;
 use super::lent_cores::LentForm;
 use super::one_core::{ResponseEquation, demand};
-use super::pinned;
+use super::pinned::PinnedCluster;
 use super::pipelined::{PipelineTerms, STEP_LIMIT};
 use super::waiting::reserved;
 use super::workload::WorkloadBursts;
@@ -86,7 +87,7 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
         let place = task_set.is_divided().then_some(cluster);
         let place = place.map(|cluster| (cluster.0, task_set.clusters().count()));
         let dags = task_set.part(cluster);
-        let settings = pinned::of_cluster(settings, cores, dags.iter());
+        let settings = of_cluster(settings, cores, dags.iter());
         whole(&dags, place, &settings)
     });
     parts.collect()
@@ -106,9 +107,9 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &AnalysisSettings)
         let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
         let responses: Vec<Option<u64>> = responses.collect();
         let by_demand = |bound: &DagBound| bound.test == SchedulabilityTest::Demand;
-        let is_asked = case.relation.ranks_sinks && judge::are_in_time(case);
+        let is_asked = case.relation.ranks_sinks && are_in_time(case);
         if (is_asked || bounds.iter().flatten().any(by_demand))
-            && let Some((busy, times)) = demand(&judge::all_dues(case), &case.set.bursts)
+            && let Some((busy, times)) = demand(&all_dues(case), &case.set.bursts)
         {
             let numbers = core::iter::once(busy).chain(times);
             text.list("demand", numbers.map(u128::cast_signed));
@@ -399,7 +400,7 @@ impl WitnessText {
     }
 
     fn response(&mut self, case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) {
-        let (id, loads) = (case.members[dag], judge::loads(case));
+        let (id, loads) = (case.members[dag], loads(case));
         let response = ResponseEquation::of(&loads, &case.set.bursts, dag);
         let blocked = response.blocking;
         self.line(format_args!("bound {id} {bound_ns} response {blocked}"));
@@ -415,9 +416,9 @@ impl WitnessText {
         let finishes_ns = case.tasks[dag].finishes_ns();
         let finishes = finishes_ns.iter().map(|&ns| i128::from(ns));
         self.list(&format!("bound {id} {bound_ns} owner"), finishes);
+        let cluster = PinnedCluster::of(case);
         for &sink in case.dag(dag).sinks() {
-            let cluster = case.pinned.as_ref();
-            if let Some(finish_ns) = cluster.and_then(|of| of.finish_ns(case, dag, sink))
+            if let Some(finish_ns) = cluster.finish_ns(case, dag, sink)
                 && finish_ns < bound_ns
             {
                 self.line(format_args!("sink {id} {} {finish_ns} 0", sink.0));
@@ -433,8 +434,8 @@ impl WitnessText {
         responses: &[Option<u64>],
     ) {
         let (id, task) = (case.members[dag], case.tasks[dag]);
-        let cluster = case.pinned.as_ref();
-        let Some(Ok(terms)) = cluster.map(|of| of.terms(case, dag, responses)) else {
+        let cluster = PinnedCluster::of(case);
+        let Ok(terms) = cluster.terms(case, dag, responses) else {
             return;
         };
         if let [core] = terms.cores[..] {

@@ -11,7 +11,7 @@ use sched_dag::{CoreId, DagId, Instance, Policy, Preemption, TaskSet};
 
 use crate::support::set::Set;
 
-/// What is eligible, as the journal tells.
+/// The instances that are eligible, as the journal tells.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Eligible {
     instances: BTreeSet<Instance>,
