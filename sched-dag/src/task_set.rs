@@ -114,6 +114,7 @@ impl TaskSet {
         let edges = [&stated.graph.successors.edges(), edges].concat();
         let pinned = cores.iter().copied().map(Some);
         let cores = match cores {
+            _ if !PINS => Vec::new(),
             [] => stated.subtasks.iter().map(Subtask::core).collect(),
             _ => pinned.collect(),
         };
@@ -517,6 +518,9 @@ impl TaskSet {
     pub fn cores_of_dag(&self, dag: DagId, all: u32) -> Vec<u32> {
         let dag = self.dag(dag);
         let cluster = self.cores_of(dag.cluster(), all);
+        if !PINS {
+            return cluster.collect();
+        }
         let is_its = |core: &u32| {
             let within = Some(core - cluster.start);
             let is_pinned = dag.subtasks.iter().any(|subtask| subtask.core() == within);

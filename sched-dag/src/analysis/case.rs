@@ -88,8 +88,7 @@ pub(super) struct AnalysisInput<'a> {
     /// The most urgent DAG first.
     pub(super) order: Vec<usize>,
     pub(super) set: EquationSet<'a>,
-    /// Whether cores of the cluster are told apart; then no equation of the set is asked.
-    pub(super) is_pinned: bool,
+    is_pinned: bool,
 }
 
 impl<'a> AnalysisInput<'a> {
@@ -117,10 +116,15 @@ impl<'a> AnalysisInput<'a> {
         };
         let own = own.iter().map(|&dag| &all[dag]);
         case.set.bursts = WorkloadBursts::of(own, settings);
-        if !case.is_pinned {
+        if !case.is_pinned() {
             case.complete();
         }
         case
+    }
+
+    /// Reports whether cores of the cluster are told apart; then no equation of the set is asked.
+    pub(super) const fn is_pinned(&self) -> bool {
+        PINS && self.is_pinned
     }
 
     pub(super) fn dag(&self, dag: usize) -> &'a Dag {

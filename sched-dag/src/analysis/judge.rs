@@ -123,7 +123,7 @@ impl AnalysisInput<'_> {
     /// Answers for the jobs of the DAGs of this case, by their positions in it; names
     /// them by their positions in the commit.
     pub(super) fn verdict(&self) -> AnalysisResult {
-        let (bounds, mut reasons, mut first) = match self.is_pinned {
+        let (bounds, mut reasons, mut first) = match self.is_pinned() {
             true => PinnedCluster::of(self).bounds(self),
             false => self.solved(),
         };
@@ -331,7 +331,7 @@ fn bound(case: &AnalysisInput<'_>, verdict: &mut AnalysisResult, bounds: &mut [V
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
     let is_met = case.relation.ranks_sinks && are_in_time(case);
-    let pinned = case.is_pinned.then(|| PinnedCluster::of(case));
+    let pinned = case.is_pinned().then(|| PinnedCluster::of(case));
     for (dag, &number) in case.members.iter().enumerate() {
         let solved = equations(case, dag, &responses).map(|(sink, equation)| {
             let solved = equation
@@ -381,7 +381,7 @@ pub(super) fn equations<'a>(
     let sinks = model.sinks().iter().zip(reaches);
     sinks.map(move |(&sink, reach)| {
         let equation = || {
-            if case.is_pinned || set.waits_enter(dag) {
+            if case.is_pinned() || set.waits_enter(dag) {
                 return None;
             }
             let deadline_ns = model.subtask(sink).relative_deadline_ns();
