@@ -42,9 +42,9 @@ use alloc::vec;
 use super::Scheduler;
 use super::jobs::Job;
 use super::key::DispatchKey;
-use super::ready_queue::{IndexedHeap, ReadyQueue};
+use super::ready_queue::ReadyQueue;
 use super::vertices::{LineId, Vertex, VertexTable};
-use crate::ids::{ClusterId, CoreId, DagId, to_u32};
+use crate::ids::{ClusterId, CoreId, DagId};
 use crate::policy::SchedulerOptions;
 use crate::spec::PINS;
 use crate::task_set::{Dag, TaskSet};
@@ -57,8 +57,6 @@ pub(super) struct ReadyLines {
     apart: Box<[CoresLine]>,
     /// By core, the line of its group.
     groups: Box<[LineId]>,
-    /// By vertex: where it is among those of its line.
-    places: Box<[u32]>,
     /// How many are in lines of cores and groups.
     count: u32,
     /// The line that an instance has come into last.
@@ -68,7 +66,7 @@ pub(super) struct ReadyLines {
 /// The line of one core, or of a group that states its cores.
 #[derive(Clone, Debug, Hash)]
 struct CoresLine {
-    keys: IndexedHeap<DispatchKey>,
+    ready: ReadyQueue,
     cores: Box<[CoreId]>,
 }
 
@@ -85,7 +83,6 @@ impl ReadyLines {
             cluster: ReadyQueue::new(task_set, options.policy, vertices),
             apart: Box::default(),
             groups: Box::default(),
-            places: Box::default(),
             count: 0,
             latest: LineId::CLUSTER,
         };
@@ -105,26 +102,26 @@ impl ReadyLines {
         cluster: ClusterId,
         vertices: &VertexTable,
     ) {
-        // Two for each core, as lines are numbered; those that are not needed stay empty.
-        let mut counts = vec![0; 2 * cores as usize];
+        // Two for each core, as lines are numbered; those that are not needed have no room.
+        let mut is_used = vec![false; 2 * cores as usize];
         let mut groups = vec![LineId::CLUSTER; cores as usize];
-        let mut places = vec![0; vertices.len()];
         for (dag, vertex) in own_vertices(task_set, cluster) {
             let line = vertices.get(vertex).line;
             if line.is_cluster() {
                 continue;
             }
-            let count = &mut counts[line.0 as usize];
-            places[vertex as usize] = to_u32(*count);
-            *count += 1;
+            is_used[line.0 as usize] = true;
             if line.core().is_none() {
                 (dag.affinity().iter()).for_each(|core| groups[*core as usize] = line);
             }
         }
-        (self.groups, self.places) = (groups.into(), places.into());
-        let lines = (0..).map(LineId).zip(counts);
-        let apart = lines.map(|(line, count)| CoresLine {
-            keys: IndexedHeap::new(count),
+        self.groups = groups.into();
+        let lines = (0..).map(LineId).zip(is_used);
+        let apart = lines.map(|(line, is_used)| CoresLine {
+            ready: match is_used {
+                true => self.cluster.clone(),
+                false => ReadyQueue::without_room(),
+            },
             cores: (0..cores)
                 .map(CoreId)
                 .filter(|core| self.is_for(line, *core))
@@ -160,8 +157,7 @@ impl ReadyLines {
             self.cluster.insert(key);
         } else {
             self.count += 1;
-            let place = self.places[key.vertex() as usize] as usize;
-            self.apart[line.0 as usize].keys.set(place, key);
+            self.apart[line.0 as usize].ready.insert(key);
         }
     }
 
@@ -172,8 +168,7 @@ impl ReadyLines {
             self.cluster.remove(key);
         } else {
             self.count -= 1;
-            let place = self.places[key.vertex() as usize] as usize;
-            self.apart[line.0 as usize].keys.remove(place);
+            self.apart[line.0 as usize].ready.remove(key);
         }
     }
 
@@ -205,7 +200,7 @@ impl ReadyLines {
     #[inline]
     pub(super) fn peek_in(&self, line: LineId) -> Option<DispatchKey> {
         match self.has_any_apart() {
-            true => self.apart[line.0 as usize].keys.peek().map(|(key, _)| key),
+            true => self.apart[line.0 as usize].ready.peek(),
             false => None,
         }
     }
@@ -213,7 +208,7 @@ impl ReadyLines {
     /// Takes the instance with the smallest key out of a line that is not the cluster's.
     #[inline]
     fn pop_in(&mut self, line: LineId) -> Option<DispatchKey> {
-        let (key, _) = self.apart[line.0 as usize].keys.pop()?;
+        let key = self.apart[line.0 as usize].ready.pop()?;
         self.count -= 1;
         Some(key)
     }
