@@ -313,12 +313,12 @@ pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Resul
          }| {
             let dag = task_set.label(dag);
             let mut text = format!("{dag} gets no cores: {reason}");
-            for (attempt, dag) in LendingAttempt::ALL.iter().zip(attempts.iter().flatten()) {
-                let begin = match attempt {
-                    LendingAttempt::Whole => "; lending cores, there was no place for",
-                    _ => ",",
-                };
-                text += &format!("{begin} {} in {attempt}", task_set.label(*dag));
+            if let Some([first, later @ ..]) = attempts {
+                let label = |dag| task_set.label(dag);
+                text += &format!("; lending cores, attempt 0 has no place for {}", label(first));
+                for (number, dag) in (1..).zip(later) {
+                    text += &format!(", {number} for {}", label(dag));
+                }
             }
             LaunchError::new(text)
         },
