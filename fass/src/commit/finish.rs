@@ -20,8 +20,8 @@ use alloc::vec::Vec;
 
 use sched_dag::analysis::{self, NotAssigned};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, CountLimit, DagId, DagLabel, LendingAttempt, PINS, Policy,
-    TaskSet, VerifiedDags, Warning, sorted_by_key, wcets,
+    CommitOptions, ConstructionPolicy, CountLimit, DagId, DagLabel, PINS, Policy, TaskSet,
+    VerifiedDags, Warning, sorted_by_key, wcets,
 };
 
 use super::answer::{Commit, CommitAnswers, staleness};
@@ -315,7 +315,10 @@ pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Resul
             let mut text = format!("{dag} gets no cores: {reason}");
             if let Some([first, later @ ..]) = attempts {
                 let label = |dag| task_set.label(dag);
-                text += &format!("; lending cores, attempt 0 has no place for {}", label(first));
+                text += &format!(
+                    "; lending cores, attempt 0 has no place for {}",
+                    label(first)
+                );
                 for (number, dag) in (1..).zip(later) {
                     text += &format!(", {number} for {}", label(dag));
                 }
