@@ -111,8 +111,6 @@ impl fmt::Display for JsonError {
     }
 }
 
-impl std::error::Error for JsonError {}
-
 /// Reads the one value that `text` consists of.
 ///
 /// # Errors

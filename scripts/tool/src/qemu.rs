@@ -25,7 +25,7 @@ use std::io::Write;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use boot::MOST_COMMAND_LINE_BYTES;
@@ -47,7 +47,7 @@ pub const MOST_CORES: u64 = replay::lines::MOST_CORES as u64;
 /// The other end of a guest's second serial port.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Second {
-    /// Forward the bytes written to [`Running::input`] to this port; then the first one has none.
+    /// Forward the bytes written to [`Running`]'s input to this port; then the first one has none.
     pub is_live: bool,
     /// The file for the bytes that the guest sends.
     pub output: Option<PathBuf>,
@@ -88,13 +88,13 @@ pub struct Qemu {
     pub module: Option<PathBuf>,
     /// The file for the bytes that the guest sends to QEMU's debug port; `None`: no such port.
     pub records: Option<PathBuf>,
-    /// Forward the bytes written to [`Running::input`] to the guest's serial port.
+    /// Forward the bytes written to [`Running`]'s input to the guest's serial port.
     pub has_input: bool,
     /// Have the guest end in order before it is killed, by ctrl-C at its first serial port.
     pub stops: bool,
     /// The connection of the second serial port; `None`: there is no such port.
     pub second: Option<Second>,
-    /// Write the address of each instruction that is executed to [`Running::log`].
+    /// Write the address of each instruction that is executed to [`Running`]'s output.
     pub logs_instructions: bool,
     /// Wait for a debugger before the first instruction, at this value of QEMU's `-gdb`.
     pub debugger: Option<OsString>,
@@ -465,12 +465,14 @@ impl fmt::Display for Ending {
 /// A QEMU that was started and not yet waited for.
 #[derive(Debug)]
 pub struct Running {
-    child: Child,
+    /// Its input is the guest's serial port, its output the log of instructions, if wanted.
+    pub(crate) child: Child,
     serial: PathBuf,
     complaints: Temporary,
     /// The serial port through which the guest is asked to end, if it listens.
     stop: Option<File>,
-    asked: Option<Asked>,
+    /// The reason why the guest was asked to end, if it was.
+    pub(crate) asked: Option<Asked>,
 }
 
 impl Running {
@@ -551,28 +553,6 @@ impl Running {
             Waited::GivenUp => Ending::TooMuchOutput,
         };
         Ok((ending, followed.text))
-    }
-
-    /// Returns the reason why the guest was asked to end, if it was.
-    #[must_use]
-    pub fn asked(&self) -> Option<Asked> {
-        self.asked
-    }
-
-    /// Takes the input of the guest's serial port, if it has one and it was not taken.
-    pub fn input(&mut self) -> Option<ChildStdin> {
-        self.child.input()
-    }
-
-    /// Takes the log of instructions, if there is one and it was not taken.
-    pub fn log(&mut self) -> Option<ChildStdout> {
-        self.child.output()
-    }
-
-    /// Returns the time since the start.
-    #[must_use]
-    pub fn elapsed(&self) -> Duration {
-        self.child.elapsed()
     }
 
     /// Returns QEMU's own error output on one line; mostly empty.

@@ -12,6 +12,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use sched_dag::law::MeasuredCosts;
+
 use super::screen::NOTHING;
 use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::{Format, states_overheads};
@@ -21,14 +23,14 @@ use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
-use crate::proof::observed::{self, MeasuredOverheads, OfDag};
+use crate::proof::observed::{self, OfDag};
 use crate::proof::report;
 use crate::protocol::Status;
 use crate::record::Record;
 use crate::system;
 
 /// The platform's overheads; an error in words if no trace was kept.
-type Measurement = Result<MeasuredOverheads, String>;
+type Measurement = Result<MeasuredCosts, String>;
 
 /// Reports whether the options ask for an observed run.
 pub(super) fn is_asked_for(options: &Parsed) -> bool {
@@ -162,9 +164,12 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
     if measures {
         let measured = seen?;
         let margin = options.number("margin").unwrap_or(observed::MARGIN_PERCENT);
-        let line = measured.line(margin);
-        say(options, &measured.text(margin), [line].into_iter());
-        next = next.with("append", format!("{append} {}", measured.word(margin)));
+        let word = observed::overheads_word(&measured, margin);
+        let text =
+            format!("\noverheads measured: {measured}; with a margin of {margin} %: {word}\n");
+        let line = observed::overheads_line(&measured, margin);
+        say(options, &text, [line].into_iter());
+        next = next.with("append", format!("{append} {word}"));
     }
     Ok(Some(next))
 }
