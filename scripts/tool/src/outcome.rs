@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use crate::child::Asked;
 use crate::medium::Medium;
-use crate::places::Places;
+use crate::places;
 use crate::protocol::{MachineLine, Status, Transcript, Verdict};
 use crate::qemu::{Ending, Qemu};
 use crate::record::Record;
@@ -227,10 +227,9 @@ impl Outcome {
             }
             _ => writeln!(text, "the serial log {log}:"),
         };
-        let places = Places::new(&self.image);
         for line in shown {
             let _ = writeln!(text, "  | {line}");
-            if let Some(place) = places.explain(line) {
+            if let Some(place) = places::explain(&self.image, line) {
                 let _ = writeln!(text, "  = {place}");
             }
         }

@@ -135,6 +135,7 @@ pub fn for_guest(entries: &[Entry]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::{for_guest, read};
+    use crate::tests::rows;
 
     #[test]
     fn texts_and_pairs_become_bytes_at_their_times() {
@@ -153,9 +154,9 @@ mod tests {
         assert_eq!(script, b"\x00\xca\x9a\x3b\0\0\0\0\x02\0g\n");
     }
 
-    /// Texts that are refused, with `/` for a line's end, and the reasons.
+    /// Texts that are refused, and the reasons.
     const REFUSED: &str = r#"5 "a" | 1: `5` has no unit; append one of ns, us, ms and s
-# a/soon 0a | 2: `soon` is no time
+# a\nsoon 0a | 2: `soon` is no time
 5ms | 1: there are no bytes; give a text
 5ms "" | 1: there are no bytes; give a text
 5ms "a | 1: the text has no end; close it
@@ -164,14 +165,13 @@ mod tests {
 5ms "\x1" | 1: `1"` is no pair of hexadecimal digits; write
 5ms 0a0 | 1: `0a0` is no pair of hexadecimal digits; write
 5ms +1 | 1: `+1` is no pair
-5ms 0a/4ms 0a | 2: this is before the line above; put"#;
+5ms 0a\n4ms 0a | 2: this is before the line above; put"#;
 
     #[test]
     fn what_is_wrong_is_told_with_its_line_and_the_remedy() {
-        for row in REFUSED.lines() {
-            let (text, says) = row.split_once(" | ").expect(row);
-            let refused = read(&text.replace('/', "\n")).unwrap_err();
-            assert!(refused.starts_with(says), "{text}: {refused}");
+        for [text, says] in rows(REFUSED) {
+            let refused = read(&text).unwrap_err();
+            assert!(refused.starts_with(&says), "{text}: {refused}");
         }
         let refused = read(&format!("5ms \"{}\"", "x".repeat(1025))).unwrap_err();
         assert!(refused.starts_with("1: 1025 bytes arrive at once"));

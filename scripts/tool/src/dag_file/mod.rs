@@ -399,6 +399,7 @@ mod tests {
     };
     use crate::run::RUN;
     use crate::system::workspace;
+    use crate::tests::rows;
     use common::random::Random;
     use dag_file::{DagFile, Length, Malformed, is_name};
     use std::path::Path;
@@ -538,9 +539,8 @@ DAG file: too large | f.dag: too large";
         // The guest's has no comments.
         assert!(file.to_string().starts_with("dag x "));
         let told = |said: &str| translate(said, Path::new("f.dag"), &file);
-        for row in SAID.lines() {
-            let (said, expected) = row.split_once(" | ").expect(row);
-            assert_eq!(told(said), Some(expected.replace(r"\n", "\n")), "{said}");
+        for [said, expected] in rows(SAID) {
+            assert_eq!(told(&said), Some(expected), "{said}");
         }
         assert_eq!(told("`jbos` is no option"), None);
     }

@@ -240,6 +240,7 @@ mod tests {
     use super::settle;
     use crate::options::Refusal;
     use crate::run::RUN;
+    use crate::tests::rows;
 
     /// Command lines, and their refusals; more are in `tests/it/on_linux.rs`.
     const REFUSED: &str = "--on linux --machine q35 | `--machine` is for the bare machine; leave
@@ -251,11 +252,10 @@ mod tests {
 
     #[test]
     fn what_is_only_on_the_machine_is_refused_in_one_line() {
-        for row in REFUSED.lines() {
-            let (line, says) = row.split_once(" | ").expect(row);
-            match settle(&RUN.right(line)) {
+        for [line, says] in rows(REFUSED) {
+            match settle(&RUN.right(&line)) {
                 Err(Refusal::Usage(why)) => {
-                    assert!(why.starts_with(says) && !why.contains('\n'), "{why}");
+                    assert!(why.starts_with(&says) && !why.contains('\n'), "{why}");
                 }
                 other => panic!("`{line}`: {other:?}"),
             }

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 use super::handed;
 use crate::options::Parsed;
-use crate::places::Places;
+use crate::places;
 use crate::progress::Progress;
 use crate::protocol::{MachineLine, read_line};
 use crate::system;
@@ -36,7 +36,7 @@ pub(super) struct Screen {
     status: StatusLine,
     /// The progress of this run, and how many jobs were done.
     progress: Option<(Progress, u64)>,
-    places: Places,
+    image: PathBuf,
 }
 
 impl Screen {
@@ -50,7 +50,7 @@ impl Screen {
             bar_is_shown: false,
             status: StatusLine::default(),
             progress: None,
-            places: Places::new(image),
+            image: image.into(),
         }
     }
 
@@ -90,7 +90,7 @@ impl Screen {
             self.wipe();
             println!("{line}");
         }
-        if let Some(place) = self.places.explain(line) {
+        if let Some(place) = places::explain(&self.image, line) {
             self.wipe();
             self.say(&format!("  {place}"));
         }
