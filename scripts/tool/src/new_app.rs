@@ -88,7 +88,6 @@ const FILES: &[AppFile] = &[
 type Changes = Vec<(String, String)>;
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn new_app(words: &[OsString]) -> ExitCode {
     NEW_APP.carry_out(words, |options| {
         print!("{}", make(options)?);

@@ -207,7 +207,6 @@ impl Outcome {
 
     /// Returns the last serial lines, indented, and the path of the whole log. After a fault at an
     /// address it adds the function.
-    #[must_use]
     pub fn tail(&self) -> String {
         // Lines of the record are of no use to people.
         let lines = self.serial.lines();

@@ -37,7 +37,6 @@ const OF_OTHERS: [&str; 4] = ["boot/", "fass/", "kernel/", "sched-dag/"];
 /// Returns the text to add to a line of the serial log of an image, if any, such as `0x20e0b8 is
 /// faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`. The image need not exist or be an
 /// ELF file.
-#[must_use]
 pub fn explain(image: &Path, line: &str) -> Option<String> {
     let line = read_line(0, line)?.ok()?;
     let is_backtrace = line.kind == BACKTRACE;
@@ -69,7 +68,6 @@ pub struct Frame {
 
 /// Returns the functions that contain each of the addresses in an image, the innermost first, by
 /// `addr2line` (`program`); nothing if it fails.
-#[must_use]
 pub fn frames(
     program: &Path,
     image: &Path,

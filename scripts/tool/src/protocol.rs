@@ -58,14 +58,12 @@ pub struct MachineLine {
 
 impl MachineLine {
     /// Returns the unsigned number at a path such as `join_latency_ns.max`.
-    #[must_use]
     pub fn number_at(&self, path: &str) -> Option<u64> {
         let names: Vec<&str> = path.split('.').collect();
         self.value.at(&names).and_then(Value::as_u64)
     }
 
     /// Returns the string member `name`, if there is one.
-    #[must_use]
     pub fn text_at(&self, name: &str) -> Option<&str> {
         self.value.get(name).and_then(Value::as_text)
     }
@@ -104,7 +102,6 @@ pub struct Transcript {
 
 impl Transcript {
     /// Reads a whole log.
-    #[must_use]
     pub fn read(log: &str) -> Transcript {
         let mut transcript = Transcript::default();
         for (index, line) in log.lines().enumerate() {
@@ -162,7 +159,6 @@ impl Transcript {
 
 /// Returns the part of a line that the guest has printed: without the line end, and without the
 /// remains of a firmware's output before the last carriage return.
-#[must_use]
 pub fn written(line: &str) -> &str {
     let line = line.trim_end_matches(['\r', '\n']);
     line.rsplit_once('\r').map_or(line, |(_, own)| own)
@@ -173,7 +169,6 @@ pub fn written(line: &str) -> &str {
 /// # Errors
 ///
 /// In words, with the line's number: it begins with `{` and is no valid machine line.
-#[must_use]
 pub fn read_line(number: usize, line: &str) -> Option<Result<MachineLine, String>> {
     let line = written(line);
     line.starts_with('{').then(|| {

@@ -125,7 +125,6 @@ impl Default for Qemu {
 impl Qemu {
     /// Returns QEMU's arguments for booting `image` with its serial output
     /// going to `serial`. For a [`Loader`] with a firmware `image` is a whole stick.
-    #[must_use]
     pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<OsString> {
         let (machine, mode, cores) = (self.machine, self.mode.arguments(), self.cores);
         let mut arguments = words(&format!(
@@ -269,7 +268,6 @@ macro_rules! named {
             pub const NAMES: &[&str] = &[$($name),*];
 
             /// Returns the choice of that name.
-            #[must_use]
             pub fn from_name(name: &str) -> Option<Self> {
                 match name {
                     $($name => Some(Self::$choice),)*
@@ -278,7 +276,6 @@ macro_rules! named {
             }
 
             /// Returns the choice's name.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$choice => $name,)*
@@ -308,7 +305,6 @@ named! {
 
 impl Mode {
     /// Says in one sentence how far times in this mode can be trusted.
-    #[must_use]
     pub fn meaning(self) -> &'static str {
         match self {
             Mode::Kvm => "real nanoseconds on real cores, the host's noise included",
@@ -364,25 +360,21 @@ named! {
 
 impl Loader {
     /// Reports whether the image is on a stick, which a PC's firmware reads.
-    #[must_use]
     pub fn needs_stick(self) -> bool {
         self != Loader::Pvh
     }
 
     /// Reports whether GRUB passes the words on.
-    #[must_use]
     pub fn is_grub(self) -> bool {
         matches!(self, Loader::Bios | Loader::Uefi)
     }
 
     /// Reports whether the firmware is UEFI.
-    #[must_use]
     pub fn is_by_uefi(self) -> bool {
         matches!(self, Loader::Uefi | Loader::Efi)
     }
 
     /// Returns the least memory in MiB with which the loader has been seen to reach the image.
-    #[must_use]
     pub fn least_memory_mib(self) -> u64 {
         match self {
             Loader::Pvh | Loader::Bios => LEAST_MEMORY_MIB,
@@ -556,7 +548,6 @@ impl Running {
     }
 
     /// Returns QEMU's own error output on one line; mostly empty.
-    #[must_use]
     pub fn complaints(&self) -> String {
         let text = fs::read(self.complaints.path()).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);

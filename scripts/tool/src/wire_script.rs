@@ -119,7 +119,6 @@ fn pair(digits: &str) -> Result<u8, String> {
 }
 
 /// Returns the entries as the guest takes them.
-#[must_use]
 pub fn for_guest(entries: &[Entry]) -> Vec<u8> {
     let mut script = Vec::new();
     for (at_ns, bytes) in entries {

@@ -179,7 +179,6 @@ pub struct Prepared {
 impl Prepared {
     /// Translates a guest's refusal of the file into one as of [`load`], one line a fault; `None`
     /// if it is about something else.
-    #[must_use]
     pub fn translate(&self, said: &str) -> Option<String> {
         translate(said, &self.path, &self.file)
     }

@@ -176,7 +176,6 @@ pub struct Judged {
 impl Settings {
     /// Returns the settings for a unit: a guard of a 500th and a window of a
     /// 100th of it, and a tolerance of 2 %, deterministic, on a microvm.
-    #[must_use]
     pub fn for_unit(unit_us: u64) -> Self {
         Self {
             mode: Mode::Deterministic,
@@ -191,7 +190,6 @@ impl Settings {
 
     /// Makes cores compute. As events then wait for the turns of others, guard and window are a
     /// 40th of a unit, and the tolerance is 5 %.
-    #[must_use]
     pub fn computing(self) -> Self {
         Self {
             guard_us: self.unit_us / 40,

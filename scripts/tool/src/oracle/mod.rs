@@ -121,7 +121,6 @@ static SYNCHRONIZER: Command = of_files(
 );
 
 /// Runs the subcommand.
-#[must_use]
 pub fn oracle(words: &[OsString]) -> ExitCode {
     ORACLE.run(words)
 }

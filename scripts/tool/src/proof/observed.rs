@@ -87,7 +87,6 @@ pub fn add(all: &mut Vec<OfDag>, record: &Record) -> Result<(), String> {
 }
 
 /// Makes a distribution from the counts of a record.
-#[must_use]
 pub fn distribution(counted: &Counted) -> Distribution {
     Distribution::counted(counted.min_ns, counted.buckets.clone())
 }
@@ -145,7 +144,6 @@ fn of_run(run: &Run) -> MeasuredCosts {
 }
 
 /// Returns the guest's word for the charged overheads, with a margin in per cent.
-#[must_use]
 pub fn overheads_word(measured: &MeasuredCosts, margin_percent: u64) -> String {
     let margin_percent = u32::try_from(margin_percent).unwrap_or(u32::MAX);
     let Overheads {
@@ -158,7 +156,6 @@ pub fn overheads_word(measured: &MeasuredCosts, margin_percent: u64) -> String {
 }
 
 /// Returns the measured overheads as a machine line.
-#[must_use]
 pub fn overheads_line(measured: &MeasuredCosts, margin_percent: u64) -> String {
     Object::new()
         .text("kind", "overheads")
@@ -174,7 +171,6 @@ pub fn overheads_line(measured: &MeasuredCosts, margin_percent: u64) -> String {
 pub const MARGIN_PERCENT: u64 = 20;
 
 /// Returns a file of the longest calls with a margin. A subtask that never ran is left out.
-#[must_use]
 pub fn text(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::from(
         "# WCETs that were observed, by `./scripts/run --observe`: a margin in per cent, then of\n\
@@ -257,7 +253,6 @@ pub fn read(path: &Path) -> Result<String, String> {
 
 /// Translates a guest's refusal of the file into one with its name and line; `None` if the message
 /// is about something else.
-#[must_use]
 pub fn translate(said: &str, path: &Path) -> Option<String> {
     let (before, rest) = said.split_once("line ")?;
     let (line, after) = rest.split_once(" of the WCETs: ")?;
@@ -266,7 +261,6 @@ pub fn translate(said: &str, path: &Path) -> Option<String> {
 }
 
 /// Returns the table of the observed times.
-#[must_use]
 pub fn table(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::new();
     for dag in all {

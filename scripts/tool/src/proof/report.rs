@@ -67,7 +67,6 @@ pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<ProofRow>, 
 
 impl ProofRow {
     /// Names the file of the DAG.
-    #[must_use]
     pub fn of_file(self, name: &str) -> Self {
         Self {
             file: Some(name.into()),
@@ -95,7 +94,6 @@ impl ProofRow {
     }
 
     /// Returns the row as a machine line.
-    #[must_use]
     pub fn line(&self) -> String {
         let mut line = Object::new().text("kind", "proof");
         if let Some(file) = &self.file {
@@ -121,7 +119,6 @@ impl ProofRow {
 }
 
 /// Returns the table.
-#[must_use]
 pub fn table(rows: &[ProofRow]) -> String {
     let names = rows.iter().map(|row| row.name().chars().count() + 1);
     let width = names.max().unwrap_or(0).max(20);
@@ -154,7 +151,6 @@ pub(crate) fn ratio(permille: Option<u64>) -> String {
 }
 
 /// Returns the number of proven DAGs, and of responses above their bounds.
-#[must_use]
 pub fn summary(rows: &[ProofRow]) -> String {
     let proven = rows.iter().filter(|row| row.bound_ns.is_some()).count();
     let above = rows.iter().filter(|row| row.exceeds()).count();
@@ -163,7 +159,6 @@ pub fn summary(rows: &[ProofRow]) -> String {
 }
 
 /// Returns the complaint about a response above its bound, which makes the proof worthless.
-#[must_use]
 pub fn complaint(rows: &[ProofRow]) -> Option<String> {
     let row = rows.iter().find(|row| row.exceeds())?;
     Some(format!(
@@ -190,7 +185,6 @@ const PARTS: [&str; 5] = [
 pub type Slack = [Option<u64>; PARTS.len()];
 
 /// Splits the bound of a DAG of a commit into its parts.
-#[must_use]
 pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
         let options = SchedulerOptions {

@@ -233,7 +233,6 @@ impl Record {
     }
 
     /// Returns the machine lines that the record has.
-    #[must_use]
     pub fn transcript(&self) -> Transcript {
         Transcript::read(&self.lines)
     }
@@ -377,7 +376,6 @@ impl Committed {
     }
 
     /// Returns the options of the scheduler.
-    #[must_use]
     pub const fn options(&self) -> SchedulerOptions {
         SchedulerOptions {
             policy: match self.told.is_edf {
@@ -393,7 +391,6 @@ impl Committed {
     }
 
     /// Returns the assumptions of the analysis besides the DAGs.
-    #[must_use]
     pub fn settings(&self) -> AnalysisSettings {
         let options = self.options();
         AnalysisSettings {
@@ -438,7 +435,6 @@ impl Committed {
     }
 
     /// Returns which subtask samples the topic of which other, as positions in the model.
-    #[must_use]
     pub fn samplings(&self) -> Vec<SampledEdge> {
         let dags = (0..).map(DagId).zip(&self.told.dags);
         let sampling = |(dag, &(reader, writer, topic, _))| {
@@ -566,7 +562,6 @@ pub struct Run {
 
 impl Run {
     /// Returns the terms on which the run is judged, with a tolerance in nanoseconds.
-    #[must_use]
     pub const fn terms(&self, bound_ns: u64) -> JudgeOptions {
         JudgeOptions {
             is_whole: self.lost == 0,

@@ -76,7 +76,6 @@ file that is no whole and unaltered recording, or no such table
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn recording(words: &[OsString]) -> ExitCode {
     RECORDING.carry_out(words, |options| {
         attempt(options).map(|()| ExitCode::SUCCESS)

@@ -92,7 +92,6 @@ fn of_run(name: &str, default: Option<&'static str>) -> Opt {
 }
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn debug(words: &[OsString]) -> ExitCode {
     DEBUG.carry_out(words, attempt)
 }

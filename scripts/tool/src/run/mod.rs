@@ -56,7 +56,6 @@ const APART: [(&str, &str, &str); 3] = [
 ];
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn run(words: &[OsString]) -> ExitCode {
     RUN.carry_out(words, attempt)
 }

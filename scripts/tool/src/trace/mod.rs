@@ -76,7 +76,6 @@ pub fn read(log: &str) -> Result<Vec<Run>, String> {
 
 /// Judges a run. `bound_ns` is the longest time for which an instance may wait for a core that it
 /// is owed; 0 is for virtual time.
-#[must_use]
 pub fn check(run: &Run, bound_ns: u64) -> Findings {
     let (view, terms) = (View::new(run), run.terms(bound_ns));
     let verdict = law::judge(&run.task_set, terms, view.in_the_order_of_the_log());
@@ -139,7 +138,6 @@ well-formed trace with events
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn check_trace(words: &[OsString]) -> ExitCode {
     CHECK_TRACE.carry_out(words, |options| {
         let breaches = judge_all(options).map_err(Refusal::Usage)?;
@@ -205,7 +203,6 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
 }
 
 /// Returns the text for people: at most `shown` breaches, then the figures.
-#[must_use]
 pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: usize) -> String {
     let mut text = String::new();
     let Findings { breaches, figures } = findings;
@@ -268,7 +265,6 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: u
 }
 
 /// Returns the machine line of kind `trace_check`.
-#[must_use]
 pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
     let Findings { breaches, figures } = findings;
     Object::new()

@@ -65,7 +65,6 @@ impl RateGraph {
     }
 
     /// Returns the position of the subtask of that name.
-    #[must_use]
     pub fn position(&self, name: &str) -> Option<usize> {
         self.positions.get(name).copied()
     }

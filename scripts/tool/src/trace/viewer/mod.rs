@@ -51,7 +51,6 @@ use crate::output::briefly;
 use crate::record::{Run, bound};
 
 /// Converts runs to JSON. `bound_ns` is the tolerance for breaches, as of [`check`].
-#[must_use]
 pub fn convert(runs: &[Run], bound_ns: u64) -> String {
     let (mut output, mut next_flow) = (Output::default(), 0);
     for run in runs {
@@ -163,7 +162,6 @@ line, or a file without a well-formed trace with events
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn trace(words: &[OsString]) -> ExitCode {
     TRACE.carry_out(words, |options| {
         let text = draw(options).map_err(Refusal::Usage)?;
