@@ -19,7 +19,7 @@
 use std::collections::BTreeMap;
 use std::env;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
@@ -75,15 +75,10 @@ pub fn frames(
 ) -> Option<BTreeMap<u64, Vec<Frame>>> {
     // `-a` repeats each address; `-i` names the inlined calls that contain it, each in two
     // lines (`-f`: function, file and line); `-C` makes names readable.
-    let output = Command::new(program)
-        .args(["-aifC", "-e"])
-        .arg(image)
-        .args(addresses.iter().map(|address| format!("{address:#x}")))
-        .stdin(Stdio::null())
-        .stderr(Stdio::null())
-        .output();
-    let output = output.ok().filter(|output| output.status.success())?;
-    Some(read_frames(&String::from_utf8_lossy(&output.stdout)))
+    let mut command = Command::new(program);
+    command.args(["-aifC", "-e"]).arg(image);
+    command.args(addresses.iter().map(|address| format!("{address:#x}")));
+    Some(read_frames(&system::run(&mut command).ok()?))
 }
 
 fn read_frames(found: &str) -> BTreeMap<u64, Vec<Frame>> {

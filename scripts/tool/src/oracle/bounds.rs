@@ -428,7 +428,7 @@ pub(super) fn list<T: ToString>(values: &[T]) -> String {
 #[cfg(test)]
 mod tests {
     use super::{check, parse};
-    use crate::tests::{altered, rows};
+    use crate::tests::{altered, assert_malformed, rows};
 
     const FILE: &str = include_str!("../../../../tests/oracle/bounds.txt");
     const MULTI_PATH: &str = include_str!("../../../../tests/oracle/multi_path.txt");
@@ -489,11 +489,7 @@ federated 7 | federated 7 0 | 36
 
     #[test]
     fn malformed_files_are_refused_with_their_line() {
-        for [from, to, line, reason] in rows(MALFORMED) {
-            let error = parse(&altered(first(), [&from, &to])).unwrap_err();
-            assert_eq!(error.line.to_string(), line, "{to}: {error}");
-            assert!(error.reason.contains(&reason), "{error}\n  not: {reason}");
-        }
+        assert_malformed(parse, first(), MALFORMED);
         assert_eq!(parse("").unwrap_err().line, 1);
         assert_eq!(parse("\nfoo\n").unwrap_err().line, 2);
         let error = parse(&first().repeat(2)).unwrap_err();

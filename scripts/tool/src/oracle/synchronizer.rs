@@ -252,7 +252,7 @@ fn compare(expected: &Departures, departures: &Departures) -> Result<(), String>
 #[cfg(test)]
 mod tests {
     use super::{check, parse};
-    use crate::tests::{altered, rows};
+    use crate::tests::{altered, assert_malformed, rows};
 
     const PUBLIC: &str = include_str!("../../../../tests/oracle/synchronizer.txt");
 
@@ -341,14 +341,8 @@ approximate 100 1 0 0 0\n |  | 2 | expected a `approximate` record";
 
     #[test]
     fn malformed_files_are_refused_with_their_line() {
-        let approximate = (APPROXIMATE, APPROXIMATE_MALFORMED);
-        for (text, table) in [(EXACT, EXACT_MALFORMED), approximate] {
-            for [from, to, line, reason] in rows(table) {
-                let malformed = parse(&altered(text, [&from, &to])).expect_err(&to);
-                assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
-                assert!(malformed.reason.contains(&reason), "{to}: {malformed}");
-            }
-        }
+        assert_malformed(parse, EXACT, EXACT_MALFORMED);
+        assert_malformed(parse, APPROXIMATE, APPROXIMATE_MALFORMED);
         assert_eq!(parse("").expect_err("no case").line, 1);
     }
 }

@@ -86,7 +86,7 @@ pub(super) fn command(words: &[OsString]) -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::{WaitingCase, check, parse};
-    use crate::tests::{altered, rows};
+    use crate::tests::{altered, assert_malformed, rows};
 
     const FILE: &str = include_str!("../../../../tests/oracle/waiting.txt");
 
@@ -155,10 +155,6 @@ wait_np_gedf -\n |  | 60 | expected a `wait_np_gedf` record, found `end`
 
     #[test]
     fn malformed_files_are_refused_with_their_line() {
-        for [from, to, line, reason] in rows(MALFORMED) {
-            let error = parse(&altered(first(), [&from, &to])).unwrap_err();
-            assert_eq!(error.line.to_string(), line, "{to}: {error}");
-            assert!(error.reason.contains(&reason), "{error}\n  not: {reason}");
-        }
+        assert_malformed(parse, first(), MALFORMED);
     }
 }

@@ -340,8 +340,7 @@ impl Committed {
         let specs: Result<Vec<_>, String> = told.dags.iter().map(spec).collect();
         let mut specs = specs.map_err(in_commit)?;
         for &(dag, subtask, limit_ns, segment_ns) in &told.waits {
-            let dag = specs.get_mut(DagId(dag).index());
-            let place = dag.and_then(|dag| dag.subtasks.get_mut(SubtaskId(subtask).index()));
+            let place = subtask_of(&mut specs, dag, subtask);
             let place = place.ok_or_else(|| in_commit("a wait is of no subtask".into()))?;
             let wait = Wait {
                 limit_ns,
@@ -350,8 +349,7 @@ impl Committed {
             place.waits.push(wait);
         }
         for &(dag, subtask, core) in &told.pins {
-            let dag = specs.get_mut(DagId(dag).index());
-            let place = dag.and_then(|dag| dag.subtasks.get_mut(SubtaskId(subtask).index()));
+            let place = subtask_of(&mut specs, dag, subtask);
             let place = place.ok_or_else(|| in_commit("a pin is of no subtask".into()))?;
             place.core = Some(core);
         }
@@ -479,6 +477,11 @@ pub fn task_set(
         faults.join("; ")
     })?;
     Ok(verified.task_set)
+}
+
+fn subtask_of(specs: &mut [DagSpec], dag: u32, subtask: u32) -> Option<&mut SubtaskSpec> {
+    let dag = specs.get_mut(DagId(dag).index())?;
+    dag.subtasks.get_mut(SubtaskId(subtask).index())
 }
 
 fn spec(dag: &CommittedDag) -> Result<DagSpec, String> {

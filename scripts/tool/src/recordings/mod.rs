@@ -24,6 +24,7 @@ use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::output;
 use crate::proof::{observed, report};
 use crate::record::Record;
+use crate::system;
 
 /// The options that write views of the commits and runs of a record.
 const OF_RUNS: [&str; 3] = ["dot", "witness", "observe"];
@@ -235,12 +236,9 @@ fn write(
 /// In words: it has no such package.
 pub fn independent_reader() -> Result<OsString, String> {
     let python = env::var_os("MCAP_PYTHON").unwrap_or("python3".into());
-    let tried = process::Command::new(&python)
-        .args(["-c", "import mcap"])
-        .output();
-    match tried.is_ok_and(|output| output.status.success()) {
-        true => Ok(python),
-        false => Err(format!(
+    match system::run(process::Command::new(&python).args(["-c", "import mcap"])) {
+        Ok(_) => Ok(python),
+        Err(_) => Err(format!(
             "{} has no package mcap; install it, or name a Python that has it by MCAP_PYTHON",
             files::shown_path(Path::new(&python))
         )),

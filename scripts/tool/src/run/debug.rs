@@ -330,8 +330,7 @@ pub(super) fn script_text(socket: &Path, places: &[String]) -> String {
 fn printers() -> Option<String> {
     let mut rustc = process::Command::new("rustc");
     rustc.current_dir(system::workspace());
-    let said = rustc.args(["--print", "sysroot"]).output().ok()?;
-    let root = String::from_utf8(said.stdout).ok()?;
+    let root = system::run(rustc.args(["--print", "sysroot"])).ok()?;
     let folder = Path::new(root.trim()).join("lib/rustlib/etc");
     let file = folder.join("gdb_load_rust_pretty_printers.py");
     file.is_file().then(|| file.display().to_string())

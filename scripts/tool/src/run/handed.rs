@@ -213,8 +213,7 @@ pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::{RUN, prepare};
-    use super::{Handed, check, of_file, pair, second};
-    use crate::options::Refusal;
+    use super::{Handed, of_file, pair, second};
     use crate::qemu::Second;
     use crate::system::workspace;
     use std::fs;
@@ -242,21 +241,6 @@ mod tests {
         }
         // A value may contain `=`.
         assert_eq!(pair("a=b=c").as_deref(), Some("a=b=c"));
-    }
-
-    #[test]
-    fn what_standard_streams_cannot_do_is_refused() {
-        for (line, says) in [
-            ("--input - --console", "`--input -` and `--console` both"),
-            ("--output -", "`--output -`: standard output is"),
-            ("--dag x --output y", "`--output` and `--dag` exclude"),
-        ] {
-            match check(&RUN.right(line)) {
-                Err(Refusal::Usage(why)) => assert!(why.starts_with(says), "{why}"),
-                other => panic!("`{line}`: {other:?}"),
-            }
-        }
-        assert!(check(&RUN.right("--input - --output x")).is_ok());
     }
 
     #[test]

@@ -238,29 +238,11 @@ fn own_words(options: &Parsed) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::settle;
-    use crate::options::Refusal;
     use crate::run::RUN;
-    use crate::tests::rows;
 
-    /// Command lines, and their refusals; more are in `tests/it/on_linux.rs`.
-    const REFUSED: &str = "--on linux --machine q35 | `--machine` is for the bare machine; leave
---on linux --gdb | `--gdb` is for the bare machine; leave
---on linux --latest 3 | `--latest` is for the bare machine; leave
---on debian --output x | `--output` is not for `--on debian`; leave it out, or give `--on linux`
---mechanism fifo | `--mechanism` is for Linux; leave it out, or give
---on linux --input x | `--input FILE` is for the bare machine, which";
-
+    /// `tests/it/lines.rs` has what is refused.
     #[test]
-    fn what_is_only_on_the_machine_is_refused_in_one_line() {
-        for [line, says] in rows(REFUSED) {
-            match settle(&RUN.right(&line)) {
-                Err(Refusal::Usage(why)) => {
-                    assert!(why.starts_with(&says) && !why.contains('\n'), "{why}");
-                }
-                other => panic!("`{line}`: {other:?}"),
-            }
-        }
+    fn standard_input_is_for_linux_too() {
         assert!(settle(&RUN.right("--on linux --input - --trace x --cores 3")).is_ok());
-        assert!(settle(&RUN.right("--machine q35")).is_ok());
     }
 }

@@ -51,22 +51,13 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
             None => ExitCode::FAILURE,
         });
     }
-    let Some(ProofRun {
-        rows,
-        code,
-        is_well,
-    }) = prove(options)?
-    else {
+    let Some((rows, code)) = prove(options)? else {
         return Ok(ExitCode::FAILURE);
     };
-    say(
-        options,
-        &report::table(&rows),
-        rows.iter().map(report::ProofRow::line),
-    );
+    say_all(options, &rows);
     match report::complaint(&rows) {
         // A failed run has been reported; a second message would hide the first.
-        Some(complaint) if is_well => Err(Refusal::Failure(complaint)),
+        Some(complaint) if code == ExitCode::SUCCESS => Err(Refusal::Failure(complaint)),
         _ => Ok(code),
     }
 }
@@ -82,22 +73,18 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
         let one = options.with("dag", file).with("quiet", NOTHING);
         // The lines of the single runs would drown the one table.
         let one = one.with("json", "yes");
-        let Some(proven) = prove(&one)? else {
+        let Some((proven, code)) = prove(&one)? else {
             return Ok(Status::Failure);
         };
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        rows.extend(proven.rows.into_iter().map(|row| row.of_file(&name)));
-        Ok(match proven.is_well {
+        rows.extend(proven.into_iter().map(|row| row.of_file(&name)));
+        Ok(match code == ExitCode::SUCCESS {
             true => Status::Success,
             false => Status::Failure,
         })
     })?;
     progress.wipe();
-    say(
-        options,
-        &report::table(&rows),
-        rows.iter().map(report::ProofRow::line),
-    );
+    say_all(options, &rows);
     if !options.is_given("json") {
         let (count, summary) = (files.len(), report::summary(&rows));
         println!("{count} files: {refused} refused, {failed} failed; {summary}");
@@ -108,16 +95,12 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
     }
 }
 
-/// The second run of a proof.
-struct ProofRun {
-    rows: Vec<report::ProofRow>,
-    code: ExitCode,
-    is_well: bool,
-}
+/// The rows of a proof, and the exit code of its second run.
+type Proven = (Vec<report::ProofRow>, ExitCode);
 
 /// Observes a run, commits with its measurements, and compares; `None` if the first run failed,
 /// which has been reported.
-fn prove(options: &Parsed) -> Result<Option<ProofRun>, Refusal> {
+fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     let log = system::new_log("observed")?;
     // Without `--observe` the WCETs of the first run lie in a file of ours.
     let own = Temporary(Some(log.with_extension("wcets")));
@@ -135,11 +118,7 @@ fn prove(options: &Parsed) -> Result<Option<ProofRun>, Refusal> {
         Err(_) if !is_well => Vec::new(),
         Err(refusal) => return Err(refusal),
     };
-    Ok(Some(ProofRun {
-        rows,
-        code,
-        is_well,
-    }))
+    Ok(Some((rows, code)))
 }
 
 /// Observes a run, unless the person states both WCETs and overheads. Returns the command line by
@@ -225,6 +204,12 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
     }
     // The overheads in the last seed's run stand for those of all.
     Ok(Some(observed::measure(&latest.runs)))
+}
+
+/// Prints the rows of a proof.
+fn say_all(options: &Parsed, rows: &[report::ProofRow]) {
+    let lines = rows.iter().map(report::ProofRow::line);
+    say(options, &report::table(rows), lines);
 }
 
 /// Prints a table for people and lines for programs, as the options want.
