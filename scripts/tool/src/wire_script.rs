@@ -51,7 +51,10 @@ fn entry(line: &str) -> Result<Entry, String> {
     let rest = rest.trim();
     let bytes = match rest.strip_prefix('"') {
         Some(text) => unescaped(text)?,
-        None => pairs(rest)?,
+        None => rest
+            .split_whitespace()
+            .map(pair)
+            .collect::<Result<_, _>>()?,
     };
     match bytes.len() {
         0 => Err(
@@ -100,10 +103,6 @@ fn escaped(rest: &mut std::str::Chars<'_>) -> Result<u8, String> {
                 .into(),
         ),
     }
-}
-
-fn pairs(words: &str) -> Result<Vec<u8>, String> {
-    words.split_whitespace().map(pair).collect()
 }
 
 fn pair(digits: &str) -> Result<u8, String> {

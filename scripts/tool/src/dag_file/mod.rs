@@ -194,15 +194,12 @@ impl Prepared {
     reason = "one option after the other, each with a refusal of its own"
 )]
 pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
+    let refuse = |line: String| vec![line];
     // Without a file, an option that is about one is a mistake.
     let Some(path) = options.path("dag") else {
-        return options.given_of(&COMPANIONS).map_or(Ok(None), |name| {
-            Err(vec![format!(
-                "`--{name}` needs `--dag FILE`; give that, too"
-            )])
-        });
+        let without = options.check_without(&COMPANIONS, "needs `--dag FILE`; give that, too");
+        return without.map(|()| None).map_err(refuse);
     };
-    let refuse = |line: String| vec![line];
     let apart = [("app", "dag"), ("jobs", "seconds")];
     let apart = apart.map(|(one, other)| (one, other, "exclude each other"));
     options.check_apart(&apart).map_err(refuse)?;

@@ -575,6 +575,16 @@ impl Parsed {
         }
     }
 
+    /// Makes sure that none of these options is given.
+    ///
+    /// # Errors
+    ///
+    /// The name of one that is, and what `why` says of it.
+    pub fn check_without(&self, names: &[&str], why: &str) -> Result<(), String> {
+        let given = self.given_of(names);
+        given.map_or(Ok(()), |name| Err(format!("`--{name}` {why}")))
+    }
+
     /// Returns the first of these options that is given.
     pub fn given_of<'n>(&self, names: &[&'n str]) -> Option<&'n str> {
         names.iter().copied().find(|name| self.is_given(name))

@@ -169,16 +169,13 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
         if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(name)) {
             return Err(format!("`--from-csv` needs `--{name}`; give it, too"));
         }
-        let views = options.given_of(&["csv", "mcap", "until"]);
-        if let Some(name) = views.or(options.given_of(&OF_RUNS)) {
-            let line = "`--from-csv` exclude each other; convert what it has written";
-            return Err(format!("`--{name}` and {line}"));
-        }
-    } else if let Some(name) = options
-        .given_of(&of_tables)
-        .or(options.given_of(&["type", "ignore", "period"]))
-    {
-        return Err(format!("`--{name}` needs `--from-csv`; give it, too"));
+        let why = "and `--from-csv` exclude each other; convert what it has written";
+        options.check_without(&["csv", "mcap", "until"], why)?;
+        options.check_without(&OF_RUNS, why)?;
+    } else {
+        let why = "needs `--from-csv`; give it, too";
+        options.check_without(&of_tables, why)?;
+        options.check_without(&["type", "ignore", "period"], why)?;
     }
     files::check(
         &[input],

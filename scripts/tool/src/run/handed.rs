@@ -168,13 +168,12 @@ pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
     if options.path("output") == Some(Path::new(STREAM)) {
         return usage("`--output -`: standard output is the guest's text; name a file");
     }
-    let wire = options.given_of(&["input", "output"]);
-    match wire.filter(|_| options.is_given("dag")) {
-        Some(name) => Err(Refusal::Usage(format!(
-            "`--{name}` and `--dag` exclude each other: DAGs of a file have no wire; give --app"
-        ))),
-        None => Ok(()),
+    if !options.is_given("dag") {
+        return Ok(());
     }
+    let why = "and `--dag` exclude each other: DAGs of a file have no wire; give --app";
+    let wire = options.check_without(&["input", "output"], why);
+    wire.map_err(Refusal::Usage)
 }
 
 /// Returns the script for the guest from the file that `--input` names; empty if it names none.

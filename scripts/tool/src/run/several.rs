@@ -39,10 +39,9 @@ pub(super) fn is_asked_for(options: &Parsed) -> bool {
 
 /// Runs the observation or the proof.
 pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
-    if let Some(name) = options.given_of(&["console", "gdb", "print-dag"]) {
-        let line = format!("`--{name}` is for a run that is not observed; leave one of them out");
-        return Err(Refusal::Usage(line));
-    }
+    let why = "is for a run that is not observed; leave one of them out";
+    let alone = options.check_without(&["console", "gdb", "print-dag"], why);
+    alone.map_err(Refusal::Usage)?;
     check_files(options)?;
     // Without a comparison the exit code says only whether each run was good.
     if !options.is_given("prove") {
@@ -259,10 +258,9 @@ const FOR_ONE_FILE: [&str; 10] = [
 /// Runs all files. A refused or failed one does not keep the others from running;
 /// the exit code is that of the worst.
 pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> {
-    if let Some(name) = options.given_of(&FOR_ONE_FILE) {
-        let line = format!("`--{name}` is for one file; name one with `--dag`");
-        return Err(Refusal::Usage(line));
-    }
+    let why = "is for one file; name one with `--dag`";
+    let for_several = options.check_without(&FOR_ONE_FILE, why);
+    for_several.map_err(Refusal::Usage)?;
     // Before any boot, so that a folder without files is refused at once.
     let files = files(folder).map_err(Refusal::Usage)?;
     if options.is_given("prove") {

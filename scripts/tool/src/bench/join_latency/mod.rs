@@ -164,11 +164,9 @@ impl JoinPlan {
     /// One line with the reason: the options contradict each other.
     fn new(options: &Parsed) -> Result<JoinPlan, String> {
         let on_linux = options.text("on") == Some("linux");
-        let of_guests = options.given_of(&["mode", "deterministic", "once"]);
-        if let Some(name) = of_guests.filter(|_| on_linux) {
-            return Err(format!(
-                "`--{name}` is for guests; leave it or `--on linux` out"
-            ));
+        if on_linux {
+            let why = "is for guests; leave it or `--on linux` out";
+            options.check_without(&["mode", "deterministic", "once"], why)?;
         }
         (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
         options.check_distinct(&["policies", "subtasks"])?;
