@@ -89,7 +89,6 @@ impl Golden<'_> {
 /// Returns an excerpt of an output. A line of `kept` that the output still has stays; otherwise it
 /// becomes the line of the output with the longest common beginning. `shown` decides which lines
 /// are equal.
-#[must_use]
 pub fn excerpt(kept: &str, output: &str, shown: impl Fn(&str) -> String) -> String {
     let common = |a: &str, b: &str| a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
     let line = |kept| {

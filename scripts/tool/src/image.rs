@@ -21,7 +21,6 @@ use crate::system;
 
 /// Returns the most bytes that an app's stripped image may have. Apps with their own workloads and
 /// baselines, several DAGs, divided cores or recordings get more.
-#[must_use]
 pub fn most_stripped_bytes(app: &str) -> u64 {
     // `hand-off` and `join-latency` measure: their workloads and baselines are in the image.
     let own = match app {
@@ -39,7 +38,6 @@ pub fn most_stripped_bytes(app: &str) -> u64 {
 }
 
 /// Returns the names of the apps: the packages under `apps/`, sorted.
-#[must_use]
 pub fn apps() -> Vec<String> {
     let entries = fs::read_dir(system::workspace().join("apps"));
     let folders = entries.into_iter().flatten().flatten();

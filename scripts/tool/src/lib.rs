@@ -74,4 +74,7 @@ pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};
 
 #[cfg(test)]
+mod tests;
+
+#[cfg(test)]
 use record::tests::made;

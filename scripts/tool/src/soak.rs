@@ -72,7 +72,6 @@ exit codes: 0 no round failed; 1 some did; 2 a refused command line
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn soak(words: &[OsString]) -> ExitCode {
     SOAK.carry_out(words, |options| {
         let plan = plan(options);

@@ -36,7 +36,6 @@ pub enum TinyEnd {
 /// # Panics
 ///
 /// Panics if `text` has 4 GiB or more.
-#[must_use]
 pub fn tiny_image(text: &str, end: TinyEnd) -> Vec<u8> {
     let code_at = BASE + HEADERS + NOTE;
     let length = u32::try_from(text.len()).expect("a tiny guest's text is short");

@@ -79,12 +79,9 @@ struct BoundsPlan {
 impl BoundsPlan {
     fn new(options: &Parsed) -> Result<Self, String> {
         options.check_distinct(&["cores"])?;
-        if let Some(name) = options.given_of(&["cores", "sets", "seed", "out"])
-            && options.files().len() > 0
-        {
-            return Err(format!(
-                "`--{name}` is for random sets; leave it or the files out"
-            ));
+        if options.files().len() > 0 {
+            let why = "is for random sets; leave it or the files out";
+            options.check_without(&["cores", "sets", "seed", "out"], why)?;
         }
         files::check_once(options.files())?;
         (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;

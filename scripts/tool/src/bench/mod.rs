@@ -42,7 +42,6 @@ static BENCH: Menu = Menu {
 };
 
 /// Runs the subcommand.
-#[must_use]
 pub fn bench(words: &[OsString]) -> ExitCode {
     // The others report their progress themselves; it prints nothing before it has a result.
     let is_silent = words.first().is_some_and(|word| word == "sizes");
