@@ -5,13 +5,15 @@ use std::ops::RangeInclusive;
 use common::random::Random;
 use sched_dag::{DagSpec, Priority, SubtaskSpec};
 
-/// Draws up to 4 DAGs for so many cores: from light to full load, deadlines below, at and beyond
-/// the period, priorities by DAG or by subtask.
-pub(crate) fn set(random: &mut Random, unit_ns: u64, cores: u32) -> Vec<DagSpec> {
-    let count = random.within(1..=4);
+/// Draws up to 4 DAGs for clusters of `clusters` cores, which they take in turn, at least one each:
+/// from light to full load, deadlines below, at and beyond the period, priorities by DAG or by
+/// subtask.
+pub(crate) fn set(random: &mut Random, unit_ns: u64, clusters: &[u32]) -> Vec<DagSpec> {
+    let count = random.within(clusters.len()..=4);
     let (overlaps, by_subtask) = (random.once_in(3), random.once_in(4));
-    let share = u64::from(count) * random.within(1..=8);
-    let dags = (0..count).map(|number| {
+    let share = count as u64 * random.within(1..=8);
+    let dags = clusters.iter().cycle().take(count).zip(0..);
+    let dags = dags.map(|(&cores, number)| {
         let mut spec = dag(random, unit_ns, cores.into(), share, overlaps);
         spec.name = format!("{number} of {count}");
         let levels = random.within(1..=6);

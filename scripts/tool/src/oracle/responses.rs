@@ -168,7 +168,7 @@ impl Seen {
 /// overhead is up to a fifth of the least WCET.
 fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
     let cores = random.within(1..=5);
-    let mut specs = set(random, 1_000, cores);
+    let mut specs = set(random, 1_000, &[cores]);
     let mixed = random.once_in(6);
     for spec in &mut specs {
         for subtask in &mut spec.subtasks {
