@@ -1,7 +1,7 @@
 //! Sets of DAGs that methods of analysis accept.
 //!
 //! First the share of random sets by utilization, for the division of cores that lends them and for
-//! other methods ([`acceptance`](super::acceptance)), or of sets that files give. No time is
+//! other methods (`acceptance`), or of sets that files give. No time is
 //! measured, so the tables are the same on every host.
 //!
 //! Two more tables follow: small sets with short deadlines, where the multi-path bound gains
