@@ -1,7 +1,7 @@
 //! Sets of DAGs that methods of analysis accept.
 //!
 //! First the share of random sets by utilization, for the division of cores that lends them and for
-//! other methods ([`acceptance`](super::acceptance)), or of sets that files give. No time is
+//! other methods (`acceptance`), or of sets that files give. No time is
 //! measured, so the tables are the same on every host.
 //!
 //! Two more tables follow: small sets with short deadlines, where the multi-path bound gains
@@ -47,11 +47,11 @@ static COMMAND: Command = Command {
     )),
     options: options! {
         /// The numbers of cores.
-        "cores": Takes::numbers(1..=64), or "4,8,16";
+        "cores": Takes::Numbers(1, 64), or "4,8,16";
         /// Random sets for each number of cores, utilization and kind of deadlines.
-        "sets": Takes::number(1..=1_000_000), or "200";
+        "sets": Takes::Number(1, 1_000_000), or "200";
         /// The seed of all random sets.
-        "seed": Takes::number(0..=u64::MAX), or "1";
+        "seed": Takes::Number(0, u64::MAX), or "1";
         /// The folder for acceptance.csv and acceptance.svg.
         "out" 'o': Takes::File("DIR"), or "target/bounds";
     },

@@ -350,16 +350,6 @@ pub enum Takes {
 }
 
 impl Takes {
-    /// Returns the kind of a number within a range.
-    pub const fn number(range: RangeInclusive<u64>) -> Takes {
-        Takes::Number(*range.start(), *range.end())
-    }
-
-    /// Returns the kind of numbers within a range, with commas between.
-    pub const fn numbers(range: RangeInclusive<u64>) -> Takes {
-        Takes::Numbers(*range.start(), *range.end())
-    }
-
     /// Returns the placeholder of a value in the help text; empty for a flag.
     const fn name(self) -> &'static str {
         match self {

@@ -13,9 +13,9 @@ static COMMAND: Command = Command {
     positional: None,
     options: options! {
         /// Processors of the guest.
-        "cores": Takes::number(1..=64), or "8";
+        "cores": Takes::Number(1, 64), or "8";
         /// Parallel subtasks.
-        "subtasks": Takes::numbers(1..=14);
+        "subtasks": Takes::Numbers(1, 14);
         /// The meaning of time.
         "mode": Takes::OneOf(&["kvm", "deterministic", "threads"]);
         /// Keep the log.

@@ -55,9 +55,9 @@ static IN_KERNEL: Command = Command {
         /// On the machine, not in virtual time on the host.
         "in-kernel": Takes::Nothing;
         /// Leave out the cases for more cores.
-        "cores-up-to": Takes::number(1..=MOST_CORES), or "64";
+        "cores-up-to": Takes::Number(1, MOST_CORES), or "64";
         /// The length of a unit of time in microseconds.
-        "unit-us": Takes::number(100..=10_000_000), or "10000";
+        "unit-us": Takes::Number(100, 10_000_000), or "10000";
         /// Whether execution is simulated, or cores also compute, for half of each unit in all.
         "work": Takes::OneOf(&["simulate", "compute"]), or "simulate";
         /// The meaning of time; see ./scripts/run --help.

@@ -104,9 +104,9 @@ pub static CHECK_TRACE: Command = Command {
         /// Microseconds for which an instance may wait for what it is owed, because a decision
         /// takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 by fifo, 10000
         /// by sched_ext, 100000 where nothing is preempted, else 1000.
-        "bound-us": Takes::number(0..=1_000_000_000);
+        "bound-us": Takes::Number(0, 1_000_000_000);
         /// Breaches of a run to be shown; all are counted.
-        "show": Takes::number(0..=u64::MAX), or "20";
+        "show": Takes::Number(0, u64::MAX), or "20";
         /// Only the chains that begin with this subtask; with --to.
         "from": Takes::Text("DAG/SUBTASK");
         /// Only the chains that end with this subtask; with --from.

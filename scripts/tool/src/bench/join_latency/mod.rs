@@ -103,19 +103,19 @@ static TABLE: Command = Command {
         /// target/join-latency, or target/join-latency-on-linux.
         "out" 'o': Takes::File("DIR");
         /// Jobs of each condition.
-        "jobs": Takes::number(1..=100_000), or "2000";
+        "jobs": Takes::Number(1, 100_000), or "2000";
         /// Parallel subtasks N; a condition has two processors more than the largest.
-        "subtasks": Takes::numbers(1..=16), or "2,4,6";
+        "subtasks": Takes::Numbers(1, 16), or "2,4,6";
         /// The policies: fass, exact, approximate-MS with the longest interval.
         "policies": Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
         /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
         /// every policy.
-        "repeat": Takes::number(1..=1000), or "1";
+        "repeat": Takes::Number(1, 1000), or "1";
         /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
         /// there are fewer.
         "on": Takes::OneOf(&["machine", "linux"]), or "machine";
         /// Queue size of the synchronizers.
-        "queue": Takes::number(1..=100_000), or "1000";
+        "queue": Takes::Number(1, 100_000), or "1000";
         /// The meaning of time, see ./scripts/run --help; kvm where it works, else deterministic.
         "mode": Takes::OneOf(Mode::NAMES);
         /// The same as --mode deterministic.

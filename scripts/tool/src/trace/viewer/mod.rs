@@ -146,11 +146,11 @@ pub static TRACE: Command = Command {
         /// Draw one run as an SVG instead: its DAGs above their schedule, with bounds and deadlines.
         "svg": Takes::Nothing;
         /// How many times the longest period the picture shows.
-        "periods": Takes::number(1..=1000), or "1";
+        "periods": Takes::Number(1, 1000), or "1";
         /// Only the run of this number; else all of them, side by side from time 0.
-        "run": Takes::number(0..=u64::MAX);
+        "run": Takes::Number(0, u64::MAX);
         /// As for ./scripts/check-trace, whose breaches are shown as markers.
-        "bound-us": Takes::number(0..=1_000_000_000);
+        "bound-us": Takes::Number(0, 1_000_000_000);
     },
     notes: "\
 Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
