@@ -115,8 +115,8 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
     })
 }
 
-/// Divides the cores as [`lend`] does, if that applies; an error says for which DAG each attempt
-/// failed.
+/// Divides the cores as [`lend`](super::lend()) does, if that applies; an error says for which DAG
+/// each attempt failed.
 fn lend_cores(
     task_set: &mut TaskSet,
     settings: &AnalysisSettings,
