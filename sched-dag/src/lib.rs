@@ -44,6 +44,10 @@
 //!   idles while an instance is ready. At one instant all completions come
 //!   first, then all releases, then one dispatch.
 //!
+//! A subtask may be *pinned* to a core of its cluster. On that core the pinned instance with the
+//! smallest key runs before all others, and these share the other cores as R5 says. The rules P1 to P4
+//! stand in `scheduler/pins.rs`, their scenarios in `tests/scenarios/pins.txt`.
+//!
 //! A subtask may *wait*, between *segments* of its function: then its instance holds no core, and is
 //! not eligible until an answer or the wait's limit comes. The rules W1 to W7 stand in
 //! `scheduler/waits.rs`, their scenarios in `tests/scenarios/waits.txt`.
@@ -124,7 +128,7 @@ pub mod virtual_time;
 pub mod wcets;
 mod worded;
 
-pub use crate::policy::{AssignmentReason, CoreDivision};
+pub use crate::policy::{AssignmentReason, CoreDivision, LendingAttempt};
 pub use ids::{ClusterId, CoreId, DagId, Instance, ModeId, SubtaskId, Vertex};
 pub use kept::Journal;
 pub use key::{DagKey, SubtaskKey};
@@ -139,8 +143,8 @@ pub use scheduler::{
     Scheduler, TurnEnd,
 };
 pub use spec::{
-    DagSpec, LatestSpec, MOST_WAITS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec, TopicPort,
-    WAITS, Wait,
+    DagSpec, LatestSpec, MOST_WAITS, PINS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,
+    TopicPort, WAITS, Wait,
 };
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;

@@ -161,13 +161,42 @@ impl CoreDivision {
 }
 
 texts! {
-    /// Why the commit has put a DAG into its cluster.
+    /// The ways in which cores are divided, in the order in which they are tried.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum LendingAttempt {
+        /// All DAGs share all cores; none owns any.
+        Whole = "attempt 0";
+        /// Light DAGs are placed by density, the densest first.
+        ByDensity = "attempt 1, by density";
+        /// Light DAGs are placed by deadline, the shortest first.
+        ByDeadline = "attempt 2, by deadline";
+        /// As [`ByDensity`](Self::ByDensity), with squeezed lists.
+        SqueezedByDensity = "attempt 3, squeezed, by density";
+        /// As [`ByDeadline`](Self::ByDeadline), with squeezed lists.
+        SqueezedByDeadline = "attempt 4, squeezed, by deadline";
+    }
+}
+
+texts! {
+    /// Why the commit has put a DAG into its cluster. What is left is in hundredths of the time of
+    /// the DAG's cores, after the work of all that execute there.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum AssignmentReason {
         /// It is heavy: a job has this much work, overheads included, to do within that time.
         Heavy { volume_ns: u64, within_ns: u64 } =
             "its own, as a job is {:?} of work within {:?}",
             Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
+        /// All DAGs share all cores.
+        Whole { left_percent: u32 } = "all, with {left_percent} % of them left (attempt 0)";
+        /// It is heavy and owns cores, on each of which its subtasks have a fixed order.
+        Owner { attempt: LendingAttempt, volume_ns: u64, within_ns: u64, left_percent: u32 } =
+            "its own in a fixed order, as a job is {:?} of work within {:?}, with {left_percent} % of \
+             them left ({attempt})",
+            Duration::from_nanos(*volume_ns), Duration::from_nanos(*within_ns);
+        /// It shares what the owners of some cores leave.
+        Member { attempt: LendingAttempt, left_percent: u32 } =
+            "the first with room for it, with {left_percent} % of them left \
+             ({attempt})";
         /// Its subtasks wait, and no sum of loads tells what fits on a core with those.
         Waits = "its own, as its subtasks wait";
         /// It is light: the cluster with the least load takes it.

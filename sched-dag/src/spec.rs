@@ -36,6 +36,9 @@ pub struct DagSpec {
     pub order: SubtaskOrder,
     /// The cluster whose cores run it; `None` where they are not divided.
     pub cluster: Option<ClusterId>,
+    /// The cores of its cluster that execute those of its subtasks that state none, counted from
+    /// 0; empty: all. DAGs of a cluster have the same ones, or none in common.
+    pub affinity: Vec<u32>,
     /// The number of jobs to release; `None`: without end.
     pub jobs: Option<u64>,
     /// The subtasks in the order of their registration.
@@ -101,6 +104,8 @@ pub struct SubtaskSpec {
     pub budget_ns: Option<u64>,
     /// The stack that it needs, in bytes, of [`STACK_BYTES`]; `None`: the driver's choice.
     pub stack_bytes: Option<u64>,
+    /// The core of its cluster that alone executes it, counted from 0; `None`: any.
+    pub core: Option<u32>,
     /// The static priority; `None`: derived from the graph.
     pub priority: Option<Priority>,
     /// Whether a started instance keeps its core although preemption is on.
@@ -117,6 +122,9 @@ pub struct SubtaskSpec {
 /// Whether subtasks may wait: what the feature `waits` is for. A program without it has no
 /// instruction for waits.
 pub const WAITS: bool = cfg!(feature = "waits");
+
+/// Whether subtasks may be pinned to a core: what the feature `pins` is for, as [`WAITS`].
+pub const PINS: bool = cfg!(feature = "pins");
 
 /// The most waits that a subtask may state.
 pub const MOST_WAITS: usize = if WAITS { 254 } else { 0 };

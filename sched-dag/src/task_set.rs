@@ -24,7 +24,7 @@ use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
-use crate::spec::{WAITS, Wait};
+use crate::spec::{PINS, WAITS, Wait};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -53,6 +53,7 @@ pub struct Dag {
     pub(crate) overrun: OverrunPolicy,
     pub(crate) on_fault: OnFault,
     pub(crate) cluster: Option<ClusterId>,
+    pub(crate) affinity: Box<[u32]>,
     pub(crate) why_there: Option<AssignmentReason>,
     pub(crate) order: SubtaskOrder,
     pub(crate) first_job: u64,
@@ -84,9 +85,16 @@ pub struct Subtask {
     pub(crate) wcet_source: WcetSource,
     pub(crate) budget_ns: Option<u64>,
     pub(crate) stack_bytes: Option<u64>,
+    pub(crate) core: Option<u32>,
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
     pub(crate) relative_deadline_ns: u64,
+}
+
+/// The graph of a DAG, and the core of each subtask.
+pub(crate) struct FixedOrder {
+    graph: Graph,
+    cores: Vec<Option<u32>>,
 }
 
 impl TaskSet {
@@ -99,16 +107,30 @@ impl TaskSet {
         dag.jobs = Some(dag.jobs.map_or(jobs.end, |stated| stated.min(jobs.end)));
     }
 
-    /// Returns a DAG's graph with more edges, which close no cycle.
-    pub(crate) fn with_edges(&self, dag: DagId, edges: &[(u32, u32)]) -> Graph {
-        let stated = &self.dag(dag).graph;
-        let edges = [&stated.successors.edges(), edges].concat();
-        Graph::new(stated.len(), &edges)
+    /// Returns the order of a DAG with more edges, which close no cycle, its subtasks pinned to
+    /// these cores of its cluster; none: as they are.
+    pub(crate) fn ordered(&self, dag: DagId, edges: &[(u32, u32)], cores: &[u32]) -> FixedOrder {
+        let stated = self.dag(dag);
+        let edges = [&stated.graph.successors.edges(), edges].concat();
+        let pinned = cores.iter().copied().map(Some);
+        let cores = match cores {
+            _ if !PINS => Vec::new(),
+            [] => stated.subtasks.iter().map(Subtask::core).collect(),
+            _ => pinned.collect(),
+        };
+        FixedOrder {
+            graph: Graph::new(stated.subtasks.len(), &edges),
+            cores,
+        }
     }
 
-    /// Exchanges the graph of a DAG of which no sink has a deadline of its own.
-    pub(crate) fn exchange(&mut self, dag: DagId, graph: &mut Graph) {
-        core::mem::swap(&mut self.dags[dag.index()].graph, graph);
+    /// Exchanges the order of a DAG of which no sink has a deadline of its own.
+    pub(crate) fn exchange(&mut self, dag: DagId, order: &mut FixedOrder) {
+        let dag = &mut self.dags[dag.index()];
+        core::mem::swap(&mut dag.graph, &mut order.graph);
+        for (subtask, core) in dag.subtasks.iter_mut().zip(&mut order.cores) {
+            core::mem::swap(&mut subtask.core, core);
+        }
     }
 
     /// Counts the subtasks of verified DAGs.
@@ -280,6 +302,16 @@ impl Dag {
         &self.subtasks[subtask.index()]
     }
 
+    /// Reports whether subtasks are pinned to cores.
+    pub(crate) fn is_pinned(&self) -> bool {
+        self.subtasks.iter().any(|subtask| subtask.core().is_some())
+    }
+
+    /// Reports whether there are subtasks that not every core of the cluster may execute.
+    pub(crate) fn is_confined(&self) -> bool {
+        self.is_pinned() || !self.affinity().is_empty()
+    }
+
     /// Returns the subtasks without predecessor, ascending, never empty.
     #[must_use]
     pub fn sources(&self) -> &[SubtaskId] {
@@ -389,6 +421,12 @@ impl Subtask {
         self.budget_ns.or(limit_ns).unwrap_or(u64::MAX)
     }
 
+    /// Returns the core of its cluster that alone executes it, counted from 0; `None`: any.
+    #[must_use]
+    pub const fn core(&self) -> Option<u32> {
+        if PINS { self.core } else { None }
+    }
+
     /// Returns the static priority, given or derived from the graph.
     #[must_use]
     pub const fn priority(&self) -> Priority {
@@ -470,6 +508,30 @@ impl TaskSet {
         }
     }
 
+    /// Lets a DAG execute on these cores of its cluster only.
+    pub(crate) fn confine(&mut self, dag: DagId, cores: Vec<u32>) {
+        self.dags[dag.index()].affinity = cores.into();
+    }
+
+    /// Returns the cores that may execute a DAG, ascending, on a machine of `all`.
+    #[must_use]
+    pub fn cores_of_dag(&self, dag: DagId, all: u32) -> Vec<u32> {
+        let dag = self.dag(dag);
+        let cluster = self.cores_of(dag.cluster(), all);
+        if !PINS {
+            return cluster.collect();
+        }
+        let is_its = |core: &u32| {
+            let within = Some(core - cluster.start);
+            let is_pinned = dag.subtasks.iter().any(|subtask| subtask.core() == within);
+            let is_free = dag.subtasks.iter().any(|subtask| subtask.core().is_none());
+            let affinity = dag.affinity();
+            is_pinned
+                || is_free && (affinity.is_empty() || affinity.iter().any(|of| Some(*of) == within))
+        };
+        cluster.clone().filter(is_its).collect()
+    }
+
     /// Reports whether the cores are divided into clusters.
     #[must_use]
     pub const fn is_divided(&self) -> bool {
@@ -517,6 +579,13 @@ impl Dag {
     #[must_use]
     pub const fn why_there(&self) -> Option<AssignmentReason> {
         self.why_there
+    }
+
+    /// Returns the cores of its cluster that execute those of its subtasks that are not pinned,
+    /// ascending, counted from 0; empty: all.
+    #[must_use]
+    pub const fn affinity(&self) -> &[u32] {
+        if PINS { &self.affinity } else { &[] }
     }
 
     /// Reports whether a cluster is stated, or chosen.

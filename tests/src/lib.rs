@@ -25,7 +25,8 @@ use tool::system;
 pub use guest::Guest;
 pub use said::{Members, Said, lawful_runs};
 
-/// Runs an app by `./scripts/run` with these words, wherever they say, and returns what it said.
+/// Runs an app, or a DAG file, by `./scripts/run` with these words, wherever they say, and returns
+/// what it said.
 ///
 /// # Panics
 ///
@@ -35,7 +36,12 @@ pub fn run(app: &str, words: &[&str]) -> Transcript {
     let mut command = Command::new(system::workspace().join("scripts/run"));
     // On Linux a panic's backtrace counts as its instance's time, which a budget limits.
     command.env_remove("RUST_BACKTRACE");
-    let output = command.args(["--app", app]).args(words).output();
+    let option = if app.ends_with(".dag") {
+        "--dag"
+    } else {
+        "--app"
+    };
+    let output = command.args([option, app]).args(words).output();
     let output = output.expect("the command can be run");
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(

@@ -74,6 +74,7 @@ fn build_dag(
         .offset(time(Some(spec.offset_ns)))
         .overrun(spec.overrun)
         .order(spec.order)
+        .affinity(&spec.affinity)
         .jobs(settings.length.jobs(spec));
     if let Some(jobs) = spec.in_flight {
         dag.in_flight(jobs);
@@ -95,6 +96,9 @@ fn build_dag(
             }
             if let Some(priority) = subtask.priority {
                 attributes = attributes.priority(priority.0);
+            }
+            if let Some(core) = subtask.core {
+                attributes = attributes.core(core);
             }
             if subtask.non_preemptive {
                 attributes = attributes.non_preemptive();

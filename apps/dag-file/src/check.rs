@@ -67,6 +67,7 @@ fn line_of(set: &Set, fault: &DagFault) -> usize {
         }),
         DagFault::WcetExceedsDeadline { dag, subtask, .. }
         | DagFault::TooManyWaits { dag, subtask, .. }
+        | DagFault::CoreOutOfRange { dag, subtask, .. }
         | DagFault::ZeroSinkDeadline { dag, sink: subtask }
         | DagFault::SinkDeadlineBeyondDag {
             dag, sink: subtask, ..
@@ -93,6 +94,8 @@ fn line_of(set: &Set, fault: &DagFault) -> usize {
         | DagFault::TimeOverflow { dag, .. }
         | DagFault::NoCluster { dag, .. }
         | DagFault::UnknownCluster { dag, .. }
+        | DagFault::AffinityOutOfRange { dag, .. }
+        | DagFault::AffinitiesOverlap { dag, .. }
         | DagFault::PrioritiesExhausted { dag } => set.dags.get(dag.id.index()).map(|dag| dag.line),
         _ => None,
     };
@@ -140,6 +143,11 @@ period 9ms\nsubtask a wcet 1ms deadline 5ms\nsubtask b wcet 1ms deadline 0ns\ned
   line 3: subtask `b` of dag `x` has a WCET of 1ms, longer than the relative deadline of 0ns;
 period 9ms\nsubtask c wcet 1ms deadline 10ms
   line 2: subtask `c` of dag `x` has a relative deadline of 10ms, longer than its DAG's
+period 9ms affinity 0,2\nsubtask a wcet 1ms\nsubtask b wcet 1ms core 2
+  line 1: dag `x` has an affinity to core 2, and its cluster has 2, counted from 0; state one
+  line 3: subtask `b` of dag `x` is pinned to core 2, and
+period 9ms affinity 0\nsubtask a wcet 1ms\ndag y period 9ms\nsubtask a wcet 1ms
+  line 3: dag `x` and dag `y` share core 0 and not all others
 period 584000s\nsubtask a wcet 1ms
   line 1:";
 

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 
 use dag_file::{DagFile, Execution, Length, Settings, build, check, parse};
 use fass::Occupation;
-use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use fass::commit::{ConstructionPolicy, DagAnswer, finish_create_dags_with};
 use kernel::options::UsageError;
 use kernel::{AppError, Machine, println};
 use sched_dag::{CommitOptions, Policy};
@@ -55,6 +55,10 @@ fn main(machine: &Machine) -> Result<(), AppError> {
             .map_err(|error| usage(format!("DAG file: {error}")))?;
         for warning in commit.warnings() {
             println!("warning: {warning}");
+        }
+        let is_placed = |answer: &&DagAnswer| answer.cluster.as_ref()?.why;
+        for answer in (commit.answers().iter()).filter(|answer| is_placed(answer).is_some()) {
+            println!("{answer}");
         }
         let run = machine.run()?;
         let report = Report::new(set, commit.answers(), &run);

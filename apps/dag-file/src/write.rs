@@ -40,6 +40,10 @@ fn write_dag(dag: &FileDag, out: &mut Formatter<'_>) -> Result {
     if let Some(cluster) = spec.cluster {
         write!(out, " cluster {}", cluster.0)?;
     }
+    for (number, core) in spec.affinity.iter().enumerate() {
+        let separator = if number == 0 { " affinity " } else { "," };
+        write!(out, "{separator}{core}")?;
+    }
     match spec.overrun {
         OverrunPolicy::Queue => {}
         OverrunPolicy::Skip => out.write_str(" overrun skip")?,
@@ -73,6 +77,9 @@ fn write_subtask(spec: &SubtaskSpec, more: &FileSubtask, out: &mut Formatter<'_>
     }
     if let Some(priority) = spec.priority {
         write!(out, " priority {}", priority.0)?;
+    }
+    if let Some(core) = spec.core {
+        write!(out, " core {core}")?;
     }
     if spec.non_preemptive {
         out.write_str(" non-preemptive")?;

@@ -280,6 +280,14 @@ crate::recordable! {
         /// The waits, those of a subtask in their order: DAG and subtask, the limit, and the WCET
         /// of the segment that follows, if it is stated.
         pub waits: Vec<(u32, u32, u64, Option<u64>)>,
+        /// The subtasks that are pinned: DAG and subtask, and the core of their cluster. Since
+        /// version 7 of the format.
+        pub pins: Vec<(u32, u32, u32)>,
+        /// The affinities: a DAG, and one of the cores of its cluster that alone execute what of it is
+        /// not pinned. Since version 7, too.
+        pub affinities: Vec<(u32, u32)>,
+        /// So much more is charged where subtasks are pinned. Since version 7, too.
+        pub move_ns: u64,
     }
 
     /// A DAG of a [`Commit`].

@@ -206,11 +206,15 @@ impl<'b> Chunk<'b> {
                 text.map(Chunk::Text)
             }
             COMMIT => {
-                // In version 5 it ends before the waits: there are 0.
-                let without_waits = || [payload, &[0; 4]].concat();
+                // In version 6 it ends before the pins, and in version 5 before the waits: all that
+                // follows is 0.
+                let of_before = |lacks: usize| {
+                    let bytes = [payload, &[0; 20][..lacks]].concat();
+                    Commit::from_bytes(&bytes).ok()
+                };
                 let commit = Commit::from_bytes(payload);
                 let commit =
-                    commit.or_else(|wrong| Commit::from_bytes(&without_waits()).map_err(|_| wrong));
+                    commit.or_else(|wrong| of_before(16).or_else(|| of_before(20)).ok_or(wrong));
                 commit.map(Chunk::Commit)
             }
             EVENTS => Events::read(payload).map(Chunk::Events),
@@ -248,7 +252,7 @@ impl Progress {
             return Err(Decoder::new(bytes).expected(mark));
         }
         let malformed =
-            input.expected("version 1 to 6 of recordings, which are those that are read");
+            input.expected("version 1 to 7 of recordings, which are those that are read");
         // A later version may have kinds that this code cannot check; an earlier one only lacks
         // some.
         if !(1..=VERSION).contains(&u16::from_le_bytes(input.array(malformed.expected)?)) {

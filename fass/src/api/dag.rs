@@ -128,6 +128,34 @@ impl Dag {
         self
     }
 
+    /// Lets only these cores of its cluster, counted from 0, execute those of its subtasks that are
+    /// not [pinned](crate::SubtaskAttributes::core); in any order, and none means all, as without it.
+    ///
+    /// DAGs of a cluster have the same affinity, or no core in common; anything else is a fault at
+    /// commit, and so is a core that there is not. Cores that DAGs with an affinity leave idle execute
+    /// no others. An app with affinities is built with `fass`' feature `pins`.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// let machine = virtual_time::VirtualTime::new().cores(3);
+    /// let period = Duration::from_millis(10);
+    /// let dags = [("brakes", &[0][..]), ("vision", &[1, 2])].map(|(name, cores)| {
+    ///     let dag = create_dag();
+    ///     dag.name(name).affinity(cores).jobs(1).period(period).relative_deadline(period);
+    ///     dag.register_untyped_subtask(|_job| (), SubtaskAttributes::named("tick"));
+    ///     dag
+    /// });
+    /// finish_create_dags(&dags).unwrap();
+    /// assert_eq!(machine.run().violations(), []);
+    /// ```
+    #[track_caller]
+    pub fn affinity(&self, cores: &[u32]) -> &Self {
+        self.open().spec.affinity = cores.into();
+        self
+    }
+
     /// Sets the number of jobs to release, after which the DAG is finished;
     /// without it the DAG runs without end.
     #[track_caller]

@@ -38,7 +38,6 @@ use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
-use core::ops::Range;
 use core::time::Duration;
 
 use sched_dag::analysis::{
@@ -359,15 +358,17 @@ pub struct DagAnswer {
 /// ```
 /// use fass::commit::{ClusterId, ClusterPlacement};
 ///
-/// let placement = ClusterPlacement { cluster: ClusterId(1), cores: 1..3, why: None };
+/// let mut placement = ClusterPlacement { cluster: ClusterId(1), cores: vec![1, 2], why: None };
 /// assert_eq!(placement.to_string(), "in cluster 1, on 2 cores from core 1 on");
+/// placement.cores = vec![1, 4];
+/// assert_eq!(placement.to_string(), "in cluster 1, on cores 1, 4");
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClusterPlacement {
     /// Which it is.
     pub cluster: ClusterId,
-    /// The numbers of its cores.
-    pub cores: Range<u32>,
+    /// The numbers of the cores that may execute it, ascending.
+    pub cores: Vec<u32>,
     /// Why the commit has put it there; `None` if the app has.
     pub why: Option<AssignmentReason>,
 }
@@ -489,7 +490,7 @@ impl CommitAnswers {
                 // On undivided cores there is nothing to tell.
                 cluster: task_set.is_divided().then(|| ClusterPlacement {
                     cluster,
-                    cores: task_set.cores_of(cluster, settings.cores),
+                    cores: task_set.cores_of_dag(dag, settings.cores),
                     why: task_set.dag(dag).why_there(),
                 }),
                 sinks: sinks(task_set, dag, &answer.sinks_ns[dag.index()]),
@@ -587,9 +588,21 @@ impl fmt::Display for ClusterPlacement {
             cores,
             why,
         } = self;
-        let (count, first) = (CountedNoun(cores.len(), "core"), cores.start);
-        let cluster = cluster.0;
-        write!(f, "in cluster {cluster}, on {count} from core {first} on")?;
+        write!(f, "in cluster {}, on ", cluster.0)?;
+        let is_row = cores.windows(2).all(|pair| pair[0] + 1 == pair[1]);
+        match (cores.first(), is_row) {
+            (Some(first), true) => {
+                let count = CountedNoun(cores.len(), "core");
+                write!(f, "{count} from core {first} on")?;
+            }
+            _ => {
+                f.write_str("cores ")?;
+                for (place, core) in cores.iter().enumerate() {
+                    let comma = if place == 0 { "" } else { ", " };
+                    write!(f, "{comma}{core}")?;
+                }
+            }
+        }
         why.map_or(Ok(()), |why| write!(f, ": {why}"))
     }
 }

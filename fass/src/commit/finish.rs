@@ -20,8 +20,8 @@ use alloc::vec::Vec;
 
 use sched_dag::analysis::{self, NotAssigned};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, CountLimit, DagId, DagLabel, Policy, TaskSet, VerifiedDags,
-    Warning, sorted_by_key, wcets,
+    CommitOptions, ConstructionPolicy, CountLimit, DagId, DagLabel, PINS, Policy, TaskSet,
+    VerifiedDags, Warning, sorted_by_key, wcets,
 };
 
 use super::answer::{Commit, CommitAnswers, staleness};
@@ -30,7 +30,7 @@ use crate::api::dag::Dag;
 use crate::draft::checks::{self, Drafts};
 use crate::draft::fault::{CommitError, Fault};
 use crate::platform;
-use crate::platform::{LaunchError, Platform};
+use crate::platform::{LaunchError, Platform, RunConfig};
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
 ///
@@ -144,6 +144,10 @@ pub fn finish_create_dags_with(
     {
         return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
+    let demands_proof = drafts.iter().any(|draft| draft.borrow().demands_proof);
+    if PINS && demands_proof && !terms.assigns {
+        divide_to_prove(platform, &mut task_set, &terms);
+    }
     analysis::fix_orders(&mut task_set, &terms.settings());
     let answers = CommitAnswers::new(&task_set, &terms);
     let certain = answers.certain_misses();
@@ -168,6 +172,25 @@ pub fn finish_create_dags_with(
             task_set,
         }),
         Err(error) => Err(CommitError::of(Fault::NotLaunched(error), warnings)),
+    }
+}
+
+/// Divides cores that are not, where a proof is demanded that only a division gives.
+fn divide_to_prove(platform: &dyn Platform, task_set: &mut TaskSet, terms: &RunConfig) {
+    let is_free = |dag: &sched_dag::Dag| !dag.states_cluster();
+    if task_set.is_divided() || !task_set.dags().iter().all(is_free) {
+        return;
+    }
+    let settings = terms.settings();
+    if analysis::answer(task_set, &settings).is_proven() {
+        return;
+    }
+    let mut divided = task_set.clone();
+    if platform.assign(&mut divided).is_ok()
+        && divided.is_divided()
+        && analysis::answer(&divided, &settings).is_proven()
+    {
+        *task_set = divided;
     }
 }
 
@@ -283,9 +306,24 @@ fn is_consequence(fault: &sched_dag::DagFault, ours: &[Fault]) -> bool {
 /// ```
 pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
     analysis::assign(task_set, &platform.terms().settings()).map_err(
-        |NotAssigned { dag, reason }| {
+        |NotAssigned {
+             dag,
+             reason,
+             attempts,
+         }| {
             let dag = task_set.label(dag);
-            LaunchError::new(format!("{dag} gets no cores: {reason}"))
+            let mut text = format!("{dag} gets no cores: {reason}");
+            if let Some([first, later @ ..]) = attempts {
+                let label = |dag| task_set.label(dag);
+                text += &format!(
+                    "; lending cores, attempt 0 has no place for {}",
+                    label(first)
+                );
+                for (number, dag) in (1..).zip(later) {
+                    text += &format!(", {number} for {}", label(dag));
+                }
+            }
+            LaunchError::new(text)
         },
     )
 }

@@ -15,8 +15,8 @@ use sched_dag::analysis::Overheads;
 use sched_dag::engine::Run;
 use sched_dag::law::Histogram;
 use sched_dag::{
-    Dag, DagId, Instance, Journal, OnFault, OverrunPolicy, Policy, Preemption, SchedulerOptions,
-    SubtaskId, TaskSet, Vertex,
+    Dag, DagId, Instance, Journal, OnFault, OverrunPolicy, PINS, Policy, Preemption,
+    SchedulerOptions, SubtaskId, TaskSet, Vertex,
 };
 
 use super::{Outgoing, Record, RecordingState};
@@ -160,7 +160,27 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
             })
             .collect(),
         waits: waits(task_set),
+        pins: pins(task_set),
+        affinities: affinities(task_set),
+        move_ns: overheads.of_a_move_ns(options.preemption),
     }
+}
+
+fn pins(task_set: &TaskSet) -> Vec<(u32, u32, u32)> {
+    let mut all = Vec::new();
+    for (dag, of_dag) in (0..).zip(task_set.dags()).filter(|_| PINS) {
+        for (subtask, of_subtask) in (0..).zip(of_dag.subtasks()) {
+            all.extend(of_subtask.core().map(|core| (dag, subtask, core)));
+        }
+    }
+    all
+}
+
+fn affinities(task_set: &TaskSet) -> Vec<(u32, u32)> {
+    let dags = (0..).zip(task_set.dags()).filter(|_| PINS);
+    let cores =
+        dags.flat_map(|(dag, of_dag)| of_dag.affinity().iter().map(move |core| (dag, *core)));
+    cores.collect()
 }
 
 fn waits(task_set: &TaskSet) -> Vec<(u32, u32, u64, Option<u64>)> {

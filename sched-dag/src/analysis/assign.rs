@@ -1,14 +1,15 @@
-//! The commit's own clusters: cores of its own for each DAG that needs several, single cores
-//! for the others.
+//! The commit's own clusters: cores that heavy DAGs own and lend, or cores of its own for each DAG
+//! that needs several and single cores for the others.
 //!
-//! This is federated scheduling (the papers are named below). A DAG is *heavy* if a job of
-//! it is more work than one core does by its deadline, or by the next release if that comes
-//! first, or if subtasks of it wait; it gets a cluster of as many cores as its multi-path bound needs, or the order that may
-//! be fixed for it. The others are
-//! *light*: clusters of one core each take them, the densest first, each where the sum of
-//! densities is least (worst fit), so that what room there is, is left on every core. A core
-//! takes light DAGs up to a sum of 1, which is enough for EDF and no proof for static
-//! priorities. Whatever is assigned, the analysis of each cluster has the last word.
+//! Under static priorities the cores are divided as [`lend`](super::lend()) does, if subtasks can be
+//! pinned and that proves all DAGs. Else this is federated scheduling (the papers are named below).
+//! A DAG is *heavy* if a job of it is more work than one core does by its deadline, or by the next
+//! release if that comes first, or if subtasks of it wait; it gets a cluster of as many cores as its
+//! multi-path bound needs, or the order that may be fixed for it. The others are *light*: clusters
+//! of one core each take them, the densest first, each where the sum of densities is least (worst
+//! fit), so that what room there is, is left on every core. A core takes light DAGs up to a sum of
+//! 1, which is enough for EDF and no proof for static priorities. Whatever is assigned, the analysis
+//! of each cluster has the last word.
 //!
 //! # Federated scheduling: cores of its own for each DAG that needs several
 //!
@@ -29,14 +30,17 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use super::lending::{LendingAnswer, lend_amid};
 use super::multi_path::multi_path;
 use super::set::constrained;
 use super::task::{Task, TaskError};
 use super::utilisation::{Ratio, sort_largest_first};
-use super::{AnalysisSettings, fixed_order};
+use super::workload::WorkloadBursts;
+use super::{AnalysisSettings, answer, fixed_order};
 use crate::ids::{ClusterId, DagId, to_u32};
-use crate::policy::AssignmentReason;
-use crate::task_set::TaskSet;
+use crate::policy::{AssignmentReason, LendingAttempt, Policy, Preemption};
+use crate::spec::PINS;
+use crate::task_set::{Dag, Subtask, TaskSet};
 use crate::worded::texts;
 
 /// A DAG that gets no cores, and why.
@@ -46,6 +50,9 @@ pub struct NotAssigned {
     pub dag: DagId,
     /// Why it gets none.
     pub reason: AssignmentFailure,
+    /// The DAGs for which the [attempts](LendingAttempt) to lend cores failed; `None` where those
+    /// do not apply.
+    pub attempts: Option<[DagId; LendingAttempt::ALL.len()]>,
 }
 
 texts! {
@@ -54,6 +61,10 @@ texts! {
     pub enum AssignmentFailure {
         /// It states a cluster, and the clusters are not made yet.
         Stated = "it states a cluster, and the commit is to make them; leave its cluster out";
+        /// It states cores of a cluster that is not made yet.
+        Confined =
+            "it states cores of a cluster, and the commit is to make the clusters; leave its affinity \
+             and the cores of its subtasks out";
         /// Its need of cores is not known.
         Unknown(error: TaskError) = "{error}";
         /// A path of it, overheads included, takes longer than a job has, on any number of cores.
@@ -86,9 +97,71 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         if model.states_cluster() {
             return Err(refused(dag, AssignmentFailure::Stated));
         }
+        if model.is_confined() {
+            return Err(refused(dag, AssignmentFailure::Confined));
+        }
         let task = overhead_ns.and_then(|overhead_ns| Task::from_dag(model, overhead_ns));
         tasks.push(task.map_err(|error| refused(dag, AssignmentFailure::Unknown(error)))?);
     }
+    let attempts = match lend_cores(task_set, settings) {
+        None => None,
+        Some(Ok(())) => return Ok(()),
+        Some(Err(failed)) => failed.try_into().ok(),
+    };
+    let federated = federate(task_set, &tasks, settings);
+    federated.map_err(|refused| NotAssigned {
+        attempts,
+        ..refused
+    })
+}
+
+/// Divides the cores as [`lend`](super::lend()) does, if that applies; an error says for which DAG
+/// each attempt failed.
+fn lend_cores(
+    task_set: &mut TaskSet,
+    settings: &AnalysisSettings,
+) -> Option<Result<(), Vec<DagId>>> {
+    let is_plain = |dag: &Dag| {
+        let mut subtasks = dag.subtasks().iter();
+        dag.least_deadline_ns() == dag.relative_deadline_ns()
+            && !subtasks.any(Subtask::is_non_preemptive)
+    };
+    let applies = PINS
+        && settings.policy == Policy::StaticPriority
+        && settings.preemption == Preemption::Enabled
+        && task_set.dags().iter().all(is_plain);
+    if !applies {
+        return None;
+    }
+    let with_moves = AnalysisSettings {
+        overheads: settings.overheads.with_moves(),
+        ..*settings
+    };
+    let overhead_ns = (with_moves.overheads).of_an_instance_ns(settings.preemption)?;
+    let tasks = (task_set.dags().iter()).map(|dag| Task::from_dag(dag, overhead_ns).ok());
+    let tasks: Vec<Task> = tasks.collect::<Option<_>>()?;
+    let tasks: Vec<&Task> = tasks.iter().collect();
+    let bursts = WorkloadBursts::of(task_set.dags().iter(), &with_moves);
+    let LendingAnswer { plan, failed } = lend_amid(&bursts, &tasks, settings.cores)?;
+    let Some(plan) = plan else {
+        let failed = failed.into_iter().map(|dag| DagId(to_u32(dag)));
+        return Some(Err(failed.collect()));
+    };
+    let mut divided = task_set.clone();
+    plan.divide(&mut divided, &tasks);
+    // Priorities that the app states may rank DAGs in another way than by deadline.
+    answer(&divided, settings).is_proven().then(|| {
+        *task_set = divided;
+        Ok(())
+    })
+}
+
+/// Divides the cores by federated scheduling.
+fn federate(
+    task_set: &mut TaskSet,
+    tasks: &[Task],
+    settings: &AnalysisSettings,
+) -> Result<(), NotAssigned> {
     // The cores of each cluster, and where each DAG is.
     let mut sizes = Vec::new();
     let mut of_dags = vec![(ClusterId(0), AssignmentReason::Light); tasks.len()];
@@ -115,7 +188,7 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         let is_enough = |&count: &u32| {
             let fixed = || fixed_order::shorter(task, count).filter(|_| allows);
             multi_path(task, count).is_some_and(|ns| ns <= within_ns)
-                || fixed().is_some_and(|(_, length_ns)| length_ns <= within_ns)
+                || fixed().is_some_and(|schedule| schedule.length_ns() <= within_ns)
         };
         // The least number that proves it, since light DAGs share what is left.
         let Some(count) = (1..=left).find(is_enough) else {
@@ -132,14 +205,18 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         sizes.push(count);
         left -= count;
     }
-    pack(&tasks, light, left, &mut sizes, &mut of_dags)?;
+    pack(tasks, light, left, &mut sizes, &mut of_dags)?;
     task_set.divide(&sizes, &of_dags);
     Ok(())
 }
 
 fn refused(dag: usize, reason: AssignmentFailure) -> NotAssigned {
     let dag = DagId(to_u32(dag));
-    NotAssigned { dag, reason }
+    NotAssigned {
+        dag,
+        reason,
+        attempts: None,
+    }
 }
 
 /// Returns the work of a job, and the time in which one core would have to do it.
@@ -345,7 +422,7 @@ mod tests {
     #[test]
     fn what_gets_no_cores_is_named() {
         let refused = |dags: &[DagSpec], cores| {
-            let NotAssigned { dag, reason } = assigned(dags, cores).unwrap_err();
+            let NotAssigned { dag, reason, .. } = assigned(dags, cores).unwrap_err();
             (dag.0, reason)
         };
         let (heavy, light) = (parallel(&[6, 6, 6, 6], 10), parallel(&[8], 10));

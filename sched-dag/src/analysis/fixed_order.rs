@@ -1,11 +1,12 @@
 //! Precedence that fixes an order of a DAG's subtasks, where that proves a shorter bound.
 //!
-//! Take a schedule of the WCETs on the cores of the DAG's cluster: always the ready subtask with
-//! the longest remaining path first, and none preempted. Add an edge from each subtask to the
-//! next one on its core. Each core's subtasks are then a chain, so the DAG is no wider than the
-//! cores; alone, no ready subtask ever waits, and the response time is at most the length of the
-//! new graph: that of the schedule. Shorter execution times make no difference to that, as
-//! they would to the schedule (R. L. Graham's anomalies, 1969).
+//! Take a schedule of the WCETs on the cores of the DAG's cluster ([`ListSchedule`]): always the
+//! ready subtask with the longest remaining path first, and none preempted. Add an edge from each
+//! subtask to the next one on its core. Each core's subtasks are then a chain, so the DAG is no
+//! wider than the cores; alone, no ready subtask ever waits, and the response time is at most the
+//! length of the new graph: that of the schedule. Where subtasks can be pinned, each is to its core
+//! of the schedule, if the answer is better with that; then it is so among others, too. Shorter execution times make no difference to
+//! that, as they would to the schedule.
 //!
 //! Among others that can be worse: the path is longer, and what interferes with it may come
 //! on one core. So the edges are added where the answer with them is better for the DAG and no
@@ -14,20 +15,18 @@
 //! as the schedule knows none, and an edge would hand an early one on.
 //!
 //! The waits of subtasks are scheduled as if they were executed: a bound of that is one of the DAG.
-//!
-//! An edge goes from an earlier finish to a later start of the schedule, so none closes a cycle.
 
-use alloc::collections::BinaryHeap;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::cmp::Reverse;
 
 use super::judge::answer;
+use super::list_schedule::ListSchedule;
 use super::multi_path::multi_path;
 use super::task::Task;
 use super::{AnalysisResult, AnalysisSettings};
 use crate::ids::{DagId, to_u32};
 use crate::policy::SubtaskOrder;
+use crate::spec::PINS;
 use crate::task_set::{Dag, TaskSet};
 
 /// Fixes the order of each DAG that allows it, where that proves more: a shorter bound of it,
@@ -41,36 +40,47 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &AnalysisSettings) {
     for dag in (0..).map(DagId).take(task_set.dags().len()) {
         let model = task_set.dag(dag);
         let cores = to_u32(task_set.cores_of(model.cluster(), settings.cores).len());
-        let edges = match Task::from_dag(model, overhead_ns) {
+        let schedule = match Task::from_dag(model, overhead_ns) {
             Ok(task) if allows(model) => shorter(&task, cores),
             _ => None,
         };
-        let Some((edges, _)) = edges else {
+        let Some(schedule) = schedule else {
             continue;
         };
-        let mut precedence = task_set.with_edges(dag, &edges);
-        let before = free.take().unwrap_or_else(|| answer(task_set, settings));
-        task_set.exchange(dag, &mut precedence);
-        let after = answer(task_set, settings);
-        // The answer is kept for the next DAG: an analysis of all is the dear part of this loop.
-        if is_better(dag, &after, &before) {
-            free = Some(after);
-        } else {
-            task_set.exchange(dag, &mut precedence);
-            free = Some(before);
+        let mut best = free.take().unwrap_or_else(|| answer(task_set, settings));
+        // On a core of its own each subtask also keeps off what shares the cluster.
+        let pinned = if PINS { schedule.places() } else { Vec::new() };
+        for cores in [&pinned[..], &[]] {
+            let mut order = task_set.ordered(dag, &schedule.edges(), cores);
+            task_set.exchange(dag, &mut order);
+            let after = answer(task_set, settings);
+            if is_better(dag, &after, &best) {
+                best = after;
+                break;
+            }
+            task_set.exchange(dag, &mut order);
+            if !PINS {
+                break;
+            }
         }
+        // The answer is kept for the next DAG: an analysis of all is the dear part of this loop.
+        free = Some(best);
     }
 }
 
 /// Reports whether an order of a DAG's subtasks may be fixed.
 pub(super) fn allows(dag: &Dag) -> bool {
-    dag.order == SubtaskOrder::Fixed && dag.least_deadline_ns() == dag.relative_deadline_ns()
+    let is_free = !dag.is_confined();
+    is_free
+        && dag.order == SubtaskOrder::Fixed
+        && dag.least_deadline_ns() == dag.relative_deadline_ns()
 }
 
-/// Returns the edges of a schedule and its length, if that is below the bound of one job alone.
-pub(super) fn shorter(task: &Task, cores: u32) -> Option<(Vec<(u32, u32)>, u64)> {
-    let bound_ns = multi_path(task, cores)?;
-    Some(schedule(task.oblivious(), cores)).filter(|&(_, length_ns)| length_ns < bound_ns)
+/// Returns a schedule that is shorter than the bound of one job alone.
+pub(super) fn shorter(task: &Task, cores: u32) -> Option<ListSchedule> {
+    let limit_ns = multi_path(task, cores)?.checked_sub(1)?;
+    let count = task.subtask_count().min(cores as usize);
+    ListSchedule::within(task.oblivious(), &vec![limit_ns; count])
 }
 
 /// Compares answers: one DAG is to have a shorter bound, and no other a longer one, nor a sink
@@ -85,48 +95,4 @@ fn is_better(dag: DagId, after: &AnalysisResult, before: &AnalysisResult) -> boo
     };
     let (after, before) = (bounds(after), bounds(before));
     after[dag.index()] < before[dag.index()] && after.iter().zip(&before).all(|(a, b)| a <= b)
-}
-
-/// Schedules the WCETs; returns an edge for each two neighbours on a core, and the length.
-fn schedule(task: &Task, cores: u32) -> (Vec<(u32, u32)>, u64) {
-    let (levels, wcets) = (task.bottom_levels(), task.wcets_ns());
-    let mut missing = task.graph.predecessor_counts();
-    let urgency = |subtask: usize| (levels[subtask], Reverse(subtask));
-    let mut ready: BinaryHeap<_> = task.sources().map(urgency).collect();
-    let cores = usize::try_from(cores)
-        .unwrap_or(usize::MAX)
-        .min(missing.len());
-    let mut last: Vec<Option<usize>> = vec![None; cores];
-    let mut idle: Vec<usize> = (0..cores).rev().collect();
-    // By their finish.
-    let mut running: BinaryHeap<Reverse<(u64, usize, usize)>> = BinaryHeap::new();
-    let mut edges = Vec::new();
-    let mut now = 0;
-    loop {
-        while let Some(core) = idle.last().copied()
-            && let Some((_, Reverse(subtask))) = ready.pop()
-        {
-            idle.pop();
-            if let Some(before) = last[core].replace(subtask) {
-                edges.push((to_u32(before), to_u32(subtask)));
-            }
-            running.push(Reverse((now + wcets[subtask], subtask, core)));
-        }
-        let Some(Reverse((finish, ..))) = running.peek().copied() else {
-            return (edges, now);
-        };
-        now = finish;
-        while let Some(Reverse((finish, subtask, core))) = running.peek().copied()
-            && finish == now
-        {
-            running.pop();
-            idle.push(core);
-            for next in task.successors(subtask) {
-                missing[next] -= 1;
-                if missing[next] == 0 {
-                    ready.push(urgency(next));
-                }
-            }
-        }
-    }
 }

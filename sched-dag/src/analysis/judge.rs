@@ -39,10 +39,6 @@
 //! own or that of another in its equation. The tests for one core, by utilisation and by intra-task
 //! priorities have no term for waits and are not asked, nor is the equation of single sinks.
 //!
-//! A DAG that cannot be analysed, because it lacks a WCET for example, takes
-//! those with it that it may delay, directly or through others. What is left
-//! is analysed without it: whatever it does, it cannot delay these.
-//!
 //! # Bounds for single sinks, where a job's bound is known
 //!
 //! The critical chain of a sink ends with the sink, so it is at most as long as the
@@ -67,23 +63,20 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::case::{AnalysisInput, CaseBounds, are_in_time, dag_id, of_cluster, with_case};
 use super::interference::DelaySources;
-use super::intra_task::{SUBTASK_LIMIT, intra_task};
-use super::one_core::{DagDemand, DueDemand, ResponseEquation, demand};
+use super::pinned::PinnedCluster;
 use super::pipelined::{PipelineTerms, STEP_LIMIT, SolverFailure};
-use super::ranks::{PreemptionMix, RankRelation};
-use super::set::{BoundFailure, EquationSet, EvaluationBudget, constrained};
-use super::task::{Task, TaskError};
+use super::ranks::PreemptionMix;
+use super::set::{BoundFailure, constrained};
+use super::task::Task;
 use super::utilisation::{Ratio, bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
-use super::waiting::Rounding;
-use super::workload::WorkloadBursts;
 use super::{
     AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason, SchedulabilityTest,
-    multi_path,
 };
-use crate::ids::{DagId, SubtaskId, to_u32};
+use crate::ids::{SubtaskId, to_u32};
 use crate::order::sorted_by_key;
-use crate::policy::{Policy, Preemption};
+use crate::policy::Policy;
 use crate::task_set::{Dag, TaskSet};
 
 /// Bounds the response time of every DAG, as far as a test proves it.
@@ -103,10 +96,8 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
     for cluster in task_set.clusters() {
         let own = (0..dags.len()).filter(|&dag| dags[dag].cluster() == cluster);
         let own: Vec<usize> = own.collect();
-        let settings = AnalysisSettings {
-            cores: to_u32(task_set.cores_of(cluster, settings.cores).len()),
-            ..*settings
-        };
+        let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
+        let settings = of_cluster(settings, cores, own.iter().map(|&dag| &dags[dag]));
         let first_failing = &mut answer.first_failing;
         with_case(
             dags,
@@ -128,107 +119,14 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
     answer
 }
 
-/// Makes the case of those DAGs at the positions `own` that can be analysed, and notes why
-/// others of these cannot be. There are no other DAGs on the cores of the settings.
-pub(super) fn with_case(
-    dags: &[Dag],
-    own: &[usize],
-    settings: &AnalysisSettings,
-    reasons: &mut [Option<NotProvenReason>],
-    work: impl FnOnce(&AnalysisInput<'_>, &mut [Option<NotProvenReason>]),
-) {
-    let relation = RankRelation::new(dags, own, settings.policy, settings.preemption);
-    let tasks = analysable(dags, own, &relation, settings, reasons);
-    let can_be = |dag: &usize| reasons[*dag].is_none();
-    let members: Vec<usize> = own.iter().copied().filter(can_be).collect();
-    let tasks: Vec<&Task> = members
-        .iter()
-        .filter_map(|&dag| tasks[dag].as_ref())
-        .collect();
-    let relation = relation.among(&members);
-    let case = AnalysisInput::new(dags, own, (&members, &tasks), relation, settings);
-    work(&case, reasons);
-}
-
-/// The DAGs that can be analysed, and what follows from their attributes.
-pub(super) struct AnalysisInput<'a> {
-    /// All DAGs of the commit.
-    all: &'a [Dag],
-    /// Whether no other DAG is on these cores, one that cannot be analysed either.
-    is_only_one: bool,
-    /// Those of this case; elsewhere a DAG is a position in this list.
-    pub(super) members: &'a [usize],
-    pub(super) tasks: &'a [&'a Task],
-    pub(super) settings: &'a AnalysisSettings,
-    pub(super) relation: RankRelation,
-    /// The most urgent DAG first.
-    order: Vec<usize>,
-    pub(super) set: EquationSet<'a>,
-}
-
-impl<'a> AnalysisInput<'a> {
-    fn new(
-        all: &'a [Dag],
-        own: &[usize],
-        (members, tasks): (&'a [usize], &'a [&'a Task]),
-        relation: RankRelation,
-        settings: &'a AnalysisSettings,
-    ) -> Self {
-        let order = sorted_by_key(members.len(), |dag| match settings.policy {
-            Policy::StaticPriority => u64::from(relation.ranks(dag)[0].0),
-            Policy::Edf => tasks[dag].relative_deadline_ns(),
-        });
-        let mut case = Self {
-            all,
-            is_only_one: own.len() == 1,
-            members,
-            tasks,
-            settings,
-            relation,
-            order,
-            set: EquationSet::new(tasks, settings.cores),
-        };
-        case.set.bursts = WorkloadBursts::of(own.iter().map(|&dag| &all[dag]), settings);
-        case.complete();
-        case
-    }
-
-    pub(super) fn dag(&self, dag: usize) -> &'a Dag {
-        &self.all[self.members[dag]]
-    }
-
-    pub(super) fn id(&self, dag: usize) -> DagId {
-        dag_id(self.members[dag])
-    }
-
+impl AnalysisInput<'_> {
     /// Answers for the jobs of the DAGs of this case, by their positions in it; names
     /// them by their positions in the commit.
     pub(super) fn verdict(&self) -> AnalysisResult {
-        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
-        let solution = self.set.solve(&self.order, may_outrank);
-        let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
-            .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
-            .collect();
-        let demand = || are_in_time(self).then_some(SchedulabilityTest::Demand);
-        // Tests that vouch for the whole set, but give no response times, are asked last: their
-        // bound is the deadline.
-        if bounds.iter().any(Option::is_none)
-            && let Some(test) = self.vouching_test().or_else(demand)
-        {
-            for (bound, task) in bounds.iter_mut().zip(self.tasks) {
-                bound.get_or_insert(DagBound {
-                    bound_ns: task.relative_deadline_ns(),
-                    test,
-                });
-            }
-        }
-        let mut reasons: Vec<Option<NotProvenReason>> = (bounds.iter().enumerate())
-            .map(|(dag, bound)| match bound {
-                Some(_) => None,
-                None => solution.failures[dag].map(|failure| self.reason(dag, failure)),
-            })
-            .collect();
-        let mut first = solution.first_failing.map(|(dag, _)| dag);
+        let (bounds, mut reasons, mut first) = match self.is_pinned() {
+            true => PinnedCluster::of(self).bounds(self),
+            false => self.solved(),
+        };
         if reasons.iter().any(Option::is_some) {
             for (dag, reason) in self.certain().into_iter().rev() {
                 if bounds[dag].is_none() {
@@ -250,57 +148,33 @@ impl<'a> AnalysisInput<'a> {
         }
     }
 
-    /// Reports whether a DAG has all cores whenever it needs them.
-    fn is_alone(&self, dag: usize) -> bool {
-        let blocked = self.relation.preemption != PreemptionMix::All && !self.is_only_one;
-        let mut others = 0..self.members.len();
-        !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
-    }
-
-    /// Bounds the response time of a DAG by its subtasks' priorities, if nothing can delay it
-    /// and that is the shortest bound.
-    fn by_priorities(&self, dag: usize) -> Option<u64> {
-        let (task, cores) = (self.tasks[dag], self.settings.cores);
-        let subtasks = self.dag(dag).subtasks();
-        if self.set.waits_enter(dag)
-            || self.relation.preemption != PreemptionMix::All
-            || self.settings.policy != Policy::StaticPriority
-            || subtasks.len() > SUBTASK_LIMIT
-            || !self.is_alone(dag)
+    /// Solves the equations of the set, and asks what vouches for what they leave open.
+    fn solved(&self) -> CaseBounds {
+        let may_outrank = |other, dag| self.relation.may_outrank(other, dag);
+        let solution = self.set.solve(&self.order, may_outrank);
+        let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
+            .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
+            .collect();
+        let demand = || are_in_time(self).then_some(SchedulabilityTest::Demand);
+        // Tests that vouch for the whole set, but give no response times, are asked last: their
+        // bound is the deadline.
+        if bounds.iter().any(Option::is_none)
+            && let Some(test) = self.vouching_test().or_else(demand)
         {
-            return None;
-        }
-        let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
-        let others = multi_path::alone(task, &self.set.shapes[dag].left, cores, Rounding::Up)?;
-        let limit = task.relative_deadline_ns().min(task.period_ns());
-        let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
-        // Long steps of the scheduler are in no equation of this test, so they are added to it.
-        let bound = bound.and_then(|bound_ns| self.set.bursts.after(bound_ns));
-        bound.filter(|&bound_ns| bound_ns <= limit)
-    }
-
-    /// Tells the equations what follows from the attributes.
-    fn complete(&mut self) {
-        self.set.keep_cores = self.relation.preemption == PreemptionMix::None;
-        self.set.deadlines_limit = self.settings.policy == Policy::Edf
-            && self.relation.preemption != PreemptionMix::Some
-            && constrained(self.tasks, self.settings.cores);
-        for (dag, figures) in self.set.figures.iter_mut().enumerate() {
-            figures.younger_may_win = self.relation.younger_may_win(dag);
-            figures.allow_in_flight(self.all[self.members[dag]].in_flight());
-        }
-        if self.set.has_waits() {
-            let tasks = self.tasks;
-            let with_waits = self.relation.closure(&|dag| tasks[dag].has_waits());
-            self.set.forbid_overlap(with_waits);
-        }
-        self.set.known = match (self.settings.cores, self.settings.policy) {
-            (1, Policy::StaticPriority) => responses(self),
-            _ => {
-                let dags = 0..self.members.len();
-                dags.map(|dag| self.by_priorities(dag)).collect()
+            for (bound, task) in bounds.iter_mut().zip(self.tasks) {
+                bound.get_or_insert(DagBound {
+                    bound_ns: task.relative_deadline_ns(),
+                    test,
+                });
             }
-        };
+        }
+        let reasons = (bounds.iter().enumerate()).map(|(dag, bound)| match bound {
+            Some(_) => None,
+            None => solution.failures[dag].map(|failure| self.reason(dag, failure)),
+        });
+        let reasons = reasons.collect();
+        let first = solution.first_failing.map(|(dag, _)| dag);
+        (bounds, reasons, first)
     }
 
     /// Names the test behind a response time of the set's equations.
@@ -434,51 +308,6 @@ impl<'a> AnalysisInput<'a> {
     }
 }
 
-fn dag_id(dag: usize) -> DagId {
-    // A task set cannot have more DAGs than ids; this only spells it out.
-    DagId(u32::try_from(dag).unwrap_or(u32::MAX))
-}
-
-/// Returns the DAGs at the positions `own` as the analysis sees them, and notes for each that
-/// cannot be analysed the reason: its own, or that it may have to wait for such a one.
-fn analysable(
-    dags: &[Dag],
-    own: &[usize],
-    relation: &RankRelation,
-    settings: &AnalysisSettings,
-    reasons: &mut [Option<NotProvenReason>],
-) -> Vec<Option<Task>> {
-    let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
-    let mut tasks: Vec<Option<Task>> = dags.iter().map(|_| None).collect();
-    for &dag in own {
-        let task = overhead
-            .ok_or(TaskError::VolumeOverflow)
-            .and_then(|overhead_ns| Task::from_dag(&dags[dag], overhead_ns));
-        reasons[dag] = match &task {
-            _ if settings.cores == 0 => Some(NotProvenReason::NoCores),
-            Ok(_) => None,
-            Err(error) => Some(NotProvenReason::Unknown(*error)),
-        };
-        tasks[dag] = task.ok();
-    }
-    let (mut known, mut unknown): (Vec<usize>, Vec<usize>) =
-        own.iter().partition(|&&dag| reasons[dag].is_none());
-    let mut seen = 0;
-    // Until nothing more follows: what is delayed by an unknown DAG is unknown, too.
-    while let Some(&other) = unknown.get(seen) {
-        seen += 1;
-        known.retain(|&dag| {
-            let is_delayed = relation.may_delay(other, dag);
-            if is_delayed {
-                reasons[dag] = Some(NotProvenReason::DelayedBy { dag: dag_id(other) });
-                unknown.push(dag);
-            }
-            !is_delayed
-        });
-    }
-    tasks
-}
-
 /// Returns the first DAG at the positions `among` that cannot be analysed for a reason of its own.
 fn first_unknown(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option<NotProven> {
     let own = |reason: &NotProvenReason| !matches!(reason, NotProvenReason::DelayedBy { .. });
@@ -488,87 +317,6 @@ fn first_unknown(among: &[usize], reasons: &[Option<NotProvenReason>]) -> Option
         Some(NotProven { dag, reason })
     });
     unknown.next()
-}
-
-/// Returns the DAGs of a case as their response times on one core need them.
-pub(super) fn loads(case: &AnalysisInput<'_>) -> Vec<DagDemand> {
-    let loads = case.tasks.iter().enumerate().map(|(dag, task)| DagDemand {
-        volume_ns: task.volume_ns(),
-        period_ns: task.period_ns(),
-        limit_ns: case.set.figures[dag].limit_ns(),
-        priorities: case.relation.ranks(dag),
-        keeps_ns: dues(case, dag)
-            .iter()
-            .map(|due| due.keeps_ns)
-            .max()
-            .unwrap_or(0),
-    });
-    loads.collect()
-}
-
-/// Bounds the response times of DAGs that something may delay, where all that may delay them
-/// keep their own.
-fn responses(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
-    let loads = loads(case);
-    let (loads, bursts) = (&loads, &case.set.bursts);
-    let (mut steps, mut found) = (EvaluationBudget::of(loads.len()), vec![None; loads.len()]);
-    for &dag in &case.order {
-        found[dag] = steps.spend(dag, |steps| {
-            ResponseEquation::of(loads, bursts, dag).solve(steps)
-        });
-    }
-    let known = (0..loads.len()).map(|dag| {
-        if case.set.waits_enter(dag) {
-            return None;
-        }
-        let others = ResponseEquation::of(loads, bursts, dag).others;
-        let are_known = others.iter().all(|&other| found[other].is_some());
-        found[dag].filter(|_| are_known && !case.is_alone(dag))
-    });
-    known.collect()
-}
-
-/// Reports whether each subtask is finished by its deadline, under EDF.
-pub(super) fn are_in_time(case: &AnalysisInput<'_>) -> bool {
-    let fit =
-        |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
-    let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
-    applies
-        && !case.set.has_waits()
-        && (0..case.tasks.len()).all(fit)
-        && demand(&all_dues(case), &case.set.bursts).is_some()
-}
-
-/// Returns the demands of all DAGs.
-pub(super) fn all_dues(case: &AnalysisInput<'_>) -> Vec<DueDemand> {
-    (0..case.tasks.len())
-        .flat_map(|dag| dues(case, dag))
-        .collect()
-}
-
-/// Returns the demands of a DAG, by deadlines.
-fn dues(case: &AnalysisInput<'_>, dag: usize) -> Vec<DueDemand> {
-    let (task, subtasks) = (case.tasks[dag], case.dag(dag).subtasks());
-    let mut dues: Vec<DueDemand> = Vec::new();
-    for (subtask, &wcet_ns) in subtasks.iter().zip(task.wcets_ns()) {
-        let deadline_ns = subtask.relative_deadline_ns();
-        let known = dues.iter().position(|due| due.deadline_ns == deadline_ns);
-        let place = known.unwrap_or(dues.len());
-        if known.is_none() {
-            dues.push(DueDemand {
-                deadline_ns,
-                period_ns: task.period_ns(),
-                volume_ns: 0,
-                keeps_ns: 0,
-            });
-        }
-        let due = &mut dues[place];
-        due.volume_ns += wcet_ns;
-        if subtask.is_non_preemptive() || case.settings.preemption == Preemption::Disabled {
-            due.keeps_ns = due.keeps_ns.max(wcet_ns);
-        }
-    }
-    dues
 }
 
 /// The path to a sink, and what of its own job may delay it.
@@ -583,10 +331,13 @@ fn bound(case: &AnalysisInput<'_>, verdict: &mut AnalysisResult, bounds: &mut [V
     let whole_ns = verdict.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let responses: Vec<Option<u64>> = whole_ns.collect();
     let is_met = case.relation.ranks_sinks && are_in_time(case);
+    let pinned = case.is_pinned().then(|| PinnedCluster::of(case));
     for (dag, &number) in case.members.iter().enumerate() {
         let solved = equations(case, dag, &responses).map(|(sink, equation)| {
             let solved = equation
                 .and_then(|(figures, delays)| figures.solve(&delays, 0, &mut { STEP_LIMIT }).ok());
+            let pinned = || pinned.as_ref()?.finish_ns(case, dag, sink);
+            let solved = solved.or_else(pinned);
             let deadline_ns = case.dag(dag).subtask(sink).relative_deadline_ns();
             solved.or(is_met.then_some(deadline_ns))
         });
@@ -630,7 +381,7 @@ pub(super) fn equations<'a>(
     let sinks = model.sinks().iter().zip(reaches);
     sinks.map(move |(&sink, reach)| {
         let equation = || {
-            if set.waits_enter(dag) {
+            if case.is_pinned() || set.waits_enter(dag) {
                 return None;
             }
             let deadline_ns = model.subtask(sink).relative_deadline_ns();
@@ -647,15 +398,9 @@ pub(super) fn equations<'a>(
 
 /// Returns the longest path to each sink, in their order.
 fn lengths_ns(task: &Task, model: &Dag) -> Vec<u64> {
-    let mut lengths_ns: Vec<u64> = task.wcets_ns().to_vec();
-    for subtask in task.topological_order() {
-        for next in task.successors(subtask) {
-            let through_ns = lengths_ns[subtask] + task.wcets_ns()[next];
-            lengths_ns[next] = lengths_ns[next].max(through_ns);
-        }
-    }
+    let finishes_ns = task.finishes_ns();
     let sinks = model.sinks().iter();
-    sinks.map(|sink| lengths_ns[sink.index()]).collect()
+    sinks.map(|sink| finishes_ns[sink.index()]).collect()
 }
 
 /// Completes the bounds of a DAG's sinks by that of its jobs, and returns the first sink

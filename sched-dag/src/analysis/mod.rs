@@ -21,9 +21,11 @@
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `utilisation` | utilisation tests | Li 2014; Bonifaci 2013 |
 //! | `ranks` | which DAG may delay which | |
-//! | `judge`, `overheads` | the verdict at commit, also for sinks with deadlines of their own | |
+//! | `case`, `overheads` | the DAGs of a cluster that can be analysed, with what they are charged | |
+//! | `judge` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
-//! | `fixed_order` | orders that the commit fixes | Graham 1969 |
+//! | `list_schedule`, `fixed_order` | orders that the commit fixes | Graham 1969 |
+//! | `lending`, `lent_cores`, `pinned` | heavy DAGs that lend what their orders leave | derived here |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -61,17 +63,22 @@
 //!   cluster is analysed by itself.
 //! - The form of overlapping jobs rests on the argument given in its module and on that
 //!   evidence, not on a reviewed proof. The multi-path bound is proven in
-//!   `docs/multi-path-bound.md`.
+//!   `docs/multi-path-bound.md`, waits and lent cores in `docs/analysis.md`.
 
 mod assign;
+mod case;
 mod cover;
 mod fixed_order;
 mod interference;
 mod intra_task;
 mod judge;
+mod lending;
+mod lent_cores;
+mod list_schedule;
 mod multi_path;
 mod one_core;
 mod overheads;
+mod pinned;
 mod pipelined;
 mod ranks;
 mod set;
@@ -96,6 +103,9 @@ pub use fixed_order::fix_orders;
 pub use interference::InterferenceBound;
 pub use intra_task::{PATH_LIMIT, SUBTASK_LIMIT, intra_task};
 pub use judge::answer;
+pub use lending::{CoreOwner, LendingAnswer, LendingPlan, LentGroup, lend};
+pub use lent_cores::CoreSupply;
+pub use list_schedule::{ListSchedule, ScheduledSubtask};
 pub use multi_path::multi_path;
 pub use overheads::{OverheadSource, Overheads};
 pub use set::{multi_path_edf, multi_path_fp};
@@ -166,6 +176,10 @@ texts! {
         OneCore = "response times on one core (Joseph and Pandya 1986)";
         /// Processor demand of one core under EDF; the bound is the deadline itself.
         Demand = "processor demand of one core (Baruah et al. 1990)";
+        /// The longest path in the order that pins and edges fix: nothing else can delay it.
+        Owner = "an order of its own on each core";
+        /// The rest of cores that owners lend, under fixed priorities.
+        Member = "what owners leave of its cores";
         /// Capacity augmentation for EDF or RM; the bound is the deadline itself.
         Capacity = "capacity augmentation (Li et al. 2014)";
         /// Speed-up tests for EDF or DM; the bound is the deadline itself.
@@ -234,6 +248,16 @@ texts! {
         NoBoundByPeriod =
             "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \
              by the period; add cores, raise its priority or lengthen the period";
+        /// A subtask is pinned to a core, and not as an owner's are.
+        Pinned { subtask: SubtaskId } =
+            "subtask {} is pinned to a core, and the test for that needs cores that no other DAG is \
+             pinned to, all subtasks of the DAG pinned, and an edge from each to the next one on \
+             its core; see to these, or leave the cores out", subtask.0;
+        /// It shares a cluster with pinned subtasks, on terms that their test does not cover.
+        BesidePinned =
+            "subtasks of its cluster are pinned, and the test for that needs deadlines within periods, \
+             preemption, no waits, and in each group of DAGs static priorities that rank whole DAGs; \
+             see to these, or leave the cores out";
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

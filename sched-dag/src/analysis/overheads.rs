@@ -8,7 +8,8 @@
 //! - if instances can be preempted, one inter-processor interrupt: an instance
 //!   preempts at most one other, when it becomes ready, so the one that
 //!   preempts is charged. The switches back to the preempted instance are the
-//!   preempting one's second switch.
+//!   preempting one's second switch. Where subtasks are pinned, an instance may in addition
+//!   [move](Overheads::of_a_move_ns) one other, and pays for that, too.
 //!
 //! These are of a step in which few instances become ready. For each one that does, `ready` is
 //! what it adds to a step, whatever is then delayed: `workload` has that term of the bounds.
@@ -89,6 +90,26 @@ impl Overheads {
         match preemption {
             Preemption::Enabled => always.checked_add(self.interrupt_ns),
             Preemption::Disabled => Some(always),
+        }
+    }
+
+    /// Returns what each instance is charged besides where subtasks are pinned: one that preempts
+    /// there may move another one to a core of its group, which preempts a third one.
+    #[must_use]
+    pub fn of_a_move_ns(&self, preemption: Preemption) -> u64 {
+        let switches = self.context_switch_ns.saturating_mul(2);
+        match preemption {
+            Preemption::Enabled => switches.saturating_add(self.interrupt_ns),
+            Preemption::Disabled => 0,
+        }
+    }
+
+    /// Returns them where subtasks are pinned.
+    pub(super) fn with_moves(self) -> Self {
+        let move_ns = self.of_a_move_ns(Preemption::Enabled);
+        Self {
+            interrupt_ns: self.interrupt_ns.saturating_add(move_ns),
+            ..self
         }
     }
 }

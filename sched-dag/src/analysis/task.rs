@@ -321,6 +321,19 @@ impl Task {
         self.graph.levels(&self.wcets_ns)
     }
 
+    /// Returns the longest path to each subtask with it: when it finishes after the release, in
+    /// nanoseconds, if it takes its WCET and no subtask waits for a core.
+    pub(super) fn finishes_ns(&self) -> Vec<u64> {
+        let mut finishes_ns = self.wcets_ns().to_vec();
+        for subtask in self.topological_order() {
+            for next in self.successors(subtask) {
+                let through_ns = finishes_ns[subtask] + self.wcets_ns()[next];
+                finishes_ns[next] = finishes_ns[next].max(through_ns);
+            }
+        }
+        finishes_ns
+    }
+
     /// Returns a longest path for the given weights; ties go to the smallest
     /// position.
     ///

@@ -13,6 +13,8 @@
 //! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
 //! edge FROM TO
 //! wait SUBTASK WCET LIMIT WCET ..             of segments and waits, likewise
+//! pin SUBTASK CORE                            of the cluster, counted from 0
+//! affinity CORE..                             of those that are not pinned; without it all
 //! due SUBTASK DEADLINE                        of a sink that is due before its job
 //! hash FNV_1A                                 of all above
 //!
@@ -38,6 +40,11 @@
 //! demand BUSY TIME..                          before all bounds, if it proves some
 //! bound DAG R demand
 //!
+//! bound DAG R owner FINISH..                  by subtask, from the release on
+//! bound DAG R sequence OWNED                  of a member, on one core
+//! bound DAG R lent CHAINS CLIPPED LEFT OWNED  of a member, on several; OWNED: by their owners
+//! chain SUBTASK.. / other DAG R WORK          as above
+//!
 //! bound DAG R priorities CORES
 //! path SUBTASK..                              each path of the DAG
 //!
@@ -49,15 +56,19 @@
 //! `cover` lines show that a DAG is no wider than there are of them; without any it may use
 //! all cores. `part` lines are disjoint chains, for the clipped form.
 
+use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{self, Write};
 
+use super::case::{AnalysisInput, all_dues, are_in_time, loads, of_cluster, with_case};
 use super::cover::{CoverChain, covering, heaviest, peel};
 use super::interference::{DelaySources, InterferingDag};
 use super::intra_task::each_path;
-use super::judge::{self, AnalysisInput, with_case};
+use super::judge;
+use super::lent_cores::LentForm;
 use super::one_core::{ResponseEquation, demand};
+use super::pinned::PinnedCluster;
 use super::pipelined::{PipelineTerms, STEP_LIMIT};
 use super::waiting::reserved;
 use super::workload::WorkloadBursts;
@@ -75,8 +86,9 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
         let cores = to_u32(task_set.cores_of(cluster, settings.cores).len());
         let place = task_set.is_divided().then_some(cluster);
         let place = place.map(|cluster| (cluster.0, task_set.clusters().count()));
-        let settings = AnalysisSettings { cores, ..*settings };
-        whole(&task_set.part(cluster), place, &settings)
+        let dags = task_set.part(cluster);
+        let settings = of_cluster(settings, cores, dags.iter());
+        whole(&dags, place, &settings)
     });
     parts.collect()
 }
@@ -95,9 +107,9 @@ fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &AnalysisSettings)
         let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
         let responses: Vec<Option<u64>> = responses.collect();
         let by_demand = |bound: &DagBound| bound.test == SchedulabilityTest::Demand;
-        let is_asked = case.relation.ranks_sinks && judge::are_in_time(case);
+        let is_asked = case.relation.ranks_sinks && are_in_time(case);
         if (is_asked || bounds.iter().flatten().any(by_demand))
-            && let Some((busy, times)) = demand(&judge::all_dues(case), &case.set.bursts)
+            && let Some((busy, times)) = demand(&all_dues(case), &case.set.bursts)
         {
             let numbers = core::iter::once(busy).chain(times);
             text.list("demand", numbers.map(u128::cast_signed));
@@ -191,6 +203,15 @@ impl WitnessText {
             for (id, subtask) in dag.subtasks().iter().enumerate() {
                 self.waits(id, subtask);
             }
+            for (id, subtask) in dag.subtasks().iter().enumerate() {
+                if let Some(core) = subtask.core() {
+                    self.line(format_args!("pin {id} {core}"));
+                }
+            }
+            if !dag.affinity().is_empty() {
+                let cores = dag.affinity().iter().map(|&core| core.into());
+                self.list("affinity", cores);
+            }
             for &sink in dag.sinks() {
                 let deadline_ns = dag.subtask(sink).relative_deadline_ns();
                 if deadline_ns < dag.relative_deadline_ns() {
@@ -253,6 +274,8 @@ impl WitnessText {
             SchedulabilityTest::Demand => self.line(format_args!("bound {id} {bound_ns} demand")),
             SchedulabilityTest::OneCore => self.response(case, dag, bound_ns),
             SchedulabilityTest::IntraTask => self.priorities(case, dag, bound_ns),
+            SchedulabilityTest::Owner => self.owner(case, dag, bound_ns),
+            SchedulabilityTest::Member => self.member(case, dag, bound_ns, responses),
             _ => {
                 let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
                 let Ok(delays) = case.set.delays_of_job(dag, responses, may_outrank) else {
@@ -377,7 +400,7 @@ impl WitnessText {
     }
 
     fn response(&mut self, case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) {
-        let (id, loads) = (case.members[dag], judge::loads(case));
+        let (id, loads) = (case.members[dag], loads(case));
         let response = ResponseEquation::of(&loads, &case.set.bursts, dag);
         let blocked = response.blocking;
         self.line(format_args!("bound {id} {bound_ns} response {blocked}"));
@@ -385,6 +408,59 @@ impl WitnessText {
         for (back, window) in (0..).zip(windows) {
             let own = response.own_work(back, window);
             self.line(format_args!("window {window} {own}"));
+        }
+    }
+
+    fn owner(&mut self, case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) {
+        let id = case.members[dag];
+        let finishes_ns = case.tasks[dag].finishes_ns();
+        let finishes = finishes_ns.iter().map(|&ns| i128::from(ns));
+        self.list(&format!("bound {id} {bound_ns} owner"), finishes);
+        let cluster = PinnedCluster::of(case);
+        for &sink in case.dag(dag).sinks() {
+            if let Some(finish_ns) = cluster.finish_ns(case, dag, sink)
+                && finish_ns < bound_ns
+            {
+                self.line(format_args!("sink {id} {} {finish_ns} 0", sink.0));
+            }
+        }
+    }
+
+    fn member(
+        &mut self,
+        case: &AnalysisInput<'_>,
+        dag: usize,
+        bound_ns: u64,
+        responses: &[Option<u64>],
+    ) {
+        let (id, task) = (case.members[dag], case.tasks[dag]);
+        let cluster = PinnedCluster::of(case);
+        let Ok(terms) = cluster.terms(case, dag, responses) else {
+            return;
+        };
+        if let [core] = terms.cores[..] {
+            let owned = core.busy_ns(bound_ns);
+            return self.line(format_args!("bound {id} {bound_ns} sequence {owned}"));
+        }
+        let waiting = u128::from(bound_ns - task.length_ns());
+        let above = terms.above();
+        let mut forms = terms.own.forms(&terms.cores, &above, bound_ns);
+        let all = |form: &LentForm| form.works.iter().map(|work| work.value).sum::<u128>();
+        let Some(form) = forms.find(|form| all(form) <= form.free as u128 * waiting) else {
+            return;
+        };
+        let (chains, clipped) = (terms.cores.len() + 1 - form.free, u8::from(form.is_clipped));
+        let [left, owned, others @ ..] = &form.works[..] else {
+            return;
+        };
+        let (left, owned) = (left.value, owned.value);
+        self.line(format_args!(
+            "bound {id} {bound_ns} lent {chains} {clipped} {left} {owned}"
+        ));
+        self.chains("chain", &covering(task, terms.own.covers.len(), chains));
+        for ((other, _, response_ns), work) in terms.above.iter().zip(others) {
+            let id = case.members[*other];
+            self.line(format_args!("other {id} {response_ns} {}", work.value));
         }
     }
 

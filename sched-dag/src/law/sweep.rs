@@ -1,8 +1,10 @@
 //! R5: did the right instances run?
 //!
 //! At every instant the rule says which instances *should* run: with m cores, those
-//! that have started and keep their core, and of all others that are eligible those
-//! with the smallest keys, until m are reached. An eligible instance that should run
+//! that have started and keep their core; on each other core for which pinned ones are
+//! eligible, of these the one with the smallest key; and of all others that are eligible
+//! those with the smallest keys, until m are reached. Where DAGs have affinities, the last
+//! holds for each group of cores by itself, and for the instances of its DAGs. An eligible instance that should run
 //! and does not is *owed* a core. In virtual time that never lasts. On a machine it is
 //! never 0: the scheduler is told, decides, and interrupts a core. So it is a breach
 //! only if it lasts for longer than a stated *bound*. The blame is what was the case
@@ -10,7 +12,7 @@
 //!
 //! Besides, at the start of an instance that will keep its core: those of higher
 //! priority that have been waiting for longer than the bound must have idle cores to
-//! go to. Without that, a wrong choice would show no longer than it takes to make. Where times
+//! go to, and none of them may be pinned to its core. Without that, a wrong choice would show no longer than it takes to make. Where times
 //! are exact, so must those that wait since an earlier event, be it of the same instant.
 //!
 //! A sweep takes changes one after the other and keeps only what waits and what
@@ -25,7 +27,7 @@ use core::ops::Range;
 
 use crate::ids::{CoreId, DagId, Instance};
 use crate::policy::{Policy, Preemption, SchedulerOptions};
-use crate::spec::WAITS;
+use crate::spec::{PINS, WAITS};
 use crate::task_set::TaskSet;
 
 /// The key of R5: the smaller one goes first. No two instances have the same.
@@ -36,11 +38,22 @@ pub(super) struct DispatchModel<'a> {
     pub(super) task_set: &'a TaskSet,
     pub(super) options: &'a SchedulerOptions,
     pub(super) cores: Range<u32>,
+    /// The affinities of its DAGs, each once.
+    pub(super) groups: Vec<&'a [u32]>,
     /// When sporadic jobs were due.
     pub(super) due_ns: BTreeMap<(DagId, u64), u64>,
 }
 
-impl DispatchModel<'_> {
+/// The cores that may execute an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place<'a> {
+    /// The one that it is pinned to.
+    Core(CoreId),
+    /// Those of its DAG's affinity.
+    Group(&'a [u32]),
+}
+
+impl<'a> DispatchModel<'a> {
     /// Returns an instance's place in the order of dispatch. Static priority: (priority, DAG,
     /// job, subtask). EDF: the deadline instead, that of the most urgent sink that the subtask
     /// reaches.
@@ -58,6 +71,21 @@ impl DispatchModel<'_> {
             }
         };
         (urgency, instance)
+    }
+
+    /// Returns the cores that may execute an instance.
+    pub(super) fn place(&self, instance: Instance) -> Place<'a> {
+        let dag = self.task_set.dag(instance.dag);
+        match dag.subtask(instance.subtask).core() {
+            Some(core) => Place::Core(CoreId(self.cores.start + core)),
+            None => Place::Group(dag.affinity()),
+        }
+    }
+
+    /// Reports whether a core is one of an affinity.
+    pub(super) fn is_of(&self, group: &[u32], core: CoreId) -> bool {
+        let number = core.0.checked_sub(self.cores.start);
+        group.is_empty() || number.is_some_and(|number| group.contains(&number))
     }
 
     /// Reports whether a started instance keeps its core until it finishes.
@@ -147,8 +175,8 @@ pub(super) struct DispatchSweep<'m> {
     model: &'m DispatchModel<'m>,
     bound_ns: u64,
     now_ns: u64,
-    /// How many cores there are of which it is known what they do.
-    pub(super) known_cores: usize,
+    /// The cores of which it is known what they do.
+    pub(super) known_cores: BTreeSet<CoreId>,
     /// How many events there were.
     events: u64,
     /// Since when each waits, and since which event.
@@ -177,7 +205,7 @@ impl<'m> DispatchSweep<'m> {
             model,
             bound_ns,
             now_ns,
-            known_cores: 0,
+            known_cores: BTreeSet::new(),
             events: 0,
             waiting: BTreeMap::new(),
             running: BTreeMap::new(),
@@ -256,27 +284,27 @@ impl<'m> DispatchSweep<'m> {
     /// Judges what is the case from now until then.
     fn settle(&mut self, until_ns: u64) {
         // A core that has not been seen yet may not be there: only seen ones count.
-        let idle = self.known_cores.saturating_sub(self.running.len());
+        let claims = self.claims();
         for place in 0..self.started.len() {
-            let wrong = self.out_of_turn(self.started[place], idle);
+            let wrong = self.out_of_turn(self.started[place], &claims);
             self.wrong.extend(wrong);
         }
-        let should_run = self.should_run();
-        let past = |key: &Key| !should_run.contains(key);
+        let should_run = self.should_run(&claims);
+        let past = |key: &Key| should_run.iter().all(|(owed, _)| owed != key);
         let over: Vec<Key> = self.owed.keys().copied().filter(past).collect();
         for key in over {
             if let Some(owed) = self.owed.remove(&key) {
                 self.close(key, &owed);
             }
         }
-        for (rank, key) in should_run.iter().enumerate() {
+        for &(ref key, has_idle_core) in &should_run {
             let since_ns = self.owed.get(key).map_or(self.now_ns, |owed| owed.since_ns);
             // The first look beyond the bound decides; finding a culprit costs a walk over all
             // cores.
             let has_blame = self.owed.get(key).is_some_and(|owed| owed.blame.is_some());
             let exceeds = since_ns.saturating_add(self.bound_ns) < until_ns;
-            let blame = (exceeds && !has_blame).then(|| self.blame(rank < idle));
-            let finds_idle_core = rank < idle && self.fresh.contains(key);
+            let blame = (exceeds && !has_blame).then(|| self.blame(*key, has_idle_core, &claims));
+            let finds_idle_core = has_idle_core && self.fresh.contains(key);
             let owed = self.owed.entry(*key).or_insert(OwedDispatch {
                 since_ns,
                 finds_idle_core,
@@ -288,48 +316,110 @@ impl<'m> DispatchSweep<'m> {
         self.started.clear();
     }
 
-    /// Returns the waiting instances that should run, in the order of keys.
-    fn should_run(&self) -> Vec<Key> {
-        let (mut free, mut owed) = (self.known_cores, Vec::new());
-        let mut movable = Vec::new();
-        for key in self.running.keys() {
-            // It has its core whatever waits, so the others share those that are left.
-            if self.model.keeps_its_core(key.1) {
-                free = free.saturating_sub(1);
-            } else {
-                movable.push(*key);
+    fn is_idle(&self, core: &CoreId) -> bool {
+        self.running.values().all(|busy| busy != core)
+    }
+
+    /// Returns how many of these cores are of a group.
+    fn count<'c>(&self, group: &[u32], cores: impl Iterator<Item = &'c CoreId>) -> usize {
+        cores.filter(|core| self.model.is_of(group, **core)).count()
+    }
+
+    /// Returns how many cores of a group are idle and not claimed.
+    fn idle(&self, group: &[u32], claims: &BTreeMap<CoreId, Key>) -> usize {
+        let claimed = claims.keys().filter(|core| self.is_idle(core));
+        let taken = self.count(group, self.running.values().chain(claimed));
+        (self.count(group, self.known_cores.iter())).saturating_sub(taken)
+    }
+
+    /// Returns the pinned instance that should run on each core for which one is eligible, and that
+    /// no instance keeps.
+    fn claims(&self) -> BTreeMap<CoreId, Key> {
+        let mut claims = BTreeMap::new();
+        if !PINS {
+            return claims;
+        }
+        for key in self.waiting.keys().chain(self.running.keys()) {
+            if let Place::Core(core) = self.model.place(key.1)
+                && self.known_cores.contains(&core)
+            {
+                let first = claims.entry(core).or_insert(*key);
+                *first = (*first).min(*key);
             }
         }
-        let mut movable = movable.into_iter().peekable();
-        let mut waiting = self.waiting.keys().copied().peekable();
-        for _ in 0..free {
+        let kept = (self.running.iter()).filter(|(key, _)| self.model.keeps_its_core(key.1));
+        for (_, core) in kept {
+            claims.remove(core);
+        }
+        claims
+    }
+
+    /// Returns the waiting instances that should run, and whether a core is idle for each: the
+    /// pinned ones, and then, group by group in the order of keys, the others.
+    fn should_run(&self, claims: &BTreeMap<CoreId, Key>) -> Vec<(Key, bool)> {
+        let claimed = claims.iter();
+        let claimed = claimed.filter(|(_, key)| self.waiting.contains_key(key));
+        let mut owed: Vec<_> = claimed
+            .map(|(core, key)| (*key, self.is_idle(core)))
+            .collect();
+        for group in &self.model.groups {
+            self.add_owed(group, claims, &mut owed);
+        }
+        owed
+    }
+
+    /// Adds those of a group.
+    fn add_owed(&self, group: &[u32], claims: &BTreeMap<CoreId, Key>, owed: &mut Vec<(Key, bool)>) {
+        let is_of_it = |key: &Key| self.model.place(key.1) == Place::Group(group);
+        let kept = (self.running.iter()).filter(|(key, _)| self.model.keeps_its_core(key.1));
+        // It has its core whatever waits, so the others share those that are left.
+        let taken = self.count(group, claims.keys().chain(kept.map(|(_, core)| core)));
+        let free = self.count(group, self.known_cores.iter());
+        let movable = self.running.keys().filter(|key| is_of_it(key));
+        let mut movable = movable
+            .filter(|key| !self.model.keeps_its_core(key.1))
+            .peekable();
+        let mut waiting = self.waiting.keys().filter(|key| is_of_it(key)).peekable();
+        let mut idle = self.idle(group, claims);
+        for _ in taken..free {
             match (waiting.peek(), movable.peek()) {
                 // One that runs and goes first has its core by right.
                 (Some(waits), Some(runs)) if runs < waits => {
                     movable.next();
                 }
                 (Some(waits), _) => {
-                    owed.push(*waits);
+                    owed.push((**waits, idle > 0));
+                    idle = idle.saturating_sub(1);
                     waiting.next();
                 }
                 (None, _) => break,
             }
         }
-        owed
     }
 
     /// Says what runs instead of an instance that is owed a core.
-    fn blame(&self, is_idle: bool) -> DispatchFault {
+    fn blame(&self, owed: Key, is_idle: bool, claims: &BTreeMap<CoreId, Key>) -> DispatchFault {
+        let place = self.model.place(owed.1);
         let mut running = self.running.iter().rev();
-        let movable = running.find(|(key, _)| !self.model.keeps_its_core(key.1));
+        let movable = running.find(|(key, core)| match place {
+            Place::Core(pin) => **core == pin,
+            Place::Group(_) => {
+                !self.model.keeps_its_core(key.1) && self.model.place(key.1) == place
+            }
+        });
         match movable {
             // The least urgent one is blamed: it is the one that a dispatch would have preempted.
             Some((key, core)) if !is_idle => DispatchFault::Runs(key.1, *core),
             _ => {
-                let is_busy = |core: &CoreId| self.running.values().any(|busy| busy == core);
+                let is_left = |core: &CoreId| self.is_idle(core) && !claims.contains_key(core);
                 let cores = self.model.cores.start..;
-                let mut cores = cores.take(self.known_cores).map(CoreId);
-                DispatchFault::Idle(cores.find(|core| !is_busy(core)))
+                let mut cores = cores.take(self.known_cores.len()).map(CoreId);
+                DispatchFault::Idle(match place {
+                    Place::Core(pin) => Some(pin),
+                    Place::Group(group) => {
+                        cores.find(|core| self.model.is_of(group, *core) && is_left(core))
+                    }
+                })
             }
         }
     }
@@ -357,17 +447,33 @@ impl<'m> DispatchSweep<'m> {
     fn out_of_turn(
         &self,
         (key, core, start): (Key, CoreId, u64),
-        idle: usize,
+        claims: &BTreeMap<CoreId, Key>,
     ) -> Option<DispatchBreach> {
         if !self.model.keeps_its_core(key.1) {
             return None;
         }
         // On a machine the one may have become ready when the other was chosen already.
-        let mut before = (self.waiting.range(..key)).filter(|(_, (since_ns, event))| {
+        let is_before = |(since_ns, event): &(u64, u64)| {
             let longest_ns = self.now_ns.saturating_sub(*since_ns);
             longest_ns > self.bound_ns || self.bound_ns == 0 && *event < start
-        });
-        let (first, (since_ns, _)) = before.nth(idle)?;
+        };
+        let of_place = |place: Place<'m>| {
+            let before = self
+                .waiting
+                .iter()
+                .filter(move |(_, since)| is_before(since));
+            before.filter(move |(other, _)| self.model.place(other.1) == place)
+        };
+        // On its core what is pinned goes first, and what is not goes after all of that.
+        let mut pinned = of_place(Place::Core(core));
+        let found = match self.model.place(key.1) {
+            Place::Core(_) => pinned.find(|(other, _)| **other < key),
+            place @ Place::Group(group) => pinned.next().or_else(|| {
+                let mut others = of_place(place).take_while(|(other, _)| **other < key);
+                others.nth(self.idle(group, claims))
+            }),
+        };
+        let (first, (since_ns, _)) = found?;
         Some(DispatchBreach::OutOfTurn {
             started: key.1,
             core,

@@ -187,6 +187,12 @@ worded! {
         /// R5: an instance was on a core that is not its cluster's.
         OutsideItsCluster { event: Event } = "outside_its_cluster", (Dispatch, By(event)),
             ", outside its cluster";
+        /// R5: an instance was on another core than the one that it is pinned to.
+        OffItsCore { event: Event, core: CoreId } = "off_its_core", (Dispatch, By(event)),
+            ", and is pinned to core {}", core.0;
+        /// R5: an instance that is not pinned was on a core to which its DAG has no affinity.
+        OutsideItsAffinity { event: Event } = "outside_its_affinity", (Dispatch, By(event)),
+            ", to which its DAG has no affinity";
         /// R5: an instance that keeps its core lost it.
         LostItsCore { event: Event } = "lost_its_core", (Dispatch, By(event)),
             " although it keeps its core until it finishes";

@@ -88,6 +88,7 @@ impl Scheduler {
     pub(super) fn decide(&mut self) {
         // Decisions are those of one dispatch: a driver that missed the ones before has lost them.
         self.decisions.clear();
+        self.decide_apart();
         // First the idle cores: R5 preempts nobody while a core is idle.
         while self.cores.any_idle()
             && let Some(key) = self.ready.pop()
@@ -126,7 +127,7 @@ impl Scheduler {
             _ => EventKind::Start,
         };
         vertex.phase = InstancePhase::Running(core);
-        self.cores.run(core, key, vertex.is_preemptible);
+        (self.cores).run(core, key, vertex.yields_to_the_unpinned());
         Decision {
             what,
             core,
@@ -136,17 +137,17 @@ impl Scheduler {
 
     /// Puts the instance that runs on a core back in line.
     #[inline]
-    fn preempt(&mut self, core: CoreId, running: DispatchKey) {
+    pub(super) fn preempt(&mut self, core: CoreId, running: DispatchKey) {
         let vertex = self.vertices.get_mut(running.vertex());
         vertex.phase = InstancePhase::Preempted;
-        let instance = vertex.present_instance();
+        let (line, instance) = (vertex.line, vertex.present_instance());
         self.decisions.push(Decision {
             what: EventKind::Suspend,
             core,
             instance,
         });
         // With the key that it had: a preempted instance keeps its place in the order.
-        self.ready.insert(running);
+        self.ready.insert(line, running);
     }
 }
 
@@ -214,7 +215,9 @@ impl Scheduler {
                 }
                 // The most frequent case of a chain: the successor never enters the queue, and one
                 // entry of the journal tells finish, ready and start.
-                1 if self.ready.is_empty() => return self.pass(next, core),
+                1 if (self.ready).is_next(self.vertices.get(next).line, core) => {
+                    return self.pass(next, core);
+                }
                 // Several, or others in line: only their keys tell which is first.
                 _ => {
                     self.write_finish(core, vertex, now_ns);
@@ -227,7 +230,12 @@ impl Scheduler {
         }
         // The core takes one of the new instances; a second one may concern another core. (The
         // module says why one cannot.)
-        let concerns_others = self.fresh > 1 && self.cores.count() > 1;
+        let is_of_others = match self.fresh {
+            0 => false,
+            1 => self.ready.latest_concerns_others(core),
+            _ => true,
+        };
+        let concerns_others = is_of_others && self.cores.count() > 1;
         if concerns_others || self.log.now_ns >= self.quiet_until_ns {
             return (self.leave_open(core, vertex), false);
         }
@@ -270,7 +278,7 @@ impl Scheduler {
             self.dags[next.dag.index()].jobs.job(next.progress)
         });
         next.phase = InstancePhase::Running(core);
-        self.cores.run(core, key, next.is_preemptible);
+        (self.cores).run(core, key, next.yields_to_the_unpinned());
         // Never a resumption: it has become ready by this very end, so it has not run before.
         let decision = Decision {
             what: EventKind::Start,
@@ -297,7 +305,7 @@ impl Scheduler {
     /// Gives a core the first in line.
     #[inline]
     pub(super) fn give_first(&mut self, core: CoreId) -> HandOff {
-        match self.ready.pop() {
+        match self.ready.pop_for(core) {
             Some(key) => HandOff::To(Vertex(key.vertex()), self.give(core, key)),
             None => HandOff::Idle,
         }
@@ -315,6 +323,7 @@ pub(super) struct CoreTable {
 struct CoreOccupancy {
     /// The key of what runs, if anything does.
     key: DispatchKey,
+    /// For an instance that is not pinned.
     may_be_preempted: bool,
 }
 
@@ -357,6 +366,13 @@ impl CoreTable {
         self.idle.pop()
     }
 
+    /// Returns the one of these cores that has become idle last, which the caller gives an instance.
+    #[inline]
+    pub(super) fn take_idle_of(&mut self, cores: &[CoreId]) -> Option<CoreId> {
+        let place = self.idle.iter().rposition(|idle| cores.contains(idle))?;
+        Some(self.idle.remove(place))
+    }
+
     /// Makes a core, if it is idle, the next one that is taken.
     pub(super) fn prefer(&mut self, core: CoreId) {
         // From the top of the stack, where the core that a driver prefers mostly is.
@@ -385,14 +401,28 @@ impl CoreTable {
     /// Returns the largest key among the instances that may be preempted.
     #[inline]
     fn largest_preemptible(&self) -> Option<(CoreId, DispatchKey)> {
-        let mut largest = None;
-        for (core, occupation) in (0..).map(CoreId).zip(&self.occupations) {
-            // Idle cores have the largest key of all, but may not be preempted, so they do not win.
-            let is_larger = largest.is_none_or(|(_, key)| key < occupation.key);
-            if occupation.may_be_preempted && is_larger {
-                largest = Some((core, occupation.key));
-            }
-        }
-        largest
+        largest_preemptible((0..).map(CoreId).zip(&self.occupations))
     }
+
+    /// Likewise, on these cores.
+    #[inline]
+    pub(super) fn largest_preemptible_of(&self, cores: &[CoreId]) -> Option<(CoreId, DispatchKey)> {
+        let occupations = cores.iter().map(|core| &self.occupations[core.index()]);
+        largest_preemptible(cores.iter().copied().zip(occupations))
+    }
+}
+
+#[inline]
+fn largest_preemptible<'o>(
+    occupations: impl Iterator<Item = (CoreId, &'o CoreOccupancy)>,
+) -> Option<(CoreId, DispatchKey)> {
+    let mut largest = None;
+    for (core, occupation) in occupations {
+        // Idle cores have the largest key of all, but may not be preempted, so they do not win.
+        let is_larger = largest.is_none_or(|(_, key)| key < occupation.key);
+        if occupation.may_be_preempted && is_larger {
+            largest = Some((core, occupation.key));
+        }
+    }
+    largest
 }

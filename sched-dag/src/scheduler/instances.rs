@@ -6,7 +6,7 @@
 //! any other, only without running.
 
 use super::jobs::Job;
-use super::ready_queue::ReadyQueue;
+use super::pins::ReadyLines;
 use super::vertices::{InstancePhase, Vertex, VertexTable};
 use super::{DagPhase, EventLog, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
@@ -50,7 +50,7 @@ impl Scheduler {
                 // No vertex keeps its key: it is absolute, so it comes out as when it was put in
                 // line.
                 let key = (self.ready).key(number, vertex, || jobs.job(vertex.progress));
-                self.ready.remove(key);
+                self.ready.remove(vertex.line, key);
             }
             _ => panic!("{instance} {event} and has not started; complete each once, or fail it"),
         }
@@ -101,7 +101,8 @@ impl Scheduler {
             let is_meant = sequence == u64::MAX || vertex.progress == sequence;
             if vertex.phase == InstancePhase::Ready && is_meant {
                 let job = state.jobs.job(vertex.progress);
-                self.ready.remove(self.ready.key(number, vertex, || job));
+                let key = self.ready.key(number, vertex, || job);
+                self.ready.remove(vertex.line, key);
                 self.log
                     .of_instance(EventKind::Cancelled, vertex.instance(job));
                 vertex.phase = InstancePhase::Absent;
@@ -263,11 +264,11 @@ pub(super) fn line_up(
     number: u32,
     vertex: &mut Vertex,
     job: &Job,
-    ready: &mut ReadyQueue,
+    ready: &mut ReadyLines,
     log: &mut EventLog,
 ) {
     vertex.phase = InstancePhase::Ready;
     vertex.job = job.number;
-    ready.insert(ready.key(number, vertex, || job));
+    ready.insert(vertex.line, ready.key(number, vertex, || job));
     log.of_instance(EventKind::Ready, vertex.instance(job));
 }

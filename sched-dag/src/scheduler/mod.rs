@@ -44,6 +44,7 @@ mod log;
 mod moment;
 mod overrun;
 mod phase;
+mod pins;
 mod ready_queue;
 mod signals;
 mod vertices;
@@ -60,7 +61,8 @@ use crate::policy::SchedulerOptions;
 use crate::scheduler::dispatch::CoreTable;
 use crate::scheduler::jobs::JobTable;
 use crate::scheduler::phase::SurvivedFaults;
-use crate::scheduler::ready_queue::{IndexedHeap, ReadyQueue};
+use crate::scheduler::pins::ReadyLines;
+use crate::scheduler::ready_queue::IndexedHeap;
 use crate::scheduler::vertices::VertexTable;
 use crate::scheduler::waits::WaitTable;
 use crate::task_set::{Dag, TaskSet};
@@ -82,7 +84,7 @@ pub struct Scheduler {
     dags: Box<[DagState]>,
     vertices: VertexTable,
     /// The ready instances that do not run.
-    ready: ReadyQueue,
+    ready: ReadyLines,
     /// How many instances have become ready since the last dispatch, and [`OWED`] if
     /// a core has become idle since then that the next instance in line may need.
     fresh: u32,
@@ -181,7 +183,7 @@ impl Scheduler {
             options,
             log: EventLog::new(),
             dags: states,
-            ready: ReadyQueue::new(&task_set, options.policy, &mut vertices),
+            ready: ReadyLines::new(&task_set, &options, cluster, &mut vertices),
             fresh: 0,
             vertices,
             cores: CoreTable::new(options.cores),

@@ -112,6 +112,11 @@ impl ReadyQueue {
         Self::of(KeyOrder::Job, in_any_order(vertices.len()))
     }
 
+    /// Makes a queue that nothing comes into.
+    pub(super) fn without_room() -> Self {
+        Self::of(KeyOrder::Job, QueueStorage::Keyed(IndexedHeap::new(0)))
+    }
+
     #[inline]
     fn of(order: KeyOrder, rest: QueueStorage) -> Self {
         Self {

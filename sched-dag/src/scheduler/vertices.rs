@@ -27,6 +27,7 @@ use core::ops::Range;
 use super::jobs::Job;
 use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
 use crate::policy::Preemption;
+use crate::spec::PINS;
 use crate::task_set::TaskSet;
 
 /// The phase of a subtask's next instance.
@@ -42,6 +43,41 @@ pub(super) enum InstancePhase {
     Preempted,
     /// It has started, and waits for something else than a core.
     Waiting,
+}
+
+/// The line that a subtask's instances come into: its core's, its group's, or the cluster's, which
+/// without the feature `pins` it is, known when it is compiled.
+///
+/// That of a core is twice the core; that of a group twice the first core of the group, and 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct LineId(pub(super) u16);
+
+impl LineId {
+    pub(super) const CLUSTER: Self = Self(u16::MAX);
+
+    fn new(pin: Option<u32>, affinity: &[u32]) -> Self {
+        match (pin, affinity) {
+            (Some(core), _) => Self::of_core(CoreId(core)),
+            (None, [first, ..]) => Self(Self::of_core(CoreId(*first)).0 + 1),
+            (None, []) => Self::CLUSTER,
+        }
+    }
+
+    #[inline]
+    pub(super) fn of_core(core: CoreId) -> Self {
+        Self(2 * u16::try_from(core.0).expect("verified to be in range"))
+    }
+
+    #[inline]
+    pub(super) fn is_cluster(self) -> bool {
+        !PINS || self == Self::CLUSTER
+    }
+
+    /// Returns the core that it is of.
+    #[inline]
+    pub(super) fn core(self) -> Option<CoreId> {
+        (PINS && self.0.is_multiple_of(2)).then(|| CoreId(u32::from(self.0) / 2))
+    }
 }
 
 /// One subtask, in one cache line.
@@ -63,6 +99,7 @@ pub(super) struct Vertex {
     /// Whether the end of its instance is told to its successors and to nobody else:
     /// it has some, its job is the only one in flight, and is not cut.
     pub(super) only_passes_on: bool,
+    pub(super) line: LineId,
     /// The initial value of a counter.
     initial: u32,
     /// Its counter, if it has one slot.
@@ -73,6 +110,8 @@ pub(super) struct Vertex {
     /// Where its successors begin and end.
     successors: [u32; 2],
 }
+
+const _: () = assert!(size_of::<Vertex>() == 64, "one cache line");
 
 /// All subtasks.
 #[derive(Clone, Debug, Hash)]
@@ -111,6 +150,7 @@ impl VertexTable {
                     is_preemptible: preemption == Preemption::Enabled
                         && !attributes.is_non_preemptive(),
                     only_passes_on: false,
+                    line: LineId::new(attributes.core(), dag.affinity()),
                     initial,
                     counter: initial,
                     counters: to_u32(counters.len()),
@@ -247,6 +287,12 @@ impl VertexTable {
 }
 
 impl Vertex {
+    /// Reports whether an instance that is not pinned may take its core from it.
+    #[inline]
+    pub(super) fn yields_to_the_unpinned(&self) -> bool {
+        self.is_preemptible && self.line.core().is_none()
+    }
+
     /// Returns the vertex's part of a job.
     #[inline]
     pub(super) const fn instance(&self, job: &Job) -> Instance {

@@ -141,6 +141,9 @@ impl Scheduler {
         let waiting = self.vertices.get_mut(vertex.0);
         let job = self.dags[waiting.dag.index()].jobs.job(waiting.progress);
         let is_alone = self.fresh == 0 && instant_ns < self.quiet_until_ns && job.cut.is_none();
+        // One that is not pinned might go on with another core then.
+        let own = self.ready.peek_own(core);
+        let is_alone = is_alone && (own.is_none() || waiting.line.core().is_some());
         if !is_alone || waiting.phase != InstancePhase::Running(core) {
             return None;
         }
@@ -156,7 +159,11 @@ impl Scheduler {
             // W4: it ends where it begins, and then competes for its own core.
             self.waits.latest[place].has_timed_out = true;
             let is_first = |first| key < first;
-            if self.ready.is_empty() || self.ready.peek().is_none_or(is_first) {
+            let is_next = match waiting.line.is_cluster() {
+                true => self.ready.is_empty() || self.ready.peek().is_none_or(is_first),
+                false => self.ready.peek_in(waiting.line).is_none_or(is_first),
+            };
+            if is_next {
                 let what = EventKind::Resume;
                 let decision = Decision {
                     what,
@@ -168,7 +175,7 @@ impl Scheduler {
             waiting.phase = InstancePhase::Preempted;
             self.log.on_this(EventKind::Wait, now_ns, instance);
             self.log.of_instance(EventKind::Wake, instance);
-            self.ready.insert(key);
+            self.ready.insert(waiting.line, key);
         }
         let done = self.give_first(core);
         if done == HandOff::Idle {
@@ -184,8 +191,10 @@ impl Scheduler {
     pub fn wake_shortly(&mut self, now_ns: u64, here: CoreId) -> Option<(CoreId, Vertex)> {
         let (limit_ns, timer) = self.timers.peek()?;
         let place = timer.checked_sub(self.dags.len())?;
-        // Where a core is idle, nothing is in line.
-        if self.fresh != 0 || limit_ns > now_ns || !self.cores.any_idle() {
+        // Where a core is idle, nothing is in the cluster's line; any idle core may be of another's.
+        let line = self.vertices.get(self.waits.vertices[place]).line;
+        let is_elsewhere = !line.is_cluster();
+        if self.fresh != 0 || limit_ns > now_ns || !self.cores.any_idle() || is_elsewhere {
             return None;
         }
         (self.log.now_ns, self.log.here) = (self.log.now_ns.max(now_ns), here);
@@ -247,7 +256,8 @@ impl Scheduler {
         // As one that was preempted, it has started and is in line for a core.
         vertex.phase = InstancePhase::Preempted;
         let job = self.dags[vertex.dag.index()].jobs.job(vertex.progress);
-        self.ready.insert(self.ready.key(number, vertex, || job));
+        let key = self.ready.key(number, vertex, || job);
+        self.ready.insert(vertex.line, key);
         self.log.of_instance(EventKind::Wake, vertex.instance(job));
         self.fresh += 1;
     }

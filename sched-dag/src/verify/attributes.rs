@@ -15,7 +15,7 @@ use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
-use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES, WAITS};
+use crate::spec::{DagSpec, MOST_WAITS, PINS, STACK_BYTES, WAITS};
 
 /// Checks the attributes of the whole commit.
 pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
@@ -43,6 +43,9 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
         warn_of_equal_priorities(findings);
     }
     check_clusters(options, findings);
+    if PINS {
+        check_affinities(options, findings);
+    }
     check_names(findings);
 }
 
@@ -327,6 +330,84 @@ fn check_clusters(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
                 });
             }
             _ => {}
+        }
+        check_cores(options, &mut page);
+    }
+}
+
+/// Returns how many cores the cluster has that a DAG states.
+fn cores_of(options: &CommitOptions, spec: &DagSpec) -> u32 {
+    let sizes = options.clusters.sizes();
+    let cluster = spec.cluster.unwrap_or_default();
+    match sizes.is_empty() {
+        true => options.cores,
+        // A cluster that there is not is a fault of its own.
+        false => sizes.get(cluster.index()).copied().unwrap_or(u32::MAX),
+    }
+}
+
+/// Checks the cores that a DAG and its subtasks state.
+fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
+    let cores = cores_of(options, page.spec);
+    // The scheduler has two lines for each, and one more, in 16 bits.
+    let most = if PINS { cores.min(0x7fff) } else { 0 };
+    let largest = page.spec.affinity.iter().copied().max();
+    if let Some(core) = largest.filter(|&core| core >= most) {
+        page.fault(|dag| DagFault::AffinityOutOfRange { dag, core, cores });
+    }
+    for (index, stated) in page.spec.subtasks.iter().enumerate() {
+        if let Some(core) = stated.core.filter(|&core| core >= most) {
+            let subtask = page.subtask(index);
+            page.fault(|dag| DagFault::CoreOutOfRange {
+                dag,
+                subtask,
+                core,
+                cores,
+            });
+        }
+    }
+}
+
+/// Returns the cores that a DAG has an affinity to, each once, ascending; none if these are all of
+/// its cluster.
+pub(super) fn affinity(options: &CommitOptions, spec: &DagSpec) -> Vec<u32> {
+    let mut cores = sorted(&spec.affinity);
+    cores.dedup();
+    if cores.len() == cores_of(options, spec) as usize {
+        cores.clear();
+    }
+    cores
+}
+
+/// Checks that DAGs of a cluster execute what they do not pin on the same cores, or on others.
+fn check_affinities(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
+    let specs = findings.specs;
+    if specs.iter().all(|spec| spec.affinity.is_empty()) {
+        return;
+    }
+    // Each affinity of a cluster, and the first DAG that has it.
+    let mut groups: Vec<(ClusterId, Vec<u32>, usize)> = Vec::new();
+    for (dag, spec) in specs.iter().enumerate() {
+        if spec.subtasks.iter().all(|subtask| subtask.core.is_some()) {
+            continue;
+        }
+        let (cluster, own) = (spec.cluster.unwrap_or_default(), affinity(options, spec));
+        let mut others = groups.iter().filter(|group| group.0 == cluster);
+        if others.clone().any(|(_, cores, _)| *cores == own) {
+            continue;
+        }
+        // None means all.
+        let has = |cores: &[u32], core| cores.is_empty() || cores.contains(core);
+        let shared = others.find_map(|(_, cores, other)| {
+            let mut shared = own.iter().chain(cores);
+            let core = shared.find(|core| has(&own, core) && has(cores, core))?;
+            Some((findings.label(*other), *core))
+        });
+        match shared {
+            None => groups.push((cluster, own, dag)),
+            Some((other, core)) => findings
+                .findings_of(dag)
+                .fault(|dag| DagFault::AffinitiesOverlap { dag, other, core }),
         }
     }
 }

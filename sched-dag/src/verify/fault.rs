@@ -10,7 +10,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::label::{
-    DagLabel, SubtaskLabel, list, members, ns, one_up_to, own_input, question, ring, undivided,
+    DagLabel, SubtaskLabel, counted_from_0, list, members, ns, one_up_to, own_input, question,
+    ring, undivided,
 };
 use crate::ids::ClusterId;
 use crate::policy::Priority;
@@ -179,6 +180,18 @@ worded! {
         TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
             "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; {}",
             if WAITS { "split it" } else { "build it with `fass`' feature `waits`" };
+        /// A subtask that is pinned to a core which its cluster does not have.
+        CoreOutOfRange { dag: DagLabel, subtask: SubtaskLabel, core: u32, cores: u32 } =
+            "core_out_of_range",
+            "{subtask} of {dag} is pinned to core {core}, and {}", counted_from_0(*cores);
+        /// A DAG with an affinity to a core which its cluster does not have.
+        AffinityOutOfRange { dag: DagLabel, core: u32, cores: u32 } = "affinity_out_of_range",
+            "{dag} has an affinity to core {core}, and {}", counted_from_0(*cores);
+        /// Two DAGs of a cluster that may share some of their cores for what they do not pin, and
+        /// not all of them.
+        AffinitiesOverlap { dag: DagLabel, other: DagLabel, core: u32 } = "affinities_overlap",
+            "{other} and {dag} share core {core} and not all others (without an affinity a DAG has \
+             every core); give both the same affinity, or no core in common";
         /// A stack that is too small or too large.
         StackOutOfRange { dag: DagLabel, subtask: SubtaskLabel, bytes: u64 } =
             "stack_out_of_range",

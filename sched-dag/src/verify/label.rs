@@ -10,7 +10,7 @@ use core::fmt::{self, Display};
 use core::time::Duration;
 
 use crate::ids::{DagId, SubtaskId, named};
-use crate::spec::DagSpec;
+use crate::spec::{DagSpec, PINS};
 use crate::task_set::TaskSet;
 
 /// A DAG as messages name it.
@@ -154,6 +154,17 @@ pub(super) fn own_input(topic: Option<&String>) -> impl Display {
 /// Returns which clusters can be stated, of so many.
 pub(super) fn one_up_to(clusters: usize) -> impl Display {
     fmt::from_fn(move |f| write!(f, "state one up to cluster {}", clusters.saturating_sub(1)))
+}
+
+/// Returns which cores can be stated in a cluster of so many.
+pub(super) fn counted_from_0(cores: u32) -> impl Display {
+    fmt::from_fn(move |f| match cores {
+        _ if !PINS => f.write_str("no core can be stated; build it with `fass`' feature `pins`"),
+        _ => write!(
+            f,
+            "its cluster has {cores}, counted from 0; state one of these"
+        ),
+    })
 }
 
 /// Returns why a cluster does not exist where there are so many, and the remedy.

@@ -3,7 +3,7 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use super::attributes::in_flight;
+use super::attributes::{affinity, in_flight};
 use super::fault::DagFault;
 use super::{CommitOptions, VerifyFindings};
 
@@ -12,7 +12,7 @@ use crate::ids::SubtaskId;
 use crate::order::sort_by_key;
 use crate::policy::Priority;
 use crate::priorities::ranks;
-use crate::spec::{DagSpec, WAITS};
+use crate::spec::{DagSpec, PINS, WAITS};
 use crate::task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
@@ -32,7 +32,7 @@ pub(super) fn build(
         return None;
     }
     let dags = findings.specs.iter().zip(shapes).zip(bases);
-    let dags = dags.map(|((spec, shape), base)| build_dag(spec, shape, base));
+    let dags = dags.map(|((spec, shape), base)| build_dag(options, spec, shape, base));
     Some(TaskSet::new(dags.collect(), options.clusters.sizes()))
 }
 
@@ -77,6 +77,7 @@ fn has_priorities(spec: &DagSpec) -> bool {
 #[inline(never)]
 #[allow(clippy::too_many_lines, reason = "fills one structure, field by field")]
 fn build_dag(
+    options: &CommitOptions,
     spec: &DagSpec,
     (mut graph, state_precedences): (Graph, Vec<StatePrecedence>),
     priority_base: u32,
@@ -111,6 +112,7 @@ fn build_dag(
             },
             budget_ns: subtask.budget_ns,
             stack_bytes: subtask.stack_bytes,
+            core: subtask.core,
             priority: match ranks.get(index) {
                 Some(rank) => Priority(priority_base + rank),
                 None => subtask.priority.expect("given to all subtasks of the DAG"),
@@ -138,6 +140,10 @@ fn build_dag(
         overrun: spec.overrun,
         on_fault: spec.on_fault,
         cluster: spec.cluster,
+        affinity: match PINS {
+            true => affinity(options, spec).into(),
+            false => Box::default(),
+        },
         order: spec.order,
         why_there: None,
         first_job: 0,

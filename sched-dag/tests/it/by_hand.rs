@@ -209,6 +209,82 @@ fn an_end_of_what_does_not_run_is_refused() {
     }
 }
 
+/// A chain of which subtasks are pinned to these cores, next to a less urgent DAG of four subtasks.
+fn pinned_chain(pins: [u32; 2], in_flight: u32) -> Hand {
+    let chain = dag(100, 100, 1, &[0, 0], &[(0, 1)]).with(|spec| {
+        spec.in_flight = Some(in_flight);
+        let subtasks = spec.subtasks.iter_mut().zip(pins);
+        subtasks.for_each(|(subtask, core)| subtask.core = Some(core));
+    });
+    let others = dag(100, 100, 1, &[5, 6, 7, 8], &[]);
+    let mut hand = Hand::new(&[chain, others], TWO_CORES);
+    hand.must("0: released 0.0, released 1.0, start 0.0.0 on 0, start 1.0.0 on 1");
+    hand
+}
+
+#[test]
+fn a_chain_that_is_pinned_to_one_core_is_handed_on_past_the_line() {
+    // With one slot, and with several.
+    for in_flight in [1, 2] {
+        pinned_chain([0, 0], in_flight).must(
+            "4 hand 0.0.0: start 0.0.1 on 0, done=on 0
+             9 hand 0.0.1: completed 0.0 Met, start 1.0.1 on 0, done=on 0",
+        );
+        pinned_chain([0, 1], in_flight).must(
+            "4 hand 0.0.0: done=Some(Open)
+             4: suspend 1.0.0 on 1, start 0.0.1 on 1, resume 1.0.0 on 0",
+        );
+    }
+}
+
+/// A chain of an affinity to the last core, next to DAGs of three less urgent subtasks there and
+/// before it.
+fn chain_in_a_group(in_flight: u32) -> Hand {
+    let affinity = |of: DagSpec, cores: &[u32]| of.with(|spec| spec.affinity = cores.to_vec());
+    let chain = dag(100, 100, 1, &[0, 0], &[(0, 1)]).with(|spec| spec.in_flight = Some(in_flight));
+    let others = |priorities: &[u32]| dag(100, 100, 1, priorities, &[]);
+    let specs = [
+        affinity(chain, &[2]),
+        affinity(others(&[5, 6, 7]), &[2]),
+        affinity(others(&[3, 4, 8]), &[1, 0, 1]),
+    ];
+    let mut hand = Hand::new(&specs, cores(3));
+    hand.must(
+        "0: released 0.0, released 1.0, released 2.0, \
+         start 2.0.0 on 0, start 2.0.1 on 1, start 0.0.0 on 2",
+    );
+    hand
+}
+
+#[test]
+fn a_chain_of_a_group_of_one_core_is_handed_on() {
+    for in_flight in [1, 2] {
+        // The first in line is less urgent, so a dispatch is not needed; nor for the next group.
+        chain_in_a_group(in_flight).must(
+            "4 hand 0.0.0: start 0.0.1 on 2, done=on 2
+             6 hand 2.0.0: start 2.0.2 on 0, done=on 0
+             9 hand 0.0.1: completed 0.0 Met, start 1.0.0 on 2, done=on 2
+             9 hand 2.0.1: done=Some(Idle)
+             9 hand 1.0.0: start 1.0.1 on 2, done=on 2",
+        );
+    }
+}
+
+#[test]
+fn of_the_idle_cores_of_a_group_the_preferred_one_is_taken_first() {
+    for (preferred, taken) in [(0, 2), (1, 1), (2, 2)] {
+        let grouped = dag(100, 100, 1, &[0], &[]).offset(2);
+        let grouped = grouped.with(|spec| spec.affinity = vec![1, 2]);
+        let others = dag(100, 100, 1, &[1], &[]).with(|spec| spec.affinity = vec![0]);
+        let mut hand = Hand::new(&[others, grouped], cores(3));
+        hand.must(&format!(
+            "0: released 0.0, start 0.0.0 on 0
+             1 prefer 2:
+             2 prefer {preferred}: released 1.0, start 1.0.0 on {taken}"
+        ));
+    }
+}
+
 #[test]
 fn an_idle_core_that_the_driver_prefers_is_taken_first() {
     // Core 1 would be; core 2 is taken if it is preferred, and a busy one is not.

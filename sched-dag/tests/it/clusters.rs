@@ -6,12 +6,14 @@
 use std::sync::Arc;
 
 use common::random::Random;
-use sched_dag::analysis::{self, AnalysisResult, AnalysisSettings, NotProvenReason, Overheads};
+use sched_dag::analysis::{
+    self, AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest,
+};
 use sched_dag::journal::Event;
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
     ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, CoreId, DagId, DagSpec, Instance,
-    Policy, SchedulerOptions, SubtaskId, TaskSet, verify,
+    Policy, Preemption, SchedulerOptions, SubtaskId, TaskSet, verify,
 };
 
 use crate::support::set::{self, Set};
@@ -46,6 +48,25 @@ fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[u32]) -> 
     run.events.iter().map(named).collect()
 }
 
+/// Pins subtasks of a set, and in clusters of several cores leaves the last one to what is pinned
+/// to it, if they are to be in groups.
+fn state_cores(specs: &mut [DagSpec], sizes: &[u32], has_groups: bool, random: &mut Random) {
+    // What keeps its core delays what is pinned to that, so which core it has would matter.
+    let mut all = specs.iter().flat_map(|spec| &spec.subtasks);
+    if all.any(|subtask| subtask.non_preemptive) {
+        return;
+    }
+    for spec in specs {
+        let cores = spec.cluster.map_or(1, |cluster| sizes[cluster.index()]);
+        for subtask in &mut spec.subtasks {
+            subtask.core = random.chance(40).then(|| random.within(0..=cores - 1));
+        }
+        if has_groups && cores > 1 {
+            spec.affinity = (0..cores - 1).collect();
+        }
+    }
+}
+
 #[test]
 fn a_cluster_runs_as_if_it_were_alone() {
     let (count, first_seed) = (number("CLUSTERED", 400), number("CLUSTER_SEED", 1));
@@ -61,6 +82,9 @@ fn a_cluster_runs_as_if_it_were_alone() {
         for spec in &mut specs {
             let cluster = u32::try_from(random.index(sizes.len())).expect("few clusters");
             spec.cluster = Some(ClusterId(cluster));
+        }
+        if set.options.preemption == Preemption::Enabled {
+            state_cores(&mut specs, &sizes, seed % 2 == 0, &mut random);
         }
         let all: Vec<u32> = (0..).take(specs.len()).collect();
         let divided = commit(&specs, set.options, CoreDivision::Of(sizes.clone()));
@@ -81,6 +105,15 @@ fn a_cluster_runs_as_if_it_were_alone() {
             };
             let same = |event: Event, first: u32| {
                 assert!((first..first + cores).contains(&event.core.0), "{event:?}");
+                if let Some(of) = event.instance().filter(|_| event.what.is_of_machine()) {
+                    let core = event.core.0 - first;
+                    let affinity = &specs[of.dag.index()].affinity;
+                    let is_right = match specs[of.dag.index()].subtasks[of.subtask.index()].core {
+                        Some(pin) => pin == core,
+                        None => affinity.is_empty() || affinity.contains(&core),
+                    };
+                    assert!(is_right, "{event:?}");
+                }
                 // Which of them it is may depend on the driver's calls.
                 let core = CoreId(0);
                 Event { core, ..event }
@@ -153,6 +186,38 @@ fn what_is_unknown_in_one_cluster_weakens_nothing_in_another() {
     );
     let begins = |line: &&str| line.starts_with("machine 1 ");
     assert_eq!(witness.lines().filter(begins).count(), 2, "one for each");
+}
+
+#[test]
+fn bounds_of_pinned_subtasks_need_an_order_on_cores_of_their_own() {
+    let mut specs = three();
+    specs[2].subtasks[0].wcet_ns = Some(1);
+    let before = answer(&specs).0;
+    assert!(before.is_proven());
+    // On its core it goes first, whatever the deadlines.
+    specs[2].subtasks[0].core = Some(0);
+    let owned = answer(&specs).0;
+    let bounds = owned.bounds.iter().map(|bound| {
+        let bound = bound.as_ref().unwrap();
+        (bound.bound_ns, bound.test)
+    });
+    let (first, other) = (before.bounds[0].unwrap(), before.bounds[1].unwrap());
+    let expected = [
+        (first.bound_ns, first.test),
+        (other.bound_ns, SchedulabilityTest::Member),
+        (1, SchedulabilityTest::Owner),
+    ];
+    assert_eq!(bounds.collect::<Vec<_>>(), expected);
+    // No edge says which of two goes first.
+    let again = specs[2].subtasks[0].clone();
+    specs[2].subtasks.push(again);
+    let (answer, _) = answer(&specs);
+    let pinned = NotProvenReason::Pinned {
+        subtask: SubtaskId(1),
+    };
+    let behind = NotProvenReason::DelayedBy { dag: DagId(2) };
+    assert_eq!(answer.reasons, [None, Some(behind), Some(pinned)]);
+    assert_eq!(answer.first_failing.unwrap().dag, DagId(2));
 }
 
 #[test]

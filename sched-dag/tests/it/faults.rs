@@ -120,6 +120,16 @@ fn numbers_have_limits() {
          stack_out_of_range `fuse`...16383 bytes
          stack_out_of_range `brake`...1048577 bytes",
     );
+    let pinned = drive(|spec| {
+        let subtasks = spec.subtasks.iter_mut().zip([1, 2, u32::MAX]);
+        subtasks.for_each(|(subtask, core)| subtask.core = Some(core));
+    });
+    refused(&[pinned]).must_say(
+        "core_out_of_range `fuse` of dag `drive`...core 2...has 2, counted from 0
+         core_out_of_range `brake`...core 4294967295",
+    );
+    refused(&[drive(|spec| spec.affinity = vec![3, 2, 0, 3])])
+        .must_say("affinity_out_of_range dag `drive`...core 3...has 2, counted from 0");
     for (wcet_ns, deadline_ns, said) in [
         (20_000_001, 20_000_000, "`fuse`...20.000001ms...20ms"),
         (51, 50, "`fuse`...51ns...50ns"),
@@ -200,6 +210,39 @@ fn cycles_are_printed_hop_by_hop_one_a_knot_and_the_shortest() {
     );
     let to_itself = with_edges(DRIVE, &[(1, 1)]);
     refused(&[to_itself]).must_say("self_edge subtask `fuse` of dag `drive`");
+}
+
+#[test]
+fn groups_of_cores_are_disjoint() {
+    let on = |name: &str, affinity: &[u32]| {
+        let mut spec = dag(&format!("{name}: > from > of-{name}; of-{name} > to >"));
+        spec.affinity = affinity.to_vec();
+        spec
+    };
+    let four = CommitOptions::new(Policy::Edf, 4);
+    let said = |specs: &[DagSpec]| Refused(verify(specs, &four).expect_err("they overlap"));
+    said(&[on("a", &[1, 0]), on("b", &[3, 1]), on("c", &[0, 1, 1])])
+        .must_say("affinities_overlap dag `a` and dag `b` share core 1 and not all others");
+    // One that states none has all.
+    said(&[on("a", &[]), on("b", &[3]), on("c", &[2])]).must_say(
+        "affinities_overlap dag `a` and dag `b` share core 3
+         affinities_overlap dag `a` and dag `c` share core 2",
+    );
+    said(&[on("a", &[2]), on("b", &[])])
+        .must_say("affinities_overlap dag `a` and dag `b` share core 2");
+    let affinity = |specs: &[DagSpec]| -> Vec<Vec<u32>> {
+        let verified = verify(specs, &four).expect("they are disjoint").task_set;
+        let dags = verified.dags().iter();
+        dags.map(|dag| dag.affinity().to_vec()).collect()
+    };
+    // All that are stated are as none.
+    let all = [on("a", &[3, 1, 0, 2, 0]), on("b", &[])];
+    assert_eq!(affinity(&all), [vec![], vec![]]);
+    let mut owner = on("owner", &[]);
+    let subtasks = owner.subtasks.iter_mut().zip(0..);
+    subtasks.for_each(|(subtask, core)| subtask.core = Some(core));
+    let lent = [owner, on("a", &[2, 0, 2]), on("b", &[1]), on("c", &[0, 2])];
+    assert_eq!(affinity(&lent), [vec![], vec![0, 2], vec![1], vec![0, 2]]);
 }
 
 #[test]

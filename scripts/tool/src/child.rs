@@ -148,7 +148,6 @@ impl Child {
     }
 
     /// Returns the child's process id.
-    #[must_use]
     pub fn id(&self) -> u32 {
         self.process.id()
     }
@@ -171,7 +170,6 @@ impl Child {
     }
 
     /// Returns the time since the start.
-    #[must_use]
     pub fn elapsed(&self) -> Duration {
         self.started.elapsed()
     }
@@ -193,7 +191,6 @@ impl Drop for Child {
 /// Returns a command for `program` that the system kills when the calling thread dies, if `setpriv`
 /// is there to ask for it. `setpriv` executes the program in its own place, so the process id stays
 /// the same.
-#[must_use]
 pub fn bound_to_us(program: &Path) -> Command {
     if system::find_program("setpriv").is_none() {
         return Command::new(program);

@@ -115,6 +115,11 @@ impl Dag<'_> {
             _ => "abort",
         };
         label += &format!("\n{jobs}, {} in flight, overrun: {overrun}", dag.in_flight);
+        let of_dag = (self.commit.told.affinities.iter()).filter(|of| of.0 == self.number);
+        let cores: Vec<u32> = of_dag.map(|of| of.1).collect();
+        if !cores.is_empty() {
+            label += &format!("\naffinity: {cores:?}");
+        }
         label
     }
 
@@ -135,6 +140,11 @@ impl Dag<'_> {
         // Under EDF the priority has no effect.
         if !self.commit.told.is_edf {
             label += &format!("\npriority {}", subtask.priority);
+        }
+        for &(dag, of, core) in &self.commit.told.pins {
+            if (dag, of as usize) == (self.number, number) {
+                label += &format!("\ncore {core}");
+            }
         }
         if subtask.is_non_preemptive {
             label += "\nnon-preemptive";
@@ -219,6 +229,8 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
         let told = Commit {
             is_edf,
             waits,
+            pins: vec![(0, 1, 1)],
+            affinities: vec![(0, 0)],
             ..told
         };
         let mut committed = Committed::new(0, told).expect("it is right");
@@ -232,9 +244,9 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
     }
 
     const DRAWN: &str = r#"  subgraph cluster_c0_d0 {
-    label="the \"eye\"\nT = 25 ms, D = 100 ms, O = 500 ns\n20 jobs, 5 in flight, overrun: queue";
+    label="the \"eye\"\nT = 25 ms, D = 100 ms, O = 500 ns\n20 jobs, 5 in flight, overrun: queue\naffinity: [0]";
     c0_d0_s0 [label="camera\nWCET 1 ms\nwaits up to 3 ms, then 400 us\npriority 1"];
-    c0_d0_s1 [label="subtask 1\npriority 2\nnon-preemptive"];
+    c0_d0_s1 [label="subtask 1\npriority 2\ncore 1\nnon-preemptive"];
     c0_d0_s2 [label="fuse\nwaits up to 0 ns\npriority 3"];
     c0_d0_s0 -> c0_d0_s1 [label="frame: Arc<[Frame]>"];
     c0_d0_t0 [shape=note, label="frame: Arc<[Frame]>"];

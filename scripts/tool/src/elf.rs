@@ -136,7 +136,6 @@ pub fn check_bootable(file: &[u8]) -> Result<(), String> {
 
 /// Returns the name of the app of an image, which `kernel::entry!` notes there; `None` if there is
 /// no such note.
-#[must_use]
 pub fn app_name(file: &[u8]) -> Option<String> {
     let notes = notes(file).ok()?;
     let note = notes.iter().find(|note| note.owner == *b"App\0")?;

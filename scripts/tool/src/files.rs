@@ -47,7 +47,6 @@ impl Named<'_> {
 }
 
 /// Returns a file's whole name for a message, with control characters made visible.
-#[must_use]
 pub fn shown_path(path: &Path) -> String {
     visible(&path.to_string_lossy()).to_string()
 }

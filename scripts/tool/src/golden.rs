@@ -86,23 +86,9 @@ impl Golden<'_> {
     }
 }
 
-/// Returns an excerpt of an output. A line of `kept` that the output still has stays; otherwise it
-/// becomes the line of the output with the longest common beginning. `shown` decides which lines
-/// are equal.
-#[must_use]
-pub fn excerpt(kept: &str, output: &str, shown: impl Fn(&str) -> String) -> String {
-    let common = |a: &str, b: &str| a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
-    let line = |kept| {
-        let is_said = output.lines().any(|line| shown(line) == shown(kept));
-        let nearest = output.lines().max_by_key(|line| common(line, kept));
-        format!("{}\n", nearest.filter(|_| !is_said).unwrap_or(kept))
-    };
-    kept.lines().map(line).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Golden, excerpt};
+    use super::Golden;
     use std::fs;
 
     #[test]
@@ -131,15 +117,5 @@ mod tests {
         is_now("# a\nsaid\n# b\naltered\nmore\n");
         assert_eq!(fs::read_to_string(&list).unwrap(), format!("{file}\n"));
         fs::remove_dir_all(folder).unwrap();
-    }
-
-    #[test]
-    fn an_excerpt_keeps_what_is_said_and_takes_the_nearest_for_the_rest() {
-        let said = "boots\ndag `x` takes at most 7ms\nx: 5 jobs\nx: 9 ms\nends\n";
-        let kept = "dag `x` takes at most 6ms\nx: 8 ms\nends\n";
-        let digits = |line: &str| line.replace(|c: char| c.is_ascii_digit(), "N");
-        assert_eq!(excerpt(kept, said, digits), kept);
-        let now = "dag `x` takes at most 7ms\nx: 9 ms\nends\n";
-        assert_eq!(excerpt(kept, said, str::to_string), now);
     }
 }

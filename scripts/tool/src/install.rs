@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::qemu::{Loader, OVMF_FILE, PROGRAM};
-use crate::system::find_program;
+use crate::system::{self, find_program};
 
 /// Something of the host's that a command needs.
 #[derive(Debug)]
@@ -219,8 +219,7 @@ fn run(name: &str, line: &str) -> Result<(), String> {
 
 fn is_root() -> bool {
     // The standard library cannot tell; `id` is in every base system.
-    let id = Command::new("id").arg("-u").output();
-    id.is_ok_and(|output| output.stdout.trim_ascii() == b"0")
+    system::run(Command::new("id").arg("-u")).is_ok_and(|id| id.trim() == "0")
 }
 
 #[cfg(test)]

@@ -43,7 +43,6 @@ pub enum Value {
 impl Value {
     /// Returns the member `name` of an object; `None` if there is none, or if
     /// this is not an object.
-    #[must_use]
     pub fn get(&self, name: &str) -> Option<&Value> {
         let Value::Object(members) = self else {
             return None;
@@ -54,13 +53,11 @@ impl Value {
 
     /// Returns the value at a path of member names, such as
     /// `["join_latency_ns", "max"]`.
-    #[must_use]
     pub fn at(&self, path: &[&str]) -> Option<&Value> {
         path.iter().try_fold(self, |value, name| value.get(name))
     }
 
     /// Returns the string, if this is one.
-    #[must_use]
     pub fn as_text(&self) -> Option<&str> {
         match self {
             Value::Text(text) => Some(text),
@@ -69,7 +66,6 @@ impl Value {
     }
 
     /// Returns the number, if this is an integer within `u64`.
-    #[must_use]
     pub fn as_u64(&self) -> Option<u64> {
         match self {
             Value::Integer(number) => u64::try_from(*number).ok(),
@@ -78,7 +74,6 @@ impl Value {
     }
 
     /// Returns the truth value, if this is one.
-    #[must_use]
     pub fn as_bool(&self) -> Option<bool> {
         match self {
             Value::Bool(truth) => Some(*truth),
@@ -87,7 +82,6 @@ impl Value {
     }
 
     /// Returns the elements of an array; nothing if this is not an array.
-    #[must_use]
     pub fn elements(&self) -> &[Value] {
         match self {
             Value::Array(elements) => elements,
@@ -110,8 +104,6 @@ impl fmt::Display for JsonError {
         write!(f, "column {}: {}", self.column, self.message)
     }
 }
-
-impl std::error::Error for JsonError {}
 
 /// Reads the one value that `text` consists of.
 ///
@@ -434,30 +426,27 @@ impl<'t> Parser<'t> {
 
 /// An object that is being written.
 #[derive(Clone, Debug, Default)]
+#[must_use]
 pub struct Object(String);
 
 impl Object {
     /// Makes an object without members.
-    #[must_use]
     pub fn new() -> Object {
         Object::default()
     }
 
     /// Adds a member with a whole number.
-    #[must_use]
     pub fn number(self, name: &str, value: impl Into<u64>) -> Object {
         let value: u64 = value.into();
         self.json(name, &value.to_string())
     }
 
     /// Adds a member with text.
-    #[must_use]
     pub fn text(self, name: &str, value: &str) -> Object {
         self.json(name, &quoted(value))
     }
 
     /// Adds a member with a value that is JSON already.
-    #[must_use]
     pub fn json(mut self, name: &str, value: &str) -> Object {
         let separator = if self.0.is_empty() { "" } else { "," };
         // Writing into a `String` cannot fail.
@@ -466,14 +455,12 @@ impl Object {
     }
 
     /// Adds a member with a list of values that are JSON already.
-    #[must_use]
     pub fn list(self, name: &str, values: impl IntoIterator<Item = impl ToString>) -> Object {
         let values = values.into_iter().map(|value| value.to_string());
         self.json(name, &format!("[{}]", values.collect::<Vec<_>>().join(",")))
     }
 
     /// Ends the object and returns its text.
-    #[must_use]
     pub fn into_text(self) -> String {
         format!("{{{}}}", self.0)
     }
@@ -484,7 +471,6 @@ impl Object {
 /// ```
 /// assert_eq!(tool::json::quoted("a \"b\"\n"), r#""a \"b\"\u000a""#);
 /// ```
-#[must_use]
 pub fn quoted(text: &str) -> String {
     recording::Part::Text(text).to_string()
 }

@@ -14,7 +14,7 @@
 //! - [`install`], [`probe`], [`system`]: programs and abilities of the host;
 //! - [`options`]: command lines by a table; [`files`]: the files they name; [`output`],
 //!   [`progress`]: printing without a panic, and progress of long work; [`random`]: task sets that
-//!   are drawn;
+//!   are drawn; `svg`: pictures;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`golden`]: texts of the tree that tests hold to their word;
 //! - [`trace`]: the events of a run, checked against the model's rules;
@@ -63,6 +63,7 @@ pub mod record;
 pub mod recordings;
 pub mod run;
 pub mod soak;
+mod svg;
 pub mod system;
 pub mod test;
 pub mod tiny;
@@ -71,6 +72,9 @@ pub mod wire_script;
 
 pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};
+
+#[cfg(test)]
+mod tests;
 
 #[cfg(test)]
 use record::tests::made;

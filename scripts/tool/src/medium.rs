@@ -66,7 +66,6 @@ exit codes: 0 the files are there; 1 one could not be made; 2 a refused command 
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn image(words: &[OsString]) -> ExitCode {
     TABLE.carry_out(words, |options| {
         let guest_words = check(options).map_err(Refusal::Usage)?;
@@ -173,7 +172,6 @@ impl Medium {
     }
 
     /// Returns the path of the file.
-    #[must_use]
     pub fn path(&self) -> &Path {
         self.0.path()
     }

@@ -88,7 +88,6 @@ const FILES: &[AppFile] = &[
 type Changes = Vec<(String, String)>;
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn new_app(words: &[OsString]) -> ExitCode {
     NEW_APP.carry_out(words, |options| {
         print!("{}", make(options)?);
@@ -406,6 +405,7 @@ mod tests {
     };
     use crate::options::Refusal;
     use crate::system::workspace;
+    use crate::tests::rows;
     use std::fs;
 
     #[test]
@@ -463,9 +463,8 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
 
     #[test]
     fn each_bad_name_is_refused_with_what_is_possible() {
-        for row in BAD.lines() {
-            let (name, line) = row.split_once(" | ").expect(row);
-            assert_eq!(check(workspace(), name), Err(line.to_string()));
+        for [name, line] in rows(BAD) {
+            assert_eq!(check(workspace(), &name), Err(line));
         }
         let long = "a".repeat(33);
         for name in ["", "../fork", "2nd", "brake-", "-a", "a--b", &long] {

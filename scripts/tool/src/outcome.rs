@@ -12,8 +12,8 @@ use std::time::Duration;
 
 use crate::child::Asked;
 use crate::medium::Medium;
-use crate::places::Places;
-use crate::protocol::{MachineLine, Status, Transcript};
+use crate::places;
+use crate::protocol::{MachineLine, Status, Transcript, Verdict};
 use crate::qemu::{Ending, Qemu};
 use crate::record::Record;
 use crate::system;
@@ -42,16 +42,6 @@ pub struct Outcome {
     pub elapsed: Duration,
     /// QEMU's own error output; mostly empty.
     pub complaints: String,
-}
-
-/// The reason why a run is not good.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fault {
-    /// [`Status::Usage`] if the guest refused its command line, otherwise
-    /// [`Status::Failure`].
-    pub status: Status,
-    /// One line that says why.
-    pub reason: String,
 }
 
 /// Boots `image`, shows each whole serial line to `show` as it comes, and
@@ -93,19 +83,19 @@ pub fn boot_with_input(
     let medium = medium.transpose()?;
     let loaded = medium.as_ref().map_or(image, Medium::path);
     let mut running = qemu.start(loaded, log)?;
-    talk(running.input());
+    talk(running.child.input());
     let (ending, serial) = running.follow(limit, &mut show)?;
     Ok(Outcome {
-        asked: running.asked(),
-        elapsed: running.elapsed(),
+        asked: running.asked,
+        elapsed: running.child.elapsed(),
         complaints: running.complaints(),
         ..Outcome::of(ending, serial, log, image)
     })
 }
 
-const fn failure(reason: String) -> Fault {
+const fn failure(reason: String) -> Verdict {
     let status = Status::Failure;
-    Fault { status, reason }
+    Verdict { status, reason }
 }
 
 /// Judges the lines of a guest: no machine line is damaged, the verdict is success, and
@@ -113,17 +103,14 @@ const fn failure(reason: String) -> Fault {
 ///
 /// # Errors
 ///
-/// The first reason why it is not good.
-pub fn judge_lines(transcript: &Transcript) -> Result<(), Fault> {
+/// The guest's own verdict, or the first reason why it is not good.
+pub fn judge_lines(transcript: &Transcript) -> Result<(), Verdict> {
     let verdict = transcript.verdict().map_err(failure)?;
     if let Some(fault) = transcript.faults.first() {
-        return Err(failure(fault.to_string()));
+        return Err(failure(fault.clone()));
     }
     if verdict.status != Status::Success {
-        return Err(Fault {
-            status: verdict.status,
-            reason: verdict.reason,
-        });
+        return Err(verdict);
     }
     let violated = |line: &&MachineLine| line.number_at("violations").is_some_and(|n| n > 0);
     match transcript.machine.iter().find(violated) {
@@ -167,8 +154,8 @@ impl Outcome {
     ///
     /// # Errors
     ///
-    /// The first reason why it is not good.
-    pub fn judge(&self) -> Result<(), Fault> {
+    /// The guest's own verdict, or the first reason why it is not good.
+    pub fn judge(&self) -> Result<(), Verdict> {
         // The kernel prints a verdict before it ends by the exit port. So a status of that port
         // without a verdict comes from the app.
         let is_odd = matches!(self.ending, Ending::Status(status) if status > 1 && status % 2 == 1);
@@ -220,7 +207,6 @@ impl Outcome {
 
     /// Returns the last serial lines, indented, and the path of the whole log. After a fault at an
     /// address it adds the function.
-    #[must_use]
     pub fn tail(&self) -> String {
         // Lines of the record are of no use to people.
         let lines = self.serial.lines();
@@ -240,10 +226,9 @@ impl Outcome {
             }
             _ => writeln!(text, "the serial log {log}:"),
         };
-        let places = Places::new(&self.image);
         for line in shown {
             let _ = writeln!(text, "  | {line}");
-            if let Some(place) = places.explain(line) {
+            if let Some(place) = places::explain(&self.image, line) {
                 let _ = writeln!(text, "  = {place}");
             }
         }
@@ -253,8 +238,8 @@ impl Outcome {
 
 #[cfg(test)]
 mod tests {
-    use super::{Fault, Outcome};
-    use crate::protocol::Status;
+    use super::Outcome;
+    use crate::protocol::{Status, Verdict};
     use crate::qemu::Ending;
     use std::path::Path;
     use std::time::Duration;
@@ -318,7 +303,8 @@ mod tests {
     fn a_refused_command_line_is_told_from_a_failure() {
         let usage = Ending::Guest(Status::Usage);
         let (status, reason) = (Status::Usage, "`x=1`: no".into());
-        assert_eq!(outcome(usage, USAGE).judge(), Err(Fault { status, reason }));
+        let refused = Verdict { status, reason };
+        assert_eq!(outcome(usage, USAGE).judge(), Err(refused));
     }
 
     #[test]

@@ -73,7 +73,6 @@ fn note(written: io::Result<()>) {
 
 /// Returns the exit code of the tool, whose work has ended with `code`. If some output could not be
 /// written, says so and makes success a failure.
-#[must_use]
 pub fn conclude(code: ExitCode) -> ExitCode {
     // Standard output buffers: the last write error shows only in a flush.
     note(stdout().flush());

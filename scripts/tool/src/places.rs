@@ -18,8 +18,8 @@
 
 use std::collections::BTreeMap;
 use std::env;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
+use std::process::Command;
 
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
@@ -34,43 +34,27 @@ const BACKTRACE: &str = "backtrace";
 /// Folders of the workspace whose code is not the app's.
 const OF_OTHERS: [&str; 4] = ["boot/", "fass/", "kernel/", "sched-dag/"];
 
-/// The names for addresses in one image.
-#[derive(Debug)]
-pub struct Places {
-    image: PathBuf,
-}
-
-impl Places {
-    /// Makes the names of an image, which need not exist or be an ELF file.
-    #[must_use]
-    pub fn new(image: &Path) -> Places {
-        Places {
-            image: image.to_path_buf(),
-        }
+/// Returns the text to add to a line of the serial log of an image, if any, such as `0x20e0b8 is
+/// faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`. The image need not exist or be an
+/// ELF file.
+pub fn explain(image: &Path, line: &str) -> Option<String> {
+    let line = read_line(0, line)?.ok()?;
+    let is_backtrace = line.kind == BACKTRACE;
+    let address = address(&line);
+    let calls = match is_backtrace {
+        true => Call::list(line.value.get("calls")),
+        false => Vec::new(),
+    };
+    let addresses = calls.iter().flat_map(|call| call.addresses());
+    let addresses: Vec<u64> = address.into_iter().chain(addresses).collect();
+    let first = *addresses.first()?;
+    let program = system::find_program("addr2line")?;
+    // All addresses in one call: the program reads the whole debugging information each time.
+    let frames = frames(&program, image, &addresses)?;
+    if is_backtrace {
+        return tell(address, &calls, &frames);
     }
-
-    /// Returns the text to add to a line of the serial log, if any, such as `0x20e0b8 is
-    /// faults::crimes::sum_down, of apps/faults/src/crimes.rs:115`.
-    #[must_use]
-    pub fn explain(&self, line: &str) -> Option<String> {
-        let line = read_line(0, line)?.ok()?;
-        let is_backtrace = line.kind == BACKTRACE;
-        let address = address(&line);
-        let calls = match is_backtrace {
-            true => Call::list(line.value.get("calls")),
-            false => Vec::new(),
-        };
-        let addresses = calls.iter().flat_map(|call| call.addresses());
-        let addresses: Vec<u64> = address.into_iter().chain(addresses).collect();
-        let first = *addresses.first()?;
-        let program = system::find_program("addr2line")?;
-        // All addresses in one call: the program reads the whole debugging information each time.
-        let frames = frames(&program, &self.image, &addresses)?;
-        if is_backtrace {
-            return tell(address, &calls, &frames);
-        }
-        Some(sentence(first, frames.get(&first)?))
-    }
+    Some(sentence(first, frames.get(&first)?))
 }
 
 /// A function that contains an address, called or inlined there.
@@ -84,7 +68,6 @@ pub struct Frame {
 
 /// Returns the functions that contain each of the addresses in an image, the innermost first, by
 /// `addr2line` (`program`); nothing if it fails.
-#[must_use]
 pub fn frames(
     program: &Path,
     image: &Path,
@@ -92,15 +75,10 @@ pub fn frames(
 ) -> Option<BTreeMap<u64, Vec<Frame>>> {
     // `-a` repeats each address; `-i` names the inlined calls that contain it, each in two
     // lines (`-f`: function, file and line); `-C` makes names readable.
-    let output = Command::new(program)
-        .args(["-aifC", "-e"])
-        .arg(image)
-        .args(addresses.iter().map(|address| format!("{address:#x}")))
-        .stdin(Stdio::null())
-        .stderr(Stdio::null())
-        .output();
-    let output = output.ok().filter(|output| output.status.success())?;
-    Some(read_frames(&String::from_utf8_lossy(&output.stdout)))
+    let mut command = Command::new(program);
+    command.args(["-aifC", "-e"]).arg(image);
+    command.args(addresses.iter().map(|address| format!("{address:#x}")));
+    Some(read_frames(&system::run(&mut command).ok()?))
 }
 
 fn read_frames(found: &str) -> BTreeMap<u64, Vec<Frame>> {
@@ -322,7 +300,6 @@ fn chain<'f>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use super::{Places, read_frames, sentence};
     use crate::system::workspace;
     use std::fs;
     use std::path::Path;
@@ -349,19 +326,19 @@ mod tests {
 
     #[test]
     fn an_address_of_a_fault_is_named_with_the_apps_line_and_nothing_else_is() {
-        let places = Places::new(&std::env::current_exe().unwrap());
+        let explained = |line: &str| explain(&std::env::current_exe().unwrap(), line);
         let inside = in_file(fuse as *const () as usize);
-        let explained = places.explain(&line("panic", &inside)).unwrap();
-        let (place, found) = explained.rsplit_once(':').unwrap();
+        let said = explained(&line("panic", &inside)).unwrap();
+        let (place, found) = said.rsplit_once(':').unwrap();
         let name = "tool::places::tests::fuse, of scripts/tool/src/places.rs";
         assert_eq!(place, format!("{inside} is {name}"));
         // Any of its three lines.
-        assert!(fuse().abs_diff(found.parse().unwrap()) <= 1, "{explained}");
+        assert!(fuse().abs_diff(found.parse().unwrap()) <= 1, "{said}");
         // Names of the library are readable, and its lines are not the app's.
         let library = in_file(std::fmt::write as *const () as usize);
         let expected = format!("{library} is core::fmt::write");
-        assert_eq!(places.explain(&line("panic", &library)), Some(expected));
-        let nowhere = places.explain(&line("panic", "0x10"));
+        assert_eq!(explained(&line("panic", &library)), Some(expected));
+        let nowhere = explained(&line("panic", "0x10"));
         assert_eq!(
             nowhere.as_deref(),
             Some("0x10 is in no function of the image")
@@ -371,10 +348,10 @@ mod tests {
             line("own", &inside),
             "  at 0x20".into(),
         ] {
-            assert_eq!(places.explain(&other), None);
+            assert_eq!(explained(&other), None);
         }
-        let missing = Places::new(Path::new("no such image"));
-        assert_eq!(missing.explain(&line("panic", "0x200000")), None);
+        let missing = explain(Path::new("no such image"), &line("panic", "0x200000"));
+        assert_eq!(missing, None);
     }
 
     #[test]

@@ -25,7 +25,6 @@ pub struct Progress {
 
 impl Progress {
     /// Starts at the first of `total` units.
-    #[must_use]
     pub fn new(total: u64, unit: &'static str) -> Progress {
         Progress {
             unit,

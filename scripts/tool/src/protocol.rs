@@ -12,7 +12,6 @@
 //! that has no section there passes, so that an app may add its own.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::sync::LazyLock;
 
 use crate::json::{self, Value};
@@ -59,35 +58,16 @@ pub struct MachineLine {
 
 impl MachineLine {
     /// Returns the unsigned number at a path such as `join_latency_ns.max`.
-    #[must_use]
     pub fn number_at(&self, path: &str) -> Option<u64> {
         let names: Vec<&str> = path.split('.').collect();
         self.value.at(&names).and_then(Value::as_u64)
     }
 
     /// Returns the string member `name`, if there is one.
-    #[must_use]
     pub fn text_at(&self, name: &str) -> Option<&str> {
         self.value.get(name).and_then(Value::as_text)
     }
 }
-
-/// A line that begins like a machine line but is damaged.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ProtocolError {
-    /// The line's number in the log, counted from 1.
-    pub number: usize,
-    /// The defect, in words.
-    pub message: String,
-}
-
-impl fmt::Display for ProtocolError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "serial line {}: {}", self.number, self.message)
-    }
-}
-
-impl std::error::Error for ProtocolError {}
 
 /// A guest's own status of its run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,12 +80,12 @@ pub enum Status {
     Usage,
 }
 
-/// The last line of a run.
+/// The last line of a run, or what the host says of it in its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Verdict {
-    /// The status that the guest states.
+    /// Whether it is good.
     pub status: Status,
-    /// Why, in words; may be empty.
+    /// Why, in one line of words; may be empty.
     pub reason: String,
 }
 
@@ -114,15 +94,14 @@ pub struct Verdict {
 pub struct Transcript {
     /// The machine lines in their order.
     pub machine: Vec<MachineLine>,
-    /// The damaged ones.
-    pub faults: Vec<ProtocolError>,
+    /// The defects of damaged ones, in words, each with the number of its line.
+    pub faults: Vec<String>,
     /// The number of the last line that is not blank.
     last_line: usize,
 }
 
 impl Transcript {
     /// Reads a whole log.
-    #[must_use]
     pub fn read(log: &str) -> Transcript {
         let mut transcript = Transcript::default();
         for (index, line) in log.lines().enumerate() {
@@ -180,7 +159,6 @@ impl Transcript {
 
 /// Returns the part of a line that the guest has printed: without the line end, and without the
 /// remains of a firmware's output before the last carriage return.
-#[must_use]
 pub fn written(line: &str) -> &str {
     let line = line.trim_end_matches(['\r', '\n']);
     line.rsplit_once('\r').map_or(line, |(_, own)| own)
@@ -190,19 +168,17 @@ pub fn written(line: &str) -> &str {
 ///
 /// # Errors
 ///
-/// The line begins with `{` and is no valid machine line.
-#[must_use]
-pub fn read_line(number: usize, line: &str) -> Option<Result<MachineLine, ProtocolError>> {
+/// In words, with the line's number: it begins with `{` and is no valid machine line.
+pub fn read_line(number: usize, line: &str) -> Option<Result<MachineLine, String>> {
     let line = written(line);
     line.starts_with('{').then(|| {
-        let fault = |message| ProtocolError { number, message };
-        let value = json::parse(line).map_err(|error| fault(error.to_string()))?;
+        let fault = |message: &str| format!("serial line {number}: {message}");
+        let value = json::parse(line).map_err(|error| fault(&error.to_string()))?;
         let kind = value.get("kind").and_then(Value::as_text);
-        let kind = kind.ok_or_else(|| fault("a machine line without a text `kind`".into()))?;
+        let kind = kind.ok_or_else(|| fault("a machine line without a text `kind`"))?;
         if let Some(missing) = missing_member(kind, &value) {
-            return Err(fault(format!(
-                "a line of kind `{kind}` without `{missing}`"
-            )));
+            let without = format!("a line of kind `{kind}` without `{missing}`");
+            return Err(fault(&without));
         }
         Ok(MachineLine {
             number,
@@ -271,7 +247,6 @@ error: no video\r{\"kind\":\"progress\",\"done\":1,\"total\":2}\r
 {"kind":"fork_join"}
 "#;
         let faults = Transcript::read(log).faults;
-        let faults: Vec<String> = faults.iter().map(ToString::to_string).collect();
         let expected = "\
 serial line 2: column 28: the line ends where `,` or `}` must stand
 serial line 3: a machine line without a text `kind`

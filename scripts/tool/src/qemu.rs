@@ -25,7 +25,7 @@ use std::io::Write;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use boot::MOST_COMMAND_LINE_BYTES;
@@ -47,7 +47,7 @@ pub const MOST_CORES: u64 = replay::lines::MOST_CORES as u64;
 /// The other end of a guest's second serial port.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Second {
-    /// Forward the bytes written to [`Running::input`] to this port; then the first one has none.
+    /// Forward the bytes written to [`Running`]'s input to this port; then the first one has none.
     pub is_live: bool,
     /// The file for the bytes that the guest sends.
     pub output: Option<PathBuf>,
@@ -88,13 +88,13 @@ pub struct Qemu {
     pub module: Option<PathBuf>,
     /// The file for the bytes that the guest sends to QEMU's debug port; `None`: no such port.
     pub records: Option<PathBuf>,
-    /// Forward the bytes written to [`Running::input`] to the guest's serial port.
+    /// Forward the bytes written to [`Running`]'s input to the guest's serial port.
     pub has_input: bool,
     /// Have the guest end in order before it is killed, by ctrl-C at its first serial port.
     pub stops: bool,
     /// The connection of the second serial port; `None`: there is no such port.
     pub second: Option<Second>,
-    /// Write the address of each instruction that is executed to [`Running::log`].
+    /// Write the address of each instruction that is executed to [`Running`]'s output.
     pub logs_instructions: bool,
     /// Wait for a debugger before the first instruction, at this value of QEMU's `-gdb`.
     pub debugger: Option<OsString>,
@@ -125,7 +125,6 @@ impl Default for Qemu {
 impl Qemu {
     /// Returns QEMU's arguments for booting `image` with its serial output
     /// going to `serial`. For a [`Loader`] with a firmware `image` is a whole stick.
-    #[must_use]
     pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<OsString> {
         let (machine, mode, cores) = (self.machine, self.mode.arguments(), self.cores);
         let mut arguments = words(&format!(
@@ -222,9 +221,7 @@ impl Qemu {
 /// Makes QEMU translate, and so log, each instruction by itself. Since version 8.1 that is an
 /// option of the accelerator.
 fn log_instructions(program: &Path, arguments: &mut Vec<OsString>) {
-    let said = Command::new(program).arg("--version").output();
-    let said = said.map_or_else(|_| Vec::new(), |output| output.stdout);
-    let said = String::from_utf8_lossy(&said);
+    let said = system::run(Command::new(program).arg("--version")).unwrap_or_default();
     let version = said.split_once("version ").map_or("", |(_, rest)| rest);
     let mut numbers = version.split(|c: char| !c.is_ascii_digit());
     let mut number = || numbers.next()?.parse::<u32>().ok();
@@ -269,7 +266,6 @@ macro_rules! named {
             pub const NAMES: &[&str] = &[$($name),*];
 
             /// Returns the choice of that name.
-            #[must_use]
             pub fn from_name(name: &str) -> Option<Self> {
                 match name {
                     $($name => Some(Self::$choice),)*
@@ -278,7 +274,6 @@ macro_rules! named {
             }
 
             /// Returns the choice's name.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$choice => $name,)*
@@ -308,7 +303,6 @@ named! {
 
 impl Mode {
     /// Says in one sentence how far times in this mode can be trusted.
-    #[must_use]
     pub fn meaning(self) -> &'static str {
         match self {
             Mode::Kvm => "real nanoseconds on real cores, the host's noise included",
@@ -364,25 +358,21 @@ named! {
 
 impl Loader {
     /// Reports whether the image is on a stick, which a PC's firmware reads.
-    #[must_use]
     pub fn needs_stick(self) -> bool {
         self != Loader::Pvh
     }
 
     /// Reports whether GRUB passes the words on.
-    #[must_use]
     pub fn is_grub(self) -> bool {
         matches!(self, Loader::Bios | Loader::Uefi)
     }
 
     /// Reports whether the firmware is UEFI.
-    #[must_use]
     pub fn is_by_uefi(self) -> bool {
         matches!(self, Loader::Uefi | Loader::Efi)
     }
 
     /// Returns the least memory in MiB with which the loader has been seen to reach the image.
-    #[must_use]
     pub fn least_memory_mib(self) -> u64 {
         match self {
             Loader::Pvh | Loader::Bios => LEAST_MEMORY_MIB,
@@ -465,12 +455,14 @@ impl fmt::Display for Ending {
 /// A QEMU that was started and not yet waited for.
 #[derive(Debug)]
 pub struct Running {
-    child: Child,
+    /// Its input is the guest's serial port, its output the log of instructions, if wanted.
+    pub(crate) child: Child,
     serial: PathBuf,
     complaints: Temporary,
     /// The serial port through which the guest is asked to end, if it listens.
     stop: Option<File>,
-    asked: Option<Asked>,
+    /// The reason why the guest was asked to end, if it was.
+    pub(crate) asked: Option<Asked>,
 }
 
 impl Running {
@@ -553,30 +545,7 @@ impl Running {
         Ok((ending, followed.text))
     }
 
-    /// Returns the reason why the guest was asked to end, if it was.
-    #[must_use]
-    pub fn asked(&self) -> Option<Asked> {
-        self.asked
-    }
-
-    /// Takes the input of the guest's serial port, if it has one and it was not taken.
-    pub fn input(&mut self) -> Option<ChildStdin> {
-        self.child.input()
-    }
-
-    /// Takes the log of instructions, if there is one and it was not taken.
-    pub fn log(&mut self) -> Option<ChildStdout> {
-        self.child.output()
-    }
-
-    /// Returns the time since the start.
-    #[must_use]
-    pub fn elapsed(&self) -> Duration {
-        self.child.elapsed()
-    }
-
     /// Returns QEMU's own error output on one line; mostly empty.
-    #[must_use]
     pub fn complaints(&self) -> String {
         let text = fs::read(self.complaints.path()).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);
@@ -599,14 +568,6 @@ mod tests {
     use super::{Loader, Machine, Mode, Qemu, Second};
     use std::ffi::OsStr;
     use std::path::Path;
-
-    #[test]
-    fn names_are_read_back() {
-        for name in Mode::NAMES {
-            assert_eq!(Mode::from_name(name).map(Mode::name), Some(*name));
-        }
-        assert_eq!(Mode::from_name("fast"), None);
-    }
 
     /// Asserts which words are among QEMU's arguments, and which are not.
     fn has(qemu: &Qemu, parts: &[&str], others: &[&str]) {

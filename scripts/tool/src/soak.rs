@@ -37,22 +37,22 @@ static SOAK: Command = Command {
         /// 16 s of guest time instead of 14 minutes; the host takes longer.
         "short": Takes::Nothing;
         /// Processors of the guest.
-        "cores": Takes::number(1..=MOST_CORES), or "4";
+        "cores": Takes::Number(1, MOST_CORES), or "4";
         /// The first round.
-        "first": Takes::number(0..=1_000_000), or "0";
+        "first": Takes::Number(0, 1_000_000), or "0";
         /// How many rounds, that is sets of DAGs; 84, with --short 16.
-        "rounds": Takes::number(1..=1_000_000);
+        "rounds": Takes::Number(1, 1_000_000);
         /// Guest time in which each of the two runs of a round releases jobs; 5000, with --short 500.
-        "round-ms": Takes::number(1..=10_000);
+        "round-ms": Takes::Number(1, 10_000);
         /// Seed of all that is random.
-        "seed": Takes::number(0..=u64::MAX), or "1";
+        "seed": Takes::Number(0, u64::MAX), or "1";
         /// The meaning of time; see ./scripts/run --help.
         "mode": Takes::OneOf(Mode::NAMES), or "deterministic";
         /// Microseconds for which an instance may wait for what it is owed; 50, and where time is
         /// real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).
-        "bound-us": Takes::number(0..=1_000_000_000);
+        "bound-us": Takes::Number(0, 1_000_000_000);
         /// Guests that run at once; as many as the host has processors, and one where time is real.
-        "side-by-side": Takes::number(1..=64);
+        "side-by-side": Takes::Number(1, 64);
     },
     notes: "\
 A round draws 3 to 8 DAGs of 3 to 12 subtasks with random graphs and execution
@@ -72,7 +72,6 @@ exit codes: 0 no round failed; 1 some did; 2 a refused command line
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn soak(words: &[OsString]) -> ExitCode {
     SOAK.carry_out(words, |options| {
         let plan = plan(options);

@@ -15,7 +15,6 @@ use crate::json::{self, Value};
 
 /// Returns the root of the workspace: as `scripts/tool/start` says, or else where this tool was
 /// built, which is wrong once the workspace has been moved.
-#[must_use]
 pub fn workspace() -> &'static Path {
     static ROOT: OnceLock<PathBuf> = OnceLock::new();
     ROOT.get_or_init(|| match env::var_os("TOOL_WORKSPACE") {
@@ -28,7 +27,6 @@ pub fn workspace() -> &'static Path {
 }
 
 /// Reports whether standard error is a terminal on which a line can renew itself.
-#[must_use]
 pub fn stderr_moves() -> bool {
     io::stderr().is_terminal() && can_move(env::var_os("TERM").as_deref())
 }
@@ -40,7 +38,6 @@ fn can_move(term: Option<&OsStr>) -> bool {
 
 /// Returns a command for the cargo that built us, or else the one on `PATH`,
 /// in the workspace's root.
-#[must_use]
 pub fn cargo() -> Command {
     let program = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(program);
@@ -90,7 +87,6 @@ pub(crate) fn last_lines(said: &[u8]) -> String {
 }
 
 /// Returns the path of a program: the path itself, or a name found on the `PATH`.
-#[must_use]
 pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
     let name = name.as_ref();
     if name.as_bytes().contains(&b'/') {
@@ -130,7 +126,6 @@ fn is_program(file: &Path) -> bool {
 }
 
 /// Describes how busy the host is, and the remedy: for a run that exceeded its time.
-#[must_use]
 pub fn host_load() -> String {
     let averages = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let load = averages.split(' ').next().unwrap_or_default();

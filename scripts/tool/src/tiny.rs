@@ -1,10 +1,8 @@
 //! A guest of a few instructions, made in memory.
 //!
-//! It prints a given text on the first serial port, then ends QEMU with a
-//! given byte or halts for good. It needs no compiler and no kernel, so it
-//! given byte or halts for good. It needs no compiler and no kernel, so it answers two questions by
-//! itself: whether virtualization truly works here (the device file may exist and not work), and
-//! whether the tool's own way of starting, reading and ending QEMU works.
+//! It prints a given text on the first serial port, then ends QEMU with a given byte or halts for
+//! good. It needs no compiler and no kernel, so it shows by itself whether the tool's own way of
+//! starting, reading and ending QEMU works.
 //!
 //! The image is an ELF file with the note that makes QEMU's `-kernel` enter
 //! it by PVH: 32-bit protected mode, flat segments, at the address in the
@@ -36,7 +34,6 @@ pub enum TinyEnd {
 /// # Panics
 ///
 /// Panics if `text` has 4 GiB or more.
-#[must_use]
 pub fn tiny_image(text: &str, end: TinyEnd) -> Vec<u8> {
     let code_at = BASE + HEADERS + NOTE;
     let length = u32::try_from(text.len()).expect("a tiny guest's text is short");

@@ -51,7 +51,10 @@ fn entry(line: &str) -> Result<Entry, String> {
     let rest = rest.trim();
     let bytes = match rest.strip_prefix('"') {
         Some(text) => unescaped(text)?,
-        None => pairs(rest)?,
+        None => rest
+            .split_whitespace()
+            .map(pair)
+            .collect::<Result<_, _>>()?,
     };
     match bytes.len() {
         0 => Err(
@@ -102,10 +105,6 @@ fn escaped(rest: &mut std::str::Chars<'_>) -> Result<u8, String> {
     }
 }
 
-fn pairs(words: &str) -> Result<Vec<u8>, String> {
-    words.split_whitespace().map(pair).collect()
-}
-
 fn pair(digits: &str) -> Result<u8, String> {
     let is_pair = digits.len() == 2 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
     let byte = u8::from_str_radix(digits, 16).ok().filter(|_| is_pair);
@@ -119,7 +118,6 @@ fn pair(digits: &str) -> Result<u8, String> {
 }
 
 /// Returns the entries as the guest takes them.
-#[must_use]
 pub fn for_guest(entries: &[Entry]) -> Vec<u8> {
     let mut script = Vec::new();
     for (at_ns, bytes) in entries {
@@ -135,6 +133,7 @@ pub fn for_guest(entries: &[Entry]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::{for_guest, read};
+    use crate::tests::rows;
 
     #[test]
     fn texts_and_pairs_become_bytes_at_their_times() {
@@ -153,9 +152,9 @@ mod tests {
         assert_eq!(script, b"\x00\xca\x9a\x3b\0\0\0\0\x02\0g\n");
     }
 
-    /// Texts that are refused, with `/` for a line's end, and the reasons.
+    /// Texts that are refused, and the reasons.
     const REFUSED: &str = r#"5 "a" | 1: `5` has no unit; append one of ns, us, ms and s
-# a/soon 0a | 2: `soon` is no time
+# a\nsoon 0a | 2: `soon` is no time
 5ms | 1: there are no bytes; give a text
 5ms "" | 1: there are no bytes; give a text
 5ms "a | 1: the text has no end; close it
@@ -164,14 +163,13 @@ mod tests {
 5ms "\x1" | 1: `1"` is no pair of hexadecimal digits; write
 5ms 0a0 | 1: `0a0` is no pair of hexadecimal digits; write
 5ms +1 | 1: `+1` is no pair
-5ms 0a/4ms 0a | 2: this is before the line above; put"#;
+5ms 0a\n4ms 0a | 2: this is before the line above; put"#;
 
     #[test]
     fn what_is_wrong_is_told_with_its_line_and_the_remedy() {
-        for row in REFUSED.lines() {
-            let (text, says) = row.split_once(" | ").expect(row);
-            let refused = read(&text.replace('/', "\n")).unwrap_err();
-            assert!(refused.starts_with(says), "{text}: {refused}");
+        for [text, says] in rows(REFUSED) {
+            let refused = read(&text).unwrap_err();
+            assert!(refused.starts_with(&says), "{text}: {refused}");
         }
         let refused = read(&format!("5ms \"{}\"", "x".repeat(1025))).unwrap_err();
         assert!(refused.starts_with("1: 1025 bytes arrive at once"));

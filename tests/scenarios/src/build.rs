@@ -283,6 +283,9 @@ fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
     for wait in &subtask.waits {
         attributes = attributes.wait(wait.limit);
     }
+    if let Some(core) = subtask.core {
+        attributes = attributes.core(core);
+    }
     if subtask.is_non_preemptive {
         attributes = attributes.non_preemptive();
     }
@@ -294,7 +297,7 @@ impl DagText {
     fn begin(&self) -> (Dag, Option<Signal>) {
         let dag = create_dag();
         dag.name(&self.name).overrun(self.overrun).order(self.order);
-        dag.offset(self.offset);
+        dag.offset(self.offset).affinity(&self.affinity);
         dag.relative_deadline(self.deadline.unwrap_or(self.period));
         if self.jobs > 0 {
             let all = u32::try_from(self.jobs).unwrap_or(u32::MAX);

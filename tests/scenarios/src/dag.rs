@@ -12,8 +12,8 @@ use crate::number;
 
 /// A DAG: `NAME`, then any of
 /// `period T` or `sporadic T`, `deadline T`, `offset T`, `jobs N`, `in-flight N`,
-/// `overrun queue|skip|abort`, `order fixed`, `survives FAULTS/WINDOW/ALL`, `cluster N`, `paused`,
-/// `on-fault DAG`.
+/// `overrun queue|skip|abort`, `order fixed`, `survives FAULTS/WINDOW/ALL`, `cluster N`,
+/// `affinity N,N`, `paused`, `on-fault DAG`.
 ///
 /// It has one job, unless that is said (`jobs 0`: no end), and room for all of its jobs.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +29,7 @@ pub struct DagText {
     pub(crate) order: SubtaskOrder,
     pub(crate) survives: Option<FaultLimit>,
     pub(crate) cluster: Option<u32>,
+    pub(crate) affinity: Vec<u32>,
     pub(crate) is_paused: bool,
     /// The DAG that a fault releases.
     pub(crate) on_fault: Option<String>,
@@ -37,7 +38,7 @@ pub struct DagText {
 }
 
 /// A subtask: `NAME TIMES`, then any of
-/// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `non-preemptive`,
+/// `after NAME NAME`, `priority N`, `wcet T`, `budget T`, `due T` (of a sink), `core N`, `non-preemptive`,
 /// `fails N,N` (in these of its calls, from 0), `restarts` or `falls-back` (what replaces it after
 /// a fault), `updates STATE`, `reads STATE`, `samples NAME` (a subtask of another DAG), and with
 /// the number of the call in which it is done `raises DAG N,N`, `pauses DAG N,N` and then
@@ -61,6 +62,7 @@ pub struct SubtaskText {
     /// How long a call of it may compute.
     pub budget: Option<Duration>,
     pub(crate) due: Option<Duration>,
+    pub(crate) core: Option<u32>,
     pub(crate) is_non_preemptive: bool,
     /// Whether it computes and does not hold its core; one with a budget does so in any case.
     pub computes: bool,
@@ -145,13 +147,13 @@ fn time(words: &mut Words<'_>) -> Result<Duration, String> {
     Ok(Duration::from_millis(number(value(words)?)?))
 }
 
-fn numbers(words: &mut Words<'_>) -> Result<Vec<u64>, String> {
+fn numbers<N: core::str::FromStr>(words: &mut Words<'_>) -> Result<Vec<N>, String> {
     value(words)?.split([',', '/']).map(number).collect()
 }
 
 fn times(words: &mut Words<'_>) -> Result<Vec<Duration>, String> {
-    let numbers = numbers(words)?.into_iter();
-    Ok(numbers.map(Duration::from_millis).collect())
+    let numbers: Vec<u64> = numbers(words)?;
+    Ok(numbers.into_iter().map(Duration::from_millis).collect())
 }
 
 impl DagText {
@@ -192,6 +194,7 @@ impl DagText {
                     });
                 }
                 "cluster" => dag.cluster = Some(number(value(words)?)?),
+                "affinity" => dag.affinity = numbers(words)?,
                 "paused" => dag.is_paused = true,
                 "on-fault" => dag.on_fault = Some(value(words)?.into()),
                 _ => return Err(format!("`{key}` is no word of a dag")),
@@ -244,6 +247,7 @@ impl DagText {
                 "wcet" => subtask.wcet = Some(time(words)?),
                 "budget" => subtask.budget = Some(time(words)?),
                 "due" => subtask.due = Some(time(words)?),
+                "core" => subtask.core = Some(number(value(words)?)?),
                 "non-preemptive" => subtask.is_non_preemptive = true,
                 "fails" => subtask.fails = numbers(words)?,
                 "restarts" => subtask.replaced = Replaced::Anew,

@@ -68,6 +68,7 @@ pub const SUITE: &[(&str, &str)] = &[
     ("lifecycle", include_str!("../lifecycle.txt")),
     ("modes", include_str!("../modes.txt")),
     ("overrun", include_str!("../overrun.txt")),
+    ("pins", include_str!("../pins.txt")),
     ("rules", include_str!("../rules.txt")),
     ("sharing", include_str!("../sharing.txt")),
     ("waits", include_str!("../waits.txt")),

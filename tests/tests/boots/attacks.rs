@@ -5,7 +5,7 @@
 
 use harness::{Guest, Members, Said};
 use tool::Outcome;
-use tool::places::Places;
+use tool::places;
 use tool::protocol::{MachineLine, Status};
 
 /// Boots one attack, or those that can be one after the other, on so many cores.
@@ -99,8 +99,7 @@ fn forged_is_text(outcome: &Outcome) {
 /// Returns the calls that led to the faults, with names.
 fn calls_told(outcome: &Outcome) -> Vec<String> {
     let lines = outcome.lines("backtrace").into_iter();
-    let places = Places::new(&outcome.image);
-    let told = lines.map(|line| places.explain(&line.text).expect("names"));
+    let told = lines.map(|line| places::explain(&outcome.image, &line.text).expect("names"));
     told.collect()
 }
 

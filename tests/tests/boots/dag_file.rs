@@ -180,6 +180,28 @@ fn dags_run_in_the_clusters_that_they_state_or_that_the_commit_finds() {
     is_refused(stated.as_bytes(), "jobs=1", why);
 }
 
+#[test]
+fn what_an_owner_leaves_is_lent_on_the_machine_and_on_linux() {
+    let file = system::workspace().join("apps/dag-file/examples/lent.dag");
+    let file = file.display().to_string();
+    let of = "--cores 2 --clusters auto --jobs 20";
+    let charged = "--mode deterministic --append overheads=measured";
+    for (place, is_exact) in [(charged, true), ("--on linux", false)] {
+        let words = [place, of].map(|words| words.split(' ')).into_iter();
+        let words: Vec<&str> = words.flatten().collect();
+        let said = harness::run(&file, &words);
+        said.line("dag_set")
+            .has([("violations", 0), ("allocations", 0)]);
+        let tests = said.lines("dag_run").into_iter().map(|dag| {
+            dag.has([("completed", 20)]);
+            let tightness = dag.number("tightness_permille");
+            assert!(!is_exact || tightness <= 1000, "{}", dag.text);
+            dag.text.contains("own on each core") || dag.text.contains("what owners leave")
+        });
+        assert_eq!(tests.collect::<Vec<_>>(), [true, true]);
+    }
+}
+
 /// Faults of a file are in the tests of `dag-file`, those of a word in the tests of the kernel's
 /// options: here is what comes of both.
 #[test]

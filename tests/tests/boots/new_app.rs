@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 
 use harness::guide::{documented_output, without_numbers};
 use harness::markdown::{blocks, page};
-use tool::golden::{Golden, excerpt};
+use tool::golden::Golden;
 use tool::new_app::{self, CrateSource};
 use tool::system::{self, workspace};
 
@@ -93,6 +93,19 @@ fn boot(repository: &Path) -> String {
 
 /// Cargo's line about the test that each new app has, when it passes.
 const PASSES: &str = "test every_job_is_in_time_and_within_its_bound ... ok";
+
+/// Returns an excerpt of an output. A line of `kept` that the output still has stays; otherwise it
+/// becomes the line of the output with the longest common beginning. `shown` decides which lines
+/// are equal.
+fn excerpt(kept: &str, output: &str, shown: impl Fn(&str) -> String) -> String {
+    let common = |a: &str, b: &str| a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
+    let line = |kept| {
+        let is_said = output.lines().any(|line| shown(line) == shown(kept));
+        let nearest = output.lines().max_by_key(|line| common(line, kept));
+        format!("{}\n", nearest.filter(|_| !is_said).unwrap_or(kept))
+    };
+    kept.lines().map(line).collect()
+}
 
 #[test]
 fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_guide_shows() {

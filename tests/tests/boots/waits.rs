@@ -132,7 +132,7 @@ fn a_wait_costs_no_step_of_the_scheduler() {
     let lines = outcome.lines("waits_cost");
     assert_eq!(lines.len(), 2);
     // One that takes time ends by the timer's interrupt, which two context switches frame.
-    for (line, (word, most)) in lines.iter().zip([("at_once", 570), ("later", 1_160)]) {
+    for (line, (word, most)) in lines.iter().zip([("at_once", 600), ("later", 1_200)]) {
         line.reads([("wait", word)]);
         line.has([("allocations", 0)]);
         let instructions = line.number("instructions");

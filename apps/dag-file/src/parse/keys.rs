@@ -76,6 +76,16 @@ impl<'l, 'a> Keys<'l, 'a> {
 
     pub(super) fn number(&mut self, key: &str) -> Result<u32, Malformed> {
         let word = self.value(key)?;
+        self.number_of(key, word)
+    }
+
+    /// Reads numbers with commas between them.
+    pub(super) fn numbers(&mut self, key: &str) -> Result<Vec<u32>, Malformed> {
+        let words = self.value(key)?.split(',');
+        words.map(|word| self.number_of(key, word)).collect()
+    }
+
+    fn number_of(&self, key: &str, word: &str) -> Result<u32, Malformed> {
         let is_number = word.bytes().all(|byte| byte.is_ascii_digit());
         let number = word.parse().ok().filter(|_| is_number);
         match number {

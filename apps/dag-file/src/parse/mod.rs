@@ -282,6 +282,7 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
             "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
             "offset" => spec.offset_ns = keys.time_ns(key)?,
             "cluster" => spec.cluster = Some(ClusterId(keys.number(key)?)),
+            "affinity" => spec.affinity = keys.numbers(key)?,
             "in-flight" => spec.in_flight = Some(keys.number(key)?),
             "overrun" => {
                 spec.overrun = match keys.value(key)? {
@@ -311,7 +312,8 @@ fn read_dag(line: &Line<'_>) -> Result<FileDag, Malformed> {
             other => {
                 return Err(keys.unknown(
                     other,
-                    "`period`, `deadline`, `offset`, `cluster`, `overrun`, `order`, `in-flight`",
+                    "`period`, `deadline`, `offset`, `cluster`, `affinity`, `overrun`, `order`, \
+                     `in-flight`",
                 ));
             }
         }
@@ -347,6 +349,7 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
                 return Err(line.malformed(message));
             }
             "priority" => spec.priority = Some(Priority(keys.number(key)?)),
+            "core" => spec.core = Some(keys.number(key)?),
             "non-preemptive" => spec.non_preemptive = true,
             "deadline" => spec.relative_deadline_ns = Some(keys.time_ns(key)?),
             "samples" => {
@@ -359,8 +362,8 @@ fn read_subtask(line: &Line<'_>) -> Result<(SubtaskSpec, FileSubtask), Malformed
             other => {
                 return Err(keys.unknown(
                     other,
-                    "`wcet`, after it any `wait` and `wcet`, `priority`, `non-preemptive`, \
-                     `deadline`, `samples`",
+                    "`wcet`, after it any `wait` and `wcet`, `priority`, `core`, \
+                     `non-preemptive`, `deadline`, `samples`",
                 ));
             }
         }

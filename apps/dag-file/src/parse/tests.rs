@@ -9,8 +9,8 @@ fn refusal(text: &str) -> String {
 const GOOD: &str = "\
 # Two sets.
 set first
-dag camera period 25ms deadline 100ms offset 1ms overrun skip order fixed in-flight 4 # all keys
-subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms
+dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip order fixed in-flight 4 # all keys
+subtask grab wcet 3ms priority 5 core 1 non-preemptive samples 1ms,2ms
 subtask show wcet 500us priority 6 deadline 30ms
 edge grab -> show
 
@@ -32,6 +32,7 @@ fn a_file_is_read_and_written_back() {
     assert_eq!(&*camera.subtasks[0].samples_ns, [1_000_000, 2_000_000]);
     assert_eq!(camera.spec.relative_deadline_ns, Some(100_000_000));
     assert_eq!(camera.spec.in_flight, Some(4));
+    assert_eq!(camera.spec.affinity, [2, 0]);
     let show = &camera.spec.subtasks[1];
     assert_eq!(show.relative_deadline_ns, Some(30_000_000));
     // Without a deadline it is the period.
@@ -46,8 +47,8 @@ fn a_file_is_read_and_written_back() {
 
     let written = file.to_string();
     assert_eq!(parse(&written).unwrap().to_string(), written);
-    let kept = "dag camera period 25ms deadline 100ms offset 1ms overrun skip order fixed in-flight 4\n\
-                subtask grab wcet 3ms priority 5 non-preemptive samples 1ms,2ms\n";
+    let kept = "dag camera period 25ms deadline 100ms offset 1ms affinity 2,0 overrun skip order fixed in-flight 4\n\
+                subtask grab wcet 3ms priority 5 core 1 non-preemptive samples 1ms,2ms\n";
     assert!(written.contains(kept), "{written}");
     let waits = "subtask only wcet 1ns wait 0ns wcet 2ms wait 3ms wcet 1us priority 1\n";
     assert!(written.contains(waits), "{written}");
@@ -75,6 +76,8 @@ dag x period 1ms period 2ms => line 1: `period` stands here twice; give it once
 dag x period -1ms => line 1: period: `-1ms` is negative; give a time from 0 on
 dag x period 99999999999s => line 1: period: `99999999999s` is more than 64 bits
 dag x period 1ms overrun wait => overrun: `wait` is none of queue, skip and abort
+dag x period 1ms affinity 0,,2 => line 1: affinity: `` is no whole number from 0 to 4294967295
+dag x period 1ms affinity => line 1: `affinity` lacks its value
 dag x period 1ms in-flight 4294967296 => in-flight: `4294967296` is no whole number
 \nsubtask a wcet 1ms => line 2: `subtask` stands before any `dag`; begin with
 {dag}subtask a => line 2: subtask `a` has no wcet; add `wcet 3ms`

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use common::random::Random;
 use recording::{
     Channel, Chunk, Commit, CommittedDag, Counted, Crc, DagHeader, DagTimes, Entry, EntryKind,
-    Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Times, VERSION,
-    Writer, mended, to_bytes,
+    Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Stream, Times,
+    VERSION, Writer, mended, to_bytes,
 };
 
 fn header() -> Header {
@@ -45,6 +45,9 @@ fn commit() -> Commit {
             bound_ns: Some(7),
             ..CommittedDag::default()
         }],
+        pins: vec![(0, 0, 1)],
+        affinities: vec![(0, 0), (0, 2)],
+        move_ns: 7,
         ..Commit::default()
     }
 }
@@ -233,7 +236,7 @@ fn foreign_and_newer_files_are_told() {
     let newer = [&MAGIC[..], &(VERSION + 1).to_le_bytes()].concat();
     assert_eq!(
         said(&newer),
-        "at byte 8: expected version 1 to 6 of recordings, which are those that are read"
+        "at byte 8: expected version 1 to 7 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);
@@ -298,4 +301,27 @@ fn a_recording_of_the_version_before_is_read_and_one_of_the_next_is_not() {
     let before = Recording::read(&before).unwrap();
     assert_eq!((before.count(), before.lost()), (20, 1));
     assert!(Recording::read(&of_version(VERSION + 1, &bytes)).is_err());
+}
+
+#[test]
+fn a_commit_of_a_version_before_has_no_waits_or_pins() {
+    let commit = Commit {
+        cores: 2,
+        ..Commit::default()
+    };
+    // Versions 5 and 6 end it before the numbers of these, and no version elsewhere.
+    for (lacks, is_one) in [(20, true), (16, true), (12, false), (17, false)] {
+        let mut bytes = Stream::begin(Vec::new()).end();
+        let end = bytes.split_off(10);
+        let payload = to_bytes(&commit);
+        let payload = &payload[..payload.len() - lacks];
+        let length = u32::try_from(payload.len()).expect("it is short");
+        bytes.extend([&[6], &length.to_le_bytes()[..], payload, &[0; 4]].concat());
+        bytes.extend(end);
+        let bytes = of_version(6, &bytes);
+        let chunk = Recording::read(&bytes)
+            .ok()
+            .and_then(|all| all.chunks().next());
+        assert_eq!(chunk.is_some(), is_one, "{lacks}");
+    }
 }

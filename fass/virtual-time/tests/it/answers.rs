@@ -231,10 +231,14 @@ fn the_commit_divides_the_cores_and_says_why() {
     assert_eq!(
         places,
         [
-            "in cluster 1, on 1 core from core 2 on: the emptiest one",
-            "in cluster 0, on 2 cores from core 0 on: its own, as a job is 12ms of work within 10ms",
-            "in cluster 2, on 1 core from core 3 on: the emptiest one",
-            "in cluster 2, on 1 core from core 3 on: the emptiest one",
+            "in cluster 1, on 1 core from core 2 on: the first with room for it, with 30 % of them \
+             left (attempt 1, by density)",
+            "in cluster 0, on 2 cores from core 0 on: its own in a fixed order, as a job is 12ms of \
+             work within 10ms, with 15 % of them left (attempt 1, by density)",
+            "in cluster 0, on 1 core from core 1 on: the first with room for it, with 10 % of them \
+             left (attempt 1, by density)",
+            "in cluster 2, on 1 core from core 3 on: the first with room for it, with 60 % of them \
+             left (attempt 1, by density)",
         ]
     );
     assert!(commit.first_unproven().is_none());

@@ -5,13 +5,13 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::replay::{stage_after, stage_before};
-use super::sweep::{DispatchModel, DispatchState, DispatchSweep, WaitCounts};
+use super::sweep::{DispatchModel, DispatchState, DispatchSweep, Place, WaitCounts};
 use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, EventKind};
 use crate::policy::{OnFault, SchedulerOptions};
 use crate::spec::WAITS;
-use crate::task_set::TaskSet;
+use crate::task_set::{Dag, TaskSet};
 
 /// The findings about R5 in a journal.
 #[derive(Clone, Debug, Default)]
@@ -42,10 +42,16 @@ pub fn judge_dispatch(
         let is_of_it = |event: &Event| task_set.dag(event.dag).cluster() == cluster;
         let events = events.clone().filter(is_of_it);
         let due = events.clone().filter(|event| event.what == EventKind::Due);
+        let own = task_set
+            .dags()
+            .iter()
+            .filter(|dag| dag.cluster() == cluster);
+        let groups: BTreeSet<&[u32]> = own.map(Dag::affinity).collect();
         let mut model = DispatchModel {
             task_set,
             options,
             cores: task_set.cores_of(cluster, options.cores),
+            groups: groups.into_iter().collect(),
             due_ns: BTreeMap::new(),
         };
         for event in due {
@@ -65,20 +71,21 @@ fn of_cluster(
     DispatchReport { violations, waits }: &mut DispatchReport,
 ) {
     let cores = model.cores.clone();
-    let (mut known, before) = match terms.is_whole {
+    let (known, before) = match terms.is_whole {
         true => (cores.map(CoreId).collect(), BTreeMap::new()),
         false => before(cores, events.clone()),
     };
     let mut sweep = DispatchSweep::new(model, terms.tolerance_ns, first_ns, waits);
     // A core that no event has named yet may have run anything, so nothing is held against it.
-    sweep.known_cores = known.len();
+    sweep.known_cores = known;
     for (instance, stage) in before {
         sweep.enter(instance, stage);
     }
     for event in events.clone() {
         sweep.go_on_to(event.time_ns);
-        let is_new = event.what.is_of_machine() && known.insert(event.core);
-        sweep.known_cores += usize::from(is_new);
+        if event.what.is_of_machine() {
+            sweep.known_cores.insert(event.core);
+        }
         // An instance's end is the DAG's too, unless the DAG survives faults.
         let ends_its_dag = model.task_set.dag(event.dag).on_fault() == OnFault::EndDag;
         if event.what == EventKind::DagEnded || event.what == EventKind::Ended && ends_its_dag {
@@ -130,12 +137,26 @@ fn before(
     (busy.collect(), first_of_instance)
 }
 
-/// Returns the instances on a core of another cluster, or that lost a core that they keep.
+/// Returns the instances on a core that is not theirs, by cluster, pin or affinity, or that lost a
+/// core that they keep.
 fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -> Vec<Violation> {
     let mut suspended = BTreeSet::new();
     let found = events.filter_map(|event| {
         if event.what.is_of_machine() && !model.cores.contains(&event.core.0) {
             return Some(Violation::OutsideItsCluster { event });
+        }
+        if event.what.is_of_machine()
+            && let Some(of) = event.instance()
+        {
+            match model.place(of) {
+                Place::Core(core) if core != event.core => {
+                    return Some(Violation::OffItsCore { event, core });
+                }
+                Place::Group(group) if !model.is_of(group, event.core) => {
+                    return Some(Violation::OutsideItsAffinity { event });
+                }
+                _ => {}
+            }
         }
         let instance = (event.instance()).filter(|of| model.keeps_its_core(*of))?;
         let lost = match event.what {

@@ -9,19 +9,34 @@ use crate::{CommitOptions, CoreDivision, DagSpec, Priority, SubtaskSpec, verify}
 /// DAGs of one subtask each in these clusters, DAG 0 the most urgent; the last one's subtask
 /// cannot be preempted if `keeps`.
 pub(in crate::law) fn dags(clusters: &[u32], keeps: bool) -> TaskSet {
+    pinned(clusters, keeps, &[])
+}
+
+/// The same, the subtasks of the first DAGs pinned to these cores of their clusters.
+fn pinned(clusters: &[u32], keeps: bool, pins: &[Option<u32>]) -> TaskSet {
+    placed(clusters, keeps, pins, &[])
+}
+
+/// The same, and the first DAGs with these affinities, if any, on four cores.
+fn placed(clusters: &[u32], keeps: bool, pins: &[Option<u32>], affinities: &[&[u32]]) -> TaskSet {
     let spec = |(dag, &cluster): (u32, &u32)| DagSpec {
         period_ns: Some(100),
         relative_deadline_ns: Some(50 + u64::from(dag)),
         cluster: Some(ClusterId(cluster)),
+        affinity: affinities
+            .get(dag as usize)
+            .map_or(vec![], |of| of.to_vec()),
         subtasks: vec![SubtaskSpec {
             priority: Some(Priority(dag)),
+            core: pins.get(dag as usize).copied().flatten(),
             non_preemptive: keeps && dag as usize + 1 == clusters.len(),
             ..SubtaskSpec::default()
         }],
         ..DagSpec::default()
     };
     let specs: Vec<DagSpec> = (0..).zip(clusters).map(spec).collect();
-    let options = CommitOptions::new(Policy::StaticPriority, 2);
+    let cores = if affinities.is_empty() { 2 } else { 4 };
+    let options = CommitOptions::new(Policy::StaticPriority, cores);
     let options = match clusters.contains(&1) {
         true => options.with_clusters(CoreDivision::Of(vec![1, 1])),
         false => options,
@@ -153,4 +168,96 @@ fn r5_holds_within_each_cluster() {
     });
     let outside = outside.each_ref().map(String::as_str);
     must(&three, 2, "0 0 5: 0@0 0-4, 1@1 0-5, 2@1 5-7", &outside);
+}
+
+#[test]
+fn r5_lets_pinned_instances_go_first_on_their_core() {
+    // DAG 2, the least urgent, takes core 0 from DAG 0, which takes core 1 from DAG 1.
+    let last = pinned(&[0, 0, 0], false, &[None, None, Some(0)]);
+    let right = "0 0 4: 0@0 0-4, 1@1 0-4, 2@0 4-6, 0@1 4-9, 1@0 6-9";
+    must(&last, 2, right, &[]);
+    let waits = passed_over(4, 2, 5, "core 0 runs subtask 0 of dag 0 job 0");
+    must(&last, 2, "0 0 4: 0@0 0-9, 1@1 0-9, 2@0 9-12", &[&waits]);
+    // DAG 1 is the one that has to go.
+    let wrong_one = passed_over(4, 0, 2, "core 1 runs subtask 0 of dag 1 job 0");
+    let ran = "0 0 4: 0@0 0-4, 1@1 0-9, 2@0 4-6, 0@0 6-9";
+    must(&last, 2, ran, &[&wrong_one]);
+    // An idle core is not idle for one that is pinned to another.
+    must(&last, 2, "0 9 0: 2@0 0-4, 0@1 0-4, 1@0 9-12", &[]);
+    let both = pinned(&[0, 0], false, &[Some(1), Some(1)]);
+    must(&both, 2, "0 0: 0@1 0-4, 1@1 4-9", &[]);
+    let order = passed_over(0, 0, 4, "core 1 runs subtask 0 of dag 1 job 0");
+    must(&both, 2, "0 0: 1@1 0-4, 0@1 4-9", &[&order]);
+    let idle = passed_over(0, 0, 2, "core 1 is idle");
+    must(&both, 2, "0 0: 0@1 2-4, 1@1 4-9", &[&idle]);
+    // While core 1 waits for that, core 0 is idle for what is not pinned.
+    let one = pinned(&[0, 0], false, &[Some(1)]);
+    let of_other = passed_over(0, 1, 4, "core 0 is idle");
+    must(&one, 2, "0 0: 0@1 0-4, 1@0 4-9", &[&of_other]);
+}
+
+#[test]
+fn r5_judges_cores_and_starts_of_pinned_instances() {
+    let off = |dag, core, pin| {
+        [(0, "starts"), (4, "finishes")].map(|(at_ns, what)| {
+            format!(
+                "at {at_ns} ns, R5 dispatch: subtask 0 of dag {dag} job 0 {what} on core {core}, \
+                 and is pinned to core {pin}"
+            )
+        })
+    };
+    let one = pinned(&[0, 0], false, &[Some(1)]);
+    let found = off(0, 0, 1);
+    let found = found.each_ref().map(String::as_str);
+    must(&one, 2, "0 4: 0@0 0-4, 1@1 4-9", &found);
+    // A core of its cluster is meant.
+    let second = pinned(&[0, 0, 1], false, &[None, None, Some(0)]);
+    must(&second, 2, "0 0 2: 0@0 0-4, 1@0 4-9, 2@1 2-5", &[]);
+    // What keeps its core keeps it from pinned ones, but starts after them.
+    let keeps = pinned(&[0, 0], true, &[Some(0)]);
+    must(&keeps, 1, "2 0: 1@0 0-4, 0@0 4-9", &[]);
+    let least = pinned(&[0, 0], true, &[None, Some(0)]);
+    must(&least, 1, "0 0: 1@0 0-4, 0@0 4-9", &[]);
+    let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 1 job 0 starts on core 0 and keeps it, \
+                  although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
+    must(&keeps, 1, "0 0: 1@0 0-4, 0@0 4-9", &[chosen]);
+}
+
+#[test]
+fn r5_judges_each_group_of_cores_by_itself() {
+    // DAGs 0 and 1 on cores 0 and 2, DAG 2 on core 1, DAG 3 the owner of core 0.
+    let pins = [None, None, None, Some(0)];
+    let lent = placed(&[0; 4], false, &pins, &[&[2, 0], &[0, 2], &[1], &[]]);
+    // DAG 0 gives way to the owner, and DAG 1 to it, though it is more urgent than DAG 2.
+    let right = "0 0 0 4: 0@0 0-4, 1@2 0-4, 2@1 0-9, 3@0 4-6, 0@2 4-7, 1@0 6-9";
+    must(&lent, 3, right, &[]);
+    let wrong_one = passed_over(4, 0, 2, "core 2 runs subtask 0 of dag 1 job 0");
+    let ran = "0 0 0 4: 0@0 0-4, 1@2 0-9, 2@1 0-9, 3@0 4-6, 0@0 6-9";
+    must(&lent, 3, ran, &[&wrong_one]);
+    // Core 1 is not idle for DAG 1, and core 0 is, whatever runs elsewhere.
+    must(&lent, 3, "0 0 0 0: 3@0 0-4, 0@2 0-4, 1@2 4-9, 2@1 0-2", &[]);
+    let inside = passed_over(4, 1, 5, "core 0 is idle");
+    let ran = "0 0 0 0: 3@0 0-4, 0@2 0-9, 1@0 9-12, 2@1 0-2";
+    must(&lent, 3, ran, &[&inside]);
+    let idle = passed_over(0, 2, 2, "core 1 is idle");
+    let ran = "0 0 0 9: 0@0 0-9, 1@2 0-9, 2@1 2-4, 3@0 9-12";
+    must(&lent, 3, ran, &[&idle]);
+    let away = [(0, "starts"), (4, "finishes")].map(|(at_ns, what)| {
+        format!(
+            "at {at_ns} ns, R5 dispatch: subtask 0 of dag 1 job 0 {what} on core 3, to which its \
+             DAG has no affinity"
+        )
+    });
+    let away = away.each_ref().map(String::as_str);
+    let ran = "0 0 0 4: 0@0 0-4, 1@3 0-4, 2@1 0-4, 3@0 4-9";
+    must(&lent, 4, ran, &away);
+    // What keeps its core starts after the more urgent of its group, though another core is idle.
+    let keeps = placed(&[0; 3], true, &[], &[&[0], &[1], &[0]]);
+    must(&keeps, 2, "0 0 0: 0@0 0-4, 2@0 4-9, 1@1 0-9", &[]);
+    let chosen = "at 0 ns, R5 dispatch: subtask 0 of dag 2 job 0 starts on core 0 and keeps it, \
+                  although subtask 0 of dag 0 job 0 waits since 0 ns and goes first";
+    must(&keeps, 2, "0 9 0: 2@0 0-4, 0@0 4-9, 1@1 9-12", &[chosen]);
+    // Cores of its cluster are meant.
+    let second = placed(&[0, 1, 1], false, &[None, None, Some(0)], &[&[], &[], &[]]);
+    must(&second, 2, "0 0 2: 0@0 0-4, 1@1 0-2, 2@1 2-5, 1@1 5-6", &[]);
 }

@@ -154,6 +154,8 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
                 });
                 dag.subtasks[index(1)].waits = waits.collect();
             }
+            ("pin", Some(dag)) => dag.subtasks[index(1)].core = Some(small(2)),
+            ("affinity", Some(dag)) => dag.affinity = (1..words.len()).map(small).collect(),
             ("due", Some(dag)) => {
                 dag.subtasks[index(1)].relative_deadline_ns = Some(number(2));
             }

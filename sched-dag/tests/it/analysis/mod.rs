@@ -7,6 +7,7 @@
 mod drawn;
 mod forged;
 mod kinds;
+mod lent;
 mod one_core;
 mod random;
 mod simulate;
@@ -218,6 +219,31 @@ fn what_becomes_ready_at_once_is_charged_whatever_its_rank() {
     // The two that a fork makes ready beyond 16, in two jobs.
     let wide = spec(100, 100, &[1; 19], &fork, 1);
     assert_eq!(on(Policy::StaticPriority, 1, wide)[0], Some(12 + 2 * 2));
+}
+
+#[test]
+fn overheads_beside_pinned_subtasks_count_in_each_bound() {
+    let mut owner = spec(10, 10, &[3], &[], 0);
+    owner.subtasks[0].core = Some(0);
+    let mut member = spec(20, 20, &[5], &[], 1);
+    let bounds = |member: &DagSpec, ready_ns, interrupt_ns| {
+        let task_set = commit(&[owner.clone(), member.clone()], Policy::StaticPriority, 2);
+        let mut with = settings(FP, 2);
+        (with.overheads.ready_ns, with.overheads.interrupt_ns) = (ready_ns, interrupt_ns);
+        let bounds = answer(&task_set, &with).bounds;
+        bounds
+            .iter()
+            .map(|bound| bound.unwrap().bound_ns)
+            .collect::<Vec<_>>()
+    };
+    // It has both cores: one is always free, and a whole unit is halved and rounded up.
+    assert_eq!(bounds(&member, 0, 0), [3, 6]);
+    // The owner may move it to the other core.
+    assert_eq!(bounds(&member, 0, 1), [3 + 2, 5 + 2 + 1]);
+    member.affinity = vec![0];
+    assert_eq!(bounds(&member, 0, 0), [3, 5 + 3]);
+    // Releases are 2 late, and so is the owner: at 12 it may come for the second time in 14.
+    assert_eq!(bounds(&member, 1, 0), [3 + 2, 5 + 2 * 3 + 3]);
 }
 
 #[test]

@@ -6,13 +6,14 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use common::random::Random;
-use sched_dag::analysis::{AnalysisResult, DagBound, answer, witness};
+use sched_dag::analysis::{AnalysisResult, DagBound, answer, assign, witness};
 use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, TaskSet};
 
 use super::forged;
 use super::kinds::tighter;
 use super::random::{Sample, draw_waits, sample};
-use super::simulate::spec;
+use super::simulate::{commit, spec};
+use super::{FP, lent, settings};
 use crate::support::number;
 
 pub(crate) fn output(files: &[String]) -> Output {
@@ -96,6 +97,70 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
 }
 
 #[test]
+fn every_divided_set_has_a_witness_and_no_altered_one_passes() {
+    let folder = std::env::temp_dir().join(format!("lent-{}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let (mut files, mut expected) = (Vec::new(), Vec::new());
+    for seed in 1..=number("WITNESS_SETS", 300) {
+        let (specs, cores) = lent::set(&mut Random::new(seed));
+        let mut task_set = commit(&specs, Policy::StaticPriority, cores);
+        let mut settings = settings(FP, cores);
+        settings.overheads.interrupt_ns = u64::from(seed % 4 == 1);
+        settings.overheads.ready_ns = u64::from(seed % 4 == 2);
+        if assign(&mut task_set, &settings).is_err() {
+            continue;
+        }
+        let path = folder.join(seed.to_string());
+        fs::write(&path, witness(&task_set, &settings)).unwrap();
+        files.push(path.to_string_lossy().into_owned());
+        expected.push(lines(&task_set, &answer(&task_set, &settings)));
+    }
+    let said = accepted(&files);
+    for (file, expected) in files.iter().zip(&expected) {
+        let said = lines_about(file, &said);
+        let agree = said.iter().zip(expected);
+        let agree = agree.filter(|(said, it)| said.starts_with(*it)).count();
+        assert_eq!(
+            agree,
+            expected.len().max(said.len()),
+            "{said:?} {expected:?}"
+        );
+    }
+    // Of one part each, with all forms of pinned subtasks.
+    let (mut counts, mut seen) = ([0; 3], BTreeMap::new());
+    for file in &files {
+        let text = fs::read_to_string(file).unwrap();
+        for part in text.replace("\nmachine ", "\n\0machine ").split('\0') {
+            let forms = [" owner ", " sequence ", " lent "].map(|form| part.contains(form));
+            let count = seen.entry(forms).or_insert(0);
+            if !forms.contains(&true) || *count == 3 {
+                continue;
+            }
+            *count += 1;
+            let alone: String = part
+                .lines()
+                .filter(|line| !line.starts_with("cluster "))
+                .fold(String::new(), |text, line| text + line + "\n");
+            fs::write(file, forged::hashed(&alone)).unwrap();
+            let more = forged::refused(file);
+            for (sum, more) in counts.iter_mut().zip(more) {
+                *sum += more;
+            }
+        }
+    }
+    let [refused, same, sound] = counts;
+    println!(
+        "{} pass, forms {seen:?}; altered: {refused} refused, {same} the same, {sound} sound",
+        files.len()
+    );
+    assert!(
+        seen.len() >= 4 && refused > 1_000 && same <= 40,
+        "{seen:?}, {refused}, {same}"
+    );
+    fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
 fn a_witness_that_lacks_a_cluster_is_refused() {
     let mut sample = full_core();
     for (spec, cluster) in sample.specs.iter_mut().zip(0..) {
@@ -135,7 +200,7 @@ fn tests(answer: &AnalysisResult, path: &Path) -> Vec<String> {
 fn lines(task_set: &TaskSet, answer: &AnalysisResult) -> Vec<String> {
     let mut lines = Vec::new();
     for cluster in task_set.clusters() {
-        let place = match task_set.is_divided() {
+        let place = match task_set.clusters().count() > 1 {
             true => format!("cluster {}: ", cluster.0),
             false => String::new(),
         };

@@ -1,7 +1,8 @@
 //! The scheduler against its rules, on random sets of DAGs and in every order of events.
 //!
 //! The rules are judged by the law ([`sched_dag::law`]), which shares no code with the scheduler,
-//! and where that does not judge by `releases.rs` and `waits.rs`. `walk.rs` is the driver. That the
+//! and where that does not judge by `releases.rs` and `waits.rs`; which instances run, by `pins.rs`, too.
+//! `walk.rs` is the driver. That the
 //! law finds what is wrong is shown in `tests/it/journal.rs`.
 //!
 //! Each set comes from a seed. More or other sets: `SCHED_DAG_SETS=100000 SCHED_DAG_SEED=7 cargo
@@ -9,6 +10,7 @@
 
 mod devices;
 mod explore;
+mod pins;
 mod releases;
 mod waits;
 mod walk;

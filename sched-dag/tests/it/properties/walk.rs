@@ -4,12 +4,13 @@
 //! driver that comes late, ends of instances that have lost their core meanwhile, ends of several in
 //! any order, faults, ends, pauses and closings at any time, answers to waits, in time or not. The
 //! journal is judged by the law ([`Walk::judged`]); what that does not judge, by [`Releases`] and,
-//! of waits, by [`Waits`], after each instant.
+//! of waits, by [`Waits`], after each instant; and which instances run, by [`Eligible`].
 //!
 //! Each end that is the last thing of an instant is told by [`Scheduler::pass_on`], or
 //! [`Scheduler::wait_shortly`], and the long way by a copy, too: both have to come to the same. So
 //! have [`Scheduler::wake_shortly`] and a dispatch.
 
+use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use sched_dag::journal::EventKind;
@@ -22,6 +23,7 @@ use sched_dag::{
     CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler, TurnEnd,
 };
 
+use super::pins::{Eligible, cores_of, keeps_its_core};
 use super::releases::{Releases, SAID};
 use super::waits::Waits;
 use crate::support::set::Set;
@@ -52,6 +54,7 @@ pub(crate) struct Walk<'s> {
     idle: Vec<CoreId>,
     releases: Vec<Releases>,
     pub(crate) waits: Waits,
+    eligible: Eligible,
     /// Whether it has come later than it should, or an end after a core was lost.
     is_late: bool,
 }
@@ -71,6 +74,7 @@ impl<'s> Walk<'s> {
             idle: (0..cores).rev().map(CoreId).collect(),
             releases: set.specs.iter().map(Releases::new).collect(),
             waits: Waits::default(),
+            eligible: Eligible::default(),
             is_late: false,
         }
     }
@@ -126,7 +130,18 @@ impl<'s> Walk<'s> {
             None => self.end()?,
         };
         self.hear(true)?;
+        let kept = (0..).map(CoreId).zip(&self.cores);
+        let kept = kept.filter_map(|(core, running)| Some(((*running)?, core)));
+        let kept = kept
+            .filter(|(of, _)| keeps_its_core(self.set, *of))
+            .collect();
         self.carry_out(&decisions)?;
+        self.eligible.read(self.scheduler.log.journal.events());
+        let task_set = self.scheduler.task_set();
+        let expected = self.eligible.should_run(self.set, task_set, &kept);
+        if self.running().collect::<BTreeSet<_>>() != expected {
+            return Err(format!("{:?} run, not {expected:?}", self.cores));
+        }
         for (core, running) in (0..).map(CoreId).zip(&self.cores) {
             if self.scheduler.running(core) != *running {
                 return Err(format!("{core:?} should run {running:?}"));
@@ -202,7 +217,7 @@ impl<'s> Walk<'s> {
         let Some((core, runs)) = core else {
             self.is_late = true;
             self.preempted.retain(|preempted| *preempted != instance);
-            return CoreId(0);
+            return CoreId(cores_of(self.set, instance)[0]);
         };
         *runs = None;
         self.idle.push(core);
@@ -303,7 +318,15 @@ impl<'s> Walk<'s> {
                     (EventKind::Suspend, place.take() == Some(instance))
                 }
                 _ => {
-                    let is_free = freed.take().or_else(|| self.idle.pop()) == Some(core);
+                    let may_be = cores_of(self.set, instance);
+                    // The last one that is idle of those that it may be on.
+                    let mut idle = self.idle.iter();
+                    let at = idle.rposition(|idle| may_be.contains(&idle.0));
+                    let free = match freed.take() {
+                        Some(freed) => Some(freed),
+                        None => at.map(|at| self.idle.remove(at)),
+                    };
+                    let is_free = free == Some(core) && may_be.contains(&core.0);
                     let is_free = is_free && place.replace(instance).is_none();
                     match self.preempted.iter().position(|it| *it == instance) {
                         Some(at) => {

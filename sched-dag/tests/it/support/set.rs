@@ -69,13 +69,16 @@ pub(crate) fn draw(random: &mut Random, overruns: Overruns) -> Set {
     set
 }
 
-/// Draws a set with sporadic DAGs, too, and every other one with waits.
+/// Draws a set with sporadic DAGs, too, and every other one with waits, or pins, or both.
 pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
     let overruns = match random.chance(40) {
         true => Overruns::Never,
         false => Overruns::Often,
     };
-    let set = with_sporadic(draw(random, overruns), random);
+    let mut set = with_sporadic(draw(random, overruns), random);
+    if random.chance(50) {
+        set = with_pins(set, random);
+    }
     match random.chance(50) {
         true => with_waits(set, random),
         false => set,
@@ -98,6 +101,9 @@ pub(crate) fn draw_tiny(random: &mut Random) -> Set {
             if random.once_in(3) {
                 let limit_ns = random.within(0..=1);
                 set.specs[0].subtasks[0].waits.push(wait(limit_ns));
+            }
+            if random.chance(50) {
+                set = with_pins(set, random);
             }
             return set;
         }
@@ -124,6 +130,40 @@ fn with_waits(mut set: Set, random: &mut Random) -> Set {
         subtask.waits = (0..waits).map(draw).collect();
     }
     set
+}
+
+/// Pins subtasks to cores: some in four of five sets, all in the others; every other set has
+/// affinities, too.
+fn with_pins(mut set: Set, random: &mut Random) -> Set {
+    let percent = random.one_of(&[0, 20, 50, 80, 100]);
+    if random.chance(50) {
+        with_affinities(&mut set.specs, set.options.cores, random);
+    }
+    let cores = set.options.cores.min(4);
+    let subtasks = set.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
+    for subtask in subtasks {
+        let core = random.within(0..=cores - 1);
+        subtask.core = random.chance(percent).then_some(core);
+    }
+    set
+}
+
+/// Gives each DAG the cores of one of up to three groups, in any order, some of them twice.
+pub(crate) fn with_affinities(specs: &mut [DagSpec], cores: u32, random: &mut Random) {
+    let mut groups = vec![Vec::new(); 4];
+    for core in 0..cores {
+        let group = random.index(4);
+        groups[group].insert(0, core);
+        groups[group].extend(random.once_in(4).then_some(core));
+    }
+    // The cores of the last one are left to what is pinned to them.
+    groups.swap_remove(3);
+    groups.retain(|group| !group.is_empty());
+    if !groups.is_empty() {
+        for spec in specs {
+            spec.affinity = groups[random.index(groups.len())].clone();
+        }
+    }
 }
 
 fn with_sporadic(mut set: Set, random: &mut Random) -> Set {

@@ -1,12 +1,13 @@
-//! The share of random sets of DAGs that are proven, by load.
+//! Sets of DAGs that methods of analysis accept.
 //!
-//! For each number of cores and each load, from a tenth of the cores to all of them, the same
-//! random sets are analysed twice: by the commit's answer, and by the forms that it had before the
-//! multi-path bound (those of the oracle, with the width refinement, and the utilisation tests,
-//! which both have). No time is measured, so the table is the same on every host.
+//! First the share of random sets by utilization, for the division of cores that lends them and for
+//! other methods (`acceptance`), or of sets that files give. No time is
+//! measured, so the tables are the same on every host.
 //!
 //! Two more tables follow: small sets with short deadlines, where the multi-path bound gains
-//! most, and bounds of Kasahara's task graphs, alone on their cores, over Graham's.
+//! most over the forms that the commit had before (those of the oracle, with the width refinement,
+//! and the utilisation tests), and bounds of Kasahara's task graphs, alone on their cores, over
+//! Graham's.
 //!
 //! Sizes and cores of small sets are those of the random test that came with the proof of the
 //! multi-path bound. It counted 91,351 sets by that bound and 47,638 by Melani's form with the
@@ -14,6 +15,7 @@
 //! deadlines is unknown, so the ratios can be compared, but not the counts.
 
 use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use common::random::Random;
@@ -25,62 +27,103 @@ use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskOrder, verify,
 };
 
+use super::acceptance::{self, SetFile};
 use super::frame::by_plan;
 use crate::dag_file::stg;
+use crate::files;
 use crate::options::{Command, Parsed, Takes, options};
 use crate::oracle::older_bounds::{Width, graham, long_paths, melani_edf, melani_fp};
 use crate::output::Table;
+use crate::progress::Lasting;
 use crate::random::graph;
 
 static COMMAND: Command = Command {
     invocation: "./scripts/bench bounds",
-    about: "Counts the random sets of DAGs that the analysis proves, with the multi-path bound \
-            and by the forms before it.",
-    positional: None,
+    about: "Draws by utilization how many random sets of DAGs are accepted by lent cores and by \
+            other methods; counts what the multi-path bound proves, and the forms before it.",
+    positional: Some((
+        Takes::File("FILE..."),
+        "Count only the sets of these files, as in tests/oracle/lent.txt, with or without answers.",
+    )),
     options: options! {
         /// The numbers of cores.
-        "cores": Takes::numbers(1..=64), or "4,8,16";
-        /// Random sets for each number of cores and load.
-        "sets": Takes::number(1..=1_000_000), or "200";
+        "cores": Takes::Numbers(1, 64), or "4,8,16";
+        /// Random sets for each number of cores, utilization and kind of deadlines.
+        "sets": Takes::Number(1, 1_000_000), or "200";
+        /// The seed of all random sets.
+        "seed": Takes::Number(0, u64::MAX), or "1";
+        /// The folder for acceptance.csv and acceptance.svg.
+        "out" 'o': Takes::File("DIR"), or "target/bounds";
     },
     notes: "\
-A set has 2 to 2 m DAGs of 5 to 20 subtasks with D = T and deadline-monotonic priorities;
-its load is the sum of volume / T over the cores. A small set has 2 to 5 DAGs of 2 to 8
-subtasks on 2 to 4 cores, with D from the longest path to T, and is one of 100 for each of --sets.
+A set has as many DAGs as cores, but 8 at least. Methods: graham, federated scheduling; multi_path,
+the same by the multi-path bound, or global deadline-monotonic priorities; v_fed, virtually-federated
+scheduling; lent, heavy DAGs with a fixed order that lend their idle time; fluid, a density test. The
+last one is of a scheduler that no machine has. A small set has 2 to 5 DAGs of 2 to 8 subtasks on 2
+to 4 cores, with D from the longest path to T, and is one of 100 for each of --sets.
 
-Exit code: 0 counted; 1 a set was proven before and is not now; 2 the command line is refused.
+Exit code: 0 counted; 1 a small set was proven before and is not now; 2 the command line or a file
+is refused.
 ",
 };
 
-/// The seed of all random sets.
-const SEED: u64 = 1;
+/// The plan of a measurement.
+struct BoundsPlan {
+    files: Vec<SetFile>,
+    cores: Vec<u32>,
+    sets: u64,
+    seed: u64,
+    out: PathBuf,
+}
+
+impl BoundsPlan {
+    fn new(options: &Parsed) -> Result<Self, String> {
+        options.check_distinct(&["cores"])?;
+        if options.files().len() > 0 {
+            let why = "is for random sets; leave it or the files out";
+            options.check_without(&["cores", "sets", "seed", "out"], why)?;
+        }
+        files::check_once(options.files())?;
+        (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
+        Ok(Self {
+            files: (options.files().map(SetFile::read)).collect::<Result<_, _>>()?,
+            cores: options.numbers("cores"),
+            sets: options.number("sets").unwrap_or_default(),
+            seed: options.number("seed").unwrap_or_default(),
+            out: options.path("out").unwrap_or(Path::new("")).into(),
+        })
+    }
+}
 
 /// Runs `bench bounds` with the words after its name.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
-    let plan = |options: &Parsed| {
-        options.check_distinct(&["cores"])?;
-        let sets = options.number("sets").unwrap_or(200);
-        Ok((options.numbers::<u32>("cores"), sets))
-    };
-    by_plan(&COMMAND, words, plan, |(cores, sets)| measure(cores, *sets))
+    by_plan(&COMMAND, words, BoundsPlan::new, measure)
 }
 
 /// Counts and prints; an error if a set that was proven before is not now.
-fn measure(cores: &[u32], count: u64) -> Result<bool, String> {
-    let of_cores = |&cores: &u32| by_load(cores, count, SEED);
-    let points: Vec<Point> = cores.iter().flat_map(of_cores).collect();
-    print!("{}", table(&points));
-    let small = small(100 * count, SEED);
+fn measure(plan: &BoundsPlan) -> Result<bool, String> {
+    if !plan.files.is_empty() {
+        let _lasting = Lasting::new("counting sets");
+        print!("{}", acceptance::of_files(&plan.files));
+        return Ok(true);
+    }
+    print!(
+        "{}",
+        acceptance::measure(&plan.cores, plan.sets, plan.seed, &plan.out)?
+    );
+    println!("written: {}", plan.out.display());
+    let _lasting = Lasting::new("counting small sets");
+    let small = small(100 * plan.sets, plan.seed);
     print!("{}", small_table(&small));
     print!("{}", graph_table()?);
-    match lost(points.iter().map(|point| &point.proven).chain([&small])) {
-        0 => Ok(true),
+    match small.iter().map(|proven| proven.lost).sum() {
+        0_u64 => Ok(true),
         lost => Err(format!("{lost} sets were proven before and are not now")),
     }
 }
 
 /// Returns the options and settings for any graphs.
-fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
+pub(super) fn terms(policy: Policy, cores: u32) -> (CommitOptions, AnalysisSettings) {
     let options = CommitOptions::new(policy, cores);
     let settings = AnalysisSettings {
         policy,
@@ -166,30 +209,6 @@ fn proofs(sets: impl Iterator<Item = (Vec<DagSpec>, u32)>) -> ByPolicy {
     all
 }
 
-/// Returns the number of sets that were proven before and are not now.
-fn lost<'p>(all: impl IntoIterator<Item = &'p ByPolicy>) -> u64 {
-    all.into_iter().flatten().map(|proven| proven.lost).sum()
-}
-
-/// The proofs at one load on one number of cores.
-struct Point {
-    cores: u32,
-    /// The load in tenths of the cores.
-    tenths: u64,
-    proven: ByPolicy,
-}
-
-/// Analyses `sets` random sets at each load.
-fn by_load(cores: u32, sets: u64, seed: u64) -> Vec<Point> {
-    let mut random = Random::new(seed);
-    let point = |tenths| Point {
-        cores,
-        tenths,
-        proven: proofs((0..sets).map(|_| (draw_set(&mut random, cores, tenths), cores))),
-    };
-    (1..=10).map(point).collect()
-}
-
 /// Analyses `sets` small random sets.
 fn small(sets: u64, seed: u64) -> ByPolicy {
     let mut random = Random::new(seed);
@@ -197,35 +216,6 @@ fn small(sets: u64, seed: u64) -> ByPolicy {
         let cores = random.within(2..=4);
         (draw_small(&mut random), cores)
     }))
-}
-
-/// Returns a table with a row for each load, and the sums for each number of cores.
-fn table(points: &[Point]) -> String {
-    let columns = "cores:6|load:6.1|sets:8|G-FP before:14.1|now:10.1|G-EDF before:14.1|now:10.1";
-    let title = "sets proven, in percent: before and with the multi-path bound\n";
-    let mut table = Table::new(title, columns);
-    for point in points {
-        let percent =
-            |of: &ProvenSets| [of.before, of.now].map(|count| 100.0 * ratio(count, of.sets));
-        let [[fp, fp_now], [edf, edf_now]] = point.proven.each_ref().map(percent);
-        let (load, sets) = (point.tenths as f64 / 10.0, point.proven[0].sets);
-        table.row(&[&point.cores, &load, &sets, &fp, &fp_now, &edf, &edf_now]);
-    }
-    for same in points.chunk_by(|one, other| one.cores == other.cores) {
-        for (position, (_, name)) in POLICIES.into_iter().enumerate() {
-            let of = |which: fn(&ProvenSets) -> u64| -> u64 {
-                same.iter()
-                    .map(|point| which(&point.proven[position]))
-                    .sum()
-            };
-            let (before, now, cores) = (of(|of| of.before), of(|of| of.now), same[0].cores);
-            let times = ratio(now, before);
-            table.line(&format!(
-                "{name} on {cores} cores: {now} sets now, {before} before: {times:.2} times as many"
-            ));
-        }
-    }
-    table.text()
 }
 
 /// Returns a table with a row for each policy.
@@ -248,30 +238,6 @@ fn ratio(count: u64, of: u64) -> f64 {
 /// The unit of small sets in nanoseconds: 2, 3 and 4 cores divide it, so that the rounding of the
 /// older forms has no effect.
 const UNIT_NS: u64 = 12;
-
-/// Draws a set whose load on `cores` cores is about `tenths` tenths.
-///
-/// Each DAG gets a random share of the load, and the period that makes its utilisation that
-/// share, but never one below its volume on all cores.
-fn draw_set(random: &mut Random, cores: u32, tenths: u64) -> Vec<DagSpec> {
-    let cores = u64::from(cores);
-    let count = random.within(2..=2 * cores);
-    let shares: Vec<u64> = (0..count).map(|_| random.within(1..=20)).collect();
-    let all: u64 = shares.iter().sum();
-    let dags = shares.iter().enumerate().map(|(number, share)| {
-        // In units of 1 us, so that the rounding of the older forms has no effect.
-        let mut spec = graph(random, 5..=20, 3..=9, 1..=100, 1_000);
-        let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
-        let volume: u64 = wcets.sum();
-        // T = volume / (share of the load), the load being `tenths * cores / 10`.
-        let period = (10 * volume * all).div_ceil(tenths * cores * share);
-        spec.name = format!("dag {number}");
-        spec.period_ns = Some(period.max(volume.div_ceil(cores)));
-        spec.relative_deadline_ns = spec.period_ns;
-        spec
-    });
-    dags.collect()
-}
 
 /// Draws a small set with short deadlines: of 2 to 5 DAGs of 2 to 8 subtasks, which take up to
 /// 20 units. A DAG's period lies between its longest path, or a quarter of its volume, and three
@@ -364,16 +330,6 @@ fn graph_table() -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_was_proven_still_is_and_light_sets_are() {
-        let points = by_load(4, 12, 7);
-        assert_eq!(points.len(), 10);
-        assert_eq!(lost(points.iter().map(|point| &point.proven)), 0);
-        let all = points.iter().flat_map(|point| point.proven);
-        let [before, now] = all.fold([0, 0], |sum, of| [sum[0] + of.before, sum[1] + of.now]);
-        assert!(now > before, "{}", table(&points));
-    }
 
     #[test]
     fn of_small_sets_more_are_proven_than_before() {

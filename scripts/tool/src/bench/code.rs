@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use crate::places::{self, Frame};
 use crate::system;
@@ -19,16 +19,11 @@ const AT_ONCE: usize = 20_000;
 ///
 /// # Errors
 ///
-/// In words: `objdump` is missing or cannot be started.
+/// In words: `objdump` is missing or has failed.
 pub(super) fn instructions(image: &Path) -> Result<BTreeMap<u64, String>, String> {
-    let objdump = program("objdump")?;
-    let output = Command::new(&objdump)
-        .args(["-d", "-C", "--no-show-raw-insn"])
-        .arg(image)
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|error| format!("`{}`: {error}", objdump.display()))?;
-    let text = String::from_utf8_lossy(&output.stdout);
+    let mut objdump = Command::new(program("objdump")?);
+    objdump.args(["-d", "-C", "--no-show-raw-insn"]).arg(image);
+    let text = system::run(&mut objdump)?;
     let instruction = |line: &str| {
         let (address, text) = line.trim().split_once(":\t")?;
         Some((u64::from_str_radix(address, 16).ok()?, text.to_string()))

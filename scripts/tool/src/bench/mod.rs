@@ -11,6 +11,7 @@
 //! - [`native`]: the scheduler on this host's own processors;
 //! - [`sizes`]: the size of each part of an image.
 
+mod acceptance;
 pub mod bounds;
 mod code;
 mod frame;
@@ -40,15 +41,10 @@ static BENCH: Menu = Menu {
     notes: "Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",
 };
 
-/// The measurements that print nothing before they have a result.
-const SILENT: [&str; 2] = ["bounds", "sizes"];
-
 /// Runs the subcommand.
-#[must_use]
 pub fn bench(words: &[OsString]) -> ExitCode {
-    // The others report their progress themselves.
-    let is_silent = |word: &OsString| SILENT.iter().any(|silent| word == silent);
-    let of_silent = words.first().is_some_and(is_silent);
-    let _lasting = of_silent.then(|| Lasting::new("measuring"));
+    // The others report their progress themselves; it prints nothing before it has a result.
+    let is_silent = words.first().is_some_and(|word| word == "sizes");
+    let _lasting = is_silent.then(|| Lasting::new("measuring"));
     BENCH.run(words)
 }

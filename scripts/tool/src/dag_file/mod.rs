@@ -179,7 +179,6 @@ pub struct Prepared {
 impl Prepared {
     /// Translates a guest's refusal of the file into one as of [`load`], one line a fault; `None`
     /// if it is about something else.
-    #[must_use]
     pub fn translate(&self, said: &str) -> Option<String> {
         translate(said, &self.path, &self.file)
     }
@@ -195,15 +194,12 @@ impl Prepared {
     reason = "one option after the other, each with a refusal of its own"
 )]
 pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
+    let refuse = |line: String| vec![line];
     // Without a file, an option that is about one is a mistake.
     let Some(path) = options.path("dag") else {
-        return options.given_of(&COMPANIONS).map_or(Ok(None), |name| {
-            Err(vec![format!(
-                "`--{name}` needs `--dag FILE`; give that, too"
-            )])
-        });
+        let without = options.check_without(&COMPANIONS, "needs `--dag FILE`; give that, too");
+        return without.map(|()| None).map_err(refuse);
     };
-    let refuse = |line: String| vec![line];
     let apart = [("app", "dag"), ("jobs", "seconds")];
     let apart = apart.map(|(one, other)| (one, other, "exclude each other"));
     options.check_apart(&apart).map_err(refuse)?;
@@ -399,6 +395,7 @@ mod tests {
     };
     use crate::run::RUN;
     use crate::system::workspace;
+    use crate::tests::rows;
     use common::random::Random;
     use dag_file::{DagFile, Length, Malformed, is_name};
     use std::path::Path;
@@ -538,9 +535,8 @@ DAG file: too large | f.dag: too large";
         // The guest's has no comments.
         assert!(file.to_string().starts_with("dag x "));
         let told = |said: &str| translate(said, Path::new("f.dag"), &file);
-        for row in SAID.lines() {
-            let (said, expected) = row.split_once(" | ").expect(row);
-            assert_eq!(told(said), Some(expected.replace(r"\n", "\n")), "{said}");
+        for [said, expected] in rows(SAID) {
+            assert_eq!(told(&said), Some(expected), "{said}");
         }
         assert_eq!(told("`jbos` is no option"), None);
     }

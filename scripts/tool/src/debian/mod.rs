@@ -120,14 +120,12 @@ impl Guest {
 
     /// Returns the program's exit code; `None` if there is none: the guest did not get that far, or
     /// Linux has ended the policy before the program's end.
-    #[must_use]
     pub fn code(&self) -> Option<i32> {
         let end = fs::read_to_string(self.end.path());
         end.ok()?.trim().parse().ok()
     }
 
     /// Returns the last lines of the guest's console, and the path of its file.
-    #[must_use]
     pub fn said(&self) -> String {
         let said = system::last_lines(&fs::read(&self.console).unwrap_or_default());
         format!("{said}\nits console: {}", self.console.display())

@@ -44,7 +44,6 @@ pub use choices;
 
 impl Menu {
     /// Runs the chosen function, shows the help text, or refuses the word with exit code 2.
-    #[must_use]
     pub fn run(&self, words: &[OsString]) -> ExitCode {
         match self.choose(words) {
             Ok(choice) => (choice.work)(&words[1..]),

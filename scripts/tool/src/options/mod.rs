@@ -222,7 +222,6 @@ impl Command {
     }
 
     /// Returns the help text, ending in a newline.
-    #[must_use]
     pub fn help(&self) -> String {
         let mut text = String::new();
         let positional = match self.positional {
@@ -351,18 +350,6 @@ pub enum Takes {
 }
 
 impl Takes {
-    /// Returns the kind of a number within a range.
-    #[must_use]
-    pub const fn number(range: RangeInclusive<u64>) -> Takes {
-        Takes::Number(*range.start(), *range.end())
-    }
-
-    /// Returns the kind of numbers within a range, with commas between.
-    #[must_use]
-    pub const fn numbers(range: RangeInclusive<u64>) -> Takes {
-        Takes::Numbers(*range.start(), *range.end())
-    }
-
     /// Returns the placeholder of a value in the help text; empty for a flag.
     const fn name(self) -> &'static str {
         match self {
@@ -499,7 +486,6 @@ pub struct Parsed {
 
 impl Parsed {
     /// Returns whether the person gave the option (or flag).
-    #[must_use]
     pub fn is_given(&self, name: &str) -> bool {
         self.given.contains_key(name)
     }
@@ -514,19 +500,16 @@ impl Parsed {
 
     /// Returns the option's value or default; `None` if it has neither. For one that
     /// takes a file there is [`path`](Self::path).
-    #[must_use]
     pub fn text(&self, name: &str) -> Option<&str> {
         self.value(name).and_then(OsStr::to_str)
     }
 
     /// Returns the file that the option names, or its default; `None` if it has neither.
-    #[must_use]
     pub fn path(&self, name: &str) -> Option<&Path> {
         self.value(name).map(Path::new)
     }
 
     /// Returns the files that these options name, of those that are given or have a default.
-    #[must_use]
     pub fn named(&self, options: &[&'static str]) -> Vec<Named<'_>> {
         let named = options.iter().filter_map(|option| {
             let path = self.path(option)?;
@@ -536,13 +519,11 @@ impl Parsed {
     }
 
     /// Returns a number's value or default; `None` if it has neither.
-    #[must_use]
     pub fn number(&self, name: &str) -> Option<u64> {
         self.text(name).and_then(|value| value.parse().ok())
     }
 
     /// Returns the numbers of a list.
-    #[must_use]
     pub fn numbers<N: FromStr>(&self, name: &str) -> Vec<N> {
         let words = self.text(name).into_iter().flat_map(|all| all.split(','));
         words.filter_map(|word| word.parse().ok()).collect()
@@ -584,14 +565,22 @@ impl Parsed {
         }
     }
 
+    /// Makes sure that none of these options is given.
+    ///
+    /// # Errors
+    ///
+    /// The name of one that is, and what `why` says of it.
+    pub fn check_without(&self, names: &[&str], why: &str) -> Result<(), String> {
+        let given = self.given_of(names);
+        given.map_or(Ok(()), |name| Err(format!("`--{name}` {why}")))
+    }
+
     /// Returns the first of these options that is given.
-    #[must_use]
     pub fn given_of<'n>(&self, names: &[&'n str]) -> Option<&'n str> {
         names.iter().copied().find(|name| self.is_given(name))
     }
 
     /// Returns a copy of the command line with another value of an option.
-    #[must_use]
     pub fn with(&self, name: &'static str, value: impl AsRef<OsStr>) -> Parsed {
         let mut other = self.clone();
         other.given.insert(name, value.as_ref().into());
@@ -599,7 +588,6 @@ impl Parsed {
     }
 
     /// Returns a copy of the command line without an option.
-    #[must_use]
     pub fn without(&self, name: &str) -> Parsed {
         let mut other = self.clone();
         other.given.remove(name);
@@ -607,7 +595,6 @@ impl Parsed {
     }
 
     /// Returns the first positional word, if one was given.
-    #[must_use]
     pub fn positional(&self) -> Option<&str> {
         self.positionals.first().and_then(|word| word.to_str())
     }

@@ -5,6 +5,7 @@ use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::Path;
 
 use super::{Command, Parsed, Refusal, Takes};
+use crate::tests::rows;
 
 static COMMAND: Command = Command {
     invocation: "./scripts/example",
@@ -12,9 +13,9 @@ static COMMAND: Command = Command {
     positional: None,
     options: options! {
         /// Processors of the guest.
-        "cores": Takes::number(1..=64), or "8";
+        "cores": Takes::Number(1, 64), or "8";
         /// Parallel subtasks.
-        "subtasks": Takes::numbers(1..=14);
+        "subtasks": Takes::Numbers(1, 14);
         /// The meaning of time.
         "mode": Takes::OneOf(&["kvm", "deterministic", "threads"]);
         /// Keep the log.
@@ -93,9 +94,8 @@ stray | unknown word `stray`; options begin with `--`, see ./scripts/example --h
 
 #[test]
 fn what_the_table_does_not_allow_is_named_with_what_it_does() {
-    for row in REFUSED.lines() {
-        let (line, said) = row.split_once(" | ").expect(row);
-        assert_eq!(refusal(line), said);
+    for [line, said] in rows(REFUSED) {
+        assert_eq!(refusal(&line), said);
     }
 }
 

@@ -1,12 +1,12 @@
 //! Reference values of the analysis at commit: lengths, widths, bounds, verdicts.
 //!
 //! A case gives task sets and the results of independent implementations for them; [`check`]
-//! computes the same with `sched_dag::analysis` and compares every quantity. There are two kinds of
-//! files, and a case is of one of them. In both it is
+//! computes the same with `sched_dag::analysis` and compares every quantity. There are three kinds
+//! of cases. In all of them it is
 //!
 //! ```text
 //! case NAME m ntasks
-//! then for each DAG:  dag T D nsub nedge / wcet c_0 .. / edge u v .. / its quantities
+//! then for each DAG:  dag T D nsub nedge / wcet c_0 .. / edge u v .. / wait .. / its quantities
 //! then for the set:   its quantities
 //! end
 //! ```
@@ -26,13 +26,31 @@
 //! of the set:  dm_order mp_gfp_dm mp_gfp_dm_clip mp_gedf mp_gedf_clip
 //! ```
 //!
+//! and, where subtasks wait, in blocks of `waiting.txt` that begin with `bounds` instead of `case`
+//!
+//! ```text
+//! of a DAG:    len / vol / span / width / cov (by chains, waits as work)
+//!              alone M A peel P least L spread X ..
+//! of the set:  dm_order wait_gfp_dm wait_gfp_dm_best wait_np_gfp_dm
+//!              wait_gedf wait_gedf_best wait_np_gedf
+//! ```
+//!
 //! Bounds under fixed priorities are in the order of `dm_order`. A lone `-`
 //! says that a test does not accept or does not apply. The bounds of the first kind that
-//! the multi-path ones have replaced are in `older_bounds`.
+//! the multi-path ones have replaced are in `older_bounds`. `alone`, `peel` and `spread` bound one
+//! job alone: by one path, by reserved chains, and with waits that are executed. No choice of chains
+//! gives less than `least`, so neither `alone` nor `peel` may be below it. The waits of a subtask
+//! are on a line of its own:
+//!
+//! ```text
+//! wait V n C_0 W_1 C_1 ..     subtask V has n >= 1 waits of the limits W between segments of the
+//!                             WCETs C, which sum up to that of the subtask
+//! ```
 
 use sched_dag::analysis::{
-    Federation, InterferenceBound, Task, bonifaci_edf, covers, federated, gedf_capacity,
-    multi_path, multi_path_edf, multi_path_fp, width,
+    Federation, InterferenceBound, SubtaskWaits, Task, WaitingForm, alone_forms, bonifaci_edf,
+    covers, federated, gedf_capacity, multi_path, multi_path_edf, multi_path_fp, waiting_edf,
+    waiting_fp, width,
 };
 
 use replay::lines::{Line, Lines, Malformed, cases, quoted};
@@ -50,11 +68,14 @@ pub struct BoundsCase {
 }
 
 /// The computed quantities: name in the file, and value.
-pub(super) type Quantities = Vec<(String, String)>;
+type Quantities = Vec<(String, String)>;
 
-/// The quantities of a DAG and of a set, by kind of file. Each case has each of them once, but the
-/// last one of a DAG once for each number of cores.
-const FORMS: [[&[&str]; 2]; 2] = [
+/// The quantities of a DAG and of a set.
+type Form = [&'static [&'static str]; 2];
+
+/// They are by kind of file. Each case has each of them once, but the last one of a DAG once for
+/// each number of cores.
+const FORMS: [Form; 2] = [
     [
         &["len", "vol", "bottom_level", "single"],
         &[
@@ -81,7 +102,21 @@ const FORMS: [[&[&str]; 2]; 2] = [
     ],
 ];
 
-/// Reads all cases of a file.
+/// Those where subtasks wait.
+const WAITING: Form = [
+    &["len", "vol", "span", "width", "cov", "alone"],
+    &[
+        "dm_order",
+        "wait_gfp_dm",
+        "wait_gfp_dm_best",
+        "wait_np_gfp_dm",
+        "wait_gedf",
+        "wait_gedf_best",
+        "wait_np_gedf",
+    ],
+];
+
+/// Reads all cases of a file without waits.
 ///
 /// # Errors
 ///
@@ -90,17 +125,27 @@ pub fn parse(text: &str) -> Result<Vec<BoundsCase>, Malformed> {
     cases(text, parse_case)
 }
 
-fn parse_case(header: &Line<'_>, lines: &mut Lines<'_>) -> Result<BoundsCase, Malformed> {
+/// Reads a case, or a block of bounds, from its header on.
+pub(super) fn parse_case(
+    header: &Line<'_>,
+    lines: &mut Lines<'_>,
+) -> Result<BoundsCase, Malformed> {
     let [name, cores, count] = header.fixed()?;
     let (cores, count) = (header.cores(cores)?, header.at_least_one(count)?);
-    let mut form = None;
+    let has_waits = header.kind == "bounds";
+    let mut form = has_waits.then_some(WAITING);
     let mut dags = Vec::new();
     for _ in 0..count {
-        let task = parse_task(lines)?;
+        let mut task = parse_task(lines)?;
+        let mut size = task.wcets_ns().len();
+        if has_waits {
+            // None of these quantities has a part for each subtask.
+            (task, size) = (parse_waits(lines, task)?, 1);
+        }
         // Only `multi_path.txt` begins with `cov`; the first DAG decides for the whole case.
         let is_multi_path = || lines.clone().next_if("cov").is_some();
         let [of_dag, _] = *form.get_or_insert_with(|| FORMS[usize::from(is_multi_path())]);
-        let quantities = parse_quantities(lines, of_dag, task.wcets_ns().len())?;
+        let quantities = parse_quantities(lines, of_dag, size)?;
         dags.push((task, quantities));
     }
     let [_, of_set] = form.unwrap_or_default();
@@ -124,6 +169,59 @@ pub(super) fn parse_task(lines: &mut Lines<'_>) -> Result<Task, Malformed> {
     let edges = lines.edges(edge_count, subtasks)?;
     Task::new(period_ns, deadline_ns, wcets_ns, &edges)
         .map_err(|error| header.malformed(error.to_string()))
+}
+
+/// Reads the waits of a DAG's subtasks, if it has any.
+fn parse_waits(lines: &mut Lines<'_>, task: Task) -> Result<Task, Malformed> {
+    let unsuspended = task.wcets_ns().iter().map(|&wcet_ns| SubtaskWaits {
+        count: 0,
+        limits_ns: 0,
+        longest_segment_ns: wcet_ns,
+    });
+    let mut waits: Vec<SubtaskWaits> = unsuspended.collect();
+    let mut last = None;
+    while let Some(line) = lines.next_if("wait") {
+        let [subtask, count, times @ ..] = &line.words[..] else {
+            return Err(line.malformed("expected `wait V n C_0 W_1 C_1 ..`"));
+        };
+        let subtask = line.index("subtask", subtask, waits.len())?;
+        let count = line.at_least_one(count)?;
+        if times.len() as u64 != 2 * u64::from(count) + 1 {
+            let reason = format!(
+                "{count} waits take twice as many times and one, found {}",
+                times.len()
+            );
+            return Err(line.malformed(reason));
+        }
+        if waits[subtask].count > 0 {
+            return Err(line.malformed(format!("the waits of subtask {subtask} stand here twice")));
+        }
+        let times = times.iter().map(|time| line.number(time));
+        let times = times.collect::<Result<Vec<u64>, Malformed>>()?;
+        let sum = |first| {
+            times
+                .iter()
+                .skip(first)
+                .step_by(2)
+                .try_fold(0, |sum: u64, &time| sum.checked_add(time))
+        };
+        let segments = times.iter().step_by(2);
+        let wcet_ns = task.wcets_ns()[subtask];
+        if sum(0) != Some(wcet_ns) || segments.clone().any(|&segment| segment == 0) {
+            let reason = format!("expected segments of at least 1 that sum up to {wcet_ns}");
+            return Err(line.malformed(reason));
+        }
+        waits[subtask] = SubtaskWaits {
+            count,
+            limits_ns: sum(1).ok_or_else(|| line.malformed("the limits are too large"))?,
+            longest_segment_ns: segments.copied().max().unwrap_or(wcet_ns),
+        };
+        last = Some(line);
+    }
+    match last {
+        None => Ok(task),
+        Some(line) => (task.with_waits(waits)).map_err(|error| line.malformed(error.to_string())),
+    }
 }
 
 /// Reads the quantities of these names, in any order, of a DAG or set of `size` parts.
@@ -168,11 +266,22 @@ fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malf
             let (graham, long_paths) = (plain(&[graham])?, plain(&[long_paths])?);
             format!("graham {graham} long_paths {long_paths}")
         }
+        ("alone", &[cores, alone, "peel", peel, "least", least, "spread", spread]) => {
+            what = on(cores)?;
+            let (alone, peel, spread) = (plain(&[alone])?, plain(&[peel])?, plain(&[spread])?);
+            format!(
+                "{alone} peel {peel} least {} spread {spread}",
+                plain(&[least])?
+            )
+        }
+        ("alone", _) => {
+            return Err(line.malformed("expected `alone M A peel P least L spread X`"));
+        }
         ("multi_path", _) => return Err(line.malformed("expected `multi_path M R`")),
         ("single", _) => {
             return Err(line.malformed("expected `single M graham R long_paths R`"));
         }
-        ("len" | "vol", _) => plain(line.exactly(1)?)?,
+        ("len" | "vol" | "span", _) => plain(line.exactly(1)?)?,
         ("cov", words) => plain(words)?,
         ("bottom_level" | "width", _) => plain(line.exactly(size)?)?,
         ("dm_order", _) => {
@@ -208,19 +317,20 @@ fn parse_quantity(line: &Line<'_>, size: usize) -> Result<(String, String), Malf
 /// The first difference, in one line.
 pub fn check(case: &BoundsCase) -> Result<(), String> {
     for (index, (task, quantities)) in case.dags.iter().enumerate() {
-        compare(quantities, |what| compute_of_dag(what, task))
-            .map_err(|difference| format!("dag {index}: {difference}"))?;
+        compare(quantities, |what, expected| {
+            compute_of_dag(what, expected, task)
+        })
+        .map_err(|difference| format!("dag {index}: {difference}"))?;
     }
     let tasks: Vec<&Task> = case.dags.iter().map(|(task, _)| task).collect();
-    compare(&case.quantities, |what| compute(what, &tasks, case.cores))
+    compare(&case.quantities, |what, _| {
+        compute(what, &tasks, case.cores)
+    })
 }
 
-pub(super) fn compare(
-    quantities: &Quantities,
-    compute: impl Fn(&str) -> String,
-) -> Result<(), String> {
+fn compare(quantities: &Quantities, compute: impl Fn(&str, &str) -> String) -> Result<(), String> {
     for (what, expected) in quantities {
-        let computed = compute(what);
+        let computed = compute(what, expected);
         if *expected != computed {
             return Err(format!("{what}: expected {expected}, computed {computed}"));
         }
@@ -229,20 +339,37 @@ pub(super) fn compare(
 }
 
 /// Computes one quantity of a DAG.
-fn compute_of_dag(what: &str, task: &Task) -> String {
+fn compute_of_dag(what: &str, expected: &str, task: &Task) -> String {
     let (name, cores) = what.split_once(' ').unwrap_or((what, "1"));
     let cores = cores.parse().expect("a number of cores, as was read");
     match name {
         "len" => task.length_ns().to_string(),
         "vol" => task.volume_ns().to_string(),
         "bottom_level" => list(&task.bottom_levels()),
-        "cov" => list(&covers(task, usize::MAX)),
+        "span" => task.span_ns().to_string(),
+        "width" => width(task).map_or("-".to_owned(), |width| width.to_string()),
+        "cov" => list(&covers(task.oblivious(), usize::MAX)),
+        "alone" => compute_alone(expected, task, cores),
         "multi_path" => multi_path(task, cores).map_or("-".to_owned(), |bound| bound.to_string()),
         _ => {
             let (graham, long_paths) = (older::graham(task, cores), older::long_paths(task, cores));
             format!("graham {graham} long_paths {long_paths}")
         }
     }
+}
+
+/// Computes the bounds of one job alone. Of `least` they tell only whether it may be so much.
+fn compute_alone(expected: &str, task: &Task, cores: u32) -> String {
+    let Some(bounds) = alone_forms(task, cores) else {
+        return "-".to_owned();
+    };
+    let (alone, peel, spread) = (bounds.one_path_ns, bounds.reserved_ns, bounds.oblivious_ns);
+    let least = expected
+        .split(' ')
+        .nth(4)
+        .and_then(|least| least.parse().ok());
+    let least = least.map_or(0, |least: u64| least.min(alone).min(peel));
+    format!("{alone} peel {peel} least {least} spread {spread}")
 }
 
 /// Computes one quantity of a set.
@@ -273,6 +400,12 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
         "mp_gfp_dm_clip" => bounds(by_priority(InterferenceBound::Waiting)),
         "mp_gedf" => bounds(multi_path_edf(tasks, cores, InterferenceBound::Window)),
         "mp_gedf_clip" => bounds(multi_path_edf(tasks, cores, InterferenceBound::Waiting)),
+        "wait_gfp_dm" => bounds(waiting_fp(&by_deadline, cores, WaitingForm::OnePath)),
+        "wait_gfp_dm_best" => bounds(waiting_fp(&by_deadline, cores, WaitingForm::Best)),
+        "wait_np_gfp_dm" => bounds(waiting_fp(&by_deadline, cores, WaitingForm::NonPreemptive)),
+        "wait_gedf" => bounds(waiting_edf(tasks, cores, WaitingForm::OnePath)),
+        "wait_gedf_best" => bounds(waiting_edf(tasks, cores, WaitingForm::Best)),
+        "wait_np_gedf" => bounds(waiting_edf(tasks, cores, WaitingForm::NonPreemptive)),
         "gedf_capacity" => gedf_capacity(tasks, cores).map(accepted),
         "bonifaci_gedf" => Some(accepted(bonifaci_edf(tasks, cores))),
         "federated" => federated(tasks, cores).map(|federation| words_of(&federation)),
@@ -295,6 +428,7 @@ pub(super) fn list<T: ToString>(values: &[T]) -> String {
 #[cfg(test)]
 mod tests {
     use super::{check, parse};
+    use crate::tests::{altered, assert_malformed, rows};
 
     const FILE: &str = include_str!("../../../../tests/oracle/bounds.txt");
     const MULTI_PATH: &str = include_str!("../../../../tests/oracle/multi_path.txt");
@@ -310,17 +444,8 @@ mod tests {
         }
     }
 
-    /// Returns the cells of each row, and the first public case with its first cell replaced by the
-    /// second, in which `\n` is the end of a line and `\x` alters the rest.
-    fn altered(rows: &str) -> impl Iterator<Item = (Vec<&str>, String)> {
-        let first = FILE.split_inclusive("end\n").next().unwrap();
-        rows.lines().map(move |row| {
-            let cells: Vec<&str> = row.split(" | ").collect();
-            let told = |cell: &str| cell.replace(r"\n", "\n").replace(r"\x", "\u{202e}");
-            let [from, to] = [cells[0], cells[1]].map(told);
-            assert!(first.contains(&from), "{from}");
-            (cells, first.replacen(&from, &to, 1))
-        })
+    fn first() -> &'static str {
+        FILE.split_inclusive("end\n").next().unwrap()
     }
 
     /// A part of the first case, its replacement, and the difference that it makes.
@@ -331,9 +456,9 @@ federated 7 | federated 6 0:1 | federated: expected 6 0:1, computed 7";
 
     #[test]
     fn a_difference_names_the_quantity() {
-        for (cells, text) in altered(WRONG) {
-            let cases = parse(&text).unwrap();
-            assert_eq!(check(&cases[0]), Err(cells[2].to_owned()));
+        for [from, to, difference] in rows(WRONG) {
+            let cases = parse(&altered(first(), [&from, &to])).unwrap();
+            assert_eq!(check(&cases[0]), Err(difference));
         }
     }
 
@@ -349,14 +474,14 @@ wcet 2 8 1 | wcet 2 8 18446744073709551615 | 2
 case bpub000 7 3 | case bpub000 0 3 | 1
 case bpub000 7 3 | case bpub000 7 4 | 28
 case bpub000 7 3 | case bpub000 4294967295 3 | 1 | expected 1 to 64 cores, found 4294967295
-case bpub000 7 3 | case b\x 7 3 | 1 | case `b\u{202e}`: a name must be seen; rename it
+case bpub000 7 3 | case b\? 7 3 | 1 | case `b\u{202e}`: a name must be seen; rename it
 single 7 graham 41 long_paths 41\n |  | 17 | expected a `single` record
 single 7 graham 41 long_paths 41\n | single 7 graham 41 long_paths 41\nsingle 7 graham 41 long_paths 41\n | 18 | `single 7` stands here twice
 single 7 graham 41 | single 65 graham 41 | 17
 dm_order 0 1 2 | dm_order 0 1 3 | 28 | expected each DAG from 0 to 2 once
 dm_order 0 1 2 | dm_order 0 1 1 | 28 | expected each DAG from 0 to 2 once
 dm_order 0 1 2 | dm_order 0 1 4294967296 | 28 | expected each DAG from 0 to 2 once
-federated 7 | federated 7 \x | 36 | expected dag:cores, found `\u{202e}`
+federated 7 | federated 7 \? | 36 | expected dag:cores, found `\u{202e}`
 width 1 1 2\n |  | 36
 bonifaci_gedf 0 | bonifaci_gedf 2 | 35
 federated 7 | federated 7 0 | 36
@@ -364,16 +489,10 @@ federated 7 | federated 7 0 | 36
 
     #[test]
     fn malformed_files_are_refused_with_their_line() {
-        for (cells, text) in altered(MALFORMED) {
-            let error = parse(&text).unwrap_err();
-            assert_eq!(error.line.to_string(), cells[2], "{}: {error}", cells[1]);
-            let reason = cells.get(3).unwrap_or(&"");
-            assert!(error.reason.contains(reason), "{error}\n  not: {reason}");
-        }
+        assert_malformed(parse, first(), MALFORMED);
         assert_eq!(parse("").unwrap_err().line, 1);
         assert_eq!(parse("\nfoo\n").unwrap_err().line, 2);
-        let first = FILE.split_inclusive("end\n").next().unwrap();
-        let error = parse(&first.repeat(2)).unwrap_err();
+        let error = parse(&first().repeat(2)).unwrap_err();
         let reason = "case `bpub000` stands here twice, first on line 1; rename one";
         assert_eq!((error.line, error.reason.as_str()), (38, reason));
     }

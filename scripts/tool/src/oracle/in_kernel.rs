@@ -55,9 +55,9 @@ static IN_KERNEL: Command = Command {
         /// On the machine, not in virtual time on the host.
         "in-kernel": Takes::Nothing;
         /// Leave out the cases for more cores.
-        "cores-up-to": Takes::number(1..=MOST_CORES), or "64";
+        "cores-up-to": Takes::Number(1, MOST_CORES), or "64";
         /// The length of a unit of time in microseconds.
-        "unit-us": Takes::number(100..=10_000_000), or "10000";
+        "unit-us": Takes::Number(100, 10_000_000), or "10000";
         /// Whether execution is simulated, or cores also compute, for half of each unit in all.
         "work": Takes::OneOf(&["simulate", "compute"]), or "simulate";
         /// The meaning of time; see ./scripts/run --help.
@@ -176,7 +176,6 @@ pub struct Judged {
 impl Settings {
     /// Returns the settings for a unit: a guard of a 500th and a window of a
     /// 100th of it, and a tolerance of 2 %, deterministic, on a microvm.
-    #[must_use]
     pub fn for_unit(unit_us: u64) -> Self {
         Self {
             mode: Mode::Deterministic,
@@ -191,7 +190,6 @@ impl Settings {
 
     /// Makes cores compute. As events then wait for the turns of others, guard and window are a
     /// 40th of a unit, and the tolerance is 5 %.
-    #[must_use]
     pub fn computing(self) -> Self {
         Self {
             guard_us: self.unit_us / 40,
@@ -393,6 +391,7 @@ mod tests {
     use crate::outcome::Outcome;
     use crate::protocol::Status;
     use crate::qemu::Ending;
+    use crate::tests::{altered, rows};
 
     const CASE: &str = "case small 1 0 1 1
 dag 4 9 0 1 1 0
@@ -420,15 +419,15 @@ end
     /// A part of that, its replacement, and the difference that it makes.
     const ALTERED: &str = r#"10000 | 20001 | dag 0 job 0 subtask 0: start: expected 0, found 0.020
 990000 finish | 979999 finish | dag 0 job 0 subtask 0: finish: expected 1, found 0.979
-990000 finish | 500000 suspend c0 0.0.0;600000 request c0 0.0.0;600000 resume c0 0.0.0;990000 finish | dag 0 job 0 subtask 0: preemptions: expected 0, found 1
+990000 finish | 500000 suspend c0 0.0.0\n600000 request c0 0.0.0\n600000 resume c0 0.0.0\n990000 finish | dag 0 job 0 subtask 0: preemptions: expected 0, found 1
 O=0 | O=1 | dag 0 job 0: release: expected 0, found 1
 990000 completed | 1020001 completed | dag 0 job 0: response: expected 1, found 1.020
-990000 completed | 990000 missed c0 0.0;990000 completed | dag 0 job 0: missed: expected 0, found 1
-0 released c0 | lost 2;0 released c0 | its trace is not whole, before line 2
+990000 completed | 990000 missed c0 0.0\n990000 completed | dag 0 job 0: missed: expected 0, found 1
+0 released c0 | lost 2\n0 released c0 | its trace is not whole, before line 2
 "small" | "smart" | its trace is not whole, before line 2
 "allocations":0 | "allocations":1 | the guest itself: allocations: expected 0, found 1
 "violations":0 | "violations":1 | the guest itself: violations: expected 0, found 1
-990000 completed c0 0.0 | | dag 0 job 0: response: there was none
+990000 completed c0 0.0 |  | dag 0 job 0: response: there was none
 "success" | "failure" | the verdict line says Failure, QEMU's exit status Success"#;
 
     #[test]
@@ -449,13 +448,9 @@ O=0 | O=1 | dag 0 job 0: release: expected 0, found 1
             latest_ns: 10_000,
         };
         assert_eq!(judged(LOG), Ok(deviation));
-        for row in ALTERED.lines() {
-            let mut cells = row.split('|').map(str::trim);
-            let mut cell = || cells.next().expect(row);
-            let (from, to, difference) = (cell(), cell(), cell());
-            assert!(LOG.contains(from), "{from}");
-            let altered = LOG.replacen(from, &to.replace(';', "\n"), 1);
-            assert_eq!(judged(&altered), Err(difference.into()), "{to}");
+        for [from, to, difference] in rows(ALTERED) {
+            let altered = altered(LOG, [&from, &to]);
+            assert_eq!(judged(&altered), Err(difference), "{to}");
         }
         let [commit, events, lines] = parts(LOG);
         let whole = record_of("", &made::commit(commit), events);

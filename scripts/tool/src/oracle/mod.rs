@@ -5,6 +5,7 @@
 //! failed`. The exit code is 0 if none failed, 1 if some did, and 2 if a file is malformed, which
 //! is reported with its line number, and then nothing is compared.
 //!
+//! - [`assignment`]: cores that are owned and lent;
 //! - [`bounds`]: the analysis at commit;
 //! - [`schedules`]: the scheduler in virtual time;
 //! - [`in_kernel`]: the same cases on the bare machine;
@@ -13,6 +14,7 @@
 //!
 //! One kind reads no files: it simulates random sets that the analysis accepts (`responses`).
 
+pub mod assignment;
 pub mod bounds;
 pub mod in_kernel;
 pub(crate) mod older_bounds;
@@ -29,7 +31,7 @@ use std::process::ExitCode;
 use replay::lines::Malformed;
 
 use crate::files;
-use crate::options::{Command, Menu, Refusal, Takes, choices, options};
+use crate::options::{Command, Menu, Opt, Refusal, Takes, choices, options};
 use crate::progress::Progress;
 
 /// A reader of the cases of one kind.
@@ -40,6 +42,9 @@ static ORACLE: Menu = Menu {
     word: "KIND",
     about: "Compares reference cases with what this project computes.",
     choices: choices! {
+        "assignment": "attempts, owners, orders, busy times, groups and bounds of lent cores", |words| {
+            run_files(words, &ASSIGNMENT, assignment::parse, assignment::check, |case| &case.name)
+        };
         "bounds": "lengths, widths, response-time bounds and verdicts", |words| {
             run_files(words, &BOUNDS, bounds::parse, bounds::check, |case| &case.name)
         };
@@ -66,43 +71,56 @@ Prints the first difference of each failing case, then `N passed, M failed`.
 Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
 ";
 
-const FILES: Option<(Takes, &str)> = Some((
-    Takes::File("FILE..."),
-    "Reference files, as in tests/oracle.",
-));
+/// Describes a kind whose reference files are read.
+const fn of_files(
+    invocation: &'static str,
+    about: &'static str,
+    options: &'static [Opt],
+) -> Command {
+    Command {
+        invocation,
+        about,
+        positional: Some((
+            Takes::File("FILE..."),
+            "Reference files, as in tests/oracle.",
+        )),
+        options,
+        notes: NOTES,
+    }
+}
 
-static BOUNDS: Command = Command {
-    invocation: "./scripts/oracle bounds",
-    about: "Compares lengths, widths, response-time bounds and verdicts with those of the \
-            analysis at commit.",
-    positional: FILES,
-    options: &[],
-    notes: NOTES,
-};
+static ASSIGNMENT: Command = of_files(
+    "./scripts/oracle assignment",
+    "Compares how cores are divided among DAGs that own and DAGs that share them, with orders, busy \
+     times and bounds, with the division by lent cores.",
+    &[],
+);
 
-static SCHEDULES: Command = Command {
-    invocation: "./scripts/oracle schedules",
-    about: "Compares starts, finishes, preemptions, response times and misses with those of \
-            the scheduler in virtual time.",
-    positional: FILES,
-    options: options! {
+static BOUNDS: Command = of_files(
+    "./scripts/oracle bounds",
+    "Compares lengths, widths, response-time bounds and verdicts with those of the analysis at \
+     commit.",
+    &[],
+);
+
+static SCHEDULES: Command = of_files(
+    "./scripts/oracle schedules",
+    "Compares starts, finishes, preemptions, response times and misses with those of the scheduler \
+     in virtual time.",
+    options! {
         /// On the bare machine; with options of its own, see schedules --in-kernel --help.
         "in-kernel": Takes::Nothing;
     },
-    notes: NOTES,
-};
+);
 
-static SYNCHRONIZER: Command = Command {
-    invocation: "./scripts/oracle synchronizer",
-    about: "Compares the sets that ExactTime and ApproximateTime emit, and what they drop, \
-            with those of the publish/subscribe baseline.",
-    positional: FILES,
-    options: &[],
-    notes: NOTES,
-};
+static SYNCHRONIZER: Command = of_files(
+    "./scripts/oracle synchronizer",
+    "Compares the sets that ExactTime and ApproximateTime emit, and what they drop, with those of \
+     the publish/subscribe baseline.",
+    &[],
+);
 
 /// Runs the subcommand.
-#[must_use]
 pub fn oracle(words: &[OsString]) -> ExitCode {
     ORACLE.run(words)
 }
@@ -136,7 +154,7 @@ fn run_files<Case>(
 }
 
 /// Reads the cases of all files, at least one.
-fn read<'f, Case>(
+pub(crate) fn read<'f, Case>(
     names: impl ExactSizeIterator<Item = &'f Path> + Clone,
     parse: Parse<Case>,
 ) -> Result<Vec<Case>, String> {

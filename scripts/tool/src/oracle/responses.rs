@@ -37,9 +37,9 @@ static TABLE: Command = Command {
     positional: None,
     options: options! {
         /// Accepted sets to run.
-        "sets": Value::number(1..=100_000_000), or "1000";
+        "sets": Value::Number(1, 100_000_000), or "1000";
         /// Seed of the first set; each has the next one.
-        "seed": Value::number(0..=u64::MAX), or "1";
+        "seed": Value::Number(0, u64::MAX), or "1";
     },
     notes: "\
 A set has up to 4 DAGs of up to 8 subtasks on up to 5 cores. Each runs twice for 12 of its longest

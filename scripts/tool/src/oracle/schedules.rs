@@ -35,7 +35,6 @@ pub struct Deviation {
 
 impl Deviation {
     /// Returns the deviation that covers both.
-    #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
             earliest_ns: self.earliest_ns.min(other.earliest_ns),

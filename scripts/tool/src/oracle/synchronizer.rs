@@ -252,6 +252,7 @@ fn compare(expected: &Departures, departures: &Departures) -> Result<(), String>
 #[cfg(test)]
 mod tests {
     use super::{check, parse};
+    use crate::tests::{altered, assert_malformed, rows};
 
     const PUBLIC: &str = include_str!("../../../../tests/oracle/synchronizer.txt");
 
@@ -276,17 +277,6 @@ r 2 0 0
 end
 ";
 
-    /// Returns each row of tables, with the case that it is about.
-    fn rows<'a>(tables: &'a [(&'a str, &'a str)]) -> impl Iterator<Item = (&'a str, &'a str)> {
-        (tables.iter()).flat_map(|(text, table)| table.lines().map(move |row| (*text, row)))
-    }
-
-    /// Splits a row of a table.
-    fn split<const N: usize>(row: &str) -> [&str; N] {
-        let cells: Vec<&str> = row.split(" | ").collect();
-        cells.try_into().expect(row)
-    }
-
     #[test]
     fn all_public_traces_agree() {
         let cases = parse(PUBLIC).unwrap();
@@ -307,13 +297,11 @@ a 0 1 19 | a 0 1 20 | arrival 2 (topic 0, message 1): set 0: expected 1 0, emitt
 
     #[test]
     fn the_first_difference_is_named() {
-        let tables = [(EXACT, EXACT_WRONG), (APPROXIMATE, APPROXIMATE_WRONG)];
-        for (text, row) in rows(&tables) {
-            let row = row.replace(r"\n", "\n");
-            let [from, to, difference] = split(&row);
-            assert!(text.contains(from), "{from}");
-            let cases = parse(&text.replacen(from, to, 1)).expect("still well formed");
-            assert_eq!(check(&cases[0]), Err(difference.to_owned()));
+        for (text, table) in [(EXACT, EXACT_WRONG), (APPROXIMATE, APPROXIMATE_WRONG)] {
+            for [from, to, difference] in rows(table) {
+                let cases = parse(&altered(text, [&from, &to])).expect("still well formed");
+                assert_eq!(check(&cases[0]), Err(difference));
+            }
         }
     }
 
@@ -353,18 +341,8 @@ approximate 100 1 0 0 0\n |  | 2 | expected a `approximate` record";
 
     #[test]
     fn malformed_files_are_refused_with_their_line() {
-        let tables = [
-            (EXACT, EXACT_MALFORMED),
-            (APPROXIMATE, APPROXIMATE_MALFORMED),
-        ];
-        for (text, row) in rows(&tables) {
-            let row = row.replace(r"\n", "\n");
-            let [from, to, line, reason] = split(&row);
-            assert!(text.contains(from), "{from}");
-            let malformed = parse(&text.replacen(from, to, 1)).expect_err(to);
-            assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
-            assert!(malformed.reason.contains(reason), "{to}: {malformed}");
-        }
+        assert_malformed(parse, EXACT, EXACT_MALFORMED);
+        assert_malformed(parse, APPROXIMATE, APPROXIMATE_MALFORMED);
         assert_eq!(parse("").expect_err("no case").line, 1);
     }
 }

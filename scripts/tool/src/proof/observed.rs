@@ -87,7 +87,6 @@ pub fn add(all: &mut Vec<OfDag>, record: &Record) -> Result<(), String> {
 }
 
 /// Makes a distribution from the counts of a record.
-#[must_use]
 pub fn distribution(counted: &Counted) -> Distribution {
     Distribution::counted(counted.min_ns, counted.buckets.clone())
 }
@@ -119,25 +118,19 @@ pub fn lines(all: &[OfDag]) -> impl Iterator<Item = String> {
     all.iter().flat_map(of_dag)
 }
 
-/// The measured overheads.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MeasuredOverheads(pub MeasuredCosts);
-
 /// Measures the overheads in the runs of a guest: the largest of all runs.
 ///
 /// # Errors
 ///
 /// In words: the log has no trace, or a damaged one.
-pub fn measure(runs: &[Run]) -> Result<MeasuredOverheads, String> {
+pub fn measure(runs: &[Run]) -> Result<MeasuredCosts, String> {
     let costs = runs.iter().map(of_run).reduce(|one, other| MeasuredCosts {
         dispatches: one.dispatches + other.dispatches,
         owed_ns: one.owed_ns.max(other.owed_ns),
         releases: one.releases + other.releases,
         late_ns: one.late_ns.max(other.late_ns),
     });
-    costs
-        .map(MeasuredOverheads)
-        .ok_or_else(|| "the guest has run nothing".into())
+    costs.ok_or_else(|| "the guest has run nothing".into())
 }
 
 fn of_run(run: &Run) -> MeasuredCosts {
@@ -150,49 +143,34 @@ fn of_run(run: &Run) -> MeasuredCosts {
     }
 }
 
-impl MeasuredOverheads {
-    /// Returns the guest's word for the charged overheads, with a margin in per cent.
-    #[must_use]
-    pub fn word(&self, margin_percent: u64) -> String {
-        let margin_percent = u32::try_from(margin_percent).unwrap_or(u32::MAX);
-        let Overheads {
-            context_switch_ns,
-            dispatch_ns,
-            interrupt_ns,
-            ..
-        } = Overheads::measured(&self.0, margin_percent, 0);
-        format!("overheads_ns={context_switch_ns},{dispatch_ns},{interrupt_ns}")
-    }
+/// Returns the guest's word for the charged overheads, with a margin in per cent.
+pub fn overheads_word(measured: &MeasuredCosts, margin_percent: u64) -> String {
+    let margin_percent = u32::try_from(margin_percent).unwrap_or(u32::MAX);
+    let Overheads {
+        context_switch_ns,
+        dispatch_ns,
+        interrupt_ns,
+        ..
+    } = Overheads::measured(measured, margin_percent, 0);
+    format!("overheads_ns={context_switch_ns},{dispatch_ns},{interrupt_ns}")
+}
 
-    /// Returns the measured and the charged overheads as text for people.
-    #[must_use]
-    pub fn text(&self, margin_percent: u64) -> String {
-        format!(
-            "\noverheads measured: {}; with a margin of {margin_percent} %: {}\n",
-            self.0,
-            self.word(margin_percent)
-        )
-    }
-
-    /// Returns the measured overheads as a machine line.
-    #[must_use]
-    pub fn line(&self, margin_percent: u64) -> String {
-        Object::new()
-            .text("kind", "overheads")
-            .number("dispatches", self.0.dispatches)
-            .number("owed_ns", self.0.owed_ns)
-            .number("releases", self.0.releases)
-            .number("late_ns", self.0.late_ns)
-            .number("margin_percent", margin_percent)
-            .into_text()
-    }
+/// Returns the measured overheads as a machine line.
+pub fn overheads_line(measured: &MeasuredCosts, margin_percent: u64) -> String {
+    Object::new()
+        .text("kind", "overheads")
+        .number("dispatches", measured.dispatches)
+        .number("owed_ns", measured.owed_ns)
+        .number("releases", measured.releases)
+        .number("late_ns", measured.late_ns)
+        .number("margin_percent", margin_percent)
+        .into_text()
 }
 
 /// The margin on the longest call, in per cent of it, if no other is given.
 pub const MARGIN_PERCENT: u64 = 20;
 
 /// Returns a file of the longest calls with a margin. A subtask that never ran is left out.
-#[must_use]
 pub fn text(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::from(
         "# WCETs that were observed, by `./scripts/run --observe`: a margin in per cent, then of\n\
@@ -275,7 +253,6 @@ pub fn read(path: &Path) -> Result<String, String> {
 
 /// Translates a guest's refusal of the file into one with its name and line; `None` if the message
 /// is about something else.
-#[must_use]
 pub fn translate(said: &str, path: &Path) -> Option<String> {
     let (before, rest) = said.split_once("line ")?;
     let (line, after) = rest.split_once(" of the WCETs: ")?;
@@ -284,7 +261,6 @@ pub fn translate(said: &str, path: &Path) -> Option<String> {
 }
 
 /// Returns the table of the observed times.
-#[must_use]
 pub fn table(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::new();
     for dag in all {

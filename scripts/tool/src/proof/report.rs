@@ -67,7 +67,6 @@ pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<ProofRow>, 
 
 impl ProofRow {
     /// Names the file of the DAG.
-    #[must_use]
     pub fn of_file(self, name: &str) -> Self {
         Self {
             file: Some(name.into()),
@@ -94,18 +93,7 @@ impl ProofRow {
         u64::try_from(permille).ok()
     }
 
-    fn parts(&self) -> [(&'static str, Option<u64>); 5] {
-        [
-            ("longest_path_ns", self.slack.length_ns),
-            ("own_order_ns", self.slack.own_order_ns),
-            ("interference_ns", self.slack.interference_ns),
-            ("blocking_ns", self.slack.blocking_ns),
-            ("overheads_ns", self.slack.overheads_ns),
-        ]
-    }
-
     /// Returns the row as a machine line.
-    #[must_use]
     pub fn line(&self) -> String {
         let mut line = Object::new().text("kind", "proof");
         if let Some(file) = &self.file {
@@ -119,7 +107,7 @@ impl ProofRow {
             ("bound_ns", self.bound_ns),
             ("tightness_permille", self.permille()),
         ];
-        let parts = self.parts();
+        let parts = PARTS.into_iter().zip(self.slack);
         for (name, number) in permille.into_iter().chain(parts) {
             // Parts without a bound would add up to nothing.
             if let (Some(number), true) = (number, self.bound_ns.is_some()) {
@@ -131,7 +119,6 @@ impl ProofRow {
 }
 
 /// Returns the table.
-#[must_use]
 pub fn table(rows: &[ProofRow]) -> String {
     let names = rows.iter().map(|row| row.name().chars().count() + 1);
     let width = names.max().unwrap_or(0).max(20);
@@ -149,7 +136,7 @@ pub fn table(rows: &[ProofRow]) -> String {
             shown(row.longest_ns),
             ratio(row.permille()),
         ];
-        let parts = row.parts().map(|(_, part)| part.map_or("-".into(), shown));
+        let parts = row.slack.map(|part| part.map_or("-".into(), shown));
         let parts = parts.into_iter().filter(|_| row.bound_ns.is_some());
         table.cells(whole.into_iter().chain(parts));
     }
@@ -164,7 +151,6 @@ pub(crate) fn ratio(permille: Option<u64>) -> String {
 }
 
 /// Returns the number of proven DAGs, and of responses above their bounds.
-#[must_use]
 pub fn summary(rows: &[ProofRow]) -> String {
     let proven = rows.iter().filter(|row| row.bound_ns.is_some()).count();
     let above = rows.iter().filter(|row| row.exceeds()).count();
@@ -173,7 +159,6 @@ pub fn summary(rows: &[ProofRow]) -> String {
 }
 
 /// Returns the complaint about a response above its bound, which makes the proof worthless.
-#[must_use]
 pub fn complaint(rows: &[ProofRow]) -> Option<String> {
     let row = rows.iter().find(|row| row.exceeds())?;
     Some(format!(
@@ -185,24 +170,21 @@ pub fn complaint(rows: &[ProofRow]) -> Option<String> {
     ))
 }
 
-/// The parts of a bound, in nanoseconds. A part is `None` if a bound that it is a difference of is
-/// not proven.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Slack {
-    /// The part of the platform's overheads.
-    pub overheads_ns: Option<u64>,
-    /// The part of less urgent instances that keep their cores.
-    pub blocking_ns: Option<u64>,
-    /// The part of other DAGs' more urgent instances.
-    pub interference_ns: Option<u64>,
-    /// The part of its own subtasks off the longest path.
-    pub own_order_ns: Option<u64>,
-    /// The length of the longest path, at its WCETs.
-    pub length_ns: Option<u64>,
-}
+/// The parts of a bound: the longest path at its WCETs, its own subtasks off that path, other DAGs'
+/// more urgent instances, less urgent ones that keep their cores, and the platform's overheads.
+const PARTS: [&str; 5] = [
+    "longest_path_ns",
+    "own_order_ns",
+    "interference_ns",
+    "blocking_ns",
+    "overheads_ns",
+];
+
+/// These parts of a bound, in nanoseconds. A part is `None` if a bound that it is a difference of
+/// is not proven.
+pub type Slack = [Option<u64>; PARTS.len()];
 
 /// Splits the bound of a DAG of a commit into its parts.
-#[must_use]
 pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
         let options = SchedulerOptions {
@@ -242,13 +224,13 @@ pub fn slack(commit: &Committed, dag: DagId) -> Slack {
     settings.cores = u32::try_from(own.subtasks.len()).unwrap_or(u32::MAX).max(1);
     let length = bound(&[own], &settings, 0);
     let part = |whole: Option<u64>, rest: Option<u64>| Some(whole?.saturating_sub(rest?));
-    Slack {
-        overheads_ns: part(full, free),
-        blocking_ns: part(free, preemptible),
-        interference_ns: part(preemptible, alone),
-        own_order_ns: part(alone, length),
-        length_ns: length,
-    }
+    [
+        length,
+        part(alone, length),
+        part(preemptible, alone),
+        part(free, preemptible),
+        part(full, free),
+    ]
 }
 
 /// Writes the witness of each commit, and returns a line that names the files. Witnesses of later

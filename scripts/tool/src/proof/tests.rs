@@ -13,6 +13,7 @@ use super::{observed, report};
 use crate::made::{commit, record_of};
 use crate::record::Committed;
 use crate::record::Record;
+use crate::tests::{altered, rows as rows_of};
 
 /// A chain of 2 and 3 ms, each charged 1 us.
 const CHAIN: &str = "static 2
@@ -65,13 +66,7 @@ fn the_model_is_made_again_and_bounded_alike() {
     assert_eq!(commits[0].told.dags[0].bound_ns, Some(5_002_000));
     assert_eq!(commits[0].task_set.dags()[0].name(), "demo");
     // The parts add up to the bound.
-    let expected = report::Slack {
-        overheads_ns: Some(2_000),
-        blocking_ns: Some(0),
-        interference_ns: Some(0),
-        own_order_ns: Some(0),
-        length_ns: Some(5_000_000),
-    };
+    let expected = [5_000_000, 0, 0, 0, 2_000].map(Some);
     assert_eq!(report::slack(&commits[0], DagId(0)), expected);
 }
 
@@ -138,16 +133,14 @@ fn what_is_of_one_of_several_files_or_commits_has_its_name() {
     fs::remove_file(&path).and(fs::remove_file(second)).unwrap();
 }
 
-/// A part of a file of WCETs, its replacement, and the line and the reason of the refusal. A line's
-/// end is `/`.
-const WRONG: &str = "\
-wcet 11 | wcet 0 | 7 | a WCET of 0
+/// A part of a file of WCETs, its replacement, and the line and the reason of the refusal.
+const WRONG: &str = r"wcet 11 | wcet 0 | 7 | a WCET of 0
 wcet 11 | wect 11 | 7 | this is no record
-end/ |  | 7 | the file does not end by `end`
-end/ | end/margin 3/ | 9 | more follows after `end`
-end/ | dag 5 demo/end/ | 8 | this DAG stands here twice
-end/ | wcet 1 0 a/end/ | 8 | this subtask stands here twice
-dag 5 demo/ |  | 6 | a WCET before the first DAG";
+end\n |  | 7 | the file does not end by `end`
+end\n | end\nmargin 3\n | 9 | more follows after `end`
+end\n | dag 5 demo\nend\n | 8 | this DAG stands here twice
+end\n | wcet 1 0 a\nend\n | 8 | this subtask stands here twice
+dag 5 demo\n |  | 6 | a WCET before the first DAG";
 
 #[test]
 fn wcets_that_are_written_are_read_and_have_the_margin() {
@@ -157,12 +150,8 @@ fn wcets_that_are_written_are_read_and_have_the_margin() {
     let path = std::env::temp_dir().join(format!("wcets-{}", std::process::id()));
     fs::write(&path, &text).unwrap();
     assert_eq!(observed::read(&path), Ok(text.clone()));
-    for row in WRONG.lines() {
-        let row = row.replace('/', "\n");
-        let [right, wrong, line, why] = row.split(" | ").collect::<Vec<_>>()[..] else {
-            panic!("{row}");
-        };
-        fs::write(&path, text.replace(right, wrong)).unwrap();
+    for [right, wrong, line, why] in rows_of(WRONG) {
+        fs::write(&path, altered(&text, [&right, &wrong])).unwrap();
         let said = observed::read(&path).unwrap_err();
         let expected = format!("{}:{line}: {why}", path.display());
         assert!(said.starts_with(&expected), "{said}");
@@ -200,9 +189,12 @@ fn the_longest_waits_of_a_run_are_what_is_charged() {
         releases: 2,
         late_ns: 2,
     };
-    assert_eq!(measured.0, expected);
-    assert_eq!(measured.word(0), "overheads_ns=0,9,7");
-    assert_eq!(measured.word(50), "overheads_ns=0,14,11");
+    assert_eq!(measured, expected);
+    let word = |margin| observed::overheads_word(&measured, margin);
+    assert_eq!(
+        [word(0), word(50)],
+        ["overheads_ns=0,9,7", "overheads_ns=0,14,11"]
+    );
     let nothing = observed::measure(&[]).unwrap_err();
     assert_eq!(nothing, "the guest has run nothing");
 }

@@ -233,7 +233,6 @@ impl Record {
     }
 
     /// Returns the machine lines that the record has.
-    #[must_use]
     pub fn transcript(&self) -> Transcript {
         Transcript::read(&self.lines)
     }
@@ -341,14 +340,23 @@ impl Committed {
         let specs: Result<Vec<_>, String> = told.dags.iter().map(spec).collect();
         let mut specs = specs.map_err(in_commit)?;
         for &(dag, subtask, limit_ns, segment_ns) in &told.waits {
-            let dag = specs.get_mut(DagId(dag).index());
-            let place = dag.and_then(|dag| dag.subtasks.get_mut(SubtaskId(subtask).index()));
+            let place = subtask_of(&mut specs, dag, subtask);
             let place = place.ok_or_else(|| in_commit("a wait is of no subtask".into()))?;
             let wait = Wait {
                 limit_ns,
                 segment_ns,
             };
             place.waits.push(wait);
+        }
+        for &(dag, subtask, core) in &told.pins {
+            let place = subtask_of(&mut specs, dag, subtask);
+            let place = place.ok_or_else(|| in_commit("a pin is of no subtask".into()))?;
+            place.core = Some(core);
+        }
+        for &(dag, core) in &told.affinities {
+            let place = specs.get_mut(DagId(dag).index());
+            let place = place.ok_or_else(|| in_commit("an affinity is of no dag".into()))?;
+            place.affinity.push(core);
         }
         let clusters = match &told.clusters[..] {
             [] => CoreDivision::Undivided,
@@ -366,7 +374,6 @@ impl Committed {
     }
 
     /// Returns the options of the scheduler.
-    #[must_use]
     pub const fn options(&self) -> SchedulerOptions {
         SchedulerOptions {
             policy: match self.told.is_edf {
@@ -382,18 +389,19 @@ impl Committed {
     }
 
     /// Returns the assumptions of the analysis besides the DAGs.
-    #[must_use]
     pub fn settings(&self) -> AnalysisSettings {
         let options = self.options();
         AnalysisSettings {
             policy: options.policy,
             preemption: options.preemption,
             cores: options.cores,
-            // The record has two numbers only, which is all that the analysis derives from
+            // The record has three numbers only, which is all that the analysis derives from
             // overheads.
             overheads: Overheads {
                 // `None` is a charge without an end: no bound must come out here either.
-                dispatch_ns: self.told.charge_ns.unwrap_or(u64::MAX),
+                dispatch_ns: (self.told.charge_ns)
+                    .map_or(u64::MAX, |ns| ns.saturating_sub(self.told.move_ns)),
+                interrupt_ns: self.told.move_ns,
                 ready_ns: self.told.ready_ns,
                 ..Overheads::default()
             },
@@ -425,7 +433,6 @@ impl Committed {
     }
 
     /// Returns which subtask samples the topic of which other, as positions in the model.
-    #[must_use]
     pub fn samplings(&self) -> Vec<SampledEdge> {
         let dags = (0..).map(DagId).zip(&self.told.dags);
         let sampling = |(dag, &(reader, writer, topic, _))| {
@@ -470,6 +477,11 @@ pub fn task_set(
         faults.join("; ")
     })?;
     Ok(verified.task_set)
+}
+
+fn subtask_of(specs: &mut [DagSpec], dag: u32, subtask: u32) -> Option<&mut SubtaskSpec> {
+    let dag = specs.get_mut(DagId(dag).index())?;
+    dag.subtasks.get_mut(SubtaskId(subtask).index())
 }
 
 fn spec(dag: &CommittedDag) -> Result<DagSpec, String> {
@@ -553,7 +565,6 @@ pub struct Run {
 
 impl Run {
     /// Returns the terms on which the run is judged, with a tolerance in nanoseconds.
-    #[must_use]
     pub const fn terms(&self, bound_ns: u64) -> JudgeOptions {
         JudgeOptions {
             is_whole: self.lost == 0,

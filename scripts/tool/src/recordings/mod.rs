@@ -24,6 +24,7 @@ use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::output;
 use crate::proof::{observed, report};
 use crate::record::Record;
+use crate::system;
 
 /// The options that write views of the commits and runs of a record.
 const OF_RUNS: [&str; 3] = ["dot", "witness", "observe"];
@@ -76,7 +77,6 @@ file that is no whole and unaltered recording, or no such table
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn recording(words: &[OsString]) -> ExitCode {
     RECORDING.carry_out(words, |options| {
         attempt(options).map(|()| ExitCode::SUCCESS)
@@ -169,16 +169,13 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
         if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(name)) {
             return Err(format!("`--from-csv` needs `--{name}`; give it, too"));
         }
-        let views = options.given_of(&["csv", "mcap", "until"]);
-        if let Some(name) = views.or(options.given_of(&OF_RUNS)) {
-            let line = "`--from-csv` exclude each other; convert what it has written";
-            return Err(format!("`--{name}` and {line}"));
-        }
-    } else if let Some(name) = options
-        .given_of(&of_tables)
-        .or(options.given_of(&["type", "ignore", "period"]))
-    {
-        return Err(format!("`--{name}` needs `--from-csv`; give it, too"));
+        let why = "and `--from-csv` exclude each other; convert what it has written";
+        options.check_without(&["csv", "mcap", "until"], why)?;
+        options.check_without(&OF_RUNS, why)?;
+    } else {
+        let why = "needs `--from-csv`; give it, too";
+        options.check_without(&of_tables, why)?;
+        options.check_without(&["type", "ignore", "period"], why)?;
     }
     files::check(
         &[input],
@@ -236,12 +233,9 @@ fn write(
 /// In words: it has no such package.
 pub fn independent_reader() -> Result<OsString, String> {
     let python = env::var_os("MCAP_PYTHON").unwrap_or("python3".into());
-    let tried = process::Command::new(&python)
-        .args(["-c", "import mcap"])
-        .output();
-    match tried.is_ok_and(|output| output.status.success()) {
-        true => Ok(python),
-        false => Err(format!(
+    match system::run(process::Command::new(&python).args(["-c", "import mcap"])) {
+        Ok(_) => Ok(python),
+        Err(_) => Err(format!(
             "{} has no package mcap; install it, or name a Python that has it by MCAP_PYTHON",
             files::shown_path(Path::new(&python))
         )),

@@ -38,7 +38,6 @@ exit codes: those of ./scripts/run, or of the program
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn boot(words: &[OsString]) -> ExitCode {
     let named = words.split_first();
     // The first word is the file, even if words after it look like our options: they are the

@@ -17,6 +17,7 @@ use std::fs::{self, File};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{self, ExitCode, Stdio};
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use replay::shown::quoted;
@@ -36,11 +37,11 @@ use crate::system;
 const START: Duration = Duration::from_secs(30);
 
 /// The table of `debug`. Options that `run` has, too, mean the same.
-static DEBUG: Command = Command {
+static DEBUG: LazyLock<Command> = LazyLock::new(|| Command {
     invocation: "./scripts/debug",
     about: "Boots an app in QEMU with gdb at it, in an image that gdb shows whole.",
     positional: None,
-    options: &[
+    options: Vec::leak(vec![
         of_run("app", None),
         Opt {
             name: "break",
@@ -69,7 +70,7 @@ static DEBUG: Command = Command {
         of_run("from", None),
         of_run("image", None),
         of_run("qemu", None),
-    ],
+    ]),
     notes: "\
 gdb is installed if it is missing. Budgets are off. In mode deterministic time stands still
 while the guest is stopped, and each run stops where the last one did; docs/debugging.md has a
@@ -77,37 +78,20 @@ worked example.
 
 exit codes: gdb's; 1 a failure; 2 a refused command line
 ",
-};
+});
 
 /// Returns an option of `run`, with another default if one is given.
-const fn of_run(name: &str, default: Option<&'static str>) -> Opt {
-    let mut at = 0;
-    // A loop with an index, since a `const fn` can use neither iterators nor `==` on text.
-    while at < RUN.options.len() {
-        if is_same(RUN.options[at].name.as_bytes(), name.as_bytes()) {
-            let mut option = RUN.options[at];
-            option.group = "";
-            if let Some(default) = default {
-                option.default = default;
-            }
-            return option;
-        }
-        at += 1;
+fn of_run(name: &str, default: Option<&'static str>) -> Opt {
+    let option = RUN.options.iter().find(|option| option.name == name);
+    let option = option.expect("`run` has each of them");
+    Opt {
+        group: "",
+        default: default.unwrap_or(option.default),
+        ..*option
     }
-    // Evaluated by the compiler: a wrong name does not build.
-    panic!("`run` has no such option")
-}
-
-const fn is_same(one: &[u8], other: &[u8]) -> bool {
-    let mut at = 0;
-    while at < one.len() && at < other.len() && one[at] == other[at] {
-        at += 1;
-    }
-    at == one.len() && at == other.len()
 }
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn debug(words: &[OsString]) -> ExitCode {
     DEBUG.carry_out(words, attempt)
 }
@@ -346,8 +330,7 @@ pub(super) fn script_text(socket: &Path, places: &[String]) -> String {
 fn printers() -> Option<String> {
     let mut rustc = process::Command::new("rustc");
     rustc.current_dir(system::workspace());
-    let said = rustc.args(["--print", "sysroot"]).output().ok()?;
-    let root = String::from_utf8(said.stdout).ok()?;
+    let root = system::run(rustc.args(["--print", "sysroot"])).ok()?;
     let folder = Path::new(root.trim()).join("lib/rustlib/etc");
     let file = folder.join("gdb_load_rust_pretty_printers.py");
     file.is_file().then(|| file.display().to_string())

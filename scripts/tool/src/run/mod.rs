@@ -56,7 +56,6 @@ const APART: [(&str, &str, &str); 3] = [
 ];
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn run(words: &[OsString]) -> ExitCode {
     RUN.carry_out(words, attempt)
 }
@@ -71,11 +70,11 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     if several::is_asked_for(options) {
         return several::run(options);
     }
-    if let Some(name) = options.given_of(&["margin", "seeds"]) {
-        let line = format!("`--{name}` needs `--observe FILE` or `--prove`; give one, too");
-        return Err(Refusal::Usage(line));
-    }
-    options.check_apart(&APART).map_err(Refusal::Usage)?;
+    let why = "needs `--observe FILE` or `--prove`; give one, too";
+    let apart = options.check_without(&["margin", "seeds"], why);
+    apart
+        .and_then(|()| options.check_apart(&APART))
+        .map_err(Refusal::Usage)?;
     check_files(options)?;
     let dags = prepare(options)?;
     if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {

@@ -42,27 +42,22 @@ fn is_in_guest(options: &Parsed) -> bool {
 pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
     if !is_asked_for(options) {
         // The reverse case: options of Linux on the bare machine.
-        return match options.given_of(&["mechanism", "busy"]) {
-            None => Ok(options.clone()),
-            Some(name) => Err(Refusal::Usage(format!(
-                "`--{name}` is for Linux; leave it out, or give `--on linux` or `--on debian`"
-            ))),
-        };
+        let why = "is for Linux; leave it out, or give `--on linux` or `--on debian`";
+        let on_machine = options.check_without(&["mechanism", "busy"], why);
+        return on_machine.map(|()| options.clone()).map_err(Refusal::Usage);
     }
     let on = options.text("on").unwrap_or_default();
-    if let Some(name) = options.given_of(&FOREIGN) {
-        let line = format!("`--{name}` is for the bare machine; leave it or `--on {on}` out");
-        return Err(Refusal::Usage(line));
-    }
+    let why = format!("is for the bare machine; leave it or `--on {on}` out");
+    let on_linux = options.check_without(&FOREIGN, &why);
+    on_linux.map_err(Refusal::Usage)?;
     let (others, place) = match is_in_guest(options) {
         true => (&NOT_IN_GUEST[..], "linux"),
         false => (&ONLY_IN_GUEST[..], "debian"),
     };
-    if let Some(name) = options.given_of(others) {
-        let line =
-            format!("`--{name}` is not for `--on {on}`; leave it out, or give `--on {place}`");
-        return Err(Refusal::Usage(line));
-    }
+    let why = format!("is not for `--on {on}`; leave it out, or give `--on {place}`");
+    options
+        .check_without(others, &why)
+        .map_err(Refusal::Usage)?;
     // Bytes with times make sense only where the times repeat.
     if options.is_given("input") && !handed::is_live(options) {
         let line = "`--input FILE` is for the bare machine, which can repeat its times; with \
@@ -238,29 +233,11 @@ fn own_words(options: &Parsed) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::settle;
-    use crate::options::Refusal;
     use crate::run::RUN;
 
-    /// Command lines, and their refusals; more are in `tests/it/on_linux.rs`.
-    const REFUSED: &str = "--on linux --machine q35 | `--machine` is for the bare machine; leave
---on linux --gdb | `--gdb` is for the bare machine; leave
---on linux --latest 3 | `--latest` is for the bare machine; leave
---on debian --output x | `--output` is not for `--on debian`; leave it out, or give `--on linux`
---mechanism fifo | `--mechanism` is for Linux; leave it out, or give
---on linux --input x | `--input FILE` is for the bare machine, which";
-
+    /// `tests/it/lines.rs` has what is refused.
     #[test]
-    fn what_is_only_on_the_machine_is_refused_in_one_line() {
-        for row in REFUSED.lines() {
-            let (line, says) = row.split_once(" | ").expect(row);
-            match settle(&RUN.right(line)) {
-                Err(Refusal::Usage(why)) => {
-                    assert!(why.starts_with(says) && !why.contains('\n'), "{why}");
-                }
-                other => panic!("`{line}`: {other:?}"),
-            }
-        }
+    fn standard_input_is_for_linux_too() {
         assert!(settle(&RUN.right("--on linux --input - --trace x --cores 3")).is_ok());
-        assert!(settle(&RUN.right("--machine q35")).is_ok());
     }
 }

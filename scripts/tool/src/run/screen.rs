@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 use super::handed;
 use crate::options::Parsed;
-use crate::places::Places;
+use crate::places;
 use crate::progress::Progress;
 use crate::protocol::{MachineLine, read_line};
 use crate::system;
@@ -33,10 +33,11 @@ pub(super) struct Screen {
     quiet: bool,
     on_terminal: bool,
     bar_is_shown: bool,
-    status: StatusLine,
+    /// The arrival of the first status line, and the run's time in it.
+    first_status: Option<(Instant, u64)>,
     /// The progress of this run, and how many jobs were done.
     progress: Option<(Progress, u64)>,
-    places: Places,
+    image: PathBuf,
 }
 
 impl Screen {
@@ -48,9 +49,9 @@ impl Screen {
             quiet: options.is_given("quiet"),
             on_terminal: system::stderr_moves(),
             bar_is_shown: false,
-            status: StatusLine::default(),
+            first_status: None,
             progress: None,
-            places: Places::new(image),
+            image: image.into(),
         }
     }
 
@@ -90,7 +91,7 @@ impl Screen {
             self.wipe();
             println!("{line}");
         }
-        if let Some(place) = self.places.explain(line) {
+        if let Some(place) = places::explain(&self.image, line) {
             self.wipe();
             self.say(&format!("  {place}"));
         }
@@ -104,10 +105,23 @@ impl Screen {
     }
 
     fn show_status(&mut self, line: &MachineLine) {
-        if let Some(text) = self.status.text(line).filter(|_| !self.quiet) {
+        if let Some(text) = self.status_text(line).filter(|_| !self.quiet) {
             eprint!("\r\x1b[K{text}");
             self.bar_is_shown = true;
         }
+    }
+
+    /// Describes in one line how the run does; `None` if the machine line lacks a member.
+    fn status_text(&mut self, line: &MachineLine) -> Option<String> {
+        let now = Instant::now();
+        let time_ns = line.number_at("time_ns")?;
+        let (since, since_ns) = match self.first_status {
+            // A second run of the same boot counts from 0 again.
+            Some(first) if first.1 <= time_ns => first,
+            _ => *self.first_status.insert((now, time_ns)),
+        };
+        let wall_ns = u64::try_from((now - since).as_nanos()).unwrap_or(u64::MAX);
+        describe(line, wall_ns, time_ns - since_ns)
     }
 
     fn advance(&mut self, line: &MachineLine) {
@@ -129,28 +143,6 @@ impl Screen {
 
 /// The longest line in bytes, so that a narrow terminal does not break it.
 const WIDTH: usize = 100;
-
-/// The data for estimates of a run's speed.
-#[derive(Debug, Default)]
-pub(super) struct StatusLine {
-    /// The arrival of the first line, and the run's time in it.
-    first: Option<(Instant, u64)>,
-}
-
-impl StatusLine {
-    /// Describes in one line how the run does; `None` if the machine line lacks a member.
-    pub(super) fn text(&mut self, line: &MachineLine) -> Option<String> {
-        let now = Instant::now();
-        let time_ns = line.number_at("time_ns")?;
-        let (since, since_ns) = match self.first {
-            // A second run of the same boot counts from 0 again.
-            Some(first) if first.1 <= time_ns => first,
-            _ => *self.first.insert((now, time_ns)),
-        };
-        let wall_ns = u64::try_from((now - since).as_nanos()).unwrap_or(u64::MAX);
-        describe(line, wall_ns, time_ns - since_ns)
-    }
-}
 
 /// Describes the run after `wall_ns` of real time, in which `run_ns` of its own time have passed.
 fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {

@@ -12,6 +12,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use sched_dag::law::MeasuredCosts;
+
 use super::screen::NOTHING;
 use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::{Format, states_overheads};
@@ -21,14 +23,14 @@ use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
-use crate::proof::observed::{self, MeasuredOverheads, OfDag};
+use crate::proof::observed::{self, OfDag};
 use crate::proof::report;
 use crate::protocol::Status;
 use crate::record::Record;
 use crate::system;
 
 /// The platform's overheads; an error in words if no trace was kept.
-type Measurement = Result<MeasuredOverheads, String>;
+type Measurement = Result<MeasuredCosts, String>;
 
 /// Reports whether the options ask for an observed run.
 pub(super) fn is_asked_for(options: &Parsed) -> bool {
@@ -37,10 +39,9 @@ pub(super) fn is_asked_for(options: &Parsed) -> bool {
 
 /// Runs the observation or the proof.
 pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
-    if let Some(name) = options.given_of(&["console", "gdb", "print-dag"]) {
-        let line = format!("`--{name}` is for a run that is not observed; leave one of them out");
-        return Err(Refusal::Usage(line));
-    }
+    let why = "is for a run that is not observed; leave one of them out";
+    let alone = options.check_without(&["console", "gdb", "print-dag"], why);
+    alone.map_err(Refusal::Usage)?;
     check_files(options)?;
     // Without a comparison the exit code says only whether each run was good.
     if !options.is_given("prove") {
@@ -49,22 +50,13 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
             None => ExitCode::FAILURE,
         });
     }
-    let Some(ProofRun {
-        rows,
-        code,
-        is_well,
-    }) = prove(options)?
-    else {
+    let Some((rows, code)) = prove(options)? else {
         return Ok(ExitCode::FAILURE);
     };
-    say(
-        options,
-        &report::table(&rows),
-        rows.iter().map(report::ProofRow::line),
-    );
+    say_all(options, &rows);
     match report::complaint(&rows) {
         // A failed run has been reported; a second message would hide the first.
-        Some(complaint) if is_well => Err(Refusal::Failure(complaint)),
+        Some(complaint) if code == ExitCode::SUCCESS => Err(Refusal::Failure(complaint)),
         _ => Ok(code),
     }
 }
@@ -80,22 +72,18 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
         let one = options.with("dag", file).with("quiet", NOTHING);
         // The lines of the single runs would drown the one table.
         let one = one.with("json", "yes");
-        let Some(proven) = prove(&one)? else {
+        let Some((proven, code)) = prove(&one)? else {
             return Ok(Status::Failure);
         };
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        rows.extend(proven.rows.into_iter().map(|row| row.of_file(&name)));
-        Ok(match proven.is_well {
+        rows.extend(proven.into_iter().map(|row| row.of_file(&name)));
+        Ok(match code == ExitCode::SUCCESS {
             true => Status::Success,
             false => Status::Failure,
         })
     })?;
     progress.wipe();
-    say(
-        options,
-        &report::table(&rows),
-        rows.iter().map(report::ProofRow::line),
-    );
+    say_all(options, &rows);
     if !options.is_given("json") {
         let (count, summary) = (files.len(), report::summary(&rows));
         println!("{count} files: {refused} refused, {failed} failed; {summary}");
@@ -106,16 +94,12 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
     }
 }
 
-/// The second run of a proof.
-struct ProofRun {
-    rows: Vec<report::ProofRow>,
-    code: ExitCode,
-    is_well: bool,
-}
+/// The rows of a proof, and the exit code of its second run.
+type Proven = (Vec<report::ProofRow>, ExitCode);
 
 /// Observes a run, commits with its measurements, and compares; `None` if the first run failed,
 /// which has been reported.
-fn prove(options: &Parsed) -> Result<Option<ProofRun>, Refusal> {
+fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     let log = system::new_log("observed")?;
     // Without `--observe` the WCETs of the first run lie in a file of ours.
     let own = Temporary(Some(log.with_extension("wcets")));
@@ -133,11 +117,7 @@ fn prove(options: &Parsed) -> Result<Option<ProofRun>, Refusal> {
         Err(_) if !is_well => Vec::new(),
         Err(refusal) => return Err(refusal),
     };
-    Ok(Some(ProofRun {
-        rows,
-        code,
-        is_well,
-    }))
+    Ok(Some((rows, code)))
 }
 
 /// Observes a run, unless the person states both WCETs and overheads. Returns the command line by
@@ -162,9 +142,12 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
     if measures {
         let measured = seen?;
         let margin = options.number("margin").unwrap_or(observed::MARGIN_PERCENT);
-        let line = measured.line(margin);
-        say(options, &measured.text(margin), [line].into_iter());
-        next = next.with("append", format!("{append} {}", measured.word(margin)));
+        let word = observed::overheads_word(&measured, margin);
+        let text =
+            format!("\noverheads measured: {measured}; with a margin of {margin} %: {word}\n");
+        let line = observed::overheads_line(&measured, margin);
+        say(options, &text, [line].into_iter());
+        next = next.with("append", format!("{append} {word}"));
     }
     Ok(Some(next))
 }
@@ -222,6 +205,12 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
     Ok(Some(observed::measure(&latest.runs)))
 }
 
+/// Prints the rows of a proof.
+fn say_all(options: &Parsed, rows: &[report::ProofRow]) {
+    let lines = rows.iter().map(report::ProofRow::line);
+    say(options, &report::table(rows), lines);
+}
+
 /// Prints a table for people and lines for programs, as the options want.
 fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
     if !options.is_given("json") {
@@ -269,10 +258,9 @@ const FOR_ONE_FILE: [&str; 10] = [
 /// Runs all files. A refused or failed one does not keep the others from running;
 /// the exit code is that of the worst.
 pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Refusal> {
-    if let Some(name) = options.given_of(&FOR_ONE_FILE) {
-        let line = format!("`--{name}` is for one file; name one with `--dag`");
-        return Err(Refusal::Usage(line));
-    }
+    let why = "is for one file; name one with `--dag`";
+    let for_several = options.check_without(&FOR_ONE_FILE, why);
+    for_several.map_err(Refusal::Usage)?;
     // Before any boot, so that a folder without files is refused at once.
     let files = files(folder).map_err(Refusal::Usage)?;
     if options.is_given("prove") {

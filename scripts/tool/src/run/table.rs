@@ -39,9 +39,9 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// Boot this image, or program; build nothing.
         "image": Takes::File("FILE");
         /// Jobs that a DAG releases; 0: no end.
-        "jobs": Takes::number(0..=1_000_000);
+        "jobs": Takes::Number(0, 1_000_000);
         /// Seed of the app's random draws; 1.
-        "seed": Takes::number(0..=u64::MAX);
+        "seed": Takes::Number(0, u64::MAX);
         /// Parameters of the app, with commas between.
         "set": Takes::Text("NAME=VALUE");
         /// Those of a file, a line for each; --set prevails.
@@ -53,7 +53,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// Platform.
         "on" in "where": Takes::OneOf(&["machine", "linux", "debian"]), or "machine";
         /// Processors; 4 on debian.
-        "cores": Takes::number(1..=MOST_CORES), or "8";
+        "cores": Takes::Number(1, MOST_CORES), or "8";
         /// See docs/commands.md.
         "mode": Takes::OneOf(Mode::NAMES);
         /// The board.
@@ -61,13 +61,13 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// The loader.
         "boot": Takes::OneOf(Loader::NAMES), or "pvh";
         /// The guest's MiB.
-        "memory": Takes::number(LEAST_MEMORY_MIB..=65_536), or "32";
+        "memory": Takes::Number(LEAST_MEMORY_MIB, 65_536), or "32";
         /// Use this QEMU; install nothing.
         "qemu": Takes::File("PROGRAM");
         /// On Linux, by what.
         "mechanism": Takes::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
         /// On debian: so many programs next to it.
-        "busy": Takes::number(0..=64);
+        "busy": Takes::Number(0, 64);
         /// Fixed priorities, or by deadline.
         "policy" in "rules": Takes::OneOf(&["static", "edf"]);
         /// Whether instances may lose their cores.
@@ -75,9 +75,9 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// Sizes of clusters of cores: N,N,... or auto.
         "clusters": Takes::Text("SIZES");
         /// Parallel ones, a run for each; 2,4,6.
-        "subtasks" in "fork-join": Takes::numbers(1..=MOST_SUBTASKS);
+        "subtasks" in "fork-join": Takes::Numbers(1, MOST_SUBTASKS);
         /// Milliseconds of the longest execution.
-        "longest": Takes::number(1..=50);
+        "longest": Takes::Number(1, 50);
         /// Whether it really computes.
         "work": Takes::OneOf(&["simulate", "compute"]);
         /// How a simulated one has its core.
@@ -89,7 +89,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// wcet (if nothing is said), uniform:0.2..1, samples.
         "execution": Takes::Text("MODEL");
         /// The jobs of so many seconds.
-        "seconds": Takes::number(1..=1_000_000);
+        "seconds": Takes::Number(1, 1_000_000);
         /// A deadline miss is a failure.
         "strict-deadlines": Takes::Nothing;
         /// Print the file in our format; run nothing.
@@ -101,7 +101,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// As --keep, without values; for check-trace.
         "trace": Takes::File("FILE");
         /// Jobs of a DAG to keep for a crash; 16.
-        "latest": Takes::number(0..=64);
+        "latest": Takes::Number(0, 64);
         /// Take the sources' values from it, compare others.
         "replay": Takes::File("FILE");
         /// --replay: begin with this job.
@@ -115,9 +115,9 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// The times of calls, as WCETs; docs/proving.md.
         "observe" in "bounds": Takes::File("FILE");
         /// Per cent that a WCET is above it; 20.
-        "margin": Takes::number(0..=1_000);
+        "margin": Takes::Number(0, 1_000);
         /// Observe a run for so many seeds; 1.
-        "seeds": Takes::number(1..=1_000);
+        "seeds": Takes::Number(1, 1_000);
         /// Commit with WCETs that --observe has written.
         "wcets": Takes::File("FILE");
         /// Observe, commit with that, and compare with bounds.
@@ -129,7 +129,7 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         /// Write what the app sends on its wire.
         "output": Takes::File("FILE");
         /// Seconds until its end; 120, one a job.
-        "timeout": Takes::number(1..=86_400);
+        "timeout": Takes::Number(1, 86_400);
         /// Only machine lines on standard output.
         "json": Takes::Nothing;
         /// Only what the guest prints.

@@ -82,7 +82,6 @@ impl TestPlan {
 }
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn test(words: &[OsString]) -> ExitCode {
     TEST.carry_out(words, |options| {
         // Before anything is built: a full disk would show as an error of the linker.

@@ -76,7 +76,6 @@ pub fn read(log: &str) -> Result<Vec<Run>, String> {
 
 /// Judges a run. `bound_ns` is the longest time for which an instance may wait for a core that it
 /// is owed; 0 is for virtual time.
-#[must_use]
 pub fn check(run: &Run, bound_ns: u64) -> Findings {
     let (view, terms) = (View::new(run), run.terms(bound_ns));
     let verdict = law::judge(&run.task_set, terms, view.in_the_order_of_the_log());
@@ -105,9 +104,9 @@ pub static CHECK_TRACE: Command = Command {
         /// Microseconds for which an instance may wait for what it is owed, because a decision
         /// takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 by fifo, 10000
         /// by sched_ext, 100000 where nothing is preempted, else 1000.
-        "bound-us": Takes::number(0..=1_000_000_000);
+        "bound-us": Takes::Number(0, 1_000_000_000);
         /// Breaches of a run to be shown; all are counted.
-        "show": Takes::number(0..=u64::MAX), or "20";
+        "show": Takes::Number(0, u64::MAX), or "20";
         /// Only the chains that begin with this subtask; with --to.
         "from": Takes::Text("DAG/SUBTASK");
         /// Only the chains that end with this subtask; with --from.
@@ -139,7 +138,6 @@ well-formed trace with events
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn check_trace(words: &[OsString]) -> ExitCode {
     CHECK_TRACE.carry_out(words, |options| {
         let breaches = judge_all(options).map_err(Refusal::Usage)?;
@@ -205,7 +203,6 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
 }
 
 /// Returns the text for people: at most `shown` breaches, then the figures.
-#[must_use]
 pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: usize) -> String {
     let mut text = String::new();
     let Findings { breaches, figures } = findings;
@@ -268,7 +265,6 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: u
 }
 
 /// Returns the machine line of kind `trace_check`.
-#[must_use]
 pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
     let Findings { breaches, figures } = findings;
     Object::new()
@@ -323,9 +319,8 @@ const SHOWN: usize = 8;
 /// The times of a chain in a run, and their bounds.
 struct MeasuredChain {
     names: Vec<String>,
-    output_age: (Distribution, Result<u64, DagId>),
-    data_age: (Distribution, Result<u64, DagId>),
-    reaction: (Distribution, Result<u64, DagId>),
+    /// The age of an output, the data age and the reaction time.
+    times: [(Distribution, Result<u64, DagId>); 3],
 }
 
 /// Measures the chains that the options name, or else all.
@@ -360,17 +355,17 @@ fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
     let measured = |chain: &Chain| {
         let times = chain.latencies(&run.task_set, events.iter().copied());
         let bounds = &run.bounds_ns;
+        let output_age = chain.output_age_bound_ns(&run.task_set, bounds);
         let reaction = chain.reaction_bound_ns(&run.task_set, bounds);
         let names = chain.names(&run.task_set).map(|name| name.to_string());
         // Reaction time and data age have the same bound.
         MeasuredChain {
             names: names.collect(),
-            output_age: (
-                Distribution::new(times.output_age_ns),
-                chain.output_age_bound_ns(&run.task_set, bounds),
-            ),
-            data_age: (Distribution::new(times.data_age_ns), reaction),
-            reaction: (Distribution::new(times.reaction_ns), reaction),
+            times: [
+                (Distribution::new(times.output_age_ns), output_age),
+                (Distribution::new(times.data_age_ns), reaction),
+                (Distribution::new(times.reaction_ns), reaction),
+            ],
         }
     };
     Ok(chains.iter().map(measured).collect())
@@ -403,11 +398,8 @@ fn chain_table(run: &Run, chains: &[MeasuredChain], is_named: bool) -> String {
     for chain in chains.iter().take(shown) {
         // Writing into a `String` cannot fail.
         let _ = writeln!(text, "  chain {}", chain.names.join(" > "));
-        for (name, (times, bound)) in [
-            ("age of an output", &chain.output_age),
-            ("data age", &chain.data_age),
-            ("reaction time", &chain.reaction),
-        ] {
+        let names = ["age of an output", "data age", "reaction time"];
+        for (name, (times, bound)) in names.into_iter().zip(&chain.times) {
             let bound = match bound {
                 Ok(ns) => format!("bound {}", microseconds(*ns)),
                 Err(dag) => match run.task_set.dag(*dag) {
@@ -434,16 +426,17 @@ fn chain_table(run: &Run, chains: &[MeasuredChain], is_named: bool) -> String {
 /// Returns the machine line of kind `chain`.
 fn chain_line(file: &str, run: &Run, chain: &MeasuredChain) -> String {
     let bound = |of: &Result<u64, DagId>| of.map_or("null".into(), |ns| ns.to_string());
+    let [output_age, data_age, reaction] = &chain.times;
     Object::new()
         .text("kind", "chain")
         .text("file", file)
         .number("run", run.number)
         .list("path", chain.names.iter().map(|name| quoted(name)))
-        .json("output_age_ns", &object(&chain.output_age.0))
-        .json("data_age_ns", &object(&chain.data_age.0))
-        .json("reaction_ns", &object(&chain.reaction.0))
-        .json("output_age_bound_ns", &bound(&chain.output_age.1))
-        .json("reaction_bound_ns", &bound(&chain.reaction.1))
+        .json("output_age_ns", &object(&output_age.0))
+        .json("data_age_ns", &object(&data_age.0))
+        .json("reaction_ns", &object(&reaction.0))
+        .json("output_age_bound_ns", &bound(&output_age.1))
+        .json("reaction_bound_ns", &bound(&reaction.1))
         .into_text()
 }
 

@@ -9,12 +9,11 @@
 //! Coordinates are whole pixels, so that a run whose times differ by less than that has the same
 //! picture, byte by byte. Pages keep such pictures, and tests draw them again.
 
-use std::fmt::Write;
-
 use sched_dag::{Dag, DagId, SubtaskId};
 
 use super::View;
 use crate::record::Run;
+use crate::svg::Svg;
 
 const WIDTH: u64 = 820;
 /// The width of the rows' names, and where the axis of time begins.
@@ -45,7 +44,7 @@ pub fn draw(run: &Run, periods: u64) -> Result<String, String> {
     let span_ns = longest_ns.saturating_mul(periods);
     let mut picture = Picture {
         view: &view,
-        svg: String::new(),
+        svg: Svg::default(),
         span_ns,
         end_ns: span_ns,
     };
@@ -71,25 +70,18 @@ pub fn draw(run: &Run, periods: u64) -> Result<String, String> {
         y = picture.responses(dag, model, y);
     }
     picture.axis(axis, y);
-    let height = y + 30;
-    Ok(format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" \
-         viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" font-size=\"13\">\n\
-         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n{}</svg>\n",
-        picture.svg
-    ))
+    Ok(picture.svg.into_text((WIDTH, y + 30)))
 }
 
 struct Picture<'v> {
     view: &'v View<'v>,
-    svg: String,
+    svg: Svg,
     /// Jobs that are released before this are drawn.
     span_ns: u64,
     /// Where the axis of time ends.
     end_ns: u64,
 }
 
-// Writing into a `String` cannot fail.
 impl<'v> Picture<'v> {
     fn dags(&self) -> impl Iterator<Item = (DagId, &'v Dag)> + use<'v> {
         (0..).map(DagId).zip(self.view.run.task_set.dags())
@@ -120,29 +112,6 @@ impl<'v> Picture<'v> {
         COLOURS[(before + subtask.0 as usize) % COLOURS.len()]
     }
 
-    fn text(&mut self, (x, y): (u64, u64), anchor: &str, text: &str) {
-        let text = text.replace('&', "&amp;").replace('<', "&lt;");
-        let _ = writeln!(
-            self.svg,
-            "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>"
-        );
-    }
-
-    fn rect(&mut self, (x, y): (u64, u64), (width, height): (u64, u64), fill: &str) {
-        let _ = writeln!(
-            self.svg,
-            "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"3\" \
-             fill=\"{fill}\" stroke=\"#333333\"/>"
-        );
-    }
-
-    fn line(&mut self, (x1, y1): (u64, u64), (x2, y2): (u64, u64), style: &str) {
-        let _ = writeln!(
-            self.svg,
-            "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" {style}/>"
-        );
-    }
-
     /// Draws a DAG from `y` on, by layers: a subtask's is the longest path to it.
     fn graph(&mut self, dag: DagId, model: &Dag, y: u64) -> u64 {
         let mut layers: Vec<Vec<SubtaskId>> = Vec::new();
@@ -166,29 +135,31 @@ impl<'v> Picture<'v> {
                 corners[subtask.0 as usize] = (LEFT + x * width, y + above + row * height);
             }
         }
-        self.text((8, y + tallest * height / 2), "start", model.name());
+        self.svg
+            .text((8, y + tallest * height / 2), "start", model.name());
         for (subtask, &from) in (0..).map(SubtaskId).zip(&corners) {
             for successor in model.successors(subtask) {
                 let to = corners[successor.0 as usize];
                 let style = "stroke=\"#333333\"";
                 let end = (to.0, to.1 + box_height / 2);
-                self.line((from.0 + BOX.0, from.1 + box_height / 2), end, style);
+                self.svg
+                    .line((from.0 + BOX.0, from.1 + box_height / 2), end, style);
                 let (x, y) = end;
-                let _ = writeln!(
-                    self.svg,
-                    "<path d=\"M{x} {y} l-8 -4 v8 z\" fill=\"#333333\"/>"
-                );
+                let arrow = format!("M{x} {y} l-8 -4 v8 z");
+                self.svg.path(&arrow, "fill=\"#333333\"");
             }
         }
         for (subtask, &(x, y)) in (0..).map(SubtaskId).zip(&corners) {
-            self.rect((x, y), (BOX.0, box_height), self.colour(dag, subtask));
+            self.svg
+                .rect((x, y), (BOX.0, box_height), self.colour(dag, subtask));
             let model = model.subtask(subtask);
             let wcet = model.wcet_ns().map(|ns| format!("WCET {}", time(ns)));
             let waits = Some(model.waiting_ns()).filter(|ns| *ns > 0);
             let waits = waits.map(|ns| format!("waits {}", time(ns)));
             let lines = [Some(model.name().into()), wcet, waits];
             for (row, line) in (0..).zip(lines.into_iter().flatten()) {
-                self.text((x + BOX.0 / 2, y + 17 + 16 * row), "middle", &line);
+                self.svg
+                    .text((x + BOX.0 / 2, y + 17 + 16 * row), "middle", &line);
             }
         }
         y + tallest * height
@@ -199,7 +170,7 @@ impl<'v> Picture<'v> {
         let cores = u64::from(self.view.run.options.cores);
         for core in 0..cores {
             let middle = y + core * ROW + 20;
-            self.text((8, middle), "start", &format!("core {core}"));
+            self.svg.text((8, middle), "start", &format!("core {core}"));
         }
         for (&instance, history) in &self.view.histories {
             if !self.is_drawn(instance.dag, instance.job) {
@@ -212,13 +183,14 @@ impl<'v> Picture<'v> {
                 let to = self.x(slice.to_ns.unwrap_or(self.end_ns).min(self.end_ns));
                 let (top, width) = (y + u64::from(slice.core.0) * ROW + 3, (to - from).max(1));
                 let colour = self.colour(instance.dag, instance.subtask);
-                self.rect((from, top), (width, ROW - 6), colour);
+                self.svg.rect((from, top), (width, ROW - 6), colour);
                 if width > LETTER * name.len() as u64 {
-                    self.text((from + width / 2, top + 17), "middle", name);
+                    self.svg.text((from + width / 2, top + 17), "middle", name);
                 }
                 if let Some((_, until_ns)) = history.wait_after(*slice) {
                     let until = self.x(until_ns.unwrap_or(self.end_ns).min(self.end_ns));
-                    self.rect((to, top + ROW - 7), ((until - to).max(1), 4), colour);
+                    self.svg
+                        .rect((to, top + ROW - 7), ((until - to).max(1), 4), colour);
                 }
             }
         }
@@ -233,7 +205,7 @@ impl<'v> Picture<'v> {
             (Some(model.relative_deadline_ns()), "#c1121f", "deadline"),
             (bound_ns.copied().flatten(), "#1a7f37", "bound"),
         ];
-        self.text((8, y + 20), "start", model.name());
+        self.svg.text((8, y + 20), "start", model.name());
         let view = self.view;
         let mut is_first = true;
         for (&(_, job), history) in view.jobs.iter().filter(|((of, _), _)| *of == dag) {
@@ -245,10 +217,12 @@ impl<'v> Picture<'v> {
             let release_ns = view.due_ns.get(&(dag, job)).copied();
             let release_ns = release_ns.unwrap_or_else(|| model.grid_ns(job));
             let (from, to) = (self.x(release_ns), self.x(completed_ns));
-            self.rect((from, y + 8), ((to - from).max(1), 16), "#eeeeee");
+            self.svg
+                .rect((from, y + 8), ((to - from).max(1), 16), "#eeeeee");
             let response = time(completed_ns - release_ns);
             if to - from > LETTER * response.len() as u64 {
-                self.text((from + (to - from) / 2, y + 21), "middle", &response);
+                self.svg
+                    .text((from + (to - from) / 2, y + 21), "middle", &response);
             }
             for (row, (after_ns, colour, name)) in (0..).zip(marks) {
                 let Some(at_ns) = after_ns.map(|after_ns| release_ns + after_ns) else {
@@ -260,7 +234,7 @@ impl<'v> Picture<'v> {
                 let (x, label_y) = (self.x(at_ns), y + 38 + 16 * row);
                 let style = format!("stroke=\"{colour}\" stroke-width=\"2\"");
                 let end_y = if is_first { label_y } else { y + 28 };
-                self.line((x, y + 2), (x, end_y), &style);
+                self.svg.line((x, y + 2), (x, end_y), &style);
                 if is_first {
                     let label = format!("{name} {}", time(at_ns - release_ns));
                     let is_wide = x + LETTER * label.len() as u64 > WIDTH - 8;
@@ -269,7 +243,7 @@ impl<'v> Picture<'v> {
                     } else {
                         (x + 4, "start")
                     };
-                    self.text((x, label_y), anchor, &label);
+                    self.svg.text((x, label_y), anchor, &label);
                 }
             }
             is_first = false;
@@ -284,12 +258,12 @@ impl<'v> Picture<'v> {
         let step_ns = step_ns.unwrap_or(self.end_ns.max(1));
         for time_ns in (0..=self.end_ns).step_by(usize::try_from(step_ns).unwrap_or(usize::MAX)) {
             let x = self.x(time_ns);
-            self.line(
+            self.svg.line(
                 (x, top),
                 (x, bottom),
                 "stroke=\"#333333\" stroke-opacity=\"0.12\"",
             );
-            self.text((x, bottom + 16), "middle", &time(time_ns));
+            self.svg.text((x, bottom + 16), "middle", &time(time_ns));
         }
     }
 }

@@ -90,8 +90,30 @@ run --dot pipe | it is a named pipe
 check-trace sub.json | it is a folder
 check-trace /dev/zero | it is a device or a pipe
 trace pipe | it is a device or a pipe
-oracle bounds /dev/zero | it is a device or a pipe";
+oracle bounds /dev/zero | it is a device or a pipe
+bench bounds sub.json | bench bounds: sub.json: cannot be read: it is a folder; name another file
+bench bounds late.txt | bench bounds: late.txt: case a: a DAG has D > T, which no method here covers; leave the case out
+bench bounds torn.txt | bench bounds: torn.txt:4: the file ends where a `end` record should be";
+    let set = "case a 2 1\ndag 8 9 1 0\nwcet 3\n";
+    fs::write(folder.join("late.txt"), format!("{set}end\n")).expect("a file");
+    fs::write(folder.join("torn.txt"), set).expect("a file");
     assert_refused(&folder, rows);
+}
+
+#[test]
+fn sets_of_files_are_counted_by_file() {
+    let folder = folder("sets");
+    // 9 of work by 8 on two cores, and on one.
+    let set = |cores: u32| format!("case on-{cores} {cores} 1\ndag 8 8 3 0\nwcet 3 3 3\nend\n");
+    fs::write(folder.join("both.txt"), set(2) + &set(1)).expect("a file");
+    fs::write(folder.join("one.txt"), set(1)).expect("a file");
+    let printed = call(&folder, ["bench", "bounds", "both.txt", "one.txt"]);
+    assert_eq!(printed.code, Some(0), "{}", printed.complaint);
+    let rows = printed.out.lines().skip(2);
+    let rows: Vec<Vec<&str>> = rows.map(|row| row.split_whitespace().collect()).collect();
+    let both = ["2", "50.0", "50.0", "50.0", "50.0", "50.0", "both.txt"];
+    let one = ["1", "0.0", "0.0", "0.0", "0.0", "0.0", "one.txt"];
+    assert_eq!(rows, [both, one]);
 }
 
 #[test]

@@ -12,8 +12,9 @@ use crate::support::{assert_refused, call, command, folder, refusal};
 
 /// Every command, by the words that name it.
 const COMMANDS: &str = "run, boot, test, new-app, check-trace, trace, recording, soak, bench, \
-    bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle bounds, \
-    oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer, oracle waiting";
+    bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle assignment, \
+    oracle bounds, oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer, \
+    oracle waiting";
 
 /// Runs the tool with the other ends of both its outputs closed; returns its exit code.
 fn code_without_readers(line: &str) -> Option<i32> {
@@ -87,12 +88,28 @@ oracle bound | oracle: unknown KIND `bound`; did you mean `bounds`?
 tset | fass-tool: unknown SUBCOMMAND `tset`; did you mean `test`?
 run --app dag-file --mode deterministic | run: app `dag-file` runs the DAGs of a file; name one by `--dag FILE`
 run --execution wcet | `--execution` needs `--dag FILE`
+run --on linux --machine q35 | `--machine` is for the bare machine; leave
+run --on linux --gdb | `--gdb` is for the bare machine; leave
+run --on linux --latest 3 | `--latest` is for the bare machine; leave
+run --on debian --output x | `--output` is not for `--on debian`; leave it out, or give `--on linux`
+run --mechanism fifo | `--mechanism` is for Linux; leave it out, or give
+run --on linux --input x | `--input FILE` is for the bare machine, which
+run --input - --console | `--input -` and `--console` both
+run --output - | `--output -`: standard output is
+run --dag x --output y | `--output` and `--dag` exclude
+run --boot bios --machine microvm | `--machine microvm`: it has no firmware
+run --boot uefi --mode deterministic | give --mode threads
+run --boot efi --mode deterministic | give --mode threads
 bench bounds --cores 2,2 | `--cores`: `2` stands twice
+bench bounds sets.txt --seed 2 | bench bounds: `--seed` is for random sets; leave it or the files out
 bench native --only join,join | `--only`: `join` stands twice
 bench join-latency --once --mode threads | `--once`
+bench join-latency --subtasks 2,2 --deterministic | `--subtasks`: `2` stands twice
+bench join-latency --policies exact,exact | `--policies`: `exact` stands twice
+bench join-latency --mode threads --deterministic | exclude
+bench join-latency --on linux --once | `--once` is for guests
 new-app | new-app: which name? give one, such as `./scripts/new-app brake-assist`
 new-app fork-join | new-app: there is an app `fork-join` already; choose another name, or edit apps/fork-join
-new-app Fork-Join | new-app: `Fork-Join` cannot be an app's name: give small letters, digits and single hyphens, a letter first, 32 at most, as in `brake-assist`
 new-app one two | new-app: `two`: only one NAME is allowed, and `one` is one
 new-app one --git https://example.org | new-app: `--git` is for a repository; add its folder, `--out DIR`";
     assert_refused(workspace(), rows);

@@ -164,6 +164,12 @@ pub(crate) const CASES: &[Case] = &[
         given.register_sink_subtask(|(_,): (u32,)| (), vec!["echoes"], PERIOD, of("store"));
         vec![given, sound("lidar", "points")]
     }),
+    ("core_out_of_range", || {
+        read_by("lidar", "points", attributes("read").core(9))
+    }),
+    ("affinity_out_of_range", || {
+        changed(|dag| _ = dag.affinity(&[0, 9]))
+    }),
     ("stack_out_of_range", || {
         read_by("lidar", "points", attributes("read").stack_bytes(4096))
     }),

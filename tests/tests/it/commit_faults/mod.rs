@@ -51,6 +51,13 @@ fn no_cluster() -> fass::commit::CommitError {
     refused(machine, starting("lidar")) // it could run in either
 }
 
+fn affinities_overlap() -> fass::commit::CommitError {
+    let _machine = virtual_time::VirtualTime::new().cores(2);
+    let dags = ["lidar", "camera"].map(starting);
+    dags[1].affinity(&[0]);
+    finish_create_dags(&dags).expect_err("the other one may have core 0, too")
+}
+
 fn not_assigned() -> fass::commit::CommitError {
     let machine = virtual_time::VirtualTime::new().cores(2).assign_clusters();
     let dag = fass::create_dag();
@@ -156,6 +163,7 @@ fn every_fault_is_found_and_said_as_documented() {
         cluster_without_cores(),
         clusters_beyond_cores(),
         no_cluster(),
+        affinities_overlap(),
         not_assigned(),
     ] {
         said.insert(refused.faults()[0].code().into(), refused.to_string());
@@ -300,7 +308,9 @@ fn every_reason_against_a_proof_is_listed() {
                 limit_ns: 4,
             },
             NotProvenReason::SpanBeyondLimit { .. } => NotProvenReason::NoBoundByPeriod,
-            NotProvenReason::NoBoundByPeriod => NotProvenReason::Limit,
+            NotProvenReason::NoBoundByPeriod => NotProvenReason::Pinned { subtask },
+            NotProvenReason::Pinned { .. } => NotProvenReason::BesidePinned,
+            NotProvenReason::BesidePinned => NotProvenReason::Limit,
             NotProvenReason::Limit => NotProvenReason::NoCores,
             NotProvenReason::NoCores => NotProvenReason::Unknown(TaskError::VolumeOverflow),
             NotProvenReason::Unknown(TaskError::VolumeOverflow) => {

@@ -49,7 +49,7 @@ fn executed(image: &Path) -> Result<Vec<u64>, String> {
     qemu.logs_instructions = true;
     let serial = system::new_log("listing")?;
     let mut running = qemu.start(image, &serial)?;
-    let log = running.log();
+    let log = running.child.output();
     let (ending, addresses) = std::thread::scope(|scope| {
         // Read while the guest runs: a full pipe would stop it.
         let reader =

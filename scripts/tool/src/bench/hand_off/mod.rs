@@ -192,6 +192,7 @@ fn measure_mode(mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
 #[cfg(test)]
 mod tests {
     use super::{HandOffPlan, TABLE};
+    use crate::tests::rows;
 
     /// Command lines, and their refusals. More are in `tests/it/files.rs`.
     const REFUSED: &str = "--compare --mode threads | leave `--mode` out
@@ -203,10 +204,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_refused() {
-        for row in REFUSED.lines() {
-            let (line, words) = row.split_once(" | ").expect(row);
-            let refused = HandOffPlan::new(&TABLE.right(line)).expect_err(line);
-            assert!(refused.contains(words), "{refused}");
+        for [line, words] in rows(REFUSED) {
+            let refused = HandOffPlan::new(&TABLE.right(&line)).expect_err(&line);
+            assert!(refused.contains(&words), "{refused}");
         }
         for line in ["--scale", "--listing /dev/null", "--compare --mode both"] {
             assert!(HandOffPlan::new(&TABLE.right(line)).is_ok(), "{line}");

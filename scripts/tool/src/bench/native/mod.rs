@@ -38,9 +38,9 @@ static TABLE: Command = Command {
     positional: None,
     options: options! {
         /// How many rounds of about 20,000 instances each figure has.
-        "rounds": Takes::number(10..=100_000), or "300";
+        "rounds": Takes::Number(10, 100_000), or "300";
         /// The jobs whose joins across cores are measured.
-        "jobs": Takes::number(100..=10_000_000), or "20000";
+        "jobs": Takes::Number(100, 10_000_000), or "20000";
         /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
         /// layered-1000, dags-1000, join, clusters; all.
         "only": Takes::Text("NAMES");

@@ -23,6 +23,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check, is_name, no_name, quoted};
+use sched_dag::analysis::Task;
 use sched_dag::{CommitOptions, DagSpec, Policy, SubtaskSpec};
 
 /// A graph in which each subtask may have a timer.
@@ -64,17 +65,12 @@ impl RateGraph {
     }
 
     /// Returns the position of the subtask of that name.
-    #[must_use]
     pub fn position(&self, name: &str) -> Option<usize> {
         self.positions.get(name).copied()
     }
 
-    fn before(&self) -> Vec<Vec<usize>> {
-        let mut before = vec![Vec::new(); self.subtasks.len()];
-        for &(earlier, later, _) in &self.edges {
-            before[later].push(earlier);
-        }
-        before
+    fn pairs(&self) -> Vec<(usize, usize)> {
+        self.edges.iter().map(|edge| (edge.0, edge.1)).collect()
     }
 }
 
@@ -85,13 +81,13 @@ impl RateGraph {
 ///
 /// The graph has a cycle, or a path that is too long for a deadline.
 pub fn split(graph: &RateGraph, name: &str) -> Result<Vec<FileDag>, Vec<Malformed>> {
-    // First: without a cycle the orders below are complete.
     refuse_cycles(graph, name)?;
-    let rates = rates(graph);
-    let is_kept = |&(earlier, later, _): &(usize, usize, usize)| {
-        graph.subtasks[later].period_ns.is_none() && rates[earlier] == rates[later]
-    };
-    let parts = parts(graph, is_kept);
+    // Of its order alone; its times cannot overflow.
+    let order = Task::new(1, 1, vec![1; graph.subtasks.len()], &graph.pairs());
+    let order = order.expect("it has no cycle");
+    let rates = rates(graph, &order);
+    let kept = |edge: &&(usize, usize, usize)| is_kept(graph, &rates, (edge.0, edge.1));
+    let parts = parts(graph, graph.edges.iter().filter(kept));
     let is_one = parts.len() == 1;
     let mut part_of = vec![0; graph.subtasks.len()];
     for (number, part) in parts.iter().enumerate() {
@@ -99,12 +95,12 @@ pub fn split(graph: &RateGraph, name: &str) -> Result<Vec<FileDag>, Vec<Malforme
     }
     let mut has_input = vec![false; graph.subtasks.len()];
     let mut edges = vec![Vec::new(); parts.len()];
-    for edge in graph.edges.iter().filter(|edge| is_kept(edge)) {
+    for edge in graph.edges.iter().filter(kept) {
         // A subtask without kept inputs is a source, and can name its DAG.
         has_input[edge.1] = true;
         edges[part_of[edge.1]].push(*edge);
     }
-    let ends_ns = earliest_ends_ns(graph, is_kept);
+    let ends_ns = earliest_ends_ns(graph, &order, &rates);
     let named = |part: &[usize]| match part.iter().find(|&&subtask| !has_input[subtask]) {
         Some(&source) if !is_one => format!("{name}-{}", graph.subtasks[source].name),
         _ => name.into(),
@@ -122,7 +118,7 @@ pub fn split(graph: &RateGraph, name: &str) -> Result<Vec<FileDag>, Vec<Malforme
         }
         dags.push(dag);
     }
-    for &(earlier, later, line) in graph.edges.iter().filter(|edge| !is_kept(edge)) {
+    for &(earlier, later, line) in graph.edges.iter().filter(|edge| !kept(edge)) {
         let (from, to) = (&graph.subtasks[earlier].name, &graph.subtasks[later].name);
         let remark = format!("{to} reads the latest value of {from} (line {line}): no precedence");
         dags[part_of[later]].remarks.push(remark);
@@ -130,73 +126,42 @@ pub fn split(graph: &RateGraph, name: &str) -> Result<Vec<FileDag>, Vec<Malforme
     Ok(dags)
 }
 
-/// Returns the rate of each subtask of a graph without cycles.
-fn rates(graph: &RateGraph) -> Vec<Rate> {
-    let periods = graph
-        .subtasks
-        .iter()
-        .filter_map(|subtask| subtask.period_ns);
-    let deadlines = graph
-        .subtasks
-        .iter()
-        .filter_map(|subtask| subtask.deadline_ns);
-    let volume = || {
-        let wcets = graph.subtasks.iter().map(|subtask| subtask.wcet_ns);
-        wcets.fold(0, u64::saturating_add).max(1)
-    };
-    let missing = periods
-        .max()
-        .or_else(|| deadlines.min())
-        .unwrap_or_else(volume);
-    let before = graph.before();
-    // Timers and sources have rates of their own; the others get theirs below.
-    let mut rates: Vec<Option<Rate>> = (graph.subtasks.iter().zip(&before))
-        .map(|(subtask, before)| match subtask.period_ns {
-            Some(period_ns) => Some((period_ns, subtask.offset_ns)),
-            None if before.is_empty() => Some((missing, subtask.offset_ns)),
-            None => None,
-        })
-        .collect();
-    // In topological order the rates of all predecessors are known.
-    for subtask in topological(graph) {
-        if rates[subtask].is_none() {
-            rates[subtask] = before[subtask].iter().filter_map(|&one| rates[one]).max();
-        }
-    }
-    rates
-        .into_iter()
-        .map(|rate| rate.unwrap_or((missing, 0)))
-        .collect()
+/// Reports whether an edge is a precedence of one DAG.
+fn is_kept(graph: &RateGraph, rates: &[Rate], (earlier, later): (usize, usize)) -> bool {
+    graph.subtasks[later].period_ns.is_none() && rates[earlier] == rates[later]
 }
 
-/// Returns the subtasks in topological order.
-fn topological(graph: &RateGraph) -> Vec<usize> {
-    let mut after = vec![Vec::new(); graph.subtasks.len()];
-    let mut waits_for = vec![0; graph.subtasks.len()];
-    for &(earlier, later, _) in &graph.edges {
-        after[earlier].push(later);
-        waits_for[later] += 1;
-    }
-    let is_free = |subtask: &usize| waits_for[*subtask] == 0;
-    let mut order: Vec<usize> = (0..graph.subtasks.len()).filter(is_free).collect();
-    let mut next = 0;
-    while let Some(&subtask) = order.get(next) {
-        next += 1;
-        for &later in &after[subtask] {
-            waits_for[later] -= 1;
-            if waits_for[later] == 0 {
-                order.push(later);
-            }
+/// Returns the rate of each subtask.
+fn rates(graph: &RateGraph, order: &Task) -> Vec<Rate> {
+    let subtasks = || graph.subtasks.iter();
+    let volume = || {
+        let wcets = subtasks().map(|subtask| subtask.wcet_ns);
+        wcets.fold(0, u64::saturating_add).max(1)
+    };
+    let missing = (subtasks().filter_map(|subtask| subtask.period_ns).max())
+        .or_else(|| subtasks().filter_map(|subtask| subtask.deadline_ns).min())
+        .unwrap_or_else(volume);
+    let of_timer = |subtask: &Subtask| Some((subtask.period_ns?, subtask.offset_ns));
+    let mut rates: Vec<Option<Rate>> = subtasks().map(of_timer).collect();
+    for subtask in order.topological_order() {
+        // Without a rate by now it is a source.
+        let rate = *rates[subtask].get_or_insert((missing, graph.subtasks[subtask].offset_ns));
+        let later = order.successors(subtask);
+        for later in later.filter(|&later| graph.subtasks[later].period_ns.is_none()) {
+            rates[later] = rates[later].max(Some(rate));
         }
     }
-    order
+    rates.into_iter().flatten().collect()
 }
 
 /// Returns the connected parts of the kept edges, each in the order of the file, the parts by their
 /// first subtask.
-fn parts(graph: &RateGraph, is_kept: impl Fn(&(usize, usize, usize)) -> bool) -> Vec<Vec<usize>> {
+fn parts<'g>(
+    graph: &RateGraph,
+    kept: impl Iterator<Item = &'g (usize, usize, usize)>,
+) -> Vec<Vec<usize>> {
     let mut beside = vec![Vec::new(); graph.subtasks.len()];
-    for &(earlier, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
+    for &(earlier, later, _) in kept {
         beside[earlier].push(later);
         beside[later].push(earlier);
     }
@@ -289,18 +254,14 @@ fn dag(
 }
 
 /// Returns for each subtask the length of the longest path that ends with it, over the kept edges.
-fn earliest_ends_ns(
-    graph: &RateGraph,
-    is_kept: impl Fn(&(usize, usize, usize)) -> bool,
-) -> Vec<u64> {
-    let mut after = vec![Vec::new(); graph.subtasks.len()];
-    for &(earlier, later, _) in graph.edges.iter().filter(|edge| is_kept(edge)) {
-        after[earlier].push(later);
-    }
+fn earliest_ends_ns(graph: &RateGraph, order: &Task, rates: &[Rate]) -> Vec<u64> {
     let mut ends_ns = vec![0_u64; graph.subtasks.len()];
-    for subtask in topological(graph) {
+    for subtask in order.topological_order() {
         ends_ns[subtask] = ends_ns[subtask].saturating_add(graph.subtasks[subtask].wcet_ns);
-        for &later in &after[subtask] {
+        for later in order
+            .successors(subtask)
+            .filter(|&later| is_kept(graph, rates, (subtask, later)))
+        {
             ends_ns[later] = ends_ns[later].max(ends_ns[subtask]);
         }
     }
@@ -320,7 +281,7 @@ fn refuse_cycles(graph: &RateGraph, name: &str) -> Result<(), Vec<Malformed>> {
             period_ns: Some(1),
             relative_deadline_ns: Some(1),
             subtasks: graph.subtasks.iter().map(untimed).collect(),
-            edges: graph.edges.iter().map(|edge| (edge.0, edge.1)).collect(),
+            edges: graph.pairs(),
             ..DagSpec::default()
         },
         edge_lines: graph.edges.iter().map(|edge| edge.2).collect(),

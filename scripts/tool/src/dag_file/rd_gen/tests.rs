@@ -3,6 +3,7 @@
 
 use super::read;
 use crate::system::workspace;
+use crate::tests::rows;
 
 const MS: u64 = 1_000_000;
 
@@ -67,13 +68,12 @@ NODElinks:\n- source: 0\n  target: 0\n | line 6: subtask `0` of dag `x` precedes
 
 #[test]
 fn a_refusal_names_line_offender_and_remedy() {
-    for row in REFUSED.lines() {
-        let (text, words) = row.split_once(" | ").expect(row);
+    for [text, words] in rows(REFUSED) {
         let node = "nodes:\n- id: 0\n  execution_time: 1\n  period: 9\n";
-        let text = text.replace(r"\n", "\n").replace("NODE", node);
+        let text = text.replace("NODE", node);
         let text = text.replace("ONE", "- id: 1\n  execution_time: 1\n");
         let message = read(&text, "x", MS).unwrap_err()[0].to_string();
-        assert!(message.contains(words), "{message}\n  not: {words}");
+        assert!(message.contains(&words), "{message}\n  not: {words}");
     }
     // Of two DAGs, the first is named after the file and its first node.
     let text = "nodes:\n- id: 0\n  execution_time: 1\n  period: 9\n- id: 1\n  execution_time: 1\n  \

@@ -3,6 +3,7 @@
 
 use super::{read, read_graphs};
 use crate::system::workspace;
+use crate::tests::rows;
 
 fn set() -> String {
     std::fs::read_to_string(workspace().join("apps/dag-file/examples/stg50.json")).unwrap()
@@ -31,16 +32,16 @@ fn the_published_graphs_are_read() {
     assert!(is_elsewhere && message.contains("this is no JSON"));
 }
 
-/// The content of the list of graphs, with `/` for a line's end, and the refusal.
+/// The content of the list of graphs, and the refusal.
 const REFUSED: &str = r#" | the file has no `graphs`
 {"name":"a","c":[-1]} | a cost is no whole number from 0 on
-/{"name":"a","c":[1],"edges":[[0,1]]} | line 2: graph `a`: an edge must be two vertices from 0 to 0
+\n{"name":"a","c":[1],"edges":[[0,1]]} | line 2: graph `a`: an edge must be two vertices from 0 to 0
 {"name":"a","c":[1],"edges":[[0]]} | an edge must be two vertices
 {"name":"a","cost":[1]} | unknown key `cost`
 {"name":"a","c":[18446744073709551615,1]} | choose a shorter unit
-{"name":"b","c":[1]},//{"name":"a","c":[0]} | line 3: graph `a` has no cost above 0
-{"name":"b","c":[1]},/{"c":[1]} | line 2: graph 1 of the list has no `name`; give it a word
-{"name":"b","c":[1]},/5 | line 2: graph 1 of the list is no object
+{"name":"b","c":[1]},\n\n{"name":"a","c":[0]} | line 3: graph `a` has no cost above 0
+{"name":"b","c":[1]},\n{"c":[1]} | line 2: graph 1 of the list has no `name`; give it a word
+{"name":"b","c":[1]},\n5 | line 2: graph 1 of the list is no object
 {"name":"{a","c":[1]} | `{a` is no name; give a word
 {"name":"a","c":[1,2],"edges":5} | graph `a`: `edges` is no list
 {"name":"a","c":[1,2],"edges":[[0,1],[0,1]]} | graph `a`: edge [0,1] stands twice; drop one
@@ -48,11 +49,10 @@ const REFUSED: &str = r#" | the file has no `graphs`
 
 #[test]
 fn a_refusal_names_line_offender_and_remedy() {
-    for row in REFUSED.lines() {
-        let (graphs, words) = row.split_once(" | ").expect(row);
-        let text = format!("{{\"graphs\":[{}]}}", graphs.replace('/', "\n"));
+    for [graphs, words] in rows(REFUSED) {
+        let text = format!("{{\"graphs\":[{graphs}]}}");
         let message = refusal(&text, None, 1);
-        assert!(message.contains(words), "{message}\n  not: {words}");
+        assert!(message.contains(&words), "{message}\n  not: {words}");
     }
     assert!(refusal("", None, 1).contains("this is no JSON"));
     // A sum that exceeds 64 bits, and whose product with the unit exceeds 128.

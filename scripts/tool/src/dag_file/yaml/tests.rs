@@ -1,6 +1,7 @@
 //! Texts that the YAML reader accepts or refuses.
 
 use super::{Node, YamlValue, parse};
+use crate::tests::rows;
 
 /// Writes a value on one line, for comparing.
 fn flat(node: &Node) -> String {
@@ -73,11 +74,9 @@ fn lines_are_known_and_what_is_not_read_is_refused_with_its_own() {
         panic!("it is a mapping");
     };
     assert_eq!((members[0].1.line, members[1].1.line), (1, 5));
-    for row in REFUSED.lines() {
-        let (text, words) = row.rsplit_once(" | ").expect(row);
-        let text = text.replace(r"\n", "\n").replace(r"\t", "\t");
-        let message = parse(&text).unwrap_err().to_string();
-        assert!(message.contains(words), "{message}\n  not: {words}");
+    for [text, words] in rows(REFUSED) {
+        let message = parse(&text.replace(r"\t", "\t")).unwrap_err().to_string();
+        assert!(message.contains(&words), "{message}\n  not: {words}");
     }
 }
 

@@ -8,6 +8,7 @@ use recording::{Chunk, Commit, Recordable, Recording, Stream, Times, Writer};
 use super::Record;
 use super::bound::{COUNTED_NS, FIFO_NS, NORMAL_NS, REAL_NS, SCHED_EXT_NS};
 use crate::made::{commit, line_of, record_of};
+use crate::tests::{altered, rows};
 
 const COMMIT: &str = "edf 2\nx T=10 D=10 O=0: a/0 b/1/7; 0>1";
 
@@ -49,15 +50,11 @@ c1 0.0.0 | c1 1.0.0 | events of run 0: Event {
 #[test]
 fn whatever_is_wrong_is_named() {
     let all = format!("{COMMIT}\n--{EVENTS}");
-    for row in WRONG.lines().filter(|row| !row.is_empty()) {
-        let [from, to, says] = row.split(" | ").collect::<Vec<_>>()[..] else {
-            panic!("{row}");
-        };
-        assert_eq!(all.matches(from).count(), 1, "{from}");
-        let altered = all.replace(from, to);
+    for [from, to, says] in rows(WRONG) {
+        let altered = altered(&all, [&from, &to]);
         let (committed, events) = altered.split_once("--").unwrap();
         let said = Record::read(&record_of("", &commit(committed), events)).unwrap_err();
-        assert!(said.starts_with(says) && !said.contains('\n'), "{said}");
+        assert!(said.starts_with(&says) && !said.contains('\n'), "{said}");
     }
     let mut orphan = Writer::begin(Vec::new());
     orphan.times(&Times::default());

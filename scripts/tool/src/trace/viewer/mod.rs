@@ -51,7 +51,6 @@ use crate::output::briefly;
 use crate::record::{Run, bound};
 
 /// Converts runs to JSON. `bound_ns` is the tolerance for breaches, as of [`check`].
-#[must_use]
 pub fn convert(runs: &[Run], bound_ns: u64) -> String {
     let (mut output, mut next_flow) = (Output::default(), 0);
     for run in runs {
@@ -111,7 +110,7 @@ fn instance_args(instance: Instance) -> Object {
 /// Draws a piece of an instance's execution, with the arrows into its start and out of its finish.
 fn draw_piece(
     view: &View<'_>,
-    (instance, piece): (Instance, usize),
+    (instance, piece): Piece,
     (name, args): (&str, &str),
     flows: &Flows,
     track: &mut TrackWriter,
@@ -147,11 +146,11 @@ pub static TRACE: Command = Command {
         /// Draw one run as an SVG instead: its DAGs above their schedule, with bounds and deadlines.
         "svg": Takes::Nothing;
         /// How many times the longest period the picture shows.
-        "periods": Takes::number(1..=1000), or "1";
+        "periods": Takes::Number(1, 1000), or "1";
         /// Only the run of this number; else all of them, side by side from time 0.
-        "run": Takes::number(0..=u64::MAX);
+        "run": Takes::Number(0, u64::MAX);
         /// As for ./scripts/check-trace, whose breaches are shown as markers.
-        "bound-us": Takes::number(0..=1_000_000_000);
+        "bound-us": Takes::Number(0, 1_000_000_000);
     },
     notes: "\
 Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
@@ -163,7 +162,6 @@ line, or a file without a well-formed trace with events
 };
 
 /// Runs the subcommand with the words after its name.
-#[must_use]
 pub fn trace(words: &[OsString]) -> ExitCode {
     TRACE.carry_out(words, |options| {
         let text = draw(options).map_err(Refusal::Usage)?;
@@ -211,12 +209,8 @@ fn draw(options: &Parsed) -> Result<String, String> {
     Ok(convert(&runs, bound_ns))
 }
 
-/// A stretch of an instance's execution, and its number within the instance, from 0.
-struct Piece {
-    instance: Instance,
-    slice: Slice,
-    number: usize,
-}
+/// A stretch of an instance's execution: its number within the instance, from 0.
+type Piece = (Instance, usize);
 
 /// Draws the cores of a run.
 fn draw_cores(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Output) {
@@ -224,8 +218,8 @@ fn draw_cores(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Output)
     let group = output.group(&format!("{prefix}cores"), "");
     for core in (0..view.run.options.cores).map(CoreId) {
         let mut track = output.track(group, &format!("core {}", core.0));
-        for piece in pieces.iter().filter(|piece| piece.slice.core == core) {
-            draw_one(view, piece, flows, &mut track);
+        for &(slice, piece) in pieces.iter().filter(|(slice, _)| slice.core == core) {
+            draw_one(view, slice, piece, flows, &mut track);
         }
         draw_preemptions(view, core, &mut track);
         output.add(track);
@@ -233,26 +227,23 @@ fn draw_cores(view: &View<'_>, prefix: &str, flows: &Flows, output: &mut Output)
 }
 
 /// Returns all stretches of execution in the order of time.
-fn pieces(view: &View<'_>) -> Vec<Piece> {
+fn pieces(view: &View<'_>) -> Vec<(Slice, Piece)> {
     let mut pieces = Vec::new();
     for (&instance, history) in &view.histories {
-        let slices = history.slices.iter().enumerate();
-        pieces.extend(slices.map(|(number, &slice)| Piece {
-            instance,
-            slice,
-            number,
-        }));
+        let slices = history.slices.iter().zip(0..);
+        pieces.extend(slices.map(|(&slice, number)| (slice, (instance, number))));
     }
-    pieces.sort_by_key(|piece| (piece.slice.from_ns, piece.slice.to_ns.unwrap_or(u64::MAX)));
+    pieces.sort_by_key(|(slice, _)| (slice.from_ns, slice.to_ns.unwrap_or(u64::MAX)));
     pieces
 }
 
-fn draw_one(view: &View<'_>, piece: &Piece, flows: &Flows, track: &mut TrackWriter) {
-    let &Piece {
-        instance,
-        slice,
-        number,
-    } = piece;
+fn draw_one(
+    view: &View<'_>,
+    slice: Slice,
+    (instance, number): Piece,
+    flows: &Flows,
+    track: &mut TrackWriter,
+) {
     let history = &view.histories[&instance];
     let is_last = number + 1 == history.slices.len();
     let begins = if number > 0 {
@@ -479,12 +470,10 @@ struct Flow {
 #[derive(Debug)]
 struct Flows {
     /// For each instance, the arrows that leave it.
-    out: BTreeMap<Instance, Vec<u64>>,
+    out: BTreeMap<Instance, Vec<Flow>>,
     /// For each instance, the arrows that lead to it.
-    into: BTreeMap<Instance, Vec<u64>>,
+    into: BTreeMap<Instance, Vec<Flow>>,
     count: u64,
-    /// The number of edges among them, which come first.
-    edges: u64,
     first: u64,
     /// The offset from the numbers of the first drawing to those of the second.
     shift: u64,
@@ -497,7 +486,6 @@ impl Flows {
             out: BTreeMap::new(),
             into: BTreeMap::new(),
             count: 0,
-            edges: 0,
             first,
             shift: 0,
         };
@@ -506,26 +494,28 @@ impl Flows {
             if history.start_ns.is_none() {
                 continue;
             }
-            for &subtask in predecessors(view, later.dag, later.subtask) {
+            let model = view.run.task_set.dag(later.dag);
+            for &subtask in model.predecessors(later.subtask) {
                 let earlier = Instance { subtask, ..later };
                 let finish = view.histories.get(&earlier).and_then(|it| it.finish_ns);
                 if finish.is_some() {
-                    flows.add(earlier, later);
+                    flows.add(earlier, later, false);
                 }
             }
         }
-        flows.edges = flows.count;
         let samplings = &view.run.samplings;
         let sampled = SampledJobs::new(samplings, view.in_the_order_of_the_log());
         for (reader, writer) in sampled.all() {
-            flows.add(writer, reader);
+            flows.add(writer, reader, true);
         }
         flows
     }
 
-    fn add(&mut self, from: Instance, to: Instance) {
-        self.out.entry(from).or_default().push(self.count);
-        self.into.entry(to).or_default().push(self.count);
+    fn add(&mut self, from: Instance, to: Instance, is_sample: bool) {
+        let number = self.first + self.count;
+        let flow = Flow { number, is_sample };
+        self.out.entry(from).or_default().push(flow);
+        self.into.entry(to).or_default().push(flow);
         self.count += 1;
     }
 
@@ -550,16 +540,12 @@ impl Flows {
         self.first + 2 * self.count
     }
 
-    fn drawn<'f>(&'f self, of: Option<&'f Vec<u64>>) -> impl Iterator<Item = Flow> + 'f {
-        of.into_iter().flatten().map(|arrow| Flow {
-            number: arrow + self.first + self.shift,
-            is_sample: *arrow >= self.edges,
+    fn drawn<'f>(&'f self, of: Option<&'f Vec<Flow>>) -> impl Iterator<Item = Flow> + 'f {
+        of.into_iter().flatten().map(|flow| Flow {
+            number: flow.number + self.shift,
+            ..*flow
         })
     }
-}
-
-fn predecessors<'v>(view: &'v View<'_>, dag: DagId, subtask: SubtaskId) -> &'v [SubtaskId] {
-    view.run.task_set.dag(dag).predecessors(subtask)
 }
 
 /// The JSON that is being written.

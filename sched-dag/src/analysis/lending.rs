@@ -1,0 +1,576 @@
+//! Lending: the cores of a commit divided among DAGs, heavy ones with a fixed order on cores of their
+//! own, light ones on what these leave.
+//!
+//! A DAG is *heavy* if its volume exceeds its deadline, so that no core alone is enough for it, else
+//! *light*. There are five [attempts](LendingAttempt), and the first that proves a bound for every
+//! DAG is taken. In the first one all DAGs share all cores. In the others:
+//!
+//! - *Owners*: the heavy DAGs, the one with the least slack `D - length` first, take the first cores
+//!   that are left, each the least number on which its [list schedule](ListSchedule) ends by its
+//!   deadline. One for which too few are left is *late*.
+//! - *Members*: the late DAGs and then the light ones are placed one by one: on the first core on
+//!   which it is proven with all that are there; else in the first group of several cores; else on
+//!   cores that are in no group yet, the least busy ones first, as few as prove it.
+//!
+//! In the last two attempts the owners' lists are squeezed before that. A member that is placed
+//! lowers nobody's bound but those of its own group, which depend on the supplies of the group's
+//! cores ([`CoreSupply`]) and on its members only.
+//!
+//! Guaranteed: every job of every DAG responds within its bound, if the plan is enforced: owners'
+//! subtasks on their cores in the order of the lists and above all else, members on the cores of
+//! their group by deadline (ties by position) and below owners. See `docs/analysis.md`, "Lent cores".
+//!
+//! Not guaranteed: that a set which is not proven misses a deadline, or that no other division
+//! would prove it. DAGs with `D > T` and DAGs that wait are not covered.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT, parts_per_million};
+use super::list_schedule::ListSchedule;
+use super::set::constrained;
+use super::task::Task;
+use super::utilisation::sort_largest_first;
+use super::workload::WorkloadBursts;
+use crate::ids::{ClusterId, DagId, to_u32};
+use crate::order::{sort_by_key, sorted_by_key};
+use crate::policy::{AssignmentReason, LendingAttempt};
+use crate::task_set::TaskSet;
+
+/// A heavy DAG on cores of its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CoreOwner {
+    /// The position of the DAG.
+    pub dag: usize,
+    /// The first of its cores, which follow one another.
+    pub first_core: usize,
+    /// Its lists; the bound is [`ListSchedule::length_ns`].
+    pub schedule: ListSchedule,
+}
+
+/// Cores that DAGs share, with what owners leave of them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LentGroup {
+    /// The cores; where they are several and not all, those that are least busy first.
+    pub cores: Vec<usize>,
+    /// The positions of the DAGs with their response-time bounds in nanoseconds, the most urgent
+    /// first: by deadline, ties by position.
+    pub members: Vec<(usize, u64)>,
+}
+
+/// A division of cores under which every DAG has a bound.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LendingPlan {
+    /// The attempt that found it.
+    pub attempt: LendingAttempt,
+    /// The owners, in the order of their cores.
+    pub owners: Vec<CoreOwner>,
+    /// The groups, in the order in which they were made; each DAG is an owner or in one of them.
+    pub groups: Vec<LentGroup>,
+    /// By core, what its owner leaves.
+    pub supplies: Vec<CoreSupply>,
+}
+
+/// The outcome of all attempts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LendingAnswer {
+    /// The plan; `None`: no attempt proved all DAGs.
+    pub plan: Option<LendingPlan>,
+    /// For each attempt that failed, the position of the DAG for which it found no place.
+    pub failed: Vec<usize>,
+}
+
+impl LendingPlan {
+    /// Divides the cores of a task set so: cores that owners and groups connect are a cluster.
+    ///
+    /// Cores are counted anew, those of a cluster in a row; cores that nobody uses come last.
+    pub(super) fn divide(&self, task_set: &mut TaskSet, tasks: &[&Task]) {
+        let clusters = self.clusters();
+        let place = |core: usize| {
+            let mut clusters = clusters.iter().enumerate();
+            let found = clusters.find_map(|(cluster, cores)| {
+                let within = cores.iter().position(|&of| of == core)?;
+                Some((ClusterId(to_u32(cluster)), to_u32(within)))
+            });
+            found.expect("owners and groups make the clusters")
+        };
+        let mut of_dags = vec![(ClusterId(0), AssignmentReason::Light); tasks.len()];
+        for owner in &self.owners {
+            let (cluster, first) = place(owner.first_core);
+            let cores = owner.schedule.places().into_iter().map(|core| first + core);
+            let dag = DagId(to_u32(owner.dag));
+            let mut order =
+                task_set.ordered(dag, &owner.schedule.edges(), &cores.collect::<Vec<_>>());
+            task_set.exchange(dag, &mut order);
+            let task = tasks[owner.dag];
+            let own = owner.first_core..owner.first_core + owner.schedule.cores.len();
+            let why = AssignmentReason::Owner {
+                attempt: self.attempt,
+                volume_ns: task.volume_ns(),
+                within_ns: task.relative_deadline_ns(),
+                left_percent: self.left_percent(&own.collect::<Vec<_>>(), tasks),
+            };
+            of_dags[owner.dag] = (cluster, why);
+        }
+        for group in &self.groups {
+            let (cluster, _) = place(group.cores[0]);
+            let left_percent = self.left_percent(&group.cores, tasks);
+            let attempt = self.attempt;
+            let why = match attempt {
+                LendingAttempt::Whole => AssignmentReason::Whole { left_percent },
+                _ => AssignmentReason::Member {
+                    attempt,
+                    left_percent,
+                },
+            };
+            let mut cores: Vec<u32> = group.cores.iter().map(|&core| place(core).1).collect();
+            cores.sort_unstable();
+            for &(dag, _) in &group.members {
+                of_dags[dag] = (cluster, why);
+                if cores.len() < clusters[cluster.index()].len() {
+                    task_set.confine(DagId(to_u32(dag)), cores.clone());
+                }
+            }
+        }
+        let sizes: Vec<u32> = clusters.iter().map(|cores| to_u32(cores.len())).collect();
+        task_set.divide(&sizes, &of_dags);
+    }
+
+    /// Returns the cores of each cluster, ascending.
+    fn clusters(&self) -> Vec<Vec<usize>> {
+        let mut clusters: Vec<Vec<usize>> = Vec::new();
+        let own = self.owners.iter().map(|owner| {
+            let first = owner.first_core;
+            (first..first + owner.schedule.cores.len()).collect()
+        });
+        for cores in own.chain(self.groups.iter().map(|group| group.cores.clone())) {
+            let (met, mut apart): (Vec<_>, Vec<_>) = (clusters.into_iter())
+                .partition(|cluster| cluster.iter().any(|core| cores.contains(core)));
+            let mut all: Vec<usize> = met.concat();
+            all.extend(
+                cores
+                    .iter()
+                    .filter(|&core| !all.contains(core))
+                    .collect::<Vec<_>>(),
+            );
+            all.sort_unstable();
+            apart.push(all);
+            clusters = apart;
+        }
+        sorted_by_key(clusters.len(), |place| clusters[place][0])
+            .into_iter()
+            .map(|place| clusters[place].clone())
+            .collect()
+    }
+
+    /// Returns how much of the time of some cores, in hundredths, is left by their owners and by
+    /// the members of groups on them.
+    fn left_percent(&self, cores: &[usize], tasks: &[&Task]) -> u32 {
+        let mut taken: u64 = cores
+            .iter()
+            .map(|&core| self.supplies[core].taken_ppm())
+            .sum();
+        for group in &self.groups {
+            let shared = group
+                .cores
+                .iter()
+                .filter(|core| cores.contains(core))
+                .count() as u64;
+            let members = group.members.iter().map(|&(dag, _)| tasks[dag]);
+            let load = members.map(|task| parts_per_million(task.volume_ns(), task.period_ns()));
+            // Members take from their cores alike.
+            taken += (load.sum::<u64>() * shared).div_ceil(group.cores.len() as u64);
+        }
+        let all = 1_000_000 * cores.len() as u64;
+        let left = all.saturating_sub(taken) / (10_000 * cores.len() as u64);
+        u32::try_from(left).unwrap_or(100)
+    }
+}
+
+/// Divides cores among DAGs by the analysis of lent cores in `docs/analysis.md`.
+///
+/// `None` if it does not apply: there is no core, a DAG has `D > T`, or a subtask waits.
+#[must_use]
+pub fn lend(tasks: &[&Task], cores: u32) -> Option<LendingAnswer> {
+    lend_amid(&WorkloadBursts::default(), tasks, cores)
+}
+
+/// As [`lend`], with long steps of the scheduler.
+pub(super) fn lend_amid(
+    bursts: &WorkloadBursts,
+    tasks: &[&Task],
+    cores: u32,
+) -> Option<LendingAnswer> {
+    if !constrained(tasks, cores) || tasks.iter().any(|task| task.has_waits()) {
+        return None;
+    }
+    let members = (tasks.iter()).map(|task| MemberTask::of(task, cores, bursts));
+    let members: Vec<MemberTask<'_>> = members.collect();
+    let count = cores as usize;
+    let (mut owners, mut late, mut failed) = (Vec::new(), Vec::new(), Vec::new());
+    for attempt in LendingAttempt::ALL {
+        match attempt {
+            LendingAttempt::ByDensity => (owners, late) = own_cores(bursts, tasks, count),
+            LendingAttempt::SqueezedByDensity => squeeze(bursts, tasks, &mut owners),
+            // The owners of the attempt before, and none at first.
+            _ => {}
+        }
+        let mut placement = MemberPlacing::of(bursts, &members, &owners, count);
+        let placed = match attempt {
+            LendingAttempt::Whole => placement.share_all(),
+            _ => placement.place_all(late.iter().copied().chain(attempt.light(tasks))),
+        };
+        match placed {
+            Err(dag) => failed.push(dag),
+            Ok(()) => {
+                let (groups, supplies) = (placement.groups, placement.supplies);
+                let plan = Some(LendingPlan {
+                    attempt,
+                    owners,
+                    groups,
+                    supplies,
+                });
+                return Some(LendingAnswer { plan, failed });
+            }
+        }
+    }
+    Some(LendingAnswer { plan: None, failed })
+}
+
+impl LendingAttempt {
+    /// All attempts, in their order.
+    pub const ALL: [Self; 5] = [
+        Self::Whole,
+        Self::ByDensity,
+        Self::ByDeadline,
+        Self::SqueezedByDensity,
+        Self::SqueezedByDeadline,
+    ];
+
+    /// Returns the positions of the light DAGs in the order in which they are placed.
+    fn light(self, tasks: &[&Task]) -> Vec<usize> {
+        let mut light: Vec<usize> = (0..tasks.len())
+            .filter(|&dag| !is_heavy(tasks[dag]))
+            .collect();
+        let deadline_ns = |dag: usize| tasks[dag].relative_deadline_ns();
+        match self {
+            Self::ByDensity | Self::SqueezedByDensity => {
+                sort_largest_first(&mut light, |dag| (tasks[dag].volume_ns(), deadline_ns(dag)));
+            }
+            _ => sort_by_key(&mut light, deadline_ns),
+        }
+        light
+    }
+}
+
+const fn is_heavy(task: &Task) -> bool {
+    task.volume_ns() > task.relative_deadline_ns()
+}
+
+/// Returns by how much an owner's subtasks are late at most, and when its lists have to end for that.
+fn late_and_limit_ns(bursts: &WorkloadBursts, task: &Task) -> (u64, u64) {
+    let deadline_ns = task.relative_deadline_ns();
+    let late_ns = u64::try_from(bursts.during(deadline_ns.into())).unwrap_or(u64::MAX);
+    (late_ns, deadline_ns.saturating_sub(late_ns))
+}
+
+/// Gives heavy DAGs cores of their own, and returns those for which too few are left.
+fn own_cores(
+    bursts: &WorkloadBursts,
+    tasks: &[&Task],
+    cores: usize,
+) -> (Vec<CoreOwner>, Vec<usize>) {
+    let mut heavy: Vec<usize> = (0..tasks.len())
+        .filter(|&dag| is_heavy(tasks[dag]))
+        .collect();
+    sort_by_key(&mut heavy, |dag| {
+        i128::from(tasks[dag].relative_deadline_ns()) - i128::from(tasks[dag].length_ns())
+    });
+    let (mut owners, mut late, mut first_core) = (Vec::new(), Vec::new(), 0);
+    for dag in heavy {
+        let (task, (_, limit_ns)) = (tasks[dag], late_and_limit_ns(bursts, tasks[dag]));
+        let least = task.volume_ns().div_ceil(limit_ns.max(1));
+        let least = usize::try_from(least).unwrap_or(usize::MAX);
+        let most = task.subtask_count().min(cores - first_core);
+        let on = |count| ListSchedule::within(task, &vec![limit_ns; count]);
+        match (least..=most).find_map(on) {
+            Some(schedule) => {
+                let count = schedule.cores.len();
+                owners.push(CoreOwner {
+                    dag,
+                    first_core,
+                    schedule,
+                });
+                first_core += count;
+            }
+            None => late.push(dag),
+        }
+    }
+    (owners, late)
+}
+
+fn squeeze(bursts: &WorkloadBursts, tasks: &[&Task], owners: &mut [CoreOwner]) {
+    for CoreOwner { dag, schedule, .. } in owners {
+        let (_, limit_ns) = late_and_limit_ns(bursts, tasks[*dag]);
+        *schedule = schedule.squeezed(tasks[*dag], limit_ns);
+    }
+}
+
+/// Members on what the owners leave, as far as they are placed.
+struct MemberPlacing<'a> {
+    members: &'a [MemberTask<'a>],
+    supplies: Vec<CoreSupply>,
+    groups: Vec<LentGroup>,
+    /// How often equations may be evaluated yet.
+    steps: u32,
+}
+
+impl<'a> MemberPlacing<'a> {
+    fn of(
+        bursts: &WorkloadBursts,
+        members: &'a [MemberTask<'a>],
+        owners: &[CoreOwner],
+        cores: usize,
+    ) -> Self {
+        let mut supplies = vec![CoreSupply::UNOWNED; cores];
+        for owner in owners {
+            let task = members[owner.dag].task;
+            let (late_ns, _) = late_and_limit_ns(bursts, task);
+            let own = supplies[owner.first_core..].iter_mut();
+            for (supply, list) in own.zip(&owner.schedule.cores) {
+                *supply = CoreSupply::of(task.period_ns(), list, late_ns);
+            }
+        }
+        Self {
+            members,
+            supplies,
+            groups: Vec::new(),
+            steps: STEP_LIMIT,
+        }
+    }
+
+    /// Places all DAGs in one group of all cores, or returns the most urgent one without a bound.
+    fn share_all(&mut self) -> Result<(), usize> {
+        let mut group = LentGroup::of((0..self.supplies.len()).collect());
+        let members = self.members;
+        let deadline_ns = |dag: usize| members[dag].task.relative_deadline_ns();
+        for dag in sorted_by_key(members.len(), deadline_ns) {
+            group = self.join(group, dag).ok_or(dag)?;
+        }
+        self.groups.push(group);
+        Ok(())
+    }
+
+    /// Places DAGs one after the other, or returns the first for which there is no place.
+    fn place_all(&mut self, mut dags: impl Iterator<Item = usize>) -> Result<(), usize> {
+        dags.find(|&dag| !self.place(dag)).map_or(Ok(()), Err)
+    }
+
+    fn place(&mut self, dag: usize) -> bool {
+        self.place_on_one(dag) || self.place_in_group(dag) || self.place_in_new_group(dag)
+    }
+
+    /// Places a DAG on the first core that is in no larger group and on which it is proven.
+    fn place_on_one(&mut self, dag: usize) -> bool {
+        (0..self.supplies.len()).any(|core| match self.group_of(core) {
+            None => self.add_group(vec![core], dag),
+            Some(place) => self.groups[place].cores.len() == 1 && self.extend_group(place, dag),
+        })
+    }
+
+    /// Places a DAG in the first group of several cores in which it is proven.
+    fn place_in_group(&mut self, dag: usize) -> bool {
+        (0..self.groups.len()).any(|place| {
+            // A core that is alone was tried before.
+            self.groups[place].cores.len() > 1 && self.extend_group(place, dag)
+        })
+    }
+
+    /// Places a DAG on the fewest cores that are in no group and on which it is proven, the least
+    /// busy first.
+    fn place_in_new_group(&mut self, dag: usize) -> bool {
+        let task = self.members[dag].task;
+        let (deadline_ns, length_ns) = (task.relative_deadline_ns(), task.length_ns());
+        let busy_ns = |core: usize| self.supplies[core].busy_ns(deadline_ns);
+        let mut free: Vec<usize> = (0..self.supplies.len())
+            .filter(|&core| self.group_of(core).is_none())
+            .collect();
+        sort_by_key(&mut free, busy_ns);
+        // A core that supplies no more than the length interferes by as much as it adds.
+        let adds = |&&core: &&usize| deadline_ns - busy_ns(core) > length_ns;
+        let count = free.iter().take_while(adds).count();
+        (2..=count).any(|count| self.add_group(free[..count].to_vec(), dag))
+    }
+
+    fn group_of(&self, core: usize) -> Option<usize> {
+        let mut groups = self.groups.iter();
+        groups.position(|group| group.cores.contains(&core))
+    }
+
+    /// Makes a group with one member if that is proven in it.
+    fn add_group(&mut self, cores: Vec<usize>, dag: usize) -> bool {
+        let group = self.join(LentGroup::of(cores), dag);
+        group.map(|group| self.groups.push(group)).is_some()
+    }
+
+    /// Adds a member to a group if all of them are proven then.
+    fn extend_group(&mut self, place: usize, dag: usize) -> bool {
+        let group = self.join(self.groups[place].clone(), dag);
+        group.map(|group| self.groups[place] = group).is_some()
+    }
+
+    /// Returns a group with one more member if all of them are proven in it.
+    fn join(&mut self, mut group: LentGroup, dag: usize) -> Option<LentGroup> {
+        let members = self.members;
+        let urgency = |dag: usize| (members[dag].task.relative_deadline_ns(), dag);
+        let is_above = |&(other, _): &(usize, u64)| urgency(other) < urgency(dag);
+        let place = group.members.partition_point(is_above);
+        group.members.insert(place, (dag, 0));
+        let cores = group.cores.iter().map(|&core| &self.supplies[core]);
+        let cores: Vec<&CoreSupply> = cores.collect();
+        // More urgent members keep their bounds.
+        let (above, changed) = group.members.split_at_mut(place);
+        let above = above.iter().map(|&(other, ns)| (&members[other], ns));
+        let mut above: Vec<(&MemberTask<'_>, u64)> = above.collect();
+        for (other, bound_ns) in changed {
+            *bound_ns = members[*other].respond(&cores, &above, &mut self.steps)?;
+            above.push((&members[*other], *bound_ns));
+        }
+        Some(group)
+    }
+}
+
+impl LentGroup {
+    const fn of(cores: Vec<usize>) -> Self {
+        let members = Vec::new();
+        Self { cores, members }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::{InterferenceBound, SubtaskWaits, multi_path_fp};
+    use common::random::Random;
+
+    fn lent(tasks: &[Task], cores: u32) -> LendingAnswer {
+        lend(&tasks.iter().collect::<Vec<_>>(), cores).expect("it applies")
+    }
+
+    #[test]
+    fn a_squeezed_core_takes_what_it_would_not_have_taken() {
+        let heavy = Task::new(10, 10, vec![4, 4, 3], &[]).unwrap();
+        let light = Task::new(12, 9, vec![2, 4], &[(0, 1)]).unwrap();
+        let answer = lent(&[heavy, light], 2);
+        assert_eq!(answer.failed, [0, 1, 1]);
+        let plan = answer.plan.unwrap();
+        assert_eq!(plan.attempt, LendingAttempt::SqueezedByDensity);
+        let [owner] = &plan.owners[..] else {
+            panic!("{plan:?}");
+        };
+        assert_eq!((owner.dag, owner.first_core), (0, 0));
+        let schedule = &owner.schedule;
+        assert_eq!((schedule.length_ns(), schedule.finish_ns(1)), (8, 3));
+        let group = LentGroup {
+            cores: vec![1],
+            members: vec![(1, 9)],
+        };
+        assert_eq!(plan.groups, [group]);
+        assert_eq!(plan.supplies[1].busy_ns(9), 3);
+    }
+
+    #[test]
+    fn a_heavy_dag_that_comes_late_shares_what_others_leave() {
+        // Both need two cores of their own, and the first has the least slack.
+        let tight = Task::new(100, 7, vec![3, 3, 2, 2, 2], &[]).unwrap();
+        let loose = Task::new(100, 20, vec![7, 7, 7], &[]).unwrap();
+        let answer = lent(&[loose, tight], 2);
+        assert_eq!(answer.failed, [1]);
+        let plan = answer.plan.unwrap();
+        assert_eq!(plan.owners[0].dag, 1);
+        // 14 beside the path and 12 of the owner on two cores; the less busy core first.
+        let group = LentGroup {
+            cores: vec![1, 0],
+            members: vec![(0, 20)],
+        };
+        assert_eq!(plan.groups, [group]);
+    }
+
+    #[test]
+    fn light_dags_go_where_they_are_proven_with_all_that_are_there() {
+        // The heavy one takes 8 of one core and 4 of another, at once: nothing is left of either
+        // within 4, and of the second 4 within 8.
+        let long = Task::new(16, 8, vec![5], &[]).unwrap();
+        let heavy = Task::new(20, 9, vec![4, 4, 4], &[]).unwrap();
+        let short = Task::new(8, 4, vec![3], &[]).unwrap();
+        let answer = lent(&[long, heavy.clone(), short.clone()], 3);
+        let plan = answer.plan.unwrap();
+        assert_eq!(plan.attempt, LendingAttempt::ByDensity);
+        // The densest is placed first, and is the most urgent one, too.
+        let group = LentGroup {
+            cores: vec![2],
+            members: vec![(2, 3), (0, 8)],
+        };
+        assert_eq!(plan.groups, [group]);
+        // A denser one is placed before the more urgent one, and then proven again.
+        let dense = Task::new(20, 16, vec![13], &[]).unwrap();
+        let urgent = Task::new(40, 4, vec![2], &[]).unwrap();
+        let answer = lent(&[dense, heavy, urgent], 3);
+        assert_eq!(answer.plan.unwrap().groups[0].members, [(2, 2), (0, 15)]);
+    }
+
+    #[test]
+    fn all_on_all_cores_is_the_multi_path_bound() {
+        let mut random = Random::new(3);
+        let mut proven = 0;
+        for _ in 0..400 {
+            let tasks: Vec<Task> = (0..2 + random.index(3))
+                .map(|_| {
+                    let count = 1 + random.index(6);
+                    let edges: Vec<_> = random.edges(count, 30).collect();
+                    let wcets = (0..count).map(|_| random.within(1..=9)).collect();
+                    let period = random.within(20..=90);
+                    Task::new(period, random.within(10..=period), wcets, &edges).unwrap()
+                })
+                .collect();
+            let mut order: Vec<usize> = (0..tasks.len()).collect();
+            order.sort_by_key(|&dag| tasks[dag].relative_deadline_ns());
+            let by_deadline: Vec<&Task> = order.iter().map(|&dag| &tasks[dag]).collect();
+            let bounds = multi_path_fp(&by_deadline, 3, InterferenceBound::Waiting);
+            let answer = lent(&tasks, 3);
+            let whole = answer
+                .plan
+                .filter(|plan| plan.attempt == LendingAttempt::Whole);
+            let members = bounds.map(|bounds| order.into_iter().zip(bounds).collect());
+            proven += u32::from(members.is_some());
+            assert_eq!(whole.map(|plan| plan.groups[0].members.clone()), members);
+        }
+        assert!((50..350).contains(&proven), "{proven}");
+    }
+
+    #[test]
+    fn what_is_not_covered_gets_no_answer() {
+        let task = |deadline_ns| Task::new(10, deadline_ns, vec![2, 3], &[]).unwrap();
+        assert!(lend(&[&task(10)], 1).is_some());
+        assert_eq!(lend(&[&task(10)], 0), None);
+        assert_eq!(lend(&[&task(10), &task(11)], 2), None);
+        let waits = |&wcet_ns: &u64| SubtaskWaits {
+            count: 1,
+            limits_ns: 1,
+            longest_segment_ns: wcet_ns,
+        };
+        let waiting = task(10).with_waits([2, 3].iter().map(waits).collect());
+        assert_eq!(lend(&[&waiting.unwrap()], 2), None);
+        // Nothing has to be proven of no DAG.
+        assert_eq!(lent(&[], 2).failed, []);
+    }
+
+    #[test]
+    fn large_numbers_are_not_proven_rather_than_wrong() {
+        let large = Task::new(u64::MAX, u64::MAX - 1, vec![u64::MAX], &[]).unwrap();
+        let half = || Task::new(u64::MAX, u64::MAX, vec![u64::MAX / 2 + 1], &[]).unwrap();
+        assert_eq!(lent(&[half(), large], 4).failed, [1; 5]);
+        let answer = lent(&[half(), half(), half()], 2);
+        assert_eq!(answer.failed, [2; 5]);
+    }
+}

@@ -1,0 +1,268 @@
+//! List schedules: for each of some cores a list of a DAG's subtasks, with the times of their WCETs.
+//!
+//! Let each subtask execute for its WCET, and at each completion look at the *ready* ones in the
+//! order of their ranks, the longest remaining path first, ties by position. Each goes to the first
+//! idle core on which it ends by that core's *limit*; if there is none, it stays ready. None is
+//! preempted.
+//!
+//! A run keeps to these times if it keeps to the lists: each subtask executes on its core only and
+//! after the one before it, with nothing that wins over it. Then each ends at its time after the
+//! release, or earlier, whatever is shorter than its WCET; a schedule made anew by shorter times
+//! might take longer (R. L. Graham's anomalies, 1969). The proof is in `docs/analysis.md`, "Lent
+//! cores".
+//!
+//! Limits make some cores end early. [`ListSchedule::squeezed`] lowers them as far as it finds
+//! schedules: the first cores are then full up to the deadline, and the last are left early.
+//!
+//! Not guaranteed: that a schedule within the limits is found if there is one.
+
+use alloc::collections::BinaryHeap;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cmp::Reverse;
+
+use super::task::Task;
+use crate::ids::to_u32;
+
+/// How often one core's limit is lowered, at most.
+const SQUEEZES: usize = 256;
+
+/// How many pairs of subtasks are looked at to squeeze one schedule, at most. A schedule of n
+/// subtasks counts as n^2, since those that no core may take are looked at again at each
+/// completion. It limits no graph of less than 45 subtasks on 16 cores.
+const SQUEEZE_STEPS: usize = 1 << 23;
+
+/// A subtask in the list of its core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScheduledSubtask {
+    /// Its position in the DAG.
+    pub subtask: usize,
+    /// Its start after the release, in nanoseconds.
+    pub start_ns: u64,
+    /// Its finish: later than the start by its WCET.
+    pub finish_ns: u64,
+}
+
+/// A schedule of one job on cores of its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ListSchedule {
+    /// By core, its subtasks in the order of their starts; a core may have none.
+    pub cores: Vec<Vec<ScheduledSubtask>>,
+}
+
+impl ListSchedule {
+    /// Schedules the WCETs on as many cores as there are limits, in nanoseconds after the release.
+    ///
+    /// `None` if no core may take some subtask, and without cores.
+    #[must_use]
+    pub fn within(task: &Task, limits_ns: &[u64]) -> Option<Self> {
+        let latest_ns = *limits_ns.iter().max()?;
+        let (levels, wcets_ns) = (task.bottom_levels(), task.wcets_ns());
+        let mut missing = task.graph.predecessor_counts();
+        let mut ready = BinaryHeap::new();
+        // Those that are to join the others.
+        let mut released: Vec<usize> = task.sources().collect();
+        let mut cores: Vec<Vec<ScheduledSubtask>> = vec![Vec::new(); limits_ns.len()];
+        let mut start_ns = 0;
+        loop {
+            for next in core::mem::take(&mut released) {
+                ready.push((levels[next], Reverse(next)));
+            }
+            let finish_ns = |list: &[ScheduledSubtask]| list.last().map_or(0, |of| of.finish_ns);
+            let is_idle = |list: &[ScheduledSubtask]| finish_ns(list) <= start_ns;
+            let mut idle = cores.iter().filter(|list| is_idle(list)).count();
+            while idle > 0
+                && let Some((_, Reverse(subtask))) = ready.pop()
+            {
+                // Some subtask executes at each instant so far, so this is at most the volume.
+                let finish_ns = start_ns + wcets_ns[subtask];
+                let mut places = cores.iter_mut().zip(limits_ns);
+                match places.find(|(list, limit_ns)| is_idle(list) && finish_ns <= **limit_ns) {
+                    Some((list, _)) => {
+                        idle -= 1;
+                        list.push(ScheduledSubtask {
+                            subtask,
+                            start_ns,
+                            finish_ns,
+                        });
+                    }
+                    // It only gets later, so no core will ever take it.
+                    None if finish_ns > latest_ns => return None,
+                    None => released.push(subtask),
+                }
+            }
+            let busy = cores.iter().map(|list| finish_ns(list));
+            let Some(next_ns) = busy.filter(|&ns| ns > start_ns).min() else {
+                return released.is_empty().then_some(Self { cores });
+            };
+            start_ns = next_ns;
+            let ended = cores.iter().filter_map(|list| list.last());
+            for ended in ended.filter(|last| last.finish_ns == start_ns) {
+                for next in task.successors(ended.subtask) {
+                    missing[next] -= 1;
+                    if missing[next] == 0 {
+                        released.push(next);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Lowers the limit of each core from the last to the first, each as far as there are
+    /// schedules, where all limits are `limit_ns` to begin with.
+    ///
+    /// The schedule may get longer, but not beyond that.
+    #[must_use]
+    pub fn squeezed(&self, task: &Task, limit_ns: u64) -> Self {
+        let mut limits_ns = vec![limit_ns; self.cores.len()];
+        let mut best = self.clone();
+        let mut tries = SQUEEZE_STEPS / task.subtask_count().pow(2).max(1);
+        for core in (0..limits_ns.len()).rev() {
+            for _ in 0..SQUEEZES {
+                let before_ns = limits_ns[core];
+                let Some(lower_ns) = best.finish_ns(core).checked_sub(1).filter(|_| tries > 0)
+                else {
+                    break;
+                };
+                tries -= 1;
+                limits_ns[core] = lower_ns;
+                let Some(found) = Self::within(task, &limits_ns) else {
+                    limits_ns[core] = before_ns;
+                    break;
+                };
+                best = found;
+            }
+        }
+        best
+    }
+
+    /// Returns when a core ends its last subtask, in nanoseconds after the release; 0 without any.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such core.
+    #[must_use]
+    pub fn finish_ns(&self, core: usize) -> u64 {
+        self.cores[core].last().map_or(0, |last| last.finish_ns)
+    }
+
+    /// Returns the last finish, in nanoseconds after the release; 0 without subtasks.
+    #[must_use]
+    pub fn length_ns(&self) -> u64 {
+        let finishes_ns = (0..self.cores.len()).map(|core| self.finish_ns(core));
+        finishes_ns.max().unwrap_or(0)
+    }
+
+    /// Returns the core of each subtask.
+    pub(super) fn places(&self) -> Vec<u32> {
+        let mut places = vec![0; self.cores.iter().map(Vec::len).sum()];
+        for (core, list) in self.cores.iter().enumerate() {
+            for of in list {
+                places[of.subtask] = to_u32(core);
+            }
+        }
+        places
+    }
+
+    /// Returns an edge for each two neighbours of a list. With the DAG's own ones they make no
+    /// cycle, as each goes to a later start.
+    pub(super) fn edges(&self) -> Vec<(u32, u32)> {
+        let mut edges = Vec::new();
+        for pair in self.cores.iter().flat_map(|list| list.windows(2)) {
+            edges.push((to_u32(pair[0].subtask), to_u32(pair[1].subtask)));
+        }
+        edges
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ListSchedule;
+    use crate::analysis::{Task, multi_path};
+    use common::random::Random;
+
+    /// By core, the subtasks with their starts.
+    fn lists(schedule: &ListSchedule) -> Vec<Vec<(usize, u64)>> {
+        let of_core = |list: &Vec<super::ScheduledSubtask>| {
+            list.iter().map(|of| (of.subtask, of.start_ns)).collect()
+        };
+        schedule.cores.iter().map(of_core).collect()
+    }
+
+    #[test]
+    fn a_core_that_would_end_too_late_is_passed_over() {
+        let task = Task::new(10, 10, vec![4, 4, 3], &[]).unwrap();
+        let found = ListSchedule::within(&task, &[10, 10]).unwrap();
+        assert_eq!(lists(&found), [vec![(0, 0), (2, 4)], vec![(1, 0)]]);
+        // The less urgent one goes first, since the core that is idle is too short for the other.
+        let found = ListSchedule::within(&task, &[10, 3]).unwrap();
+        assert_eq!(lists(&found), [vec![(0, 0), (1, 4)], vec![(2, 0)]]);
+        assert_eq!((found.length_ns(), found.finish_ns(1)), (8, 3));
+        for limits in [&[10, 2][..], &[7, 3], &[]] {
+            assert_eq!(ListSchedule::within(&task, limits), None, "{limits:?}");
+        }
+    }
+
+    #[test]
+    fn squeezing_ends_the_last_core_early() {
+        let task = Task::new(10, 10, vec![4, 4, 3], &[]).unwrap();
+        let found = ListSchedule::within(&task, &[10, 10]).unwrap();
+        let found = found.squeezed(&task, 10);
+        assert_eq!(lists(&found), [vec![(0, 0), (1, 4)], vec![(2, 0)]]);
+        // All of it fits on one core, so the other has nothing.
+        let found = ListSchedule::within(&task, &[11, 11]).unwrap();
+        let found = found.squeezed(&task, 11);
+        assert_eq!((found.length_ns(), found.finish_ns(1)), (11, 0));
+    }
+
+    #[test]
+    fn a_fixed_order_is_never_longer_than_the_bound_of_a_free_one() {
+        let mut random = Random::new(35);
+        for _ in 0..300 {
+            let count = 1 + random.index(12);
+            let edges: Vec<_> = random.edges(count, 25).collect();
+            let wcets: Vec<u64> = (0..count).map(|_| 1 + random.index(9) as u64).collect();
+            let task = Task::new(999, 999, wcets.clone(), &edges).unwrap();
+            for cores in 1..5 {
+                let limits = vec![999; cores];
+                let schedule = ListSchedule::within(&task, &limits).unwrap();
+                let length = schedule.length_ns();
+                assert!(length <= multi_path(&task, super::to_u32(cores)).unwrap());
+                // Lemma 1: the lists as edges make a longest path of that length.
+                let order = schedule.edges().into_iter();
+                let order = order.map(|(from, to)| (from as usize, to as usize));
+                let all: Vec<_> = edges.iter().copied().chain(order).collect();
+                let ordered = Task::new(999, 999, wcets.clone(), &all).unwrap();
+                assert_eq!(ordered.length_ns(), length);
+                // Lemma 2: a limit for all cores is met, or nothing meets it.
+                let by = |limit| ListSchedule::within(&task, &vec![limit; cores]);
+                assert_eq!(by(length), Some(schedule.clone()));
+                assert_eq!(by(length - 1), None);
+                // Squeezed, it keeps to the limit, to every WCET and to every edge.
+                let limit = length + random.index(9) as u64;
+                assert_is_valid(&schedule.squeezed(&task, limit), &task, limit);
+            }
+        }
+    }
+
+    fn assert_is_valid(schedule: &ListSchedule, task: &Task, limit: u64) {
+        let mut times = vec![None; task.subtask_count()];
+        for list in &schedule.cores {
+            let apart = |pair: &[super::ScheduledSubtask]| pair[0].finish_ns <= pair[1].start_ns;
+            assert!(list.windows(2).all(apart));
+            for of in list {
+                let wcet = task.wcets_ns()[of.subtask];
+                assert_eq!(of.finish_ns - of.start_ns, wcet);
+                assert!(of.finish_ns <= limit);
+                let before = times[of.subtask].replace((of.start_ns, of.finish_ns));
+                assert_eq!(before, None);
+            }
+        }
+        let times: Option<Vec<_>> = times.into_iter().collect();
+        let times = times.expect("each subtask is in a list");
+        for (subtask, &(_, finish)) in times.iter().enumerate() {
+            let mut next = task.successors(subtask);
+            assert!(next.all(|next| finish <= times[next].0));
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! Response times where subtasks are pinned: owners by their orders, others in what these leave.
+//!
+//! A DAG whose subtasks are all pinned, no other's to the same cores, is an *owner* of these
+//! cores. If those on one core follow one another by edges, nothing ever delays it: each
+//! subtask finishes at the length of the longest path to it, or earlier. A DAG without pinned
+//! subtasks is a *member* of the group of its cores, with all that have the same ones, and executes
+//! in what the owners leave ([`lent_cores`](super::lent_cores), whose proofs these bounds rest on).
+//!
+//! This is how a commit reads what [`lend`](super::lend()) has divided, and also what a person has
+//! pinned: nothing is taken over from the division but cores and edges.
+//!
+//! Assumes, of all DAGs of the cluster: `D <= T`, and subtasks that can be preempted and do not
+//! wait. Of the members of a group that are several: a static priority that outranks DAG by DAG.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::case::{AnalysisInput, CaseBounds};
+use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT};
+use super::list_schedule::ScheduledSubtask;
+use super::ranks::PreemptionMix;
+use super::set::constrained;
+use super::{DagBound, NotProvenReason, SchedulabilityTest};
+use crate::ids::{SubtaskId, to_u32};
+use crate::order::sort_by_key;
+
+/// The owners and groups of a cluster.
+pub(super) struct PinnedCluster {
+    /// By core, what its owner leaves.
+    pub(super) supplies: Vec<CoreSupply>,
+    /// By core, its list: subtasks of one DAG of the case.
+    pub(super) lists: Vec<Vec<ScheduledSubtask>>,
+    /// By core, the DAG of the case that is pinned to it.
+    pub(super) owners: Vec<Option<usize>>,
+    /// By DAG of the case, why it can be neither an owner nor a member.
+    refusals: Vec<Option<NotProvenReason>>,
+}
+
+impl PinnedCluster {
+    pub(super) fn of(case: &AnalysisInput<'_>) -> Self {
+        let cores = case.settings.cores as usize;
+        let mut cluster = Self {
+            supplies: vec![CoreSupply::UNOWNED; cores],
+            lists: vec![Vec::new(); cores],
+            owners: vec![None; cores],
+            refusals: vec![None; case.members.len()],
+        };
+        for dag in 0..case.members.len() {
+            cluster.refusals[dag] = cluster.enter(case, dag).err();
+        }
+        for core in 0..cores {
+            if let Some(owner) = cluster.owners[core]
+                && cluster.refusals[owner].is_none()
+                && let Some(bound_ns) = owner_bound_ns(case, owner)
+            {
+                let task = case.tasks[owner];
+                let late_ns = bound_ns - task.length_ns();
+                let supply = CoreSupply::of(task.period_ns(), &cluster.lists[core], late_ns);
+                cluster.supplies[core] = supply;
+            }
+        }
+        cluster
+    }
+
+    /// Enters the lists of an owner; an error says why a DAG is neither that nor a member.
+    fn enter(&mut self, case: &AnalysisInput<'_>, dag: usize) -> Result<(), NotProvenReason> {
+        let (subtasks, task) = (case.dag(dag).subtasks(), case.tasks[dag]);
+        let is_pinned = |subtask: &usize| subtasks[*subtask].core().is_some();
+        let mut pinned: Vec<usize> = (0..subtasks.len()).filter(is_pinned).collect();
+        let finishes_ns = task.finishes_ns();
+        // No WCET is 0, so an edge leads to a later finish.
+        sort_by_key(&mut pinned, |subtask| finishes_ns[subtask]);
+        let is_whole = pinned.is_empty() || pinned.len() == subtasks.len();
+        for subtask in pinned {
+            let core = subtasks[subtask].core().map_or(0, |core| core as usize);
+            let owner = *self.owners[core].get_or_insert(dag);
+            let list = &mut self.lists[core];
+            let follows =
+                |last: &ScheduledSubtask| task.successors(last.subtask).any(|next| next == subtask);
+            if !is_whole || owner != dag || !list.last().is_none_or(follows) {
+                let subtask = SubtaskId(to_u32(subtask));
+                return Err(NotProvenReason::Pinned { subtask });
+            }
+            list.push(ScheduledSubtask {
+                subtask,
+                start_ns: finishes_ns[subtask] - task.wcets_ns()[subtask],
+                finish_ns: finishes_ns[subtask],
+            });
+        }
+        let is_covered = case.relation.preemption == PreemptionMix::All
+            && !case.set.has_waits()
+            && constrained(case.tasks, case.settings.cores);
+        is_covered
+            .then_some(())
+            .ok_or(NotProvenReason::BesidePinned)
+    }
+
+    /// Bounds the responses of owners, and then those of members, the most urgent first.
+    pub(super) fn bounds(&self, case: &AnalysisInput<'_>) -> CaseBounds {
+        let count = case.members.len();
+        let (mut bounds, mut reasons) = (vec![None; count], self.refusals.clone());
+        let owned = (0..count).filter(|&dag| self.refusals[dag].is_none() && !is_member(case, dag));
+        for dag in owned {
+            let (task, length_ns) = (case.tasks[dag], case.tasks[dag].length_ns());
+            bounds[dag] = owner_bound_ns(case, dag);
+            reasons[dag] = match length_ns > task.relative_deadline_ns() {
+                true => Some(NotProvenReason::LengthBeyondDeadline { length_ns }),
+                false => bounds[dag].is_none().then_some(NotProvenReason::NoBound),
+            };
+        }
+        let mut steps = STEP_LIMIT;
+        for &dag in case.order.iter().filter(|&&dag| is_member(case, dag)) {
+            if self.refusals[dag].is_some() {
+                continue;
+            }
+            let response = self.terms(case, dag, &bounds).and_then(|terms| {
+                let response = terms.own.respond(&terms.cores, &terms.above(), &mut steps);
+                response.ok_or(NotProvenReason::NoBound)
+            });
+            match response {
+                Ok(bound_ns) => bounds[dag] = Some(bound_ns),
+                Err(reason) => reasons[dag] = Some(reason),
+            }
+        }
+        let is_own = |dag: &usize| {
+            let reason = reasons[*dag];
+            reason.is_some_and(|reason| !matches!(reason, NotProvenReason::DelayedBy { .. }))
+        };
+        let first = case.order.iter().copied().find(is_own);
+        let bounds = bounds.iter().enumerate().map(|(dag, bound_ns)| {
+            let test = match is_member(case, dag) {
+                true => SchedulabilityTest::Member,
+                false => SchedulabilityTest::Owner,
+            };
+            bound_ns.map(|bound_ns| DagBound { bound_ns, test })
+        });
+        (bounds.collect(), reasons, first)
+    }
+
+    /// Returns the terms of a member's equation.
+    pub(super) fn terms<'a>(
+        &'a self,
+        case: &'a AnalysisInput<'_>,
+        dag: usize,
+        responses: &[Option<u64>],
+    ) -> Result<MemberTerms<'a>, NotProvenReason> {
+        let delayed = |other: usize| NotProvenReason::DelayedBy {
+            dag: case.id(other),
+        };
+        let cores = self.group(case, dag);
+        for owner in cores.iter().filter_map(|&core| self.owners[core]) {
+            if responses[owner].is_none() {
+                return Err(delayed(owner));
+            }
+        }
+        let of = |dag| MemberTask::of(case.tasks[dag], to_u32(cores.len()), &case.set.bursts);
+        let mut above = Vec::new();
+        let affinity = case.dag(dag).affinity();
+        for (other, &response_ns) in responses.iter().enumerate() {
+            let shares = is_member(case, other) && case.dag(other).affinity() == affinity;
+            if !shares || !case.relation.may_outrank(other, dag) {
+                continue;
+            }
+            if case.relation.may_outrank(dag, other) {
+                return Err(NotProvenReason::BesidePinned);
+            }
+            let response_ns = response_ns.ok_or_else(|| delayed(other))?;
+            above.push((other, of(other), response_ns));
+        }
+        Ok(MemberTerms {
+            own: of(dag),
+            cores: cores.iter().map(|&core| &self.supplies[core]).collect(),
+            above,
+        })
+    }
+
+    /// Returns the cores of a member's group.
+    fn group(&self, case: &AnalysisInput<'_>, dag: usize) -> Vec<usize> {
+        match case.dag(dag).affinity() {
+            [] => (0..self.supplies.len()).collect(),
+            cores => cores.iter().map(|&core| core as usize).collect(),
+        }
+    }
+
+    /// Returns when an owner's subtask finishes after the release, at the latest.
+    pub(super) fn finish_ns(
+        &self,
+        case: &AnalysisInput<'_>,
+        dag: usize,
+        subtask: SubtaskId,
+    ) -> Option<u64> {
+        let core = case.dag(dag).subtask(subtask).core()?;
+        let mut list = self.lists[core as usize].iter();
+        let found = list.find(|of| of.subtask == subtask.index());
+        case.set.bursts.after(found?.finish_ns)
+    }
+}
+
+/// A member's equation.
+pub(super) struct MemberTerms<'a> {
+    pub(super) own: MemberTask<'a>,
+    pub(super) cores: Vec<&'a CoreSupply>,
+    /// The more urgent members, by their positions in the case, with their bounds.
+    pub(super) above: Vec<(usize, MemberTask<'a>, u64)>,
+}
+
+impl<'a> MemberTerms<'a> {
+    pub(super) fn above(&self) -> Vec<(&MemberTask<'a>, u64)> {
+        let above = self.above.iter();
+        above.map(|(_, of, bound_ns)| (of, *bound_ns)).collect()
+    }
+}
+
+/// Returns when the last of an owner's subtasks finishes, if that is in time.
+fn owner_bound_ns(case: &AnalysisInput<'_>, dag: usize) -> Option<u64> {
+    let task = case.tasks[dag];
+    let bound_ns = case.set.bursts.after(task.length_ns());
+    bound_ns.filter(|&bound_ns| bound_ns <= task.relative_deadline_ns())
+}
+
+fn is_member(case: &AnalysisInput<'_>, dag: usize) -> bool {
+    !case.dag(dag).is_pinned()
+}

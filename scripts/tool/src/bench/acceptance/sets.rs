@@ -1,0 +1,174 @@
+//! Random sets of DAGs of a given utilization.
+//!
+//! A graph is a fork-join of 2 to 8 branches, or 3 to 5 layers of 1 to 5 subtasks with an edge to and
+//! from each, or one of 6 to 18 subtasks with 15 % of the edges that there can be. WCETs are
+//! multiples of 10 up to 1,000. The DAGs of a set share its utilization so that each division is as
+//! likely as any other, as UUniFast does (E. Bini, G. Buttazzo, Real-Time Systems 30, 2005); sets in
+//! which a DAG would need more than its volume over its longest path are thrown away.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use common::random::Random;
+use sched_dag::analysis::Task;
+
+/// How deadlines relate to periods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Deadlines {
+    /// `D = T`.
+    Implicit,
+    /// `D` is uniform from the longest path to `T`.
+    Constrained,
+}
+
+impl Deadlines {
+    pub(super) const ALL: [Self; 2] = [Self::Implicit, Self::Constrained];
+
+    /// Returns the name in a file, and the one in a picture.
+    pub(super) const fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Implicit => ("implicit", "D = T"),
+            Self::Constrained => ("constrained", "D ≤ T"),
+        }
+    }
+}
+
+/// The parts of a core that shares are counted in.
+const PARTS: u64 = 1 << 32;
+
+/// How many divisions of the utilization are tried before other graphs are drawn.
+const TRIES: u32 = 300;
+
+/// Draws a set for some cores: as many DAGs as cores, but 8 at least, with a utilization of
+/// `percent` of the cores, below 100.
+pub(super) fn draw(
+    random: &mut Random,
+    cores: u32,
+    percent: u64,
+    deadlines: Deadlines,
+) -> Vec<Task> {
+    let whole = PARTS * u64::from(cores) * percent / 100;
+    loop {
+        let graphs: Vec<Task> = (0..cores.max(8)).map(|_| graph(random)).collect();
+        for _ in 0..TRIES {
+            // The distances of random points are uniform among all that have this sum.
+            let mut points: Vec<u64> = (1..graphs.len())
+                .map(|_| random.within(0..=whole))
+                .collect();
+            points.extend([0, whole]);
+            points.sort_unstable();
+            let shares = points.windows(2).map(|pair| pair[1] - pair[0]);
+            let dags = graphs.iter().zip(shares);
+            let timed = dags.map(|(graph, share)| timed(random, graph, share, deadlines));
+            if let Some(set) = timed.collect() {
+                return set;
+            }
+        }
+    }
+}
+
+/// Gives a graph the period by which it uses a share of a core, in parts, and a deadline; `None` if
+/// its longest path does not allow that.
+fn timed(random: &mut Random, graph: &Task, share: u64, deadlines: Deadlines) -> Option<Task> {
+    let (volume, length) = (graph.volume_ns(), graph.length_ns());
+    let work = u128::from(volume) * u128::from(PARTS);
+    if share == 0 || u128::from(share) * u128::from(length) > work {
+        return None;
+    }
+    let period = u64::try_from(work.div_ceil(share.into())).ok()?;
+    let deadline = match deadlines {
+        Deadlines::Implicit => period,
+        Deadlines::Constrained => random.within(length..=period),
+    };
+    Task::new(period, deadline, graph.wcets_ns().to_vec(), &edges(graph)).ok()
+}
+
+/// Returns the edges of a graph.
+pub(super) fn edges(graph: &Task) -> Vec<(usize, usize)> {
+    let of = |from| graph.successors(from).map(move |to| (from, to));
+    (0..graph.subtask_count()).flat_map(of).collect()
+}
+
+/// Draws a graph with WCETs.
+fn graph(random: &mut Random) -> Task {
+    let (subtasks, edges) = match random.index(3) {
+        0 => {
+            let branches = 1..=random.within(2..=8_usize);
+            let end = branches.end() + 1;
+            let edges = branches.flat_map(|branch| [(0, branch), (branch, end)]);
+            (end + 1, edges.collect())
+        }
+        1 => layers(random),
+        _ => {
+            let subtasks = random.within(6..=18);
+            (subtasks, random.edges(subtasks, 15).collect())
+        }
+    };
+    let wcets = (0..subtasks).map(|_| 10 * random.within(1..=100));
+    let task = Task::new(1, 1, wcets.collect(), &edges);
+    task.expect("its WCETs are above 0 and its edges lead to larger numbers")
+}
+
+/// Draws the number of subtasks and the edges of a graph in layers.
+fn layers(random: &mut Random) -> (usize, Vec<(usize, usize)>) {
+    let mut layers: Vec<Range<usize>> = Vec::new();
+    let mut subtasks = 0;
+    for _ in 0..random.within(3..=5) {
+        let end = subtasks + random.within(1..=5_usize);
+        layers.push(subtasks..end);
+        subtasks = end;
+    }
+    let mut edges = BTreeSet::new();
+    for pair in layers.windows(2) {
+        let (above, below) = (&pair[0], &pair[1]);
+        let mut one_of = |layer: &Range<usize>| layer.start + random.index(layer.len());
+        edges.extend(below.clone().map(|to| (one_of(above), to)));
+        edges.extend(above.clone().map(|from| (from, one_of(below))));
+    }
+    (subtasks, edges.into_iter().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_have_the_utilization_that_is_asked_for() {
+        let mut random = Random::new(36);
+        for (cores, percent) in [(1, 50), (4, 95), (16, 70)] {
+            for deadlines in Deadlines::ALL {
+                let set = draw(&mut random, cores, percent, deadlines);
+                assert_eq!(set.len(), cores.max(8) as usize);
+                let utilization = |task: &Task| task.volume_ns() as f64 / task.period_ns() as f64;
+                let sum: f64 = set.iter().map(utilization).sum();
+                let expected = f64::from(cores) * percent as f64 / 100.0;
+                // Periods are rounded up.
+                assert!(sum <= expected && sum > 0.99 * expected, "{sum} {expected}");
+                for task in set {
+                    let (period, deadline) = (task.period_ns(), task.relative_deadline_ns());
+                    assert!(task.length_ns() <= deadline && deadline <= period);
+                    assert!(deadlines == Deadlines::Constrained || deadline == period);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn each_layer_is_joined_to_the_next() {
+        let mut random = Random::new(36);
+        for _ in 0..100 {
+            let (subtasks, edges) = layers(&mut random);
+            assert!((3..=25).contains(&subtasks));
+            let goes = |end: fn(&(usize, usize)) -> usize, subtask| {
+                edges.iter().any(|edge| end(edge) == subtask)
+            };
+            // Only the first layer has none before it, only the last none after it.
+            let sources = (0..subtasks).filter(|&of| !goes(|edge| edge.1, of));
+            let sinks = (0..subtasks).filter(|&of| !goes(|edge| edge.0, of));
+            let (sources, sinks): (Vec<_>, Vec<_>) = (sources.collect(), sinks.collect());
+            assert!(sources.iter().copied().eq(0..sources.len()));
+            assert!(sinks.iter().copied().eq(subtasks - sinks.len()..subtasks));
+            assert!((1..=5).contains(&sources.len()) && (1..=5).contains(&sinks.len()));
+        }
+    }
+}
