@@ -4,7 +4,8 @@
 //! call that a machine has, and stays one source for all platforms.
 //!
 //! All of them share a target folder and the profiles of a new repository, so that each crate is
-//! compiled once; the folder stays from one run of this test to the next.
+//! compiled once; the folder stays from one run of this test to the next. An app's image stands there
+//! under the app's name, so no two that boot have the same.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -20,9 +21,6 @@ use tool::system::{self, workspace};
 
 /// The guide's app.
 const NAME: &str = "first-steps";
-
-/// The README's app.
-const README_NAME: &str = "vision";
 
 /// Our folder, in which nothing but `target` is from before.
 fn ours() -> &'static Path {
@@ -40,8 +38,8 @@ fn ours() -> &'static Path {
 }
 
 /// Makes an app in a repository of its own, and returns the folder.
-fn repository(folder: &str, name: &str) -> PathBuf {
-    let out = ours().join(folder);
+fn repository(name: &str) -> PathBuf {
+    let out = ours().join(name);
     new_app::create_repository(&out, name, CrateSource::Folder(workspace()))
         .expect("the name is free");
     share_target(&out);
@@ -109,7 +107,7 @@ fn excerpt(kept: &str, output: &str, shown: impl Fn(&str) -> String) -> String {
 
 #[test]
 fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_guide_shows() {
-    let app = repository("own", NAME);
+    let app = repository(NAME);
     let said = cargo(&app, "test");
     assert!(said.contains(PASSES), "{said}");
 
@@ -147,7 +145,7 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
 
 #[test]
 fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
-    let app = repository("replayed", NAME);
+    let app = repository("replayed");
     let file = app.join("run.rec").display().to_string();
     let record = format!("run -- --mode deterministic --record {file}");
     cargo(&app, &record);
@@ -163,7 +161,7 @@ fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
     let replay = format!("run --example replay -- {file}");
     let said = cargo(&app, &replay);
     assert_eq!(said, "0 values are compared: nothing differs\n");
-    let said = cargo(&app, &format!("{replay} --until {NAME}/17"));
+    let said = cargo(&app, &format!("{replay} --until replayed/17"));
     assert!(said.contains("    gives `distance`: 82\n"), "{said}");
 
     let library = app.join("src/lib.rs");
@@ -182,7 +180,7 @@ fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
 
 #[test]
 fn what_its_repository_lacks_is_named_with_the_remedy() {
-    let app = repository("lacking", "brake-assist");
+    let app = repository("brake-assist");
     for (file, line, command, remedy) in [
         (
             "src/main.rs",
@@ -226,7 +224,7 @@ fn what_its_repository_lacks_is_named_with_the_remedy() {
 
 #[test]
 fn the_linters_are_content_with_a_new_app_wherever_it_is() {
-    let of_its_own = repository("linted", NAME);
+    let of_its_own = repository("linted");
     let clippy = "clippy --all-targets -- -D warnings";
     cargo(&of_its_own, clippy);
 
@@ -263,7 +261,7 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
     let code = &code.expect("the app's code").text;
     let place = "`src/lib.rs`, in place of what follows `#![forbid(unsafe_code)]`";
     assert!(readme.contains(place), "the README puts it elsewhere");
-    let app = repository("readme", README_NAME);
+    let app = repository("vision");
     let library = app.join("src/lib.rs");
     let template = fs::read_to_string(&library).expect("the new app's");
     let (head, _) = template
@@ -320,7 +318,7 @@ const BEFORE: &str = r#"
     let signal = other.sporadic(Duration::from_millis(9));
     let read = other.using((gain.reading(), log.sending())).source(|_| ());
     read.register(SubtaskAttributes::named("read"));
-    let [first] = first_steps::build(jobs);
+    let [first] = every_call::build(jobs);
     let dags = [first, other];
     machine.spread(&dags);
 "#;
@@ -352,10 +350,10 @@ fn a_main_with_every_call_of_the_machine_is_one_source_on_the_machine_and_on_lin
             "`{name}` is not called; write it into `BEFORE` or `RUN`"
         );
     }
-    let app = repository("every-call", NAME);
+    let app = repository("every-call");
     for (file, old, new) in [
         ("src/main.rs", "    options.finish(&[\"jobs\"])?;\n", BEFORE),
-        ("src/main.rs", "&first_steps::build(jobs)", "&dags"),
+        ("src/main.rs", "&every_call::build(jobs)", "&dags"),
         ("src/main.rs", "    let run = machine.run()?;\n", RUN),
         ("src/main.rs", "use fass::finish_create_dags;", USES),
         (
