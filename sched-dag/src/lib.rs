@@ -117,7 +117,6 @@ mod nearest;
 mod order;
 pub mod placement;
 mod policy;
-mod priorities;
 mod request;
 mod scheduler;
 mod spec;

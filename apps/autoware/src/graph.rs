@@ -1,4 +1,4 @@
-//! The six DAGs.
+//! The six DAGs, and the pieces of work that their subtasks do, which take drawn times.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -7,10 +7,10 @@ use core::cell::Cell;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
+use common::random::Random;
 use fass::shared::{Latest, Sample};
-use fass::{Dag, SubtaskAttributes, create_dag};
+use fass::{Dag, SubtaskAttributes, create_dag, execute_for};
 
-use crate::crunch::Crunch;
 use crate::{WCET_OF_ENDS, Workload};
 
 /// The lidar job that a value goes back to, if any: what all topics carry.
@@ -326,5 +326,33 @@ impl Builder<'_> {
             Self::end_attributes("VehicleDBWSystem"),
         );
         (dag, acted_on)
+    }
+}
+
+/// The work of one subtask, job by job.
+#[derive(Clone, Debug)]
+struct Crunch {
+    workload: Workload,
+    random: Random,
+}
+
+impl Crunch {
+    /// Makes the work of subtask number `number` of the system.
+    fn new(workload: &Workload, number: u64) -> Self {
+        let seed = workload.seed.wrapping_mul(0xd134_2543_de82_ef95);
+        Self {
+            workload: *workload,
+            random: Random::new(seed.wrapping_add(number << 32)),
+        }
+    }
+
+    /// Does one piece of work: executes for between the least part of its WCET and
+    /// nearly all of it. A hundredth is left for what the machine adds.
+    fn work(&mut self) {
+        let least = self.workload.least_percent.min(99);
+        let per_mille = least * 10 + self.random.number() % ((99 - least) * 10 + 1);
+        let ns = u64::try_from(self.workload.crunch.as_nanos()).unwrap_or(u64::MAX);
+        let time = Duration::from_nanos(ns / 1000 * per_mille);
+        execute_for(time, self.workload.occupation);
     }
 }

@@ -50,7 +50,6 @@
 
 extern crate alloc;
 
-mod crunch;
 mod graph;
 mod latency;
 

@@ -19,12 +19,10 @@ extern crate alloc;
 
 mod dag;
 pub mod filter;
-mod walk;
 
 use core::time::Duration;
 
-pub use dag::build;
-pub use walk::Walk;
+pub use dag::{Walk, build};
 
 /// The time between two samples: 120 in a second.
 pub const PERIOD: Duration = Duration::from_nanos(8_333_333);

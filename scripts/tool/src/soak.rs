@@ -24,7 +24,7 @@ use crate::outcome::{self, Outcome};
 use crate::progress::{Progress, SILENCE};
 use crate::protocol::MachineLine;
 use crate::qemu::{MOST_CORES, Mode, Qemu};
-use crate::record::{Run, bound};
+use crate::record::{COUNTED_TOLERANCE_NS, Run};
 use crate::trace::{check, read};
 use crate::{image, install, probe, system};
 
@@ -199,7 +199,7 @@ impl SoakPlan {
         seed: 1,
         cores: 4,
         mode: Mode::Deterministic,
-        bound_ns: bound::COUNTED_NS,
+        bound_ns: COUNTED_TOLERANCE_NS,
         side_by_side: 1,
     };
 

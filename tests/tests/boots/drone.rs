@@ -2,7 +2,7 @@
 
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::EventKind;
-use tool::record::bound::COUNTED_NS;
+use tool::record::COUNTED_TOLERANCE_NS;
 
 /// Describes the drone on two cores.
 fn drone(words: &str) -> Guest {
@@ -53,7 +53,7 @@ fn a_reserve_that_is_set_at_boot_sends_it_down_early_in_the_mode_of_the_landing(
         ("allocations", 0),
     ]);
     assert!(line.number("descents") >= 10, "{}", line.text);
-    let runs = lawful_runs(&outcome, COUNTED_NS);
+    let runs = lawful_runs(&outcome, COUNTED_TOLERANCE_NS);
     let entered = runs[0].events.iter();
     let entered = entered.filter(|event| event.what == EventKind::Entered);
     let modes: Vec<u64> = entered.map(|event| event.job).collect();

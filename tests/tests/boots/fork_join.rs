@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use harness::{Guest, Members, Said, lawful_runs};
-use tool::record::bound;
+use tool::record::COUNTED_TOLERANCE_NS;
 use tool::{Outcome, system};
 
 fn demo(cores: u64, words: &str) -> Guest {
@@ -56,7 +56,7 @@ fn every_job_joins_while_its_subtasks_compute() {
         let words = "jobs=6 subtasks=2 work=compute events=on";
         let outcome = demo(cores, words).succeed();
         joins_are_right(&outcome, 6, &[2]);
-        assert_eq!(lawful_runs(&outcome, bound::COUNTED_NS)[0].lost, 0);
+        assert_eq!(lawful_runs(&outcome, COUNTED_TOLERANCE_NS)[0].lost, 0);
     }
 }
 

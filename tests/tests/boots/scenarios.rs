@@ -6,7 +6,7 @@ use harness::{Guest, lawful_runs};
 use scenarios::Scenario;
 use tool::image;
 use tool::protocol::Transcript;
-use tool::record::bound::COUNTED_NS;
+use tool::record::COUNTED_TOLERANCE_NS;
 
 /// Runs those for 1 to 5 cores, which are all.
 fn run(mut run: impl FnMut(u64) -> Transcript) {
@@ -29,7 +29,7 @@ fn each_scenario_is_as_it_says() {
     run(|cores| {
         let guest = Guest::test("scenarios").word("events=on").cores(cores);
         let outcome = guest.succeed();
-        let runs = lawful_runs(&outcome, COUNTED_NS);
+        let runs = lawful_runs(&outcome, COUNTED_TOLERANCE_NS);
         assert!(runs.iter().all(|run| run.complete && run.lost == 0));
         outcome.transcript
     });

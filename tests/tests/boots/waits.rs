@@ -9,8 +9,8 @@ use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::{Event, EventKind};
 use tool::Outcome;
 use tool::protocol::MachineLine;
+use tool::record::COUNTED_TOLERANCE_NS;
 use tool::record::Run;
-use tool::record::bound::COUNTED_NS;
 
 /// Returns the events of instances, a line for each job of the subtask `first`: from its start to
 /// that of the next one.
@@ -55,7 +55,7 @@ fn camera(guest: &Guest) -> (Outcome, Run) {
         ("allocations", 0),
         ("violations", 0),
     ]);
-    let mut runs = lawful_runs(&outcome, COUNTED_NS);
+    let mut runs = lawful_runs(&outcome, COUNTED_TOLERANCE_NS);
     assert!(runs.len() == 1 && runs[0].complete && runs[0].lost == 0);
     (outcome, runs.remove(0))
 }
@@ -110,7 +110,7 @@ fn a_function_waits_until_its_bytes_have_gone_and_for_those_that_come() {
         let line = outcome.line("waits_wire");
         line.has([("sum", 1230), ("timed_out", 1), ("unsent", 0)]);
         line.has([("allocations", 0), ("violations", 0)]);
-        let run = lawful_runs(&outcome, COUNTED_NS).remove(0);
+        let run = lawful_runs(&outcome, COUNTED_TOLERANCE_NS).remove(0);
         if !clusters.is_empty() {
             // The port is of an idle core of the other one, which looks each millisecond.
             continue;
@@ -204,7 +204,7 @@ fn a_fault_or_an_end_comes_after_a_wait_or_in_it() {
     for cores in [1, 4] {
         let guest = Guest::test("waits_faults").cores(cores);
         let outcome = guest.word("events=on").succeed();
-        let runs = lawful_runs(&outcome, COUNTED_NS);
+        let runs = lawful_runs(&outcome, COUNTED_TOLERANCE_NS);
         let lines = outcome.lines("waits_run");
         assert_eq!((runs.len(), lines.len()), (RUNS.len(), RUNS.len()));
         for ((run, line), (title, expected)) in runs.iter().zip(lines).zip(RUNS) {

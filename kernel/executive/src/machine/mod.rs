@@ -24,7 +24,6 @@ pub mod interrupts_off;
 pub mod legacy;
 pub mod local_apic;
 mod machine_check;
-mod meter;
 pub mod non_maskable;
 pub mod paging;
 pub mod paint;

@@ -5,6 +5,7 @@
 //! [`get`]: everything that changes in it is atomic.
 
 use core::arch::asm;
+use core::panic::Location;
 use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
@@ -13,7 +14,6 @@ use super::accusation::AccusationBox;
 use super::context::{Context, Parked, Registers};
 use super::cpu;
 use super::descriptors::{self, TaskState};
-use super::meter::CoreMeter;
 use fass::platform::SetOnce;
 
 /// The stacks with which a core begins: their tops, each with a guard page below,
@@ -26,6 +26,27 @@ pub struct CoreStacks {
     pub handler: u64,
     /// Run exceptions: ordinary, double fault, non-maskable, machine check.
     pub exceptions: [u64; 4],
+}
+
+/// A meter of how long a core's interrupts stay disabled, in ticks of the time stamp counter.
+#[derive(Debug)]
+pub(super) struct CoreMeter {
+    /// When the current section began; 0 if there is none.
+    pub(super) began: AtomicU64,
+    pub(super) began_at: AtomicPtr<Location<'static>>,
+    pub(super) longest: AtomicU64,
+    pub(super) longest_at: AtomicPtr<Location<'static>>,
+}
+
+impl CoreMeter {
+    pub(super) const fn new() -> Self {
+        Self {
+            began: AtomicU64::new(0),
+            began_at: AtomicPtr::new(core::ptr::null_mut()),
+            longest: AtomicU64::new(0),
+            longest_at: AtomicPtr::new(core::ptr::null_mut()),
+        }
+    }
 }
 
 /// A core's part in the turns of those that compute ([`turns`](super::turns)).

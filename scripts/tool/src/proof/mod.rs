@@ -3,14 +3,279 @@
 //! A record has everything that bounds follow from: the graphs with WCETs and priorities, the
 //! policy, the cores, the charge on each instance, and the bounds. From these the host runs the
 //! same analysis. So it also gets results for which the guest has no room, such as a witness, or
-//! the parts of a bound ([`report`]). If host and guest disagree about a bound, that is an error.
+//! the parts of a bound. If host and guest disagree about a bound, that is an error.
 //!
 //! It also measures the execution times of the runs and the platform's own overheads
 //! ([`observed`]). The longest calls, with a margin, are WCETs that a later commit can take; the
-//! longest responses are shown next to the bounds ([`report`]).
+//! longest responses are shown next to the bounds.
+//!
+//! To attribute the slack of a bound, the same analysis is run again with less and less: without
+//! the platform's overheads, then with every subtask preemptible, then with the DAG alone. The
+//! difference that each step makes is the part of what it leaves out:
+//!
+//! ```text
+//! bound = overheads + blocking + interference + own order + longest path
+//! ```
+//!
+//! *Own order* is the delay of the longest path by the DAG's other subtasks, *overheads* are those
+//! of all DAGs. The rest, from the longest observed response up to the longest path at its WCETs,
+//! is the pessimism of the WCETs.
+//!
+//! The witnesses of a guest's bounds go to files, for `./scripts/check-witness`.
 
 pub mod observed;
-pub mod report;
+
+use std::path::{Path, PathBuf};
+
+use sched_dag::analysis::{self, AnalysisSettings, Overheads};
+use sched_dag::{CoreDivision, Dag, DagId, DagSpec, Preemption, SchedulerOptions};
+
+use crate::files;
+use crate::json::Object;
+use crate::output::{Table, shown};
+use crate::record::{self, Committed};
+use observed::OfDag;
+
+/// One DAG of one commit.
+#[derive(Clone, Debug)]
+pub struct ProofRow {
+    /// The file of the DAG, if there are several.
+    file: Option<String>,
+    commit: usize,
+    dag: String,
+    bound_ns: Option<u64>,
+    longest_ns: u64,
+    slack: Slack,
+}
+
+/// Puts the bounds of commits next to the longest responses of their DAGs.
+///
+/// # Errors
+///
+/// In words: a DAG was committed and not run.
+pub fn rows(commits: &[Committed], observed: &[OfDag]) -> Result<Vec<ProofRow>, String> {
+    let mut rows = Vec::new();
+    for commit in commits {
+        for (number, dag) in (0..).map(DagId).zip(&commit.told.dags) {
+            let of_dag = observed.iter().find(|observed| observed.hash == dag.hash);
+            let longest_ns = of_dag.and_then(|dag| dag.longest_responses_ns.get(&commit.number));
+            let longest_ns = longest_ns.ok_or_else(|| {
+                let (name, commit) = (&dag.name, commit.number);
+                format!("dag `{name}` of commit {commit} has not run")
+            })?;
+            rows.push(ProofRow {
+                file: None,
+                commit: commit.number,
+                dag: dag.name.clone(),
+                bound_ns: dag.bound_ns,
+                longest_ns: *longest_ns,
+                slack: slack(commit, number),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+impl ProofRow {
+    /// Names the file of the DAG.
+    pub fn of_file(self, name: &str) -> Self {
+        Self {
+            file: Some(name.into()),
+            ..self
+        }
+    }
+
+    fn name(&self) -> String {
+        match &self.file {
+            Some(file) => format!("{file}: {}", self.dag),
+            None => self.dag.clone(),
+        }
+    }
+
+    fn exceeds(&self) -> bool {
+        self.bound_ns
+            .is_some_and(|bound_ns| self.longest_ns > bound_ns)
+    }
+
+    /// Returns the longest response in thousandths of the bound.
+    fn permille(&self) -> Option<u64> {
+        // In 128 bits, since a response of 213 days times 1000 exceeds 64.
+        let permille = u128::from(self.longest_ns) * 1000 / u128::from(self.bound_ns?.max(1));
+        u64::try_from(permille).ok()
+    }
+
+    /// Returns the row as a machine line.
+    pub fn line(&self) -> String {
+        let mut line = Object::new().text("kind", "proof");
+        if let Some(file) = &self.file {
+            line = line.text("file", file);
+        }
+        line = line
+            .number("commit", self.commit as u64)
+            .text("dag", &self.dag)
+            .number("longest_ns", self.longest_ns);
+        let permille = [
+            ("bound_ns", self.bound_ns),
+            ("tightness_permille", self.permille()),
+        ];
+        let parts = PARTS.into_iter().zip(self.slack);
+        for (name, number) in permille.into_iter().chain(parts) {
+            // Parts without a bound would add up to nothing.
+            if let (Some(number), true) = (number, self.bound_ns.is_some()) {
+                line = line.number(name, number);
+            }
+        }
+        line.into_text()
+    }
+}
+
+/// Returns the table.
+pub fn table(rows: &[ProofRow]) -> String {
+    let names = rows.iter().map(|row| row.name().chars().count() + 1);
+    let width = names.max().unwrap_or(0).max(20);
+    let title = format!("\n{:1$}   where the bound is from:\n", "", width + 33);
+    let columns = format!(
+        "dag:<{width}|bound:12|longest:12|ratio:9|path:12|own order:12|others:12|blocking:12|\
+         overheads:12"
+    );
+    let mut table = Table::new(&title, &columns);
+    for row in rows {
+        let bound = row.bound_ns.map_or("not proven".into(), shown);
+        let whole = [
+            row.name(),
+            bound,
+            shown(row.longest_ns),
+            ratio(row.permille()),
+        ];
+        let parts = row.slack.map(|part| part.map_or("-".into(), shown));
+        let parts = parts.into_iter().filter(|_| row.bound_ns.is_some());
+        table.cells(whole.into_iter().chain(parts));
+    }
+    table.text()
+}
+
+/// Formats thousandths as per cent with one decimal.
+pub(crate) fn ratio(permille: Option<u64>) -> String {
+    permille.map_or("-".into(), |permille| {
+        format!("{}.{} %", permille / 10, permille % 10)
+    })
+}
+
+/// Returns the number of proven DAGs, and of responses above their bounds.
+pub fn summary(rows: &[ProofRow]) -> String {
+    let proven = rows.iter().filter(|row| row.bound_ns.is_some()).count();
+    let above = rows.iter().filter(|row| row.exceeds()).count();
+    let dags = rows.len();
+    format!("{proven} of {dags} DAGs proven, {above} responses above a bound")
+}
+
+/// Returns the complaint about a response above its bound, which makes the proof worthless.
+pub fn complaint(rows: &[ProofRow]) -> Option<String> {
+    let row = rows.iter().find(|row| row.exceeds())?;
+    Some(format!(
+        "dag `{}` of commit {} took {}, beyond its bound of {}; a WCET or an overhead is too small",
+        row.name(),
+        row.commit,
+        shown(row.longest_ns),
+        shown(row.bound_ns?)
+    ))
+}
+
+/// The parts of a bound: the longest path at its WCETs, its own subtasks off that path, other DAGs'
+/// more urgent instances, less urgent ones that keep their cores, and the platform's overheads.
+const PARTS: [&str; 5] = [
+    "longest_path_ns",
+    "own_order_ns",
+    "interference_ns",
+    "blocking_ns",
+    "overheads_ns",
+];
+
+/// These parts of a bound, in nanoseconds. A part is `None` if a bound that it is a difference of
+/// is not proven.
+pub type Slack = [Option<u64>; PARTS.len()];
+
+/// Splits the bound of a DAG of a commit into its parts.
+pub fn slack(commit: &Committed, dag: DagId) -> Slack {
+    let bound = |dags: &[DagSpec], settings: &AnalysisSettings, dag: usize| -> Option<u64> {
+        let options = SchedulerOptions {
+            policy: settings.policy,
+            preemption: settings.preemption,
+            cores: settings.cores,
+        };
+        let task_set = record::task_set(options, CoreDivision::Undivided, dags).ok()?;
+        let answer = analysis::answer(&task_set, settings);
+        answer.bounds[dag].map(|bound| bound.bound_ns)
+    };
+    // DAGs of other clusters do not interfere.
+    let task_set = &commit.task_set;
+    let cluster = task_set.dag(dag).cluster();
+    let is_here = |(_, model): &(usize, &Dag)| model.cluster() == cluster;
+    let here = || task_set.dags().iter().enumerate().filter(is_here);
+    let specs = here().map(|(place, _)| &commit.specs[place]);
+    let mut all: Vec<DagSpec> = specs.cloned().collect();
+    (all.iter_mut()).for_each(|dag| dag.cluster = None);
+    // Its index among the DAGs of its cluster.
+    let index = here().take_while(|(place, _)| *place < dag.index()).count();
+    let full = commit.told.dags[dag.index()].bound_ns;
+    // The order of the steps decides which part gets an effect that two of them have.
+    let mut settings = commit.settings();
+    let cores = task_set.cores_of(cluster, settings.cores).len();
+    settings.cores = u32::try_from(cores).unwrap_or(u32::MAX);
+    settings.overheads = Overheads::default();
+    let free = bound(&all, &settings, index);
+    settings.preemption = Preemption::Enabled;
+    for subtask in all.iter_mut().flat_map(|dag| &mut dag.subtasks) {
+        subtask.non_preemptive = false;
+    }
+    let preemptible = bound(&all, &settings, index);
+    let own = all.swap_remove(index);
+    let alone = bound(std::slice::from_ref(&own), &settings, 0);
+    // With a core for each subtask nothing delays the longest path.
+    settings.cores = u32::try_from(own.subtasks.len()).unwrap_or(u32::MAX).max(1);
+    let length = bound(&[own], &settings, 0);
+    let part = |whole: Option<u64>, rest: Option<u64>| Some(whole?.saturating_sub(rest?));
+    [
+        length,
+        part(alone, length),
+        part(preemptible, alone),
+        part(free, preemptible),
+        part(full, free),
+    ]
+}
+
+/// Writes the witness of each commit, and returns a line that names the files. Witnesses of later
+/// commits get files of their own, with the commit's number as the last extension.
+///
+/// # Errors
+///
+/// In words: nothing was committed, or a file cannot be written.
+pub fn write(path: &Path, commits: &[Committed]) -> Result<String, String> {
+    let mut names = Vec::new();
+    for commit in commits {
+        let path = file(path, commit.number);
+        let text = analysis::witness(&commit.task_set, &commit.settings());
+        files::write_named("witness", &path, text)?;
+        names.push(files::shown_path(&path));
+    }
+    match names.join(" ") {
+        none if none.is_empty() => Err("the guest has committed no DAG".into()),
+        names => Ok(format!(
+            "{names}: what proves the bounds; `./scripts/check-witness {names}` checks it"
+        )),
+    }
+}
+
+fn file(path: &Path, commit: usize) -> PathBuf {
+    match commit {
+        0 => path.into(),
+        later => {
+            let mut name = path.as_os_str().to_owned();
+            name.push(format!(".{later}"));
+            name.into()
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests;

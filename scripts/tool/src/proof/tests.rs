@@ -7,9 +7,9 @@ use recording::{Commit, Counted, DagTimes, SubtaskTimes, Times, Writer};
 use sched_dag::DagId;
 use sched_dag::law::MeasuredCosts;
 
+use super::observed;
 use super::observed::OfDag;
-use super::report::{ProofRow, complaint, rows, summary, table};
-use super::{observed, report};
+use super::{ProofRow, complaint, rows, summary, table};
 use crate::made::{commit, record_of};
 use crate::record::Committed;
 use crate::record::Record;
@@ -67,7 +67,7 @@ fn the_model_is_made_again_and_bounded_alike() {
     assert_eq!(commits[0].task_set.dags()[0].name(), "demo");
     // The parts add up to the bound.
     let expected = [5_000_000, 0, 0, 0, 2_000].map(Some);
-    assert_eq!(report::slack(&commits[0], DagId(0)), expected);
+    assert_eq!(super::slack(&commits[0], DagId(0)), expected);
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn what_is_of_one_of_several_files_or_commits_has_its_name() {
         number: 2,
         ..first.clone()
     };
-    let said = report::write(&path, &[first, third]).unwrap();
+    let said = super::write(&path, &[first, third]).unwrap();
     let (first, second) = (path.display(), format!("{}.2", path.display()));
     assert!(said.starts_with(&format!("{first} {second}: ")), "{said}");
     fs::remove_file(&path).and(fs::remove_file(second)).unwrap();

@@ -3,8 +3,6 @@
 //! It comes as a file, or as lines of a serial log with the file's bytes. Every view of a run
 //! (shown, judged, drawn or computed) is derived from it.
 
-pub mod bound;
-
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -19,8 +17,29 @@ use sched_dag::{
     SubtaskSpec, TaskSet, Wait, verify,
 };
 
-use crate::protocol::{Transcript, read_line};
-use crate::qemu::MOST_CORES;
+use crate::options::Parsed;
+use crate::protocol::{MachineLine, Transcript, read_line};
+use crate::qemu::{MOST_CORES, Mode};
+
+// The longest time for which an instance may wait for a core that the rules owe it: a decision takes
+// effect only after an interrupt, and where a run's time is real, the host may do something else
+// meanwhile. In mode `deterministic` that cannot happen, so such a record is judged more strictly.
+
+/// In counted time: covers time slices and the kernel's steps, which grow with the number of
+/// simultaneous events.
+pub const COUNTED_TOLERANCE_NS: u64 = 50_000;
+
+/// Where time is real.
+pub const REAL_TOLERANCE_NS: u64 = 1_000_000;
+
+/// On Linux by SCHED_FIFO, where interrupts and a hypervisor take time, too.
+pub const FIFO_TOLERANCE_NS: u64 = 5_000_000;
+
+/// On Linux by `sched_ext`, where all real-time programs take precedence, too.
+pub const SCHED_EXT_TOLERANCE_NS: u64 = 10_000_000;
+
+/// On Linux by ordinary threads, which every program delays.
+pub const NORMAL_TOLERANCE_NS: u64 = 100_000_000;
 
 /// The record of a boot.
 #[derive(Clone, Debug, Default)]
@@ -177,7 +196,7 @@ impl Record {
         let transcript = Transcript::read(&record.lines);
         // Only now, since the line may come in any chunk of text.
         if let Some(boot) = transcript.of_kind("boot").next() {
-            let usual_bound_ns = bound::usual_ns(boot);
+            let usual_bound_ns = usual_tolerance_ns(boot);
             record
                 .runs
                 .iter_mut()
@@ -203,7 +222,7 @@ impl Record {
         let run = Run {
             number,
             options: committed.options(),
-            usual_bound_ns: bound::REAL_NS,
+            usual_bound_ns: REAL_TOLERANCE_NS,
             task_set: committed.task_set.clone(),
             samplings: committed.samplings(),
             bounds_ns: committed.told.dags.iter().map(|dag| dag.bound_ns).collect(),
@@ -571,6 +590,27 @@ impl Run {
             is_complete: self.complete,
             tolerance_ns: bound_ns,
         }
+    }
+}
+
+/// Returns the bound that a person has chosen, or else the usual one of the run.
+pub fn tolerance_ns(run: &Run, options: &Parsed) -> u64 {
+    let chosen = options.number("bound-us");
+    chosen.map_or(run.usual_bound_ns, |bound_us| bound_us.saturating_mul(1000))
+}
+
+/// Returns the usual bound of a boot's runs from its line of kind `boot`: the tool passes each
+/// guest its mode, and a program on Linux says whether it can preempt, and by which mechanism.
+fn usual_tolerance_ns(boot: &MachineLine) -> u64 {
+    let words = boot.text_at("command_line").unwrap_or_default();
+    let word = |name: &str| words.split(' ').find_map(|word| word.strip_prefix(name));
+    match word("mode=").and_then(Mode::from_name) {
+        Some(Mode::Deterministic) => COUNTED_TOLERANCE_NS,
+        _ if boot.text_at("clock") != Some("linux") => REAL_TOLERANCE_NS,
+        // Without preemption an instance waits for others' whole executions.
+        _ if !boot.text.contains("\"preemptive\":true") => NORMAL_TOLERANCE_NS,
+        _ if word("mechanism=") == Some("sched_ext") => SCHED_EXT_TOLERANCE_NS,
+        _ => FIFO_TOLERANCE_NS,
     }
 }
 

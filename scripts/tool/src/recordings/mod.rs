@@ -22,7 +22,7 @@ use crate::dot;
 use crate::files::{self, Named};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::output;
-use crate::proof::{observed, report};
+use crate::proof::{self, observed};
 use crate::record::Record;
 use crate::system;
 
@@ -157,7 +157,7 @@ pub(crate) fn drawn_and_proven(record: &Record, options: &Parsed) -> Result<Vec<
         ));
     }
     if let Some(path) = options.path("witness") {
-        announced.push(report::write(path, record.proven()?)?);
+        announced.push(proof::write(path, record.proven()?)?);
     }
     Ok(announced)
 }

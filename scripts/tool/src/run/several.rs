@@ -24,7 +24,7 @@ use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
 use crate::proof::observed::{self, OfDag};
-use crate::proof::report;
+use crate::proof::{self, ProofRow};
 use crate::protocol::Status;
 use crate::record::Record;
 use crate::system;
@@ -54,7 +54,7 @@ pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
         return Ok(ExitCode::FAILURE);
     };
     say_all(options, &rows);
-    match report::complaint(&rows) {
+    match proof::complaint(&rows) {
         // A failed run has been reported; a second message would hide the first.
         Some(complaint) if code == ExitCode::SUCCESS => Err(Refusal::Failure(complaint)),
         _ => Ok(code),
@@ -85,17 +85,17 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
     progress.wipe();
     say_all(options, &rows);
     if !options.is_given("json") {
-        let (count, summary) = (files.len(), report::summary(&rows));
+        let (count, summary) = (files.len(), proof::summary(&rows));
         println!("{count} files: {refused} refused, {failed} failed; {summary}");
     }
-    match report::complaint(&rows) {
+    match proof::complaint(&rows) {
         Some(complaint) => Err(Refusal::Failure(complaint)),
         None => Ok(worst(refused, failed)),
     }
 }
 
 /// The rows of a proof, and the exit code of its second run.
-type Proven = (Vec<report::ProofRow>, ExitCode);
+type Proven = (Vec<ProofRow>, ExitCode);
 
 /// Observes a run, commits with its measurements, and compares; `None` if the first run failed,
 /// which has been reported.
@@ -152,11 +152,11 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
     Ok(Some(next))
 }
 
-fn compare(booted: &Booted) -> Result<Vec<report::ProofRow>, String> {
+fn compare(booted: &Booted) -> Result<Vec<ProofRow>, String> {
     let record = booted.outcome.record()?;
     let mut all = Vec::new();
     observed::add(&mut all, &record)?;
-    report::rows(record.proven()?, &all)
+    proof::rows(record.proven()?, &all)
 }
 
 /// Observes a run for each seed, prints the execution times, and writes the file of WCETs. Returns
@@ -206,9 +206,9 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
 }
 
 /// Prints the rows of a proof.
-fn say_all(options: &Parsed, rows: &[report::ProofRow]) {
-    let lines = rows.iter().map(report::ProofRow::line);
-    say(options, &report::table(rows), lines);
+fn say_all(options: &Parsed, rows: &[ProofRow]) {
+    let lines = rows.iter().map(ProofRow::line);
+    say(options, &proof::table(rows), lines);
 }
 
 /// Prints a table for people and lines for programs, as the options want.
@@ -387,7 +387,7 @@ fn add_rows(table: &mut Table, file: &Path, cores: u64, outcome: &Outcome) {
             &violations,
             &milliseconds(line.number_at("bound_ns")),
             &milliseconds(line.number_at("response_time_ns.max")),
-            &report::ratio(line.number_at("tightness_permille")),
+            &proof::ratio(line.number_at("tightness_permille")),
         ]);
     }
 }

@@ -51,7 +51,7 @@ use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
 use crate::files;
 use crate::json::{Object, quoted};
 use crate::options::{Command, Parsed, Refusal, Takes, did_you_mean, options};
-use crate::record::{Record, Run, bound};
+use crate::record::{Record, Run, tolerance_ns};
 
 pub use viewer::TRACE;
 pub use viewer::trace;
@@ -184,7 +184,7 @@ fn read_file(path: &Path) -> Result<Vec<Run>, String> {
 
 /// Judges a run, prints the findings, and returns the number of breaches.
 fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> usize {
-    let bound_ns = bound::tolerance_ns(run, options);
+    let bound_ns = tolerance_ns(run, options);
     let shown = options.number("show").unwrap_or(u64::MAX);
     let shown = usize::try_from(shown).unwrap_or(usize::MAX);
     let findings = check(run, bound_ns);

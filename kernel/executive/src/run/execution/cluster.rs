@@ -6,11 +6,16 @@
 //!
 //! Where the cores are not divided there is one cluster, which has no others to look for; what
 //! only divided cores need is in [`divided`](super::divided).
+//!
+//! Requests of one cluster to others (signals, pauses, modes, the end) are
+//! [letters](sched_dag::lifecycle::Mailboxes): the other cluster's first core is woken, which takes
+//! them in a step of its own. That takes no lock, so nobody waits.
 
+use alloc::sync::Arc;
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 
-use fass::platform::SetOnce;
-use sched_dag::CoreId;
+use fass::platform::{Request, SetOnce};
+use sched_dag::{ClusterId, CoreId, lifecycle};
 
 use super::ClusterRun;
 use crate::machine::spinlock::SpinLock;
@@ -167,4 +172,25 @@ impl CoreSet {
             }
         }
     }
+}
+
+/// The mailboxes of a run; all clusters have the same ones. None where cores are not divided.
+pub(super) type Letters = Option<Arc<lifecycle::Mailboxes>>;
+
+/// Sends a request to the other clusters that it concerns, adds the cores that have to take it, and
+/// reports whether it does not concern the cluster itself.
+pub(super) fn send_to_others(
+    letters: &Letters,
+    from: ClusterId,
+    request: Request,
+    woken: &mut CoreSet,
+) -> bool {
+    letters.as_ref().is_some_and(|letters| {
+        letters.send(Some(from), request, |cluster| {
+            let there = nth(cluster.index());
+            // What was left before is seen by the core that takes the letters.
+            there.has_letters.store(true, Ordering::Release);
+            woken.insert(there.core(FIRST_SEAT));
+        })
+    })
 }

@@ -9,8 +9,7 @@ use fass::platform::LaunchError;
 use sched_dag::lifecycle::{self, Lifecycle, Parts};
 use sched_dag::{DagId, TaskSet};
 
-use super::cluster::{BESIDES, ClusterState, MAY_DIVIDE, OTHERS, nth};
-use super::letters::Letters;
+use super::cluster::{BESIDES, ClusterState, Letters, MAY_DIVIDE, OTHERS, nth};
 use super::{ClusterRun, cluster};
 use crate::machine::this_core;
 

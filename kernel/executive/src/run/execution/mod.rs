@@ -12,7 +12,6 @@
 
 mod cluster;
 mod divided;
-mod letters;
 #[allow(unsafe_code, reason = "what a fault has left on a stack is taken back")]
 mod loans;
 mod port;

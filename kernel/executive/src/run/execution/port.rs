@@ -14,8 +14,7 @@ use sched_dag::lifecycle::{self, Request};
 use sched_dag::{ClusterId, CoreId, DriverNotice, Preemption, SchedulerOptions, TaskSet};
 
 use super::EPOCH_NS;
-use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, MAY_DIVIDE};
-use super::letters::{self, Letters};
+use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, Letters, MAY_DIVIDE};
 use super::loans::RunnerLoan;
 use super::status::note_running;
 use crate::machine::clock;
@@ -68,7 +67,7 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
 
     #[inline]
     fn forward(&mut self, request: Request) -> bool {
-        MAY_DIVIDE && letters::send(self.letters, self.id, request, self.woken)
+        MAY_DIVIDE && cluster::send_to_others(self.letters, self.id, request, self.woken)
     }
 
     #[inline]

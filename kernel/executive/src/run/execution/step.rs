@@ -12,7 +12,7 @@
 //! A completing instance's latest values show, and its requests are taken, signals among them,
 //! under the lock and before the scheduler's step; the step passes them on right after the
 //! completion. A signal from outside makes a step of its own. A request that concerns another
-//! cluster is a letter (`letters`), which counts once that cluster takes it.
+//! cluster is a letter ([`cluster`](super::cluster)), which counts once that cluster takes it.
 
 use core::sync::atomic::Ordering;
 
@@ -23,8 +23,7 @@ use sched_dag::lifecycle::WaitId;
 use sched_dag::placement::NextWork;
 use sched_dag::{CoreId, DagId, Instance, Moment};
 
-use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, MAY_DIVIDE};
-use super::letters::Letters;
+use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, Letters, MAY_DIVIDE};
 use super::loans::RunnerLoan;
 use super::port::{SmpPort, here, instance_time_ns, seat, since_epoch};
 use super::status::{self, note_running};

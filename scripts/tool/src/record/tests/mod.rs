@@ -6,7 +6,10 @@ use common::random::Random;
 use recording::{Chunk, Commit, Recordable, Recording, Stream, Times, Writer};
 
 use super::Record;
-use super::bound::{COUNTED_NS, FIFO_NS, NORMAL_NS, REAL_NS, SCHED_EXT_NS};
+use super::{
+    COUNTED_TOLERANCE_NS, FIFO_TOLERANCE_NS, NORMAL_TOLERANCE_NS, REAL_TOLERANCE_NS,
+    SCHED_EXT_TOLERANCE_NS,
+};
 use crate::made::{commit, line_of, record_of};
 use crate::tests::{altered, rows};
 
@@ -146,13 +149,19 @@ fn a_record_says_how_strictly_it_is_judged() {
         let record = record_of(&format!("{boot},{rest}\n"), &commit(COMMIT), EVENTS);
         Record::read(&record).unwrap().runs.remove(0).usual_bound_ns
     };
-    assert_eq!(of("pit", "policy=edf mode=deterministic"), COUNTED_NS);
-    assert_eq!(of("pit", "mode=threads"), REAL_NS);
-    assert_eq!(of("linux true", "policy=edf"), FIFO_NS);
-    assert_eq!(of("linux true", "mechanism=sched_ext"), SCHED_EXT_NS);
-    assert_eq!(of("linux", "mechanism=fifo"), NORMAL_NS);
+    assert_eq!(
+        of("pit", "policy=edf mode=deterministic"),
+        COUNTED_TOLERANCE_NS
+    );
+    assert_eq!(of("pit", "mode=threads"), REAL_TOLERANCE_NS);
+    assert_eq!(of("linux true", "policy=edf"), FIFO_TOLERANCE_NS);
+    assert_eq!(
+        of("linux true", "mechanism=sched_ext"),
+        SCHED_EXT_TOLERANCE_NS
+    );
+    assert_eq!(of("linux", "mechanism=fifo"), NORMAL_TOLERANCE_NS);
     assert_eq!(
         Record::read(&good()).unwrap().runs[0].usual_bound_ns,
-        REAL_NS
+        REAL_TOLERANCE_NS
     );
 }

@@ -48,7 +48,7 @@ use crate::files;
 use crate::json::{Object, quoted};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::output::briefly;
-use crate::record::{Run, bound};
+use crate::record::{Run, tolerance_ns};
 
 /// Converts runs to JSON. `bound_ns` is the tolerance for breaches, as of [`check`].
 pub fn convert(runs: &[Run], bound_ns: u64) -> String {
@@ -203,9 +203,7 @@ fn draw(options: &Parsed) -> Result<String, String> {
         return picture::draw(run, options.number("periods").unwrap_or(1));
     }
     // All runs of a file come from one boot, so one bound holds for all.
-    let bound_ns = runs
-        .first()
-        .map_or(0, |run| bound::tolerance_ns(run, options));
+    let bound_ns = runs.first().map_or(0, |run| tolerance_ns(run, options));
     Ok(convert(&runs, bound_ns))
 }
 
