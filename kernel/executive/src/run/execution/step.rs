@@ -12,7 +12,7 @@
 //! A completing instance's latest values show, and its requests are taken, signals among them,
 //! under the lock and before the scheduler's step; the step passes them on right after the
 //! completion. A signal from outside makes a step of its own. A request that concerns another
-//! cluster is a letter ([`cluster`](super::cluster)), which counts once that cluster takes it.
+//! cluster is a letter ([`cluster`]), which counts once that cluster takes it.
 
 use core::sync::atomic::Ordering;
 
