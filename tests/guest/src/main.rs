@@ -9,6 +9,7 @@ mod attacks;
 mod checksum;
 mod cluster_scale;
 mod endless;
+mod every_call;
 mod input;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
@@ -44,6 +45,7 @@ const TESTS: &[(&str, Test)] = &[
     ("preemption", preemption::run),
     ("occupation", occupation::run),
     ("endless", endless::run),
+    ("every_call", every_call::run),
     ("exceeded", single::exceeded),
     ("input", input::run),
     ("large", large::run),

@@ -2,11 +2,9 @@
 //! predecessors; nothing allocates while jobs run; and a deterministic run is
 //! the same run every time.
 
-use std::path::Path;
-
 use harness::{Guest, Members, Said, lawful_runs};
+use tool::Outcome;
 use tool::record::COUNTED_TOLERANCE_NS;
-use tool::{Outcome, system};
 
 fn demo(cores: u64, words: &str) -> Guest {
     Guest::new("fork-join").cores(cores).word(words)
@@ -87,16 +85,4 @@ fn a_wrong_guest_command_line_ends_in_a_usage_error() {
         assert!(reason.starts_with(why), "{reason}");
         assert_eq!(reason.lines().count(), 1, "{reason}");
     }
-}
-
-#[test]
-fn a_build_without_optimization_evaluates_its_run() {
-    let words = "build --quiet --package fork-join --bin fork-join";
-    let built = system::cargo().args(words.split(' ')).output();
-    let built = built.expect("cargo starts");
-    assert!(built.status.success(), "{built:?}");
-    let image = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("debug/fork-join");
-    let outcome = demo(1, "jobs=20 subtasks=6").image(&image).succeed();
-    let line = outcome.line("fork_join");
-    line.has([("violations", 0), ("joins", 20)]);
 }

@@ -10,6 +10,7 @@ mod cruise_replay;
 mod dag_file;
 mod debian;
 mod drone;
+mod every_call;
 mod faults;
 mod fork_join;
 mod gait;

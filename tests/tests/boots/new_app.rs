@@ -1,7 +1,6 @@
 //! A new app as a person gets it, in a repository of its own and under `apps/`: it passes its own
 //! test and the linters, boots, says what the guide shows, and is told what its repository
-//! lacks. So does the README's first app, when the README is followed. Its `main` may make every
-//! call that a machine has, and stays one source for all platforms.
+//! lacks. So does the README's first app, when the README is followed.
 //!
 //! All of them share a target folder and the profiles of a new repository, so that each crate is
 //! compiled once; the folder stays from one run of this test to the next. An app's image stands there
@@ -158,7 +157,7 @@ fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
         let replayed = "\"kind\":\"replayed\",\"compared\":0,\"uncompared\":0";
         assert!(said.contains(replayed), "{place}: {said}");
     }
-    let replay = format!("run --example replay -- {file}");
+    let replay = format!("run --profile linux --example replay -- {file}");
     let said = cargo(&app, &replay);
     assert_eq!(said, "0 values are compared: nothing differs\n");
     let said = cargo(&app, &format!("{replay} --until replayed/17"));
@@ -290,87 +289,4 @@ fn the_readmes_first_app_is_the_one_that_its_test_runs_and_that_boots() {
         text: shown,
     };
     golden.assert_is(&excerpt(shown, &boot(&app), str::to_string));
-}
-
-/// The names that these need.
-const USES: &str = r"
-use core::time::Duration;
-use fass::shared::{Parameter, Wire};
-use fass::{Policy, Preemption, SubtaskAttributes, create_dag, finish_create_dags};
-";
-
-/// Calls that `main` may make before it commits, in the place of asking for its options' end.
-const BEFORE: &str = r#"
-    machine.configure(Policy::Edf, Preemption::Enabled);
-    machine.offer_clusters()?;
-    machine.divide(&[1, machine.cores() - 1]);
-    machine.offer_overheads()?;
-    machine.set_coincidence(Duration::ZERO);
-    machine.accept_faults();
-    machine.accept_exceeded_bounds();
-    machine.show_topics();
-    let (log, gain) = (Wire::new("log"), Parameter::new("gain", 1_u64, 1..=9));
-    machine.connect(&log)?;
-    machine.offer(&[&gain])?;
-    options.finish(&["jobs", "output", "clusters", "overheads"])?;
-    let other = create_dag();
-    other.name("other").relative_deadline(Duration::from_millis(9));
-    let signal = other.sporadic(Duration::from_millis(9));
-    let read = other.using((gain.reading(), log.sending())).source(|_| ());
-    read.register(SubtaskAttributes::named("read"));
-    let [first] = every_call::build(jobs);
-    let dags = [first, other];
-    machine.spread(&dags);
-"#;
-
-/// Calls that it may make in the place of a plain run.
-const RUN: &str = r#"
-    machine.raise_on_input(&signal);
-    println!("{} and {:?}", machine.has_console(), machine.clusters());
-    println!("{:?} and {:?}", machine.resources(), machine.module());
-    let run = match jobs {
-        20 => machine.run_from(fass::now_ns() + 50_000_000)?,
-        _ => machine.run()?,
-    };
-    machine.report_memory();
-"#;
-
-#[test]
-fn a_main_with_every_call_of_the_machine_is_one_source_on_the_machine_and_on_linux() {
-    let source = workspace().join("kernel/front/src/app/machine.rs");
-    let source = fs::read_to_string(source).expect("the front's");
-    for call in source.split("pub fn ").skip(1) {
-        let (name, arguments) = call.split_once('(').expect("a function");
-        if !arguments.starts_with("&self") {
-            continue;
-        }
-        let is_made = [BEFORE, RUN].concat().contains(&format!("machine.{name}("));
-        assert!(
-            is_made,
-            "`{name}` is not called; write it into `BEFORE` or `RUN`"
-        );
-    }
-    let app = repository("every-call");
-    for (file, old, new) in [
-        ("src/main.rs", "    options.finish(&[\"jobs\"])?;\n", BEFORE),
-        ("src/main.rs", "&every_call::build(jobs)", "&dags"),
-        ("src/main.rs", "    let run = machine.run()?;\n", RUN),
-        ("src/main.rs", "use fass::finish_create_dags;", USES),
-        (
-            "Cargo.toml",
-            "/kernel\" }",
-            "/kernel\", features = [\"clusters\"] }",
-        ),
-    ] {
-        let text = fs::read_to_string(app.join(file)).expect("the new app's");
-        assert_eq!(text.matches(old).count(), 1, "{file}: `{old}`");
-        fs::write(app.join(file), text.replace(old, new)).expect("it is ours");
-    }
-    for place in ["--on linux --jobs 20", "--mode deterministic"] {
-        let output = app.join("log").display().to_string();
-        let words = format!("run -- {place} --cores 2 --output {output}");
-        let said = cargo(&app, &words);
-        let success = "{\"kind\":\"verdict\",\"status\":\"success\"}\n";
-        assert!(said.contains(success), "{place}: {said}");
-    }
 }

@@ -1,29 +1,13 @@
 //! `debug` as a person uses it: gdb stops in a subtask and shows its variables.
 
-use std::ffi::OsStr;
 use std::fs;
-use std::io::{Write, stderr};
 
-use tool::image;
-use tool::{install, system::workspace};
+use tool::system::workspace;
 
 use crate::support::{call, folder};
 
-/// Reports whether there is a gdb, or one can be installed. If not, says so past the test's
-/// captured output.
-fn is_gdb_here() -> bool {
-    let ensured = install::ensure(&install::GDB);
-    if let Err(why) = &ensured {
-        let _ = writeln!(stderr(), "skipped, a test without gdb: {why}");
-    }
-    ensured.is_ok()
-}
-
 #[test]
 fn a_breakpoint_in_a_subtask_shows_locals_and_callers() {
-    if !is_gdb_here() {
-        return;
-    }
     let folder = folder("debugged");
     let lines = "next\nnext\ninfo locals\nprint goal[2]\nbacktrace 2\n";
     fs::write(folder.join("commands"), lines).expect("a file in it");
@@ -47,9 +31,6 @@ fn a_breakpoint_in_a_subtask_shows_locals_and_callers() {
 
 #[test]
 fn a_place_that_is_not_there_is_refused() {
-    if !is_gdb_here() {
-        return;
-    }
     for (place, remedy) in [
         ("contrl", "; did you mean `control`?"),
         ("attitude.rs:9999", "no code of that line; name a file"),
@@ -58,31 +39,5 @@ fn a_place_that_is_not_there_is_refused() {
         let said = called.complaint;
         assert_eq!(called.code, Some(2), "{said}");
         assert!(said.contains(place) && said.contains(remedy), "{said}");
-    }
-}
-
-#[test]
-fn without_optimization_the_stacks_hold() {
-    for (app, words, result) in [
-        ("fork-join", "jobs=2 work=compute", "\"kind\":\"fork_join\""),
-        ("drone", "seconds=1", "\"kind\":\"drone\""),
-    ] {
-        let image = image::build_for_gdb(app).expect("it builds");
-        let words = format!("budget_factor=0 {words}");
-        let run = [
-            "run",
-            "--mode=deterministic",
-            "--cores=4",
-            "--append",
-            &words,
-            "--image",
-        ];
-        let words = run.iter().map(OsStr::new).chain([image.as_os_str()]);
-        let called = call(workspace(), words);
-        let said = called.out + &called.complaint;
-        assert!(said.contains(result), "{said}");
-        for never in ["fault:", "panic", "\"kind\":\"fault\""] {
-            assert!(!said.contains(never), "{said}");
-        }
     }
 }

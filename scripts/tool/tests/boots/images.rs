@@ -1,6 +1,7 @@
-//! `run --image FILE`: an image names its app, and runs as no other; and the memory that `run`
-//! chooses by itself.
+//! `run --image FILE`: an image names its app, and runs as no other; the memory that `run` chooses
+//! by itself; and an image that is not optimized.
 
+use std::ffi::OsStr;
 use std::fs;
 
 use tool::{image, system::workspace};
@@ -60,5 +61,32 @@ fn the_usual_memory_suffices_for_as_many_processors_as_there_may_be() {
     for cores in [24, 32, 64] {
         let words = "run --mode deterministic --jobs 2 --subtasks 2 --cores";
         succeed(workspace(), &format!("{words} {cores}"));
+    }
+}
+
+#[test]
+fn without_optimization_the_stacks_hold_and_a_run_is_evaluated() {
+    for (app, words, result) in [
+        ("fork-join", "jobs=2 work=compute", "\"kind\":\"fork_join\""),
+        ("fork-join", "jobs=20 subtasks=6", "\"joins\":20,"),
+        ("drone", "seconds=1", "\"kind\":\"drone\""),
+    ] {
+        let image = image::build_for_gdb(app).expect("it builds");
+        let words = format!("budget_factor=0 {words}");
+        let run = [
+            "run",
+            "--mode=deterministic",
+            "--cores=4",
+            "--append",
+            &words,
+            "--image",
+        ];
+        let words = run.iter().map(OsStr::new).chain([image.as_os_str()]);
+        let called = call(workspace(), words);
+        let said = called.out + &called.complaint;
+        assert!(said.contains(result), "{said}");
+        for never in ["fault:", "panic", "\"kind\":\"fault\""] {
+            assert!(!said.contains(never), "{said}");
+        }
     }
 }

@@ -55,7 +55,8 @@ fn a_recording_of_something_else_is_refused_in_words() {
 /// Runs the example `replay`, as a person does.
 fn replay(file: &File, words: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO"));
-    command.args(["run", "-q", "-p", "gait", "--example", "replay", "--"]);
+    let run = "run -q --profile linux -p gait --example replay --";
+    command.args(run.split(' '));
     command.arg(&file.0).args(words);
     command.output().expect("cargo can be started")
 }
