@@ -1,12 +1,14 @@
 //! The tests of all packages: compiled by cargo, run here, counted by libtest's output.
 //!
-//! The binaries are run here, one after the other, so that each has a limit of its own and a name
-//! in the report, and guests are booted only where they can be. A binary's last word is its `test
+//! The binaries are run here, two at a time, so that each has a limit of its own and a name in the
+//! report, and guests are booted only where they can be. A binary's last word is its `test
 //! result:` lines, which are summed. Output is shown in full if something failed.
 
 use std::fs::{self, File};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::thread;
 use std::time::Duration;
 
 use super::{CheckFailure, Tally, TestPlan};
@@ -21,11 +23,16 @@ use crate::system;
 /// host's delays. Each guest has a limit of its own.
 const LIMIT: Duration = Duration::from_secs(3600);
 
+/// The number of test binaries that run at a time. Many tests wait, for a guest or for the time of
+/// a job, while another can compute.
+const AT_ONCE: usize = 2;
+
 /// The integration test of a package that boots guests; no other does.
 const BOOTS: &str = "boots";
 
 /// The programs that modules of boot tests need besides QEMU.
-const NEEDS: [(&str, &[&Need]); 4] = [
+const NEEDS: [(&str, &[&Need]); 5] = [
+    ("debugger::", &[&install::GDB]),
     ("by_efi::", &[&install::MTOOLS, &install::OVMF]),
     (
         "on_screen::",
@@ -53,29 +60,26 @@ pub(super) fn run_all(plan: &TestPlan, (binaries, compiled): Compiled, tally: &m
     if let Err(why) = compiled {
         tally.run("all tests compile", || Err(why.into()));
     }
-    for binary in binaries {
-        let name = binary.name();
-        let mut command = binary.command(plan);
-        if binary.boots_guests() {
-            let Some(tests) = binary.wanted(plan) else {
-                continue;
-            };
-            let obstacle = match plan.quick {
-                true => Err("left out by --quick".into()),
-                false => plan.boots.clone(),
-            };
-            // Skipped and counted as such: a guest that cannot boot must not pass silently.
-            if let Err(why) = obstacle {
-                tally.skip(&name, &why);
-                continue;
-            }
-            for (module, why) in lacking(&tests) {
-                tally.skip(&format!("{name}: {module}"), &why);
-                command.args(["--skip", module]);
+    // What they need is installed before, by one package manager at a time.
+    let prepare = |binary: TestBinary| Some((binary.name(), binary.prepare(plan, tally)?));
+    let prepared: Vec<_> = binaries.into_iter().filter_map(prepare).collect();
+    let queue = Mutex::new(prepared.into_iter());
+    let take = || queue.lock().ok()?.next();
+    let lane = || {
+        let mut tally = Tally::default();
+        while let Some((name, command)) = take() {
+            run(plan, &name, command, &mut tally);
+        }
+        tally
+    };
+    thread::scope(|scope| {
+        for lane in [(); AT_ONCE].map(|()| scope.spawn(lane)) {
+            match lane.join() {
+                Ok(of_lane) => tally.add(of_lane),
+                Err(_) => tally.fail("the tests", "a thread that runs them panicked"),
             }
         }
-        run(plan, &name, command, tally);
-    }
+    });
     // Doctests need cargo to compile each, which is not quick.
     if !plan.quick {
         run(plan, "doctests", doctests(plan), tally);
@@ -87,7 +91,8 @@ pub(super) fn compile() -> Compiled {
     println!("compiling the tests");
     let _lasting = Lasting::new("compiling the tests");
     let mut command = system::cargo();
-    let words = "test --workspace --no-run --no-fail-fast --quiet \
+    // Examples, which cargo would compile here as well, are built where a test runs them.
+    let words = "test --workspace --tests --no-run --no-fail-fast --quiet \
                  --message-format=json-render-diagnostics";
     command.args(words.split_whitespace());
     let (messages, compiled) = system::messages_of(&mut command);
@@ -139,6 +144,29 @@ impl TestBinary {
         command.env("CARGO_MANIFEST_DIR", &self.folder);
         command.env_remove("TOOL_CALLED_IN");
         command
+    }
+
+    /// Returns the command for those of the wanted tests that can run; the others are skipped.
+    fn prepare(&self, plan: &TestPlan, tally: &mut Tally) -> Option<Command> {
+        let mut command = self.command(plan);
+        if !self.boots_guests() {
+            return Some(command);
+        }
+        let (name, tests) = (self.name(), self.wanted(plan)?);
+        let obstacle = match plan.quick {
+            true => Err("left out by --quick".into()),
+            false => plan.boots.clone(),
+        };
+        // Skipped and counted as such: a guest that cannot boot must not pass silently.
+        if let Err(why) = obstacle {
+            tally.skip(&name, &why);
+            return None;
+        }
+        for (module, why) in lacking(&tests) {
+            tally.skip(&format!("{name}: {module}"), &why);
+            command.args(["--skip", module]);
+        }
+        Some(command)
     }
 
     /// Lists the wanted tests; `None` if there are none. A program that cannot list them counts as
