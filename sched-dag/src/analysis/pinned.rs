@@ -23,6 +23,7 @@ use super::set::constrained;
 use super::{DagBound, NotProvenReason, SchedulabilityTest};
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::sort_by_key;
+use crate::task_set::Subtask;
 
 /// The owners and groups of a cluster.
 pub(super) struct PinnedCluster {
@@ -30,8 +31,10 @@ pub(super) struct PinnedCluster {
     pub(super) supplies: Vec<CoreSupply>,
     /// By core, its list: subtasks of one DAG of the case.
     pub(super) lists: Vec<Vec<ScheduledSubtask>>,
-    /// By core, the DAG of the case that is pinned to it.
+    /// By core, the first DAG of the case that is pinned to it.
     pub(super) owners: Vec<Option<usize>>,
+    /// By core, whether another DAG of the case is pinned to it, too.
+    is_shared: Vec<bool>,
     /// By DAG of the case, why it can be neither an owner nor a member.
     refusals: Vec<Option<NotProvenReason>>,
 }
@@ -43,8 +46,16 @@ impl PinnedCluster {
             supplies: vec![CoreSupply::UNOWNED; cores],
             lists: vec![Vec::new(); cores],
             owners: vec![None; cores],
+            is_shared: vec![false; cores],
             refusals: vec![None; case.members.len()],
         };
+        // All at first: a DAG that can have no bound delays the others on its cores, too.
+        for dag in 0..case.members.len() {
+            for core in case.dag(dag).subtasks().iter().filter_map(Subtask::core) {
+                let owner = cluster.owners[core as usize].get_or_insert(dag);
+                cluster.is_shared[core as usize] |= *owner != dag;
+            }
+        }
         for dag in 0..case.members.len() {
             cluster.refusals[dag] = cluster.enter(case, dag).err();
         }
@@ -73,11 +84,10 @@ impl PinnedCluster {
         let is_whole = pinned.is_empty() || pinned.len() == subtasks.len();
         for subtask in pinned {
             let core = subtasks[subtask].core().map_or(0, |core| core as usize);
-            let owner = *self.owners[core].get_or_insert(dag);
             let list = &mut self.lists[core];
             let follows =
                 |last: &ScheduledSubtask| task.successors(last.subtask).any(|next| next == subtask);
-            if !is_whole || owner != dag || !list.last().is_none_or(follows) {
+            if !is_whole || self.is_shared[core] || !list.last().is_none_or(follows) {
                 let subtask = SubtaskId(to_u32(subtask));
                 return Err(NotProvenReason::Pinned { subtask });
             }
@@ -157,7 +167,10 @@ impl PinnedCluster {
         let mut above = Vec::new();
         let affinity = case.dag(dag).affinity();
         for (other, &response_ns) in responses.iter().enumerate() {
-            let shares = is_member(case, other) && case.dag(other).affinity() == affinity;
+            // Of a DAG that is pinned in part, which has no bound, the rest is in a group as well.
+            let mut subtasks = case.dag(other).subtasks().iter();
+            let is_in_group = subtasks.any(|subtask| subtask.core().is_none());
+            let shares = is_in_group && case.dag(other).affinity() == affinity;
             if !shares || !case.relation.may_outrank(other, dag) {
                 continue;
             }

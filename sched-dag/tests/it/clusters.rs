@@ -211,13 +211,18 @@ fn bounds_of_pinned_subtasks_need_an_order_on_cores_of_their_own() {
     // No edge says which of two goes first.
     let again = specs[2].subtasks[0].clone();
     specs[2].subtasks.push(again);
-    let (answer, _) = answer(&specs);
-    let pinned = NotProvenReason::Pinned {
-        subtask: SubtaskId(1),
+    let (unordered, _) = answer(&specs);
+    let pinned = |subtask| NotProvenReason::Pinned {
+        subtask: SubtaskId(subtask),
     };
     let behind = NotProvenReason::DelayedBy { dag: DagId(2) };
-    assert_eq!(answer.reasons, [None, Some(behind), Some(pinned)]);
-    assert_eq!(answer.first_failing.unwrap().dag, DagId(2));
+    assert_eq!(unordered.reasons, [None, Some(behind), Some(pinned(1))]);
+    assert_eq!(unordered.first_failing.unwrap().dag, DagId(2));
+    // Of two DAGs on one core neither has it to itself.
+    specs[2].subtasks.pop();
+    specs[1].subtasks[0].core = Some(0);
+    let (shared, _) = answer(&specs);
+    assert_eq!(shared.reasons, [None, Some(pinned(0)), Some(pinned(0))]);
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Bounds of lent cores against virtual time: divided sets keep the bounds that divided them.
+//! Bounds of lent cores against virtual time: divided sets keep the bounds that divided them, and
+//! sets that a person has pinned, however that is, the bounds that the analysis gives them.
 //!
 //! Random sets with heavy DAGs are divided by the commit's own assignment. The analysis of what
 //! came of it, which knows only cores and edges, must prove each DAG; and no job may respond later
@@ -6,7 +7,7 @@
 //! signals. Each set that is divided has 400 jobs and more. `LENT_SETS=n` draws n sets in place of 2,000.
 
 use common::random::Random;
-use sched_dag::analysis::{answer, assign};
+use sched_dag::analysis::{SchedulabilityTest, answer, assign};
 use sched_dag::{AssignmentReason, DagSpec, LendingAttempt, Policy, Priority};
 
 use super::kinds::breach;
@@ -88,5 +89,49 @@ fn divided_sets_keep_their_bounds() {
         let often = if sets >= 20_000 { 5 } else { 4 };
         assert!(!by_attempt[..often].contains(&0), "{by_attempt:?}");
         assert!(groups > 20 && refused > 20, "{groups} {refused}");
+    }
+}
+
+/// Pins subtasks as a person might: of a DAG all, some or none, to any cores. Now and then what is
+/// not pinned is in one of two groups.
+fn pin(specs: &mut [DagSpec], cores: u32, random: &mut Random) {
+    let first = random.within(0..=2 * cores).min(cores) % cores;
+    for spec in specs {
+        let percent = [0, 0, 50, 100][random.index(4)];
+        for subtask in &mut spec.subtasks {
+            let core = random.within(0..=cores - 1);
+            subtask.core = random.chance(percent).then_some(core);
+        }
+        if first > 0 {
+            let groups = [0..first, first..cores];
+            spec.affinity = groups[random.index(2)].clone().collect();
+        }
+    }
+}
+
+#[test]
+fn what_a_person_has_pinned_keeps_its_bounds() {
+    let sets = number("PINNED_SETS", 3_000);
+    let (mut owners, mut members, mut unproven) = (0_u64, 0_u64, 0_u64);
+    for seed in 1..=sets {
+        let mut random = Random::new(seed);
+        let (mut specs, cores) = set(&mut random);
+        pin(&mut specs, cores, &mut random);
+        let task_set = commit(&specs, Policy::StaticPriority, cores);
+        let settings = settings(FP, cores);
+        let answer = answer(&task_set, &settings);
+        for bound in &answer.bounds {
+            match bound.map(|bound| bound.test) {
+                Some(SchedulabilityTest::Owner) => owners += 1,
+                Some(SchedulabilityTest::Member) => members += 1,
+                _ => unproven += 1,
+            }
+        }
+        let breach = breach(&task_set, &settings, &answer, &mut random);
+        assert_eq!(breach, None, "seed {seed}: {specs:#?}");
+    }
+    println!("{owners} owners, {members} members, {unproven} others");
+    if sets >= 3_000 {
+        assert!(owners > 200 && members > 200 && unproven > 200);
     }
 }
