@@ -52,6 +52,35 @@ pub struct DagSpec {
     pub latest: Vec<LatestSpec>,
 }
 
+impl DagSpec {
+    /// Returns the most jobs in flight, given or enough for the deadline, and no more than there
+    /// are.
+    ///
+    /// A job that meets its deadline is in flight for at most D, so at most
+    /// ceil(D / T) of them are at any time; with one more a late job can end while
+    /// the next one is released. Where subtasks share a state, jobs take turns.
+    #[must_use]
+    pub fn most_in_flight(&self) -> u64 {
+        let jobs = self.jobs.unwrap_or(u64::MAX);
+        if let Some(given) = self.in_flight {
+            return u64::from(given).min(jobs);
+        }
+        if self.states.iter().any(StateSpec::is_shared) {
+            return 1;
+        }
+        let (Some(period_ns), Some(deadline_ns)) = (self.period_ns, self.relative_deadline_ns)
+        else {
+            return 1;
+        };
+        // A fault of its own; the other checks need a number to go on with.
+        if period_ns == 0 {
+            return 1;
+        }
+        let enough = deadline_ns.div_ceil(period_ns).saturating_add(1);
+        enough.min(jobs)
+    }
+}
+
 /// A state that subtasks of one DAG share, as its app describes it.
 ///
 /// Its users do not run at the same time unless all of them only read. The
@@ -63,6 +92,14 @@ pub struct StateSpec {
     pub name: String,
     /// Its users, each subtask once, in any order.
     pub users: Vec<StateUser>,
+}
+
+impl StateSpec {
+    /// Reports whether several subtasks use it; one alone is in order by itself.
+    pub(crate) fn is_shared(&self) -> bool {
+        let first = self.users.first();
+        first.is_some_and(|first| self.users.iter().any(|user| user.subtask != first.subtask))
+    }
 }
 
 /// A subtask's use of a state.

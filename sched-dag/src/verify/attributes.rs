@@ -10,7 +10,6 @@ use alloc::vec::Vec;
 use super::fault::{DagFault, OverflowingTime, TopicSide, Warning};
 use super::label::SubtaskLabel;
 use super::names::Interner;
-use super::topics::is_shared;
 use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
@@ -49,31 +48,8 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
     check_names(findings);
 }
 
-/// Returns the most jobs in flight of a DAG, given or enough for its deadline.
-///
-/// A job that meets its deadline is in flight for at most D, so at most
-/// ceil(D / T) of them are at any time; with one more a late job can end while
-/// the next one is released. Where subtasks share a state, jobs take turns.
-pub(super) fn in_flight(spec: &DagSpec) -> u64 {
-    if let Some(given) = spec.in_flight {
-        return u64::from(given);
-    }
-    if spec.states.iter().any(is_shared) {
-        return 1;
-    }
-    let (Some(period_ns), Some(deadline_ns)) = (spec.period_ns, spec.relative_deadline_ns) else {
-        return 1;
-    };
-    // A fault of its own; the other checks need a number to go on with.
-    if period_ns == 0 {
-        return 1;
-    }
-    let enough = deadline_ns.div_ceil(period_ns).saturating_add(1);
-    enough.min(spec.jobs.unwrap_or(u64::MAX))
-}
-
 fn check_instances(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
-    let of = |spec: &DagSpec| u128::from(in_flight(spec)) * spec.subtasks.len() as u128;
+    let of = |spec: &DagSpec| u128::from(spec.most_in_flight()) * spec.subtasks.len() as u128;
     let specs = findings.specs;
     let instances: u128 = specs.iter().map(|spec| of(spec)).sum();
     if instances <= u128::from(options.instance_limit) {
@@ -85,7 +61,7 @@ fn check_instances(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
             .findings_of(most)
             .fault(|dag| DagFault::TooManyInstances {
                 dag,
-                in_flight: in_flight(specs[most]),
+                in_flight: specs[most].most_in_flight(),
                 instances,
                 limit: options.instance_limit,
             });

@@ -17,7 +17,7 @@ use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::attributes::{affinity, in_flight};
+use super::attributes::affinity;
 use super::fault::DagFault;
 use super::{CommitOptions, VerifyFindings};
 
@@ -149,7 +149,8 @@ fn build_dag(
         period_ns: spec.period_ns.expect("verified to be given"),
         relative_deadline_ns: of_sinks_ns.max().expect("verified to have a sink"),
         offset_ns: spec.offset_ns,
-        in_flight: u32::try_from(in_flight(spec)).expect("verified to fit the instance limit"),
+        in_flight: u32::try_from(spec.most_in_flight())
+            .expect("verified to fit the instance limit"),
         overrun: spec.overrun,
         on_fault: spec.on_fault,
         cluster: spec.cluster,

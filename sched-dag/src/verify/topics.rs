@@ -320,12 +320,6 @@ fn check_latest(latest: &LatestSpec, page: &mut DagFindings<'_, '_>) {
     }
 }
 
-/// Reports whether several subtasks use a state; one alone is in order by itself.
-pub(super) fn is_shared(state: &StateSpec) -> bool {
-    let first = state.users.first();
-    first.is_some_and(|first| state.users.iter().any(|user| user.subtask != first.subtask))
-}
-
 /// Checks the states of all DAGs.
 pub(super) fn check_states(findings: &mut VerifyFindings<'_>) {
     for dag in 0..findings.specs.len() {
@@ -375,7 +369,7 @@ fn check_users(stated: &StateSpec, page: &mut DagFindings<'_, '_>) {
     users.dedup();
     // Without a stated number the commit takes 1.
     if let Some(in_flight @ 2..) = spec.in_flight
-        && is_shared(stated)
+        && stated.is_shared()
     {
         page.fault(|dag| DagFault::StateOverJobs {
             dag,
@@ -390,11 +384,11 @@ fn check_users(stated: &StateSpec, page: &mut DagFindings<'_, '_>) {
 #[inline(never)]
 pub(super) fn order_users(spec: &DagSpec, graph: &Graph) -> Vec<StatePrecedence> {
     let mut precedences = Vec::new();
-    if !spec.states.iter().any(is_shared) {
+    if !spec.states.iter().any(StateSpec::is_shared) {
         return precedences;
     }
     let place = places(graph);
-    for state in spec.states.iter().filter(|state| is_shared(state)) {
+    for state in spec.states.iter().filter(|state| state.is_shared()) {
         let place_of = |user: usize| place.get(state.users[user].subtask).copied();
         let users = sorted_by_key(state.users.len(), place_of);
         // In the order in which a topological walk meets them, so that no edge that is added
