@@ -209,7 +209,8 @@ impl UnprovenDag {
                 let lacking = subtasks.filter(|(_, subtask)| subtask.wcet_ns().unwrap_or(0) == 0);
                 lacking.map(|(id, _)| id).collect()
             }
-            NotProvenReason::SubtaskBeyondPeriod { subtask } => vec![subtask],
+            NotProvenReason::SubtaskBeyondPeriod { subtask }
+            | NotProvenReason::Pinned { subtask } => vec![subtask],
             NotProvenReason::PathBeyondDeadline { sink, .. }
             | NotProvenReason::NoSinkBound { sink } => vec![sink],
             _ => Vec::new(),
@@ -245,6 +246,12 @@ impl fmt::Display for UnprovenDag {
             (NotProvenReason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
                 f,
                 "{subtask} alone takes more than a period; split it or lengthen the period"
+            ),
+            (NotProvenReason::Pinned { .. }, [subtask, ..], _) => write!(
+                f,
+                "{subtask} is pinned to a core, and the test for that needs cores that no other \
+                 DAG is pinned to, all subtasks of the DAG pinned, and an edge from each to the \
+                 next one on its core; see to these, or leave the cores out"
             ),
             (NotProvenReason::PathBeyondDeadline { length_ns, .. }, [sink, ..], _) => write!(
                 f,

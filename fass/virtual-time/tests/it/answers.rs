@@ -136,6 +136,18 @@ fn dags_without_all_wcets_say_so() {
 }
 
 #[test]
+fn a_pinned_subtask_that_bars_a_proof_is_named() {
+    let machine = VirtualTime::new().policy(Policy::StaticPriority);
+    let pinned = ["left", "right"].map(|name| {
+        let dag = every(10, name);
+        dag.register_untyped_subtask(|_| (), taking(name, 1).core(0));
+        dag.jobs(50).clone()
+    });
+    let expected = ["subtask `left` is pinned", "subtask `right` is pinned"];
+    answered(&machine, &pinned, &expected.map(|reason| ["", reason]));
+}
+
+#[test]
 fn what_is_certain_to_miss_is_accepted_with_a_warning() {
     let machine = VirtualTime::new().policy(Policy::Edf);
     let long = chain("long", 0, [10, 9], [5, 5]);
