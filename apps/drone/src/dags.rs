@@ -27,7 +27,7 @@ pub const WCETS: [(&str, u64); 12] = [
     ("locate", 60),
     ("drain", 60),
     ("watch", 60),
-    ("decide", 60),
+    ("decide", 240),
     ("descend", 60),
     ("alarm", 60),
 ];

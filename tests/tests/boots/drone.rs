@@ -21,6 +21,13 @@ fn it_flies_without_a_miss_on_one_core_and_on_four() {
 }
 
 #[test]
+fn no_wcet_of_it_is_exceeded_on_four_cores() {
+    let outcome = drone("seconds=8").cores(4).succeed();
+    outcome.line("drone").has([("landed", 1)]);
+    assert_eq!(outcome.transcript.of_kind("wcet_exceeded").count(), 0);
+}
+
+#[test]
 fn a_camera_that_fails_costs_a_frame_within_its_limit_and_beyond_it_the_drone_is_sent_down() {
     for place in ["linux", "machine"] {
         for (survived, costs) in [(0, ["dag"].as_slice()), (1, &["job"]), (1, &["job", "dag"])] {
