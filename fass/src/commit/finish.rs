@@ -146,7 +146,7 @@ pub fn finish_create_dags_with(
     }
     let demands_proof = drafts.iter().any(|draft| draft.borrow().demands_proof);
     if PINS && demands_proof && !terms.assigns {
-        divide_to_prove(platform, &mut task_set, &terms);
+        divide_to_prove(platform, &mut task_set, &terms, &drafts);
     }
     analysis::fix_orders(&mut task_set, &terms.settings());
     let answers = CommitAnswers::new(&task_set, &terms);
@@ -175,8 +175,14 @@ pub fn finish_create_dags_with(
     }
 }
 
-/// Divides cores that are not, where a proof is demanded that only a division gives.
-fn divide_to_prove(platform: &dyn Platform, task_set: &mut TaskSet, terms: &RunConfig) {
+/// Divides cores that are not, where a proof is demanded that only a division gives. DAGs that are
+/// in modes have to stay together, as a mode is entered by one cluster.
+fn divide_to_prove(
+    platform: &dyn Platform,
+    task_set: &mut TaskSet,
+    terms: &RunConfig,
+    drafts: &Drafts,
+) {
     let is_free = |dag: &sched_dag::Dag| !dag.states_cluster();
     if task_set.is_divided() || !task_set.dags().iter().all(is_free) {
         return;
@@ -186,8 +192,14 @@ fn divide_to_prove(platform: &dyn Platform, task_set: &mut TaskSet, terms: &RunC
         return;
     }
     let mut divided = task_set.clone();
-    if platform.assign(&mut divided).is_ok()
+    let is_assigned = platform.assign(&mut divided).is_ok();
+    let cluster = |dag: &DagId| divided.dag(*dag).cluster();
+    let of_modes = checks::dags_of_modes(drafts).concat();
+    if is_assigned
         && divided.is_divided()
+        && of_modes
+            .windows(2)
+            .all(|pair| cluster(&pair[0]) == cluster(&pair[1]))
         && analysis::answer(&divided, &settings).is_proven()
     {
         *task_set = divided;

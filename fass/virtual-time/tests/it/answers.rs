@@ -7,6 +7,7 @@ use fass::commit::{
     Commit, ConstructionPolicy, DagAnswer, Fault, OverheadSource, Overheads,
     finish_create_dags_with,
 };
+use fass::shared::Modes;
 use fass::{Dag, Policy, Preemption, create_dag, finish_create_dags};
 use virtual_time::{Report, VirtualTime};
 
@@ -113,6 +114,33 @@ fn a_demanded_proof_that_is_missing_refuses_the_commit() {
     // The handles are as they were: alone it is proven.
     let commit = finish_create_dags(&[late]).expect("nothing delays it");
     assert_eq!(commit.answer("late").verdict.bound(), Some(ms(3)));
+}
+
+/// A DAG of three cores in a row and one of the rest, as in `lent.dag`; each demands a proof.
+fn lending(number: usize) -> [Dag; 2] {
+    let vision = every(100, &format!("vision {number}"));
+    let subtask = |name, ms| vision.register_untyped_subtask(|_| (), taking(name, ms));
+    let (first, last) = (subtask("first", 1), subtask("last", 1));
+    for (name, ms) in [("left", 39), ("right", 39), ("stereo", 29)] {
+        let middle = subtask(name, ms);
+        vision.precede(&first, &middle).precede(&middle, &last);
+    }
+    let control = chain(&format!("control {number}"), 0, [120, 95], [20, 39]);
+    [vision.clone(), control].map(|dag| dag.jobs(3).demand_proof().clone())
+}
+
+#[test]
+fn cores_are_divided_for_a_proof_unless_that_parts_the_dags_of_modes() {
+    let _machine = VirtualTime::new().policy(Policy::StaticPriority).cores(4);
+    let dags = || [lending(0), lending(1)].concat();
+    let commit = finish_create_dags(&dags()).expect("divided, all are proven");
+    assert!(commit.first_unproven().is_none());
+
+    let _machine = VirtualTime::new().policy(Policy::StaticPriority).cores(4);
+    let (dags, modes) = (dags(), Modes::new());
+    modes.mode("all", &dags.iter().collect::<Vec<_>>());
+    modes.mode("few", &[&dags[0]]);
+    assert!(codes(&dags).contains(&"not_proven"), "{:?}", codes(&dags));
 }
 
 #[test]
