@@ -11,7 +11,9 @@
 //! ```
 //!
 //! The hash is of names and edges, so that WCETs of another graph are told from these.
-//! WCETs that the file lacks stay as the app has stated them. Nothing here trusts the file.
+//! WCETs that the file lacks stay as the app has stated them. That of a subtask that waits is one for
+//! all its segments together, and takes the place of all that are stated. Nothing here trusts the
+//! file.
 
 use core::fmt;
 
@@ -144,6 +146,11 @@ pub fn apply(text: &str, spec: &mut DagSpec) -> Result<(), WcetFault> {
                 let found = found.ok_or(WcetFault { line, problem })?;
                 found.wcet_ns = Some(wcet_ns);
                 found.wcet_margin_percent = Some(margin_percent);
+                // The sum is of all segments: nothing follows from it for one of them, and what is
+                // stated of the later ones would not be parts of it.
+                for wait in &mut found.waits {
+                    wait.segment_ns = None;
+                }
             }
             WcetRecord::Wcet { .. } | WcetRecord::End => {}
         }
@@ -190,7 +197,7 @@ impl fmt::Display for WcetFault {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::SubtaskSpec;
+    use crate::spec::{SubtaskSpec, Wait};
 
     fn spec(names: &str, edges: &[(usize, usize)]) -> DagSpec {
         let subtask = |name: &str| SubtaskSpec {
@@ -227,6 +234,22 @@ mod tests {
         unnamed.name = "b".into();
         assert_eq!(apply(&text, &mut unnamed), Ok(()));
         assert_eq!(unnamed.subtasks[0].wcet_ns, Some(5));
+    }
+
+    #[test]
+    fn an_observed_sum_replaces_the_stated_segments() {
+        let mut own = spec("x,y", &[]);
+        let wait = |segment_ns| Wait {
+            limit_ns: 7,
+            segment_ns,
+        };
+        for subtask in &mut own.subtasks {
+            subtask.waits = [wait(Some(2))].into();
+        }
+        assert_eq!(apply(&file(&own, "wcet 9 1 y\n"), &mut own), Ok(()));
+        let [x, y] = [0, 1].map(|at| (own.subtasks[at].wcet_ns, &*own.subtasks[at].waits));
+        assert_eq!(x, (Some(5), &[wait(Some(2))][..]));
+        assert_eq!(y, (Some(9), &[wait(None)][..]));
     }
 
     #[test]
