@@ -198,6 +198,9 @@ impl DagDraft {
         let mut waits = alloc::vec![Wait::default(); attributes.waits.len()];
         for (wait, (limit, segment)) in waits.iter_mut().zip(attributes.waits).filter(|_| WAITS) {
             wait.limit_ns = self.convert(limit, Some(subtask), "wait").unwrap_or(0);
+            // Else the WCET of the first segment would pass for a sum of which nothing is known for
+            // the segments; the verification refuses 0.
+            let segment = segment.or(wcet.map(|_| Duration::ZERO));
             wait.segment_ns = segment.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
         }
         // The sum; where a part is missing, the verification says so.

@@ -247,6 +247,11 @@ pub(crate) const CASES: &[Case] = &[
         let sleep = || async { (1_u32,) };
         waiting(|dag| dag.async_source(sleep), read)
     }),
+    ("segments_partly_given", || {
+        let read = attributes("read").wcet(PERIOD / 4).wait(PERIOD / 2);
+        let sleep = || async { (1_u32,) };
+        waiting(|dag| dag.async_source(sleep), read)
+    }),
     ("answers_not_recorded", || {
         let (accelerator, _driver) = create_device::<u32, u32>("accelerator");
         let dag = dag("lidar: > read > points");
