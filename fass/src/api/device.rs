@@ -14,7 +14,8 @@
 //!
 //! # How the two ends meet
 //!
-//! Each question has a number, from 1 on. The word `posted` is that of the one that waits for its
+//! Each question has a number, from 1 on, that no other one has of any device: so a ticket is of no
+//! use to another device's driver. The word `posted` is that of the question that waits for its
 //! answer; whoever exchanges it for 0 has decided: the driver, who then has answered, or the asking
 //! end, which has given up. There are two places for questions, as the driver may be just taking one
 //! out that has been given up; the asking end writes the next one to the other. The place of the
@@ -67,7 +68,6 @@ where
         answers: SetOnce::new(),
         posted_ns: AtomicU64::new(0),
         took_ns: AtomicU64::new(0),
-        count: AtomicU64::new(0),
         staged: AtomicU64::new(0),
         posted: AtomicU64::new(0),
     });
@@ -254,18 +254,19 @@ struct DeviceCell<Q, A> {
     /// When the latest question was posted, and how long the answer took, if it is recorded.
     posted_ns: AtomicU64,
     took_ns: AtomicU64,
-    /// How many questions have a number.
-    count: AtomicU64,
     /// The question to be posted at the end of the turn, or 0.
     staged: AtomicU64,
     /// The question that waits for its answer, or 0.
     posted: AtomicU64,
 }
 
+/// How many questions have a number, of all devices.
+static QUESTIONS: AtomicU64 = AtomicU64::new(0);
+
 impl<Q, A> DeviceCell<Q, A> {
     /// Writes a question down, which is not to be seen yet, and returns its number.
     fn stage(&self, wait: (u64, u32), question: Q) -> u64 {
-        let number = self.count.fetch_add(1, Ordering::Relaxed) + 1;
+        let number = QUESTIONS.fetch_add(1, Ordering::Relaxed) + 1;
         // The driver is at one of them at most.
         let place = self.questions.iter().find_map(SharedCell::change);
         let mut place = place.expect("the driver's end is used by one thread at a time");

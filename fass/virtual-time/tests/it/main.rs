@@ -2,6 +2,7 @@
 
 mod answers;
 mod chains;
+mod devices;
 mod faults;
 mod latest;
 mod lifecycle;
