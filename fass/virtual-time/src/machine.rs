@@ -242,7 +242,7 @@ impl Session {
         let report = Report {
             panics: calls.panics.clone(),
             degraded: calls.degraded.clone(),
-            is_late: machine.settings.borrow().late.most_ns > 0,
+            late_ns: machine.settings.borrow().late.most_ns,
             ..Report::new(
                 run,
                 now_ns,

@@ -67,8 +67,8 @@ pub struct Report {
     /// what its functions remember of jobs before is lacking.
     pub lacking: Option<(String, u64)>,
     pub(crate) run: Run,
-    /// Whether interrupts may have been late.
-    pub(crate) is_late: bool,
+    /// How late interrupts may have been, in nanoseconds.
+    pub(crate) late_ns: u64,
 }
 
 impl Deref for Report {
@@ -115,7 +115,7 @@ impl Report {
             lacking: outcome.lacking,
             events,
             run,
-            is_late: false,
+            late_ns: 0,
         }
     }
 
@@ -156,8 +156,12 @@ impl Report {
         let mut events = self.events.clone();
         events.sort_by_key(|event| event.time_ns);
         let events = events.iter().copied();
-        // With any tolerance it is not judged how late a timer is.
-        let (task_set, terms) = (self.task_set(), JudgeOptions::whole(self.is_late.into()));
+        let (task_set, late_ns) = (self.task_set(), self.late_ns);
+        // With any tolerance it is not judged how late a timer is, but one that ends a wait.
+        let terms = JudgeOptions {
+            late_ns,
+            ..JudgeOptions::whole((late_ns > 0).into())
+        };
         let mut found = law::violations(task_set, terms, events.clone());
         let of_dispatch = law::dispatch_violations(task_set, &self.options(), terms, events);
         found.extend(of_dispatch);

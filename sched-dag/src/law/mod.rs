@@ -94,11 +94,13 @@ pub struct JudgeOptions {
     pub is_complete: bool,
     /// For how long what is owed may be owed, in nanoseconds: a machine takes time from a
     /// finish to what follows from it, and from a decision to what a core does. Nothing
-    /// may come too early. How late a timer is, is not judged.
+    /// may come too early. How late a timer is, is judged of waits only.
     ///
     /// 0: everything has the very time at which the model lets it happen, as in virtual
     /// time; then timers are punctual, too. [`u64::MAX`]: only order counts.
     pub tolerance_ns: u64,
+    /// How late a timer may be that ends a wait at its limit, besides the tolerance, in nanoseconds.
+    pub late_ns: u64,
 }
 
 impl JudgeOptions {
@@ -112,6 +114,7 @@ impl JudgeOptions {
             is_whole: true,
             is_complete: false,
             tolerance_ns,
+            late_ns: 0,
         }
     }
 }

@@ -219,6 +219,14 @@ fn a_device_that_answers_twice_late_or_never_changes_nothing_else() {
 }
 
 #[test]
+fn a_wait_to_its_limit_is_no_breach_where_timers_are_late() {
+    let machine = VirtualTime::new().late(ms(1), 7);
+    let report = run(&machine, &[sleeper("a", 0, 1, &[(5, 1)])]);
+    // The release and the end of the wait are late, by 1 ms together.
+    assert_eq!(responses_ms(&report, "a"), [8]);
+}
+
+#[test]
 fn a_call_may_shorten_a_limit_and_several_devices_are_several_waits() {
     let (slow, slow_driver) = create_device::<(), u8>("slow");
     let (fast, fast_driver) = create_device::<(), u8>("fast");

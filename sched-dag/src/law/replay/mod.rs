@@ -287,7 +287,8 @@ impl InstanceLife {
             EventKind::Wake => {
                 let limit_ns = stated.get(waits.checked_sub(1)?)?.limit_ns;
                 let latest_ns = since_ns.saturating_add(limit_ns);
-                let is_late = event.time_ns > latest_ns.saturating_add(terms.tolerance_ns);
+                let owed_ns = terms.tolerance_ns.saturating_add(terms.late_ns);
+                let is_late = event.time_ns > latest_ns.saturating_add(owed_ns);
                 is_late.then_some(Violation::WaitBeyondLimit {
                     event,
                     since_ns,

@@ -589,6 +589,7 @@ impl Run {
             is_whole: self.lost == 0,
             is_complete: self.complete,
             tolerance_ns: bound_ns,
+            late_ns: 0,
         }
     }
 }
