@@ -17,9 +17,11 @@
 //! Each question has a number, from 1 on, that no other one has of any device: so a ticket is of no
 //! use to another device's driver. The word `posted` is that of the question that waits for its
 //! answer; whoever exchanges it for 0 has decided: the driver, who then has answered, or the asking
-//! end, which has given up. There are two places for questions, as the driver may be just taking one
-//! out that has been given up; the asking end writes the next one to the other. The place of the
-//! answer is the driver's until it has answered, and then the asking end's.
+//! end, which has given up, or whose instance is cancelled. The driver does not decide behind the
+//! wait's last instant, when the asking end may not have had a core yet. There are two places for
+//! questions, as the driver may be just taking one out that has been given up; the asking end writes
+//! the next one to the other. The place of the answer is the driver's until it has answered, and then
+//! the asking end's.
 //!
 //! A [wire](super::wire_waits) is a device, too: its driver says that an answer is there, and the
 //! asking end takes it from the wire. It may be there before it is asked for.
@@ -29,7 +31,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use core::fmt;
 use core::pin::Pin;
-use core::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
+use core::sync::atomic::{AtomicU64, Ordering, fence};
 use core::task::{Context, Poll};
 use core::time::Duration;
 
@@ -64,11 +66,12 @@ where
         questions: [(); 2].map(|()| SharedCell::new(None)),
         answer: SharedCell::new(None),
         source: SetOnce::new(),
-        is_at_once: AtomicBool::new(false),
         answers: SetOnce::new(),
         posted_ns: AtomicU64::new(0),
         took_ns: AtomicU64::new(0),
+        last_ns: AtomicU64::new(0),
         staged: AtomicU64::new(0),
+        latest: AtomicU64::new(0),
         posted: AtomicU64::new(0),
     });
     let driver = DeviceDriver {
@@ -247,15 +250,17 @@ struct DeviceCell<Q, A> {
     answer: SharedCell<Option<(u64, A)>>,
     /// Where the answers are, if not there.
     source: SetOnce<Box<dyn AnswerSource<A>>>,
-    /// Whether the answer to the latest question was there when that was posted.
-    is_at_once: AtomicBool,
     /// How the answers are recorded, if they are.
     answers: SetOnce<Box<dyn AnyAnswers<A>>>,
     /// When the latest question was posted, and how long the answer took, if it is recorded.
     posted_ns: AtomicU64,
     took_ns: AtomicU64,
+    /// The last instant at which it may be answered.
+    last_ns: AtomicU64,
     /// The question to be posted at the end of the turn, or 0.
     staged: AtomicU64,
+    /// The question that was posted last, or 0.
+    latest: AtomicU64,
     /// The question that waits for its answer, or 0.
     posted: AtomicU64,
 }
@@ -307,7 +312,8 @@ impl<Q, A> DeviceCell<Q, A> {
     /// Decides on a question that waits for its answer, and reports whether it did.
     fn decide(&self, number: u64) -> bool {
         let posted = &self.posted;
-        let decided = posted.compare_exchange(number, 0, Ordering::AcqRel, Ordering::Relaxed);
+        // Acquire: if the driver has, the answer is in its place.
+        let decided = posted.compare_exchange(number, 0, Ordering::AcqRel, Ordering::Acquire);
         decided.is_ok()
     }
 }
@@ -319,7 +325,7 @@ struct QuestionPost<Q, A>(Arc<DeviceCell<Q, A>>);
 impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
     fn happen(&mut self, _: u64, _: &mut dyn FnMut(platform::Request)) {}
 
-    fn wait(&mut self, ended_ns: u64) -> bool {
+    fn wait(&mut self, ended_ns: u64, limit_ns: u64) -> bool {
         let cell = &*self.0;
         let number = cell.staged.load(Ordering::Relaxed);
         if number == 0 {
@@ -328,18 +334,23 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
         cell.staged.store(0, Ordering::Relaxed);
         cell.posted_ns.store(ended_ns, Ordering::Relaxed);
         cell.took_ns.store(0, Ordering::Relaxed);
+        let last_ns = ended_ns.saturating_add(limit_ns);
+        cell.last_ns.store(last_ns, Ordering::Relaxed);
+        cell.latest.store(number, Ordering::Relaxed);
         // Release: the question is in its place.
         cell.posted.store(number, Ordering::Release);
         if let Some(ring) = cell.bell.get() {
             ring();
         }
-        let is_at_once = cell.source.get().is_some_and(|source| {
+        cell.source.get().is_some_and(|source| {
             // With the driver's: an answer that comes now is seen here, or the question there.
             fence(Ordering::SeqCst);
             source.is_there() && cell.decide(number)
-        });
-        cell.is_at_once.store(is_at_once, Ordering::Relaxed);
-        is_at_once
+        })
+    }
+
+    fn withdraw(&mut self) {
+        self.0.posted.store(0, Ordering::Release);
     }
 }
 
@@ -514,8 +525,11 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
         }
         polled.map(|has_timed_out| {
             let cell = this.cell;
-            let is_there =
-                this.number > 0 && (!has_timed_out || cell.is_at_once.load(Ordering::Relaxed));
+            // At the limit, too, an answer may be there: since the wait began, or since the driver gave
+            // it while the scheduler ended the wait. A replay may post no question.
+            let was_answered =
+                || cell.latest.load(Ordering::Relaxed) == this.number && !cell.decide(this.number);
+            let is_there = this.number > 0 && (!has_timed_out || was_answered());
             let answer = is_there.then(|| cell.take_answer(this.number));
             // That there was none in time is an answer, too, without which a replay would differ.
             if let Some(answers) = answers.filter(|answers| answers.is_open()) {
@@ -607,7 +621,7 @@ impl<Q, A> DeviceDriver<Q, A> {
         if self.end_wait(ticket) {
             return Ok(());
         }
-        // It has been given up just now; nobody else writes to the place.
+        // It comes too late, or has been given up just now; nobody else writes to the place.
         let mut place = self.cell.answer.change();
         let taken = place.as_mut().and_then(|place| place.take());
         taken.map_or(Ok(()), |(_, taken)| Err(taken))
@@ -616,9 +630,14 @@ impl<Q, A> DeviceDriver<Q, A> {
     /// Ends the wait for an answer, which is there. Reports whether somebody waits for it.
     fn end_wait(&self, ticket: Ticket) -> bool {
         let (cell, platform) = (&self.cell, platform::expect_installed());
+        let now_ns = platform.now_ns();
+        // The asking end may get to know only later that its wait has ended: it has no core yet.
+        if now_ns > cell.last_ns.load(Ordering::Relaxed) {
+            return false;
+        }
         if cell.answers.get().is_some_and(|answers| answers.is_open()) {
             let posted_ns = cell.posted_ns.load(Ordering::Relaxed);
-            let took_ns = platform.now_ns().saturating_sub(posted_ns);
+            let took_ns = now_ns.saturating_sub(posted_ns);
             cell.took_ns.store(took_ns, Ordering::Relaxed);
         }
         let decided = cell.decide(ticket.number);

@@ -26,6 +26,10 @@ impl Effect for MutedEffect {
         });
     }
 
+    fn withdraw(&mut self) {
+        self.0.withdraw();
+    }
+
     fn fail(&mut self, failed_ns: u64) {
         self.0.fail(failed_ns);
     }
@@ -37,11 +41,14 @@ pub(crate) trait Effect: Send {
     /// to be told.
     fn happen(&mut self, completed_ns: u64, ask: &mut dyn FnMut(Request));
 
-    /// Does what is to be done at the end of a turn that ends in a wait. Reports whether it waits
-    /// for something that is there.
-    fn wait(&mut self, _ended_ns: u64) -> bool {
+    /// Does what is to be done at the end of a turn that ends in a wait, of so many nanoseconds at
+    /// the most. Reports whether it waits for something that is there.
+    fn wait(&mut self, _ended_ns: u64, _limit_ns: u64) -> bool {
         false
     }
+
+    /// Takes back what the latest wait has posted: its instance is cancelled.
+    fn withdraw(&mut self) {}
 
     /// Does what is to be done for an instance that has failed.
     fn fail(&mut self, _failed_ns: u64) {}

@@ -344,7 +344,8 @@ impl SubtaskCode {
         pass(&mut *self.subtask, job);
     }
 
-    /// Gives up the inputs of job `job` that have arrived, instead of running it.
+    /// Gives up the inputs of job `job` that have arrived, instead of running it, and what it waits
+    /// for.
     ///
     /// To be called for an instance that will not run, once no predecessor of
     /// it runs any more: a value that arrives later would stay in its slot.
@@ -356,6 +357,10 @@ impl SubtaskCode {
     /// the bodies.
     pub fn discard(&mut self, job: u64) {
         self.subtask.discard(job);
+        // It was cancelled while it waited.
+        if self.goes_on(job) {
+            self.effects.iter_mut().for_each(|effect| effect.withdraw());
+        }
     }
 
     /// Returns the replacement of the function after a fault; `None`: its faults end the DAG.

@@ -233,15 +233,17 @@ impl TurnState {
         is_last
     }
 
-    /// Takes what the turn that has ended asks for, if it has not finished.
-    fn take_request(&self) -> Option<Request> {
+    /// Takes what the turn that has ended asks for, if it has not finished, and for how long at the
+    /// most.
+    fn take_request(&self) -> Option<(Request, u64)> {
         let ns = self.asked_ns.load(Ordering::Relaxed);
         let asks = self.asks.load(Ordering::Relaxed);
         self.asks.store(NONE, Ordering::Relaxed);
         match asks {
             NONE => None,
-            AFTER => Some(Request::Wait(ns)),
-            _ => Some(Request::WaitUntil(ns)),
+            AFTER => Some((Request::Wait(ns), ns)),
+            // The release is not later than the end of the turn.
+            _ => Some((Request::WaitUntil(ns), ns)),
         }
     }
 
@@ -275,16 +277,20 @@ impl Effect for TurnEffects {
                 let real = self.real.iter_mut();
                 real.for_each(|effect| effect.happen(completed_ns, ask));
             }
-            Some(request) => {
+            Some((request, limit_ns)) => {
                 // All are asked, as each has something to post when a wait begins.
                 let mut is_there = false;
                 for effect in &mut self.real {
-                    is_there |= effect.wait(completed_ns);
+                    is_there |= effect.wait(completed_ns, limit_ns);
                 }
                 // It is a wait all the same: the instance gives its core up.
                 ask(if is_there { Request::Wait(0) } else { request });
             }
         }
+    }
+
+    fn withdraw(&mut self) {
+        self.real.iter_mut().for_each(|effect| effect.withdraw());
     }
 
     fn fail(&mut self, failed_ns: u64) {
