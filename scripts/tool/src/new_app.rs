@@ -211,6 +211,11 @@ pub fn check(workspace: &Path, name: &str) -> Result<(), String> {
     if workspace.join(&folder).exists() {
         return Err(taken(name));
     }
+    check_packages(workspace, name)
+}
+
+/// Checks that no package of a workspace has an app's name.
+fn check_packages(workspace: &Path, name: &str) -> Result<(), String> {
     match package_folder(workspace, name) {
         Some(taken) => refuse(
             name,
@@ -319,16 +324,9 @@ const OWN_FILES: [AppFile; 6] = [
 /// The name or the folder is refused, or a file cannot be written; nothing is left then.
 pub fn create_repository(out: &Path, name: &str, source: CrateSource<'_>) -> Result<(), Refusal> {
     check_word(name).map_err(Refusal::Usage)?;
-    // Cargo could not tell the app from a dependency of the same name.
-    if PACKAGES
-        .iter()
-        .any(|package| package.replace("fass/", "").replace('/', "-") == name)
-    {
-        return Err(Refusal::Usage(format!(
-            "{} cannot be an app's name: it is that of a package that the app needs; choose another",
-            quoted(name)
-        )));
-    }
+    // Cargo could not tell the app from a dependency of the same name, however indirect. A git
+    // repository has the packages that this workspace has.
+    check_packages(system::workspace(), name).map_err(Refusal::Usage)?;
     let shown = quoted(&out.to_string_lossy()).to_string();
     let changes = match source {
         // The URL goes into a TOML string as it is.
@@ -514,20 +512,21 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
                 assert!(steps.contains(&install), "{steps}");
                 assert!(!texts.concat().contains("/workspace"), "{texts:?}");
             }
-            for (out, name, part) in [
-                (
-                    out.clone(),
-                    "brake",
-                    ": it is there already; name a folder to be made",
-                ),
-                (
-                    out.join("new"),
-                    "boot-link",
-                    "of a package that the app needs; choose",
-                ),
-                (out.join("new"), "Brake", ": give small letters, digits and"),
-            ] {
-                match create_repository(&out, name, source) {
+            let is_there = ": it is there already; name a folder to be made";
+            let packages = "boot-entry boot-link common executive front linux recording sched-dag";
+            let packages = packages
+                .split(' ')
+                .map(|name| (name, " has it; choose another"));
+            let rows = [
+                ("brake", is_there),
+                ("Brake", ": give small letters, digits and"),
+            ];
+            for (name, part) in rows.into_iter().chain(packages) {
+                let folder = match name {
+                    "brake" => out.clone(),
+                    _ => out.join("new"),
+                };
+                match create_repository(&folder, name, source) {
                     Err(Refusal::Usage(line)) => assert!(line.contains(part), "{line}"),
                     other => panic!("{name}: {other:?}"),
                 }
