@@ -143,6 +143,25 @@ fn in_a_repository_of_its_own_it_passes_its_test_and_boots_and_says_what_the_gui
 }
 
 #[test]
+fn its_report_is_of_all_jobs_also_of_those_whose_events_are_gone() {
+    let app = repository("long-run");
+    let library = app.join("src/lib.rs");
+    let text = fs::read_to_string(&library).expect("the new app's");
+    // The first of a hundred jobs is the longest.
+    let first = text.replace("work(800)", "work(if distance == 100 { 900 } else { 100 })");
+    assert_ne!(first, text);
+    fs::write(&library, first).expect("it is ours");
+    let words = "run -- --cores 2 --mode deterministic --append trace_events=200";
+    let said = cargo(&app, words);
+    let line = said.lines().find(|line| line.contains("response time: "));
+    let line = line.expect("the app reports").replace("4.9", "LONG");
+    assert!(
+        line.contains("median 4.") && line.contains("at most LONG"),
+        "{said}"
+    );
+}
+
+#[test]
 fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
     let app = repository("replayed");
     let file = app.join("run.rec").display().to_string();

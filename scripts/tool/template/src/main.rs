@@ -8,7 +8,7 @@ extern crate alloc;
 use alloc::format;
 
 use fass::finish_create_dags;
-use kernel::report::{Distribution, Ns};
+use kernel::report::Ns;
 use kernel::{AppError, Machine, Run, println};
 
 kernel::entry!(main);
@@ -48,7 +48,12 @@ fn report(run: &Run, name: &str) {
         "{name}: {} jobs complete, {} deadlines missed",
         statistics.completed, statistics.misses
     );
-    let response_times = Distribution::new(run.response_times_ns(name));
+    // Of all jobs; `Run::record` has the latest ones only, if there are more than fit into memory.
+    // The maximum is exact, the median up to 3.2 % too large.
+    let task_set = run.task_set();
+    let times = run.times().map(|times| times.dag(task_set.find(name)));
+    let response_times = times.map(|times| times.response_time.distribution());
+    let response_times = response_times.unwrap_or_default();
     // A DAG that has released no job has no times.
     if response_times.count() > 0 {
         println!(
