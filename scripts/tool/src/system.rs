@@ -26,6 +26,21 @@ pub fn workspace() -> &'static Path {
     })
 }
 
+/// Returns the command that a person types here for a subcommand: a script of the workspace, or,
+/// where no script has started this tool, `fass-tool` as it is installed.
+pub(crate) fn script(name: &str) -> String {
+    let is_here = || env::current_dir().is_ok_and(|here| here == workspace());
+    match env::var_os("TOOL_WORKSPACE") {
+        _ if is_here() => format!("./scripts/{name}"),
+        Some(root) => Path::new(&root)
+            .join("scripts")
+            .join(name)
+            .display()
+            .to_string(),
+        None => format!("fass-tool {name}"),
+    }
+}
+
 /// Reports whether standard error is a terminal on which a line can renew itself.
 pub fn stderr_moves() -> bool {
     io::stderr().is_terminal() && can_move(env::var_os("TERM").as_deref())

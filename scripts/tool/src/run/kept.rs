@@ -21,6 +21,7 @@ use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::protocol::Status;
 use crate::qemu::Ending;
+use crate::record::Record;
 use crate::recordings;
 use crate::system;
 
@@ -115,17 +116,40 @@ impl Kept {
             true => "",
             false => "until it died, ",
         };
+        let part = self.part(&bytes);
+        // A file of DAGs takes no replay, and an app whose topics are not recorded refuses one.
+        let values = Recording::read(&bytes).is_ok_and(|of| of.count() > 0 && of.lost() == 0);
+        let is_replayed = values && !options.is_given("dag");
+        let [check, trace, show] = ["check-trace", "trace", "recording"].map(system::script);
         let announce = |(name, path): (&str, &Path)| {
             files::write_named(name, path, &bytes)?;
             let file = files::shown_path(path);
+            let shown = format!("`{show} {file}` shows what is recorded");
+            let uses = match is_replayed {
+                true => format!("{shown}, and `--replay {file}` repeats it"),
+                false => format!("and {shown}"),
+            };
             Ok(format!(
-                "{file}: all of the run, {how}{} bytes; `./scripts/check-trace {file}` judges it, \
-                 `./scripts/trace {file} -o {file}.json` draws it, `./scripts/recording {file}` \
-                 shows what is recorded, and `--replay {file}` repeats it",
+                "{file}: {part}, {how}{} bytes; `{check} {file}` judges it, \
+                 `{trace} {file} -o {file}.json` draws it, {uses}",
                 bytes.len()
             ))
         };
         wanted.into_iter().map(announce).collect()
+    }
+
+    /// Says which part of the run the record has.
+    fn part(&self, bytes: &[u8]) -> String {
+        let what = match self.word {
+            Some("events") => "the events of the run",
+            _ => "all of the run",
+        };
+        // The journal of a long run has its latest events only.
+        let runs = Record::read(bytes).map_or(Vec::new(), |record| record.runs);
+        match runs.iter().map(|run| run.lost).sum::<u64>() {
+            0 => what.into(),
+            lost => format!("{what} but {lost} events, which are lost"),
+        }
     }
 
     /// Returns the record with a header and with the guest's machine lines.
@@ -184,8 +208,8 @@ impl Kept {
             )
         });
         Ok(vec![format!(
-            "{file}: the inputs of the last jobs before the fault; `./scripts/recording {file}` \
-             lists them{shown}"
+            "{file}: the inputs of the last jobs before the fault; `{} {file}` lists them{shown}",
+            system::script("recording")
         )])
     }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use recording::Recording;
 use tool::record::Record;
+use tool::system::workspace;
 
 use crate::support::{assert_refused, call, folder, succeed};
 
@@ -20,6 +21,9 @@ fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
     let folder = folder("kept");
     let said = succeed(&folder, &format!("{RUN} --keep run.kept"));
     assert!(!said.contains("\"kind\":\"record\""), "{said}");
+    let replay = ", and `--replay run.kept` repeats it\n";
+    assert!(said.contains("run.kept: all of the run, "), "{said}");
+    assert!(said.contains(replay), "{said}");
     succeed(&folder, "check-trace run.kept");
     succeed(&folder, "trace run.kept --out drawn.json");
     let shown = succeed(
@@ -54,6 +58,28 @@ fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
 recording cut | cut: at byte
 run --on debian --keep x | `--keep` is not for `--on debian`; leave it out",
     );
+}
+
+#[test]
+fn of_a_file_that_is_kept_only_what_holds_is_said() {
+    let folder = folder("announced");
+    let demo = workspace().join("apps/dag-file/examples/demo.dag");
+    let dags = format!("run --dag {} --mode deterministic --jobs 5", demo.display());
+    for (line, part) in [
+        (format!("{RUN} --trace a"), "a: the events of the run, "),
+        (format!("{dags} --keep a"), "a: all of the run, "),
+        (
+            format!("{RUN} --trace a --append trace_events=100"),
+            " events, which are lost, ",
+        ),
+    ] {
+        let said = succeed(&folder, &line);
+        assert!(said.contains(part), "{line}: {said}");
+        // Our folder is not the workspace, so it has none of the scripts.
+        assert!(said.contains("check-trace a` judges it, "), "{said}");
+        assert!(!said.contains("./scripts/"), "{said}");
+        assert!(!said.contains("--replay"), "{line}: {said}");
+    }
 }
 
 #[test]
