@@ -63,6 +63,10 @@ pub fn run(words: &[OsString]) -> ExitCode {
 fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     // First: the default number of cores depends on the platform.
     let options = &on_linux::settle(options)?;
+    if !options.is_given("replay") {
+        let from = options.check_without(&["from"], "needs `--replay FILE`; give it, too");
+        from.map_err(Refusal::Usage)?;
+    }
     // Before the checks below: a folder, and an observed run, have rules of their own.
     if let Some(folder) = several::folder(options) {
         return several::run_folder(options, &folder);

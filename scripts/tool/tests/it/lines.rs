@@ -88,6 +88,7 @@ oracle bound | oracle: unknown KIND `bound`; did you mean `bounds`?
 tset | fass-tool: unknown SUBCOMMAND `tset`; did you mean `test`?
 run --app dag-file --mode deterministic | run: app `dag-file` runs the DAGs of a file; name one by `--dag FILE`
 run --execution wcet | `--execution` needs `--dag FILE`
+run --from a/1 | run: `--from` needs `--replay FILE`; give it, too
 run --on linux --machine q35 | `--machine` is for the bare machine; leave
 run --on linux --gdb | `--gdb` is for the bare machine; leave
 run --on linux --latest 3 | `--latest` is for the bare machine; leave
