@@ -354,7 +354,7 @@ fn table(run: usize, commit: &Commit, times: &Times) -> String {
         row(&format!("`{name}` release jitter"), &times.release_jitter);
         for (subtask, times) in dag.subtasks.iter().zip(&times.subtasks) {
             let name = visible(&subtask.name).to_string();
-            row(&format!("  `{name}` join latency"), &times.join_latency);
+            row(&format!("  `{name}` join to start"), &times.join_latency);
             row(&format!("  `{name}` execution"), &times.execution);
             if let Some((response, ..)) = &times.sink {
                 row(&format!("  `{name}` response"), response);

@@ -34,6 +34,11 @@ fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
         shown.contains(" machine lines\n") && shown.contains("\ncomplete\n"),
         "{shown}"
     );
+    // The latency of a join ends with readiness, which events have at the same instant.
+    assert!(
+        shown.contains("` join to start ") && !shown.contains("join latency"),
+        "{shown}"
+    );
     assert!(read(&folder, "wcets").starts_with(b"# WCETs that were observed"));
     let replayed = succeed(&folder, &format!("{RUN} --policy edf --replay run.kept"));
     assert!(replayed.contains("\"uncompared\":0"), "{replayed}");
