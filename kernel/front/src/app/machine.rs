@@ -493,7 +493,8 @@ impl<S: Divisible> Machine<S> {
     /// with `clusters=auto` the commit does ([`sched_dag::analysis::assign()`]): a DAG that
     /// needs several cores gets a cluster of its own, the others share clusters of one core each.
     /// For that all subtasks need WCETs, and no DAG states a cluster. Without the word cores are
-    /// not divided.
+    /// not divided. An app that reads options calls it before
+    /// [`finish`](crate::options::CommandLine::finish), which refuses words that nothing has read.
     ///
     /// # Errors
     ///
