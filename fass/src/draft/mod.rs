@@ -497,7 +497,7 @@ impl SubtaskAttributes {
     ///
     /// Without it the platform may enforce a multiple of the
     /// [WCET](Self::wcet). At most `u64::MAX` nanoseconds; a longer one is a
-    /// fault at commit. Virtual time does not enforce budgets.
+    /// fault at commit.
     pub fn budget(mut self, budget: Duration) -> Self {
         self.budget = Some(budget);
         self
