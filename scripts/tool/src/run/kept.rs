@@ -225,7 +225,7 @@ impl Kept {
 }
 
 /// Writes the files that the options want of a run, and announces them. Of a run that failed only
-/// the record is written.
+/// the record is written, and views of the commit if a bound was exceeded.
 pub(super) fn write(
     options: &Parsed,
     kept: &Kept,
@@ -237,17 +237,27 @@ pub(super) fn write(
     for line in kept.write(options, &outcome)? {
         screen.say(&line);
     }
+    let wants_views = options.given_of(&["dot", "witness"]).is_some();
+    let views = || recordings::drawn_and_proven(&outcome.record()?, options);
     // After a failure views would be wrong or missing, and would hide its message.
     if outcome.judge().is_ok() {
-        let views = match options.given_of(&["dot", "witness"]) {
-            Some(_) => recordings::drawn_and_proven(&outcome.record()?, options)?,
-            None => Vec::new(),
-        };
+        let views = wants_views.then(views).transpose()?.unwrap_or_default();
         let warning = handed::warning(options, &outcome);
         views
             .iter()
             .chain(&warning)
             .for_each(|line| screen.say(line));
+    } else if wants_views
+        && outcome
+            .transcript
+            .of_kind("bound_exceeded")
+            .next()
+            .is_some()
+    {
+        // The commit was in order, and the proof shows which statement has not held. Without one,
+        // the failure itself is the worse news.
+        let views = views().unwrap_or_default();
+        views.iter().for_each(|line| screen.say(line));
     }
     Ok(Booted {
         outcome,

@@ -88,6 +88,24 @@ fn of_a_file_that_is_kept_only_what_holds_is_said() {
 }
 
 #[test]
+fn the_proof_of_a_bound_that_is_exceeded_is_written() {
+    let folder = folder("exceeded");
+    let dags = "dag quick period 10ms\nsubtask only wcet 1us\nend\n";
+    fs::write(folder.join("quick.dag"), dags).expect("our folder takes a file");
+    // The kernel takes its time, and that is not stated.
+    let line = "run --dag quick.dag --cores 1 --mode deterministic --jobs 3 --witness proof \
+                --append overheads_ns=0,0,0";
+    let called = call(&folder, line.split_whitespace());
+    assert_eq!(called.code, Some(1), "{}{}", called.out, called.complaint);
+    assert!(
+        called
+            .complaint
+            .contains("beyond its proven bound of 1.000 us")
+    );
+    assert!(read(&folder, "proof").starts_with(b"machine 1 "));
+}
+
+#[test]
 fn a_replay_of_signals_leaves_no_file_unless_an_instance_has_failed() {
     let folder = folder("signals");
     fs::write(folder.join("gaps"), "1ms \"gap 2350\\n\"\n").expect("our folder takes a file");
