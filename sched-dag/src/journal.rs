@@ -15,8 +15,6 @@
 //! one instance, one job and one core each comes after all that it follows from. Their
 //! times need not ascend: on a machine a function returns before the scheduler hears
 //! of it, and another core may come between.
-//!
-//! # What can happen: the vocabulary of the journal
 
 use core::fmt;
 use core::str::FromStr;

@@ -84,7 +84,7 @@
 //!   a number of jobs in flight of at least 1, and, for each job that will be
 //!   due, times that fit 64 bits.
 //! - *A driver*: the scheduler allocates nothing after [`Scheduler::new`]
-//!   (asserted in `tests/allocation.rs`), does not recurse, and says in
+//!   (asserted in `tests/it/allocation.rs`), does not recurse, and says in
 //!   [`Scheduler::next_event_ns`] when it needs to be called again.
 //! - *A platform that keeps values on edges*: at most [`Dag::in_flight`] jobs of
 //!   a DAG are in flight, and no two of them have the same number modulo that.

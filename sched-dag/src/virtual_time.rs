@@ -24,20 +24,26 @@
 //!     CommitOptions, DagId, DagSpec, Policy, Preemption, SchedulerOptions, SubtaskSpec, verify,
 //! };
 //!
-//! let dag = DagSpec { period_ns: Some(100), relative_deadline_ns: Some(50), jobs: Some(3),
-//! subtasks: vec![SubtaskSpec::default(), SubtaskSpec::default()], edges: vec![(0, 1)],
-//! ..DagSpec::default() }; let verified = verify(&[dag], &CommitOptions::new(Policy::Edf,
-//! 1)).expect("the DAG is right"); let options = SchedulerOptions { policy: Policy::Edf,
-//! preemption: Preemption::Enabled, cores: 1 }; let mut run =
-//! VirtualTime::new(&Arc::new(verified.task_set), options); assert_eq!(run.run(&mut
-//! ExecutionTimes(|_instance| 20)), RunOutcome::Finished); assert_eq!(run.now_ns(), 240);
+//! let dag = DagSpec {
+//!     period_ns: Some(100),
+//!     relative_deadline_ns: Some(50),
+//!     jobs: Some(3),
+//!     subtasks: vec![SubtaskSpec::default(), SubtaskSpec::default()],
+//!     edges: vec![(0, 1)],
+//!     ..DagSpec::default()
+//! };
+//! let commit = CommitOptions::new(Policy::Edf, 1);
+//! let tasks = Arc::new(verify(&[dag], &commit).expect("the DAG is right").task_set);
+//! let options = SchedulerOptions {
+//!     policy: Policy::Edf,
+//!     preemption: Preemption::Enabled,
+//!     cores: 1,
+//! };
+//! let mut run = VirtualTime::new(&tasks, options);
+//! let outcome = run.run(&mut ExecutionTimes(|_instance| 20));
+//! assert_eq!((outcome, run.now_ns()), (RunOutcome::Finished, 240));
 //! assert_eq!(run.scheduler_of(DagId(0)).statistics(DagId(0)).misses, 0);
 //! ```
-//!
-//! The world of a run in virtual time: how long instances execute, what fails, what comes from
-//! outside.
-//!
-//! # One cluster: its engine, and what its cores execute until when
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;

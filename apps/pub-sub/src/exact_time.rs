@@ -1,7 +1,7 @@
 //! Equal stamps make a set.
 //!
 //! An *entry* is a stamp with a slot for each topic. A message goes into its
-//! topic's slot of its stamp's entry. The numbered steps, which `tests/steps.rs`
+//! topic's slot of its stamp's entry. The numbered steps, which `tests/it/steps.rs`
 //! takes one by one:
 //!
 //! 1. Entries are ordered by stamp. A message whose slot is taken replaces the

@@ -283,10 +283,14 @@ worded! {
             "priority {} is given {} times: to {}; the order of registration decides between them",
             priority.0, subtasks.len(), list(&members(subtasks));
         /// A sink writes a topic that no subtask reads.
-        UnreadSinkValue { dag: DagLabel, subtask: SubtaskLabel, topic: String } =
-            "unread_sink_value",
-            "{subtask}, a sink of {dag}, writes topic `{topic}`, which no subtask reads; drop the \
-             output";
+        UnreadSinkValue {
+            dag: DagLabel,
+            subtask: SubtaskLabel,
+            topic: String,
+            meant: Option<String>
+        } = "unread_sink_value",
+            "{subtask}, a sink of {dag}, writes topic `{topic}`, which no subtask reads; {}drop the \
+             output", question(meant.as_ref());
         /// Two DAGs with one name.
         DuplicateDagName { first: DagLabel, second: DagLabel } = "duplicate_dag_name",
             "two DAGs are named `{}` (number {} and {}); rename one",

@@ -77,8 +77,9 @@ fn verify_all(specs: &[&DagSpec], options: &CommitOptions) -> Result<VerifiedDag
     } else {
         model::build(options, shapes, &mut findings)
     };
-    let (mut faults, warnings) = findings.into_parts();
+    let (mut faults, mut warnings) = findings.into_parts();
     names::suggest(specs, &mut faults);
+    names::suggest_for_sinks(specs, &mut warnings);
     match task_set {
         Some(task_set) => Ok(VerifiedDags { task_set, warnings }),
         None => Err(RejectedDags { faults, warnings }),

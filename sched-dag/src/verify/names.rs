@@ -17,7 +17,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::MOST_FAULTS;
-use super::fault::DagFault;
+use super::fault::{DagFault, Warning};
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::SubtaskId;
 use crate::nearest::nearest;
@@ -111,6 +111,28 @@ pub(super) fn suggest(specs: &[&DagSpec], faults: &mut [DagFault]) {
         | DagFault::UnreadTopic { meant, .. } = &mut faults[index]
         {
             *meant = found;
+        }
+    }
+}
+
+/// Adds to the first warnings of a sink's value the topic of the DAG that was probably meant: one
+/// that is read.
+#[inline(never)]
+pub(super) fn suggest_for_sinks(specs: &[&DagSpec], warnings: &mut [Warning]) {
+    for warning in warnings.iter_mut().take(MOST_FAULTS) {
+        if let Warning::UnreadSinkValue {
+            dag,
+            subtask,
+            topic,
+            meant,
+        } = warning
+        {
+            let spec = specs[dag.id.index()];
+            let own = own_topics(spec, subtask.id);
+            let inputs = spec.subtasks.iter().flat_map(|subtask| &subtask.inputs);
+            let read = inputs.map(|port| port.topic.as_str());
+            let read: Vec<&str> = read.filter(|name| !own.contains(name)).collect();
+            *meant = nearest(topic, &read).map(Into::into);
         }
     }
 }

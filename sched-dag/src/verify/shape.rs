@@ -165,6 +165,7 @@ fn check_sinks(
                 dag,
                 subtask: writer,
                 topic,
+                meant: None,
             });
         } else {
             page.fault(|dag| DagFault::UnreadTopic {

@@ -285,6 +285,18 @@ fn a_misspelt_topic_is_reported_from_both_sides_and_makes_no_second_sink() {
 }
 
 #[test]
+fn a_second_sink_that_writes_a_misspelt_topic_is_asked_what_it_means() {
+    let sinks = ConstructionPolicy {
+        sinks: CountLimit::Several,
+        ..ConstructionPolicy::paper()
+    };
+    let log = dag(&format!("{DRIVE}; image > log > obstakle"));
+    let verified = verify(&[log], &options().with_construction(sinks)).expect("a warning");
+    let text = verified.warnings[0].to_string();
+    assert!(text.contains("`obstakle`, which no subtask reads; did you mean `obstacle`? If not, drop"), "{text}");
+}
+
+#[test]
 fn a_topic_that_would_be_another_fault_or_is_of_another_dag_is_not_suggested() {
     let other = "park: > sonar > near; near near1 > stop >";
     for (misspelt, topic) in [

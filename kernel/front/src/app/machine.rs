@@ -4,11 +4,7 @@
 //! The part that differs is in its [`System`], by which each crate that apps know as `kernel`
 //! names its own `Machine`.
 //!
-//! # What a machine does for an app besides runs
-//!
 //! An image has the code of those services alone that its app asks for.
-//!
-//! # How an app divides the cores, or leaves that to the command line
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
