@@ -3,7 +3,7 @@
 //! A function may ask for more than values: that a sporadic DAG gets a signal, that a DAG rests
 //! or goes on, that another set of DAGs runs (M1 to M7, below), that the run ends. As all that a
 //! function does, a *request* takes effect with the completion of its instance (R3), never before.
-//! The rules, whose tests in `tests/lifecycle.rs` bear their numbers:
+//! The rules, whose scenarios in `tests/scenarios/lifecycle.txt` bear their numbers:
 //!
 //! - **L1, when.** A request takes effect at the instant of the completion, after all completions
 //!   and faults of that instant and before its releases. An instance that fails has asked for
@@ -21,8 +21,7 @@
 //!
 //! Where clusters have no instant in common, requests cross them as [`Mailboxes`].
 //!
-//! A driver has [`PendingRequests`], which keeps them from a completion to the scheduler's step,
-//! and
+//! A driver has [`PendingRequests`], which keeps them from a completion to the scheduler's step, and
 //! the plan's [`Lifecycle`], which serves all but signals. It is behind a trait so that an
 //! image none of whose functions asks for such a thing has no code for it.
 //!
@@ -31,7 +30,7 @@
 //! A *mode* is a set of DAGs that run together, such as those of a flight, or of a landing. A
 //! DAG that is in some mode is *on* in its modes and off, that is paused, in the others; a
 //! DAG that is in none runs in all. The rules, whose scenarios in `tests/scenarios/modes.txt` bear
-//! their numbers (M7 has its test in `tests/rules/modes.rs`):
+//! their numbers (M7 has its test in `tests/it/modes.rs`):
 //!
 //! - **M1, what is on.** A run begins in mode 0. When a mode is entered, its DAGs are resumed, and
 //!   the others that are in some mode are paused (P1 to P5). DAGs that are on in the old

@@ -52,7 +52,7 @@
 //!   proven" ([`NotProvenReason::Limit`]), never a guess. Time is near linear in
 //!   subtasks and edges for a DAG of more than [`SUBTASK_LIMIT`] subtasks, and quadratic in the
 //!   number of DAGs.
-//! - *Evidence*: the property test in `tests/analysis` simulates thousands of
+//! - *Evidence*: the property test in `tests/it/analysis/` simulates thousands of
 //!   random sets and compares each observed response time with its bound.
 //!
 //! # What is not

@@ -293,7 +293,10 @@ fn a_second_sink_that_writes_a_misspelt_topic_is_asked_what_it_means() {
     let log = dag(&format!("{DRIVE}; image > log > obstakle"));
     let verified = verify(&[log], &options().with_construction(sinks)).expect("a warning");
     let text = verified.warnings[0].to_string();
-    assert!(text.contains("`obstakle`, which no subtask reads; did you mean `obstacle`? If not, drop"), "{text}");
+    assert!(
+        text.contains("`obstakle`, which no subtask reads; did you mean `obstacle`? If not, drop"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -166,7 +166,7 @@ impl Figure {
     }
 }
 
-/// Runs a script of `scripts/plot` on the results in `out`; it draws into `out/plots`.
+/// Runs a script of `scripts/plot` on the results in `out`; it draws into a folder `plots` there.
 ///
 /// # Errors
 ///

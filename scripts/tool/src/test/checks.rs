@@ -13,7 +13,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use super::{CheckFailure, SourceFile, Tally, TestPlan, budgets, layers, none_of, packages, words};
+use super::{
+    CheckFailure, SourceFile, Tally, TestPlan, budgets, layers, none_of, packages, paths, words,
+};
 use crate::bench::hand_off;
 use crate::image;
 use crate::probe;
@@ -54,6 +56,10 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     run("layers name only layers below them", &|| {
         Ok(layers::check(sources)?)
     });
+    run(
+        "every path that a page or a comment names is there",
+        &|| Ok(paths::check(sources)?),
+    );
     run("no crate has more lines than its budget", &|| {
         Ok(budgets::check(sources, blessed)?)
     });

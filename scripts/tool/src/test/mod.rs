@@ -16,6 +16,7 @@ mod budgets;
 mod checks;
 mod layers;
 mod libtest;
+mod paths;
 mod words;
 
 use std::collections::BTreeSet;
