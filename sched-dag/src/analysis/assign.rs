@@ -32,9 +32,9 @@ use core::time::Duration;
 
 use super::lending::{LendingAnswer, lend_amid};
 use super::multi_path::multi_path;
+use super::ratio::{Ratio, sort_largest_first};
 use super::set::constrained;
 use super::task::{Task, TaskError};
-use super::utilisation::{Ratio, sort_largest_first};
 use super::workload::WorkloadBursts;
 use super::{AnalysisSettings, answer, fixed_order};
 use crate::ids::{ClusterId, DagId, to_u32};

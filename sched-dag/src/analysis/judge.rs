@@ -2,9 +2,8 @@
 //!
 //! [`answer`] looks at what is certain (missing WCETs, a path longer than the
 //! deadline, a subtask longer than the period, more work than cores), then
-//! solves the response-time equations of the set, and finally asks the
-//! capacity tests about what those leave open; these give only the
-//! deadline as the bound, so they come last although they are the cheapest.
+//! solves the response-time equations of the set, and finally asks the demand
+//! test of one core about what those leave open; it gives only the deadline as the bound.
 //!
 //! The work that interferes with DAG `k` is decided for each pair of DAGs:
 //!
@@ -36,7 +35,7 @@
 //!
 //! Where subtasks *wait* (`waiting`), of a DAG or of one that may delay it, directly or through
 //! others, jobs must not overlap: a bound beyond the period does not count as proven, the DAG's
-//! own or that of another in its equation. The tests for one core, by utilisation and by intra-task
+//! own or that of another in its equation. The tests for one core and by intra-task
 //! priorities have no term for waits and are not asked, nor is the equation of single sinks.
 //!
 //! # Bounds for single sinks, where a job's bound is known
@@ -68,9 +67,9 @@ use super::interference::DelaySources;
 use super::pinned::PinnedCluster;
 use super::pipelined::{PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::ranks::PreemptionMix;
-use super::set::{BoundFailure, constrained};
+use super::ratio::Ratio;
+use super::set::BoundFailure;
 use super::task::Task;
-use super::utilisation::{Ratio, bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
 use super::{
     AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason, SchedulabilityTest,
 };
@@ -155,16 +154,12 @@ impl AnalysisInput<'_> {
         let mut bounds: Vec<Option<DagBound>> = (solution.responses.iter().enumerate())
             .map(|(dag, response)| response.map(|bound_ns| self.bound(dag, bound_ns)))
             .collect();
-        let demand = || are_in_time(self).then_some(SchedulabilityTest::Demand);
-        // Tests that vouch for the whole set, but give no response times, are asked last: their
-        // bound is the deadline.
-        if bounds.iter().any(Option::is_none)
-            && let Some(test) = self.vouching_test().or_else(demand)
-        {
+        // The test that gives no response times is asked last: its bound is the deadline.
+        if bounds.iter().any(Option::is_none) && are_in_time(self) {
             for (bound, task) in bounds.iter_mut().zip(self.tasks) {
                 bound.get_or_insert(DagBound {
                     bound_ns: task.relative_deadline_ns(),
-                    test,
+                    test: SchedulabilityTest::Demand,
                 });
             }
         }
@@ -197,42 +192,6 @@ impl AnalysisInput<'_> {
             }
         };
         DagBound { bound_ns, test }
-    }
-
-    /// Returns the utilisation test that accepts the whole set, if one does.
-    fn vouching_test(&self) -> Option<SchedulabilityTest> {
-        let (tasks, cores) = (self.tasks, self.settings.cores);
-        // These tests know neither blocking, nor sinks' own deadlines, nor overheads that grow, nor
-        // waits.
-        let applies = self.relation.preemption == PreemptionMix::All
-            && !self.relation.ranks_sinks
-            && self.set.bursts.are_none()
-            && !self.set.has_waits();
-        if !applies || !constrained(tasks, cores) {
-            return None;
-        }
-        let (capacity, speed_up) = match self.settings.policy {
-            Policy::Edf => (gedf_capacity(tasks, cores), bonifaci_edf(tasks, cores)),
-            Policy::StaticPriority => {
-                let pairs = || self.order.windows(2).map(|pair| (pair[0], pair[1]));
-                // Ranges of priorities overlap, so the order of the DAGs is none of the two that
-                // the tests know.
-                if pairs().any(|(first, second)| self.relation.may_outrank(second, first)) {
-                    return None;
-                }
-                let by = |time: fn(&Task) -> u64| {
-                    pairs().all(|(first, second)| time(tasks[first]) <= time(tasks[second]))
-                };
-                let monotonic = by(Task::period_ns).then(|| grm_capacity(tasks, cores));
-                let speed_up = by(Task::relative_deadline_ns) && bonifaci_dm(tasks, cores);
-                (monotonic.flatten(), speed_up)
-            }
-        };
-        match (capacity, speed_up) {
-            (Some(true), _) => Some(SchedulabilityTest::Capacity),
-            (_, true) => Some(SchedulabilityTest::SpeedUp),
-            _ => None,
-        }
     }
 
     fn reason(&self, dag: usize, failure: BoundFailure) -> NotProvenReason {

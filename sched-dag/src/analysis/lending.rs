@@ -28,9 +28,9 @@ use alloc::vec::Vec;
 
 use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT, parts_per_million};
 use super::list_schedule::ListSchedule;
+use super::ratio::sort_largest_first;
 use super::set::constrained;
 use super::task::Task;
-use super::utilisation::sort_largest_first;
 use super::workload::WorkloadBursts;
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};

@@ -19,7 +19,7 @@
 //! | `set` | the equations of all DAGs, solved exactly | |
 //! | `one_core` | response times and demand on one core; subtasks that keep their core | Joseph and Pandya 1986; Baruah 1990 |
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
-//! | `utilisation` | utilisation tests | Li 2014; Bonifaci 2013 |
+//! | `ratio` | sums of utilisations | |
 //! | `ranks` | which DAG may delay which | |
 //! | `case`, `overheads` | the DAGs of a cluster that can be analysed, with what they are charged | |
 //! | `judge` | the verdict at commit, also for sinks with deadlines of their own | |
@@ -81,9 +81,9 @@ mod overheads;
 mod pinned;
 mod pipelined;
 mod ranks;
+mod ratio;
 mod set;
 mod task;
-mod utilisation;
 mod waiting;
 mod whole_units;
 mod witness;
@@ -110,7 +110,6 @@ pub use multi_path::multi_path;
 pub use overheads::{OverheadSource, Overheads};
 pub use set::{multi_path_edf, multi_path_fp};
 pub use task::{SubtaskWaits, Task, TaskError};
-pub use utilisation::{bonifaci_dm, bonifaci_edf, gedf_capacity, grm_capacity};
 pub use whole_units::{AloneBounds, WaitingForm, alone_forms, waiting_edf, waiting_fp};
 pub use witness::witness;
 
@@ -180,10 +179,6 @@ texts! {
         Owner = "an order of its own on each core";
         /// The rest of cores that owners lend, under fixed priorities.
         Member = "what owners leave of its cores";
-        /// Capacity augmentation for EDF or RM; the bound is the deadline itself.
-        Capacity = "capacity augmentation (Li et al. 2014)";
-        /// Speed-up tests for EDF or DM; the bound is the deadline itself.
-        SpeedUp = "speed-up (Bonifaci et al. 2013)";
     }
 }
 

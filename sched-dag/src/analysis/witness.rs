@@ -48,7 +48,6 @@
 //! bound DAG R priorities CORES
 //! path SUBTASK..                              each path of the DAG
 //!
-//! bound DAG R utilisation
 //! unproven DAG
 //! seal FNV_1A                                 of all above
 //! ```
@@ -268,9 +267,6 @@ impl WitnessText {
     ) {
         let (id, task) = (case.members[dag], case.tasks[dag]);
         match test {
-            SchedulabilityTest::Capacity | SchedulabilityTest::SpeedUp => {
-                self.line(format_args!("bound {id} {bound_ns} utilisation"));
-            }
             SchedulabilityTest::Demand => self.line(format_args!("bound {id} {bound_ns} demand")),
             SchedulabilityTest::OneCore => self.response(case, dag, bound_ns),
             SchedulabilityTest::IntraTask => self.priorities(case, dag, bound_ns),

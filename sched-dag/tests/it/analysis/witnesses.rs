@@ -92,7 +92,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     // More of the same are numbers that the checker no longer computes.
     assert!(refused > 2_000 && same <= 23, "{refused}, {same}");
     assert!(sound > 100, "no statement was altered: {sound}");
-    assert!(by_test.len() >= 13, "some test was never used: {by_test:?}");
+    assert!(by_test.len() >= 12, "some test was never used: {by_test:?}");
     fs::remove_dir_all(&folder).unwrap();
 }
 
@@ -248,7 +248,7 @@ fn behind_unknown() -> Sample {
     }
 }
 
-/// Two DAGs that nearly use up one core, which only the utilisation proves.
+/// Two DAGs that nearly use up one core, which only the demand proves.
 fn full_core() -> Sample {
     let specs = [spec(6, 6, &[3], &[], 0), spec(9, 9, &[4], &[], 0)];
     Sample {

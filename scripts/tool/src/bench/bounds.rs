@@ -5,9 +5,8 @@
 //! measured, so the tables are the same on every host.
 //!
 //! Two more tables follow: small sets with short deadlines, where the multi-path bound gains
-//! most over the forms that the commit had before (those of the oracle, with the width refinement,
-//! and the utilisation tests), and bounds of Kasahara's task graphs, alone on their cores, over
-//! Graham's.
+//! most over Melani's form of it with the width refinement, and bounds of Kasahara's task graphs,
+//! alone on their cores, over Graham's.
 //!
 //! Sizes and cores of small sets are those of the random test that came with the proof of the
 //! multi-path bound. It counted 91,351 sets by that bound and 47,638 by Melani's form with the
@@ -19,10 +18,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use common::random::Random;
-use sched_dag::analysis::{
-    AnalysisSettings, Overheads, Task, answer, bonifaci_dm, bonifaci_edf, fix_orders,
-    gedf_capacity, grm_capacity, multi_path,
-};
+use sched_dag::analysis::{AnalysisSettings, Overheads, Task, answer, fix_orders, multi_path};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskOrder, verify,
 };
@@ -40,7 +36,7 @@ use crate::random::graph;
 static COMMAND: Command = Command {
     invocation: "./scripts/bench bounds",
     about: "Draws by utilization how many random sets of DAGs are accepted by lent cores and by \
-            other methods; counts what the multi-path bound proves, and the forms before it.",
+            other methods; counts what the multi-path bound proves, and the form before it.",
     positional: Some((
         Takes::File("FILE..."),
         "Count only the sets of these files, as in tests/oracle/lent.txt, with or without answers.",
@@ -146,11 +142,9 @@ struct ProvenSets {
     sets: u64,
     /// By Melani's form with the width refinement alone.
     melani: u64,
-    /// By any of the forms before the multi-path bound.
-    before: u64,
     /// By the commit's answer.
     now: u64,
-    /// Proven before, but not now.
+    /// Proven by Melani's form, but not now.
     lost: u64,
 }
 
@@ -168,30 +162,18 @@ impl ProvenSets {
         let tasks: Option<Vec<Task>> = tasks.map(|dag| Task::from_dag(dag, 0).ok()).collect();
         let tasks = tasks.unwrap_or_default();
         let mut tasks: Vec<&Task> = tasks.iter().collect();
-        let (melani, others) = match policy {
+        let melani = match policy {
             Policy::StaticPriority => {
                 // In the order in which a commit derives priorities: deadline-monotonic, ties by
                 // position.
                 tasks.sort_by_key(|task| task.relative_deadline_ns());
-                let others =
-                    grm_capacity(&tasks, cores) == Some(true) || bonifaci_dm(&tasks, cores);
-                (melani_fp(&tasks, cores, Width::Used).is_some(), others)
+                melani_fp(&tasks, cores, Width::Used).is_some()
             }
-            Policy::Edf => {
-                let others =
-                    gedf_capacity(&tasks, cores) == Some(true) || bonifaci_edf(&tasks, cores);
-                (melani_edf(&tasks, cores, Width::Used).is_some(), others)
-            }
+            Policy::Edf => melani_edf(&tasks, cores, Width::Used).is_some(),
         };
-        // Before, the most urgent DAG had to pass the bound by long paths.
-        let first = tasks.first().is_none_or(|task| {
-            policy == Policy::Edf || long_paths(task, cores) <= task.relative_deadline_ns()
-        });
-        let before = (melani || others) && first;
         self.melani += u64::from(melani);
-        self.before += u64::from(before);
         self.now += u64::from(now);
-        self.lost += u64::from(before && !now);
+        self.lost += u64::from(melani && !now);
     }
 }
 
@@ -220,19 +202,13 @@ fn small(sets: u64, seed: u64) -> ByPolicy {
 
 /// Returns a table with a row for each policy.
 fn small_table(proven: &ByPolicy) -> String {
-    let columns = "policy:8|sets:9|Melani:10|before:10|now:10|now / Melani:14.2|now / before:14.2";
+    let columns = "policy:8|sets:9|Melani:10|now:10|now / Melani:14.2";
     let mut table = Table::new("small sets with short deadlines, proven\n", columns);
     for (of, (_, name)) in proven.iter().zip(POLICIES) {
-        let [of_melani, of_before] = [of.melani, of.before].map(|other| ratio(of.now, other));
-        table.row(&[
-            &name, &of.sets, &of.melani, &of.before, &of.now, &of_melani, &of_before,
-        ]);
+        let of_melani = of.now as f64 / of.melani.max(1) as f64;
+        table.row(&[&name, &of.sets, &of.melani, &of.now, &of_melani]);
     }
     table.text()
-}
-
-fn ratio(count: u64, of: u64) -> f64 {
-    count as f64 / of.max(1) as f64
 }
 
 /// The unit of small sets in nanoseconds: 2, 3 and 4 cores divide it, so that the rounding of the

@@ -48,9 +48,8 @@
 //! ```
 
 use sched_dag::analysis::{
-    Federation, InterferenceBound, SubtaskWaits, Task, WaitingForm, alone_forms, bonifaci_edf,
-    covers, federated, gedf_capacity, multi_path, multi_path_edf, multi_path_fp, waiting_edf,
-    waiting_fp, width,
+    Federation, InterferenceBound, SubtaskWaits, Task, WaitingForm, alone_forms, covers, federated,
+    multi_path, multi_path_edf, multi_path_fp, waiting_edf, waiting_fp, width,
 };
 
 use replay::lines::{Line, Lines, Malformed, cases, quoted};
@@ -406,8 +405,8 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
         "wait_gedf" => bounds(waiting_edf(tasks, cores, WaitingForm::OnePath)),
         "wait_gedf_best" => bounds(waiting_edf(tasks, cores, WaitingForm::Best)),
         "wait_np_gedf" => bounds(waiting_edf(tasks, cores, WaitingForm::NonPreemptive)),
-        "gedf_capacity" => gedf_capacity(tasks, cores).map(accepted),
-        "bonifaci_gedf" => Some(accepted(bonifaci_edf(tasks, cores))),
+        "gedf_capacity" => older::li_edf(tasks, cores).map(accepted),
+        "bonifaci_gedf" => Some(accepted(older::bonifaci_edf(tasks, cores))),
         "federated" => federated(tasks, cores).map(|federation| words_of(&federation)),
         _ => None,
     };

@@ -1,13 +1,17 @@
 //! Published bounds that the multi-path ones have replaced, for comparison with them.
 //!
 //! They round down, as `bounds.txt` does, and find their fixed points by small steps, which is slow
-//! where times are nanoseconds. All assume `D <= T`; priorities are the order given.
+//! where times are nanoseconds. All but the last assume `D <= T`; priorities are the order given.
 //!
 //! - [`graham`]: R. L. Graham, SIAM J. Applied Mathematics 17(2), 1969;
 //! - [`long_paths`]: Q. He et al., RTSS 2022: path 0 is a longest path, path `j` a longest
 //!   one when the subtasks of the earlier paths weigh nothing;
 //! - [`melani_fp`], [`melani_edf`]: A. Melani et al., IEEE Trans. Computers 66(2), 2017;
-//! - [`np_safe_fp`]: the same with the blocking of subtasks that are never preempted.
+//! - [`np_safe_fp`]: the same with the blocking of subtasks that are never preempted;
+//! - [`li_edf`]: J. Li et al., ECRTS 2014: utilisation of `m / b`, `length <= D / b`, with
+//!   `b = (3 - 2/m + sqrt(5 - 8/m + 4/m^2)) / 2`, and `D = T`;
+//! - [`bonifaci_edf`]: V. Bonifaci et al., ECRTS 2013, Theorem 21: a density of `(m + 1/2) / 3`,
+//!   `length <= D / 3`. These two say only whether deadlines are met.
 
 use std::cmp::Reverse;
 
@@ -94,6 +98,32 @@ pub(crate) fn melani_edf(tasks: &[&Task], cores: u32, width: Width) -> Option<Ve
             return Some(bounds);
         }
     }
+}
+
+/// Reports whether a set passes the capacity-augmentation test; `None`: a DAG has `D != T`.
+pub(crate) fn li_edf(tasks: &[&Task], cores: u32) -> Option<bool> {
+    let implicit = |task: &&Task| task.relative_deadline_ns() == task.period_ns();
+    let m = f64::from(cores);
+    let b = (3.0 - 2.0 / m + (5.0 - 8.0 / m + 4.0 / (m * m)).sqrt()) / 2.0;
+    (tasks.iter().all(implicit)).then(|| is_light(tasks, 1.0 / b, m / b))
+}
+
+/// Reports whether a set passes the speed-up test.
+pub(crate) fn bonifaci_edf(tasks: &[&Task], cores: u32) -> bool {
+    is_light(tasks, 1.0 / 3.0, (f64::from(cores) + 0.5) / 3.0)
+}
+
+/// Reports whether each length is at most such a part of its deadline, and the density at most so
+/// much.
+fn is_light(tasks: &[&Task], part: f64, density: f64) -> bool {
+    let mut lengths = (tasks.iter()).map(|task| (task.length_ns(), task.relative_deadline_ns()));
+    let volumes = tasks.iter().map(|task| {
+        let shorter = task.period_ns().min(task.relative_deadline_ns());
+        task.volume_ns() as f64 / shorter as f64
+    });
+    // Reals decide all but ties.
+    lengths.all(|(length, deadline)| length as f64 <= part * deadline as f64 + 1e-9)
+        && volumes.sum::<f64>() <= density + 1e-9
 }
 
 fn by_priority(
