@@ -66,7 +66,9 @@
 //! - Of a pause and a resumption of one DAG that wait, the later one counts, and so it is of modes;
 //!   an end counts more than a closing.
 //! - Of two answers to waits of one subtask the one to the later wait counts.
-//! - What is taken in one step is served in this order: DAG by DAG, the mode, the end.
+//! - What is taken in one step is served in this order: the mode; DAG by DAG its pause or
+//!   resumption, its signals, its end; the end of the run. One sender's letters that it leaves in
+//!   this order are served in it, also if they are taken in two steps. Of others the order is open.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -204,9 +206,10 @@ impl PendingRequests {
     ) {
         letters.take_all(cluster, |request| {
             // Of a person's pause, say, the lifecycle has to know; a signal is the scheduler's
-            // alone.
+            // alone. It finds the DAG as the letters before it have left it.
             if self.lifecycle.is_some() && request.is_of_lifecycle() {
                 self.keep(request);
+                self.serve(moment);
             } else {
                 moment.serve(request);
             }
@@ -214,7 +217,6 @@ impl PendingRequests {
     }
 
     /// Passes the requests on, after the completions of the instant.
-    #[inline(always)]
     pub fn serve(&mut self, moment: &mut Moment<'_>) {
         let mut waits = false;
         for request in self.kept.drain(..) {
@@ -588,19 +590,33 @@ impl Mailboxes {
 
     /// Takes all that waits for a cluster.
     pub fn take_all(&self, cluster: ClusterId, mut take: impl FnMut(Request)) {
+        let of_all = &self.clusters[cluster.index()];
+        // Each word is taken and emptied in one access: what comes afterwards is of the next step.
+        // What is taken last is emptied first. Else one sender's letters, left between two of these
+        // accesses, could be taken in the wrong order, in two steps.
+        let ends = of_all.ends.swap(false, Ordering::Acquire);
+        let mode = || {
+            // Reading suffices in nearly all rounds.
+            let is_there = of_all.mode.load(Ordering::Relaxed) != NOTHING;
+            let word = is_there.then(|| of_all.mode.swap(NOTHING, Ordering::Acquire));
+            let asked = word.and_then(unpacked);
+            asked.map(|(mode, entry)| Request::Enter(mode, entry))
+        };
         for (dag, to) in (0..).map(DagId).zip(&self.dags) {
             if to.cluster != cluster {
                 continue;
             }
-            // Taken and emptied in one access: what comes afterwards is of the next step.
-            match to.change.swap(NOTHING, Ordering::Acquire) {
+            let end = to.end.swap(NOTHING, Ordering::Acquire);
+            let signals = to.signals.swap(0, Ordering::Acquire);
+            let change = to.change.swap(NOTHING, Ordering::Acquire);
+            mode().into_iter().for_each(&mut take);
+            match change {
                 PAUSE => take(Request::Pause(dag)),
                 RESUME => take(Request::Resume(dag)),
                 _ => {}
             }
-            let signals = to.signals.swap(0, Ordering::Acquire);
             (0..signals).for_each(|_| take(Request::Signal(dag)));
-            match to.end.swap(NOTHING, Ordering::Acquire) {
+            match end {
                 CLOSE => take(Request::Close(dag)),
                 END => take(Request::End(dag)),
                 _ => {}
@@ -612,11 +628,8 @@ impl Mailboxes {
                     .for_each(|wait| take(Request::Answer(wait)));
             }
         }
-        let to = &self.clusters[cluster.index()];
-        if let Some((mode, entry)) = unpacked(to.mode.swap(NOTHING, Ordering::Acquire)) {
-            take(Request::Enter(mode, entry));
-        }
-        if to.ends.swap(false, Ordering::Acquire) {
+        mode().into_iter().for_each(&mut take);
+        if ends {
             take(Request::ShutDown);
         }
     }
@@ -711,11 +724,11 @@ mod tests {
         let mut taken = Vec::new();
         letters.take_all(there, |request| taken.push(request));
         let expected = [
+            modes[1],
             Request::Signal(DagId(1)),
             Request::Signal(DagId(1)),
             Request::Resume(DagId(2)),
             Request::End(DagId(2)),
-            modes[1],
             Request::ShutDown,
         ];
         assert_eq!(taken, expected);

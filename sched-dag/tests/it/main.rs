@@ -10,6 +10,7 @@ mod counting;
 mod faults;
 mod journal;
 mod large;
+mod letters;
 mod modes;
 mod priorities;
 mod properties;
