@@ -9,8 +9,9 @@
 //!
 //! A cluster whose DAGs are over *rests*, and a signal may set it going again. The run is over when
 //! all of them rest and no letter is on its way. Both are one count, of *reasons to go on*: each
-//! letter adds to it as a cluster that does not rest. It does so before it can be taken, as its
-//! writer may be a thread from outside, which may lose its processor at any instruction.
+//! letter adds to it as a cluster that does not rest. It is there before it is counted, as its writer
+//! may be a thread from outside, which may lose its processor at any instruction. So a step that
+//! another letter has opened may serve it earlier; a step opens only letters that are counted.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};

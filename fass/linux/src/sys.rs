@@ -144,7 +144,7 @@ pub(crate) fn set_normal(thread: ThreadId) -> io::Result<()> {
 /// Sleeps until the word is woken, or until a time on the clock; not at all if the word has
 /// another value. May return early.
 pub(crate) fn wait(word: &AtomicU32, value: u32, until_ns: Option<u64>) {
-    const WAIT_UNTIL: i64 = 9 | 128;
+    const WAIT_UNTIL: i32 = 9 | 128;
     let time = until_ns.map(|ns| Time {
         s: i64::try_from(ns / 1_000_000_000).unwrap_or(i64::MAX),
         ns: i64::try_from(ns % 1_000_000_000).unwrap_or(0),
@@ -158,7 +158,7 @@ pub(crate) fn wait(word: &AtomicU32, value: u32, until_ns: Option<u64>) {
 
 /// Wakes a thread that waits for the word, or all.
 pub(crate) fn wake(word: &AtomicU32, most: i32) {
-    const WAKE: i64 = 1 | 128;
+    const WAKE: i32 = 1 | 128;
     // SAFETY: FUTEX_WAKE takes the word's address and reads nothing.
     unsafe { syscall(SYS_FUTEX, word.as_ptr(), WAKE, most) };
 }

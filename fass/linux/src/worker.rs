@@ -22,7 +22,7 @@
 //! watches the clock for the rest.
 
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 
 use sched_dag::CoreId;
 
@@ -86,6 +86,11 @@ impl Worker {
     pub(crate) fn sit(&self, core: Option<CoreId>) {
         let place = core.map_or(0, |core| core.0 + 1);
         self.seat.store(place, Ordering::Relaxed);
+        if core.is_none() {
+            // With that of `call`: from now on it sleeps while it waits, so it sees the call before,
+            // or the caller that it has no seat.
+            fence(Ordering::SeqCst);
+        }
     }
 
     /// Returns that core. While it waits, nobody takes that from it.
@@ -96,6 +101,10 @@ impl Worker {
     /// Makes it look for work.
     pub(crate) fn call(&self) {
         self.call.store(1, Ordering::Release);
+        if self.polls {
+            // With that of `sit`.
+            fence(Ordering::SeqCst);
+        }
         if !self.watches() {
             sys::wake(&self.call, 1);
         }
@@ -182,10 +191,7 @@ impl Worker {
     /// Demotes it to a role, and reports whether it has: not if its instance has just
     /// ended. Under the lock.
     pub(crate) fn demote(&self, levels: Option<Levels>, role: Role) -> bool {
-        let changed =
-            self.mode
-                .compare_exchange(RUNS, DEMOTED, Ordering::AcqRel, Ordering::Acquire);
-        if changed.is_err() {
+        if !self.exchange(RUNS, DEMOTED) {
             return false;
         }
         self.bring(levels, role);
@@ -200,11 +206,19 @@ impl Worker {
     /// Lets it run again what it ran when it was demoted. Under the lock.
     pub(crate) fn promote(&self, levels: Option<Levels>) {
         // If its instance has ended meanwhile, it is about to report that.
-        let _ = self
-            .mode
-            .compare_exchange(DEMOTED, RUNS, Ordering::AcqRel, Ordering::Acquire);
+        self.exchange(DEMOTED, RUNS);
         self.bring(levels, Role::Run);
         self.tell_holder();
+    }
+
+    /// Changes the mode if it is the expected one, and reports whether it was.
+    ///
+    /// In one order with the look at `holds` behind it: a holder says that it holds, and then looks
+    /// at the mode, so one of both sees the other.
+    fn exchange(&self, expected: u32, mode: u32) -> bool {
+        let (won, lost) = (Ordering::SeqCst, Ordering::Acquire);
+        let exchanged = self.mode.compare_exchange(expected, mode, won, lost);
+        exchanged.is_ok()
     }
 
     fn tell_holder(&self) {
@@ -268,6 +282,8 @@ impl Lead {
 
 #[cfg(test)]
 mod tests {
+    use std::thread;
+
     use super::*;
 
     #[test]
@@ -290,6 +306,57 @@ mod tests {
         worker.call();
         assert!(worker.wait_for_call(u64::MAX, &mut Lead::default()));
         assert_eq!(worker.call.load(Ordering::Relaxed), 0);
+    }
+
+    /// Has a worker called so many times, each time it waits, by a thread.
+    fn call_often(worker: &Worker, leaves: bool) {
+        let rounds = if cfg!(miri) { 5 } else { 2_000 };
+        let (calls, seen) = (AtomicU32::new(0), AtomicU32::new(0));
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                for round in 1..=rounds {
+                    calls.store(round, Ordering::Relaxed);
+                    worker.call();
+                    while seen.load(Ordering::Acquire) < round {
+                        thread::yield_now();
+                    }
+                }
+            });
+            // A lost call makes itself felt by the time, far beyond any delay.
+            let end_ns = sys::now_ns() + 60_000_000_000;
+            for round in 1..=rounds {
+                worker.sit(Some(CoreId(0)));
+                if leaves {
+                    worker.sit(None);
+                }
+                while !worker.wait_for_call(end_ns, &mut Lead::default()) {
+                    assert!(sys::now_ns() < end_ns, "call {round} is lost");
+                }
+                assert_eq!(calls.load(Ordering::Relaxed), round, "what came before it");
+                seen.store(round, Ordering::Release);
+            }
+        });
+    }
+
+    #[test]
+    fn no_call_is_lost_asleep_or_watching_or_by_leaving_a_seat() {
+        for (polls, leaves) in [(false, false), (true, false), (true, true)] {
+            call_often(&Worker::new(polls), leaves);
+        }
+    }
+
+    /// A holder that is promoted goes on; were it not told, it would sleep for ever.
+    #[test]
+    fn one_that_holds_is_told() {
+        for _ in 0..if cfg!(miri) { 5 } else { 1_000 } {
+            let worker = Worker::default();
+            worker.run();
+            thread::scope(|scope| {
+                scope.spawn(|| worker.hold(1));
+                worker.demote(None, Role::Demoted);
+                worker.promote(None);
+            });
+        }
     }
 
     #[test]
