@@ -6,6 +6,7 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier, PoisonError, RwLock};
+use std::time::Duration;
 use std::{io, thread};
 
 use sched_dag::lifecycle::Request;
@@ -117,6 +118,20 @@ impl Control {
     pub fn change(&self, dag: impl DagKey, request: fn(DagId) -> Request) {
         let dag = self.office.task_set.find(dag);
         self.office.send(None, request(dag));
+    }
+
+    /// Waits until the requests that were left for a DAG's cluster are taken, the run is over, or a
+    /// second has passed. No instance may wait so.
+    pub fn wait_for_letters(&self, dag: DagId) {
+        let cluster = self.office.task_set.dag(dag).cluster();
+        for _ in 0..20_000 {
+            if !self.office.has_letters(cluster) || self.office.is_over() {
+                break;
+            }
+            thread::sleep(Duration::from_micros(50));
+        }
+        // They are taken in a step, under the lock.
+        let _ = self.with_scheduler(cluster.index(), |_| ());
     }
 
     /// Has nothing more released, and what is in flight go on to its end.

@@ -6,8 +6,9 @@
 
 use std::cell::Cell;
 use std::io::{self, Write};
+use std::panic;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Barrier, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Barrier, Mutex, MutexGuard, Once, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -45,6 +46,28 @@ pub(crate) static LEFT: Mutex<Outgoing> = Mutex::new(None);
 thread_local! {
     /// The instance that this thread runs.
     static RUNNING: Cell<Option<Instance>> = const { Cell::new(None) };
+    /// The latest instance that has panicked in it, and where.
+    static PANICKED: Cell<Option<(Instance, String)>> = const { Cell::new(None) };
+}
+
+/// Has the places of panics in instances noted, besides what is done at panics anyway.
+pub(crate) fn note_places() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let before = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if let (Some(instance), Some(place)) = (RUNNING.get(), info.location()) {
+                PANICKED.set(Some((instance, place.to_string())));
+            }
+            before(info);
+        }));
+    });
+}
+
+/// Takes the place at which an instance of this thread has panicked, if it has.
+pub(crate) fn place_of(instance: Instance) -> Option<String> {
+    let (panicked, place) = PANICKED.take()?;
+    (panicked == instance).then_some(place)
 }
 
 pub(crate) struct File {

@@ -59,3 +59,4 @@ pub use control::{Control, EndSignals};
 pub use machine::{Connection, Linux, Mechanism, StartError, now_ns, own_core, processors};
 pub use platform::{Counts, Run};
 pub use state::Fault;
+pub use team::is_of_run;

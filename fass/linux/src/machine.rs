@@ -258,7 +258,8 @@ impl Linux {
     }
 
     /// Says how to count what the program has allocated so far, for
-    /// [`allocations`](sched_dag::engine::Run::allocations).
+    /// [`allocations`](sched_dag::engine::Run::allocations): in [threads of a run](crate::is_of_run),
+    /// or what other threads allocate meanwhile counts as the jobs'.
     #[must_use = "the machine itself is returned"]
     pub fn allocations(self, count: fn() -> u64) -> Self {
         self.set(|threads| threads.allocations = count)

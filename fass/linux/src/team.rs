@@ -25,7 +25,7 @@
 //! its clock at both ends of a turn, and adds up what the instance has taken; at the end of a turn
 //! it sees for itself whether that is too much.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -44,6 +44,19 @@ use crate::{edge, sys};
 thread_local! {
     /// The run and the number of the worker that this thread is.
     static OWN: RefCell<Option<(Arc<Team>, Number)>> = const { RefCell::new(None) };
+    /// Whether it is a thread of a run. Without a destructor, so that an allocator may look.
+    static IS_OF_RUN: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Reports whether the calling thread is one that releases or runs jobs, for an allocator that
+/// [counts](crate::Linux::allocations).
+///
+/// ```
+/// assert!(!linux::is_of_run()); // it is the app's own
+/// ```
+#[must_use]
+pub fn is_of_run() -> bool {
+    IS_OF_RUN.get()
 }
 
 /// Calls a function with the worker that the calling thread is; `None` if it is none.
@@ -156,6 +169,7 @@ impl Team {
 
     /// Works until all jobs have ended.
     pub(crate) fn work(self: Arc<Self>, me: Number) {
+        IS_OF_RUN.set(true);
         OWN.set(Some((Arc::clone(&self), me)));
         let worker = &self.workers[me];
         worker.register_thread();
@@ -403,6 +417,12 @@ impl Team {
             None if state.engine.scheduler.is_finished() => 0,
             None => u64::MAX,
         };
+        self.announce_at(next_ns);
+    }
+
+    /// Sees to it that the release thread looks in time for an event then.
+    #[inline]
+    pub(crate) fn announce_at(&self, next_ns: u64) {
         self.look_out.announce(next_ns);
         if self
             .look_out
@@ -516,6 +536,7 @@ fn pause_ns(rest_ns: u64) -> u64 {
 impl Team {
     /// Makes the scheduler's steps until all jobs have ended.
     pub(crate) fn release(&self, mut budgets: Budgets) {
+        IS_OF_RUN.set(true);
         sys::make_timers_exact();
         if self.lock().engine.task_set.is_divided() {
             // Were it woken on another cluster's processor, that would wait for it.
@@ -558,9 +579,8 @@ impl Team {
     }
 
     /// Settles when it looks next. A thread that makes the next event an earlier one writes that
-    /// first
-    /// and then reads when we look; we do it the other way round, so one of us sees the other.
-    fn settle_look(&self, budgets_ns: u64) -> u64 {
+    /// first and then reads when we look; we do it the other way round, so one of us sees the other.
+    pub(crate) fn settle_look(&self, budgets_ns: u64) -> u64 {
         loop {
             let next_ns = self.look_out.next_ns();
             let own_ns = self.look_out.of_release(next_ns, sys::now_ns());

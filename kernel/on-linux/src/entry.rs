@@ -176,7 +176,7 @@ pub(crate) fn apply(
             chosen.apply(terms);
             terms.wcets = wcets.map(Cow::Borrowed);
         })
-        .allocations(crate::heap::allocations);
+        .allocations(crate::heap::allocations_of_runs);
     let replayed = options.text("replay");
     let words = ["record", "keep", "events"].map(|word| Some((word, options.text(word)?)));
     match (words.into_iter().flatten().next(), replayed) {

@@ -10,18 +10,20 @@ use front::report::HeapUsage;
 pub struct Heap;
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+/// Those in threads of a run.
+static OF_RUNS: AtomicU64 = AtomicU64::new(0);
 static IN_USE: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 
-/// Returns how often memory was allocated so far.
-pub(crate) fn allocations() -> u64 {
-    ALLOCATIONS.load(Relaxed)
+/// Returns how often memory was allocated so far by threads that release or run jobs.
+pub(crate) fn allocations_of_runs() -> u64 {
+    OF_RUNS.load(Relaxed)
 }
 
 /// Returns how much memory is and was in use, of so many bytes that there are.
 pub(crate) fn usage(capacity_bytes: usize) -> HeapUsage {
     HeapUsage {
-        allocations: allocations(),
+        allocations: ALLOCATIONS.load(Relaxed),
         in_use_bytes: IN_USE.load(Relaxed),
         peak_bytes: PEAK.load(Relaxed),
         capacity_bytes,
@@ -30,6 +32,9 @@ pub(crate) fn usage(capacity_bytes: usize) -> HeapUsage {
 
 fn count(bytes: usize) {
     ALLOCATIONS.fetch_add(1, Relaxed);
+    if linux::is_of_run() {
+        OF_RUNS.fetch_add(1, Relaxed);
+    }
     let now = IN_USE.fetch_add(bytes, Relaxed) + bytes;
     if now > PEAK.load(Relaxed) {
         PEAK.fetch_max(now, Relaxed);

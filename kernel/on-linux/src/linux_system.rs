@@ -5,6 +5,7 @@
 //! the run.
 
 use std::cell::{Cell, RefCell};
+use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -204,11 +205,13 @@ fn tell_faults(run: &linux::Run) {
         };
         let dag = run.task_set().dag(instance.dag);
         let subtask = dag.subtask(instance.subtask).name();
+        let place = fault.place.as_deref();
         crate::println!(
-            "fault: {cause} in subtask `{subtask}` of dag `{}`, job {}: {}; {}",
+            "fault: {cause} in subtask `{subtask}` of dag `{}`, job {}: {}; {}{}",
             dag.name(),
             instance.job,
             fault.cause,
+            fmt::from_fn(|f| place.map_or(Ok(()), |place| write!(f, "at {place}; "))),
             fault.cost.consequence()
         );
         json::report("fault", |line| {
@@ -220,7 +223,7 @@ fn tell_faults(run: &linux::Run) {
                 .number("job", instance.job)
                 .text("cost", fault.cost.word())
                 .number("cpu", 0_u32)
-                .text("place", "unknown")
+                .text("place", place.unwrap_or("unknown"))
                 .text("message", &fault.cause);
         });
     }
@@ -249,6 +252,8 @@ impl LiveRun for LinuxRun {
     fn control(dag: DagId, change: fn(DagId) -> Request) {
         if let Some(live) = Control::get() {
             live.change(dag, change);
+            // What is shown next shows it.
+            live.wait_for_letters(dag);
         }
     }
 

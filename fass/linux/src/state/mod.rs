@@ -56,6 +56,8 @@ pub struct Fault {
     pub instance: Instance,
     /// Why.
     pub cause: String,
+    /// Where, if it has panicked: `file:line:column`.
+    pub place: Option<String>,
     /// Whether it has exceeded its budget. Its function runs on then, in nobody's way, so that
     /// nothing can take over: the cost is the DAG.
     pub is_overrun: bool,
@@ -295,6 +297,7 @@ impl State {
         self.faults.push(Fault {
             instance,
             cause,
+            place: edge::place_of(instance),
             is_overrun,
             cost,
         });

@@ -12,6 +12,8 @@ use fass::platform::with_edge;
 use fass::shared::Parameter;
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use linux::{Control, Linux, Mechanism};
+use sched_dag::lifecycle::Request;
+use sched_dag::{DagId, DagPhase};
 
 #[test]
 fn a_chain_on_one_core_wakes_nobody() {
@@ -122,6 +124,32 @@ fn a_dag_is_paused_resumed_and_stopped_from_outside() {
             "{statistics:?}"
         );
     }
+}
+
+#[test]
+fn what_was_asked_for_is_there_once_its_letter_is_taken() {
+    let alone = alone(1, Mechanism::Normal);
+    let endless = chain("endless", 1, 1_000_000, ms(1), 10);
+    finish_create_dags(&[endless]).unwrap();
+    let control = alone.machine.control().unwrap();
+    let person = thread::spawn(move || {
+        let dag = DagId(0);
+        let is_there = |request: fn(DagId) -> Request, phase| {
+            control.change(dag, request);
+            control.wait_for_letters(dag);
+            let found = control.with_scheduler(0, |scheduler| scheduler.phase(dag));
+            found == Some(phase)
+        };
+        let late = (0..100).filter(|_| {
+            let is_paused = is_there(Request::Pause, DagPhase::Paused);
+            !(is_there(Request::Resume, DagPhase::Running) && is_paused)
+        });
+        let late = late.count();
+        control.end(dag);
+        late
+    });
+    alone.machine.run().unwrap();
+    assert_eq!(person.join().unwrap(), 0, "changes were not there yet");
 }
 
 #[test]
