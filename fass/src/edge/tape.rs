@@ -498,4 +498,39 @@ mod tests {
             "one is gone"
         );
     }
+
+    #[test]
+    fn each_lost_job_is_told_before_the_next_value_while_jobs_go_on() {
+        let jobs = if cfg!(miri) { 60 } else { 30_000_u64 };
+        // The last one is published, as is every fourth, and every third.
+        let is_lost = |job: u64| !(job.is_multiple_of(4) || job.is_multiple_of(3));
+        let (lost, published) = (LostJobs::new(), AtomicU64::new(0));
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for job in 1..=jobs {
+                    match is_lost(job) {
+                        false => published.store(job, Ordering::Release),
+                        true => {
+                            while !lost.note(job) {
+                                std::thread::yield_now();
+                            }
+                        }
+                    }
+                }
+            });
+            let mut expected = (1..=jobs).filter(|job| is_lost(*job)).peekable();
+            let mut job = 0;
+            while job < jobs {
+                job = published.load(Ordering::Acquire);
+                while let Some((first, last)) = lost.next_run(Some(job)) {
+                    (first..=last).for_each(|lost| assert_eq!(expected.next(), Some(lost)));
+                }
+                let next = expected.peek().copied();
+                assert!(
+                    next.is_none_or(|next| next > job),
+                    "{next:?} is not told before {job}"
+                );
+            }
+        });
+    }
 }

@@ -1,7 +1,9 @@
 //! Every order in which a parked instance can end, step by step, without a thread.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::Duration;
 
 use fass::{Preemption, SubtaskAttributes, create_dag, finish_create_dags};
@@ -30,6 +32,9 @@ struct Stage {
 
 impl Stage {
     fn new(cores: u32, urgent_keeps_its_core: bool) -> Self {
+        // A program has one machine at a time.
+        static MACHINE: Mutex<()> = Mutex::new(());
+        let _one = MACHINE.lock();
         let machine = Linux::sharing(cores, Mechanism::Normal).unwrap();
         HOST.threads().as_mut().unwrap().terms.scheduler.preemption = Preemption::Enabled;
         let dags = DAGS.map(|name| {
@@ -248,5 +253,42 @@ fn a_parked_one_ends_in_any_order() {
             steps.split(", ").for_each(|step| stage.play(step));
             assert_eq!(stage.story(), story, "{keeps_its_core}: {steps}");
         }
+    }
+}
+
+/// The release thread settles when it looks while a worker makes the next event an earlier one: it
+/// is rung for, or looks in time.
+#[test]
+fn an_earlier_event_is_not_missed() {
+    const PATIENCE_NS: u64 = 30_000;
+    let team = Stage::new(2, false).team;
+    let alarm = team.office.alarm(team.cluster);
+    let rounds = if cfg!(miri) { 5 } else { 2_000 };
+    for round in 0..rounds {
+        // In the far future, so that none is due while it is settled.
+        let event_ns = sys::now_ns() + 1_000_000_000_000;
+        let before_ns = if round % 2 == 0 {
+            u64::MAX
+        } else {
+            2 * event_ns
+        };
+        team.look_out.announce(before_ns);
+        team.looks_at_ns.store(0, Ordering::SeqCst);
+        let seen = alarm.load(Ordering::Acquire);
+        let looks_at_ns = thread::scope(|scope| {
+            scope.spawn(|| {
+                team.look_out.leave(CoreId(0));
+                team.announce_at(event_ns);
+                team.look_out.rest(CoreId(0));
+                team.announce_at(event_ns - 100_000);
+            });
+            team.settle_look(u64::MAX)
+        });
+        let is_rung = alarm.load(Ordering::Acquire) != seen;
+        let is_in_time = looks_at_ns <= event_ns - 100_000 + PATIENCE_NS;
+        assert!(
+            is_rung || is_in_time,
+            "it looks at {looks_at_ns} for an event at {event_ns}"
+        );
     }
 }

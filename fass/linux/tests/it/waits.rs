@@ -1,10 +1,10 @@
 //! Subtasks that wait: what ends a wait, who has the core meanwhile, and what a fault leaves.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::RecvError;
+use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::support::{alone, breaches, chain, mechanisms, ms, spin};
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
@@ -268,4 +268,51 @@ fn a_call_that_blocks_is_made_in_a_thread_of_its_own() {
     let run = alone.machine.run().unwrap();
     assert_eq!(run.faults(), []);
     assert_eq!(run.statistics("asks").completed, 3);
+}
+
+/// The driver's thread answers about when the wait ends by its limit.
+#[test]
+fn an_answer_at_the_limit_counts_for_both_ends_or_for_neither() {
+    let us = Duration::from_micros;
+    let alone = alone(1, Mechanism::Normal);
+    let (device, mut driver) = create_device::<u64, u64>("close");
+    let asks = every(ms(1), "asks");
+    asks.jobs(300).in_flight(1);
+    let got = Arc::new(Mutex::new(Vec::with_capacity(300)));
+    let (of_jobs, mut job) = (Arc::clone(&got), 0);
+    let ask = move |device: Asker<u64, u64>| {
+        let (asked, got) = (job, Arc::clone(&of_jobs));
+        job += 1;
+        async move {
+            if let Ok(answer) = device.ask(asked).await {
+                got.lock().unwrap().push(answer);
+            }
+        }
+    };
+    let ask = asks.using(device.asking()).async_source(ask);
+    ask.register(SubtaskAttributes::named("ask").wait(us(200)));
+    finish_create_dags(&[asks]).unwrap();
+    let is_over = Arc::<AtomicBool>::default();
+    let has_ended = Arc::clone(&is_over);
+    let server = thread::spawn(move || {
+        let mut given = Vec::new();
+        while !has_ended.load(Relaxed) {
+            let Some((ticket, asked)) = driver.question() else {
+                thread::yield_now();
+                continue;
+            };
+            let due = Instant::now() + us(asked % 40 * 10);
+            while Instant::now() < due {
+                std::hint::spin_loop();
+            }
+            if driver.answer(ticket, asked).is_ok() {
+                given.push(asked);
+            }
+        }
+        given
+    });
+    let run = alone.machine.run().unwrap();
+    is_over.store(true, Relaxed);
+    assert_eq!(run.faults(), []);
+    assert_eq!(*got.lock().unwrap(), server.join().unwrap());
 }

@@ -171,7 +171,8 @@ impl<T> Reader<T> {
     /// Leaves the value of `job`, if some slot holds it, to the writer.
     pub(crate) fn give_up(&mut self, job: u64) {
         if let Some(slot) = self.slot_of(job) {
-            slot.turn.store(GIVEN_UP, Ordering::Release);
+            // Relaxed suffices: this end has not touched the value, which the writer drops.
+            slot.turn.store(GIVEN_UP, Ordering::Relaxed);
         }
     }
 

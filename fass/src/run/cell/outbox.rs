@@ -308,7 +308,8 @@ mod tests {
     fn what_fits_comes_out_in_order_and_what_does_not_is_named() {
         let (outbox, mut reader) = outbox(83).expect("there is memory");
         let (mut read, mut lost) = (Vec::new(), Vec::new());
-        for job in 0..2000 {
+        let jobs = if cfg!(miri) { 200 } else { 2000 };
+        for job in 0..jobs {
             stage(&outbox, job);
             if !outbox.publish(job + 1) {
                 outbox.show(|job, bytes| {
@@ -321,10 +322,11 @@ mod tests {
             }
         }
         read.extend(core::iter::from_fn(|| take(&mut reader)));
-        assert!(read.is_sorted() && read.len() > 500 && lost.len() > 50);
+        let most = if cfg!(miri) { (50, 5) } else { (500, 50) };
+        assert!(read.is_sorted() && read.len() > most.0 && lost.len() > most.1);
         read.append(&mut lost);
         read.sort_unstable();
-        assert!(read.into_iter().eq(0..2000));
+        assert!(read.into_iter().eq(0..jobs));
     }
 
     #[test]
@@ -340,7 +342,7 @@ mod tests {
 
     #[test]
     fn threads_hand_records_over_whole() {
-        let jobs = if cfg!(miri) { 200 } else { 200_000 };
+        let jobs = if cfg!(miri) { 40 } else { 200_000 };
         let (outbox, mut reader) = outbox(100).expect("there is memory");
         let is_over = AtomicBool::new(false);
         thread::scope(|scope| {

@@ -132,3 +132,30 @@ impl<T> Drop for SpinLockGuard<'_, T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::SpinLock;
+
+    /// By the way that leaves interrupts alone, which a program of the host may not touch.
+    #[test]
+    fn one_core_at_a_time_has_the_data_and_sees_all_changes() {
+        let rounds = if cfg!(miri) { 20 } else { 200 };
+        let lock = SpinLock::new([0_u64; 2]);
+        let add = || {
+            for _ in 0..rounds {
+                let mut data = lock.lock_uninterrupted();
+                let [first, second] = *data;
+                assert_eq!(first, second);
+                *data = [first + 1, second + 1];
+            }
+        };
+        std::thread::scope(|scope| {
+            scope.spawn(add);
+            scope.spawn(add);
+            add();
+        });
+        assert_eq!(*lock.lock_uninterrupted(), [3 * rounds; 2]);
+        assert_eq!(u64::from(lock.acquisitions()), 3 * rounds + 1);
+    }
+}
