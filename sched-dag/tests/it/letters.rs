@@ -29,8 +29,7 @@ fn letters() -> Mailboxes {
 }
 
 /// Returns in how many of so many rounds the second of two requests is taken first.
-fn inversions(rounds: u64, [first, second]: [Request; 2]) -> u64 {
-    let letters = letters();
+fn inversions(letters: &Mailboxes, rounds: u64, [first, second]: [Request; 2]) -> u64 {
     let (sent, taken) = (AtomicU64::new(0), AtomicU64::new(0));
     let wait_for = |word: &AtomicU64, round| {
         let mut looks = 0_u32;
@@ -83,7 +82,8 @@ fn letters_of_one_sender_are_taken_in_its_order() {
         [Request::Signal(to), Request::Close(to)],
         [Request::Signal(to), Request::ShutDown],
     ];
-    let inverted = in_order.map(|pair| inversions(rounds, pair));
+    let letters = letters();
+    let inverted = in_order.map(|pair| inversions(&letters, rounds, pair));
     assert_eq!(inverted, [0; 5], "of {rounds} each, of {in_order:?}");
 }
 

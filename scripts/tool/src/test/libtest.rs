@@ -209,7 +209,7 @@ fn doctests(plan: &TestPlan) -> Command {
 }
 
 /// Runs one command and counts the results in its output.
-fn run(plan: &TestPlan, name: &str, command: Command, tally: &mut Tally) {
+pub(super) fn run(plan: &TestPlan, name: &str, command: Command, tally: &mut Tally) {
     let mut report = LibtestReport::default();
     let (waited, elapsed) = match follow(plan, command, &mut report) {
         Ok(ended) => ended,

@@ -16,6 +16,7 @@ mod budgets;
 mod checks;
 mod layers;
 mod libtest;
+mod nightly;
 mod paths;
 mod words;
 
@@ -46,6 +47,10 @@ pub static TEST: Command = Command {
         "quick": Takes::Nothing;
         /// Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.
         "bless": Takes::Nothing;
+        /// Only tests where threads meet, under Miri of a nightly toolchain.
+        "miri": Takes::Nothing;
+        /// Only runs on threads of Linux, under ThreadSanitizer of a nightly toolchain.
+        "thread-sanitizer": Takes::Nothing;
         /// Show every test by name, not only those that fail.
         "verbose" 'v': Takes::Nothing;
     },
@@ -97,26 +102,17 @@ pub fn test(words: &[OsString]) -> ExitCode {
             blessed: list.transpose()?,
         };
         let mut tally = Tally::default();
-        let sources = &sources()[..];
         let plan = &plan;
-        let (send, compiled) = mpsc::channel();
-        thread::scope(|scope| {
-            // Cargo builds images in another folder than tests and lints. So both are built at the
-            // same time, and lints run while tests run.
-            let aside = scope.spawn(move || {
-                let _ = send.send(libtest::compile());
-                checks::lint_all(plan, sources)
-            });
-            build_images(plan, sources, &mut tally);
-            let compiled = compiled.recv().map_err(|error| error.to_string())?;
-            libtest::run_all(plan, compiled, &mut tally);
-            checks::run_all(plan, sources, &mut tally);
-            let linted = aside
-                .join()
-                .map_err(|_| "the thread of the lints panicked")?;
-            tally.add(linted);
-            Ok::<(), String>(())
-        })?;
+        let [miri, sanitizer] = ["miri", "thread-sanitizer"].map(|word| options.is_given(word));
+        if miri {
+            nightly::run_miri(plan, &mut tally)?;
+        }
+        if sanitizer {
+            nightly::run_thread_sanitizer(plan, &mut tally)?;
+        }
+        if !(miri || sanitizer) {
+            run_all(plan, &mut tally)?;
+        }
         if let Some(list) = &plan.blessed {
             // Without a rewritten file there is no list.
             tally.bless(&fs::read_to_string(list).unwrap_or_default());
@@ -132,6 +128,29 @@ pub fn test(words: &[OsString]) -> ExitCode {
             Some(line) => Err(Refusal::Usage(line)),
             None => Ok(ExitCode::from(u8::from(tally.has_failed()))),
         }
+    })
+}
+
+/// Runs all tests and checks.
+fn run_all(plan: &TestPlan, tally: &mut Tally) -> Result<(), String> {
+    let sources = &sources()[..];
+    let (send, compiled) = mpsc::channel();
+    thread::scope(|scope| {
+        // Cargo builds images in another folder than tests and lints. So both are built at the
+        // same time, and lints run while tests run.
+        let aside = scope.spawn(move || {
+            let _ = send.send(libtest::compile());
+            checks::lint_all(plan, sources)
+        });
+        build_images(plan, sources, tally);
+        let compiled = compiled.recv().map_err(|error| error.to_string())?;
+        libtest::run_all(plan, compiled, tally);
+        checks::run_all(plan, sources, tally);
+        let linted = aside
+            .join()
+            .map_err(|_| "the thread of the lints panicked")?;
+        tally.add(linted);
+        Ok(())
     })
 }
 
