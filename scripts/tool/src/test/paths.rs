@@ -45,7 +45,7 @@ pub(super) fn check(sources: &[SourceFile]) -> Result<(), String> {
         let folder = Path::new(name).parent().unwrap_or(Path::new(""));
         for (number, line) in (1..).zip(text.lines()) {
             let comment = line.trim_start();
-            if !is_page && !(name.ends_with(".rs") && comment.starts_with("//")) {
+            if !(is_page || name.ends_with(".rs") && comment.starts_with("//")) {
                 continue;
             }
             let words = line
