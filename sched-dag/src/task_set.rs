@@ -400,6 +400,14 @@ impl Subtask {
         segments.map_or(self.wcet_ns, |segments| segments.into_iter().max())
     }
 
+    /// Returns its WCET with what each of its segments is charged, `None` if there is none or the
+    /// sum overflows.
+    #[must_use]
+    pub fn charged_ns(&self, of_segment_ns: u64) -> Option<u64> {
+        let charge_ns = of_segment_ns.checked_mul(1 + self.waits.len() as u64)?;
+        self.wcet_ns?.checked_add(charge_ns)
+    }
+
     /// Returns the stack that it needs, in bytes, if the app stated one.
     #[must_use]
     pub const fn stack_bytes(&self) -> Option<u64> {

@@ -55,13 +55,9 @@ pub(super) fn of_cluster<'a>(
     cores: u32,
     dags: impl Iterator<Item = &'a Dag>,
 ) -> AnalysisSettings {
-    let overheads = match is_pinned(dags) {
-        true => settings.overheads.with_moves(),
-        false => settings.overheads,
-    };
     AnalysisSettings {
         cores,
-        overheads,
+        overheads: settings.overheads.among(dags),
         ..*settings
     }
 }

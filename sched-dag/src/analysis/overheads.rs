@@ -1,7 +1,7 @@
 //! Overheads: the time that the platform adds to executions.
 //!
 //! The tests know execution times only. Measured costs of the platform are
-//! charged to the WCET of each subtask, once an instance:
+//! charged to the WCET of each subtask, once for each of its segments:
 //!
 //! - two context switches, into the instance and out of it;
 //! - one dispatch, the scheduler's own work at its start or finish;
@@ -20,6 +20,8 @@
 
 use crate::law::MeasuredCosts;
 use crate::policy::Preemption;
+use crate::spec::PINS;
+use crate::task_set::Dag;
 
 /// Measured costs, each a worst case; all 0 by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -82,7 +84,7 @@ impl Overheads {
         }
     }
 
-    /// Returns the charge of each instance, or `None` if that overflows.
+    /// Returns the charge of each segment, or `None` if that overflows.
     #[must_use]
     pub fn of_an_instance_ns(&self, preemption: Preemption) -> Option<u64> {
         let switches = self.context_switch_ns.checked_mul(2)?;
@@ -101,6 +103,15 @@ impl Overheads {
         match preemption {
             Preemption::Enabled => switches.saturating_add(self.interrupt_ns),
             Preemption::Disabled => 0,
+        }
+    }
+
+    /// Returns them in a cluster with these DAGs.
+    #[must_use]
+    pub fn among<'a>(self, mut dags: impl Iterator<Item = &'a Dag>) -> Self {
+        match PINS && dags.any(Dag::is_confined) {
+            true => self.with_moves(),
+            false => self,
         }
     }
 

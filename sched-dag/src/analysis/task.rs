@@ -144,10 +144,12 @@ impl Task {
     /// [`WaitsOverflow`](TaskError::WaitsOverflow).
     pub fn from_dag(dag: &Dag, overhead_ns: u64) -> Result<Self, TaskError> {
         let charge = |(subtask, of): (u32, &Subtask)| {
-            let (subtask, wcet_ns) = (SubtaskId(subtask), of.wcet_ns());
-            let wcet_ns = wcet_ns.filter(|&wcet_ns| wcet_ns > 0);
-            let wcet_ns = wcet_ns.ok_or(TaskError::MissingWcet { subtask })?;
-            let charged_ns = wcet_ns.checked_add(overhead_ns);
+            let subtask = SubtaskId(subtask);
+            let known = of.wcet_ns().is_some_and(|wcet_ns| wcet_ns > 0);
+            let known = known
+                .then_some(of)
+                .ok_or(TaskError::MissingWcet { subtask })?;
+            let charged_ns = known.charged_ns(overhead_ns);
             charged_ns.ok_or(TaskError::VolumeOverflow)
         };
         let wcets_ns = (0..).zip(dag.subtasks()).map(charge);
@@ -159,32 +161,15 @@ impl Task {
             ..task
         };
         let mut subtasks = dag.subtasks().iter();
-        match subtasks.all(|of| of.waits().is_empty()) {
-            true => Ok(task),
-            false => task.charge_segments(dag, overhead_ns),
+        if subtasks.all(|of| of.waits().is_empty()) {
+            return Ok(task);
         }
-    }
-
-    /// Adds the waits of a verified DAG, and `overhead_ns` for each segment but the first.
-    fn charge_segments(mut self, dag: &Dag, overhead_ns: u64) -> Result<Self, TaskError> {
-        for (wcet_ns, of) in self.wcets_ns.iter_mut().zip(dag.subtasks()) {
-            let charged_ns = overhead_ns.checked_mul(of.waits().len() as u64);
-            let charged_ns = charged_ns.and_then(|charged_ns| charged_ns.checked_add(*wcet_ns));
-            *wcet_ns = charged_ns.ok_or(TaskError::VolumeOverflow)?;
-        }
-        let (period_ns, deadline_ns) = (self.period_ns, self.relative_deadline_ns);
-        let task = Self::assemble(period_ns, deadline_ns, self.wcets_ns.into(), self.graph)?;
         let waits = dag.subtasks().iter().map(|of| SubtaskWaits {
             count: to_u32(of.waits().len()),
             limits_ns: of.waiting_ns(),
             // No longer than the WCET, to which as much is added, if not more.
             longest_segment_ns: of.longest_segment_ns().unwrap_or(0) + overhead_ns,
         });
-        let least_deadline_ns = self.least_deadline_ns;
-        let task = Self {
-            least_deadline_ns,
-            ..task
-        };
         task.with_waits(waits.collect())
     }
 

@@ -141,6 +141,21 @@ fn overheads_that_the_kernel_measures_are_charged_hold_and_are_the_same_again() 
 }
 
 #[test]
+fn a_call_may_take_longer_than_its_wcet_by_the_charge_of_each_segment() {
+    let text = format!(
+        "dag w period 20ms\nsubtask s wcet 10us{}\nend\n",
+        " wait 1us wcet 10us".repeat(20)
+    );
+    let outcome = run(&text, "jobs=20 overheads_ns=1000,10000,4000,1000");
+    assert_eq!(
+        outcome.lines("wcet_exceeded").len(),
+        0,
+        "{}",
+        outcome.tail()
+    );
+}
+
+#[test]
 fn measured_overheads_cover_a_hundred_releases_at_once() {
     let dags = (0..100).map(|n| format!("dag x{n} period 100ms\nsubtask a wcet 100us\n"));
     let text = format!("{}end\n", dags.collect::<String>());

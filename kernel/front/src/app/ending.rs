@@ -31,7 +31,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use fass::commit::{CommitError, Overheads};
 use sched_dag::engine::Run;
-use sched_dag::{DagId, Instance, SubtaskId, TaskSet};
+use sched_dag::{Dag, DagId, Instance, SubtaskId, TaskSet};
 
 use crate::options::UsageError;
 use crate::report::{self, Ns};
@@ -340,11 +340,13 @@ pub(super) fn note(run: &Run, overheads: Overheads) {
     if !subtasks.any(|subtask| subtask.wcet_ns().is_some()) {
         return;
     }
-    let charged_ns = overheads.of_an_instance_ns(run.options().preemption);
-    let (Some(charged_ns), Some(counts)) = (charged_ns, run.coarse_times()) else {
+    let Some(counts) = run.coarse_times() else {
         return;
     };
     for (dag, model) in (0..).map(DagId).zip(set.dags()) {
+        let shares = |other: &&Dag| other.cluster() == model.cluster();
+        let overheads = overheads.among(set.dags().iter().filter(shares));
+        let overhead_ns = overheads.of_an_instance_ns(run.options().preemption);
         for (subtask, of_subtask) in (0..).map(SubtaskId).zip(model.subtasks()) {
             let Some(wcet_ns) = of_subtask.wcet_ns() else {
                 continue;
@@ -353,7 +355,10 @@ pub(super) fn note(run: &Run, overheads: Overheads) {
             let counted = counts.subtask(set.vertex(Instance { dag, job, subtask }));
             let times = counted.execution_time.distribution();
             let (calls, longest_ns) = (times.count(), times.max());
-            if longest_ns <= wcet_ns.saturating_add(charged_ns) {
+            // What does not fit into 64 bits is charged as well, and no call takes longer.
+            let charged_ns =
+                overhead_ns.and_then(|of_segment_ns| of_subtask.charged_ns(of_segment_ns));
+            if charged_ns.is_none_or(|charged_ns| longest_ns <= charged_ns) {
                 continue;
             }
             crate::println!(
