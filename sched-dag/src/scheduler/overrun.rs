@@ -12,7 +12,8 @@
 //!    that waits and is not blocked; completions of that instant count.
 //! 4. A miss is noticed at the first instant after the deadline, whether the
 //!    job is in flight or waits, and once. A job that is skipped or aborted
-//!    before its deadline counts as that and never as a miss.
+//!    before its deadline counts as that and never as a miss; at its deadline it is
+//!    a miss, too, as if the step came some time later.
 //! 5. The run of consecutive misses ends only with a job that meets its
 //!    deadline. Skipped and aborted jobs neither lengthen nor end it.
 //!
@@ -42,7 +43,7 @@
 use super::Scheduler;
 use crate::ids::DagId;
 use crate::journal::EventKind;
-use crate::policy::OverrunPolicy;
+use crate::policy::{JobOutcome, OverrunPolicy};
 use crate::spec::WAITS;
 
 impl Scheduler {
@@ -140,15 +141,19 @@ impl Scheduler {
         if WAITS {
             self.time_out_due();
         }
-        let state = &mut self.dags[dag.index()];
+        let jobs = &self.dags[dag.index()].jobs;
+        let sequence = jobs.oldest_uncut();
+        let job = sequence.map_or(jobs.first_waiting, |sequence| jobs.job(sequence).number);
+        self.judge_given_up(dag, job);
         // All in flight are cut already, so room is on its way: aborting more would cost jobs and
         // bring nothing.
-        let Some(sequence) = state.jobs.abort_oldest() else {
+        let Some(sequence) = sequence else {
             self.skip_oldest_waiting(dag);
             return;
         };
+        let state = &mut self.dags[dag.index()];
+        state.jobs.cut(sequence, JobOutcome::Aborted);
         state.statistics.aborts += 1;
-        let job = state.jobs.job(sequence).number;
         self.log.of_job(EventKind::Aborted, dag, job, None);
         self.cancel_ready(dag, sequence);
     }

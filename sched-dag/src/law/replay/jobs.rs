@@ -454,7 +454,9 @@ impl JournalReplay<'_> {
             .min();
         let earliest_ns = dues.iter().map(|due| due.deadline_ns).min()?;
         let deadline_ns = meant_ns.unwrap_or(earliest_ns);
-        if missed.time_ns <= deadline_ns {
+        // One that is given up at its deadline misses it at that instant (rule 4).
+        let is_given_up = known.cut.is_some_and(|cut| cut.time_ns == missed.time_ns);
+        if missed.time_ns + u64::from(is_given_up) <= deadline_ns {
             return Some(Violation::MissedEarly { event, deadline_ns });
         }
         if meant_ns.is_none() {

@@ -104,16 +104,17 @@ impl JobTable {
         // Where there is one, no time is spent on looking for the first.
         let deadline_ns = match &*self.deadlines {
             [only] => self.unjudged(dag, 0, only)?.deadline_ns,
-            _ => self.first_unjudged(dag)?.deadline_ns,
+            _ => self.first_unjudged(dag, None)?.deadline_ns,
         };
         Some(deadline_ns + 1)
     }
 
-    /// Returns the job that is to be judged first.
+    /// Returns the job that is to be judged first, or when this job is, if one is given.
     #[inline(never)]
-    fn first_unjudged(&self, dag: &Dag) -> Option<UnjudgedJob> {
+    fn first_unjudged(&self, dag: &Dag, only: Option<u64>) -> Option<UnjudgedJob> {
         let of_deadlines = self.deadlines.iter().enumerate();
         let unjudged = of_deadlines.filter_map(|(at, deadline)| self.unjudged(dag, at, deadline));
+        let unjudged = unjudged.filter(|unjudged| only.is_none_or(|job| unjudged.number == job));
         unjudged.min_by_key(|unjudged| unjudged.deadline_ns)
     }
 
@@ -199,20 +200,27 @@ impl Scheduler {
     pub(in crate::scheduler) fn judge(&mut self, dag: DagId, ended: Option<u32>) {
         let late_ns = self.dags[dag.index()].jobs.late_ns(self.task_set.dag(dag));
         if late_ns.is_some_and(|late_ns| late_ns <= self.log.now_ns) {
-            self.judge_late(dag, ended);
+            self.judge_late(dag, ended, None);
         }
     }
 
+    /// Notices the deadlines at this instant, too, of a job that is given up at it: completions
+    /// come first, so what is not complete by now misses them.
+    pub(in crate::scheduler) fn judge_given_up(&mut self, dag: DagId, job: u64) {
+        self.judge_late(dag, None, Some(job));
+    }
+
     #[inline]
-    fn judge_late(&mut self, dag: DagId, ended: Option<u32>) {
+    fn judge_late(&mut self, dag: DagId, ended: Option<u32>, given_up: Option<u64>) {
         let model = self.task_set.dag(dag);
         let first = self.task_set.first_vertex(dag);
         let state = &mut self.dags[dag.index()];
         // Each round judges one job by one deadline, in the order of time: so it costs what was
         // missed since the last look, and the misses are written down in their order.
-        while let Some(unjudged) = state.jobs.first_unjudged(model)
+        let end_ns = self.log.now_ns + u64::from(given_up.is_some());
+        while let Some(unjudged) = state.jobs.first_unjudged(model, given_up)
             // A finish at the deadline itself is in time.
-            && unjudged.deadline_ns < self.log.now_ns
+            && unjudged.deadline_ns < end_ns
         {
             let vertices = &self.vertices;
             let is_late = |sink: SubtaskId| match unjudged.sequence {

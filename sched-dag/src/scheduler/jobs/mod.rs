@@ -282,12 +282,11 @@ impl JobTable {
         }
     }
 
-    /// Cuts the oldest job in flight that is not cut, to make room, and returns its
-    /// sequence number.
+    /// Returns the sequence number of the oldest job in flight that is not cut.
     #[inline]
-    pub(super) fn abort_oldest(&mut self) -> Option<u64> {
+    pub(super) fn oldest_uncut(&self) -> Option<u64> {
         let mut in_flight = self.oldest..self.next;
-        in_flight.find(|&sequence| self.cut(sequence, JobOutcome::Aborted))
+        in_flight.find(|&sequence| self.job(sequence).cut.is_none())
     }
 
     /// Cuts a job in flight, and reports whether it was not cut before.

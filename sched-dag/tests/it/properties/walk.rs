@@ -10,7 +10,7 @@
 //! [`Scheduler::wait_shortly`], and the long way by a copy, too: both have to come to the same. So
 //! have [`Scheduler::wake_shortly`] and a dispatch.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use sched_dag::journal::EventKind;
@@ -20,7 +20,7 @@ use sched_dag::law::{
 };
 use sched_dag::lifecycle::Request;
 use sched_dag::{
-    CoreId, DagId, DagPhase, Decision, HandOff, Instance, Journal, Scheduler, TurnEnd,
+    CoreId, DagId, DagPhase, Decision, HandOff, Instance, JobOutcome, Journal, Scheduler, TurnEnd,
 };
 
 use super::pins::{Eligible, cores_of, keeps_its_core};
@@ -382,6 +382,18 @@ impl<'s> Walk<'s> {
     fn counted_misses(&self) -> Result<(), String> {
         let task_set = self.scheduler.task_set();
         let events = self.scheduler.log.journal.events();
+        // A call for the instant of an abort may tell of the finish after it.
+        let (mut aborted, mut late_ends) = (HashSet::new(), HashSet::new());
+        for event in self.scheduler.log.journal.events() {
+            let of = (event.dag, event.job);
+            match (event.what, event.instance()) {
+                (EventKind::Aborted, _) => _ = aborted.insert(of),
+                (EventKind::Finish, Some(end)) if aborted.contains(&of) => {
+                    _ = late_ends.insert(end)
+                }
+                _ => {}
+            }
+        }
         let record = RunRecord::of_events(task_set, true, events).expect("it is short");
         for (dag, model) in (0..).map(DagId).zip(task_set.dags()) {
             let statistics = self.scheduler.statistics(dag);
@@ -391,10 +403,20 @@ impl<'s> Walk<'s> {
             for &sink in model.sinks() {
                 let relative_ns = model.subtask(sink).relative_deadline_ns();
                 let is_late = |&(number, job): &(u64, &JobRecord)| {
+                    let instance = Instance {
+                        dag,
+                        job: number,
+                        subtask: sink,
+                    };
                     let finish_ns = record.instances(dag, number)[sink.index()].finish_ns;
+                    let is_late_end = u64::from(late_ends.contains(&instance));
+                    let finish_ns = finish_ns.map(|ns| ns + is_late_end);
+                    // What is aborted at its deadline has missed it.
+                    let is_aborted = job.outcome == Some(JobOutcome::Aborted);
+                    let cut_ns = job.cut_ns.map(|ns| ns + u64::from(is_aborted));
                     let is_late = |release_ns: u64| {
                         let is_after = |ns: u64| ns > release_ns + relative_ns;
-                        finish_ns.is_none_or(is_after) && job.cut_ns.is_none_or(is_after)
+                        finish_ns.is_none_or(is_after) && cut_ns.is_none_or(is_after)
                     };
                     job.release_ns.is_some_and(is_late)
                 };
