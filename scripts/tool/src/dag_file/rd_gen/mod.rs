@@ -222,7 +222,8 @@ fn text<'n>(node: &'n Node, key: &str) -> Result<&'n str, Malformed> {
 }
 
 fn time_ns(node: &Node, key: &str, unit_ns: u64) -> Result<u64, Malformed> {
-    time::scale_ns(text(node, key)?, unit_ns)
+    let has_time = ["period", "end_to_end_deadline"].contains(&key);
+    time::scale_ns(text(node, key)?, unit_ns, !has_time)
         .map_err(|message| malformed(node.line, format!("{key}: {message}")))
 }
 

@@ -39,12 +39,17 @@ fn times_and_defaults_are_those_of_the_file() {
     let text = "nodes:\n- id: 0\n  execution_time: 2.5\n  period: 10\n  offset: 1\n\
                 - id: 1\n  execution_time: 1\n  end_to_end_deadline: 8\n\
                 links:\n- source: 0\n  target: 1\n  communication_time: 3\n";
-    let file = read(text, "x", MS).unwrap();
+    let dag = |text: &str| read(text, "x", MS).unwrap().to_string();
     assert_eq!(
-        file.to_string(),
+        dag(text),
         "dag x period 10ms deadline 8ms offset 1ms\n\
          subtask 0 wcet 2500us\nsubtask 1 wcet 4ms\nedge 0 -> 1\n\nend\n"
     );
+    // 30 Hz: time to execute in is rounded down, what it takes up.
+    let text = "nodes:\n- id: 0\n  execution_time: 3.33333333\n  period: 33.33333333\n  \
+                end_to_end_deadline: 16.66666667\n";
+    let rounded = "dag x period 33333333ns deadline 16666666ns\nsubtask 0 wcet 3333334ns\n\nend\n";
+    assert_eq!(dag(text), rounded);
 }
 
 /// The content of a file, and the refusal. `NODE` is a node called 0, of four lines with the
