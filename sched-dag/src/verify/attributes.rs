@@ -164,6 +164,17 @@ fn check_subtasks(page: &mut DagFindings<'_, '_>) {
             }
             _ => {}
         }
+        // An observed WCET has a margin, which may well be beyond the budget.
+        if let (Some(wcet_ns), None) = (stated.wcet_ns, stated.wcet_margin_percent)
+            && let Some(budget_ns) = stated.budget_ns.filter(|&budget_ns| budget_ns < wcet_ns)
+        {
+            page.fault(|dag| DagFault::WcetExceedsBudget {
+                dag,
+                subtask: subtask(),
+                wcet_ns,
+                budget_ns,
+            });
+        }
         check_segments(page, index);
         if let Some(bytes) = stated.stack_bytes
             && !STACK_BYTES.contains(&bytes)

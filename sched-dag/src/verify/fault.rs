@@ -172,6 +172,12 @@ worded! {
         } = "wcet_exceeds_deadline",
             "{subtask} of {dag} has a WCET of {:?}, longer than the relative deadline of {:?}; \
              shorten it or extend the deadline", ns(*wcet_ns), ns(*relative_deadline_ns);
+        /// A subtask that its budget would end within its stated WCET.
+        WcetExceedsBudget {
+            dag: DagLabel, subtask: SubtaskLabel, wcet_ns: u64, budget_ns: u64
+        } = "wcet_exceeds_budget",
+            "{subtask} of {dag} has a WCET of {:?}, longer than its budget of {:?}, beyond which it \
+             is ended; give it a longer budget, or correct the WCET", ns(*wcet_ns), ns(*budget_ns);
         /// A subtask that waits, some of whose segments have a WCET, or one of 0.
         SegmentsPartlyGiven { dag: DagLabel, subtask: SubtaskLabel } = "segments_partly_given",
             "{subtask} of {dag} waits, and not each of its segments has a WCET above 0; give one to \

@@ -153,6 +153,10 @@ pub(crate) const CASES: &[Case] = &[
     ("wcet_exceeds_deadline", || {
         due(PERIOD, attributes("store").wcet(PERIOD * 2))
     }),
+    ("wcet_exceeds_budget", || {
+        let store = attributes("store").wcet(PERIOD / 2);
+        due(PERIOD, store.budget(PERIOD / 5))
+    }),
     ("priorities_partly_given", || {
         read_by("lidar", "points", attributes("read").priority(7))
     }),
