@@ -227,7 +227,7 @@ texts! {
         /// that deadlines will be missed.
         NoBound =
             "no test bounds its response time by its relative deadline (it may still meet it); add \
-             cores, raise its priority or relax the deadline";
+             cores or let the commit divide them, shorten what outranks it or relax the deadline";
         /// As [`NoBound`](Self::NoBound), but with more jobs allowed in flight
         /// there might be one.
         InFlightTooFew { in_flight: u32 } =
@@ -242,7 +242,8 @@ texts! {
         /// which may delay this one by its own.
         NoBoundByPeriod =
             "subtasks wait, and no test bounds the response time, or that of a DAG that may delay it, \
-             by the period; add cores, raise its priority or lengthen the period";
+             by the period; add cores or let the commit divide them, shorten what outranks it or \
+             lengthen the period";
         /// A subtask is pinned to a core, and not as an owner's are.
         Pinned { subtask: SubtaskId } =
             "subtask {} is pinned to a core, and the test for that needs cores that no other DAG is \

@@ -122,10 +122,17 @@ impl<'a> Reader<'a> {
             "dag" => self.take_dag(line),
             "subtask" => self.take_subtask(line),
             "edge" => self.take_edge(line),
-            other => Err(line.malformed(format!(
-                "expected {RECORDS}, found {}; correct it, or make it a comment with #",
-                quoted(other)
-            ))),
+            other => {
+                let remedy = match self.file.sets.is_empty() {
+                    // Perhaps no line of it is meant for this reader.
+                    true => "write a file of another format as docs/dag-file.md says",
+                    false => "make it a comment with #",
+                };
+                let found = quoted(other);
+                Err(line.malformed(format!(
+                    "expected {RECORDS}, found {found}; correct it, or {remedy}"
+                )))
+            }
         }
     }
 

@@ -67,7 +67,7 @@ fn every_part_of_a_file_that_is_cut_off_is_refused() {
 const REFUSED: &str = r"
 => line 1: the file ends where a `dag` record should be; it is empty: describe a DAG, or name
 end => line 1: the file has no dag; add one before `end`
-dig x => line 1: expected `set`, `dag`, `subtask`, `edge` or `end`, found `dig`; correct it
+dig x => line 1: expected `set`, `dag`, `subtask`, `edge` or `end`, found `dig`; correct it, or write a file of another format as docs
 dag x => line 1: dag `x` has no period; add `period 25ms`
 dag => line 1: `dag` lacks its name
 dag x perod 1ms => line 1: unknown key `perod`; a dag has `period`, `deadline`,
