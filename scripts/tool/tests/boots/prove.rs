@@ -46,6 +46,21 @@ fn the_run_that_observes_judges_no_bound() {
     assert_eq!(said.matches("\"kind\":\"proof\"").count(), 20, "{said}");
 }
 
+/// Observed WCETs have a margin, and the example of lent cores has room for that.
+#[test]
+fn the_example_of_lent_cores_is_proven_as_its_page_says() {
+    let lent = include_str!("../../../../apps/dag-file/examples/lent.dag");
+    let options = "--cores 2 --clusters auto --mode deterministic";
+    let called = prove("lent", options, &[("lent.dag", lent)]);
+    assert_eq!(called.code, Some(0), "{}{}", called.out, called.complaint);
+    for test in [
+        "an order of its own on each core",
+        "what owners leave of its cores",
+    ] {
+        assert!(called.out.contains(test), "{}", called.out);
+    }
+}
+
 #[test]
 fn overheads_that_are_stated_are_charged_and_none_are_measured() {
     let options = "--append overheads_ns=0,50000,0";
