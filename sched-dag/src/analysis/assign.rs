@@ -8,8 +8,9 @@
 //! multi-path bound needs, or the order that may be fixed for it. The others are *light*: clusters
 //! of one core each take them, the densest first, each where the sum of densities is least (worst
 //! fit), so that what room there is, is left on every core. A core takes light DAGs up to a sum of
-//! 1, which is enough for EDF and no proof for static priorities. Whatever is assigned, the analysis
-//! of each cluster has the last word.
+//! 1, which is enough for EDF and no proof for static priorities. Where that leaves a DAG without
+//! cores, all DAGs share all of them if that proves each. Whatever is assigned, the analysis of each
+//! cluster has the last word.
 //!
 //! # Federated scheduling: cores of its own for each DAG that needs several
 //!
@@ -30,7 +31,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use super::lending::{LendingAnswer, lend_amid};
+use super::lending::{LendingAnswer, LendingPlan, lend_amid};
 use super::multi_path::multi_path;
 use super::ratio::{Ratio, sort_largest_first};
 use super::set::constrained;
@@ -108,11 +109,35 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         Some(Ok(())) => return Ok(()),
         Some(Err(failed)) => failed.try_into().ok(),
     };
-    let federated = federate(task_set, &tasks, settings);
-    federated.map_err(|refused| NotAssigned {
-        attempts,
-        ..refused
-    })
+    let Err(refused) = federate(task_set, &tasks, settings) else {
+        return Ok(());
+    };
+    // Lending has tried that, where it applies; it knows neither waits nor EDF.
+    let whole = LendingPlan::whole(tasks.len(), settings.cores as usize);
+    let tasks: Vec<&Task> = tasks.iter().collect();
+    match attempts.is_none() && take_if_proven(task_set, &whole, &tasks, settings) {
+        true => Ok(()),
+        false => Err(NotAssigned {
+            attempts,
+            ..refused
+        }),
+    }
+}
+
+/// Divides the cores as planned if that proves all DAGs, and reports whether it does.
+fn take_if_proven(
+    task_set: &mut TaskSet,
+    plan: &LendingPlan,
+    tasks: &[&Task],
+    settings: &AnalysisSettings,
+) -> bool {
+    let mut divided = task_set.clone();
+    plan.divide(&mut divided, tasks);
+    let is_proven = answer(&divided, settings).is_proven();
+    if is_proven {
+        *task_set = divided;
+    }
+    is_proven
 }
 
 /// Divides the cores as [`lend`](super::lend()) does, if that applies; an error says for which DAG
@@ -147,13 +172,8 @@ fn lend_cores(
         let failed = failed.into_iter().map(|dag| DagId(to_u32(dag)));
         return Some(Err(failed.collect()));
     };
-    let mut divided = task_set.clone();
-    plan.divide(&mut divided, &tasks);
     // Priorities that the app states may rank DAGs in another way than by deadline.
-    answer(&divided, settings).is_proven().then(|| {
-        *task_set = divided;
-        Ok(())
-    })
+    take_if_proven(task_set, &plan, &tasks, settings).then_some(Ok(()))
 }
 
 /// Divides the cores by federated scheduling.
@@ -417,6 +437,15 @@ mod tests {
         let whys = found.dags().iter().map(Dag::why_there);
         let expected = [AssignmentReason::Light, AssignmentReason::Waits];
         assert!(whys.eq(expected.map(Some)));
+        // Where cores of its own leave none to others, all share all that there are.
+        let mut waits = parallel(&[2], 20);
+        waits.subtasks[0].waits.push(Wait {
+            limit_ns: 6,
+            segment_ns: Some(1),
+        });
+        let found = assigned(&[parallel(&[1], 10), waits], 1).unwrap();
+        let whole = Some(AssignmentReason::Whole { left_percent: 85 });
+        assert!(found.dags().iter().all(|dag| dag.why_there() == whole));
     }
 
     #[test]

@@ -81,6 +81,18 @@ pub struct LendingAnswer {
 }
 
 impl LendingPlan {
+    /// Returns the first attempt of DAGs that another analysis has to prove.
+    pub(super) fn whole(dags: usize, cores: usize) -> Self {
+        let mut group = LentGroup::of((0..cores).collect());
+        group.members = (0..dags).map(|dag| (dag, u64::MAX)).collect();
+        Self {
+            attempt: LendingAttempt::Whole,
+            owners: Vec::new(),
+            groups: vec![group],
+            supplies: vec![CoreSupply::UNOWNED; cores],
+        }
+    }
+
     /// Divides the cores of a task set so: cores that owners and groups connect are a cluster.
     ///
     /// Cores are counted anew, those of a cluster in a row; cores that nobody uses come last.
