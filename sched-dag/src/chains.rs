@@ -34,35 +34,38 @@
 //!
 //! # Bounds: how long the times of a chain can be, where each of its DAGs has a bound
 //!
-//! Let DAG i of the chain, counted from 0 to n, have period T(i) and a proven response time
-//! R(i), both from nominal releases on. Then
+//! Let DAG i of the chain, counted from 0 to n, have a proven response time R(i) from nominal
+//! releases on. Let T(i) be its period, or, where it survives faults, as many periods more as jobs
+//! in a row may be lost by those ([`Dag::renewal_ns`]). Then
 //!
 //! - the age of an output is at most T(0) + R(0) + ... + T(n-1) + R(n-1) + R(n);
 //! - data age and reaction time are at most T(n) longer.
 //!
 //! *Proof of the first.* Let job j of DAG i sample, at time t, the value of job k of DAG i-1.
-//! Job k+1 was not complete at t, and is so R(i-1) after its release, which is T(i-1) after that
-//! of k; so t < r(k) + T(i-1) + R(i-1). And r(j) <= t, as nothing of job j starts before its
+//! The next job that is not lost was not complete at t, and is so R(i-1) after its release, which is
+//! T(i-1) after that of k at most; so t < r(k) + T(i-1) + R(i-1). And r(j) <= t, as nothing of job j starts before its
 //! release. So from r(k) to r(j) it is less than T(i-1) + R(i-1). Summed up over the samplings,
 //! this leads from the release of the job that the output goes back to, to that of its own job,
 //! which takes R(n) more.
 //!
-//! *Of the second.* The next output is that of the next job, released T(n) later: that is the
-//! data age. With the longest data age goes the longest reaction time, as the words above say.
+//! *Of the second.* The next output is that of the next job that is not lost, released T(n) later at
+//! most: that is the data age. With the longest data age goes the longest reaction time, as the words above say.
 //!
 //! The sum of T + R over all DAGs is the bound of A. Davare et al., Period Optimization for Hard
 //! Real-time Distributed Automotive Systems, DAC 2007 (doi:10.1145/1278480.1278553). It is safe
 //! for any phases of the DAGs, so it is not tight for given ones.
 //!
-//! It holds for as long as jobs come: none is skipped, aborted or lost by a fault, and the DAGs
-//! go on. A sporadic DAG has no longest distance of releases, so its T is none; as the last
+//! It holds for as long as jobs come: none is skipped in a pause, and the DAGs go on. (With bounds
+//! none is skipped or aborted for another reason.) A sporadic DAG has no longest distance of releases, so its T is none; as the last
 //! DAG of a chain it still has an age of outputs.
 //!
 //! # Which outputs count
 //!
 //! Outputs count up to the instant at which the next job of one of the chain's DAGs would have
 //! been due and did not come, because the DAG had ended: from then on what is sampled only gets
-//! older. Outputs that go back to nothing, as the first ones of a run, do not count.
+//! older. In a pause and after it an output does not count as long as one of the values that it goes
+//! back through is of before, nor the time between two outputs with a pause of the last DAG between
+//! them. Outputs that go back to nothing, as the first ones of a run, do not count.
 //!
 //! Let outputs m and m+1 follow each other and go back to jobs s(m) and s(m+1). The data age of
 //! m is f(m+1) - r(s(m)). If s(m+1) > s(m), this is the reaction time to what happens after the
@@ -191,7 +194,7 @@ fn sum(
         // through it.
         let response_ns = response_ns.filter(|_| !model.is_sporadic());
         let of_dag = model
-            .period_ns()
+            .renewal_ns()
             .saturating_add(response_ns.ok_or(segment.dag)?);
         Ok(sum.saturating_add(of_dag))
     })
@@ -363,6 +366,7 @@ impl Chain {
         let hops: Vec<SampledEdge> = hops.collect();
         let sampled = SampledJobs::new(&hops, events.clone());
         let releases = NominalReleases::of(task_set, events.clone());
+        let pauses = PausedJobs::of(task_set, events.clone());
         let end_ns = self.segments.iter().map(|segment| {
             let model = task_set.dag(segment.dag);
             let last = releases.0.keys().rfind(|(dag, _)| *dag == segment.dag);
@@ -376,8 +380,8 @@ impl Chain {
         let end_ns = end_ns.min().unwrap_or(u64::MAX);
         let (first, last) = (self.segments[0], self.segments[self.segments.len() - 1]);
         let mut latencies = ChainLatencies::default();
-        // The job that the output before goes back to, and its release.
-        let mut before: Option<(u64, u64)> = None;
+        // Of the output before: its job, that which it goes back to, and the release of that.
+        let mut before: Option<(u64, u64, u64)> = None;
         let is_output = |event: &Event| {
             (event.what, event.dag, event.subtask) == (EventKind::Finish, last.dag, Some(last.exit))
                 && event.time_ns <= end_ns
@@ -386,7 +390,9 @@ impl Chain {
             // What it goes back to, hop by hop.
             let origin = hops.iter().rev().try_fold(output.job, |job, hop| {
                 let (dag, subtask) = hop.reader;
-                sampled.job(Instance { dag, job, subtask }, hop.writer)
+                let job = sampled.job(Instance { dag, job, subtask }, hop.writer)?;
+                let is_of_before = pauses.has_come(hop.writer.0, job, output.time_ns);
+                (!is_of_before).then_some(job)
             });
             let release_ns = |job| releases.0.get(&(first.dag, job)).copied();
             let Some((origin, release_ns)) = origin.and_then(|job| Some((job, release_ns(job)?)))
@@ -398,7 +404,9 @@ impl Chain {
             };
             let since = |start_ns: u64| output.time_ns.saturating_sub(start_ns);
             latencies.output_age_ns.push(since(release_ns));
-            if let Some((before, before_ns)) = before {
+            if let Some((job, before, before_ns)) = before
+                && !pauses.has_come(last.dag, job, output.time_ns)
+            {
                 latencies.data_age_ns.push(since(before_ns));
                 // Inputs between two origins reach no output earlier than this one.
                 let missed = releases
@@ -407,7 +415,7 @@ impl Chain {
                 let reactions = missed.map(|(_, release_ns)| since(*release_ns));
                 latencies.reaction_ns.extend(reactions);
             }
-            before = Some((origin, release_ns));
+            before = Some((output.job, origin, release_ns));
         }
         latencies
     }
@@ -435,6 +443,44 @@ impl NominalReleases {
             }
         }
         Self(releases)
+    }
+}
+
+/// When jobs were skipped because their DAGs were paused.
+struct PausedJobs(BTreeMap<(DagId, u64), u64>);
+
+impl PausedJobs {
+    fn of(task_set: &TaskSet, events: impl Iterator<Item = Event>) -> Self {
+        let mut resumed_ns = BTreeMap::new();
+        let mut skipped = BTreeMap::new();
+        for Event {
+            what,
+            dag,
+            job,
+            time_ns,
+            ..
+        } in events
+        {
+            match what {
+                EventKind::Off => _ = resumed_ns.insert(dag, u64::MAX),
+                EventKind::On => _ = resumed_ns.insert(dag, time_ns),
+                EventKind::Skipped => {
+                    // A driver that comes late may tell of the job after the pause.
+                    let due_ns = task_set.dag(dag).grid_ns(job);
+                    if resumed_ns.get(&dag).is_some_and(|&ns| due_ns < ns) {
+                        skipped.insert((dag, job), time_ns);
+                    }
+                }
+                _ => {}
+            }
+        }
+        Self(skipped)
+    }
+
+    /// Reports whether, after a job of a DAG, one has been skipped so by an instant.
+    fn has_come(&self, dag: DagId, job: u64, by_ns: u64) -> bool {
+        let mut later = self.0.range((dag, job + 1)..=(dag, u64::MAX));
+        later.next().is_some_and(|(_, &time_ns)| time_ns <= by_ns)
     }
 }
 

@@ -274,6 +274,21 @@ impl Dag {
         self.on_fault
     }
 
+    /// Returns the longest time between the nominal releases of two jobs of a periodic DAG that
+    /// follow each other and are not lost by faults that it survives, while it is not paused.
+    #[must_use]
+    pub fn renewal_ns(&self) -> u64 {
+        let lost_in_a_row = match self.on_fault {
+            OnFault::EndDag => 0,
+            // One more would be within a window of these.
+            OnFault::DropJob(limit) if u64::from(limit.faults) < limit.window => {
+                limit.faults.min(limit.in_all)
+            }
+            OnFault::DropJob(limit) => limit.in_all,
+        };
+        self.period_ns.saturating_mul(1 + u64::from(lost_in_a_row))
+    }
+
     /// Returns the first job to release: 0, but in a replay that begins later.
     #[must_use]
     pub const fn first_job(&self) -> u64 {

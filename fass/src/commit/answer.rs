@@ -636,5 +636,5 @@ pub(super) fn staleness(
 /// Returns how old a value of a DAG can be, by the answer about that.
 fn bound(writer: &sched_dag::Dag, answer: &DagAnswer) -> Option<Duration> {
     let response = answer.verdict.bound().filter(|_| !writer.is_sporadic())?;
-    Duration::from_nanos(writer.period_ns()).checked_add(response)
+    Duration::from_nanos(writer.renewal_ns()).checked_add(response)
 }

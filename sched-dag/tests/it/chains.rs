@@ -2,8 +2,8 @@
 
 use sched_dag::chains::{Chain, ChainLatencies, SampledEdge, SampledJobs};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, Instance, Policy, SubtaskId, SubtaskSpec,
-    TaskSet, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, FaultLimit, Instance, OnFault, Policy,
+    SubtaskId, SubtaskSpec, TaskSet, verify,
 };
 
 use crate::support::events::events;
@@ -11,19 +11,6 @@ use crate::support::events::events;
 /// `camera` (period 100, `expose` before `detect`), `plan` (period 60), `motor` (period 20):
 /// `plan` samples what `detect` writes, `motor/drive` what `plan` writes.
 fn model() -> (TaskSet, [SampledEdge; 2]) {
-    let subtask = |name: &str| SubtaskSpec {
-        name: name.into(),
-        wcet_ns: Some(10),
-        ..SubtaskSpec::default()
-    };
-    let dag = |name: &str, period_ns, subtasks: &[&str]| DagSpec {
-        name: name.into(),
-        period_ns: Some(period_ns),
-        relative_deadline_ns: Some(period_ns),
-        subtasks: subtasks.iter().map(|name| subtask(name)).collect(),
-        edges: (1..subtasks.len()).map(|at| (at - 1, at)).collect(),
-        ..DagSpec::default()
-    };
     let dags = [
         dag("camera", 100, &["expose", "detect"]),
         dag("plan", 60, &["plan"]),
@@ -38,6 +25,22 @@ fn model() -> (TaskSet, [SampledEdge; 2]) {
     ];
     let verified = verify(&dags, &options).expect("a sound set");
     (verified.task_set, samplings)
+}
+
+fn dag(name: &str, period_ns: u64, subtasks: &[&str]) -> DagSpec {
+    let subtask = |name: &&str| SubtaskSpec {
+        name: (*name).into(),
+        wcet_ns: Some(10),
+        ..SubtaskSpec::default()
+    };
+    DagSpec {
+        name: name.into(),
+        period_ns: Some(period_ns),
+        relative_deadline_ns: Some(period_ns),
+        subtasks: subtasks.iter().map(subtask).collect(),
+        edges: (1..subtasks.len()).map(|at| (at - 1, at)).collect(),
+        ..DagSpec::default()
+    }
 }
 
 fn sampling(writer: (DagId, SubtaskId), reader: (DagId, SubtaskId)) -> SampledEdge {
@@ -133,6 +136,41 @@ fn outputs_behind_the_end_of_a_dag_do_not_count() {
     let latencies = chain.latencies(&task_set, ended.into_iter());
     assert_eq!(latencies.output_age_ns, [82]);
     assert!(latencies.data_age_ns.is_empty() && latencies.reaction_ns.is_empty());
+}
+
+#[test]
+fn pauses_do_not_count_and_jobs_that_faults_may_take_do() {
+    let (task_set, samplings) = model();
+    let chain = &Chain::all(&task_set, &samplings)[0];
+    // The camera is paused before its job of 100, and resumed for that of 200.
+    let paused = RUN.replace("100 released 0 1, ", "99 off 0 0\n100 skipped 0 1, ");
+    let paused = paused.replace("145 finish 0 1 1", "145 on 0 0");
+    let latencies = chain.latencies(&task_set, events(&paused).into_iter());
+    // `plan` has the image of before the pause up to its job of 180, and that goes on to the motor.
+    assert_eq!(latencies.output_age_ns, [82]);
+    // The motor is paused between its outputs of 103 and 143.
+    let paused = RUN.replace("120 released", "119 off 2 0\n120 skipped 2 6, released");
+    let paused = paused.replace("140 released", "140 on 2 0, released");
+    let latencies = chain.latencies(&task_set, events(&paused).into_iter());
+    assert_eq!(latencies.output_age_ns, [82, 103, 143, 104]);
+    assert_eq!(latencies.data_age_ns, [103, 204]);
+    // Of 3 jobs 2 may be lost, with a window of 2 all that may be in all.
+    for (window, period_ns) in [(3, 300), (2, 600)] {
+        let mut spec = dag("camera", 100, &["expose"]);
+        let limit = FaultLimit {
+            faults: 2,
+            window,
+            in_all: 5,
+        };
+        spec.on_fault = OnFault::DropJob(limit);
+        let dags = [spec, dag("motor", 20, &["drive"])];
+        let task_set = verify(&dags, &CommitOptions::new(Policy::Edf, 2))
+            .unwrap()
+            .task_set;
+        let chain = &Chain::all(&task_set, &[sampling(place(0, 0), place(1, 0))])[0];
+        let age = chain.output_age_bound_ns(&task_set, &[Some(50), Some(5)]);
+        assert_eq!(age, Ok(period_ns + 50 + 5));
+    }
 }
 
 #[test]

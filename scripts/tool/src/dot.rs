@@ -80,7 +80,7 @@ impl Dag<'_> {
         for &(reader, writer, topic, staleness_ns) in &self.dag.samples {
             let writer = self.id(writer);
             let label = staleness_ns.map_or(String::new(), |ns| {
-                format!(", label=\"less than {} old\"", briefly(ns))
+                format!(", label=\"less than {} old while jobs come\"", briefly(ns))
             });
             let _ = writeln!(
                 text,
@@ -254,7 +254,7 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
     c0_d0_s1 -> c0_d0_s2 [style=dotted, label="map"];
     c0_d0_s0 -> c0_d0_s2;
   }
-  c0_d0_t0 -> c0_d0_s0 [style=dashed, label="less than 12 ms old"];
+  c0_d0_t0 -> c0_d0_s0 [style=dashed, label="less than 12 ms old while jobs come"];
   c0_d0_t0 -> c0_d0_s2 [style=dashed];
 "#;
 

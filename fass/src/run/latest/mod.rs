@@ -284,8 +284,8 @@ pub struct Staleness {
     /// The topic.
     pub topic: String,
     /// The time, never reached, from the nominal release of the job that the value is
-    /// of to the start of the instance that samples it, while the writer is not paused and has
-    /// jobs to come. `None` if the writer has no proven bound, or is sporadic.
+    /// of to the start of the instance that samples it, while jobs of the writer come: not in a pause,
+    /// up to the first job after it, and not after the last one. `None` if the writer has no proven bound, or is sporadic.
     pub bound: Option<Duration>,
 }
 
@@ -303,7 +303,7 @@ impl fmt::Display for Staleness {
             "{reader} of {reader_dag} samples topic `{topic}` of {writer_dag}, "
         )?;
         match bound {
-            Some(bound) => write!(f, "less than {bound:?} old"),
+            Some(bound) => write!(f, "less than {bound:?} old while its jobs come"),
             None => f.write_str("of unknown age"),
         }
     }

@@ -190,6 +190,13 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
     let findings = check(run, bound_ns);
     let mut table = table(file, run, &findings, bound_ns, shown);
     table += &chain_table(run, chains, options.is_given("from"));
+    let exceeded: usize = chains.iter().map(|chain| chain.exceeded(bound_ns)).sum();
+    if exceeded > 0 {
+        let _ = writeln!(
+            table,
+            "  breach {exceeded} times of chains are beyond their bounds"
+        );
+    }
     if options.is_given("json") {
         eprint!("{table}");
     } else {
@@ -197,9 +204,9 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
     }
     println!("{}", machine_line(file, run, &findings));
     for chain in chains {
-        println!("{}", chain_line(file, run, chain));
+        println!("{}", chain_line(file, run, chain, bound_ns));
     }
-    findings.breaches.len()
+    findings.breaches.len() + exceeded
 }
 
 /// Returns the text for people: at most `shown` breaches, then the figures.
@@ -323,6 +330,16 @@ struct MeasuredChain {
     times: [(Distribution, Result<u64, DagId>); 3],
 }
 
+impl MeasuredChain {
+    /// Returns how many of its times are beyond their bounds, by more than the tolerance.
+    fn exceeded(&self, tolerance_ns: u64) -> usize {
+        let is_beyond = |(times, bound): &&(Distribution, Result<u64, DagId>)| {
+            bound.is_ok_and(|ns| times.max() > ns.saturating_add(tolerance_ns))
+        };
+        self.times.iter().filter(is_beyond).count()
+    }
+}
+
 /// Measures the chains that the options name, or else all.
 ///
 /// # Errors
@@ -424,7 +441,7 @@ fn chain_table(run: &Run, chains: &[MeasuredChain], is_named: bool) -> String {
 }
 
 /// Returns the machine line of kind `chain`.
-fn chain_line(file: &str, run: &Run, chain: &MeasuredChain) -> String {
+fn chain_line(file: &str, run: &Run, chain: &MeasuredChain, tolerance_ns: u64) -> String {
     let bound = |of: &Result<u64, DagId>| of.map_or("null".into(), |ns| ns.to_string());
     let [output_age, data_age, reaction] = &chain.times;
     Object::new()
@@ -437,6 +454,7 @@ fn chain_line(file: &str, run: &Run, chain: &MeasuredChain) -> String {
         .json("reaction_ns", &object(&reaction.0))
         .json("output_age_bound_ns", &bound(&output_age.1))
         .json("reaction_bound_ns", &bound(&reaction.1))
+        .number("exceeded", chain.exceeded(tolerance_ns) as u64)
         .into_text()
 }
 

@@ -154,12 +154,14 @@ const CHAIN: &str = "
 170 finish c0 1.4.0
 170 completed c0 1.4";
 
-/// The record of it.
-fn chain() -> Vec<u8> {
-    let text = "edf 2
-        eye T=100 D=100 O=0 bound=30: look/0
-        arm T=40 D=40 O=0 bound=20: move/0";
-    let mut commit = commit(text);
+/// The record of it, with this bound of the first DAG.
+fn chain(bound_ns: u64) -> Vec<u8> {
+    let text = format!(
+        "edf 2
+        eye T=100 D=100 O=0 bound={bound_ns}: look/0
+        arm T=40 D=40 O=0 bound=20: move/0"
+    );
+    let mut commit = commit(&text);
     commit.dags[0].topics = vec![CommittedTopic::default()];
     commit.dags[1].samples = vec![(0, 0, 0, Some(130))];
     record_of("", &commit, CHAIN)
@@ -167,7 +169,8 @@ fn chain() -> Vec<u8> {
 
 #[test]
 fn a_chain_across_dags_has_the_times_that_a_person_computes() {
-    let folder = traces("chain", &[("chain.rec", &chain())]);
+    let records = [("chain.rec", &chain(30)[..]), ("late.rec", &chain(10))];
+    let folder = traces("chain", &records);
     let said = succeed(&folder, "check-trace chain.rec");
     // Ages 55, 90, 132 and 70; data ages 90, 132 and 170; the reaction to what is seen just after 0
     // is the output of 170.
@@ -182,6 +185,15 @@ fn a_chain_across_dags_has_the_times_that_a_person_computes() {
     let line = machine_line(&succeed(&folder, of_chain), "chain");
     assert_eq!(line.number_at("reaction_ns.max"), Some(170));
     assert_eq!(line.number_at("reaction_bound_ns"), Some(190));
+    assert_eq!(line.number_at("exceeded"), Some(0));
+    // With 20 less the age of 132 is beyond 130, and nothing else.
+    let late = call(&folder, ["check-trace", "--bound-us", "0", "late.rec"]);
+    assert_eq!(late.code, Some(1));
+    assert!(
+        late.out.contains("  breach 1 times of chains are"),
+        "{}",
+        late.out
+    );
     let rows = "
 check-trace chain.rec --from eye/lok --to arm/move | did you mean `eye/look`?
 check-trace chain.rec --from arm/move --to eye/look | no edges and samples lead from `arm/move`";
