@@ -185,6 +185,26 @@ pub struct Entry<'v> {
     pub value: &'v [u8],
 }
 
+/// Reads the nominal release of the entry whose value begins there in a recording.
+///
+/// ```
+/// use recording::{Entry, EntryKind, Header, Recording, Writer};
+///
+/// let mut record = Writer::new(&Header { dags: vec![Default::default()], ..Header::default() });
+/// let what = EntryKind::Clock;
+/// record.write(&Entry { what, dag: 0, place: 0, job: 2, release_ns: 20, at_ns: 25, value: &[0; 4] });
+/// let bytes = record.end();
+/// let value = Recording::read(&bytes).unwrap().entries().next().unwrap().value;
+/// let place = value.as_ptr().addr() - bytes.as_ptr().addr();
+/// assert_eq!(recording::release_ns_of(&bytes, place), Some(20));
+/// ```
+#[must_use]
+pub fn release_ns_of(bytes: &[u8], value: usize) -> Option<u64> {
+    // It is the last but one of the numbers before the value.
+    let (_, [release_ns, _]) = bytes.get(..value)?.as_rchunks::<8>().1.split_last_chunk()?;
+    Some(u64::from_le_bytes(*release_ns))
+}
+
 impl<'v> Entry<'v> {
     pub(super) fn encode(&self, out: &mut Encoder<'_>) {
         // The value comes last and has no length: the frame's length says where it ends.

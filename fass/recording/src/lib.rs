@@ -60,11 +60,11 @@ mod shown;
 mod stream;
 
 pub use bytes::{Decoder, Encoder, Full, Malformed};
-pub use entry::{Channel, DagHeader, Entry, EntryKind, Header, Role};
+pub use entry::{Channel, DagHeader, Entry, EntryKind, Header, Role, release_ns_of};
 pub use entry::{
     Commit, CommittedDag, CommittedSubtask, CommittedTopic, Counted, DagTimes, SubtaskTimes, Times,
 };
-pub use read::{Chunk, Events, Mismatch, Recording, mended};
+pub use read::{Chunk, Events, Mismatch, Recording, completed, mended};
 #[doc(hidden)]
 pub use recordable::deepest;
 pub use recordable::{MOST_GROWTH, Recordable, to_bytes};

@@ -1,6 +1,7 @@
 //! Reading a recording, all of which may be wrong: its chunks, and the values of one channel by
 //! their type.
 
+use alloc::borrow::Cow;
 use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
@@ -337,6 +338,36 @@ pub fn mended(bytes: &[u8]) -> Result<Vec<u8>, Malformed> {
     let whole = bytes[..progress.last].to_vec();
     let stream = Stream::behind(progress.crc, (progress.count, progress.lost), whole);
     Ok(stream.cut())
+}
+
+/// Returns a whole recording as it is, and a [`mended`] one in place of one that only ends too
+/// early, as a program that was killed leaves it, or a disk that was full.
+///
+/// # Errors
+///
+/// The bytes are no recording, or are altered.
+///
+/// ```
+/// use recording::{Header, Recording, Writer, completed};
+///
+/// let whole = Writer::new(&Header::default()).end();
+/// assert_eq!(completed(&whole).unwrap(), whole);
+/// let cut = completed(&whole[..whole.len() - 1]).unwrap();
+/// assert!(Recording::read(&cut).unwrap().is_cut());
+/// ```
+pub fn completed<'b>(bytes: impl Into<Cow<'b, [u8]>>) -> Result<Cow<'b, [u8]>, Malformed> {
+    let bytes = bytes.into();
+    let mut progress = Progress::none();
+    match progress.read(&bytes) {
+        Ok(_) => Ok(bytes),
+        // A frame that is whole and wrong was altered; this one is not whole.
+        Err(_)
+            if progress.last > 0 && frame(&mut Decoder::new(&bytes[progress.last..])).is_err() =>
+        {
+            mended(&bytes).map(Cow::Owned)
+        }
+        Err(malformed) => Err(malformed),
+    }
 }
 
 impl Frame<'_> {

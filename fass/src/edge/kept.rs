@@ -5,6 +5,7 @@
 //! may be slow. Events are copied out of a journal under the cluster's lock, and sent outside of
 //! it.
 
+use alloc::format;
 use alloc::vec::Vec;
 
 use recording::{
@@ -100,6 +101,11 @@ impl<S: Sink + Send + 'static> BootRecord<S> {
     /// Adds the events of a run whose clusters' journals were not looked at, and what the run
     /// took.
     pub fn end_run(&mut self, run: &Run) {
+        // Functions are told the clock's time: so a reader finds that of the run.
+        if let epoch_ns @ 1.. = run.epoch_ns() {
+            let line = format!("{{\"kind\":\"epoch\",\"ns\":{epoch_ns}}}\n");
+            self.stream.text(&line);
+        }
         // Where nothing was committed, there is only what was kept before a fault.
         if self.taken.is_empty() {
             return;

@@ -80,6 +80,7 @@ impl Replay {
         // After all comparisons: what follows trusts the header.
         self.find_inputs(task_set);
         self.find_begins(task_set)?;
+        self.check_releases(task_set)?;
         self.name_faults(task_set);
         let is_compared = |((place, _), _): &&((u16, u64), _)| {
             is_compared(self.header.channels[usize::from(*place)].role)
@@ -144,6 +145,29 @@ impl Replay {
         dags.dedup();
         let cuts = self.passed.cuts.clone();
         self.passed = Arc::new(SkippedInstances { dags, jobs, cuts });
+    }
+
+    /// Makes sure that time releases the jobs when it has released them.
+    fn check_releases(&self, task_set: &TaskSet) -> Result<(), String> {
+        for ((place, job), value) in &self.values {
+            let dag = self.header.channels[usize::from(*place)].dag;
+            let model = task_set.dag(id(dag));
+            let here_ns = model.grid_ns(*job);
+            let then_ns = recording::release_ns_of(&self.bytes, value.start);
+            if let Some(then_ns) = then_ns
+                && then_ns != here_ns
+                && !model.is_sporadic()
+                && self.passed.is_of(dag)
+            {
+                return Err(format!(
+                    "the recording's job {job} of dag `{}` was due at {then_ns} ns, and is due at \
+                     {here_ns} ns here; commit the period and the offset that were recorded, or \
+                     record it again",
+                    self.name_of(dag)
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Makes sure that no recorded source would be called, and that none of its values is lost.

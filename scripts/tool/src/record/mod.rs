@@ -120,7 +120,8 @@ impl Record {
     /// In words: the fault and its position.
     pub fn read(bytes: &[u8]) -> Result<Self, String> {
         if bytes.starts_with(&MAGIC) {
-            let recording = Recording::read(bytes).map_err(|malformed| malformed.to_string())?;
+            let whole = recording::completed(bytes).map_err(|malformed| malformed.to_string())?;
+            let recording = Recording::read(&whole).map_err(|malformed| malformed.to_string())?;
             return Self::of(&recording, String::new());
         }
         // A damaged line for people is no fault; a damaged machine line is found below.

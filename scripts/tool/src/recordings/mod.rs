@@ -15,7 +15,9 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::{self, ExitCode};
 
-use recording::{Chunk, Commit, Counted, Entry, EntryKind, Recording, Schema, Shown, Times};
+use recording::{
+    Chunk, Commit, Counted, Entry, EntryKind, Recording, Role, Schema, Shown, Times, Writer,
+};
 use replay::shown::{quoted, visible};
 
 use crate::dot;
@@ -23,6 +25,7 @@ use crate::files::{self, Named};
 use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::output;
 use crate::proof::{self, observed};
+use crate::protocol::Transcript;
 use crate::record::Record;
 use crate::system;
 
@@ -65,7 +68,7 @@ pub static RECORDING: Command = Command {
         "type": Takes::Text("TYPE");
         /// --from-csv: columns that are no part of the values, with commas between.
         "ignore": Takes::Text("COLUMNS");
-        /// --from-csv: the time from row to row, such as 10ms, if there is no column release_ns.
+        /// --from-csv: the time from job to job, such as 10ms; a column release_ns has to agree.
         "period": Takes::Text("TIME");
     },
     notes: "\
@@ -99,12 +102,14 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     let recording = parse(file, &bytes).map_err(Refusal::Usage)?;
     // Before anything is printed, since it may refuse.
     of_runs(&recording, options).map_err(Refusal::Usage)?;
+    let bytes = in_run_time(&recording);
+    let rebased = parse(file, &bytes).map_err(Refusal::Usage)?;
     match options.text("until") {
-        Some(job) => print!("{}", inputs_until(&recording, job).map_err(Refusal::Usage)?),
+        Some(job) => print!("{}", inputs_until(&rebased, job).map_err(Refusal::Usage)?),
         None => print!("{}", shown(&recording)),
     }
     if let Some(folder) = options.path("csv") {
-        for (name, table) in table::tables(&recording) {
+        for (name, table) in table::tables(&rebased) {
             let path = folder.join(name);
             write(&path, |out| out.write_all(table.as_bytes()))?;
             println!("{}", files::shown_path(&path));
@@ -113,12 +118,43 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     if let Some(path) = options.path("mcap") {
         let mut messages = 0;
         write(path, |out| {
-            messages = mcap::write(&recording, out)?;
+            messages = mcap::write(&rebased, out)?;
             Ok(())
         })?;
         println!("{}: {messages} messages", files::shown_path(path));
     }
     Ok(())
+}
+
+/// Returns the values with all times in that of the run: a function is told the clock's, also by
+/// samples.
+fn in_run_time(recording: &Recording<'_>) -> Vec<u8> {
+    let texts = recording.chunks().filter_map(|chunk| match chunk {
+        Chunk::Text(text) => Some(text),
+        _ => None,
+    });
+    let said = Transcript::read(&texts.collect::<String>());
+    let epoch = said.of_kind("epoch").next();
+    let epoch_ns = epoch.and_then(|line| line.number_at("ns")).unwrap_or(0);
+    let header = recording.header();
+    let mut record = Writer::new(header);
+    for entry in recording.entries() {
+        let mut value = entry.value.to_vec();
+        let role = header.channels.get(usize::from(entry.place));
+        let times = match (entry.what, role.map(|channel| channel.role)) {
+            // Behind the length of the list, and behind `some` and the job.
+            (EntryKind::Clock, _) => value.get_mut(4..),
+            (EntryKind::Value, Some(Role::Sample)) => value.get_mut(9..17),
+            _ => None,
+        };
+        for time in times.unwrap_or_default().as_chunks_mut().0 {
+            let clock_ns = u64::from_le_bytes(*time);
+            *time = clock_ns.saturating_sub(epoch_ns).to_le_bytes();
+        }
+        let value = &value;
+        record.write(&Entry { value, ..entry });
+    }
+    record.end()
 }
 
 /// Writes the views of commits and runs that the options name.
@@ -186,8 +222,10 @@ fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
 
 /// Reads a file that must be a recording.
 pub(crate) fn read(file: &Path) -> Result<Vec<u8>, String> {
-    files::read(file)
-        .map_err(|why| format!("{}: {why}; name another file", files::shown_path(file)))
+    let place = files::shown_path(file);
+    let bytes = files::read(file).map_err(|why| format!("{place}: {why}; name another file"))?;
+    let bytes = recording::completed(bytes).map_err(|malformed| format!("{place}: {malformed}"))?;
+    Ok(bytes.into_owned())
 }
 
 /// Reads the bytes that a guest has sent to the debug port. A firmware prints there, too, before

@@ -88,7 +88,8 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         }],
     });
     let mut row = 0;
-    let mut lines_of_jobs = BTreeMap::new();
+    let mut before: Option<(usize, u64, u64)> = None;
+    let (mut first, mut off_grid) = (None, None);
     while let Some(cells) = rows.next() {
         let cells = cells.map_err(refuse)?;
         let line = rows.line;
@@ -110,13 +111,27 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
             }),
         };
         let job = number(columns.job, row)?;
-        // A replay looks values up by job, so a job must have one value.
-        if let Some(before) = lines_of_jobs.insert(job, line) {
-            let why = format!("job {job} stands in line {before} already; number them apart");
+        let by_period_ns = |job: u64| job.saturating_mul(period_ns.unwrap_or(0));
+        let release_ns = number(columns.release_ns, by_period_ns(job))?;
+        // A replay releases the jobs one after the other, each once.
+        if let Some((other, of_job, of_ns)) = before.replace((line, job, release_ns))
+            && (job <= of_job || release_ns <= of_ns)
+        {
+            let why = format!(
+                "job {job} at {release_ns} ns is not after line {other}, job {of_job} at {of_ns} \
+                 ns; put the rows in the order of jobs and times, each once"
+            );
             return Err(at(line, why));
         }
-        let release_ns = job.saturating_mul(period_ns.unwrap_or(0));
-        let release_ns = number(columns.release_ns, release_ns)?;
+        let (first_job, offset_ns) = *first.get_or_insert((job, release_ns));
+        let due_ns = by_period_ns(job - first_job).saturating_add(offset_ns);
+        if period_ns.is_some() && release_ns != due_ns {
+            let why = format!(
+                "job {job} is due at {due_ns} ns by --period, and at {release_ns} ns by column \
+                 release_ns; number the jobs by the period, or leave --period out"
+            );
+            off_grid.get_or_insert(at(line, why));
+        }
         let mut value = Vec::new();
         for ((_, part), &column) in parts.iter().zip(&columns.values) {
             encode(part, &cells[column], &mut value).map_err(|why| at(line, why))?;
@@ -132,7 +147,8 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         });
         row += 1;
     }
-    Ok(writer.end())
+    // An order that is wrong says more.
+    off_grid.map_or(Ok(writer.end()), Err)
 }
 
 /// The roles of the columns, by their numbers.

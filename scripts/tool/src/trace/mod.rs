@@ -51,6 +51,7 @@ use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
 use crate::files;
 use crate::json::{Object, quoted};
 use crate::options::{Command, Parsed, Refusal, Takes, did_you_mean, options};
+use crate::output::shown as shown_ns;
 use crate::record::{Record, Run, tolerance_ns};
 
 pub use viewer::TRACE;
@@ -97,8 +98,7 @@ pub static CHECK_TRACE: Command = Command {
     about: "Replays the traces of runs against the model's rules and reports each breach.",
     positional: Some((
         Takes::File("FILE..."),
-        "Serial logs, or other files of JSON lines, with traces: \
-         `./scripts/run --trace FILE` makes one.",
+        "Records of runs, as `./scripts/run --trace FILE` and --keep write them, or serial logs.",
     )),
     options: options! {
         /// Microseconds for which an instance may wait for what it is owed, because a decision
@@ -148,7 +148,7 @@ pub fn check_trace(words: &[OsString]) -> ExitCode {
 /// Judges the runs of all files, and returns the number of breaches.
 fn judge_all(options: &Parsed) -> Result<usize, String> {
     if options.files().len() == 0 {
-        return Err("which files? name at least one serial log with a trace".into());
+        return Err("which files? name at least one record of a run".into());
     }
     files::check_once(options.files())?;
     let mut runs = Vec::new();
@@ -241,13 +241,16 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: u
             run.lost, figures.from_ns
         ));
     }
+    if !run.complete {
+        say("  the record ends before the run: only what came until then is judged");
+    }
     let mut row = |name: &str, value: &str| say(&format!("  {name:32}{value}"));
     row("events", &figures.events.to_string());
     row("instances started", &figures.instances.to_string());
     row("preemptions", &figures.preemptions.to_string());
     row(
         "finish to ready, largest",
-        &microseconds(figures.finish_to_ready_max_ns),
+        &shown_ns(figures.finish_to_ready_max_ns),
     );
     row(
         "ready to start, a core idle",
@@ -258,8 +261,8 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: u
         "longest inversion",
         &format!(
             "{} (bound {})",
-            microseconds(figures.longest_inversion_ns),
-            microseconds(bound_ns)
+            shown_ns(figures.longest_inversion_ns),
+            shown_ns(bound_ns)
         ),
     );
     let loads = figures.load_permille.iter();
@@ -293,19 +296,15 @@ pub fn machine_line(file: &str, run: &Run, findings: &Findings) -> String {
         .into_text()
 }
 
-fn microseconds(ns: u64) -> String {
-    format!("{}.{:03} us", ns / 1000, ns % 1000)
-}
-
 fn distribution(of: &Distribution) -> String {
     if of.count() == 0 {
         return "none".into();
     }
     format!(
         "median {}, p99 {}, max {} of {}",
-        microseconds(of.median()),
-        microseconds(of.p99()),
-        microseconds(of.max()),
+        shown_ns(of.median()),
+        shown_ns(of.p99()),
+        shown_ns(of.max()),
         of.count()
     )
 }
@@ -418,7 +417,7 @@ fn chain_table(run: &Run, chains: &[MeasuredChain], is_named: bool) -> String {
         let names = ["age of an output", "data age", "reaction time"];
         for (name, (times, bound)) in names.into_iter().zip(&chain.times) {
             let bound = match bound {
-                Ok(ns) => format!("bound {}", microseconds(*ns)),
+                Ok(ns) => format!("bound {}", shown_ns(*ns)),
                 Err(dag) => match run.task_set.dag(*dag) {
                     model if model.is_sporadic() => {
                         format!("no bound, as dag `{}` is sporadic", model.name())

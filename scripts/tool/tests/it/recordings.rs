@@ -5,7 +5,9 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use recording::{Channel, DagHeader, Entry, EntryKind, Header, Recordable, Role, Writer, to_bytes};
+use recording::{
+    Channel, DagHeader, Entry, EntryKind, Header, Recordable, Recording, Role, Writer, to_bytes,
+};
 
 use crate::support::{assert_refused, call, folder, refusal, succeed};
 
@@ -77,6 +79,47 @@ fn a_recording_is_shown_and_becomes_tables() {
 }
 
 #[test]
+fn samples_and_told_times_are_on_the_time_of_the_run_as_all_else_is() {
+    let folder = folder("recording-epoch");
+    let mut header = Recording::read(&recording())
+        .expect("whole")
+        .header()
+        .clone();
+    header.channels[0].role = Role::Sample;
+    header.channels[0].schema = <Option<(u64, u64, u8)>>::schema();
+    let mut writer = Writer::new(&header);
+    writer.text("{\"kind\":\"epoch\",\"ns\":1000}\n");
+    let (dag, place, job, release_ns, at_ns) = (0, 0, 0, 0, 300);
+    for (what, value) in [
+        (EntryKind::Value, to_bytes(&Some((7_u64, 1_250_u64, 9_u8)))),
+        (EntryKind::Value, to_bytes(&None::<(u64, u64, u8)>)),
+        (EntryKind::Clock, to_bytes(&vec![1_260_u64, 1_270])),
+    ] {
+        let value = &value;
+        writer.write(&Entry {
+            what,
+            dag,
+            place,
+            job,
+            release_ns,
+            at_ns,
+            value,
+        });
+    }
+    fs::write(folder.join("demo.rec"), writer.end()).expect("a file");
+    let said = succeed(&folder, "recording demo.rec --until eye/0 --csv tables");
+    for words in [
+        "sample `seen`: [7,250,9]\n",
+        "`seen`: null\n",
+        "told the time: [260,270]\n",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+    let table = fs::read_to_string(folder.join("tables/eye.seen.sampled.csv")).expect("a table");
+    assert!(table.contains("0,0,300,\"[7,250,9]\"\n"), "{table}");
+}
+
+#[test]
 fn what_is_recorded_of_a_job_is_shown() {
     let folder = recorded("recording-until");
     let shown = "job 4 of dag `eye`, due at 4000000 ns\n  4000250 ns, subtask 2, source `seen`: \
@@ -127,6 +170,24 @@ recording foreign | foreign: at byte 0: expected the mark of a recording";
     assert_refused(&folder, rows);
 }
 
+#[test]
+fn what_ends_too_early_is_shown_as_a_part() {
+    let folder = folder("recording-cut");
+    let bytes = recording();
+    for length in (0..300).step_by(5).chain([bytes.len() - 1]) {
+        fs::write(folder.join("cut"), &bytes[..length]).expect("a file");
+        let said = call(&folder, ["recording", "cut"]);
+        // Without mark and version nothing is known.
+        let (code, lines) = if length < 10 { (2, 1) } else { (0, 0) };
+        assert_eq!(said.code, Some(code), "{length}");
+        assert_eq!(said.complaint.lines().count(), lines, "{}", said.complaint);
+        let is_part = said
+            .out
+            .contains("\nincomplete: it says nothing of what came after");
+        assert_eq!(is_part, code == 0, "{}", said.out);
+    }
+}
+
 /// The lines of a table, the options, and the refusal. A line's end is `/`.
 const WRONG: &str = "
 a,b/1,2/ |  | in.csv:1: there is no column release_ns; say by --period
@@ -139,7 +200,10 @@ a,b/1,2/ | --period 1ms --type [f64; | `--type`, column 6: expected a number
 a/1/ | --period 1ms --ignore b | there is no column `b`; there are a
 a,b,a/1,2,3/ | --period 1ms | in.csv:1: there are two columns `a`; rename one, or --ignore both
 job,a,job/1,2,3/ | --period 1ms | in.csv:1: there are two columns `job`
-job,a/1,2/0,2/1,3/ | --period 1ms | in.csv:4: job 1 stands in line 2 already; number them apart
+job,a/1,2/0,2/1,3/ | --period 1ms | in.csv:3: job 0 at 0 ns is not after line 2, job 1 at 1000000 ns; put the rows in the order
+release_ns,a/0,1/10000000,3/5000000,5/ | --period 5ms | in.csv:4: job 2 at 5000000 ns is not after line 3, job 1 at 10000000 ns
+release_ns,a/0,1/0,3/ |  | in.csv:3: job 1 at 0 ns is not after line 2, job 0 at 0 ns
+release_ns,a/0,1/5000000,3/20000000,5/ | --period 5ms | in.csv:4: job 2 is due at 10000000 ns by --period, and at 20000000 ns by column release_ns
  | --period 1ms | in.csv:1: the table is empty
 a/x/ | --period 1ms --type [text;257] | in.csv:2: an array of more than 256 columns, [text; 257], is not read from a table
 a/1/ | --period 1ms --type [[[[[[u8;64];64];64];64];64];64] | in.csv:2: an array of more than 256 columns";

@@ -176,9 +176,9 @@ fn a_chain_across_dags_has_the_times_that_a_person_computes() {
     // is the output of 170.
     let chain = "
   chain eye/look > arm/move
-    age of an output              median 0.070 us, p99 0.132 us, max 0.132 us of 4 (bound 0.150 us)
-    data age                      median 0.132 us, p99 0.170 us, max 0.170 us of 3 (bound 0.190 us)
-    reaction time                 median 0.170 us, p99 0.170 us, max 0.170 us of 1 (bound 0.190 us)
+    age of an output              median 70 ns, p99 132 ns, max 132 ns of 4 (bound 150 ns)
+    data age                      median 132 ns, p99 170 ns, max 170 ns of 3 (bound 190 ns)
+    reaction time                 median 170 ns, p99 170 ns, max 170 ns of 1 (bound 190 ns)
 ";
     assert!(said.contains(chain), "{said}");
     let of_chain = "check-trace --json chain.rec --from eye/look --to arm/move";
