@@ -404,6 +404,13 @@ impl Linux {
         }));
     }
 
+    /// Adds a line to the record, if there is one.
+    pub fn note(line: &str) {
+        if let Some(file) = &mut *unpoisoned(&FILE) {
+            file.file().text(line);
+        }
+    }
+
     /// Has the run to come replay a recording, which may begin with this job of a DAG, or before.
     pub fn replay(&self, recording: &'static [u8], from: Option<(&'static str, u64)>) {
         let bytes = recording;

@@ -7,9 +7,10 @@ use std::{env, fs, panic};
 
 use fass::Policy;
 use fass::edge::job_of;
+use sched_dag::{Instance, OnFault};
 
 use crate::VirtualTime;
-use crate::report::Report;
+use crate::report::{PanicRecord, Report};
 
 const USAGE: &str = "\
 Replays a recording of this app in virtual time, and compares what it computes.
@@ -20,8 +21,8 @@ usage: FILE [--from DAG/JOB] [--until DAG/JOB] [--cores N] [--policy edf|static]
 recorded. --until shows what the subtasks of a job got and gave, as far as it is recorded. Without it the
 first job is shown in which a function panics, if one does.
 
-exit codes: 0 nothing differs; 1 something does, a function panics, or there is no such job;
-2 a refused command line or file";
+exit codes: 0 nothing differs; 1 something does, a function panics in a job that the recorded run has
+not survived, or there is no such job; 2 a refused command line or file";
 
 /// The command line, parsed.
 struct Words {
@@ -119,7 +120,8 @@ fn replay(
     let place = words.file.to_string_lossy();
     let bytes = fs::read(&words.file).map_err(|error| format!("{place}: {error}"))?;
     // An app keeps what it reads for as long as it runs, as on its machine.
-    let bytes: &'static [u8] = bytes.leak();
+    let bytes = recording::completed(bytes).map_err(|malformed| format!("{place}: {malformed}"))?;
+    let bytes: &'static [u8] = bytes.into_owned().leak();
     let machine = VirtualTime::new().cores(words.cores).policy(words.policy);
     if cfg!(panic = "abort") {
         name_remedy();
@@ -140,8 +142,14 @@ fn replay(
         return Ok(ExitCode::from(u8::from(!is_right)));
     }
     let report = machine.try_run().map_err(|error| error.to_string())?;
-    println!("{}", summary(&report));
-    let Some(panic) = report.panics.first() else {
+    let survived = |panic: &&PanicRecord| {
+        let Instance { dag, job, .. } = panic.instance;
+        let survives = report.task_set().dag(dag).on_fault() != OnFault::EndDag;
+        survives && machine.has_failed(dag, job)
+    };
+    let again = report.panics.iter().filter(survived).count();
+    println!("{}", summary(&report, again));
+    let Some(panic) = report.panics.iter().find(|panic| !survived(panic)) else {
         return Ok(ExitCode::from(u8::from(report.divergence.is_some())));
     };
     let (dag, job) = (panic.instance.dag, panic.instance.job);
@@ -161,7 +169,7 @@ fn name_remedy() {
     }));
 }
 
-fn summary(report: &Report) -> String {
+fn summary(report: &Report, again: usize) -> String {
     let compared = report.compared;
     let differs = match &report.divergence {
         Some(divergence) => divergence.to_string(),
@@ -172,12 +180,16 @@ fn summary(report: &Report) -> String {
         0 => String::new(),
         count => format!(", {count} are not"),
     };
-    let panics = match report.panics.len() {
+    let again_too = match again {
+        0 => String::new(),
+        count => format!("\n{count} faults that the recorded run has survived came again"),
+    };
+    let panics = match report.panics.len() - again {
         0 => String::new(),
         count => format!("\n{count} panics, first of all in this job:"),
     };
     let lacking = (report.lacking.as_ref()).map_or(String::new(), |(dag, first)| {
         format!("\nwhat functions of dag `{dag}` remember of jobs before {first} is not recorded")
     });
-    format!("{compared} values are compared{uncompared}: {differs}{lacking}{panics}")
+    format!("{compared} values are compared{uncompared}: {differs}{lacking}{again_too}{panics}")
 }

@@ -13,9 +13,9 @@ use fass::edge::{Begin, RecordedValue};
 use fass::log::{Level, LogLine, set_level};
 use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig, set_clock};
 use fass::shared::{DeviceDriver, Wire};
-use recording::Channel;
+use recording::{Channel, Entry, EntryKind};
 use sched_dag::lifecycle::{Request, WaitId};
-use sched_dag::{DagId, TaskSet};
+use sched_dag::{DagId, JobOutcome, TaskSet};
 
 use crate::job::JobShown;
 use crate::machine::{Arrival, Machine, RunError, Session};
@@ -61,10 +61,25 @@ impl VirtualTime {
     /// Returns what the subtasks of a job got and gave.
     pub(crate) fn show(&self, report: &Report, dag: DagId, job: u64) -> JobShown {
         let edge = &self.machine.edge;
-        JobShown {
+        let mut shown = JobShown {
             unmet_fault: edge.of_replay(|replay| replay.unmet_fault(Some((dag, job)))),
             ..JobShown::new(report, &self.recording(), dag, job)
+        };
+        // A replay goes on behind a fault, as what that cut is recorded; the job was lost.
+        let is_lost = self.has_failed(dag, job) && shown.unmet_fault.is_none();
+        if let Some(times) = shown.times.as_mut().filter(|_| is_lost) {
+            times.times.outcome = Some(JobOutcome::Failed);
         }
+        shown
+    }
+
+    /// Reports whether a job has failed in the run that is replayed.
+    pub(crate) fn has_failed(&self, dag: DagId, job: u64) -> bool {
+        let is_it = |entry: Entry<'_>| {
+            entry.what == EntryKind::Fault && (entry.dag.into(), entry.job) == (dag.0, job)
+        };
+        let edge = &self.machine.edge;
+        edge.of_replay(|replay| replay.events().any(is_it))
     }
 
     /// Runs to the end, for a duration, or until a job has ended. Meanwhile this machine is the

@@ -89,7 +89,7 @@ fn run(
     let signals = EndSignals::catch_first();
     let options = CommandLine::parse(line)?;
     let (linux, module) = apply(name, &options)?;
-    json::report("boot", |object| {
+    let boot = |object: &mut json::JsonObject<'_, '_>| {
         object
             .text("version", env!("CARGO_PKG_VERSION"))
             .text("app", name)
@@ -98,7 +98,10 @@ fn run(
             .text("clock", "linux")
             .flag("preemptive", linux.is_preemptive())
             .text("command_line", line);
-    });
+    };
+    json::report("boot", boot);
+    // The record, which the tool may never see, says by what it is to be judged.
+    Linux::note(&format!("{}\n", json::line("boot", boot)));
     for warning in linux.warnings() {
         crate::println!("fass-linux: {warning}");
     }

@@ -6,7 +6,7 @@ use std::ops::AddAssign;
 
 use crate::support::{commit, every, job_numbers, ms, named, run, ticking};
 use fass::shared::{Raiser, Sample, State};
-use fass::{Dag, create_dag, finish_create_dags};
+use fass::{Dag, FaultLimit, create_dag, finish_create_dags};
 use recording::{Channel, Entry, EntryKind, Recording, Role, Writer, to_bytes};
 use virtual_time::{JobShown, Passed, Report, RunError, SubtaskShown, Value, VirtualTime};
 
@@ -225,6 +225,36 @@ fn a_fault_that_does_not_come_again_is_told() {
     assert_eq!(found, (1, None, None));
 }
 
+#[test]
+fn a_job_that_a_survived_fault_has_cost_is_lost_in_the_replay_too() {
+    let build = || {
+        let dag = demo("demo", &["in"]);
+        let fails = |(n,): (u64,)| assert!(n != 1, "one");
+        dag.survive_faults(FaultLimit {
+            faults: 1,
+            window: 2,
+            in_all: 1,
+        });
+        dag.register_subtask(fails, vec!["in"], vec![], named("fails"));
+        [dag]
+    };
+    let machine = || VirtualTime::new().contain_panics();
+    let bytes = record(&machine(), &build());
+    let replaying = machine().replay(&bytes).expect("whole");
+    commit(&build());
+    for (job, outcome) in [(0, "in time"), (1, "cut by a fault"), (2, "in time")] {
+        let shown = replaying
+            .until("demo", job)
+            .expect("it is there")
+            .to_string();
+        let first = shown.lines().next();
+        assert!(
+            first.is_some_and(|line| line.ends_with(&format!(": {outcome}"))),
+            "{shown}"
+        );
+    }
+}
+
 /// A DAG that tells, and one that samples it, asks for the time, and fails in job 3.
 fn two() -> [Dag; 2] {
     let teller = every(10, "teller");
@@ -336,6 +366,13 @@ fn a_recording_that_does_not_fit_is_refused() {
     let fewer = "the recording's dag 1 is `slow`, and here there is none";
     let forgotten = "topic `in` of a source is in the recording, and is not recorded here";
     let has_lost = "the recording has lost topic `list` of job 1";
+    let later = |offset, period| {
+        let dag = demo("demo", both);
+        dag.offset(offset).period(period);
+        dag
+    };
+    let faster = "job 1 of dag `demo` was due at 10000000 ns, and is due at 5000000 ns here";
+    let offset = "job 0 of dag `demo` was due at 0 ns, and is due at 7000000 ns here";
     let too_far = "the recording has job 1099511627776 of dag `demo`";
     for (recording, dag, words) in [
         (&whole, demo("other", both), other_name),
@@ -346,6 +383,8 @@ fn a_recording_that_does_not_fit_is_refused() {
         (&lost, list(), has_lost),
         (&far_value, demo("demo", both), too_far),
         (&far_signal, demo("demo", both), too_far),
+        (&whole, later(ms(0), ms(5)), faster),
+        (&whole, later(ms(7), ms(10)), offset),
     ] {
         let _machine = VirtualTime::new().replay(recording).expect("whole");
         let said = finish_create_dags(&[dag]).expect_err(words).to_string();
