@@ -10,7 +10,7 @@
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
-use std::io::Read;
+use std::io::{Read, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -114,6 +114,28 @@ pub(crate) fn write_named(
     let named = Named { option, path };
     let written = fs::write(path, content);
     written.map_err(|error| format!("{}: cannot be written: {error}", named.words()))
+}
+
+/// Returns why nothing more can be written to a file, if that is so.
+pub(crate) fn why_full(path: &Path) -> Option<String> {
+    const MORE: usize = 4096;
+    let length = fs::metadata(path).ok()?.len();
+    // Not by a trial: the system ends a program that goes beyond this limit.
+    let limits = fs::read_to_string("/proc/self/limits").unwrap_or_default();
+    let limit = limits
+        .lines()
+        .find_map(|line| line.strip_prefix("Max file size"));
+    let limit = limit.and_then(|line| line.split_whitespace().next()?.parse().ok());
+    if limit.is_some_and(|limit: u64| length + MORE as u64 > limit) {
+        return Some("a file may not be longer (`ulimit -f`)".into());
+    }
+    let mut file = OpenOptions::new().append(true).open(path).ok()?;
+    let written = file
+        .write_all(&[b'\n'; MORE])
+        .and_then(|()| file.sync_all());
+    // What was written for the trial goes again.
+    let _ = file.set_len(length);
+    written.err().map(|error| error.to_string())
 }
 
 /// Writes a file of ours, and makes its folder if need be.

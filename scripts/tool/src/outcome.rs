@@ -11,6 +11,7 @@ use std::process::ChildStdin;
 use std::time::Duration;
 
 use crate::child::Asked;
+use crate::files;
 use crate::medium::Medium;
 use crate::places;
 use crate::protocol::{MachineLine, Status, Transcript, Verdict};
@@ -162,10 +163,17 @@ impl Outcome {
         if (is_odd || matches!(self.ending, Ending::Guest(_)))
             && self.transcript.of_kind("verdict").next().is_none()
         {
-            return Err(failure(format!(
-                "{}, but the kernel gave no verdict: the app has written to QEMU's exit port itself",
-                self.ending
-            )));
+            let why = files::why_full(&self.log).map_or_else(
+                || {
+                    "the kernel gave no verdict: the app has written to QEMU's exit port itself"
+                        .into()
+                },
+                |why| {
+                    let log = files::shown_path(&self.log);
+                    format!("its log {log} has no end: {why}; make room, or name a file elsewhere")
+                },
+            );
+            return Err(failure(format!("{}, but {why}", self.ending)));
         }
         let Ending::Guest(by_exit) = self.ending else {
             // QEMU handles such signals itself and ends with the status of a shutdown.

@@ -182,8 +182,7 @@ fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
         return Ok(Vec::new());
     };
     let place = files::shown_path(path);
-    let text = files::read_text(path)
-        .map_err(|why| Refusal::Usage(format!("`--input`: {why}; name another file")))?;
+    let text = files::read_text(path).map_err(|why| Refusal::Usage(format!("`--input`: {why}")))?;
     let entries = wire_script::read(&text)
         .map_err(|why| Refusal::Usage(format!("`--input`: {place}:{why}")))?;
     if entries.is_empty() {

@@ -68,6 +68,16 @@ impl Kept {
         self.raw.0.clone()
     }
 
+    /// Says where the record can be read while the run goes on.
+    pub(super) fn introduce(&self, screen: &Screen) {
+        if let (Some(_), Some(raw)) = (self.word, &self.raw.0) {
+            let (show, raw) = (system::script("recording"), files::shown_path(raw));
+            screen.say(&format!(
+                "record: until the end of the run `{show} {raw}` shows what came so far\n"
+            ));
+        }
+    }
+
     /// Returns the guest's word and the file, for a Linux program that writes the file itself.
     pub(super) fn word_with_file(&self) -> Option<(&'static str, PathBuf)> {
         self.word.zip(self.raw())
@@ -126,7 +136,10 @@ impl Kept {
             let file = files::shown_path(path);
             let shown = format!("`{show} {file}` shows what is recorded");
             let uses = match is_replayed {
-                true => format!("{shown}, and `--replay {file}` repeats it"),
+                true => format!(
+                    "{shown}, and `--replay {file}` repeats it{}",
+                    but_for(&bytes)
+                ),
                 false => format!("and {shown}"),
             };
             Ok(format!(
@@ -135,12 +148,27 @@ impl Kept {
                 bytes.len()
             ))
         };
-        wanted.into_iter().map(announce).collect()
+        let announced: Result<Vec<_>, String> = wanted.into_iter().map(announce).collect();
+        let announced = announced?;
+        let is_torn = Recording::read(&outcome.sent).is_err() && !outcome.sent.is_empty();
+        if is_torn && outcome.judge().is_ok() {
+            let raw = self.raw().unwrap_or_default();
+            let why = files::why_full(&raw);
+            let why = why.unwrap_or("it has no end, although the run has".into());
+            let raw = files::shown_path(&raw);
+            return Err(format!(
+                "{}\nwhat came of the record was not written whole to {raw}: {why}; make room, and \
+                 run it again",
+                announced.join("\n")
+            ));
+        }
+        Ok(announced)
     }
 
     /// Says which part of the run the record has.
     fn part(&self, bytes: &[u8]) -> String {
         let what = match self.word {
+            _ if Recording::read(bytes).is_ok_and(|of| of.is_cut()) => "a part of the run",
             Some("events") => "the events of the run",
             _ => "all of the run",
         };
@@ -221,6 +249,32 @@ impl Kept {
         let is_ours = (system::workspace().join("apps").join(app).join(EXAMPLE)).is_file();
         let in_its_own = || Path::new(EXAMPLE).is_file().then(String::new);
         is_ours.then(|| format!(" -p {app}")).or_else(in_its_own)
+    }
+}
+
+/// Names the DAGs of a record that a replay computes anew, if there are such.
+fn but_for(bytes: &[u8]) -> String {
+    let Ok(recording) = Recording::read(bytes) else {
+        return String::new();
+    };
+    let header = recording.header();
+    let has_values = |name: &str| {
+        let mut channels = header.channels.iter();
+        channels.any(|channel| header.dags[usize::from(channel.dag)].name == name)
+    };
+    let commit = recording.chunks().find_map(|chunk| match chunk {
+        Chunk::Commit(commit) => Some(commit),
+        _ => None,
+    });
+    let dags = commit.map_or(Vec::new(), |commit| commit.dags);
+    let names = dags.iter().map(|dag| &*dag.name);
+    match names.filter(|name| !has_values(name)).collect::<Vec<_>>()[..] {
+        [] => String::new(),
+        ref names => format!(
+            ", but for dag `{}`: of it nothing is recorded, what it receives and its requests (of \
+             modes and pauses) included; record its sources' topics by `Dag::record`",
+            names.join("`, `")
+        ),
     }
 }
 

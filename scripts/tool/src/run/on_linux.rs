@@ -146,6 +146,9 @@ pub(super) fn run_app(
         options,
         guest.is_some().then_some(mode),
     );
+    if guest.is_none() {
+        kept.introduce(&screen);
+    }
     let mut show = |line: &str| {
         if shows {
             let translated = dags.and_then(|dags| dags.translate(line));

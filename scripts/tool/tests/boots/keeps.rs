@@ -3,12 +3,13 @@
 use std::fs::{self, Permissions};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
+use std::process::Command;
 
 use recording::Recording;
 use tool::record::Record;
 use tool::system::workspace;
 
-use crate::support::{assert_refused, call, folder, succeed};
+use crate::support::{Called, assert_refused, call, folder, succeed};
 
 const RUN: &str = "run --app autoware --cores 4 --mode deterministic --jobs 5";
 
@@ -57,10 +58,14 @@ fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
 
     let bytes = read(&folder, "run.kept");
     fs::write(folder.join("cut"), &bytes[..bytes.len() - 1]).expect("our folder takes a file");
+    assert!(succeed(&folder, "recording cut").contains("\nincomplete: "));
+    let mut altered = bytes;
+    altered[1000] ^= 1;
+    fs::write(folder.join("altered"), altered).expect("our folder takes a file");
     assert_refused(
         &folder,
-        "check-trace cut | cut: at byte
-recording cut | cut: at byte
+        "check-trace altered | altered: at byte
+recording altered | altered: at byte
 run --on debian --keep x | `--keep` is not for `--on debian`; leave it out",
     );
 }
@@ -142,6 +147,37 @@ fn of_a_run_that_died_what_it_said_until_then_is_kept() {
     succeed(&folder, "check-trace --bound-us 5000000 died");
     let shown = succeed(&folder, "recording died");
     assert!(shown.contains("\nincomplete: it says nothing of what came after its last entry\n"));
+}
+
+#[test]
+fn what_finds_no_room_is_a_failure_of_the_disk_and_a_part_of_the_run() {
+    let folder = folder("no-room");
+    let image = tool::image::build("camera").expect("it can be built");
+    let image = image.display();
+    let run = format!("run --image {image} --mode deterministic --cores 1 --append jobs=100");
+    for (blocks, option, words) in [
+        (80, "--keep kept", "a part of the run, "),
+        (
+            2,
+            "--serial log",
+            "but its log log has no end: a file may not be longer",
+        ),
+    ] {
+        let line = format!("ulimit -f {blocks}; exec \"$0\" {run} {option}");
+        let tool = env!("CARGO_BIN_EXE_fass-tool");
+        let called = Command::new("sh")
+            .args(["-c", &line, tool])
+            .current_dir(&folder)
+            .output();
+        let called = Called::of(called.expect("a shell"));
+        let said = called.out + &called.complaint;
+        assert_eq!(called.code, Some(1), "{said}");
+        assert!(
+            said.contains(words) && said.contains("may not be longer"),
+            "{said}"
+        );
+    }
+    assert!(succeed(&folder, "recording kept").contains("\nincomplete: "));
 }
 
 #[test]
