@@ -18,8 +18,10 @@
 
 use std::collections::BTreeMap;
 use std::env;
-use std::path::Path;
-use std::process::Command;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{self, ChildStdout, Command, Stdio};
+use std::sync::Mutex;
 
 use crate::json::Value;
 use crate::protocol::{MachineLine, read_line};
@@ -48,9 +50,15 @@ pub fn explain(image: &Path, line: &str) -> Option<String> {
     let addresses = calls.iter().flat_map(|call| call.addresses());
     let addresses: Vec<u64> = address.into_iter().chain(addresses).collect();
     let first = *addresses.first()?;
-    let program = system::find_program("addr2line")?;
-    // All addresses in one call: the program reads the whole debugging information each time.
-    let frames = frames(&program, image, &addresses)?;
+    let mut of_lines = OF_LINES.lock().ok()?;
+    if of_lines.as_ref().is_none_or(|of| of.image != image) {
+        let program = system::find_program("addr2line")?;
+        *of_lines = NamedImage::open(&program, image);
+    }
+    let Some(frames) = of_lines.as_mut()?.frames(&addresses) else {
+        *of_lines = None;
+        return None;
+    };
     if is_backtrace {
         return tell(address, &calls, &frames);
     }
@@ -73,37 +81,88 @@ pub fn frames(
     image: &Path,
     addresses: &[u64],
 ) -> Option<BTreeMap<u64, Vec<Frame>>> {
-    // `-a` repeats each address; `-i` names the inlined calls that contain it, each in two
-    // lines (`-f`: function, file and line); `-C` makes names readable.
-    let mut command = Command::new(program);
-    command.args(["-aifC", "-e"]).arg(image);
-    command.args(addresses.iter().map(|address| format!("{address:#x}")));
-    Some(read_frames(&system::run(&mut command).ok()?))
+    Some(NamedImage::open(program, image)?.frames(addresses)?.clone())
 }
 
-fn read_frames(found: &str) -> BTreeMap<u64, Vec<Frame>> {
-    let mut all = BTreeMap::new();
-    let mut lines = found.lines();
-    let mut frames: &mut Vec<Frame> = &mut Vec::new();
-    while let Some(line) = lines.next() {
-        // `addr2line -a` prints 16 digits; a function's name never looks so.
-        let digits = line.strip_prefix("0x").filter(|digits| digits.len() == 16);
-        if let Some(address) = digits.and_then(|digits| u64::from_str_radix(digits, 16).ok()) {
-            frames = all.entry(address).or_default();
-            continue;
+/// An `addr2line` that has an image open, and its answers.
+struct NamedImage {
+    image: PathBuf,
+    process: process::Child,
+    answers: BufReader<ChildStdout>,
+    known: BTreeMap<u64, Vec<Frame>>,
+}
+
+/// The one for the lines of a log: it reads the whole debugging information when it starts.
+static OF_LINES: Mutex<Option<NamedImage>> = Mutex::new(None);
+
+/// An address that is in no image: it ends the answer to the one before.
+const NOWHERE: &str = "0xffffffffffffffff";
+
+impl NamedImage {
+    fn open(program: &Path, image: &Path) -> Option<Self> {
+        // `-a` repeats each address; `-i` names the inlined calls that contain it, each in two
+        // lines (`-f`: function, file and line); `-C` makes names readable.
+        let mut command = Command::new(program);
+        command.args(["-aifC", "-e"]).arg(image);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut process = command.stderr(Stdio::null()).spawn().ok()?;
+        Some(Self {
+            image: image.into(),
+            answers: BufReader::new(process.stdout.take()?),
+            process,
+            known: BTreeMap::new(),
+        })
+    }
+
+    /// Returns the functions that contain each of the addresses, and those of before.
+    fn frames(&mut self, addresses: &[u64]) -> Option<&BTreeMap<u64, Vec<Frame>>> {
+        for address in addresses {
+            if !self.known.contains_key(address) {
+                let frames = self.ask(*address)?;
+                self.known.insert(*address, frames);
+            }
+        }
+        Some(&self.known)
+    }
+
+    fn ask(&mut self, address: u64) -> Option<Vec<Frame>> {
+        let question = format!("{address:#x}\n{NOWHERE}\n");
+        self.process
+            .stdin
+            .as_mut()?
+            .write_all(question.as_bytes())
+            .ok()?;
+        let mut lines = self.answers.by_ref().lines().map_while(Result::ok);
+        read_frames(&mut lines)
+    }
+}
+
+/// Reads the answer to an address, which comes before that to [`NOWHERE`].
+fn read_frames(lines: &mut impl Iterator<Item = String>) -> Option<Vec<Frame>> {
+    // The address itself.
+    lines.next()?;
+    let mut frames = Vec::new();
+    loop {
+        let (function, place) = (lines.next()?, lines.next()?);
+        if function == NOWHERE {
+            // `place` is no function, and no line follows.
+            lines.next()?;
+            return Some(frames);
         }
         // ` (discriminator 2)` after the line tells copies of it apart; a path may contain blanks.
-        let place = lines.next().unwrap_or("??:?");
+        let line = place.split(" (discriminator ").next().unwrap_or(&place);
         frames.push(Frame {
-            function: line.into(),
-            line: place
-                .split(" (discriminator ")
-                .next()
-                .unwrap_or(place)
-                .into(),
+            function,
+            line: line.into(),
         });
     }
-    all
+}
+
+impl Drop for NamedImage {
+    fn drop(&mut self) {
+        // It ends with its input, which this closes.
+        let _ = self.process.wait();
+    }
 }
 
 /// Returns the address in a line's `place`, if its kind has one.
@@ -350,6 +409,10 @@ mod tests {
         ] {
             assert_eq!(explained(&other), None);
         }
+        let process = || OF_LINES.lock().unwrap().as_ref().map(|of| of.process.id());
+        let first = process();
+        assert!(explained(&line("panic", &inside)).is_some() && first.is_some());
+        assert_eq!(process(), first, "a process for each line takes minutes");
         let missing = explain(Path::new("no such image"), &line("panic", "0x200000"));
         assert_eq!(missing, None);
     }
@@ -364,10 +427,11 @@ mod tests {
              edges\n{root}/apps/my vision/src/lib.rs:7 (discriminator 2)\n\
              {{closure#1}}\n{root}/apps/vision/src/lib.rs:9\n\
              poll\n{root}/fass/src/run/subtask.rs:81\n\
-             0x00000000002070e9\ninterrupt_common\nfaults.2b61-cgu.0:?\n"
+             {NOWHERE}\n??\n??:0\n\
+             0x00000000002070e9\ninterrupt_common\nfaults.2b61-cgu.0:?\n{NOWHERE}\n??\n??:0\n"
         );
-        let frames = read_frames(&found);
-        let told = |address: u64| sentence(address, &frames[&address]);
+        let mut lines = found.lines().map(String::from);
+        let mut told = |address: u64| sentence(address, &read_frames(&mut lines).unwrap());
         let name = "<fass::subtask::Turns as core::future::Future>::poll";
         let expected = format!("0x20e0b8 is {name}, of apps/my vision/src/lib.rs:7");
         assert_eq!(told(0x20_e0b8), expected);
