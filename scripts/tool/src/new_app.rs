@@ -334,19 +334,36 @@ pub fn create_repository(out: &Path, name: &str, source: CrateSource<'_>) -> Res
             let line = format!("`--git {}`: no URL has such a character", quoted(url));
             return Err(Refusal::Usage(line));
         }
-        CrateSource::Folder(root) => match root.to_str().filter(|root| !root.contains(['"', '\\']))
-        {
-            Some(root) => from_folder(root),
-            None => {
-                let line = format!("{shown}: cargo cannot name the folder of these commands");
-                return Err(Refusal::Failure(line));
+        CrateSource::Folder(root) => {
+            match way(out, root).filter(|way| !way.contains(['"', '\\'])) {
+                Some(way) => from_folder(&way),
+                None => {
+                    let line = format!("{shown}: cargo cannot name the folder of these commands");
+                    return Err(Refusal::Failure(line));
+                }
             }
-        },
+        }
         CrateSource::Git(url) => from_git(url),
     };
     let files = OWN_FILES.into_iter().chain(FILES.iter().copied());
     let taken = format!("`--out` {shown}: it is there already; name a folder to be made");
     write_folder(out, name, files, changes, &taken)
+}
+
+/// Returns the way from a folder to be made to another one, so that both may be moved together.
+fn way(from: &Path, to: &Path) -> Option<String> {
+    let from = std::path::absolute(from).ok()?;
+    // Of the folders above those that are there: the rest has no links yet.
+    let there = from.ancestors().find(|above| above.exists())?;
+    let new = from.strip_prefix(there).ok()?;
+    let (from, to) = (
+        there.canonicalize().ok()?.join(new),
+        to.canonicalize().ok()?,
+    );
+    let common = from.ancestors().find(|above| to.starts_with(above))?;
+    let up = from.strip_prefix(common).ok()?.iter().map(|_| "..");
+    let way: PathBuf = up.chain(to.strip_prefix(common).ok()?.to_str()).collect();
+    way.to_str().map(String::from)
 }
 
 /// Returns the changes for crates of this workspace. Nothing is installed for them.
@@ -399,7 +416,7 @@ git init                # docs/guide.md goes on from here
 mod tests {
     use super::{
         CrateSource, FILES, MANIFEST, PACKAGES, PLACEHOLDER, check, create, create_repository,
-        names,
+        names, way,
     };
     use crate::options::Refusal;
     use crate::system::workspace;
@@ -499,6 +516,13 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
             let texts = places.map(|place| fs::read_to_string(out.join(place)).unwrap());
             let [manifest, runner, steps] = &texts;
             assert_eq!(steps.contains("install"), is_git, "{steps}");
+            let root = workspace().to_str().unwrap();
+            assert!(
+                !texts.concat().contains(root),
+                "a colleague has another folder: {texts:?}"
+            );
+            let kernel = out.join(way(&out, workspace()).unwrap()).canonicalize();
+            assert_eq!(kernel.unwrap(), workspace().canonicalize().unwrap());
             if is_git {
                 let by_url = format!("{{ git = \"{url}\" }}");
                 assert_eq!(

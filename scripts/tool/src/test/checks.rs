@@ -27,6 +27,29 @@ use crate::system;
 /// The most lines of a source file.
 const MOST_LINES: usize = 800;
 
+/// The folders of the root; cargo's own has what is made, results of measurements included.
+const FOLDERS: [&str; 9] = [
+    "apps",
+    "boot",
+    "docs",
+    "fass",
+    "kernel",
+    "sched-dag",
+    "scripts",
+    "target",
+    "tests",
+];
+
+/// Refuses folders that nobody has planned, such as a command's output.
+fn strange_folders(root: &Path) -> Result<(), String> {
+    let folders = fs::read_dir(root).into_iter().flatten().flatten();
+    let folders = folders.filter(|entry| entry.path().is_dir());
+    let names = folders.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let strange = names.filter(|name| !name.starts_with('.') && !FOLDERS.contains(&&**name));
+    let line = |name| format!("{name}/ is no folder of the project; write results below target/");
+    none_of(strange.map(line).collect())
+}
+
 /// Runs the wanted checks, without those of cargo.
 pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally) {
     let blessed = plan.blessed.as_deref();
@@ -43,6 +66,9 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     });
     run("no source file has more than 800 lines", &|| {
         Ok(complain(sources, is_long)?)
+    });
+    run("no folder of the root is unknown", &|| {
+        Ok(strange_folders(system::workspace())?)
     });
     run("every source file opens with an essay", &|| {
         Ok(complain(sources, lacks_essay)?)
