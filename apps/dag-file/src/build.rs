@@ -21,6 +21,8 @@ pub enum Length {
     Jobs(u64),
     /// Each DAG releases the jobs of this time in nanoseconds, at least one.
     Span(u64),
+    /// So many times the longest period of the set: so no DAG ends while others are slowed by it.
+    Periods(u64),
 }
 
 /// How a set is run.
@@ -37,11 +39,21 @@ pub struct Settings {
 }
 
 impl Length {
+    /// Returns the same, for the DAGs of a set.
+    #[must_use]
+    pub fn of(self, set: &Set) -> Self {
+        let Self::Periods(count) = self else {
+            return self;
+        };
+        let periods = set.dags.iter().filter_map(|dag| dag.spec.period_ns);
+        Self::Span(periods.max().unwrap_or(0).saturating_mul(count))
+    }
+
     /// Returns the number of jobs of a DAG.
     #[must_use]
     pub fn jobs(self, spec: &DagSpec) -> u64 {
         match self {
-            Self::Jobs(jobs) => jobs,
+            Self::Jobs(jobs) | Self::Periods(jobs) => jobs,
             Self::Span(span_ns) => {
                 let period_ns = spec.period_ns.unwrap_or(0).max(1);
                 let after_offset_ns = span_ns.saturating_sub(spec.offset_ns);
@@ -55,8 +67,13 @@ impl Length {
 #[must_use]
 pub fn build(set: &Set, settings: &Settings) -> Vec<Dag> {
     let mut seeds = (0..).map(|n| nth(settings.seed, n));
+    let length = settings.length.of(set);
+    let settings = Settings {
+        length,
+        ..*settings
+    };
     let dags = set.dags.iter();
-    dags.map(|dag| build_dag(dag, settings, &mut seeds))
+    dags.map(|dag| build_dag(dag, &settings, &mut seeds))
         .collect()
 }
 
@@ -240,5 +257,9 @@ mod tests {
         let of = |ns, dag: usize| Length::Span(ns).jobs(&file.sets[0].dags[dag].spec);
         assert_eq!((of(100_000_000, 0), of(100_000_000, 1)), (5, 10));
         assert_eq!((of(0, 0), of(15_000_001, 1)), (1, 2));
+        // No DAG ends before the slowest one.
+        let set = &file.sets[0];
+        let jobs = [0, 1].map(|dag| Length::Periods(3).of(set).jobs(&set.dags[dag].spec));
+        assert_eq!(jobs, [3, 6]);
     }
 }

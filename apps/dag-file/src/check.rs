@@ -24,7 +24,7 @@ use crate::file::{FileDag, Set};
 /// Every fault, with its line; of very many the first, and their number.
 pub fn check(set: &Set, machine: &CommitOptions, length: Length) -> Result<(), Vec<Malformed>> {
     let specs = set.dags.iter().map(|dag| DagSpec {
-        jobs: Some(length.jobs(&dag.spec)),
+        jobs: Some(length.of(set).jobs(&dag.spec)),
         ..dag.spec.clone()
     });
     let specs: Vec<DagSpec> = specs.collect();

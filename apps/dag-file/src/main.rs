@@ -117,7 +117,8 @@ fn wishes(machine: &Machine) -> Result<Wishes, AppError> {
             let seconds = options.number("seconds", 1..=1_000_000_000, 1)?;
             Length::Span(seconds * 1_000_000_000)
         }
-        (_, None) => Length::Jobs(options.number("jobs", 1..=1_000_000, 50)?),
+        (Some(_), None) => Length::Jobs(options.number("jobs", 1..=1_000_000, 1)?),
+        (None, None) => Length::Periods(50),
     };
     let occupations = [("hold", Occupation::Hold), ("spin", Occupation::Spin)];
     let wishes = Wishes {

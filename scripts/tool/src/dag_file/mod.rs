@@ -144,8 +144,8 @@ const COMPANIONS: [&str; 6] = [
     "strict-deadlines",
 ];
 
-/// The jobs of each DAG if no number is given.
-const JOBS: u64 = 50;
+/// The longest periods of a run if nothing is said of its length, as for the guest.
+const PERIODS: u64 = 50;
 
 /// Returns the word with the kernel's worst overheads, as measured in deterministic mode: a context
 /// switch, a dispatch, an interrupt, an instance that becomes ready. The commit adds them to WCETs
@@ -275,16 +275,17 @@ fn clusters(text: Option<&str>) -> Result<CoreDivision, String> {
 }
 
 fn length(options: &Parsed) -> Length {
-    match options.number("seconds") {
-        Some(seconds) => Length::Span(seconds.saturating_mul(1_000_000_000)),
-        None => Length::Jobs(options.number("jobs").unwrap_or(JOBS)),
+    match (options.number("seconds"), options.number("jobs")) {
+        (Some(seconds), _) => Length::Span(seconds.saturating_mul(1_000_000_000)),
+        (None, Some(jobs)) => Length::Jobs(jobs),
+        (None, None) => Length::Periods(PERIODS),
     }
 }
 
 /// Returns the number of records of a set in a run: its jobs, instances and waits.
 fn records(set: &Set, length: Length) -> u64 {
     let of = |dag: &FileDag| {
-        let jobs = length.jobs(&dag.spec);
+        let jobs = length.of(set).jobs(&dag.spec);
         let waits: usize = dag.spec.subtasks.iter().map(|of| of.waits.len()).sum();
         jobs.saturating_mul((dag.subtasks.len() + waits) as u64 + 1)
     };
@@ -300,7 +301,10 @@ fn in_flight_bytes(set: &Set, length: Length) -> u64 {
     const OF_A_JOB: u64 = 1024 * 4 / 3;
     const OF_AN_INSTANCE: u64 = 288 * 4 / 3;
     let of = |dag: &FileDag| {
-        let jobs = dag.spec.most_in_flight().min(length.jobs(&dag.spec));
+        let jobs = dag
+            .spec
+            .most_in_flight()
+            .min(length.of(set).jobs(&dag.spec));
         let places = jobs.checked_next_power_of_two().unwrap_or(u64::MAX);
         let instances = dag.subtasks.len() as u64;
         places.saturating_mul(
@@ -351,7 +355,7 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
         seconds += u128::from(records(set, length) / 500);
         let (mut span_ns, mut busy_ns) = (0_u128, 0_u128);
         for FileDag { spec, .. } in &set.dags {
-            let jobs = u128::from(length.jobs(spec));
+            let jobs = u128::from(length.of(set).jobs(spec));
             let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
             let waits = spec.subtasks.iter().flat_map(|subtask| &subtask.waits);
             let each_ns = wcets.chain(waits.map(|wait| wait.limit_ns));
