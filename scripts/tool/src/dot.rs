@@ -5,7 +5,7 @@
 //! its WCET, waits and priority; an arrow for each edge, with the topic and the message's
 //! type, dotted where a state makes the edge. A topic whose latest value is sampled
 //! has a note of its own, with a dashed arrow to each subtask, of any DAG, that
-//! samples it.
+//! samples it; the note of a topic that only leaves the DAG says that it is recorded.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -146,6 +146,11 @@ impl Dag<'_> {
                 label += &format!("\ncore {core}");
             }
         }
+        for &(sink, deadline_ns) in &self.dag.sinks {
+            if sink as usize == number && deadline_ns != self.dag.relative_deadline_ns {
+                label += &format!("\nD = {}", briefly(deadline_ns));
+            }
+        }
         if subtask.is_non_preemptive {
             label += "\nnon-preemptive";
         }
@@ -157,14 +162,20 @@ impl Dag<'_> {
         // Edges that a topic or a state makes are drawn by these, with a label.
         let mut explained = BTreeSet::new();
         for (number, topic) in self.dag.topics.iter().enumerate() {
-            let label = format!("{}: {}", topic.name, without_paths(&topic.type_name));
-            let (label, writer) = (quoted(&label), topic.writer);
+            let name = format!("{}: {}", topic.name, without_paths(&topic.type_name));
+            let (label, writer) = (quoted(&name), topic.writer);
             for &reader in &topic.readers {
                 explained.insert((writer, reader));
                 let edge = format!("{id}_s{writer} -> {id}_s{reader}");
                 let _ = writeln!(text, "    {edge} [label={label}];");
             }
+            let all = self.commit.told.dags.iter().flat_map(|dag| &dag.samples);
+            let mut all = all.map(|&(_, dag, topic, _)| (dag, topic as usize));
+            let is_taken = all.any(|of| of == (self.number, number));
             if topic.is_sampled {
+                // The model has one mark for both: values that leave the DAG.
+                let label = if is_taken { name } else { name + "\nrecorded" };
+                let label = quoted(&label);
                 let note = format!("{id}_t{number}");
                 let _ = writeln!(text, "    {note} [shape=note, label={label}];");
                 let _ = writeln!(text, "    {id}_s{writer} -> {note} [style=dashed];");
@@ -223,7 +234,16 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
             readers: vec![1],
             is_sampled: true,
         }];
+        let topic = eye.topics[0].clone();
+        let (name, type_name) = ("log".into(), "u8".into());
+        eye.topics.push(CommittedTopic {
+            name,
+            type_name,
+            readers: Vec::new(),
+            ..topic
+        });
         eye.states = vec![("map".into(), 1, 2)];
+        eye.sinks = vec![(2, 90_000_000)];
         eye.samples = vec![(0, 0, 0, Some(12_000_000)), (2, 0, 0, None)];
         let waits = vec![(0, 0, 3_000_000, Some(400_000)), (0, 2, 0, None)];
         let told = Commit {
@@ -247,10 +267,12 @@ eye T=25000000 D=100000000 O=500 flight=5: camera/1/1000000 b/2 fuse/3; 0>1 0>2 
     label="the \"eye\"\nT = 25 ms, D = 100 ms, O = 500 ns\n20 jobs, 5 in flight, overrun: queue\naffinity: [0]";
     c0_d0_s0 [label="camera\nWCET 1 ms\nwaits up to 3 ms, then 400 us\npriority 1"];
     c0_d0_s1 [label="subtask 1\npriority 2\ncore 1\nnon-preemptive"];
-    c0_d0_s2 [label="fuse\nwaits up to 0 ns\npriority 3"];
+    c0_d0_s2 [label="fuse\nwaits up to 0 ns\npriority 3\nD = 90 ms"];
     c0_d0_s0 -> c0_d0_s1 [label="frame: Arc<[Frame]>"];
     c0_d0_t0 [shape=note, label="frame: Arc<[Frame]>"];
     c0_d0_s0 -> c0_d0_t0 [style=dashed];
+    c0_d0_t1 [shape=note, label="log: u8\nrecorded"];
+    c0_d0_s0 -> c0_d0_t1 [style=dashed];
     c0_d0_s1 -> c0_d0_s2 [style=dotted, label="map"];
     c0_d0_s0 -> c0_d0_s2;
   }

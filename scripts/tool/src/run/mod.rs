@@ -151,9 +151,8 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         Some(path) => path.into(),
         None => image::build(&app)?,
     };
-    // Interactive runs need real time; a firmware takes minutes where instructions are counted.
-    let is_live = options.is_given("console") || handed::is_live(options);
-    let otherwise = match is_live || longest.loader.needs_stick() {
+    // A firmware takes minutes where instructions are counted.
+    let otherwise = match longest.loader.needs_stick() {
         true => Mode::Threads,
         false => Mode::Deterministic,
     };
@@ -163,6 +162,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     let limit = limit(options, dags);
     let mut screen = Screen::new(options, &image);
     introduce(&screen, &app, &qemu, why);
+    kept.introduce(&screen);
     let show = |line: &str| {
         // A firmware draws its menus on the serial port with escape sequences; they are not shown.
         if shows && !(qemu.loader.needs_stick() && line.contains('\x1b')) {
@@ -231,6 +231,7 @@ fn describe(
         guest_words: format!("mode={mode} {words}").trim_end().into(),
         module: None,
         records: None,
+        is_paced: is_live(options),
         has_input: options.is_given("console"),
         stops: screen::can_stop(options),
         second: handed::second(options),
@@ -268,6 +269,11 @@ fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
     Duration::from_secs(seconds)
 }
 
+/// Reports whether somebody sends while the guest runs.
+fn is_live(options: &Parsed) -> bool {
+    options.is_given("console") || handed::is_live(options)
+}
+
 /// Prints the app, its guest, and how far the times can be trusted.
 fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say(&format!("app {app}, guest words: {}", qemu.guest_words));
@@ -278,6 +284,9 @@ fn introduce(screen: &Screen, app: &str, qemu: &Qemu, why: Option<String>) {
     screen.say(&format!("time: {}", qemu.mode.meaning()));
     if let Some(why) = why {
         screen.say(&format!("mode {} because {why}", qemu.mode));
+    }
+    if qemu.has_input {
+        screen.say("console: type `help`; the end of input or ctrl-C ends the run");
     }
     if qemu.debugger.is_some() {
         screen.say("waiting for a debugger: `gdb IMAGE -ex 'target remote :1234'`");

@@ -9,6 +9,8 @@
 //! Coordinates are whole pixels, so that a run whose times differ by less than that has the same
 //! picture, byte by byte. Pages keep such pictures, and tests draw them again.
 
+use std::ops::Range;
+
 use sched_dag::{Dag, DagId, SubtaskId};
 
 use super::View;
@@ -32,31 +34,31 @@ const COLOURS: [&str; 10] = [
     "#90d5c9", "#e3e3e3",
 ];
 
-/// Draws what the jobs did that were released in the first `periods` of the longest period.
+/// Draws what the jobs did that were released from one time on and before another.
 ///
 /// # Errors
 ///
 /// In words: no job is left of that time.
-pub fn draw(run: &Run, periods: u64) -> Result<String, String> {
+pub fn draw(run: &Run, released_ns: Range<u64>) -> Result<String, String> {
     let view = View::new(run);
-    let dags = run.task_set.dags();
-    let longest_ns = dags.iter().map(Dag::period_ns).max().unwrap_or(0);
-    let span_ns = longest_ns.saturating_mul(periods);
     let mut picture = Picture {
         view: &view,
         svg: Svg::default(),
-        span_ns,
-        end_ns: span_ns,
+        end_ns: released_ns.end,
+        released_ns,
     };
-    let ends = view.jobs.values().filter_map(|job| {
-        let is_drawn = job.released_ns.is_some_and(|at_ns| at_ns < span_ns);
-        is_drawn.then_some(job.completed_ns.unwrap_or(0))
-    });
+    let jobs = view
+        .jobs
+        .iter()
+        .filter(|((dag, job), _)| picture.is_drawn(*dag, *job));
+    let ends = jobs.map(|(_, job)| job.completed_ns.unwrap_or(0));
     let last_ns = ends.max().ok_or_else(|| {
         format!(
-            "run {} keeps no job that was released before {}; ask for more by `--periods`",
+            "run {} keeps no job that was released from {} to {}; name another time by `--from`, \
+             or more of it by `--periods` or `--until`",
             run.number,
-            time(span_ns)
+            time(picture.released_ns.start),
+            time(picture.released_ns.end)
         )
     })?;
     picture.end_ns = picture.end_ns.max(last_ns);
@@ -76,8 +78,8 @@ pub fn draw(run: &Run, periods: u64) -> Result<String, String> {
 struct Picture<'v> {
     view: &'v View<'v>,
     svg: Svg,
-    /// Jobs that are released before this are drawn.
-    span_ns: u64,
+    /// Jobs that are released then are drawn.
+    released_ns: Range<u64>,
     /// Where the axis of time ends.
     end_ns: u64,
 }
@@ -93,15 +95,17 @@ impl<'v> Picture<'v> {
             .jobs
             .get(&(dag, job))
             .and_then(|job| job.released_ns);
-        released_ns.is_some_and(|released_ns| released_ns < self.span_ns)
+        released_ns.is_some_and(|at_ns| self.released_ns.contains(&at_ns))
     }
 
     /// Where an instant is on the axis.
     fn x(&self, time_ns: u64) -> u64 {
         let pixels = u128::from(WIDTH - LEFT - RIGHT);
-        let end_ns = u128::from(self.end_ns.max(1));
+        let from_ns = self.released_ns.start;
+        let span_ns = u128::from((self.end_ns - from_ns).max(1));
         // To the nearest pixel.
-        let x = (2 * u128::from(time_ns) * pixels + end_ns) / (2 * end_ns);
+        let after_ns = u128::from(time_ns.saturating_sub(from_ns));
+        let x = (2 * after_ns * pixels + span_ns) / (2 * span_ns);
         LEFT + u64::try_from(x).expect("within the picture")
     }
 
@@ -200,11 +204,16 @@ impl<'v> Picture<'v> {
     /// Draws the response time of each job of a DAG, from `y` on, with bound and deadline.
     fn responses(&mut self, dag: DagId, model: &Dag, y: u64) -> u64 {
         let bound_ns = self.view.run.bounds_ns.get(dag.0 as usize);
-        let marks = [
-            // Of two rows of labels the later mark's is the upper one: its line ends above the other.
-            (Some(model.relative_deadline_ns()), "#c1121f", "deadline"),
-            (bound_ns.copied().flatten(), "#1a7f37", "bound"),
-        ];
+        let own = model.sinks().iter().map(|sink| model.subtask(*sink));
+        let own = own.filter(|sink| sink.relative_deadline_ns() != model.relative_deadline_ns());
+        // Of two rows of labels the later mark's is the upper one: its line ends above the other.
+        let mut marks = vec![(model.relative_deadline_ns(), "#c1121f", "deadline".into())];
+        marks.extend(own.map(|sink| {
+            let name = format!("deadline of {}", sink.name());
+            (sink.relative_deadline_ns(), "#c1121f", name)
+        }));
+        let bound_ns = bound_ns.copied().flatten();
+        marks.extend(bound_ns.map(|bound_ns| (bound_ns, "#1a7f37", "bound".into())));
         self.svg.text((8, y + 20), "start", model.name());
         let view = self.view;
         let mut is_first = true;
@@ -224,10 +233,8 @@ impl<'v> Picture<'v> {
                 self.svg
                     .text((from + (to - from) / 2, y + 21), "middle", &response);
             }
-            for (row, (after_ns, colour, name)) in (0..).zip(marks) {
-                let Some(at_ns) = after_ns.map(|after_ns| release_ns + after_ns) else {
-                    continue;
-                };
+            for (row, (after_ns, colour, name)) in (0_u64..).zip(&marks) {
+                let at_ns = release_ns + after_ns;
                 if at_ns > self.end_ns {
                     continue;
                 }
@@ -248,15 +255,19 @@ impl<'v> Picture<'v> {
             }
             is_first = false;
         }
-        y + 2 * ROW
+        y + 2 * ROW + 16 * (marks.len() as u64).saturating_sub(2)
     }
 
     /// Draws the axis between two heights, with some ten marks.
     fn axis(&mut self, top: u64, bottom: u64) {
         let steps = (0..).flat_map(|power| [1, 2, 5].map(|step| step * 10_u64.pow(power)));
-        let step_ns = steps.take(54).find(|step| self.end_ns / step <= 12);
-        let step_ns = step_ns.unwrap_or(self.end_ns.max(1));
-        for time_ns in (0..=self.end_ns).step_by(usize::try_from(step_ns).unwrap_or(usize::MAX)) {
+        let from_ns = self.released_ns.start;
+        let span_ns = self.end_ns - from_ns;
+        let step_ns = steps.take(54).find(|step| span_ns / step <= 12);
+        let step_ns = step_ns.unwrap_or(span_ns.max(1));
+        let first_ns = from_ns.next_multiple_of(step_ns);
+        let by = usize::try_from(step_ns).unwrap_or(usize::MAX);
+        for time_ns in (first_ns..=self.end_ns).step_by(by) {
             let x = self.x(time_ns);
             self.svg.line(
                 (x, top),

@@ -37,10 +37,11 @@ use std::fmt::Write;
 use std::fs;
 use std::process::ExitCode;
 
+use dag_file::time::parse_ns;
 use sched_dag::chains::SampledJobs;
 use sched_dag::journal::EventKind;
 use sched_dag::law::Violation;
-use sched_dag::{CoreId, DagId, Instance, SubtaskId};
+use sched_dag::{CoreId, Dag, DagId, Instance, SubtaskId};
 
 use super::{JobHistory, Slice, View, picture};
 use super::{check, read_file};
@@ -137,8 +138,7 @@ pub static TRACE: Command = Command {
     about: "Draws the traces of runs: for Perfetto's viewer, or as one picture.",
     positional: Some((
         Takes::File("FILE"),
-        "A serial log, or another file of JSON lines, with traces: \
-         `./scripts/run --trace FILE` makes one.",
+        "A record of runs, as `./scripts/run --trace FILE` and --keep write it, or a serial log.",
     )),
     options: options! {
         /// Write to this file; else to standard output.
@@ -147,6 +147,10 @@ pub static TRACE: Command = Command {
         "svg": Takes::Nothing;
         /// How many times the longest period the picture shows.
         "periods": Takes::Number(1, 1000), or "1";
+        /// The picture begins at this time of the run, such as 20ms; else at 0.
+        "from": Takes::Text("TIME");
+        /// It shows the jobs that are released before this time, whatever --periods says.
+        "until": Takes::Text("TIME");
         /// Only the run of this number; else all of them, side by side from time 0.
         "run": Takes::Number(0, u64::MAX);
         /// As for ./scripts/check-trace, whose breaches are shown as markers.
@@ -183,7 +187,7 @@ pub fn trace(words: &[OsString]) -> ExitCode {
 
 /// Converts the runs that the options name.
 fn draw(options: &Parsed) -> Result<String, String> {
-    let input = options.file("which file? name a serial log with a trace")?;
+    let input = options.file("which file? name a record of a run")?;
     files::check(&[input], &options.named(&["out"]))?;
     let mut runs = read_file(input.path)?;
     let file = files::shown_path(input.path);
@@ -200,7 +204,16 @@ fn draw(options: &Parsed) -> Result<String, String> {
     if options.is_given("svg") {
         // Without `--run` the first one: a picture has one axis of time.
         let run = runs.first().ok_or("the file has no run")?;
-        return picture::draw(run, options.number("periods").unwrap_or(1));
+        let time = |name: &str| {
+            let time = options.text(name).map(parse_ns).transpose();
+            time.map_err(|why| format!("`--{name}`: {why}"))
+        };
+        let from_ns = time("from")?.unwrap_or(0);
+        let periods = run.task_set.dags().iter().map(Dag::period_ns);
+        let longest_ns = periods.max().unwrap_or(0);
+        let span_ns = longest_ns.saturating_mul(options.number("periods").unwrap_or(1));
+        let until_ns = time("until")?.unwrap_or(from_ns.saturating_add(span_ns));
+        return picture::draw(run, from_ns..until_ns.max(from_ns));
     }
     // All runs of a file come from one boot, so one bound holds for all.
     let bound_ns = runs.first().map_or(0, |run| tolerance_ns(run, options));

@@ -218,7 +218,7 @@ fn a_wait_ends_a_piece_and_is_shown_in_its_subtask() {
     assert_drawn(&run, "s: ", of_subtask);
 
     let stated = format!("{HEADER}\nwait 0.0 30\nwait 0.0 20");
-    let svg = picture::draw(&run_of(&stated, waits), 1).expect("it has a job");
+    let svg = picture::draw(&run_of(&stated, waits), 0..1000).expect("it has a job");
     assert_eq!(svg.matches(">waits 50 ns<").count(), 1, "{svg}");
     // Job 1 has no release.
     assert_eq!(svg.matches(" height=\"4\"").count(), 2, "{svg}");
@@ -272,7 +272,7 @@ fn runs_stand_side_by_side_and_share_no_number() {
 
 #[test]
 fn a_picture_shows_what_cores_executed_and_each_job_with_its_deadline() {
-    let svg = picture::draw(&diamond(), 1).expect("it has jobs");
+    let svg = picture::draw(&diamond(), 0..1500).expect("it has jobs");
     let count = |part: &str| svg.matches(part).count();
     // The page, five boxes, five executions in six pieces, three of job 1, two complete jobs.
     assert_eq!(count("<rect"), 1 + 5 + 6 + 3 + 2, "{svg}");
@@ -290,6 +290,10 @@ fn a_picture_shows_what_cores_executed_and_each_job_with_its_deadline() {
     ] {
         assert_eq!(count(label), usize::from(label != ">core 2<"), "{label}");
     }
-    let why = picture::draw(&run_of(HEADER, ""), 1).expect_err("no event is there");
+    // Of a window only the jobs that are released in it, from where the axis begins.
+    let svg = picture::draw(&diamond(), 1..1500).expect("it has jobs");
+    let (whole, part) = (count("<rect"), svg.matches("<rect").count());
+    assert!((1 + 5..whole).contains(&part), "{svg}");
+    let why = picture::draw(&run_of(HEADER, ""), 0..1500).expect_err("no event is there");
     assert!(why.contains("keeps no job"), "{why}");
 }
