@@ -23,8 +23,9 @@ use crate::file::{FileDag, Set};
 ///
 /// Every fault, with its line; of very many the first, and their number.
 pub fn check(set: &Set, machine: &CommitOptions, length: Length) -> Result<(), Vec<Malformed>> {
+    let length = length.of(set);
     let specs = set.dags.iter().map(|dag| DagSpec {
-        jobs: Some(length.of(set).jobs(&dag.spec)),
+        jobs: Some(length.jobs(&dag.spec)),
         ..dag.spec.clone()
     });
     let specs: Vec<DagSpec> = specs.collect();

@@ -284,8 +284,9 @@ fn length(options: &Parsed) -> Length {
 
 /// Returns the number of records of a set in a run: its jobs, instances and waits.
 fn records(set: &Set, length: Length) -> u64 {
+    let length = length.of(set);
     let of = |dag: &FileDag| {
-        let jobs = length.of(set).jobs(&dag.spec);
+        let jobs = length.jobs(&dag.spec);
         let waits: usize = dag.spec.subtasks.iter().map(|of| of.waits.len()).sum();
         jobs.saturating_mul((dag.subtasks.len() + waits) as u64 + 1)
     };
@@ -300,11 +301,9 @@ const MOST_MEMORY_MIB: u64 = 3072;
 fn in_flight_bytes(set: &Set, length: Length) -> u64 {
     const OF_A_JOB: u64 = 1024 * 4 / 3;
     const OF_AN_INSTANCE: u64 = 288 * 4 / 3;
+    let length = length.of(set);
     let of = |dag: &FileDag| {
-        let jobs = dag
-            .spec
-            .most_in_flight()
-            .min(length.of(set).jobs(&dag.spec));
+        let jobs = dag.spec.most_in_flight().min(length.jobs(&dag.spec));
         let places = jobs.checked_next_power_of_two().unwrap_or(u64::MAX);
         let instances = dag.subtasks.len() as u64;
         places.saturating_mul(
@@ -353,9 +352,10 @@ fn limit_s(file: &DagFile, length: Length) -> u64 {
     let mut seconds = 120_u128;
     for set in &file.sets {
         seconds += u128::from(records(set, length) / 500);
+        let length = length.of(set);
         let (mut span_ns, mut busy_ns) = (0_u128, 0_u128);
         for FileDag { spec, .. } in &set.dags {
-            let jobs = u128::from(length.of(set).jobs(spec));
+            let jobs = u128::from(length.jobs(spec));
             let wcets = spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
             let waits = spec.subtasks.iter().flat_map(|subtask| &subtask.waits);
             let each_ns = wcets.chain(waits.map(|wait| wait.limit_ns));
