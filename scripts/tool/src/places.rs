@@ -60,7 +60,7 @@ pub fn explain(image: &Path, line: &str) -> Option<String> {
         return None;
     };
     if is_backtrace {
-        return tell(address, &calls, &frames);
+        return tell(address, &calls, frames);
     }
     Some(sentence(first, frames.get(&first)?))
 }
