@@ -308,6 +308,8 @@ crate::recordable! {
         pub affinities: Vec<(u32, u32)>,
         /// So much more is charged where subtasks are pinned. Since version 7, too.
         pub move_ns: u64,
+        /// By DAG, which test gave its bound, or why there is none. Since version 8.
+        pub answers: Vec<String>,
     }
 
     /// A DAG of a [`Commit`].

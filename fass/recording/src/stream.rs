@@ -32,8 +32,9 @@ pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 /// [`EntryKind::Fault`]; those before 4 have no text, and
 /// those before 5 no commits, events and times, and no [states](crate::Role::State); those before 6
 /// no [waits](Commit::waits) and no [answers](crate::Role::Answer); those before 7 no
-/// [pins](Commit::pins) and [affinities](Commit::affinities).
-pub const VERSION: u16 = 7;
+/// [pins](Commit::pins) and [affinities](Commit::affinities); those before 8 no
+/// [answers](Commit::answers).
+pub const VERSION: u16 = 8;
 
 /// The kinds of frames.
 pub(super) const HEADER: u8 = 1;

@@ -502,13 +502,15 @@ impl CommitAnswers {
                 verdict,
             }
         });
-        let of_dags = of_dags.collect();
+        let of_dags: Vec<DagAnswer> = of_dags.collect();
+        let answers = of_dags.iter().map(ToString::to_string).collect();
         let bounds_ns = (answer.bounds.iter()).map(|bound| Some(bound.as_ref()?.bound_ns));
         Self {
             of_dags,
             proven: ProvenBounds {
                 bounds_ns: bounds_ns.collect(),
                 sink_bounds_ns: answer.sinks_ns,
+                answers,
             },
             first_unproven: answer.first_failing.map(|failing| failing.dag.index()),
             settings,

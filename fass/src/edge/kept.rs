@@ -169,6 +169,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
         pins: pins(task_set),
         affinities: affinities(task_set),
         move_ns: overheads.of_a_move_ns(options.preemption),
+        answers: plan.proven.answers.clone(),
     }
 }
 

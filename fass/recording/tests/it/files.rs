@@ -48,6 +48,7 @@ fn commit() -> Commit {
         pins: vec![(0, 0, 1)],
         affinities: vec![(0, 0), (0, 2)],
         move_ns: 7,
+        answers: vec!["dag `fast` takes at most 7ns".into()],
         ..Commit::default()
     }
 }
@@ -236,7 +237,7 @@ fn foreign_and_newer_files_are_told() {
     let newer = [&MAGIC[..], &(VERSION + 1).to_le_bytes()].concat();
     assert_eq!(
         said(&newer),
-        "at byte 8: expected version 1 to 7 of recordings, which are those that are read"
+        "at byte 8: expected version 1 to 8 of recordings, which are those that are read"
     );
     let mut more = recording();
     more.push(0);
@@ -304,13 +305,13 @@ fn a_recording_of_the_version_before_is_read_and_one_of_the_next_is_not() {
 }
 
 #[test]
-fn a_commit_of_a_version_before_has_no_waits_or_pins() {
+fn a_commit_of_a_version_before_has_no_waits_pins_or_answers() {
     let commit = Commit {
         cores: 2,
         ..Commit::default()
     };
-    // Versions 5 and 6 end it before the numbers of these, and no version elsewhere.
-    for (lacks, is_one) in [(20, true), (16, true), (12, false), (17, false)] {
+    // Versions 5, 6 and 7 end it before the numbers of these, and no version elsewhere.
+    for (lacks, is_one) in [(24, true), (20, true), (4, true), (12, false), (17, false)] {
         let mut bytes = Stream::begin(Vec::new()).end();
         let end = bytes.split_off(10);
         let payload = to_bytes(&commit);

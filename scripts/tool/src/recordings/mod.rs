@@ -359,6 +359,9 @@ fn shown(recording: &Recording<'_>) -> String {
             let _ = writeln!(text, "  {count} {what}");
         }
     }
+    for answer in commits.iter().flat_map(|commit| &commit.answers) {
+        let _ = writeln!(text, "  {}", visible(answer));
+    }
     let _ = match recording.lost() {
         _ if recording.is_cut() => writeln!(
             text,
