@@ -5,22 +5,19 @@
 //! those with it that it may delay, directly or through others. What is left
 //! is analysed without it: whatever it does, it cannot delay these.
 
-use alloc::vec;
 use alloc::vec::Vec;
 
-use super::intra_task::{SUBTASK_LIMIT, intra_task};
-use super::one_core::{DagDemand, DueDemand, ResponseEquation, demand};
+use super::features::Features;
 use super::ranks::{PreemptionMix, RankRelation};
-use super::set::{EquationSet, EvaluationBudget, constrained};
+use super::set::{EquationSet, constrained};
 use super::task::{Task, TaskError};
-use super::waiting::Rounding;
 use super::workload::WorkloadBursts;
-use super::{AnalysisSettings, DagBound, NotProvenReason, multi_path};
+use super::{AnalysisSettings, NotProvenReason};
 use crate::ids::DagId;
 use crate::order::sorted_by_key;
 use crate::policy::{Policy, Preemption};
 use crate::spec::PINS;
-use crate::task_set::Dag;
+use crate::task_set::{Dag, Subtask};
 
 /// Makes the case of those DAGs at the positions `own` that can be analysed, and notes why
 /// others of these cannot be. There are no other DAGs on the cores of the settings.
@@ -62,14 +59,6 @@ pub(super) fn of_cluster<'a>(
     }
 }
 
-/// By DAG of a case, its bound or why it has none; and the first that has none for a reason of its
-/// own.
-pub(super) type CaseBounds = (
-    Vec<Option<DagBound>>,
-    Vec<Option<NotProvenReason>>,
-    Option<usize>,
-);
-
 /// The DAGs that can be analysed, and what follows from their attributes.
 pub(super) struct AnalysisInput<'a> {
     /// All DAGs of the commit.
@@ -85,6 +74,8 @@ pub(super) struct AnalysisInput<'a> {
     pub(super) order: Vec<usize>,
     pub(super) set: EquationSet<'a>,
     is_pinned: bool,
+    /// By DAG, the features that enter it: its own, and those of all that may delay it.
+    pub(super) entering: Vec<Features>,
 }
 
 impl<'a> AnalysisInput<'a> {
@@ -109,13 +100,27 @@ impl<'a> AnalysisInput<'a> {
             order,
             set: EquationSet::new(tasks, settings.cores),
             is_pinned: is_pinned(own.iter().map(|&dag| &all[dag])),
+            entering: Vec::new(),
         };
         let own = own.iter().map(|&dag| &all[dag]);
         case.set.bursts = WorkloadBursts::of(own, settings);
+        case.entering = case.features();
         if !case.is_pinned() {
             case.complete();
         }
         case
+    }
+
+    /// Returns by DAG the features that enter it.
+    fn features(&self) -> Vec<Features> {
+        let is_pinned = self.is_pinned();
+        let (settings, relation) = (self.settings, &self.relation);
+        let all = Features::of_case(settings, relation, &self.set.bursts, is_pinned);
+        let own = (0..self.members.len()).map(|dag| Features::of_dag(self.dag(dag)).and(all));
+        // What is pinned goes before all that is not.
+        Features::spread(own.collect(), |other, dag| {
+            is_pinned || relation.may_delay(other, dag)
+        })
     }
 
     /// Reports whether cores of the cluster are told apart; then no equation of the set is asked.
@@ -138,26 +143,9 @@ impl<'a> AnalysisInput<'a> {
         !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
     }
 
-    /// Bounds the response time of a DAG by its subtasks' priorities, if nothing can delay it
-    /// and that is the shortest bound.
-    fn by_priorities(&self, dag: usize) -> Option<u64> {
-        let (task, cores) = (self.tasks[dag], self.settings.cores);
-        let subtasks = self.dag(dag).subtasks();
-        if self.set.waits_enter(dag)
-            || self.relation.preemption != PreemptionMix::All
-            || self.settings.policy != Policy::StaticPriority
-            || subtasks.len() > SUBTASK_LIMIT
-            || !self.is_alone(dag)
-        {
-            return None;
-        }
-        let order = sorted_by_key(subtasks.len(), |subtask| subtasks[subtask].priority().0);
-        let others = multi_path::alone(task, &self.set.shapes[dag].left, cores, Rounding::Up)?;
-        let limit = task.relative_deadline_ns().min(task.period_ns());
-        let bound = intra_task(task, &order, cores).filter(|&bound_ns| bound_ns < others);
-        // Long steps of the scheduler are in no equation of this test, so they are added to it.
-        let bound = bound.and_then(|bound_ns| self.set.bursts.after(bound_ns));
-        bound.filter(|&bound_ns| bound_ns <= limit)
+    /// Reports whether a subtask is not preempted once it has started.
+    pub(super) fn keeps_core(&self, subtask: &Subtask) -> bool {
+        subtask.is_non_preemptive() || self.settings.preemption == Preemption::Disabled
     }
 
     /// Tells the equations what follows from the attributes.
@@ -171,17 +159,10 @@ impl<'a> AnalysisInput<'a> {
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
         }
         if self.set.has_waits() {
-            let tasks = self.tasks;
-            let with_waits = self.relation.closure(&|dag| tasks[dag].has_waits());
-            self.set.forbid_overlap(with_waits);
+            let entering = self.entering.iter();
+            let with_waits = entering.map(|features| features.cover(Features::WAITS));
+            self.set.forbid_overlap(with_waits.collect());
         }
-        self.set.known = match (self.settings.cores, self.settings.policy) {
-            (1, Policy::StaticPriority) => responses(self),
-            _ => {
-                let dags = 0..self.members.len();
-                dags.map(|dag| self.by_priorities(dag)).collect()
-            }
-        };
     }
 }
 
@@ -230,85 +211,4 @@ fn analysable(
         });
     }
     tasks
-}
-
-/// Returns the DAGs of a case as their response times on one core need them.
-pub(super) fn loads(case: &AnalysisInput<'_>) -> Vec<DagDemand> {
-    let loads = case.tasks.iter().enumerate().map(|(dag, task)| DagDemand {
-        volume_ns: task.volume_ns(),
-        period_ns: task.period_ns(),
-        limit_ns: case.set.figures[dag].limit_ns(),
-        priorities: case.relation.ranks(dag),
-        keeps_ns: dues(case, dag)
-            .iter()
-            .map(|due| due.keeps_ns)
-            .max()
-            .unwrap_or(0),
-    });
-    loads.collect()
-}
-
-/// Bounds the response times of DAGs that something may delay, where all that may delay them
-/// keep their own.
-fn responses(case: &AnalysisInput<'_>) -> Vec<Option<u64>> {
-    let loads = loads(case);
-    let (loads, bursts) = (&loads, &case.set.bursts);
-    let (mut steps, mut found) = (EvaluationBudget::of(loads.len()), vec![None; loads.len()]);
-    for &dag in &case.order {
-        found[dag] = steps.spend(dag, |steps| {
-            ResponseEquation::of(loads, bursts, dag).solve(steps)
-        });
-    }
-    let known = (0..loads.len()).map(|dag| {
-        if case.set.waits_enter(dag) {
-            return None;
-        }
-        let others = ResponseEquation::of(loads, bursts, dag).others;
-        let are_known = others.iter().all(|&other| found[other].is_some());
-        found[dag].filter(|_| are_known && !case.is_alone(dag))
-    });
-    known.collect()
-}
-
-/// Reports whether each subtask is finished by its deadline, under EDF.
-pub(super) fn are_in_time(case: &AnalysisInput<'_>) -> bool {
-    let fit =
-        |dag: usize| case.set.figures[dag].limit_ns() == case.tasks[dag].relative_deadline_ns();
-    let applies = case.settings.cores == 1 && case.settings.policy == Policy::Edf;
-    applies
-        && !case.set.has_waits()
-        && (0..case.tasks.len()).all(fit)
-        && demand(&all_dues(case), &case.set.bursts).is_some()
-}
-
-/// Returns the demands of all DAGs.
-pub(super) fn all_dues(case: &AnalysisInput<'_>) -> Vec<DueDemand> {
-    (0..case.tasks.len())
-        .flat_map(|dag| dues(case, dag))
-        .collect()
-}
-
-/// Returns the demands of a DAG, by deadlines.
-fn dues(case: &AnalysisInput<'_>, dag: usize) -> Vec<DueDemand> {
-    let (task, subtasks) = (case.tasks[dag], case.dag(dag).subtasks());
-    let mut dues: Vec<DueDemand> = Vec::new();
-    for (subtask, &wcet_ns) in subtasks.iter().zip(task.wcets_ns()) {
-        let deadline_ns = subtask.relative_deadline_ns();
-        let known = dues.iter().position(|due| due.deadline_ns == deadline_ns);
-        let place = known.unwrap_or(dues.len());
-        if known.is_none() {
-            dues.push(DueDemand {
-                deadline_ns,
-                period_ns: task.period_ns(),
-                volume_ns: 0,
-                keeps_ns: 0,
-            });
-        }
-        let due = &mut dues[place];
-        due.volume_ns += wcet_ns;
-        if subtask.is_non_preemptive() || case.settings.preemption == Preemption::Disabled {
-            due.keeps_ns = due.keeps_ns.max(wcet_ns);
-        }
-    }
-    dues
 }

@@ -9,8 +9,8 @@
 
 use alloc::vec::Vec;
 
+use super::blocking::{Blocking, largest};
 use super::cover::parallelism_covers_and_parts;
-use super::one_core::{Blocking, largest};
 use super::task::Task;
 use super::waiting::beside_span;
 use super::workload::{InterferingWorkload, WorkloadBursts, WorkloadSegment};

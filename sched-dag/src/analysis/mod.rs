@@ -17,15 +17,16 @@
 //! | `intra_task` | one DAG alone, by its subtasks' priorities | He 2019 |
 //! | `workload`, `interference` | what other DAGs execute meanwhile | Melani 2015, extended |
 //! | `set` | the equations of all DAGs, solved exactly | |
-//! | `one_core` | response times and demand on one core; subtasks that keep their core | Joseph and Pandya 1986; Baruah 1990 |
+//! | `blocking` | subtasks that keep their core | derived here |
 //! | `pipelined` | overlapping jobs, `R > T` | derived here |
 //! | `ratio` | sums of utilisations | |
 //! | `ranks` | which DAG may delay which | |
 //! | `case`, `overheads` | the DAGs of a cluster that can be analysed, with what they are charged | |
+//! | `features`, `bound_tests` | what enters a DAG; the tests, each with what it covers | Joseph and Pandya 1986; Baruah 1990 |
 //! | `judge` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
 //! | `list_schedule`, `fixed_order` | orders that the commit fixes | Graham 1969 |
-//! | `lending`, `lent_cores`, `pinned` | heavy DAGs that lend what their orders leave | derived here |
+//! | `lending`, `lent_cores` | heavy DAGs that lend what their orders leave | derived here |
 //! | `witness` | what it takes to check the bounds | |
 //!
 //! A sporadic DAG counts as one of its minimum inter-arrival time. No test here
@@ -66,8 +67,11 @@
 //!   `docs/multi-path-bound.md`, waits and lent cores in `docs/analysis.md`.
 
 mod assign;
+mod blocking;
+mod bound_tests;
 mod case;
 mod cover;
+mod features;
 mod fixed_order;
 mod interference;
 mod intra_task;
@@ -76,9 +80,7 @@ mod lending;
 mod lent_cores;
 mod list_schedule;
 mod multi_path;
-mod one_core;
 mod overheads;
-mod pinned;
 mod pipelined;
 mod ranks;
 mod ratio;
@@ -87,6 +89,7 @@ mod task;
 mod waiting;
 mod whole_units;
 mod witness;
+mod witness_text;
 mod workload;
 
 use alloc::vec::Vec;
@@ -264,8 +267,8 @@ texts! {
 impl AnalysisResult {
     /// Reports whether every DAG has a bound.
     #[must_use]
-    pub const fn is_proven(&self) -> bool {
-        self.first_failing.is_none()
+    pub fn is_proven(&self) -> bool {
+        self.bounds.iter().all(Option::is_some)
     }
 }
 

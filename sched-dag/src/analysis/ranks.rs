@@ -67,21 +67,11 @@ impl RankRelation {
         other != dag && (self.preemption != PreemptionMix::All || self.may_outrank(other, dag))
     }
 
-    /// Returns by DAG whether something is so of it, or of a DAG that may delay it, directly or
-    /// through others.
-    pub(super) fn closure(&self, is_so: &impl Fn(usize) -> bool) -> Vec<bool> {
-        let count = self.priorities.len();
-        let mut found: Vec<bool> = (0..count).map(is_so).collect();
-        let mut news: Vec<usize> = (0..count).filter(|&dag| found[dag]).collect();
-        while let Some(other) = news.pop() {
-            for (dag, found) in found.iter_mut().enumerate() {
-                if !*found && self.may_delay(other, dag) {
-                    *found = true;
-                    news.push(dag);
-                }
-            }
-        }
-        found
+    /// Reports whether of two DAGs each may outrank the other.
+    pub(super) fn interleaves(&self) -> bool {
+        let all = 0..self.priorities.len();
+        let both = |a: usize, b: usize| self.may_outrank(a, b) && self.may_outrank(b, a);
+        all.clone().any(|a| all.clone().any(|b| both(a, b)))
     }
 
     /// Returns the most and the least urgent priority of a DAG among all; the smaller wins.

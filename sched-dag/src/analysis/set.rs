@@ -48,8 +48,6 @@ pub(super) struct EquationSet<'a> {
     pub(super) is_of_waits: bool,
     /// By DAG, whether waits enter its equations; empty: of none.
     with_waits: Vec<bool>,
-    /// Bounds that are known already, by DAG.
-    pub(super) known: Vec<Option<u64>>,
 }
 
 /// The bounds of one DAG of a set, as far as they are solved.
@@ -74,6 +72,16 @@ pub(super) enum BoundFailure {
     Overlapping,
 }
 
+impl DagSolution {
+    fn fail(&mut self, dag: usize, failure: BoundFailure) {
+        if let BoundFailure::Own(why) = failure {
+            self.first_failing.get_or_insert((dag, why));
+        }
+        self.failures[dag] = Some(failure);
+        self.responses[dag] = None;
+    }
+}
+
 impl<'a> EquationSet<'a> {
     /// Describes DAGs that are preemptive and whose older jobs win.
     pub(super) fn new(tasks: &'a [&'a Task], cores: u32) -> Self {
@@ -96,7 +104,6 @@ impl<'a> EquationSet<'a> {
             rounding: Rounding::Up,
             is_of_waits: tasks.iter().any(|task| task.has_waits()),
             with_waits: Vec::new(),
-            known: alloc::vec![None; tasks.len()],
         }
     }
 
@@ -120,17 +127,28 @@ impl<'a> EquationSet<'a> {
     }
 
     /// Solves the equations, visiting the DAGs in `order`: any will do, and the highest priority
-    /// first is fastest.
+    /// first is fastest. Bounds that are known already stay.
     pub(super) fn solve(
         &self,
+        known: &[Option<u64>],
         order: &[usize],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> DagSolution {
         let mut solution = DagSolution {
-            responses: (0..self.tasks.len()).map(|dag| self.start(dag)).collect(),
+            responses: (known.iter().enumerate())
+                .map(|(dag, known)| known.or_else(|| self.start(dag)))
+                .collect(),
             first_failing: None,
             failures: alloc::vec![None; self.tasks.len()],
         };
+        // Where waits enter, a job that alone takes longer than it may has no bound. It fails first, and
+        // not one that would have to wait for it.
+        for &dag in order {
+            let limit_ns = self.figures[dag].limit_ns();
+            if self.waits_enter(dag) && solution.responses[dag] > Some(limit_ns) {
+                solution.fail(dag, BoundFailure::Own(SolverFailure::BeyondDeadline));
+            }
+        }
         // However the set is built, the commit ends: what is not solved in time is not proven.
         let mut steps = EvaluationBudget::of(self.tasks.len());
         let mut is_done = false;
@@ -139,7 +157,7 @@ impl<'a> EquationSet<'a> {
             is_done = true;
             for &dag in order {
                 let before = solution.responses[dag];
-                if self.known[dag].is_none() && before.is_some() {
+                if known[dag].is_none() && before.is_some() {
                     let delays = self.delays_of_job(dag, &solution.responses, &may_outrank);
                     self.visit(dag, delays, &mut solution, &mut steps);
                 }
@@ -150,7 +168,7 @@ impl<'a> EquationSet<'a> {
         // The budget is spent on the way up. From the deadlines down each round is a bound, so the
         // last whole one can be had.
         if let Some((_, SolverFailure::Limit)) = solution.first_failing
-            && let Some(coarse) = self.down_from_deadlines(&may_outrank)
+            && let Some(coarse) = self.down_from_deadlines(known, &may_outrank)
         {
             solution.responses = coarse.into_iter().map(Some).collect();
             solution.first_failing = None;
@@ -169,15 +187,14 @@ impl<'a> EquationSet<'a> {
         steps: &mut EvaluationBudget,
     ) {
         let start_ns = solution.responses[dag].unwrap_or(0);
-        let after = match delays {
-            Err(failure) => Err(failure),
-            Ok(delays) => (self.respond(dag, &delays, start_ns, steps)).map_err(|why| {
-                solution.first_failing.get_or_insert((dag, why));
-                BoundFailure::Own(why)
-            }),
-        };
-        solution.failures[dag] = after.err();
-        solution.responses[dag] = after.ok();
+        let after = delays.and_then(|delays| {
+            let after = self.respond(dag, &delays, start_ns, steps);
+            after.map_err(BoundFailure::Own)
+        });
+        match after {
+            Ok(after_ns) => solution.responses[dag] = Some(after_ns),
+            Err(failure) => solution.fail(dag, failure),
+        }
     }
 
     /// Returns the least response time of a DAG among others, if it is at least `start_ns`.
@@ -215,18 +232,11 @@ impl<'a> EquationSet<'a> {
         }
     }
 
-    /// Returns the known bound, or that of a job alone, below which no solution lies: from
+    /// Returns the bound of a job alone, below which no solution lies: from
     /// there on the workloads only grow.
     fn start(&self, dag: usize) -> Option<u64> {
-        let alone = || {
-            alone(
-                self.tasks[dag],
-                &self.shapes[dag].left,
-                self.cores,
-                self.rounding,
-            )
-        };
-        self.known[dag].or_else(alone)
+        let left = &self.shapes[dag].left;
+        alone(self.tasks[dag], left, self.cores, self.rounding)
     }
 
     /// Tries the deadlines as bounds: if each equation holds with the others'
@@ -234,18 +244,19 @@ impl<'a> EquationSet<'a> {
     /// comes near it. From there it goes down, as long as steps are left.
     pub(super) fn down_from_deadlines(
         &self,
+        known: &[Option<u64>],
         may_outrank: impl Fn(usize, usize) -> bool,
     ) -> Option<Vec<u64>> {
         let mut steps = EvaluationBudget::of(self.tasks.len());
-        let mut bounds: Vec<u64> = (self.known.iter().zip(&self.figures))
+        let mut bounds: Vec<u64> = (known.iter().zip(&self.figures))
             .map(|(known, figures)| known.unwrap_or(figures.limit_ns()))
             .collect();
         let mut has_round = false;
         loop {
             let responses: Vec<Option<u64>> = bounds.iter().copied().map(Some).collect();
             let lower = (0..self.tasks.len()).map(|dag| {
-                if self.known[dag].is_some() {
-                    return self.known[dag];
+                if known[dag].is_some() {
+                    return known[dag];
                 }
                 let delays = self.delays_of_job(dag, &responses, &may_outrank).ok()?;
                 self.respond(dag, &delays, 0, &mut steps).ok()
@@ -387,7 +398,9 @@ pub fn multi_path_fp(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> Op
         set.forbid_overlap(alloc::vec![true; tasks.len()]);
     }
     let order: Vec<usize> = (0..tasks.len()).collect();
-    let solution = set.solve(&order, |other, dag| other < dag);
+    let solution = set.solve(&alloc::vec![None; tasks.len()], &order, |other, dag| {
+        other < dag
+    });
     solution.responses.into_iter().collect()
 }
 
@@ -399,7 +412,7 @@ pub fn multi_path_edf(tasks: &[&Task], cores: u32, clip: InterferenceBound) -> O
     let mut set = constrained(tasks, cores).then(|| EquationSet::new(tasks, cores))?;
     set.clip = clip;
     set.deadlines_limit = true;
-    set.down_from_deadlines(|_, _| true)
+    set.down_from_deadlines(&alloc::vec![None; tasks.len()], |_, _| true)
 }
 
 #[cfg(test)]

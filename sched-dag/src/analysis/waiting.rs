@@ -36,8 +36,8 @@
 
 use alloc::vec::Vec;
 
+use super::blocking::Blocking;
 use super::cover::{CoverChain, STEPS};
-use super::one_core::Blocking;
 use super::task::{SubtaskWaits, Task};
 use crate::spec::WAITS;
 

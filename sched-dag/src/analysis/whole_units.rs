@@ -54,7 +54,9 @@ pub enum WaitingForm {
 pub fn waiting_fp(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
     let set = in_units(tasks, cores, form)?;
     let order: Vec<usize> = (0..tasks.len()).collect();
-    let solution = set.solve(&order, |other, dag| other < dag);
+    let solution = set.solve(&alloc::vec![None; tasks.len()], &order, |other, dag| {
+        other < dag
+    });
     solution.responses.into_iter().collect()
 }
 
@@ -64,7 +66,7 @@ pub fn waiting_fp(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<
 pub fn waiting_edf(tasks: &[&Task], cores: u32, form: WaitingForm) -> Option<Vec<u64>> {
     let mut set = in_units(tasks, cores, form)?;
     set.deadlines_limit = true;
-    set.down_from_deadlines(|_, _| true)
+    set.down_from_deadlines(&alloc::vec![None; tasks.len()], |_, _| true)
 }
 
 fn in_units<'a>(tasks: &'a [&Task], cores: u32, form: WaitingForm) -> Option<EquationSet<'a>> {

@@ -39,8 +39,8 @@
 //!
 //! Each instance is charged for a step in which few instances become ready (`overheads`).
 //! For each of them it is longer by `ready` at most, and as long as it lasts it may keep the
-//! cores from any instance, a more urgent one too. So in a window of length `L` each core loses,
-//! beyond the charges, no more than
+//! cores from any instance, a more urgent one too. So in a window of length `L` some core is lost,
+//! beyond the charges, for no longer than
 //!
 //! `E(L) = sum over all DAGs on them of ((L + late + carry) / T + 1) burst` (floor)
 //!

@@ -144,6 +144,12 @@ fn each_commit_is_in_the_record() {
     };
     assert_eq!((first.number, second.number), (0, 1));
     let dag = &first.told.dags[0];
+    let answer = &first.told.answers[0];
+    let begin = format!("dag `{}` takes at most ", dag.name);
+    assert!(
+        answer.starts_with(&begin) && answer.contains(", by multiple paths"),
+        "{answer}"
+    );
     let names: Vec<&str> = dag.subtasks.iter().map(|subtask| &*subtask.name).collect();
     assert_eq!(names, ["source", "parallel-0", "parallel-1", "sink"]);
     let names: Vec<&str> = dag.topics.iter().map(|topic| &*topic.name).collect();

@@ -51,11 +51,13 @@ pub(crate) fn refused(file: &str) -> [usize; 3] {
 }
 
 /// Returns the text with each number one more, one less, and 0; and with all WCETs, priorities
-/// or marks of keeping the core alike.
+/// or marks of keeping the core alike; and with a subtask that is pinned.
 fn altered(text: &str) -> Vec<String> {
     let mut all: Vec<String> = (1..=3)
         .flat_map(|column| ["0", "1"].map(|value| with_column(text, column, value)))
         .collect();
+    // A feature that its bounds may not cover.
+    all.push(text.replacen("\nhash ", "\npin 0 0\nhash ", 1));
     let mut at = 0;
     for word in text.split_inclusive([' ', '\n']) {
         let (before, after) = (&text[..at], &text[at + word.trim_end().len()..]);

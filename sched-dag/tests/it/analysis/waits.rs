@@ -137,3 +137,35 @@ fn an_order_is_fixed_as_if_waits_were_executed() {
     let fixed = bounds(&answer(&task_set, &settings))[0];
     assert_eq!((free, fixed), (Some(10), Some(7)));
 }
+
+#[test]
+fn what_overlaps_is_named_where_no_dag_has_a_bound() {
+    let named = |specs: &[DagSpec], kind| {
+        let answer = answered(specs, &settings(kind, 4));
+        let is_unknown = |bound: &Option<_>| bound.is_none();
+        assert_eq!(answer.is_proven(), !answer.bounds.iter().any(is_unknown));
+        let failing = answer.first_failing.unwrap();
+        (failing.dag.0, failing.reason, answer.reasons)
+    };
+    // Each would count the other's jobs, and only the second one takes longer than it may.
+    let fine = spec(3, 3, &[1], &[], 0);
+    let late = waiting(spec(3, 3, &[2], &[], 0), 0, 4, 1);
+    let (span_ns, limit_ns) = (6, 3);
+    let beyond = NotProvenReason::SpanBeyondLimit { span_ns, limit_ns };
+    let delayed = NotProvenReason::DelayedBy { dag: DagId(1) };
+    assert_eq!(
+        named(&[fine, late], EDF),
+        (1, beyond, vec![Some(delayed), Some(beyond)])
+    );
+    // Jobs of the first one overlap and are in time, but the equations of waits do not count them.
+    let overlapping = DagSpec {
+        in_flight: Some(4),
+        ..spec(5, 20, &[3, 3], &[(0, 1)], 0)
+    };
+    let waits = waiting(spec(100, 100, &[2], &[], 1), 0, 4, 1);
+    let no_bound = NotProvenReason::NoBoundByPeriod;
+    assert_eq!(
+        named(&[overlapping, waits], FP),
+        (1, no_bound, vec![None, Some(no_bound)])
+    );
+}

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use common::random::Random;
-use sched_dag::analysis::{AnalysisResult, DagBound, answer, assign, witness};
-use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, TaskSet};
+use sched_dag::analysis::{AnalysisResult, DagBound, NotProvenReason, answer, assign, witness};
+use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, SubtaskId, TaskSet};
 
 use super::forged;
 use super::kinds::tighter;
@@ -194,6 +194,50 @@ fn tests(answer: &AnalysisResult, path: &Path) -> Vec<String> {
     let forms = ["reserved", "blocked"].into_iter();
     let forms = forms.filter(|form| text.contains(&format!(" {form} ")));
     tests.chain(sinks).chain(forms.map(String::from)).collect()
+}
+
+/// A pinned subtask goes first, whatever its deadline, so demand by deadlines says nothing.
+#[test]
+fn demand_proves_no_deadline_of_a_sink_where_subtasks_are_pinned() {
+    let mut specs = [spec(20, 20, &[5], &[], 0), spec(20, 20, &[1, 1], &[], 0)];
+    specs[1].subtasks[0].relative_deadline_ns = Some(2);
+    let settings = settings((Policy::Edf, Preemption::Enabled), 1);
+    let free = witness(&commit(&specs, Policy::Edf, 1), &settings);
+    specs[0].subtasks[0].core = Some(0);
+    let task_set = commit(&specs, Policy::Edf, 1);
+    let answer = answer(&task_set, &settings);
+    let sink = SubtaskId(0);
+    let reasons = [None, Some(NotProvenReason::NoSinkBound { sink })];
+    assert_eq!(answer.reasons, reasons);
+    // Nor does the checker believe it: the demand of the same DAGs without the pin.
+    let demand = free.lines().find(|line| line.starts_with("demand "));
+    let demand = format!("\n{}\nbound ", demand.expect("it proves the deadlines"));
+    let pinned = witness(&task_set, &settings);
+    let forged = forged::hashed(&pinned.replacen("\nbound ", &demand, 1));
+    let file = std::env::temp_dir().join(format!("pinned-{}", std::process::id()));
+    fs::write(&file, forged).unwrap();
+    let said = output(&[file.to_string_lossy().into_owned()]);
+    let said = String::from_utf8(said.stdout).unwrap();
+    assert!(
+        said.ends_with("refused: dag 0: `due` does not cover pins\n"),
+        "{said}"
+    );
+    fs::remove_file(&file).unwrap();
+}
+
+/// Its command line is one of the family: help, and 2 for what is refused.
+#[test]
+fn the_checker_has_help_and_refuses_command_lines() {
+    for (word, code, begin) in [
+        ("--help", 0, "Checks what proves"),
+        ("--jobs", 2, "check-witness: unknown option `--jobs`; "),
+        ("/no/file", 2, "check-witness: `/no/file`: No such file"),
+    ] {
+        let output = output(&[word.into()]);
+        let said = [output.stdout, output.stderr].concat();
+        assert_eq!(output.status.code(), Some(code));
+        assert!(said.starts_with(begin.as_bytes()), "{word}");
+    }
 }
 
 /// Returns how the lines begin that the checker is to say.

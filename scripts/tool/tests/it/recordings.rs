@@ -6,12 +6,16 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use recording::{
-    Channel, DagHeader, Entry, EntryKind, Header, Recordable, Recording, Role, Writer, to_bytes,
+    Channel, Commit, DagHeader, Entry, EntryKind, Header, Recordable, Recording, Role, Writer,
+    to_bytes,
 };
 
 use crate::support::{assert_refused, call, folder, refusal, succeed};
 
 type Value = (String, Option<f64>, [i16; 2], Vec<u64>);
+
+/// What the commit has said of its DAG.
+const ANSWER: &str = "dag `eye` takes at most 7ms, by multiple paths";
 
 /// A recording of 5,000 values, and of other entries.
 fn recording() -> Vec<u8> {
@@ -30,6 +34,10 @@ fn recording() -> Vec<u8> {
         }],
     };
     let mut writer = Writer::new(&header);
+    writer.commit(&Commit {
+        answers: vec![ANSWER.into()],
+        ..Commit::default()
+    });
     for job in 0..5_000 {
         let value: Value = (
             format!("job \"{job}\", \n"),
@@ -67,6 +75,7 @@ fn a_recording_is_shown_and_becomes_tables() {
     let said = succeed(&folder, "recording demo.rec --csv tables");
     let of_source = "source `seen` of dag `eye`: 4999 values of (text, f64?, [i16; 2], [u64])";
     assert!(said.contains(of_source), "{said}");
+    assert!(said.contains(ANSWER), "{said}");
     assert!(said.contains("incomplete: 1 values are lost"), "{said}");
     let table = |name: &str| fs::read_to_string(folder.join("tables").join(name));
     let begin = "job,release_ns,at_ns,0,1,2_0,2_1,3\n\

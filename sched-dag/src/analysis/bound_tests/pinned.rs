@@ -4,35 +4,94 @@
 //! cores. If those on one core follow one another by edges, nothing ever delays it: each
 //! subtask finishes at the length of the longest path to it, or earlier. A DAG without pinned
 //! subtasks is a *member* of the group of its cores, with all that have the same ones, and executes
-//! in what the owners leave ([`lent_cores`](super::lent_cores), whose proofs these bounds rest on).
+//! in what the owners leave ([`lent_cores`](crate::analysis::lent_cores), whose proofs these bounds rest on).
 //!
-//! This is how a commit reads what [`lend`](super::lend()) has divided, and also what a person has
+//! This is how a commit reads what [`lend`](crate::analysis::lend()) has divided, and also what a person has
 //! pinned: nothing is taken over from the division but cores and edges.
 //!
 //! Assumes, of all DAGs of the cluster: `D <= T`, and subtasks that can be preempted and do not
 //! wait. Of the members of a group that are several: a static priority that outranks DAG by DAG.
 
+use alloc::format;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::case::{AnalysisInput, CaseBounds};
-use super::lent_cores::{CoreSupply, MemberTask, STEP_LIMIT};
-use super::list_schedule::ScheduledSubtask;
-use super::ranks::PreemptionMix;
-use super::set::constrained;
-use super::{DagBound, NotProvenReason, SchedulabilityTest};
+use super::{BoundTest, BoundWitness, JobBounds, Responses, SinkBounds};
+use crate::analysis::case::AnalysisInput;
+use crate::analysis::cover::covering;
+use crate::analysis::features::covers;
+use crate::analysis::lent_cores::{CoreSupply, LentForm, MemberTask, STEP_LIMIT};
+use crate::analysis::list_schedule::ScheduledSubtask;
+use crate::analysis::witness_text::WitnessText;
+use crate::analysis::{NotProvenReason, SchedulabilityTest};
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::sort_by_key;
+use crate::spec::PINS;
 use crate::task_set::Subtask;
 
+/// Nothing at all in a program without pins.
+pub(super) const TEST: BoundTest = if PINS { OF_PINS } else { BoundTest::NONE };
+
+const OF_PINS: BoundTest = BoundTest {
+    names: &[SchedulabilityTest::Owner, SchedulabilityTest::Member],
+    covers: covers!(
+        RANKED BY_DEADLINE ONE_CORE CORES PREEMPTION SINK_DEADLINES INTERLEAVED PINS OVERHEADS
+        BURSTS SPORADIC
+    ),
+    jobs,
+    sinks,
+};
+
+pub(super) const WITNESS: BoundWitness = BoundWitness {
+    job: |case, responses, dag, bound_ns, text| match is_member(case, dag) {
+        true => write_member(case, responses, dag, bound_ns, text),
+        false => write_owner(case, dag, bound_ns, text),
+    },
+    sinks: |case, _, dag, bound_ns, text| {
+        let cluster = case.is_pinned().then(|| PinnedCluster::of(case));
+        for &sink in case.dag(dag).sinks() {
+            let finish_ns = (cluster.as_ref()).and_then(|of| of.finish_ns(case, dag, sink));
+            if let Some(finish_ns) = finish_ns.filter(|&finish_ns| finish_ns < bound_ns) {
+                let id = case.members[dag];
+                text.line(format_args!("sink {id} {} {finish_ns} 0", sink.0));
+            }
+        }
+    },
+    ..BoundWitness::NONE
+};
+
+fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
+    if case.is_pinned() {
+        PinnedCluster::of(case).bound(case, found);
+    }
+}
+
+fn sinks(case: &AnalysisInput<'_>, _: Responses<'_>, found: &mut SinkBounds) {
+    if case.is_pinned() {
+        let cluster = PinnedCluster::of(case);
+        for dag in 0..case.members.len() {
+            let sinks = case.dag(dag).sinks().iter();
+            found.offer(dag, sinks.map(|&sink| cluster.finish_ns(case, dag, sink)));
+        }
+    }
+}
+
+/// Says why a DAG has no bound that no test is asked about.
+pub(super) fn refusal(case: &AnalysisInput<'_>, dag: usize) -> NotProvenReason {
+    match case.is_pinned() {
+        true => PinnedCluster::of(case).refusals[dag].unwrap_or(NotProvenReason::BesidePinned),
+        false => NotProvenReason::NoBound,
+    }
+}
+
 /// The owners and groups of a cluster.
-pub(super) struct PinnedCluster {
+struct PinnedCluster {
     /// By core, what its owner leaves.
-    pub(super) supplies: Vec<CoreSupply>,
+    supplies: Vec<CoreSupply>,
     /// By core, its list: subtasks of one DAG of the case.
-    pub(super) lists: Vec<Vec<ScheduledSubtask>>,
+    lists: Vec<Vec<ScheduledSubtask>>,
     /// By core, the first DAG of the case that is pinned to it.
-    pub(super) owners: Vec<Option<usize>>,
+    owners: Vec<Option<usize>>,
     /// By core, whether another DAG of the case is pinned to it, too.
     is_shared: Vec<bool>,
     /// By DAG of the case, why it can be neither an owner nor a member.
@@ -40,7 +99,7 @@ pub(super) struct PinnedCluster {
 }
 
 impl PinnedCluster {
-    pub(super) fn of(case: &AnalysisInput<'_>) -> Self {
+    fn of(case: &AnalysisInput<'_>) -> Self {
         let cores = case.settings.cores as usize;
         let mut cluster = Self {
             supplies: vec![CoreSupply::UNOWNED; cores],
@@ -97,16 +156,11 @@ impl PinnedCluster {
                 finish_ns: finishes_ns[subtask],
             });
         }
-        let is_covered = case.relation.preemption == PreemptionMix::All
-            && !case.set.has_waits()
-            && constrained(case.tasks, case.settings.cores);
-        is_covered
-            .then_some(())
-            .ok_or(NotProvenReason::BesidePinned)
+        Ok(())
     }
 
     /// Bounds the responses of owners, and then those of members, the most urgent first.
-    pub(super) fn bounds(&self, case: &AnalysisInput<'_>) -> CaseBounds {
+    fn bound(&self, case: &AnalysisInput<'_>, found: &mut JobBounds) {
         let count = case.members.len();
         let (mut bounds, mut reasons) = (vec![None; count], self.refusals.clone());
         let owned = (0..count).filter(|&dag| self.refusals[dag].is_none() && !is_member(case, dag));
@@ -136,19 +190,21 @@ impl PinnedCluster {
             let reason = reasons[*dag];
             reason.is_some_and(|reason| !matches!(reason, NotProvenReason::DelayedBy { .. }))
         };
-        let first = case.order.iter().copied().find(is_own);
-        let bounds = bounds.iter().enumerate().map(|(dag, bound_ns)| {
+        found.first_failing = case.order.iter().copied().find(is_own);
+        found.reasons = reasons;
+        for (dag, bound_ns) in bounds.into_iter().enumerate() {
             let test = match is_member(case, dag) {
                 true => SchedulabilityTest::Member,
                 false => SchedulabilityTest::Owner,
             };
-            bound_ns.map(|bound_ns| DagBound { bound_ns, test })
-        });
-        (bounds.collect(), reasons, first)
+            if let Some(bound_ns) = bound_ns {
+                found.offer(dag, bound_ns, test);
+            }
+        }
     }
 
     /// Returns the terms of a member's equation.
-    pub(super) fn terms<'a>(
+    fn terms<'a>(
         &'a self,
         case: &'a AnalysisInput<'_>,
         dag: usize,
@@ -196,7 +252,7 @@ impl PinnedCluster {
     }
 
     /// Returns when an owner's subtask finishes after the release, at the latest.
-    pub(super) fn finish_ns(
+    fn finish_ns(
         &self,
         case: &AnalysisInput<'_>,
         dag: usize,
@@ -210,15 +266,15 @@ impl PinnedCluster {
 }
 
 /// A member's equation.
-pub(super) struct MemberTerms<'a> {
-    pub(super) own: MemberTask<'a>,
-    pub(super) cores: Vec<&'a CoreSupply>,
+struct MemberTerms<'a> {
+    own: MemberTask<'a>,
+    cores: Vec<&'a CoreSupply>,
     /// The more urgent members, by their positions in the case, with their bounds.
-    pub(super) above: Vec<(usize, MemberTask<'a>, u64)>,
+    above: Vec<(usize, MemberTask<'a>, u64)>,
 }
 
 impl<'a> MemberTerms<'a> {
-    pub(super) fn above(&self) -> Vec<(&MemberTask<'a>, u64)> {
+    fn above(&self) -> Vec<(&MemberTask<'a>, u64)> {
         let above = self.above.iter();
         above.map(|(_, of, bound_ns)| (of, *bound_ns)).collect()
     }
@@ -233,4 +289,49 @@ fn owner_bound_ns(case: &AnalysisInput<'_>, dag: usize) -> Option<u64> {
 
 fn is_member(case: &AnalysisInput<'_>, dag: usize) -> bool {
     !case.dag(dag).is_pinned()
+}
+
+fn write_owner(case: &AnalysisInput<'_>, dag: usize, bound_ns: u64, text: &mut WitnessText) {
+    let id = case.members[dag];
+    let finishes_ns = case.tasks[dag].finishes_ns();
+    let finishes = finishes_ns.iter().map(|&ns| i128::from(ns));
+    text.list(&format!("bound {id} {bound_ns} owner"), finishes);
+}
+
+fn write_member(
+    case: &AnalysisInput<'_>,
+    responses: Responses<'_>,
+    dag: usize,
+    bound_ns: u64,
+    text: &mut WitnessText,
+) {
+    let (id, task) = (case.members[dag], case.tasks[dag]);
+    let cluster = PinnedCluster::of(case);
+    let Ok(terms) = cluster.terms(case, dag, responses) else {
+        return;
+    };
+    if let [core] = terms.cores[..] {
+        let owned = core.busy_ns(bound_ns);
+        return text.line(format_args!("bound {id} {bound_ns} sequence {owned}"));
+    }
+    let waiting = u128::from(bound_ns - task.length_ns());
+    let above = terms.above();
+    let mut forms = terms.own.forms(&terms.cores, &above, bound_ns);
+    let all = |form: &LentForm| form.works.iter().map(|work| work.value).sum::<u128>();
+    let Some(form) = forms.find(|form| all(form) <= form.free as u128 * waiting) else {
+        return;
+    };
+    let (chains, clipped) = (terms.cores.len() + 1 - form.free, u8::from(form.is_clipped));
+    let [left, owned, others @ ..] = &form.works[..] else {
+        return;
+    };
+    let (left, owned) = (left.value, owned.value);
+    text.line(format_args!(
+        "bound {id} {bound_ns} lent {chains} {clipped} {left} {owned}"
+    ));
+    text.chains("chain", &covering(task, terms.own.covers.len(), chains));
+    for ((other, _, response_ns), work) in terms.above.iter().zip(others) {
+        let id = case.members[*other];
+        text.line(format_args!("other {id} {response_ns} {}", work.value));
+    }
 }

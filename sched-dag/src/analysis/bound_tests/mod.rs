@@ -1,0 +1,199 @@
+//! The tests of a commit: each is one file, which says what its proof covers, and a name in the
+//! table below.
+//!
+//! They are asked in the order of the table, each of the DAGs that it covers (see
+//! [`features`](super::features)). Nobody but this module asks a test, neither for jobs nor for
+//! sinks nor for a witness, and what a test computes is private to its file: so there is no other
+//! way to its answer. Of several bounds the smallest counts.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::case::AnalysisInput;
+use super::features::Features;
+use super::witness_text::WitnessText;
+use super::{DagBound, NotProvenReason, SchedulabilityTest};
+
+/// The bounds of jobs by DAG, as far as they are known.
+pub(super) type Responses<'a> = &'a [Option<u64>];
+
+/// A test of schedulability.
+struct BoundTest {
+    /// The names of its bounds, one for each form that it has; a test of sinks alone has none.
+    names: &'static [SchedulabilityTest],
+    /// The features that its proof covers.
+    covers: Features,
+    /// Bounds jobs.
+    jobs: fn(&AnalysisInput<'_>, &mut JobBounds),
+    /// Bounds sinks, where the bounds of jobs are known.
+    sinks: fn(&AnalysisInput<'_>, Responses<'_>, &mut SinkBounds),
+}
+
+impl BoundTest {
+    /// A test that covers nothing and answers nothing.
+    const NONE: Self = Self {
+        names: &[],
+        covers: Features::NONE,
+        jobs: |_, _| (),
+        sinks: |_, _, _| (),
+    };
+
+    /// Reports whether it covers all that enters a DAG.
+    fn is_for(&self, case: &AnalysisInput<'_>, dag: usize) -> bool {
+        self.covers.cover(case.entering[dag])
+    }
+
+    /// Reports of each DAG whether it covers it, if it does one.
+    fn asked(&self, case: &AnalysisInput<'_>) -> Option<Vec<bool>> {
+        let asked = (0..case.members.len()).map(|dag| self.is_for(case, dag));
+        Some(asked.collect()).filter(|asked: &Vec<bool>| asked.contains(&true))
+    }
+}
+
+/// The part of a test that writes its terms, apart: a program that writes no witness has none.
+struct BoundWitness {
+    /// Writes what is needed once before all bounds.
+    certificate: fn(&AnalysisInput<'_>, &[Option<DagBound>], &mut WitnessText),
+    /// Writes the terms of a DAG's bound.
+    job: fn(&AnalysisInput<'_>, Responses<'_>, usize, u64, &mut WitnessText),
+    /// Writes the terms of a DAG's sinks whose bounds are below that of their job.
+    sinks: fn(&AnalysisInput<'_>, Responses<'_>, usize, u64, &mut WitnessText),
+}
+
+impl BoundWitness {
+    /// Writes nothing.
+    const NONE: Self = Self {
+        certificate: |_, _, _| (),
+        job: |_, _, _, _, _| (),
+        sinks: |_, _, _, _, _| (),
+    };
+}
+
+/// Makes the tables of tests.
+macro_rules! tests {
+    ($($module:ident)+) => {
+        $(mod $module;)+
+
+        static TESTS: &[BoundTest] = &[$($module::TEST),+];
+
+        static WITNESSES: &[BoundWitness] = &[$($module::WITNESS),+];
+    };
+}
+
+// Those on whose bounds others rest stand before these.
+tests!(response priorities pinned multiple_paths demand sink_paths);
+
+/// The bounds of jobs, as far as tests have found them.
+pub(super) struct JobBounds {
+    pub(super) bounds: Vec<Option<DagBound>>,
+    /// Why there is none.
+    pub(super) reasons: Vec<Option<NotProvenReason>>,
+    /// The first DAG that has none for a reason of its own.
+    pub(super) first_failing: Option<usize>,
+    /// By DAG, whether the test in hand covers it.
+    asked: Vec<bool>,
+}
+
+impl JobBounds {
+    /// Takes a bound, if the test in hand covers the DAG and no bound as small is known.
+    fn offer(&mut self, dag: usize, bound_ns: u64, test: SchedulabilityTest) {
+        let is_less = self.bounds[dag].is_none_or(|known| bound_ns < known.bound_ns);
+        if self.asked[dag] && is_less {
+            self.bounds[dag] = Some(DagBound { bound_ns, test });
+        }
+    }
+}
+
+/// The bounds of sinks, by DAG and place among its sinks.
+pub(super) struct SinkBounds {
+    bounds_ns: Vec<Vec<Option<u64>>>,
+    asked: Vec<bool>,
+}
+
+impl SinkBounds {
+    /// Takes bounds of the sinks of a DAG, if the test in hand covers it.
+    fn offer(&mut self, dag: usize, found_ns: impl Iterator<Item = Option<u64>>) {
+        if self.asked[dag] {
+            for (known, found) in self.bounds_ns[dag].iter_mut().zip(found_ns) {
+                *known = [*known, found].into_iter().flatten().min();
+            }
+        }
+    }
+}
+
+/// Returns the bounds of the jobs of a case.
+pub(super) fn bound_jobs(case: &AnalysisInput<'_>) -> JobBounds {
+    let count = case.members.len();
+    let mut found = JobBounds {
+        bounds: vec![None; count],
+        reasons: vec![None; count],
+        first_failing: None,
+        asked: Vec::new(),
+    };
+    for test in TESTS {
+        if let Some(asked) = test.asked(case) {
+            found.asked = asked;
+            (test.jobs)(case, &mut found);
+        }
+    }
+    for &dag in &case.order {
+        let mut tests = TESTS.iter().filter(|test| !test.names.is_empty());
+        if found.bounds[dag].is_some() {
+            found.reasons[dag] = None;
+        } else if !tests.any(|test| test.is_for(case, dag)) {
+            found.reasons[dag] = Some(pinned::refusal(case, dag));
+            found.first_failing.get_or_insert(dag);
+        }
+    }
+    found
+}
+
+/// Returns the bounds of the sinks of a case, by DAG and place among its sinks.
+pub(super) fn bound_sinks(
+    case: &AnalysisInput<'_>,
+    responses: Responses<'_>,
+) -> Vec<Vec<Option<u64>>> {
+    let unknown = (0..case.members.len()).map(|dag| vec![None; case.dag(dag).sinks().len()]);
+    let mut found = SinkBounds {
+        bounds_ns: unknown.collect(),
+        asked: Vec::new(),
+    };
+    for test in TESTS {
+        if let Some(asked) = test.asked(case) {
+            found.asked = asked;
+            (test.sinks)(case, responses, &mut found);
+        }
+    }
+    found.bounds_ns
+}
+
+/// Writes what is needed once before all bounds.
+pub(super) fn write_certificates(
+    case: &AnalysisInput<'_>,
+    bounds: &[Option<DagBound>],
+    text: &mut WitnessText,
+) {
+    for (test, of) in TESTS.iter().zip(WITNESSES) {
+        if test.asked(case).is_some() {
+            (of.certificate)(case, bounds, text);
+        }
+    }
+}
+
+/// Writes the terms of a DAG's bound, and of its sinks'.
+pub(super) fn write_terms(
+    case: &AnalysisInput<'_>,
+    responses: Responses<'_>,
+    dag: usize,
+    bound: DagBound,
+    text: &mut WitnessText,
+) {
+    let all = || TESTS.iter().zip(WITNESSES);
+    let asked = || all().filter(|(test, _)| test.is_for(case, dag));
+    for (_, of) in asked().filter(|(test, _)| test.names.contains(&bound.test)) {
+        (of.job)(case, responses, dag, bound.bound_ns, text);
+    }
+    for (_, of) in asked() {
+        (of.sinks)(case, responses, dag, bound.bound_ns, text);
+    }
+}

@@ -1,0 +1,264 @@
+//! The multi-path bound: the equations of all DAGs of a case, solved together.
+//!
+//! The work that interferes with DAG `k` is decided for each pair of DAGs:
+//!
+//! - *Static priorities.* DAG `i` may outrank `k` if its most urgent subtask
+//!   wins over `k`'s least urgent one (equal priorities: the DAG committed
+//!   first wins). Priorities may thus interleave: then two DAGs may outrank
+//!   each other and each counts in full for the other. That is safe: while a
+//!   subtask of `k` waits, whatever runs on the cores belongs to `k` or wins
+//!   over that subtask, so its DAG is among those counted.
+//! - *EDF.* Every DAG may outrank every other. If `D <= T` for all DAGs, only
+//!   jobs with a deadline no later are counted: a subtask that waits is due no later than
+//!   its job, so what wins over it is, too. Where sinks have deadlines of their own, a job
+//!   counts as soon as the first of its deadlines is no later.
+//! - *No preemption at all.* Lower-ranked subtasks block besides; those of
+//!   DAGs that count in full are counted already.
+//! - *Preemption for some subtasks and not for others.* A subtask preempted
+//!   again and again may find other non-preemptible ones each time, which the
+//!   blocking term does not cover. Then every other DAG counts in full, in
+//!   whatever order: true of any work-conserving scheduler.
+//!
+//! If a younger job may win over an older one of the same DAG (unequal
+//! priorities inside, or no preemption), the equation counts younger jobs too.
+//! A response time beyond `in_flight` periods would meet the overrun policy;
+//! it does not count as proven.
+//!
+//! Where subtasks *wait* (`waiting`), of a DAG or of one that may delay it, directly or through
+//! others, jobs must not overlap: a bound beyond the period does not count as proven, the DAG's
+//! own or that of another in its equation.
+
+use alloc::vec::Vec;
+use core::fmt;
+
+use super::{BoundTest, BoundWitness, JobBounds, Responses};
+use crate::analysis::case::AnalysisInput;
+use crate::analysis::cover::covering;
+use crate::analysis::features::covers;
+use crate::analysis::interference::{DelaySources, InterferingDag};
+use crate::analysis::pipelined::{PipelineTerms, SolverFailure};
+use crate::analysis::ranks::PreemptionMix;
+use crate::analysis::set::BoundFailure;
+use crate::analysis::waiting::reserved;
+use crate::analysis::witness_text::WitnessText;
+use crate::analysis::{NotProvenReason, SchedulabilityTest};
+use crate::policy::Policy;
+
+pub(super) const TEST: BoundTest = BoundTest {
+    names: &[
+        SchedulabilityTest::Alone,
+        SchedulabilityTest::FixedPriority,
+        SchedulabilityTest::Edf,
+        SchedulabilityTest::NonPreemptive,
+        SchedulabilityTest::Pipelined,
+        SchedulabilityTest::AnyOrder,
+    ],
+    covers: covers!(
+        RANKED BY_DEADLINE ONE_CORE CORES PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES INTERLEAVED
+        WAITS LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
+    ),
+    jobs,
+    ..BoundTest::NONE
+};
+
+pub(super) const WITNESS: BoundWitness = BoundWitness {
+    job: write,
+    ..BoundWitness::NONE
+};
+
+/// Bounds the DAGs that have no bound yet, with the bounds of the others.
+fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
+    let known = found.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
+    let known: Vec<Option<u64>> = known.collect();
+    let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+    let solution = case.set.solve(&known, &case.order, may_outrank);
+    for dag in (0..known.len()).filter(|&dag| known[dag].is_none()) {
+        match solution.responses[dag] {
+            Some(bound_ns) => found.offer(dag, bound_ns, form(case, dag, bound_ns)),
+            None => {
+                // Numbers that overflow alone are no failure of an equation.
+                let limit = BoundFailure::Own(SolverFailure::Limit);
+                let failure = solution.failures[dag].unwrap_or(limit);
+                found.reasons[dag] = Some(reason(case, dag, failure));
+            }
+        }
+    }
+    found.first_failing = solution.first_failing.map(|(dag, _)| dag);
+}
+
+/// Names the form of a response time.
+fn form(case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) -> SchedulabilityTest {
+    if bound_ns > case.tasks[dag].period_ns() {
+        SchedulabilityTest::Pipelined
+    } else if case.is_alone(dag) {
+        SchedulabilityTest::Alone
+    } else {
+        match (case.relation.preemption, case.settings.policy) {
+            (PreemptionMix::Some, _) => SchedulabilityTest::AnyOrder,
+            (PreemptionMix::None, _) => SchedulabilityTest::NonPreemptive,
+            (PreemptionMix::All, Policy::StaticPriority) => SchedulabilityTest::FixedPriority,
+            (PreemptionMix::All, Policy::Edf) => SchedulabilityTest::Edf,
+        }
+    }
+}
+
+fn reason(case: &AnalysisInput<'_>, dag: usize, failure: BoundFailure) -> NotProvenReason {
+    let task = case.tasks[dag];
+    let in_flight = case.dag(dag).in_flight();
+    let room = u128::from(in_flight) * u128::from(task.period_ns());
+    match failure {
+        BoundFailure::Other(other) => NotProvenReason::DelayedBy {
+            dag: case.id(other),
+        },
+        BoundFailure::Overlapping => NotProvenReason::NoBoundByPeriod,
+        BoundFailure::Own(SolverFailure::Limit) => NotProvenReason::Limit,
+        BoundFailure::Own(SolverFailure::BeyondDeadline) if case.set.waits_enter(dag) => {
+            let (span_ns, limit_ns) = (task.span_ns(), case.set.figures[dag].limit_ns());
+            match (span_ns > limit_ns, limit_ns < task.relative_deadline_ns()) {
+                (true, _) => NotProvenReason::SpanBeyondLimit { span_ns, limit_ns },
+                (false, true) => NotProvenReason::NoBoundByPeriod,
+                (false, false) => NotProvenReason::NoBound,
+            }
+        }
+        BoundFailure::Own(SolverFailure::BeyondDeadline)
+            // A job may wait for room until its deadline has passed, however fast the others
+            // are.
+            if room < u128::from(task.relative_deadline_ns()) =>
+        {
+            NotProvenReason::InFlightTooFew { in_flight }
+        }
+        BoundFailure::Own(SolverFailure::BeyondDeadline) => NotProvenReason::NoBound,
+    }
+}
+
+fn write(
+    case: &AnalysisInput<'_>,
+    responses: Responses<'_>,
+    dag: usize,
+    bound_ns: u64,
+    text: &mut WitnessText,
+) {
+    let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+    let Ok(delays) = case.set.delays_of_job(dag, responses, may_outrank) else {
+        return;
+    };
+    let listed = listed(case, dag, responses, &delays);
+    if bound_ns > case.tasks[dag].period_ns() {
+        let figures = &case.set.figures[dag];
+        let begin = format_args!("bound {} {bound_ns} overlap", case.members[dag]);
+        overlap(text, begin, figures, bound_ns, &delays, &listed);
+    } else {
+        paths(text, case, dag, bound_ns, &delays, &listed);
+    }
+}
+
+fn paths(
+    text: &mut WitnessText,
+    case: &AnalysisInput<'_>,
+    dag: usize,
+    bound_ns: u64,
+    delays: &DelaySources,
+    listed: &[OutrankingDag<'_>],
+) {
+    let (id, task) = (case.members[dag], case.tasks[dag]);
+    let equations = case.set.equations(dag);
+    let waiting = bound_ns - task.span_ns();
+    let enough = |cores: u128| cores * u128::from(waiting);
+    let mut forms = equations.forms(delays, bound_ns);
+    let Some(form) = forms.find(|form| form.busy.value <= enough(form.cores)) else {
+        return;
+    };
+    let (cores, busy) = (form.cores, form.busy.value);
+    let chains = equations.cores + 1 - usize::try_from(cores).unwrap_or(0);
+    let by_cover = equations.covers.get(chains - 1).map(|cover| {
+        let left = task.oblivious().volume_ns() - cover;
+        if form.is_clipped { left.max(1) } else { left }
+    });
+    let own = equations.left[chains - 1];
+    match (delays.left_and_blocking, by_cover) {
+        (Some(left), _) => {
+            text.line(format_args!("bound {id} {bound_ns} blocked {left} {busy}"))
+        }
+        (None, Some(left)) if form.is_clipped || left == own => {
+            let word = if form.is_clipped { "waiting" } else { "paths" };
+            let blocked = delays
+                .blocking
+                .during(equations.cores, chains - 1, form.is_clipped);
+            text.line(format_args!(
+                "bound {id} {bound_ns} {word} {chains} {cores} {left} {blocked} {busy}"
+            ));
+            let most = equations.covers.len();
+            text.chains("chain", &covering(task.oblivious(), most, chains));
+        }
+        _ => {
+            let chains = chains - 1;
+            text.line(format_args!(
+                "bound {id} {bound_ns} reserved {chains} {cores} {own} {busy}"
+            ));
+            let reserved = reserved(task, case.set.cores).into_iter();
+            let reserved = reserved.skip(1).take(chains).map(|with| with.chain);
+            text.chains("chain", &reserved.collect::<Vec<_>>());
+        }
+    }
+    for other in listed {
+        let count = usize::try_from(cores).unwrap_or(usize::MAX);
+        let (count, [all, clipped]) = other.workloads.on((bound_ns, waiting), count);
+        let (id, response) = (other.id, other.response_ns);
+        if form.is_clipped {
+            text.line(format_args!(
+                "other {id} {response} {count} {all} {clipped}"
+            ));
+        } else {
+            text.line(format_args!("other {id} {response} {count} {all}"));
+        }
+    }
+}
+
+pub(super) fn overlap(
+    text: &mut WitnessText,
+    begin: fmt::Arguments<'_>,
+    figures: &PipelineTerms,
+    bound_ns: u64,
+    delays: &DelaySources,
+    listed: &[OutrankingDag<'_>],
+) {
+    let Ok((windows, own)) = figures.windows(delays, bound_ns) else {
+        return;
+    };
+    text.line(format_args!("{begin} {own}"));
+    for (back, window) in windows.iter().enumerate() {
+        let window_ns = u64::try_from(*window).unwrap_or(u64::MAX);
+        let busy = figures.busy(back as u128, own, delays, window_ns).value;
+        text.line(format_args!("window {window} {busy}"));
+        for other in listed {
+            let (count, [all, _]) = other.workloads.on((window_ns, 0), usize::MAX);
+            let (id, response) = (other.id, other.response_ns);
+            text.line(format_args!("other {id} {response} {count} {all}"));
+        }
+    }
+}
+
+/// A DAG that may outrank another, with its number in the commit.
+pub(super) struct OutrankingDag<'a> {
+    id: usize,
+    response_ns: u64,
+    workloads: &'a InterferingDag,
+}
+
+/// Names the DAGs that may outrank one, in the order of their workloads.
+pub(super) fn listed<'a>(
+    case: &AnalysisInput<'_>,
+    dag: usize,
+    responses: &[Option<u64>],
+    delays: &'a DelaySources,
+) -> Vec<OutrankingDag<'a>> {
+    let ids = (0..responses.len()).filter(|&other| case.relation.may_outrank(other, dag));
+    let listed = ids
+        .zip(&delays.others)
+        .map(|(other, workloads)| OutrankingDag {
+            id: case.members[other],
+            response_ns: responses[other].unwrap_or(u64::MAX),
+            workloads,
+        });
+    listed.collect()
+}

@@ -1,0 +1,142 @@
+//! The equations of single sinks, where the bound of their job is known.
+//!
+//! The critical chain of a sink ends with the sink, so it is at most as long as the
+//! longest path to it, and its subtasks are the sink's ancestors. What delays it is what
+//! delays the job, but for two things:
+//!
+//! - Of the job itself only subtasks count that may win over an ancestor. If all can be
+//!   preempted these are, under EDF, those that reach a sink whose deadline is no later
+//!   (all ancestors have deadlines no later than the sink's); under static priority,
+//!   those that are not less urgent than the least urgent ancestor. If not all can be
+//!   preempted, all count.
+//! - Under EDF with `D <= T`, jobs of other DAGs count up to the *sink's* deadline. What is
+//!   due later and keeps its core may block.
+//!
+//! So the sink's bound is the solution of the job's equation with these figures (see
+//! `pipelined`). Older and younger jobs of the DAG count as there, with the job's bound,
+//! which holds for all of them. The sink finishes no later than its job: the smaller of
+//! both bounds is taken. Evidence: `accepted_sets_keep_their_bounds` observes sinks, too.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::multiple_paths::{listed, overlap};
+use super::{BoundTest, BoundWitness, Responses, SinkBounds};
+use crate::analysis::case::AnalysisInput;
+use crate::analysis::features::covers;
+use crate::analysis::interference::DelaySources;
+use crate::analysis::pipelined::{PipelineTerms, STEP_LIMIT};
+use crate::analysis::ranks::PreemptionMix;
+use crate::analysis::witness_text::WitnessText;
+use crate::ids::SubtaskId;
+use crate::order::sorted_by_key;
+use crate::policy::Policy;
+
+pub(super) const TEST: BoundTest = BoundTest {
+    covers: covers!(
+        RANKED BY_DEADLINE ONE_CORE CORES PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES INTERLEAVED
+        LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
+    ),
+    sinks,
+    ..BoundTest::NONE
+};
+
+pub(super) const WITNESS: BoundWitness = BoundWitness {
+    sinks: write,
+    ..BoundWitness::NONE
+};
+
+fn sinks(case: &AnalysisInput<'_>, responses: Responses<'_>, found: &mut SinkBounds) {
+    for dag in (0..case.members.len()).filter(|&dag| TEST.is_for(case, dag)) {
+        let solved = equations(case, dag, responses).map(|(_, equation)| {
+            let (figures, delays) = equation?;
+            figures.solve(&delays, 0, &mut { STEP_LIMIT }).ok()
+        });
+        found.offer(dag, solved);
+    }
+}
+
+fn write(
+    case: &AnalysisInput<'_>,
+    responses: Responses<'_>,
+    dag: usize,
+    whole_ns: u64,
+    text: &mut WitnessText,
+) {
+    for (sink, equation) in equations(case, dag, responses) {
+        if let Some((figures, delays)) = equation
+            && let Ok(bound_ns) = figures.solve(&delays, 0, &mut { STEP_LIMIT })
+            && bound_ns < whole_ns
+        {
+            let listed = listed(case, dag, responses, &delays);
+            let begin = format_args!("sink {} {} {bound_ns}", case.members[dag], sink.0);
+            overlap(text, begin, &figures, bound_ns, &delays, &listed);
+        }
+    }
+}
+
+/// The path to a sink, and what of its own job may delay it.
+struct SinkPath {
+    length_ns: u64,
+    volume_ns: u64,
+}
+
+/// Returns the equation of each sink of a DAG and what may delay it, where the response times
+/// of jobs are known that it rests on.
+fn equations<'a>(
+    case: &'a AnalysisInput<'_>,
+    dag: usize,
+    responses: &'a [Option<u64>],
+) -> impl Iterator<Item = (SubtaskId, Option<(PipelineTerms, DelaySources)>)> {
+    let (set, model) = (&case.set, case.dag(dag));
+    let sinks = model.sinks().iter().zip(reaches(case, dag));
+    sinks.map(move |(&sink, reach)| {
+        let equation = || {
+            let deadline_ns = model.subtask(sink).relative_deadline_ns();
+            let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+            let delays = set.delays(dag, deadline_ns, responses, may_outrank).ok()?;
+            let (length_ns, volume_ns) = (reach.length_ns, reach.volume_ns);
+            let figures = &set.figures[dag];
+            let figures = figures.of_sink(length_ns, volume_ns, deadline_ns, responses[dag]?);
+            Some((figures, delays))
+        };
+        (sink, equation())
+    })
+}
+
+fn reaches(case: &AnalysisInput<'_>, dag: usize) -> Vec<SinkPath> {
+    let (task, model) = (case.tasks[dag], case.dag(dag));
+    let subtasks = model.subtasks();
+    // The smaller number wins, in both.
+    let urgency = |subtask: usize| match case.settings.policy {
+        Policy::StaticPriority => u64::from(subtasks[subtask].priority().0),
+        Policy::Edf => subtasks[subtask].relative_deadline_ns(),
+    };
+    // The largest number among the ancestors.
+    let mut least_urgent: Vec<u64> = (0..subtasks.len()).map(urgency).collect();
+    for subtask in task.topological_order() {
+        for next in task.successors(subtask) {
+            least_urgent[next] = least_urgent[next].max(least_urgent[subtask]);
+        }
+    }
+    // By urgency, with the sums of WCETs: a look at all subtasks for each sink takes as long
+    // as the square of a large DAG's size.
+    let order = sorted_by_key(subtasks.len(), urgency);
+    let mut sums_ns = vec![0];
+    for &subtask in &order {
+        sums_ns.push(sums_ns[sums_ns.len() - 1] + task.wcets_ns()[subtask]);
+    }
+    let finishes_ns = task.finishes_ns();
+    let reach = model.sinks().iter().map(|sink| {
+        let least = least_urgent[sink.index()];
+        let counted = match case.relation.preemption {
+            PreemptionMix::All => order.partition_point(|&subtask| urgency(subtask) <= least),
+            PreemptionMix::None | PreemptionMix::Some => order.len(),
+        };
+        SinkPath {
+            length_ns: finishes_ns[sink.index()],
+            volume_ns: sums_ns[counted],
+        }
+    });
+    reach.collect()
+}
