@@ -139,7 +139,7 @@ pub use policy::{
 };
 pub use scheduler::{
     DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,
-    Scheduler, TurnEnd,
+    SKIPS_A_STEP, SKIPS_EVERY_NS, Scheduler, TurnEnd,
 };
 pub use spec::{
     DagSpec, LatestSpec, MOST_WAITS, PINS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,

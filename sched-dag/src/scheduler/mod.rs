@@ -25,7 +25,8 @@
 //!   successors of its subtask, a decision the logarithm of the number of
 //!   subtasks. Besides, a job that is cut costs its
 //!   instances, once; at one instant that is at most the DAG's
-//!   subtasks and edges times the jobs that may be in flight. After a
+//!   subtasks and edges times the jobs that may be in flight. A backlog that is
+//!   skipped costs [`SKIPS_A_STEP`] events a step, however long it is. After a
 //!   pause of the driver, each release and each deadline that has passed
 //!   meanwhile costs its step.
 //!
@@ -54,6 +55,7 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::hash::{Hash, Hasher};
+use core::ops::Range;
 
 use crate::ids::{ClusterId, CoreId, DagId, Instance, Vertex, to_u32};
 use crate::journal::EventKind;
@@ -70,7 +72,7 @@ use crate::task_set::{Dag, TaskSet};
 pub use crate::scheduler::dispatch::{Decision, HandOff};
 pub use crate::scheduler::log::{DriverNotice, EventLog};
 pub use crate::scheduler::moment::{Moment, TurnEnd};
-pub use crate::scheduler::phase::{DagPhase, DagSnapshot};
+pub use crate::scheduler::phase::{DagPhase, DagSnapshot, SKIPS_A_STEP, SKIPS_EVERY_NS};
 
 /// The state of all jobs in flight.
 ///
@@ -90,12 +92,14 @@ pub struct Scheduler {
     fresh: u32,
     cores: CoreTable,
     /// When something happens to each DAG without a completion, and behind the DAGs, when each
-    /// wait ends at the latest.
+    /// wait ends at the latest, and when skips are told of.
     timers: IndexedHeap<u64>,
     waits: WaitTable,
     /// The least of these times, at hand for each completion; `u64::MAX` also if there
     /// is none.
     quiet_until_ns: u64,
+    /// How many skips were told of at the instant that is given.
+    told: (u64, usize),
     /// Vertices whose instances were cancelled and whose successors do not know
     /// yet.
     ending: Vec<u32>,
@@ -115,6 +119,8 @@ struct DagState {
     survived: SurvivedFaults,
     /// When the latest pause has ended; what was due before is skipped.
     resumed_ns: u64,
+    /// The jobs that are skipped and not told of.
+    untold: Range<u64>,
 }
 
 impl Scheduler {
@@ -168,11 +174,12 @@ impl Scheduler {
                     statistics: DagStatistics::default(),
                     survived: SurvivedFaults::new(dag.on_fault()),
                     resumed_ns: 0,
+                    untold: 0..0,
                 }
             })
             .collect();
         let waits = WaitTable::new(&task_set);
-        let mut timers = IndexedHeap::new(dags.len() + waits.len());
+        let mut timers = IndexedHeap::new(dags.len() + waits.len() + 1);
         for (index, (dag, state)) in dags.iter().zip(&states).enumerate() {
             if let Some(event_ns) = state.jobs.next_event_ns(dag, 0) {
                 timers.set(index, event_ns);
@@ -190,6 +197,7 @@ impl Scheduler {
             quiet_until_ns: earliest_ns(&timers),
             timers,
             waits,
+            told: (0, 0),
             ending: Vec::with_capacity(longest.unwrap_or(0)),
             // A dispatch names a core at most twice: to preempt and to start.
             decisions: Vec::with_capacity(2 * options.cores as usize),
@@ -210,10 +218,10 @@ impl Scheduler {
     /// room for.
     pub fn hear(&mut self, kinds: impl IntoIterator<Item = EventKind>) -> usize {
         // At one instant a DAG's end may skip and cancel all that it has, and a change of mode
-        // each other DAG's waiting job.
+        // each other DAG's waiting job; and a step tells of skips.
         let of_dag = |dag: &Dag| dag.slots() * (dag.subtasks().len() + 4);
         let most = self.task_set.dags().iter().map(of_dag).max();
-        let others = 8 * self.dags.len();
+        let others = 8 * self.dags.len() + SKIPS_A_STEP;
         self.log.hear(kinds, most.unwrap_or(0) + others)
     }
 
@@ -250,13 +258,13 @@ impl Scheduler {
         Some(self.vertices.get(key.vertex()).present_instance())
     }
 
-    /// Reports whether every DAG [is over](Self::is_over).
+    /// Reports whether every DAG [is over](Self::is_over), and every skip is told of.
     #[must_use]
     #[inline]
     pub fn is_finished(&self) -> bool {
         let dags = self.task_set.dags().iter().zip(&self.dags);
-        dags.into_iter()
-            .all(|(dag, state)| state.jobs.are_over(dag))
+        let are_over = (dags.into_iter()).all(|(dag, state)| state.jobs.are_over(dag));
+        are_over && self.timers.key_of(self.skips_timer()).is_none()
     }
 
     /// Reports whether nothing of a DAG is left to be done: no job is in flight,
@@ -372,7 +380,14 @@ impl Hash for Scheduler {
     fn hash<H: Hasher>(&self, state: &mut H) {
         // The least time is that of the timers, and between instants nothing is ending.
         (self.log.now_ns, &self.dags, &self.vertices, &self.ready).hash(state);
-        (self.fresh, &self.cores, &self.timers, &self.waits).hash(state);
+        (
+            self.fresh,
+            &self.cores,
+            &self.timers,
+            &self.waits,
+            self.told,
+        )
+            .hash(state);
     }
 }
 

@@ -48,11 +48,14 @@ use crate::spec::WAITS;
 
 impl Scheduler {
     /// Releases all jobs of a DAG that are due, and notices deadlines that have
-    /// passed. A number behind the DAGs' is that of a wait's timer.
+    /// passed. A number behind the DAGs' is that of a wait's timer, or of the skips'.
     #[inline]
     pub(super) fn serve(&mut self, dag: DagId) {
-        if WAITS && dag.index() >= self.dags.len() {
-            return self.time_out(dag.index());
+        if dag.index() >= self.dags.len() {
+            return match WAITS && dag.index() < self.skips_timer() {
+                true => self.time_out(dag.index()),
+                false => self.tell_skips(),
+            };
         }
         // Mostly what is due is a release, and the job before it has ended.
         if !self.dags[dag.index()].jobs.are_at_rest() {

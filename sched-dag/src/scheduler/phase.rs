@@ -11,7 +11,10 @@
 //!   the pause, too, since pauses come before releases. Numbers and the grid O +
 //!   kT go on. Of a sporadic DAG, the job that a signal asks for is skipped.
 //! - **P2, no backlog.** Releases that wait for an older job are skipped at the
-//!   pause, the oldest first. Each costs a step, once.
+//!   pause, however many there are. They are told of from the oldest on: one at once, and
+//!   [`SKIPS_A_STEP`] more of all DAGs in that step and in each that follows, every
+//!   [`SKIPS_EVERY_NS`]. If the DAG is paused once more before that is over, the rest is counted
+//!   only.
 //! - **P3, in flight.** What was released goes on as ever, to its end.
 //! - **P4, resuming.** The first job that is due at the instant of the resumption
 //!   or later is released at its nominal release time.
@@ -30,8 +33,8 @@
 //! - **C1, no release.** A closed DAG releases no job any more, at the very instant of the
 //!   closing neither, since closings come before releases. No further job is due, so none is
 //!   skipped either; a signal that is kept for one is forgotten.
-//! - **C2, no backlog.** Releases that wait for an older job are skipped at the closing, the
-//!   oldest first.
+//! - **C2, no backlog.** Releases that wait for an older job are skipped at the closing, and told
+//!   of as at a pause.
 //! - **C3, in flight.** What was released goes on as ever, to its end, and may be late.
 //! - **C4, over.** The DAG is over when nothing of it is in flight. Signals to it are dropped,
 //!   and counted.
@@ -108,10 +111,17 @@
 use alloc::boxed::Box;
 use alloc::vec;
 
-use super::{DagStatistics, Scheduler};
+use super::{DagStatistics, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
 use crate::policy::{JobOutcome, OnFault};
+
+/// Of how many skips one step tells at most, besides one of each DAG whose backlog it skips: they
+/// take no longer than the releases of a few DAGs.
+pub const SKIPS_A_STEP: usize = 32;
+
+/// The time until the next step does. All cores are left to the instances meanwhile.
+pub const SKIPS_EVERY_NS: u64 = 100_000;
 
 /// A phase of a DAG's life. A DAG is paused and goes on any number of times; it never comes back
 /// from a later phase to an earlier one of the other two.
@@ -290,10 +300,55 @@ impl Scheduler {
 
     #[inline]
     fn skip_waiting(&mut self, dag: DagId) {
-        while self.waiting(dag) > 0 {
-            self.skip_oldest_waiting(dag);
+        if self.waiting(dag) > 0 {
+            let state = &mut self.dags[dag.index()];
+            let skipped = state.jobs.skip_all_waiting();
+            state.statistics.skips += skipped.end - skipped.start;
+            state.untold = skipped;
+            self.tell_skip(dag);
+            self.tell_skips();
         }
         self.set_timer(dag);
+    }
+
+    /// Tells of skips as far as one step may, and leaves the others to the next ones.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn tell_skips(&mut self) {
+        let now_ns = self.log.now_ns;
+        if self.told.0 != now_ns {
+            self.told = (now_ns, 0);
+        }
+        for dag in (0..).map(DagId).take(self.dags.len()) {
+            while self.told.1 < SKIPS_A_STEP && self.tell_skip(dag) {
+                self.told.1 += 1;
+            }
+        }
+        let timer = self.skips_timer();
+        match self.dags.iter().all(|state| state.untold.is_empty()) {
+            true => self.timers.remove(timer),
+            false => self
+                .timers
+                .set(timer, now_ns.saturating_add(SKIPS_EVERY_NS)),
+        }
+        self.quiet_until_ns = earliest_ns(&self.timers);
+    }
+
+    /// Tells of the oldest skip of a DAG that is not told of; reports whether there is one.
+    fn tell_skip(&mut self, dag: DagId) -> bool {
+        let state = &mut self.dags[dag.index()];
+        let job = state.untold.next();
+        if let Some(job) = job {
+            let release_ns = (state.jobs).waiting_release_ns(self.task_set.dag(dag), job);
+            (self.log).of_job(EventKind::Skipped, dag, job, Some(release_ns));
+        }
+        job.is_some()
+    }
+
+    /// Returns the number of the timer by which they are told of, behind all others.
+    #[inline]
+    pub(super) fn skips_timer(&self) -> usize {
+        self.dags.len() + self.waits.len()
     }
 }
 

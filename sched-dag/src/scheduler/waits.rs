@@ -192,7 +192,8 @@ impl Scheduler {
         let (limit_ns, timer) = self.timers.peek()?;
         let place = timer.checked_sub(self.dags.len())?;
         // Where a core is idle, nothing is in the cluster's line; any idle core may be of another's.
-        let line = self.vertices.get(self.waits.vertices[place]).line;
+        // The last timer is no wait's.
+        let line = self.vertices.get(*self.waits.vertices.get(place)?).line;
         let is_elsewhere = !line.is_cluster();
         if self.fresh != 0 || limit_ns > now_ns || !self.cores.any_idle() || is_elsewhere {
             return None;

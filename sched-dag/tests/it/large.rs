@@ -1,8 +1,14 @@
 //! Large commits and runs: no recursion, no quadratic loop.
 
-use sched_dag::{CommitOptions, DagFault, DagSpec, Policy, SubtaskSpec, verify};
+use sched_dag::journal::EventKind;
+use sched_dag::law::{self, JudgeOptions};
+use sched_dag::lifecycle::Request;
+use sched_dag::{
+    CommitOptions, DagFault, DagId, DagSpec, Journal, Policy, SKIPS_A_STEP, SKIPS_EVERY_NS,
+    SubtaskSpec, verify,
+};
 
-use crate::support::{PREEMPTIVE, Spec, cores, dag, run};
+use crate::support::{PREEMPTIVE, Spec, cores, dag, run, scheduler};
 
 const LARGE: usize = 200_000;
 
@@ -42,5 +48,39 @@ fn a_huge_cycle_or_knot_is_refused_in_bounded_time() {
         let cycles: Vec<usize> = cycles.collect();
         assert_eq!(cycles.len(), 1);
         assert!(length.is_none_or(|length| cycles == [length]));
+    }
+}
+
+/// C2, P2: however many jobs wait, no step tells of more than so many.
+#[test]
+fn a_long_backlog_is_skipped_in_short_steps() {
+    const JOBS: u64 = 100_000;
+    for request in [Request::Pause(DagId(0)), Request::Close(DagId(0))] {
+        let overloaded = dag(10, 10, JOBS, &[0], &[]).with(|spec| spec.in_flight = Some(1));
+        let mut scheduler = scheduler(&[overloaded.clone(), overloaded], cores(1));
+        scheduler.log.journal = Journal::growing();
+        scheduler.hear([EventKind::Skipped]);
+        let mut now_ns = 10 * JOBS;
+        let _ = scheduler.at(now_ns).dispatch();
+        scheduler.at(now_ns).serve(request);
+        scheduler.at(now_ns).serve(Request::Close(DagId(1)));
+        // The first one of each DAG comes besides.
+        let (mut most, mut skips, mut notices) = (SKIPS_A_STEP + 2, 0, Vec::new());
+        loop {
+            let _ = scheduler.at(now_ns).dispatch();
+            scheduler.log.exchange_notices(&mut notices);
+            assert!((1..=most).contains(&notices.len()), "{}", notices.len());
+            (most, skips) = (SKIPS_A_STEP, skips + notices.len() as u64);
+            let Some(next_ns) = scheduler.next_event_ns() else {
+                break;
+            };
+            assert!(!scheduler.is_finished() && next_ns == now_ns + SKIPS_EVERY_NS);
+            now_ns = next_ns;
+        }
+        assert_eq!(skips, 2 * (JOBS - 1));
+        assert_eq!(scheduler.statistics(DagId(0)).skips, JOBS - 1);
+        let events = scheduler.log.journal.events();
+        let found = law::violations(scheduler.task_set(), JudgeOptions::whole(u64::MAX), events);
+        assert_eq!(found, []);
     }
 }

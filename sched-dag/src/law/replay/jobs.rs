@@ -50,14 +50,14 @@ pub(super) struct JobState {
     /// Whether its release may be among the events that are lost.
     pub(super) is_partial: bool,
     pub(super) released: Option<StepTime>,
-    queued: Option<StepTime>,
-    skipped: Option<StepTime>,
+    pub(super) queued: Option<StepTime>,
+    pub(super) skipped: Option<StepTime>,
     /// When it was aborted, or a fault has cut it.
     pub(super) cut: Option<StepTime>,
     pub(super) missed: Option<StepTime>,
     pub(super) completed: Option<StepTime>,
     /// By subtask, as far as there is one.
-    lives: Vec<Option<InstanceLife>>,
+    pub(super) lives: Vec<Option<InstanceLife>>,
 }
 
 impl JobState {
@@ -129,12 +129,7 @@ impl DagReplay {
             self.forgotten = first.key() + 1;
             first.remove();
         }
-        while let Some(first) = self.waiting.first_entry()
-            && *first.key() < job
-            && first.get().skipped.is_some()
-        {
-            first.remove();
-        }
+        self.waiting.forget_before(job);
     }
 }
 
@@ -168,8 +163,7 @@ impl JournalReplay<'_> {
             return;
         }
         // A job is first due, and in flight only from its release on.
-        let waiting = of_dag.waiting.entry(job).or_default();
-        waiting.release_ns = release_ns;
+        let mut waiting = of_dag.waiting.take(job).unwrap_or_default();
         found[0] = waiting.note(&event, moment);
         if is_released && let Some(skipped) = waiting.skipped {
             let (before, before_ns) = (EventKind::Skipped, skipped.time_ns);
@@ -184,16 +178,23 @@ impl JournalReplay<'_> {
             .filter(|release_ns| event.time_ns < *release_ns)
             .map(|release_ns| Violation::BeforeRelease { event, release_ns });
         if is_released {
-            found[3] = self.released_at_wrong_time(&event, release_ns);
+            let was_queued = waiting.queued.is_some();
+            found[3] = self.released_at_wrong_time(&event, release_ns, was_queued);
         }
         self.found.extend(found.into_iter().flatten());
-        if is_released {
-            self.open_job(&event, release_ns);
+        match is_released {
+            true => self.open_job(&event, release_ns, waiting),
+            false => self.dag(dag).waiting.put(job, &waiting),
         }
     }
 
     /// The first thing that is wrong with a release but that it is early.
-    fn released_at_wrong_time(&self, event: &Event, release_ns: Option<u64>) -> Option<Violation> {
+    fn released_at_wrong_time(
+        &self,
+        event: &Event,
+        release_ns: Option<u64>,
+        was_queued: bool,
+    ) -> Option<Violation> {
         let event = *event;
         let Event { dag, job, .. } = event;
         let model = self.task_set.dag(dag);
@@ -228,7 +229,6 @@ impl JournalReplay<'_> {
                 });
             }
         }
-        let was_queued = of_dag.waiting.get(&job)?.queued.is_some();
         let expected_ns = match was_queued {
             // A queued job is released by the completion that makes room.
             true => of_dag.completed_ns,
@@ -243,11 +243,14 @@ impl JournalReplay<'_> {
     }
 
     /// From now on the job is in flight.
-    fn open_job(&mut self, event: &Event, release_ns: Option<u64>) {
+    fn open_job(&mut self, event: &Event, release_ns: Option<u64>, mut begun: JobState) {
         let Event { dag, job, .. } = *event;
         let moment = self.moment(event);
+        // Judged when it was written; by now only the latest one of its run is known.
+        if let (Some(missed), Some(deadline_ns)) = (&mut begun.missed, self.deadline_ns(dag, job)) {
+            missed.time_ns = deadline_ns + 1;
+        }
         let of_dag = self.dag(dag);
-        let mut begun = of_dag.waiting.remove(&job).unwrap_or_default();
         // Something of a partial one may have happened, such as its deadline's passing.
         if let Some(partial) = of_dag.jobs.remove(&job) {
             begun.missed = begun.missed.or(partial.missed);
@@ -267,10 +270,12 @@ impl JournalReplay<'_> {
         let of_dag = self.dag(dag);
         // A job may miss its deadline while its release waits.
         if event.what == EventKind::Missed
-            && let Some(waiting) = of_dag.waiting.get_mut(&job)
+            && let Some(mut waiting) = of_dag.waiting.take(job)
         {
             let again = waiting.note(event, moment);
-            self.found.extend(again);
+            of_dag.waiting.put(job, &waiting);
+            let wrong = again.or_else(|| self.missed_while_waiting(event));
+            self.found.extend(wrong);
             return;
         }
         if !self.find_job(event) {
@@ -303,6 +308,26 @@ impl JournalReplay<'_> {
         if event.what == EventKind::Completed {
             self.dag(dag).forget_before(job);
         }
+    }
+
+    /// Returns the first deadline of a job of a periodic DAG.
+    fn deadline_ns(&self, dag: DagId, job: u64) -> Option<u64> {
+        let model = self.task_set.dag(dag);
+        let of_sinks = model.sinks().iter();
+        let first_ns = of_sinks.map(|sink| model.subtask(*sink).relative_deadline_ns());
+        let is_on_grid = !model.is_sporadic();
+        (first_ns.min().filter(|_| is_on_grid)).map(|ns| model.grid_ns(job).saturating_add(ns))
+    }
+
+    /// R4 for a job that has missed its deadline before it was released.
+    fn missed_while_waiting(&self, event: &Event) -> Option<Violation> {
+        let event = *event;
+        let deadline_ns = self.deadline_ns(event.dag, event.job)?;
+        if event.time_ns <= deadline_ns {
+            return Some(Violation::MissedEarly { event, deadline_ns });
+        }
+        let is_late = self.is_exact() && event.time_ns > deadline_ns + 1;
+        is_late.then_some(Violation::MissedLate { event, deadline_ns })
     }
 
     fn subtasks(&self, dag: DagId) -> u32 {

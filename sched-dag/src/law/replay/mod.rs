@@ -3,8 +3,8 @@
 //! The events are taken in their order, in which each comes after all that it follows
 //! from, and held against what is known by then: so what is not there yet has not
 //! happened, whatever its time says. Jobs are forgotten once they are complete and
-//! nothing waits for them any more, so the memory that it takes is that of the jobs in
-//! flight.
+//! nothing waits for them any more, and of those that are due and wait only runs are kept
+//! ([`backlog`]), so the memory that it takes is that of the jobs in flight.
 //!
 //! Words. A *step* of the scheduler is known by the core that made it and by that core's
 //! last machine event before it: between two machine events of a core, a completion's
@@ -27,6 +27,7 @@
 //!
 //! If its job is partial, an instance's first event tells what it must have been before.
 
+mod backlog;
 mod jobs;
 
 use alloc::collections::BTreeMap;
@@ -39,6 +40,7 @@ use crate::journal::{Event, EventKind};
 use crate::policy::OnFault;
 use crate::spec::{WAITS, Wait};
 use crate::task_set::TaskSet;
+use backlog::Backlog;
 use jobs::JobState;
 
 /// The findings about R1 to R4, lives of DAGs and cores in a journal.
@@ -114,7 +116,7 @@ struct DagReplay {
     /// The jobs that are released, or partial, and not forgotten.
     jobs: BTreeMap<u64, JobState>,
     /// The jobs that are due and not released.
-    waiting: BTreeMap<u64, JobState>,
+    waiting: Backlog,
     /// How many jobs were released and are not complete.
     in_flight: u32,
     /// All jobs before this one are forgotten or not complete.
@@ -216,7 +218,7 @@ impl JournalReplay<'_> {
             return true;
         }
         let is_over = job < of_dag.forgotten;
-        let is_partial = may_be_lost && !is_over && !of_dag.waiting.contains_key(&job);
+        let is_partial = may_be_lost && !is_over && !of_dag.waiting.contains(job);
         // In both cases nothing is concluded from what is not there of it.
         of_dag.jobs.insert(job, JobState::partial(release_ns));
         if !is_partial {

@@ -22,6 +22,7 @@
 mod judging;
 
 use alloc::boxed::Box;
+use core::ops::Range;
 
 use super::phase::DagPhase;
 use crate::ids::to_u32;
@@ -271,7 +272,15 @@ impl JobTable {
         (number, release_ns)
     }
 
-    /// Returns the nominal release time of a waiting job.
+    /// Drops all waiting jobs, and returns their numbers.
+    #[inline]
+    pub(super) fn skip_all_waiting(&mut self) -> Range<u64> {
+        let waiting = self.first_waiting..self.next_due;
+        self.first_waiting = self.next_due;
+        waiting
+    }
+
+    /// Returns the nominal release time of a waiting job, or of one that has been skipped since.
     #[inline]
     pub(super) fn waiting_release_ns(&self, dag: &Dag, number: u64) -> u64 {
         if dag.is_sporadic() {
