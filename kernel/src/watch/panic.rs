@@ -131,7 +131,7 @@ fn die(what: &str, message: &dyn Display, place: &dyn Display, registers: Option
         instruction: Some(registers.rip),
         stack_pointer: registers.rsp,
     });
-    let line = json::line("backtrace", |line| spot.write(index, line));
+    let line = json::line("backtrace", |line| spot.backtrace().write(index, line));
     write_line_in_emergency(&line);
     give_verdict(&what)
 }

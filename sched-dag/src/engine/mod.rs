@@ -341,8 +341,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     }
 
     /// Returns the cost of a fault of the vertex' instance if it comes now.
-    #[must_use]
-    pub fn cost_of_fault(&self, vertex: Vertex) -> FaultCost {
+    fn cost_of_fault(&self, vertex: Vertex) -> FaultCost {
         let instance = self.scheduler.instance_of(vertex);
         let alternate = self.alternates[vertex.index()].as_ref();
         let is_survived = self.scheduler.survives(instance.dag, instance.job);

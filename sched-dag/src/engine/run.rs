@@ -39,7 +39,7 @@ pub struct Run {
     proven: ProvenBounds,
     dags: Vec<DagCounts>,
     journal: Journal,
-    record: OnceCell<RunRecord>,
+    record: OnceCell<Option<RunRecord>>,
     times: OnceCell<Option<RunTally>>,
     counts: RunCounts,
 }
@@ -166,11 +166,19 @@ impl Run {
     /// If there is no memory for it.
     #[must_use]
     pub fn record(&self) -> &RunRecord {
-        self.record.get_or_init(|| {
+        let record = self.try_record();
+        record.expect("there is no memory for the times of so many jobs; give the machine more")
+    }
+
+    /// Returns the times of all jobs, as [`record`](Self::record) does; `None` if there is no memory
+    /// for them, as after an overload, in which each job that waits counts.
+    #[must_use]
+    pub fn try_record(&self) -> Option<&RunRecord> {
+        let record = self.record.get_or_init(|| {
             let (is_whole, events) = (self.journal.is_whole(), self.journal.events());
-            let record = RunRecord::of_events(&self.task_set, is_whole, events);
-            record.expect("the times of a journal's events fit into memory")
-        })
+            RunRecord::of_events(&self.task_set, is_whole, events)
+        });
+        record.as_ref()
     }
 
     /// Returns the response times of a DAG's complete jobs, in nanoseconds; of the latest jobs if

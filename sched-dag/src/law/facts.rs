@@ -16,7 +16,7 @@ impl RunRecord {
     /// If the oldest events are lost (`is_whole` is false), it has the jobs that were
     /// due at or after the first event that is left: of these no event is missing.
     ///
-    /// Returns `None` if the jobs are too many for this machine's memory to address.
+    /// Returns `None` if there is no memory for so many jobs.
     #[must_use]
     pub fn of_events(
         task_set: &TaskSet,

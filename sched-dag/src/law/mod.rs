@@ -30,7 +30,6 @@ pub mod sweep;
 mod tally;
 mod violation;
 
-use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
@@ -139,8 +138,7 @@ impl RunRecord {
     /// Makes an empty record with room for the jobs of each DAG whose numbers are in
     /// `jobs(dag)`.
     ///
-    /// Returns `None` if the jobs are too many for this machine's memory to
-    /// address.
+    /// Returns `None` if there is no memory for so many jobs.
     fn with_jobs(task_set: &TaskSet, jobs: impl Fn(DagId) -> Range<u64>) -> Option<Self> {
         let dags = (0..).map(DagId).zip(task_set.dags()).map(|(id, dag)| {
             let Range { start, end } = jobs(id);
@@ -150,8 +148,8 @@ impl RunRecord {
             Some(DagRecord {
                 subtasks,
                 first_job: start,
-                jobs: vec![JobRecord::default(); jobs],
-                instances: vec![InstanceRecord::default(); instances],
+                jobs: filled(jobs)?,
+                instances: filled(instances)?,
             })
         });
         Some(Self {
@@ -269,6 +267,14 @@ impl DagRecord {
         let place = usize::try_from(job.checked_sub(self.first_job)?).ok()?;
         (place < self.jobs.len()).then_some(place)
     }
+}
+
+/// Returns so many values that tell of nothing, `None` if there is no memory for them.
+fn filled<T: Clone + Default>(count: usize) -> Option<Vec<T>> {
+    let mut values = Vec::new();
+    values.try_reserve_exact(count).ok()?;
+    values.resize(count, T::default());
+    Some(values)
 }
 
 /// Returns the latest of some times, `None` if one is missing or there are none.

@@ -1,14 +1,14 @@
 //! Large commits and runs: no recursion, no quadratic loop.
 
-use sched_dag::journal::EventKind;
-use sched_dag::law::{self, JudgeOptions};
+use sched_dag::journal::{Event, EventKind};
+use sched_dag::law::{self, JudgeOptions, RunRecord};
 use sched_dag::lifecycle::Request;
 use sched_dag::{
-    CommitOptions, DagFault, DagId, DagSpec, Journal, Policy, SKIPS_A_STEP, SKIPS_EVERY_NS,
+    CommitOptions, CoreId, DagFault, DagId, DagSpec, Journal, Policy, SKIPS_A_STEP, SKIPS_EVERY_NS,
     SubtaskSpec, verify,
 };
 
-use crate::support::{PREEMPTIVE, Spec, cores, dag, run, scheduler};
+use crate::support::{PREEMPTIVE, Spec, commit, cores, dag, run, scheduler};
 
 const LARGE: usize = 200_000;
 
@@ -83,4 +83,25 @@ fn a_long_backlog_is_skipped_in_short_steps() {
         let found = law::violations(scheduler.task_set(), JudgeOptions::whole(u64::MAX), events);
         assert_eq!(found, []);
     }
+}
+
+/// After an overload a record of each job that waits may not fit.
+#[test]
+fn times_that_memory_cannot_hold_are_none() {
+    const JOBS: u64 = 1 << 50;
+    let task_set = commit(&[dag(1, 1, JOBS, &[0], &[])], PREEMPTIVE);
+    let skipped = |job| Event {
+        time_ns: JOBS,
+        what: EventKind::Skipped,
+        core: CoreId(0),
+        dag: DagId(0),
+        job,
+        subtask: None,
+    };
+    let record = |last| {
+        let events = [0, last].map(skipped);
+        RunRecord::of_events(&task_set, true, events.into_iter())
+    };
+    assert!(record(7).is_some_and(|record| record.jobs(DagId(0)).len() == 8));
+    assert!(record(JOBS - 1).is_none());
 }

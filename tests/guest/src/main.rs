@@ -8,6 +8,7 @@ extern crate alloc;
 mod attacks;
 mod checksum;
 mod cluster_scale;
+mod delays;
 mod endless;
 mod every_call;
 mod input;
@@ -40,6 +41,7 @@ const TESTS: &[(&str, Test)] = &[
     ("attack", attacks::run),
     ("crime", crime),
     ("cluster_scale", cluster_scale::run),
+    ("delays", delays::run),
     ("deaf_alone", |machine| single::deaf(machine, false)),
     ("deaf_beside", |machine| single::deaf(machine, true)),
     ("preemption", preemption::run),

@@ -9,6 +9,7 @@ mod cruise;
 mod cruise_replay;
 mod dag_file;
 mod debian;
+mod delays;
 mod drone;
 mod every_call;
 mod faults;

@@ -11,8 +11,8 @@ use boot_entry::image;
 
 use super::this_core;
 
-/// How many words of a stack are read at most: 16 KiB.
-const WORDS: u64 = 2048;
+/// How many words of a stack are read at most: 8 KiB, for interrupts are disabled meanwhile.
+const WORDS: u64 = 1024;
 
 /// The longest call instruction: two of REX and opcode, a ModRM, a SIB, four of displacement,
 /// in the forms that compilers use (Intel SDM 2, `CALL`).

@@ -28,6 +28,11 @@
 //! The time for which an instance waits for its turn does not count as its execution: it
 //! uses up no budget. It does pass on the clock, for all.
 //!
+//! Core 0's background computes, too, and has no turn: it gives way. Every [`FIRST_TURN_NS`] a
+//! timer ends its visit, whatever it does, and it goes on once no core is fresh
+//! ([`begin_background`]). Where it has interrupts disabled it gives way once for each piece of
+//! text and each look at the scheduler ([`look_up`]).
+//!
 //! A core that halts for an instance or watches the clock (`occupation`, `Event::wait`)
 //! takes no part. All this is off unless [`enable`] is called: real cores compute at the
 //! same time, and a core that is alone need not share. The statics here need no order
@@ -101,15 +106,51 @@ pub fn come(core: &Core) {
     }
 }
 
-/// Yields to cores that were just given an instance. For background work; interrupts are enabled.
-pub fn give_way() {
+/// Whether core 0's background computes; it does nothing else while it halts.
+static BACKGROUND: AtomicBool = AtomicBool::new(false);
+
+/// Notes that the background computes from now on, and has it give way, by and by. Interrupts are
+/// enabled.
+pub fn begin_background() {
     if is_enabled() {
-        // One visit for all others: one that has been woken becomes fresh in it.
+        BACKGROUND.store(true, Ordering::Relaxed);
+        interrupt_flag::disable();
+        give_way(this_core::get());
+        interrupt_flag::enable();
+    }
+}
+
+/// Notes that the background halts, or has ended.
+pub fn end_background() {
+    if is_enabled() {
+        BACKGROUND.store(false, Ordering::Relaxed);
+        timer::set(Alarm::Hold, u64::MAX);
+    }
+}
+
+/// Yields to cores that were just given an instance, until an interrupt is pending. The background
+/// does so again in a short while. Interrupts are disabled.
+fn give_way(core: &Core) {
+    // One visit for all others: one that has been woken becomes fresh in it. And one more behind:
+    // a core that begins its turn arms its timer, which ends its visit.
+    cpu::relax();
+    while FRESH.load(Ordering::Relaxed) != 0 && !local_apic::is_interrupt_pending() {
         cpu::relax();
-        while FRESH.load(Ordering::Relaxed) != 0 {
-            cpu::relax();
-        }
-        // A core that begins its turn arms its timer, which ends its visit: it gets another one.
+    }
+    cpu::relax();
+    keep_giving_way(core);
+}
+
+/// Sets the timer by which the background gives way.
+fn keep_giving_way(core: &Core) {
+    if core.index == 0 && BACKGROUND.load(Ordering::Relaxed) {
+        timer::set(Alarm::Hold, clock::now_ns().saturating_add(FIRST_TURN_NS));
+    }
+}
+
+/// Gives all other cores a visit, in work for people that may have interrupts disabled.
+pub fn look_up() {
+    if is_enabled() {
         cpu::relax();
     }
 }
@@ -132,12 +173,16 @@ pub fn leave(core: &Core) {
     }
 }
 
-/// Like [`leave`], and sees to it that the core is not interrupted for a turn's end.
+/// Like [`leave`], and sees to it that the core is not interrupted for a turn's end. Core 0 goes
+/// back to its background.
 #[inline]
 pub fn rest(core: &Core) {
-    if is_enabled() && core.part() != TimeSlicePart::None {
-        set_part(core, TimeSlicePart::None);
-        timer::set(Alarm::Hold, u64::MAX);
+    if is_enabled() {
+        if core.part() != TimeSlicePart::None {
+            set_part(core, TimeSlicePart::None);
+            timer::set(Alarm::Hold, u64::MAX);
+        }
+        keep_giving_way(core);
     }
 }
 
@@ -211,6 +256,12 @@ fn end_interrupt_in_turn() {
     URGENT.fetch_sub(1, Ordering::Relaxed);
     let core = this_core::get();
     match core.part() {
+        TimeSlicePart::None if core.context().is_background() && !timer::is_set(Alarm::Hold) => {
+            if BACKGROUND.load(Ordering::Relaxed) {
+                give_way(core);
+            }
+            return;
+        }
         TimeSlicePart::None | TimeSlicePart::Comes => return,
         TimeSlicePart::Computes if timer::is_set(Alarm::Hold) => return,
         TimeSlicePart::Computes => pass(core),

@@ -9,6 +9,14 @@
 //! the context goes back into the stock. Until the machine is reset a fault keeps all that the
 //! function owned on the heap, and the app's locks that it held.
 //!
+//! # The report: noted at the fault, told by core 0's background
+//!
+//! To make a report's text takes some 100 us, so nobody waits for that. The instance is ended
+//! first, and what is known of its fault becomes a *note* of fixed size. That takes about as long as
+//! the step of the scheduler that it comes with, and all else is left to the background, with
+//! interrupts enabled. [`PLACES`] notes can wait; further faults are counted, and the journal has
+//! them.
+//!
 //! That is possible because code that may be at fault is told apart by the
 //! interrupt flag: apps run with interrupts enabled, while code that holds a
 //! lock of the kernel's, or handles an interrupt, has them disabled. A fault there, or
@@ -16,33 +24,73 @@
 
 use core::fmt::{self, Display};
 use core::panic::PanicInfo;
+use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
 use sched_dag::Instance;
 use sched_dag::engine::FaultCost;
 
 use super::{contexts, execution};
+use crate::machine::context::Context;
 use crate::machine::fault::CpuException;
 use crate::machine::interrupt::Interrupted;
+use crate::machine::spinlock::SpinLock;
 use crate::machine::timer::{self, Alarm};
 use crate::machine::{cpu, interrupt_flag, this_core};
-use crate::text::backtrace::CodeLocation;
+use crate::text::backtrace::{Backtrace, CodeLocation};
 use fass::edge::Excerpt;
 use front::json;
 
-/// How much of a panic's message is shown, and of a name, in bytes. With these a
+/// How much of a panic's message is shown, of its place, and of a name, in bytes. With these a
 /// report's machine line stays together, see `console`.
 const MESSAGE_BYTES: usize = 400;
+const PLACE_BYTES: usize = 200;
 const NAME_BYTES: usize = 60;
 
+/// How many notes can wait to be told.
+const PLACES: usize = 8;
+
 /// A contained fault, as its report states it.
-struct ContainedFault<'a> {
-    cause: &'a str,
-    message: &'a dyn Display,
-    place: &'a dyn Display,
+struct FaultNote {
+    instance: Instance,
+    cause: &'static str,
+    message: Excerpt<MESSAGE_BYTES>,
+    place: Excerpt<PLACE_BYTES>,
     address: Option<u64>,
-    spot: CodeLocation,
+    core: u32,
+    stack_used: u64,
+    stack_bytes: u64,
+    calls: Backtrace,
+    /// `None` until the instance is ended.
+    cost: Option<FaultCost>,
 }
+
+/// A place for a note. Its representation has zeros where it is empty, so that no image holds them.
+#[repr(u8)]
+#[expect(clippy::large_enum_variant, reason = "nothing is allocated")]
+enum NotePlace {
+    Empty,
+    Full(FaultNote),
+}
+
+/// The notes that wait, a ring.
+struct NoteQueue {
+    places: [NotePlace; PLACES],
+    oldest: usize,
+    count: usize,
+    /// How many faults found no place since one was taken.
+    left_out: u64,
+}
+
+static WAITING: SpinLock<NoteQueue> = SpinLock::new(NoteQueue {
+    places: [const { NotePlace::Empty }; PLACES],
+    oldest: 0,
+    count: 0,
+    left_out: 0,
+});
+
+/// Whether there are any, so that a look at none is short.
+static HAS_WAITING: AtomicBool = AtomicBool::new(false);
 
 /// Ends the instance that panics, if it is a subtask's; else returns.
 pub fn end_panicked(info: &PanicInfo<'_>) {
@@ -51,37 +99,46 @@ pub fn end_panicked(info: &PanicInfo<'_>) {
     }
     interrupt_flag::disable();
     let core = this_core::get();
-    let context = core.context();
     let Some(instance) = execution::running(core) else {
         interrupt_flag::enable();
         return;
     };
+    let context = core.context();
     interrupt_flag::enable();
+    keep_panic((instance, context), info, CodeLocation::here());
+    cpu::ask_for_end();
+}
+
+/// Keeps the note of a panic. Apart, for the calls are read from the stack pointer of the caller on,
+/// whose frame is small.
+#[inline(never)]
+fn keep_panic(
+    (instance, context): (Instance, &Context),
+    info: &PanicInfo<'_>,
+    location: CodeLocation,
+) {
     // The message is made into text before any lock is taken, as that is the
     // app's code once more. A panic in it comes here a second time. There may be no
     // memory left, so none is taken from here on.
-    let message: Excerpt<MESSAGE_BYTES> = match context.note_fault() {
+    let message = match context.note_fault() {
         false => Excerpt::of(info.message()),
         true => Excerpt::of("it panicked again while its message was made"),
     };
-    report(
-        instance,
-        &ContainedFault {
-            cause: "panic",
-            message: &message,
-            place: &place_of(info),
-            address: None,
-            spot: CodeLocation::here(),
-        },
-    );
-    cpu::ask_for_end();
+    let place = Excerpt::of(place_of(info));
+    interrupt_flag::disable();
+    let note = FaultNote::new(instance, "panic", message, None, location);
+    keep(FaultNote { place, ..note });
+    interrupt_flag::enable();
 }
 
 /// Ends this core's instance, which has asked for that after it was found at fault.
 pub fn end_at_fault(interrupted: &mut Interrupted) {
     let core = this_core::get();
-    if core.context().is_at_fault() && execution::running(core).is_some() {
-        end_interrupted(interrupted);
+    if core.context().is_at_fault()
+        && let Some(instance) = execution::running(core)
+    {
+        let cost = end_interrupted(interrupted);
+        WAITING.lock_uninterrupted().settle(instance, cost);
     }
 }
 
@@ -96,20 +153,13 @@ pub fn end_faulty(exception: &CpuException<'_>, interrupted: &mut Interrupted) -
         return false;
     };
     let rip = exception.registers.rip;
-    report(
-        instance,
-        &ContainedFault {
-            cause: exception.name,
-            message: exception,
-            place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
-            address: exception.address,
-            spot: CodeLocation {
-                instruction: Some(rip),
-                stack_pointer: exception.registers.rsp,
-            },
-        },
-    );
-    end_interrupted(interrupted);
+    let location = CodeLocation {
+        instruction: Some(rip),
+        stack_pointer: exception.registers.rsp,
+    };
+    let (name, message) = (exception.name, Excerpt::of(exception));
+    let note = FaultNote::new(instance, name, message, exception.address, location);
+    end_noted(note, interrupted);
     true
 }
 
@@ -126,28 +176,28 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
         return;
     }
     let budget = Duration::from_nanos(execution::budget_ns(instance));
-    let rip = interrupted.instruction();
-    report(
-        instance,
-        &ContainedFault {
-            cause: "budget overrun",
-            message: &format_args!("executed for more than its budget of {budget:?}"),
-            place: &fmt::from_fn(|f| write!(f, "{rip:#x}")),
-            address: None,
-            spot: CodeLocation {
-                instruction: Some(rip),
-                stack_pointer: interrupted.stack_pointer(),
-            },
-        },
-    );
-    end_interrupted(interrupted);
+    let message = format_args!("executed for more than its budget of {budget:?}");
+    let location = CodeLocation {
+        instruction: Some(interrupted.instruction()),
+        stack_pointer: interrupted.stack_pointer(),
+    };
+    let message = Excerpt::of(message);
+    let note = FaultNote::new(instance, "budget overrun", message, None, location);
+    end_noted(note, interrupted);
+}
+
+/// Ends the instance of a note, and keeps that.
+fn end_noted(note: FaultNote, interrupted: &mut Interrupted) {
+    let cost = Some(end_interrupted(interrupted));
+    keep(FaultNote { cost, ..note });
 }
 
 /// Ends this core's instance, whose context a handler has interrupted.
-fn end_interrupted(interrupted: &mut Interrupted) {
+fn end_interrupted(interrupted: &mut Interrupted) -> FaultCost {
     let abandoned = interrupted.abandon(contexts::new_worker());
-    execution::fail(&abandoned);
+    let cost = execution::fail(&abandoned);
     contexts::give_back(abandoned.recover());
+    cost.unwrap_or(FaultCost::Dag)
 }
 
 /// Returns where a panic was raised, as `file:line:column`.
@@ -159,49 +209,136 @@ pub fn place_of(info: &PanicInfo<'_>) -> impl Display {
     })
 }
 
-fn report(instance: Instance, fault: &ContainedFault<'_>) {
-    let ContainedFault {
-        cause,
-        message,
-        place,
-        address,
-        spot,
-    } = fault;
-    let core = this_core::get().index;
-    // No lock is held by code that has interrupts enabled.
-    let known = execution::cost_of_fault(instance);
-    let names = known.as_ref().map(|(_, model)| {
-        let dag = model.dag(instance.dag);
-        (dag.name(), dag.subtask(instance.subtask).name())
-    });
-    let (dag, subtask) = names.unwrap_or_default();
-    let dag = Excerpt::<NAME_BYTES>::of(dag);
-    let subtask = Excerpt::<NAME_BYTES>::of(subtask);
-    let cost = known.as_ref().map_or(FaultCost::Dag, |(cost, _)| *cost);
-    let consequence = cost.consequence();
-    front::println!(
-        "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: {message}; \
-         at {place}; {consequence}",
-        instance.job
-    );
-    let context = this_core::get().context();
-    let used = context.stack_top().saturating_sub(spot.stack_pointer);
-    json::report("fault", |line| {
-        line.text("cause", cause)
-            .number("dag", instance.dag.0)
-            .text("dag_name", &dag)
-            .number("subtask", instance.subtask.0)
-            .text("subtask_name", &subtask)
-            .number("job", instance.job)
-            .text("cost", cost.word())
-            .number("cpu", core)
-            .text("place", place)
-            .text("message", message)
-            .number("stack_used_bytes", used)
-            .number("stack_bytes", context.stack_bytes());
-        if let Some(address) = address {
-            line.text("address", format_args!("{address:#x}"));
+/// Has a note wait to be told, or counts it.
+fn keep(note: FaultNote) {
+    let mut waiting = WAITING.lock();
+    if waiting.count == PLACES {
+        waiting.left_out += 1;
+        return;
+    }
+    let free = (waiting.oldest + waiting.count) % PLACES;
+    waiting.places[free] = NotePlace::Full(note);
+    waiting.count += 1;
+    HAS_WAITING.store(true, Ordering::Relaxed);
+}
+
+/// Tells of the contained fault that was noted first, and reports whether there was one. Nothing
+/// is allocated.
+pub fn tell_fault() -> bool {
+    if !HAS_WAITING.load(Ordering::Relaxed) {
+        return false;
+    }
+    let (note, left_out) = WAITING.lock().take();
+    if let Some(note) = &note {
+        note.tell();
+    }
+    if left_out > 0 {
+        front::println!("fault: {left_out} more came too fast to be told of; the journal has them");
+    }
+    note.is_some()
+}
+
+impl NoteQueue {
+    /// Adds what the latest fault of an instance has cost.
+    fn settle(&mut self, instance: Instance, cost: FaultCost) {
+        for place in &mut self.places {
+            if let NotePlace::Full(note) = place
+                && (note.instance, note.cost) == (instance, None)
+            {
+                note.cost = Some(cost);
+            }
         }
-    });
-    json::report("backtrace", |line| spot.write(core, line));
+    }
+
+    /// Takes the oldest note, once its instance is ended, and how many faults found no place.
+    fn take(&mut self) -> (Option<FaultNote>, u64) {
+        let place = &mut self.places[self.oldest];
+        let taken = match place {
+            NotePlace::Full(FaultNote { cost: Some(_), .. }) => {
+                core::mem::replace(place, NotePlace::Empty)
+            }
+            _ => NotePlace::Empty,
+        };
+        let NotePlace::Full(note) = taken else {
+            return (None, 0);
+        };
+        self.oldest = (self.oldest + 1) % PLACES;
+        self.count -= 1;
+        HAS_WAITING.store(self.count > 0, Ordering::Relaxed);
+        (Some(note), core::mem::take(&mut self.left_out))
+    }
+}
+
+impl FaultNote {
+    /// Notes what is known of a fault of this core's instance, at an instruction. Interrupts are
+    /// disabled.
+    fn new(
+        instance: Instance,
+        cause: &'static str,
+        message: Excerpt<MESSAGE_BYTES>,
+        address: Option<u64>,
+        location: CodeLocation,
+    ) -> Self {
+        let core = this_core::get();
+        let context = core.context();
+        Self {
+            instance,
+            cause,
+            message,
+            place: Excerpt::of(fmt::from_fn(|f| match location.instruction {
+                Some(instruction) => write!(f, "{instruction:#x}"),
+                None => Ok(()),
+            })),
+            address,
+            core: core.index,
+            stack_used: context.stack_top().saturating_sub(location.stack_pointer),
+            stack_bytes: context.stack_bytes(),
+            calls: location.backtrace(),
+            cost: None,
+        }
+    }
+
+    fn tell(&self) {
+        let Self {
+            instance,
+            cause,
+            message,
+            place,
+            core,
+            ..
+        } = self;
+        let model = execution::task_set();
+        let names = model.as_ref().map(|model| {
+            let dag = model.dag(instance.dag);
+            (dag.name(), dag.subtask(instance.subtask).name())
+        });
+        let (dag, subtask) = names.unwrap_or_default();
+        let dag = Excerpt::<NAME_BYTES>::of(dag);
+        let subtask = Excerpt::<NAME_BYTES>::of(subtask);
+        let cost = self.cost.unwrap_or(FaultCost::Dag);
+        let consequence = cost.consequence();
+        front::println!(
+            "fault: {cause} in subtask `{subtask}` of dag `{dag}`, job {}, on core {core}: \
+             {message}; at {place}; {consequence}",
+            instance.job
+        );
+        json::report("fault", |line| {
+            line.text("cause", cause)
+                .number("dag", instance.dag.0)
+                .text("dag_name", &dag)
+                .number("subtask", instance.subtask.0)
+                .text("subtask_name", &subtask)
+                .number("job", instance.job)
+                .text("cost", cost.word())
+                .number("cpu", *core)
+                .text("place", place)
+                .text("message", message)
+                .number("stack_used_bytes", self.stack_used)
+                .number("stack_bytes", self.stack_bytes);
+            if let Some(address) = self.address {
+                line.text("address", format_args!("{address:#x}"));
+            }
+        });
+        json::report("backtrace", |line| self.calls.write(*core, line));
+    }
 }

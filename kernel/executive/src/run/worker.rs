@@ -98,11 +98,12 @@ fn watch(core: &Core) {
 /// do at once.
 pub fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
     while !execution::is_finished() {
-        turns::give_way();
+        turns::begin_background();
         let has_more = when_idle();
         if console::send_pending_byte() || has_more {
             continue;
         }
+        turns::end_background();
         interrupt_flag::disable();
         if execution::is_finished() {
             interrupt_flag::enable();
@@ -110,4 +111,5 @@ pub fn wait_in_background(mut when_idle: impl FnMut() -> bool) {
             interrupt_flag::enable_and_halt();
         }
     }
+    turns::end_background();
 }

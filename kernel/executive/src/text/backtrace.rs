@@ -8,6 +8,13 @@ use front::json::JsonObject;
 /// The most calls that a line has, so that it stays together (`console`).
 const MOST: usize = 24;
 
+/// The calls that a stack held, for when it holds others.
+#[derive(Debug)]
+pub struct Backtrace {
+    instruction: Option<u64>,
+    calls: [Option<CallSite>; MOST],
+}
+
 /// Where code was as it failed.
 #[derive(Clone, Copy, Debug)]
 pub struct CodeLocation {
@@ -29,19 +36,30 @@ impl CodeLocation {
         }
     }
 
+    /// Reads the calls, all of this core's stack.
+    #[must_use]
+    pub fn backtrace(self) -> Backtrace {
+        let mut found = backtrace::calls(self.stack_pointer);
+        Backtrace {
+            instruction: self.instruction,
+            calls: core::array::from_fn(|_| found.next()),
+        }
+    }
+}
+
+impl Backtrace {
     /// Writes the members of a line of kind `backtrace`.
-    pub fn write(self, core: u32, line: &mut JsonObject<'_, '_>) {
+    pub fn write(&self, core: u32, line: &mut JsonObject<'_, '_>) {
         line.number("cpu", core);
         if let Some(instruction) = self.instruction {
             line.text("place", format_args!("{instruction:#x}"));
         }
-        let calls = backtrace::calls(self.stack_pointer).take(MOST).map(shown);
-        line.list("calls", calls);
+        line.list("calls", self.calls.iter().flatten().map(shown));
     }
 }
 
 /// Shows a call as where it returns to and what it called.
-fn shown(call: CallSite) -> impl fmt::Display {
+fn shown(call: &CallSite) -> impl fmt::Display {
     fmt::from_fn(move |f| {
         write!(f, "\"{:#x}", call.returns_to)?;
         if let Some(callee) = call.callee {

@@ -209,8 +209,10 @@ impl RunVerdict {
         });
         for exceeded in ends.filter_map(|(dag, sink)| ExceededBound::find(run, dag, sink)) {
             let is_unoptimized = IS_UNOPTIMIZED.load(Ordering::Relaxed);
-            let also = causes(is_unoptimized, self.shares_clock);
-            let text = exceeded.report(run.task_set(), also);
+            let dags = (0..).map(DagId).take(run.task_set().dags().len());
+            let has_faults = dags.map(|dag| run.statistics(dag).faults).sum::<u64>() > 0;
+            let also = causes(is_unoptimized, self.shares_clock, has_faults);
+            let text = exceeded.report(run.task_set(), &also);
             // What the app judges itself is not kept: it would count as in use.
             if self.judges_bounds.get() {
                 self.exceeded.borrow_mut().get_or_insert(text);
@@ -246,20 +248,20 @@ impl RunVerdict {
 }
 
 /// Says what may have made calls longer than WCETs that are right elsewhere.
-const fn causes(is_unoptimized: bool, shares_clock: bool) -> &'static str {
-    match (is_unoptimized, shares_clock) {
-        (false, false) => "",
-        (true, false) => "; the image's profile does not optimize: boot one that does",
-        (false, true) => {
-            "; in mode deterministic cores that compute share one clock: `--cores 1` shows what \
-             each call takes alone"
-        }
-        (true, true) => {
-            "; the image's profile does not optimize: boot one that does; and in mode \
-             deterministic cores that compute share one clock: `--cores 1` shows what each call \
-             takes alone"
-        }
-    }
+fn causes(is_unoptimized: bool, shares_clock: bool, has_faults: bool) -> String {
+    let of_image = "; the image's profile does not optimize: boot one that does";
+    let of_clock = "; in mode deterministic cores that compute share one clock: `--cores 1` shows \
+                    what each call takes alone";
+    let of_faults = ", and functions that hold their cores instead (`Occupation::Hold`) share \
+                     nothing; a function that a fault has ended took of that clock, too";
+    [
+        (of_image, is_unoptimized),
+        (of_clock, shares_clock),
+        (of_faults, shares_clock && has_faults),
+    ]
+    .into_iter()
+    .filter_map(|(cause, applies)| applies.then_some(cause))
+    .collect()
 }
 
 impl ExceededBound {
@@ -269,22 +271,23 @@ impl ExceededBound {
             Some(sink) => run.sink_bound_ns(dag, sink)?,
             None => run.bound_ns(dag)?,
         };
-        let record = run.record();
+        let record = run.try_record();
         let end_ns = |job| match sink {
-            Some(subtask) => record.instance(Instance { dag, job, subtask })?.finish_ns,
-            None => record.completion_ns(dag, job),
+            Some(subtask) => record?.instance(Instance { dag, job, subtask })?.finish_ns,
+            None => record?.completion_ns(dag, job),
         };
         let complete = |(job, times): (u64, &sched_dag::law::JobRecord)| {
             times.outcome?;
             Some((end_ns(job)?.saturating_sub(times.release_ns?), job))
         };
-        let responses = record.numbered(dag).filter_map(complete);
+        let recorded = record.into_iter().flat_map(|record| record.numbered(dag));
+        let responses = recorded.filter_map(complete);
         let late = responses.filter(|(response_ns, _)| *response_ns > bound_ns);
         let (mut jobs, mut longest) = late.fold((0, (0, 0)), |(jobs, longest), of_job| {
             (jobs + 1, of_job.max(longest))
         });
         // Of jobs that are not recorded any more, the longest one is known.
-        if record.first_job(dag) > 0
+        if record.is_none_or(|record| record.first_job(dag) > 0)
             && sink.is_none()
             && let Some(times) = run.times()
             && times.dag(dag).longest().0 > bound_ns

@@ -1,7 +1,7 @@
 //! The background: work of core 0 for people while a run goes on, when it has nothing else to do.
 //!
-//! It prints progress, what functions say in the log, and the status if the command line asks for
-//! it, and holds the console's conversation. All this is core 0's background, which is suspended
+//! It prints progress, what functions say in the log, the faults that were contained, and the status
+//! if the command line asks for it, and holds the console's conversation. All this is core 0's background, which is suspended
 //! whenever the core has an instance to run.
 //!
 //! It is not suspended within a *slice* of the status or the console, which holds a lock, with
@@ -11,7 +11,7 @@
 //!
 //! Under overload the background may never run again, and then a person wants most to see
 //! what goes on, and to stop it. So if it has not run for [`STARVED_NS`], core 0's heartbeat
-//! does the slices instead. The heartbeat also notices that an instance keeps its core for
+//! does the slices instead, and tells of a fault. The heartbeat also notices that an instance keeps its core for
 //! long ([`stall`]).
 //!
 //! # Bytes from the serial port where no conversation takes them
@@ -37,7 +37,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use executive::machine::spinlock::SpinLock;
 use executive::machine::{clock, serial};
-use executive::run::{execution, heartbeat};
+use executive::run::{containment, execution, heartbeat};
 use executive::text::console;
 use fass::platform::SetOnce;
 use front::report::tell_log;
@@ -103,7 +103,7 @@ static SLICED: SpinLock<SlicedWork> = SpinLock::new(SlicedWork {
     session: None,
 });
 
-/// When the background ran last, on the clock; `u64::MAX` if there are no slices.
+/// When the background ran last, on the clock; `u64::MAX` outside runs.
 static RAN_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
 impl SlicedWork {
@@ -127,6 +127,7 @@ pub(crate) fn beat(now_ns: u64) {
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
         return;
     }
+    containment::tell_fault();
     if let Some(mut sliced) = SLICED.try_lock() {
         sliced.slice(true);
     }
@@ -169,8 +170,8 @@ impl Background {
                     .console
                     .map(|echo| ShellSession::new(echo == ConsoleEcho::On)),
             };
-            RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         }
+        RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         stall::start();
         // What a person says to the console is no event.
         let input = input.filter(|_| wishes.console.is_none());
@@ -189,8 +190,10 @@ impl Background {
 
     /// Does what is due. Reports whether there is more to do at once.
     pub(crate) fn step(&mut self) -> bool {
+        RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         self.progress.print_when_due();
         tell_log(execution::task_set);
+        while containment::tell_fault() {}
         if let Some(listener) = &self.listener {
             listener.step();
         }
@@ -198,7 +201,6 @@ impl Background {
         if !self.is_sliced {
             return has_more;
         }
-        RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
         SLICED.lock().slice(false) || has_more
     }
 
@@ -210,6 +212,7 @@ impl Background {
             line.end_run();
         }
         tell_log(execution::task_set);
+        while containment::tell_fault() {}
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;

@@ -12,17 +12,17 @@
 use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
-use sched_dag::engine::{FaultCost, PlatformPort as _};
+use sched_dag::engine::PlatformPort as _;
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet, WAITS};
 
 use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT};
 use super::{ClusterRun, RunnerLoan, divided};
-use crate::machine::clock;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::this_core::{self, Core};
 use crate::machine::timer::{self, Alarm};
+use crate::machine::{clock, turns};
 use crate::memory::heap;
 
 const _: () = {
@@ -94,20 +94,9 @@ pub fn budget_ns(instance: Instance) -> u64 {
     })
 }
 
-/// Returns what a fault of an instance that runs here costs if it comes now, and the model, if a
-/// run goes on. Of two faults of a DAG at one moment, either may take what is left to be survived;
-/// the journal tells.
-pub fn cost_of_fault(instance: Instance) -> Option<(FaultCost, Arc<TaskSet>)> {
-    let place = cluster::cluster_of(this_core::get()).execution.lock();
-    place.as_ref().map(|execution| {
-        let task_set = execution.task_set();
-        let cost = execution.engine.cost_of_fault(task_set.vertex(instance));
-        (cost, Arc::clone(task_set))
-    })
-}
-
 /// Looks at the scheduler of a cluster, shortly, if there is one.
 pub fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
+    turns::look_up();
     let mut place = cluster::nth(cluster).execution.lock();
     (place.as_mut()).map(|execution| look(&mut execution.engine.scheduler))
 }

@@ -17,7 +17,7 @@
 use core::sync::atomic::Ordering;
 
 use fass::platform::{Plan, Request};
-use sched_dag::engine::{Engine, NextAction};
+use sched_dag::engine::{Engine, FaultCost, NextAction};
 use sched_dag::journal::{EventKind, EventSubject};
 use sched_dag::lifecycle::WaitId;
 use sched_dag::placement::NextWork;
@@ -295,19 +295,15 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
     take_turns(core, work)
 }
 
-/// Ends this core's instance because of a fault, and with it its DAG or its job. Its context was
-/// `left` here. Interrupts are disabled.
-pub fn fail(left: &AbandonedContext) {
+/// Ends this core's instance because of a fault, and with it its DAG or its job, and returns which.
+/// Its context was `left` here. Interrupts are disabled.
+pub fn fail(left: &AbandonedContext) -> Option<FaultCost> {
     let core = this_core::get();
     let mut place = cluster::cluster_of(core).execution.lock_uninterrupted();
-    let Some(execution) = place.as_mut() else {
-        return;
-    };
+    let execution = place.as_mut()?;
     let here = seat(core);
-    let Some(lost) = (execution.loans).recover(&mut execution.engine.placement, here.index(), left)
-    else {
-        return;
-    };
+    let placement = &mut execution.engine.placement;
+    let lost = (execution.loans).recover(placement, here.index(), left)?;
     // Not when the interrupt came: a step may have left events since then. Nor may what follows
     // stand before this event.
     let clock_ns = clock::now_ns();
@@ -316,10 +312,11 @@ pub fn fail(left: &AbandonedContext) {
     edge::failed(lost.instance, ended_ns, clock_ns);
     let mut woken = CoreSet::default();
     let (engine, mut port) = execution.parts(&mut woken);
-    engine.tell_fault((ended_ns, here), lost.vertex, Some(lost), &mut port);
+    let cost = engine.tell_fault((ended_ns, here), lost.vertex, Some(lost), &mut port);
     execution.end_step(clock_ns, &mut woken);
     drop(place);
     woken.wake();
+    Some(cost)
 }
 
 /// Makes a step of the scheduler if `is_event`, and follows its decisions on this

@@ -1,0 +1,156 @@
+//! What can delay an instance besides the model, provoked at all moments around its release.
+//!
+//! In each run a disturbance comes every 1.003 ms, next to two DAGs of 1 kHz with a bound: a more
+//! urgent and a less urgent one. So from job to job it comes 3 us later to them. All functions hold
+//! their cores, and the overheads are those that the kernel measures. Of each run the longest
+//! responses are printed next to the bounds.
+
+use alloc::boxed::Box;
+use alloc::format;
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use fass::shared::Switch;
+use fass::{Dag, FaultLimit, Occupation, create_dag, execute_for, finish_create_dags, sleep};
+use faults::crimes::RECURRING;
+use kernel::{AppError, Machine, json, println};
+
+use crate::single::{named, single_every};
+
+/// How often a disturbance comes, and how often each DAG with a bound is released.
+const TIMES: u64 = 60;
+
+/// What is said in a disturbance.
+const LINES: u64 = 10;
+
+type Work = Box<dyn FnMut() + Send>;
+
+/// Disturbances, each with its name.
+const CAUSES: [(&str, fn() -> Vec<Dag>); 9] = [
+    ("none", Vec::new),
+    ("releases", releases),
+    ("wakes", wakes),
+    ("panics", || faults(40, || panic!("on purpose"))),
+    ("exceptions", || faults(60, || drop(RECURRING[1]()))),
+    ("overruns", || faults(30, || hold(1_000))),
+    ("log", || {
+        lines(|line| fass::log!(Info, "flood", line = line))
+    }),
+    ("text", || lines(|line| println!("{line:>60}"))),
+    ("backlog", backlog),
+];
+
+fn us(us: u64) -> Duration {
+    Duration::from_micros(us)
+}
+
+fn hold(time_us: u64) {
+    execute_for(us(time_us), Occupation::Hold);
+}
+
+/// Runs them one after the other.
+pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
+    machine.offer_overheads()?;
+    machine.options().finish(&["test", "overheads"])?;
+    machine.accept_faults();
+    for (cause, disturb) in CAUSES {
+        let bounded = |name, priority| {
+            let attributes = named(name).priority(priority).wcet(us(20));
+            single_every(us(1_000), name, TIMES + 5, attributes, || hold(19))
+        };
+        let mut dags = alloc::vec![bounded("urgent", 0), bounded("modest", 9)];
+        dags.extend(disturb());
+        finish_create_dags(&dags)?;
+        let run = machine.run()?;
+        for name in ["urgent", "modest"] {
+            json::emit("delay", |line| {
+                line.text("cause", cause)
+                    .text("dag_name", name)
+                    .number("bound_ns", run.bound_ns(name).unwrap_or(0))
+                    .number("longest_ns", run.response_times_ns(name).max().unwrap_or(0))
+                    .number("jobs", run.statistics(name).completed);
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Makes a DAG that disturbs.
+fn disturbance(name: &str) -> Dag {
+    let dag = create_dag();
+    (dag.name(name).jobs(TIMES).period(us(1_003))).relative_deadline(us(1_003));
+    dag.offset(us(900));
+    dag
+}
+
+/// More of them are released than there are cores.
+fn releases() -> Vec<Dag> {
+    let single = |number| {
+        let dag = disturbance(&format!("release-{number}"));
+        dag.source(|| hold(4))
+            .register(named("holds").priority(5).wcet(us(5)));
+        dag
+    };
+    (0..9).map(single).collect()
+}
+
+/// Their waits end at once.
+fn wakes() -> Vec<Dag> {
+    let single = |number| {
+        let dag = disturbance(&format!("wake-{number}"));
+        let attributes = named("waits")
+            .priority(5)
+            .wcet(us(4))
+            .wait(us(20))
+            .wcet(us(4));
+        (dag.async_source(|| async { sleep(us(20)).await })).register(attributes);
+        dag
+    };
+    (0..4).map(single).collect()
+}
+
+/// Each job is lost to a fault.
+fn faults(budget_us: u64, work: fn()) -> Vec<Dag> {
+    let dag = disturbance("faulty");
+    dag.survive_faults(FaultLimit {
+        faults: 1,
+        window: 1,
+        in_all: 1_000,
+    });
+    let attributes = named("fails").priority(5).wcet(us(60));
+    let made = move || move |()| work();
+    (dag.restarting(made)).register(attributes.budget(us(budget_us)));
+    alloc::vec![dag]
+}
+
+/// Says much in each job.
+fn lines(say: fn(u64)) -> Vec<Dag> {
+    let dag = disturbance("talkative");
+    let work: Work = Box::new(move || (0..LINES).for_each(say));
+    dag.source(work)
+        .register(named("talks").priority(5).wcet(us(150)));
+    alloc::vec![dag]
+}
+
+/// Thousands of jobs wait as their DAG is paused.
+fn backlog() -> Vec<Dag> {
+    let over = create_dag();
+    (over.name("over").jobs(2 * TIMES * 50).period(us(20))).relative_deadline(us(100));
+    over.in_flight(1);
+    let switch = disturbance("switch");
+    let mut job = 0;
+    let pause = move |mut of: Switch<'_>| {
+        job += 1;
+        if job == TIMES / 2 {
+            of.pause();
+        }
+    };
+    let attributes = named("pauses").priority(5).wcet(us(5));
+    switch
+        .using(over.switching())
+        .source(pause)
+        .register(attributes);
+    over.source(|| hold(100))
+        .register(named("holds").priority(99).wcet(us(100)));
+    alloc::vec![switch, over]
+}

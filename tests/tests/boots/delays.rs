@@ -1,0 +1,30 @@
+//! Whatever delays an instance is charged: with the overheads that the kernel measures, bounds hold
+//! next to everything that takes time besides the model (`docs/proving.md`).
+
+use harness::Guest;
+
+/// The causes of delays that the guest provokes.
+const CAUSES: usize = 9;
+
+/// Where a bound is exceeded the guest's own verdict is a failure, too.
+#[test]
+fn whatever_delays_an_instance_is_charged() {
+    for cores in [1, 2, 4] {
+        for preemption in ["on", "off"] {
+            let guest = Guest::test("delays").cores(cores).memory_mib(64);
+            let words = format!("overheads=measured status=1 preemption={preemption}");
+            let outcome = guest.word(&words).boot();
+            let rows = outcome.lines("delay");
+            for row in &rows {
+                println!("{cores} cores, preemption {preemption}: {}", row.text);
+            }
+            assert_eq!(rows.len(), 2 * CAUSES, "{}", outcome.tail());
+            for row in rows {
+                let (bound_ns, longest_ns) = (row.number("bound_ns"), row.number("longest_ns"));
+                assert!(row.number("jobs") > 60, "{}", row.text);
+                // No job was as short, so the figures are of this run.
+                assert!((19_000..=bound_ns).contains(&longest_ns), "{}", row.text);
+            }
+        }
+    }
+}
