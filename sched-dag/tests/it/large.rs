@@ -89,7 +89,8 @@ fn a_long_backlog_is_skipped_in_short_steps() {
 #[test]
 fn times_that_memory_cannot_hold_are_none() {
     const JOBS: u64 = 1 << 50;
-    let task_set = commit(&[dag(1, 1, JOBS, &[0], &[])], PREEMPTIVE);
+    let endless = dag(1, 1, 1, &[0], &[]).with(|spec| spec.jobs = Some(JOBS));
+    let task_set = commit(&[endless], PREEMPTIVE);
     let skipped = |job| Event {
         time_ns: JOBS,
         what: EventKind::Skipped,

@@ -31,7 +31,7 @@ const CAUSES: [(&str, fn() -> Vec<Dag>); 9] = [
     ("releases", releases),
     ("wakes", wakes),
     ("panics", || faults(40, || panic!("on purpose"))),
-    ("exceptions", || faults(60, || drop(RECURRING[1]()))),
+    ("exceptions", || faults(60, || _ = RECURRING[1]())),
     ("overruns", || faults(30, || hold(1_000))),
     ("log", || {
         lines(|line| fass::log!(Info, "flood", line = line))
