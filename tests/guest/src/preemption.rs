@@ -7,15 +7,20 @@
 //!
 //! With `budgets=yes` each of them has a budget of half as much again as it takes alone: it would
 //! not do if it had to answer for the time in which it is suspended, or others compute.
+//!
+//! With `held=yes` some instance is preempted however late the host is: instances of the least
+//! urgent DAG hold all cores but one until two of the most urgent DAG have run at the same time.
 
 use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::sync::atomic::{AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use fass::shared::Raiser;
+use fass::{Dag, SubtaskAttributes, create_dag};
 use kernel::{AppError, Machine, json};
 
 use crate::checksum::checksum;
@@ -41,7 +46,8 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let ms = options.number("ms", 1..=3_600_000, 500)?;
     let rounds = options.number("rounds", 1..=1_000_000, ROUNDS)?;
     let has_budgets = options.choice("budgets", &[("no", false), ("yes", true)])?;
-    options.finish(&["test", "ms", "rounds", "budgets"])?;
+    let is_held = options.choice("held", &[("no", false), ("yes", true)])?;
+    options.finish(&["test", "ms", "rounds", "budgets", "held"])?;
 
     let mut work = Work {
         rounds,
@@ -53,11 +59,14 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let alone = Duration::from_nanos(fass::now_ns() - start_ns);
     work.budget = has_budgets.then(|| alone * 3 / 2);
     let work = Arc::new(work);
-    let dags: Vec<Dag> = (0..)
+    let mut dags: Vec<Dag> = (0..)
         .zip(PERIODS_MS)
         .map(|(priority, period_ms)| fork_join(priority, period_ms, ms, &work))
         .collect();
-    finish_create_dags(&dags)?;
+    if is_held {
+        dags.extend(holding(machine.cores(), &work));
+    }
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph())?;
     let run = machine.run()?;
 
     let violations = run.violations().count() as u64;
@@ -124,6 +133,51 @@ fn fork_join(priority: u32, period_ms: u64, ms: u64, work: &Arc<Work>) -> Dag {
     let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
     dag.register_sink_subtask(join, parts, period, computing("sink"));
     dag
+}
+
+/// Builds the DAG that holds the cores, and the one that it calls for when it does.
+fn holding(cores: u32, work: &Arc<Work>) -> [Dag; 2] {
+    let [ms, longest] = [Duration::from_millis(2), Duration::from_secs(100)];
+    // How many hold a core, and how many of those that preempt them have run.
+    let counts = Arc::new([const { AtomicU32::new(0) }; 2]);
+    let compute_until = |place: usize, count: u32| {
+        let (counts, work) = (counts.clone(), work.clone());
+        move || {
+            while counts[place].load(Ordering::Relaxed) < count {
+                work.compute();
+            }
+        }
+    };
+    let urgent = create_dag();
+    let called = urgent.name("urgent").jobs(1).sporadic(ms);
+    let first = SubtaskAttributes::default().priority(0);
+    let source = urgent.source(|| (1_u8,)).writes(&["now"]);
+    source.register(first.clone());
+    for _ in 0..2 {
+        let counts = counts.clone();
+        let preempt = move |(_,): (u8,)| _ = counts[1].fetch_add(1, Ordering::Relaxed);
+        urgent.register_sink_subtask(preempt, ["now"], ms, first.clone());
+    }
+    let held = create_dag();
+    held.name("held").jobs(1);
+    let last = SubtaskAttributes::default().priority(9);
+    held.register_periodic_subtask(|| (1_u8,), ["go"], longest, last.clone());
+    for _ in 1..cores {
+        let (hold, counts) = (compute_until(1, 2), counts.clone());
+        let hold = move |(_,): (u8,)| {
+            counts[0].fetch_add(1, Ordering::Relaxed);
+            hold();
+        };
+        held.register_sink_subtask(hold, ["go"], longest, last.clone());
+    }
+    let wait = compute_until(0, cores - 1);
+    let call = move |mut called: Raiser<'_>, (_,): (u8,)| {
+        wait();
+        called.raise();
+    };
+    let call = held.using(called.raising()).subtask(call).reads(&["go"]);
+    call.due(longest).register(last);
+    [urgent, held]
 }
 
 impl Work {

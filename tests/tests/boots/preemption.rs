@@ -80,7 +80,7 @@ fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
 fn preempted_instances_lose_nothing_in_real_time() {
     for (cores, policy) in [(2, "static"), (4, "edf")] {
         // Emulated AVX is slow: where too much is to be done, only the most urgent DAG runs.
-        let words = format!("ms=200 rounds=4 policy={policy}");
+        let words = format!("ms=200 rounds=4 held=yes policy={policy}");
         let outcome = preemption(Mode::Threads, cores).word(&words).succeed();
         keeps_all(&outcome, true, 1);
     }
