@@ -249,9 +249,9 @@ impl fmt::Display for UnprovenDag {
             ),
             (NotProvenReason::Pinned { .. }, [subtask, ..], _) => write!(
                 f,
-                "{subtask} is pinned to a core, and the test for that needs cores that no other \
-                 DAG is pinned to, all subtasks of the DAG pinned, and an edge from each to the \
-                 next one on its core; see to these, or leave the cores out"
+                "{subtask} is pinned, and no test bounds the response time of its DAG as on one \
+                 core; pin all its subtasks, to cores that no other DAG is pinned to, with an edge \
+                 from each to the next one on its core, or leave the cores out"
             ),
             (NotProvenReason::PathBeyondDeadline { length_ns, .. }, [sink, ..], _) => write!(
                 f,

@@ -5,6 +5,7 @@
 //! those with it that it may delay, directly or through others. What is left
 //! is analysed without it: whatever it does, it cannot delay these.
 
+use alloc::vec;
 use alloc::vec::Vec;
 
 use super::features::Features;
@@ -13,7 +14,7 @@ use super::set::{EquationSet, constrained};
 use super::task::{Task, TaskError};
 use super::workload::WorkloadBursts;
 use super::{AnalysisSettings, NotProvenReason};
-use crate::ids::DagId;
+use crate::ids::{DagId, to_u32};
 use crate::order::sorted_by_key;
 use crate::policy::{Policy, Preemption};
 use crate::spec::PINS;
@@ -105,9 +106,7 @@ impl<'a> AnalysisInput<'a> {
         let own = own.iter().map(|&dag| &all[dag]);
         case.set.bursts = WorkloadBursts::of(own, settings);
         case.entering = case.features();
-        if !case.is_pinned() {
-            case.complete();
-        }
+        case.complete();
         case
     }
 
@@ -119,11 +118,37 @@ impl<'a> AnalysisInput<'a> {
         let own = (0..self.members.len()).map(|dag| Features::of_dag(self.dag(dag)).and(all));
         // What is pinned goes before all that is not.
         Features::spread(own.collect(), |other, dag| {
-            is_pinned || relation.may_delay(other, dag)
+            self.has_pins(other) || relation.may_delay(other, dag)
         })
     }
 
-    /// Reports whether cores of the cluster are told apart; then no equation of the set is asked.
+    /// Reports whether a subtask of a DAG is pinned.
+    fn has_pins(&self, dag: usize) -> bool {
+        PINS && self.dag(dag).is_pinned()
+    }
+
+    /// Reports whether an instance of `other` may go before one of `dag` on a core that counts for
+    /// that.
+    pub(super) fn may_outrank(&self, other: usize, dag: usize) -> bool {
+        let ranked = self.relation.may_outrank(other, dag);
+        if !self.is_pinned() || other == dag {
+            return ranked;
+        }
+        let shares = self.dag(other).affinity() == self.dag(dag).affinity();
+        let is_kept = self.relation.preemption != PreemptionMix::All;
+        self.has_pins(other) || is_kept || ranked && shares
+    }
+
+    /// Returns how many cores count for a DAG where cores are told apart.
+    fn counted_cores(&self, dag: usize) -> u32 {
+        match (self.has_pins(dag), self.dag(dag).affinity().len()) {
+            (true, _) => 1,
+            (false, 0) => self.settings.cores,
+            (false, cores) => to_u32(cores),
+        }
+    }
+
+    /// Reports whether cores of the cluster are told apart.
     pub(super) const fn is_pinned(&self) -> bool {
         PINS && self.is_pinned
     }
@@ -150,15 +175,22 @@ impl<'a> AnalysisInput<'a> {
 
     /// Tells the equations what follows from the attributes.
     fn complete(&mut self) {
-        self.set.keep_cores = self.relation.preemption == PreemptionMix::None;
-        self.set.deadlines_limit = self.settings.policy == Policy::Edf
+        let is_pinned = self.is_pinned();
+        self.set.keep_cores = !is_pinned && self.relation.preemption == PreemptionMix::None;
+        self.set.deadlines_limit = !is_pinned
+            && self.settings.policy == Policy::Edf
             && self.relation.preemption != PreemptionMix::Some
             && constrained(self.tasks, self.settings.cores);
         for (dag, figures) in self.set.figures.iter_mut().enumerate() {
             figures.younger_may_win = self.relation.younger_may_win(dag);
             figures.allow_in_flight(self.all[self.members[dag]].in_flight());
         }
-        if self.set.has_waits() {
+        if is_pinned {
+            for dag in 0..self.members.len() {
+                self.set.count_on(dag, self.counted_cores(dag));
+            }
+            self.set.forbid_overlap(vec![true; self.members.len()]);
+        } else if self.set.has_waits() {
             let entering = self.entering.iter();
             let with_waits = entering.map(|features| features.cover(Features::WAITS));
             self.set.forbid_overlap(with_waits.collect());

@@ -182,6 +182,8 @@ texts! {
         Owner = "an order of its own on each core";
         /// The rest of cores that owners lend, under fixed priorities.
         Member = "what owners leave of its cores";
+        /// The multi-path bound where cores are told apart: on those that count for the DAG.
+        BesidePins = "multiple paths next to pinned subtasks";
     }
 }
 
@@ -249,9 +251,9 @@ texts! {
              lengthen the period";
         /// A subtask is pinned to a core, and not as an owner's are.
         Pinned { subtask: SubtaskId } =
-            "subtask {} is pinned to a core, and the test for that needs cores that no other DAG is \
-             pinned to, all subtasks of the DAG pinned, and an edge from each to the next one on \
-             its core; see to these, or leave the cores out", subtask.0;
+            "subtask {} is pinned, and no test bounds the response time of its DAG as on one core; pin \
+             all its subtasks, to cores that no other DAG is pinned to, with an edge from each to the \
+             next one on its core, or leave the cores out", subtask.0;
         /// It shares a cluster with pinned subtasks, on terms that their test does not cover.
         BesidePinned =
             "subtasks of its cluster are pinned, and the test for that needs deadlines within periods, \

@@ -34,6 +34,8 @@ use crate::spec::WAITS;
 pub(super) struct EquationSet<'a> {
     pub(super) tasks: &'a [&'a Task],
     pub(super) cores: u32,
+    /// By DAG, how many of them its equations count.
+    counted: Vec<u32>,
     pub(super) shapes: Vec<GraphSummary>,
     pub(super) figures: Vec<PipelineTerms>,
     /// Whether only jobs with deadlines no later count (EDF with `D <= T`).
@@ -93,6 +95,7 @@ impl<'a> EquationSet<'a> {
         Self {
             tasks,
             cores,
+            counted: alloc::vec![cores; tasks.len()],
             figures: figures
                 .map(|(task, shape)| PipelineTerms::of(task, cores as usize, shape))
                 .collect(),
@@ -105,6 +108,15 @@ impl<'a> EquationSet<'a> {
             is_of_waits: tasks.iter().any(|task| task.has_waits()),
             with_waits: Vec::new(),
         }
+    }
+
+    /// Counts fewer cores in the equations of a DAG.
+    pub(super) fn count_on(&mut self, dag: usize, cores: u32) {
+        let own = GraphSummary::of(self.tasks[dag], cores);
+        let shape = &mut self.shapes[dag];
+        // What it executes next to others may be on all cores.
+        (shape.covers, shape.left) = (own.covers, own.left);
+        self.counted[dag] = cores;
     }
 
     /// Reports whether subtasks wait.
@@ -225,7 +237,7 @@ impl<'a> EquationSet<'a> {
             task: self.tasks[dag],
             covers: &self.shapes[dag].covers,
             left: &self.shapes[dag].left,
-            cores: self.cores as usize,
+            cores: self.counted[dag] as usize,
             clip: self.clip,
             rounding: self.rounding,
             limit_ns: figures.limit_ns().min(self.tasks[dag].period_ns()),
@@ -236,7 +248,7 @@ impl<'a> EquationSet<'a> {
     /// there on the workloads only grow.
     fn start(&self, dag: usize) -> Option<u64> {
         let left = &self.shapes[dag].left;
-        alone(self.tasks[dag], left, self.cores, self.rounding)
+        alone(self.tasks[dag], left, self.counted[dag], self.rounding)
     }
 
     /// Tries the deadlines as bounds: if each equation holds with the others'
@@ -305,7 +317,7 @@ impl<'a> EquationSet<'a> {
                 if self.waits_enter(dag) && response > self.tasks[other].period_ns() {
                     return Err(BoundFailure::Overlapping);
                 }
-                others.push(self.other(other, response, limit_ns));
+                others.push(self.other(dag, other, response, limit_ns));
             }
             // What outranks is in the interference already, except under EDF, where a later job of
             // it may block.
@@ -337,8 +349,9 @@ impl<'a> EquationSet<'a> {
     }
 
     /// Describes what a DAG with a response-time bound may execute next to another one.
-    pub(super) fn other(
+    fn other(
         &self,
+        dag: usize,
         other: usize,
         response_ns: u64,
         limit_ns: Option<u64>,
@@ -348,7 +361,8 @@ impl<'a> EquationSet<'a> {
             Some(limit_ns) => workload.under_edf(task.least_deadline_ns(), limit_ns),
             None => workload,
         };
-        InterferingDag::new(task, shape, response_ns, self.cores.into(), limit)
+        let cores = self.counted[dag].into();
+        InterferingDag::new(task, shape, response_ns, cores, limit)
     }
 }
 

@@ -218,11 +218,13 @@ fn bounds_of_pinned_subtasks_need_an_order_on_cores_of_their_own() {
     let behind = NotProvenReason::DelayedBy { dag: DagId(2) };
     assert_eq!(unordered.reasons, [None, Some(behind), Some(pinned(1))]);
     assert_eq!(unordered.first_failing.unwrap().dag, DagId(2));
-    // Of two DAGs on one core neither has it to itself.
+    // Of two DAGs on one core neither has it to itself, and each counts for the other.
     specs[2].subtasks.pop();
     specs[1].subtasks[0].core = Some(0);
     let (shared, _) = answer(&specs);
-    assert_eq!(shared.reasons, [None, Some(pinned(0)), Some(pinned(0))]);
+    let beside = SchedulabilityTest::BesidePins;
+    let tests = shared.bounds.iter().map(|bound| bound.unwrap().test);
+    assert_eq!(tests.collect::<Vec<_>>(), [first.test, beside, beside]);
 }
 
 #[test]

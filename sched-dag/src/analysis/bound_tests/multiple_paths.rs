@@ -27,6 +27,21 @@
 //! Where subtasks *wait* (`waiting`), of a DAG or of one that may delay it, directly or through
 //! others, jobs must not overlap: a bound beyond the period does not count as proven, the DAG's
 //! own or that of another in its equation.
+//!
+//! Where cores are told apart (P1 to P4 of `scheduler/pins.rs`), fewer of them *count* for a DAG: one
+//! if a subtask of it is pinned, else those of its group. While a segment of it is eligible and does not
+//! execute, as many cores as count execute something else:
+//!
+//! - A pinned one waits for its core, and there another pinned one executes, or what keeps the core.
+//! - Another one waits for a core of its group, and each of these executes a pinned one, or one of the
+//!   group that wins or keeps its core.
+//!
+//! The equations ask no more of a machine than that. Which cores count may change from one instant to
+//! the next. On those that do, a job of another DAG executes its volume at most, within its bound, and
+//! on no more of them at once than there are or than it is wide. So such a DAG has the bounds of a
+//! machine of as many cores, on which all DAGs with pinned subtasks count in full, and those of its group
+//! that may outrank it; where cores are kept all do. Under EDF no deadline limits what
+//! counts, and jobs must not overlap, as where subtasks wait.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -42,6 +57,7 @@ use crate::analysis::set::BoundFailure;
 use crate::analysis::waiting::reserved;
 use crate::analysis::witness_text::WitnessText;
 use crate::analysis::{NotProvenReason, SchedulabilityTest};
+use crate::ids::to_u32;
 use crate::policy::Policy;
 
 pub(super) const TEST: BoundTest = BoundTest {
@@ -52,10 +68,11 @@ pub(super) const TEST: BoundTest = BoundTest {
         SchedulabilityTest::NonPreemptive,
         SchedulabilityTest::Pipelined,
         SchedulabilityTest::AnyOrder,
+        SchedulabilityTest::BesidePins,
     ],
     covers: covers!(
         RANKED BY_DEADLINE ONE_CORE CORES PREEMPTION ALL_KEEP SOME_KEEP SINK_DEADLINES INTERLEAVED
-        WAITS LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
+        PINS WAITS LATE_DEADLINES FEW_IN_FLIGHT OVERHEADS BURSTS SPORADIC
     ),
     jobs,
     ..BoundTest::NONE
@@ -70,11 +87,13 @@ pub(super) const WITNESS: BoundWitness = BoundWitness {
 fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
     let known = found.bounds.iter().map(|bound| Some((*bound)?.bound_ns));
     let known: Vec<Option<u64>> = known.collect();
-    let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+    let may_outrank = |other, dag| case.may_outrank(other, dag);
     let solution = case.set.solve(&known, &case.order, may_outrank);
     for dag in (0..known.len()).filter(|&dag| known[dag].is_none()) {
         match solution.responses[dag] {
             Some(bound_ns) => found.offer(dag, bound_ns, form(case, dag, bound_ns)),
+            // It has a shorter bound as an owner, so why it is none is what to see to.
+            None if matches!(found.reasons[dag], Some(NotProvenReason::Pinned { .. })) => {}
             None => {
                 // Numbers that overflow alone are no failure of an equation.
                 let limit = BoundFailure::Own(SolverFailure::Limit);
@@ -88,7 +107,9 @@ fn jobs(case: &AnalysisInput<'_>, found: &mut JobBounds) {
 
 /// Names the form of a response time.
 fn form(case: &AnalysisInput<'_>, dag: usize, bound_ns: u64) -> SchedulabilityTest {
-    if bound_ns > case.tasks[dag].period_ns() {
+    if case.is_pinned() {
+        SchedulabilityTest::BesidePins
+    } else if bound_ns > case.tasks[dag].period_ns() {
         SchedulabilityTest::Pipelined
     } else if case.is_alone(dag) {
         SchedulabilityTest::Alone
@@ -138,7 +159,7 @@ fn write(
     bound_ns: u64,
     text: &mut WitnessText,
 ) {
-    let may_outrank = |other, dag| case.relation.may_outrank(other, dag);
+    let may_outrank = |other, dag| case.may_outrank(other, dag);
     let Ok(delays) = case.set.delays_of_job(dag, responses, may_outrank) else {
         return;
     };
@@ -195,7 +216,7 @@ fn paths(
             text.line(format_args!(
                 "bound {id} {bound_ns} reserved {chains} {cores} {own} {busy}"
             ));
-            let reserved = reserved(task, case.set.cores).into_iter();
+            let reserved = reserved(task, to_u32(equations.cores)).into_iter();
             let reserved = reserved.skip(1).take(chains).map(|with| with.chain);
             text.chains("chain", &reserved.collect::<Vec<_>>());
         }
@@ -252,7 +273,7 @@ pub(super) fn listed<'a>(
     responses: &[Option<u64>],
     delays: &'a DelaySources,
 ) -> Vec<OutrankingDag<'a>> {
-    let ids = (0..responses.len()).filter(|&other| case.relation.may_outrank(other, dag));
+    let ids = (0..responses.len()).filter(|&other| case.may_outrank(other, dag));
     let listed = ids
         .zip(&delays.others)
         .map(|(other, workloads)| OutrankingDag {

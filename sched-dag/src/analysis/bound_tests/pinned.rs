@@ -9,8 +9,8 @@
 //! This is how a commit reads what [`lend`](crate::analysis::lend()) has divided, and also what a person has
 //! pinned: nothing is taken over from the division but cores and edges.
 //!
-//! Assumes, of all DAGs of the cluster: `D <= T`, and subtasks that can be preempted and do not
-//! wait. Of the members of a group that are several: a static priority that outranks DAG by DAG.
+//! Assumes subtasks of the cluster that can be preempted; of an owner, and of all that may delay a
+//! member: `D <= T`, and subtasks that do not wait. Of the members of a group that are several: a static priority that outranks DAG by DAG.
 
 use alloc::format;
 use alloc::vec;
@@ -258,6 +258,8 @@ impl PinnedCluster {
         dag: usize,
         subtask: SubtaskId,
     ) -> Option<u64> {
+        // Of one that is no owner the lists are in part.
+        self.refusals[dag].is_none().then_some(())?;
         let core = case.dag(dag).subtask(subtask).core()?;
         let mut list = self.lists[core as usize].iter();
         let found = list.find(|of| of.subtask == subtask.index());
