@@ -1,7 +1,7 @@
 //! Whatever delays an instance is charged: with the overheads that the kernel measures, bounds hold
 //! next to everything that takes time besides the model (`docs/proving.md`).
 
-use harness::Guest;
+use harness::{Guest, Members, Said};
 
 /// The causes of delays that the guest provokes.
 const CAUSES: usize = 9;
