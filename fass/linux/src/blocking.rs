@@ -5,10 +5,13 @@
 //! level. So it may be late where the cores are busy, and delays nobody; and the wait ends at its
 //! limit, whatever the call does.
 
+use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::Duration;
 
-use fass::shared::{Device, create_device};
+use fass::shared::{Device, DeviceDriver, Ticket, create_device};
+
+use crate::sys;
 
 /// How long the thread waits at most until it looks whether the device is still used.
 const LOOK: Duration = Duration::from_millis(100);
@@ -49,13 +52,10 @@ where
 {
     let (device, mut driver) = create_device(name);
     let serve = move || {
-        let own = thread::current();
-        driver.on_question(move || own.unpark());
         while driver.is_used() {
-            match driver.question() {
+            if let Some((ticket, question)) = next_question(&mut driver, LOOK) {
                 // One that comes too late is of no use to anybody.
-                Some((ticket, question)) => drop(driver.answer(ticket, call(question))),
-                None => thread::park_timeout(LOOK),
+                drop(driver.answer(ticket, call(question)));
             }
         }
     };
@@ -64,4 +64,30 @@ where
         .spawn(serve)
         .expect("the system has a thread for each device");
     device
+}
+
+/// Waits for the next question of a device, for so long at the most, in a thread of the driver's own.
+/// The worker whose instance asks wakes that, once it has given the scheduler's lock back.
+///
+/// ```
+/// use std::time::Duration;
+/// let (_sonar, mut driver) = fass::shared::create_device::<(), u32>("sonar");
+/// assert!(linux::next_question(&mut driver, Duration::from_millis(1)).is_none());
+/// ```
+pub fn next_question<Q, A>(
+    driver: &mut DeviceDriver<Q, A>,
+    most: Duration,
+) -> Option<(Ticket, Q)> {
+    let bell = driver.bell();
+    let most_ns = u64::try_from(most.as_nanos()).unwrap_or(u64::MAX);
+    let until_ns = sys::now_ns().saturating_add(most_ns);
+    loop {
+        // Before the look: a question that comes after that changes it.
+        let seen = bell.load(Ordering::Acquire);
+        let found = driver.question();
+        if found.is_some() || sys::now_ns() >= until_ns {
+            return found;
+        }
+        sys::wait(&bell, seen, Some(until_ns));
+    }
 }

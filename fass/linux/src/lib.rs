@@ -54,7 +54,7 @@ mod sys;
 mod team;
 mod worker;
 
-pub use blocking::blocking;
+pub use blocking::{blocking, next_question};
 pub use control::{Control, EndSignals};
 pub use machine::{Connection, Linux, Mechanism, StartError, now_ns, own_core, processors};
 pub use platform::{Counts, Run};

@@ -333,6 +333,9 @@ impl Team {
                     NextAction::Run(runner) => {
                         self.hand_offs.fetch_add(1, Ordering::Relaxed);
                         self.announce(&state);
+                        if !state.rung.is_empty() {
+                            self.call(state);
+                        }
                         return Some(runner);
                     }
                     NextAction::Look { .. } => {}
@@ -397,12 +400,17 @@ impl Team {
             for (place, worker) in called.iter_mut().zip(state.take_called(AT_ONCE)) {
                 *place = Some(worker);
             }
+            let bell = state.rung.pop();
+            let has_more = called[AT_ONCE - 1].is_some() || !state.rung.is_empty();
             drop(state);
+            if let Some(bell) = bell {
+                sys::wake(&bell, i32::MAX);
+            }
             for worker in called.into_iter().flatten() {
                 self.calls.fetch_add(1, Ordering::Relaxed);
                 self.workers[worker].call();
             }
-            if called[AT_ONCE - 1].is_none() {
+            if !has_more {
                 return;
             }
             state = self.lock();

@@ -2,8 +2,11 @@
 //!
 //! A device has two ends. One subtask *asks*: it is async, sends a question and waits for the
 //! answer, or until the limit of that wait. The other end is the *driver's*: it takes the question
-//! and answers it, from a thread, an interrupt's handler, a test. So all that a device can do to a
+//! and answers it, from a DAG of its own, a thread of Linux, a test. So all that a device can do to a
 //! DAG is to end a wait before its limit.
+//!
+//! A driver that is a DAG is released by the questions themselves ([`Device::served_by`]): its time,
+//! too, is a part of the wait, and its faults are its own.
 //!
 //! # What is guaranteed
 //!
@@ -31,23 +34,26 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use core::fmt;
 use core::pin::Pin;
-use core::sync::atomic::{AtomicU64, Ordering, fence};
+use core::ptr;
+use core::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering, fence};
 use core::task::{Context, Poll};
 use core::time::Duration;
 
 use recording::{Recordable, Schema};
-use sched_dag::lifecycle::WaitId;
+use sched_dag::lifecycle::{Request, WaitId};
 use sched_dag::{Instance, SubtaskId};
 
 use super::dag::Dag;
 use super::record::EDGE;
+use super::signal::Signal;
 use super::uses::{Uses, sealed};
 use crate::platform;
 use crate::run::answers::{AnyAnswers, AnyDevice, RecordedAnswers};
+use crate::run::cell::turn::turn_of;
 use crate::run::cell::{SetOnce, SharedCell};
 use crate::run::effect::{Effect, RequestTarget};
 use crate::run::line::ChannelState;
-use crate::run::turn::WaitEnd;
+use crate::run::turn::{TurnState, WaitEnd, WaitFault};
 use crate::run::waiting::{WaitStep, nanoseconds};
 
 /// Makes a device of that name: the end of the subtask that asks it, and the driver's.
@@ -62,6 +68,8 @@ where
     let cell = Arc::new(DeviceCell {
         name: name.into(),
         asking: SetOnce::new(),
+        turn: AtomicUsize::new(0),
+        server: SetOnce::new(),
         bell: SetOnce::new(),
         questions: [(); 2].map(|()| SharedCell::new(None)),
         answer: SharedCell::new(None),
@@ -243,8 +251,12 @@ struct DeviceCell<Q, A> {
     name: String,
     /// The subtask that asks.
     asking: SetOnce<(Arc<RequestTarget>, SubtaskId)>,
-    /// Rung when a question is there.
-    bell: SetOnce<Box<dyn Fn() + Send + Sync>>,
+    /// The turns of that subtask, by their address.
+    turn: AtomicUsize,
+    /// The DAG that a question releases.
+    server: SetOnce<Arc<RequestTarget>>,
+    /// The word that a question changes, where a driver's thread sleeps on it.
+    bell: SetOnce<Arc<AtomicU32>>,
     questions: [SharedCell<Option<Question<Q>>>; 2],
     /// The answer, with the number of its question.
     answer: SharedCell<Option<(u64, A)>>,
@@ -320,13 +332,22 @@ impl<Q, A> DeviceCell<Q, A> {
 
 /// Posts the question that an instance has staged, once its turn has ended in the wait for the
 /// answer.
-struct QuestionPost<Q, A>(Arc<DeviceCell<Q, A>>);
+struct QuestionPost<Q, A> {
+    cell: Arc<DeviceCell<Q, A>>,
+    /// Whether a thread sleeps that is to be woken for it.
+    rings: bool,
+}
 
 impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
-    fn happen(&mut self, _: u64, _: &mut dyn FnMut(platform::Request)) {}
+    fn happen(&mut self, _: u64, _: &mut dyn FnMut(Request)) {}
 
-    fn wait(&mut self, ended_ns: u64, limit_ns: u64) -> bool {
-        let cell = &*self.0;
+    fn bind(&mut self, turn: &TurnState) {
+        let turn = ptr::from_ref(turn).addr();
+        self.cell.turn.store(turn, Ordering::Relaxed);
+    }
+
+    fn wait(&mut self, (ended_ns, limit_ns): (u64, u64), ask: &mut dyn FnMut(Request)) -> bool {
+        let cell = &*self.cell;
         let number = cell.staged.load(Ordering::Relaxed);
         if number == 0 {
             return false;
@@ -339,8 +360,12 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
         cell.latest.store(number, Ordering::Relaxed);
         // Release: the question is in its place.
         cell.posted.store(number, Ordering::Release);
-        if let Some(ring) = cell.bell.get() {
-            ring();
+        if let Some(server) = cell.server.get() {
+            ask(Request::Signal(server.dag()));
+        }
+        if let Some(bell) = cell.bell.get() {
+            bell.fetch_add(1, Ordering::Release);
+            self.rings = true;
         }
         cell.source.get().is_some_and(|source| {
             // With the driver's: an answer that comes now is seen here, or the question there.
@@ -349,8 +374,13 @@ impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
         })
     }
 
+    fn bell(&mut self) -> Option<Arc<AtomicU32>> {
+        let rings = core::mem::take(&mut self.rings);
+        rings.then(|| self.cell.bell.get().cloned()).flatten()
+    }
+
     fn withdraw(&mut self) {
-        self.0.posted.store(0, Ordering::Release);
+        self.cell.posted.store(0, Ordering::Release);
     }
 }
 
@@ -359,6 +389,44 @@ impl<Q, A> Device<Q, A> {
     #[must_use = "a use has no effect until a subtask is registered with it"]
     pub fn asking(&self) -> DeviceUse<Q, A> {
         DeviceUse(Self(Arc::clone(&self.0)))
+    }
+
+    /// Has each question raise a signal, in the step in which the wait for the answer begins: the
+    /// sporadic DAG that it releases has the driver. It answers at once, or starts what answers
+    /// later. Reports whether it is the first signal of the device, which alone counts.
+    ///
+    /// To be called before the commit, which must have the signal's DAG, too.
+    ///
+    /// ```
+    /// use core::time::Duration;
+    /// use fass::shared::{Asker, create_device};
+    /// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+    ///
+    /// let machine = virtual_time::VirtualTime::new();
+    /// let (ms, named) = (Duration::from_millis, SubtaskAttributes::named);
+    /// let (adder, mut driver) = create_device::<u32, u32>("adder");
+    /// let (asks, serves) = (create_dag(), create_dag());
+    /// asks.name("asks").jobs(2).period(ms(10)).relative_deadline(ms(10));
+    /// let ask = |adder: Asker<u32, u32>| async move { assert_eq!(adder.ask(1).await, Ok(2)) };
+    /// let ask = asks.using(adder.asking()).async_source(ask);
+    /// ask.register(named("ask").wait(ms(5)));
+    ///
+    /// serves.name("serves").relative_deadline(ms(2));
+    /// adder.served_by(&serves.sporadic(ms(5)));
+    /// let serve = move || {
+    ///     fass::execute_for(ms(1), fass::Occupation::Spin);
+    ///     if let Some((ticket, number)) = driver.question() {
+    ///         driver.answer(ticket, number + 1).expect("it waits");
+    ///     }
+    /// };
+    /// serves.source(serve).register(named("serve"));
+    /// finish_create_dags(&[asks, serves]).unwrap();
+    /// let report = machine.run();
+    /// assert_eq!(report.dag("serves").statistics().completed, 2);
+    /// assert_eq!(report.dag("asks").jobs()[0].response_time_ns(), Some(1_000_000));
+    /// ```
+    pub fn served_by(&self, signal: &Signal) -> bool {
+        self.0.server.set(Arc::clone(&signal.target))
     }
 }
 
@@ -427,6 +495,10 @@ impl<Q: Send + Sync, A: Send + Sync> AnyDevice for DeviceCell<Q, A> {
     fn line(&self) -> Option<(Schema, Arc<ChannelState>)> {
         self.answers.get().map(|answers| answers.line())
     }
+
+    fn server(&self) -> Option<&Arc<RequestTarget>> {
+        self.server.get()
+    }
 }
 
 impl<Q, A> sealed::Sealed for DeviceUse<Q, A> {}
@@ -447,7 +519,10 @@ impl<Q: Send + Sync + 'static, A: Send + Sync + 'static> Uses for DeviceUse<Q, A
         draft
             .devices
             .push((subtask, Arc::<DeviceCell<Q, A>>::clone(&cell)));
-        let post = QuestionPost(Arc::clone(&cell));
+        let post = QuestionPost {
+            cell: Arc::clone(&cell),
+            rings: false,
+        };
         draft.effects.push((subtask, Box::new(post)));
         Asker(cell)
     }
@@ -510,6 +585,12 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
 
     fn poll(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Self::Output> {
         let this = self.get_mut();
+        // A question of another subtask, which was passed the handle, would go out with a wait of
+        // this one's.
+        let turn = turn_of(context.waker()).map_or(0, |turn| ptr::from_ref(turn).addr());
+        if turn != this.cell.turn.load(Ordering::Relaxed) {
+            WaitFault::Outside.raise()
+        }
         let answers = this.cell.answers.get();
         // No question leaves in a replay: what it may set off happened in the recorded run.
         if let Some(answers) = answers.filter(|answers| answers.replays()) {
@@ -662,18 +743,18 @@ impl<Q, A> DeviceDriver<Q, A> {
         }
     }
 
-    /// Has something done when there is a question: it wakes a thread, or tells the hardware.
-    /// Reports whether it is the first such thing, which alone counts.
-    ///
-    /// It is done in the scheduler's step, so it must be short, and wait for nothing.
+    /// Returns a word that changes when there is a question, for a platform that has threads: one
+    /// may sleep on it.
     ///
     /// ```
     /// let (_sonar, driver) = fass::shared::create_device::<(), u32>("sonar");
-    /// let thread = std::thread::current();
-    /// assert!(driver.on_question(move || thread.unpark()));
+    /// assert!(std::sync::Arc::ptr_eq(&driver.bell(), &driver.bell()));
     /// ```
-    pub fn on_question(&self, ring: impl Fn() + Send + Sync + 'static) -> bool {
-        self.cell.bell.set(Box::new(ring))
+    #[must_use]
+    pub fn bell(&self) -> Arc<AtomicU32> {
+        let bell = &self.cell.bell;
+        let _ = bell.get().is_some() || bell.set(Arc::default());
+        bell.get().cloned().unwrap_or_default()
     }
 
     /// Reports whether there is still something that may ask.

@@ -68,7 +68,7 @@ use crate::run::effect::{GO, RequestKind, Wish};
 /// ```
 #[derive(Clone)]
 pub struct Signal {
-    target: Arc<RequestTarget>,
+    pub(super) target: Arc<RequestTarget>,
 }
 
 /// The use of a [`Signal`] by a subtask that may raise it: the function gets a

@@ -54,7 +54,10 @@ fn check_others(drafts: &Drafts, draft: &DagDraft, label: &DagLabel, faults: &mu
         .raises
         .iter()
         .map(|(subtask, signal)| (*subtask, signal));
-    for (subtask, signal) in raises.chain(of_faults.map(|signal| (0, signal))) {
+    let asked = draft.devices.iter();
+    let asked = asked.filter_map(|(subtask, device)| Some((*subtask, device.server()?)));
+    let raises = raises.chain(of_faults.map(|signal| (0, signal)));
+    for (subtask, signal) in raises.chain(asked) {
         if dag_of(drafts, signal).is_none() {
             let (dag, subtask) = (label.clone(), draft.label(subtask));
             faults.push(Fault::SignalNotCommitted { dag, subtask });

@@ -14,6 +14,7 @@ use alloc::vec::Vec;
 use recording::{Decoder, Encoder, Full, Recordable, Schema};
 
 use super::cell::SharedCell;
+use super::effect::RequestTarget;
 use super::line::{ChannelState, TopicEdge, room_for};
 
 /// An answer as it is written down: the number of the wait, how long the answer took in
@@ -26,6 +27,9 @@ pub(crate) trait AnyDevice: Send + Sync {
 
     /// Returns the type of the recorded answers of a job, and their line, if they are recorded.
     fn line(&self) -> Option<(Schema, Arc<ChannelState>)>;
+
+    /// Returns the DAG that its questions release, if they release one.
+    fn server(&self) -> Option<&Arc<RequestTarget>>;
 }
 
 /// The answers of a device whose answers are recorded.

@@ -15,6 +15,8 @@ use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 use sched_dag::lifecycle::{ModeEntry, Request};
 use sched_dag::{DagId, ModeId};
 
+use super::turn::TurnState;
+
 /// An effect without its signals.
 pub(crate) struct MutedEffect(pub(crate) Box<dyn Effect>);
 
@@ -43,8 +45,17 @@ pub(crate) trait Effect: Send {
 
     /// Does what is to be done at the end of a turn that ends in a wait, of so many nanoseconds at
     /// the most. Reports whether it waits for something that is there.
-    fn wait(&mut self, _ended_ns: u64, _limit_ns: u64) -> bool {
+    fn wait(&mut self, _ended_and_limit_ns: (u64, u64), _ask: &mut dyn FnMut(Request)) -> bool {
         false
+    }
+
+    /// Takes note of the turns of its subtask, if that may wait.
+    fn bind(&mut self, _turn: &TurnState) {}
+
+    /// Returns the word that the latest wait has changed, if a thread of the platform may sleep on
+    /// it: once.
+    fn bell(&mut self) -> Option<Arc<AtomicU32>> {
+        None
     }
 
     /// Takes back what the latest wait has posted: its instance is cancelled.

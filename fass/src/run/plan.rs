@@ -6,6 +6,7 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::sync::atomic::AtomicU32;
 
 use sched_dag::engine::{Alternate, ProvenBounds};
 use sched_dag::journal::EventSubject;
@@ -329,6 +330,15 @@ impl SubtaskCode {
         self.effects = effects
             .map(|effect| Box::new(MutedEffect(effect)) as _)
             .collect();
+    }
+
+    /// Returns the word that a question of the latest turn has changed, if threads may sleep on it:
+    /// once, for a platform that wakes them.
+    ///
+    /// See [`DeviceDriver::bell`](crate::shared::DeviceDriver::bell).
+    #[must_use]
+    pub fn bell(&mut self) -> Option<Arc<AtomicU32>> {
+        self.effects.iter_mut().find_map(|effect| effect.bell())
     }
 
     /// Reports whether [`complete`](Self::complete) has anything to do, ever: a

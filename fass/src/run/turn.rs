@@ -68,10 +68,11 @@ worded! {
         Foreign = "foreign_wait",
             "a foreign wait: the function awaits what is none of its subtask's waits, and nothing \
              would end that; await `sleep`, `until`, a device's answer or a wire";
-        /// A wait of ours is begun by something else than the future of a subtask.
+        /// A wait of ours is polled by something else than the future of its subtask, in another
+        /// job than the one that began it, or after its end.
         Outside = "wait_outside",
-            "a wait outside: it is polled by something else than the future of a subtask; await it \
-             in the function of an async subtask";
+            "a wait outside: it is polled by something else than the instance that it is for, or \
+             after its end; await it once, in the function of the async subtask that has it";
     }
 }
 
@@ -265,7 +266,8 @@ pub(crate) struct TurnEffects {
 }
 
 impl TurnEffects {
-    pub(crate) fn new(turn: Arc<TurnState>, real: Vec<Box<dyn Effect>>) -> Self {
+    pub(crate) fn new(turn: Arc<TurnState>, mut real: Vec<Box<dyn Effect>>) -> Self {
+        real.iter_mut().for_each(|effect| effect.bind(&turn));
         Self { turn, real }
     }
 }
@@ -281,12 +283,16 @@ impl Effect for TurnEffects {
                 // All are asked, as each has something to post when a wait begins.
                 let mut is_there = false;
                 for effect in &mut self.real {
-                    is_there |= effect.wait(completed_ns, limit_ns);
+                    is_there |= effect.wait((completed_ns, limit_ns), ask);
                 }
                 // It is a wait all the same: the instance gives its core up.
                 ask(if is_there { Request::Wait(0) } else { request });
             }
         }
+    }
+
+    fn bell(&mut self) -> Option<Arc<AtomicU32>> {
+        self.real.iter_mut().find_map(|effect| effect.bell())
     }
 
     fn withdraw(&mut self) {

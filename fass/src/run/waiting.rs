@@ -8,6 +8,7 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::pin::{Pin, pin};
+use core::ptr;
 use core::task::{Context, Poll, Waker};
 use core::time::Duration;
 
@@ -21,18 +22,23 @@ use super::turn::{TurnState, WaitEnd, WaitFault};
 /// A wait of a future of ours, which the first poll begins.
 pub(crate) struct WaitStep {
     end: WaitEnd,
-    /// The job, and the number of waits with this one.
-    begun: Option<(u64, u32)>,
+    /// The address of the turns, the job, and the number of waits with this one.
+    begun: Option<(usize, u64, u32)>,
+    is_over: bool,
 }
 
 impl WaitStep {
     pub(crate) const fn new(end: WaitEnd) -> Self {
-        Self { end, begun: None }
+        Self {
+            end,
+            begun: None,
+            is_over: false,
+        }
     }
 
     /// Returns the job and the number of the wait, if it has begun.
     pub(crate) fn id(&self) -> Option<(u64, u32)> {
-        self.begun.map(|(job, count)| (job, count - 1))
+        self.begun.map(|(_, job, count)| (job, count - 1))
     }
 
     /// Lets it end otherwise.
@@ -51,17 +57,25 @@ impl WaitStep {
         let Some(turn) = turn_of(context.waker()) else {
             WaitFault::Outside.raise()
         };
-        let Some(begun) = self.begun else {
+        let address = ptr::from_ref(turn).addr();
+        let Some((begun_in, job, count)) = self.begun else {
             // The first poll is in the turn that ends with this wait.
             turn.begin(self.end);
-            self.begun = Some(turn.latest());
+            let (job, count) = turn.latest();
+            self.begun = Some((address, job, count));
             return Poll::Pending;
         };
+        let (present, latest) = turn.latest();
+        // Of another instance nothing is known here.
+        if self.is_over || (begun_in, job) != (address, present) {
+            WaitFault::Outside.raise()
+        }
         // An answer is for the latest wait only.
-        let is_latest = begun == turn.latest();
+        let is_latest = count == latest;
         if is_latest && turn.is_asking() {
             return Poll::Pending;
         }
+        self.is_over = true;
         Poll::Ready(!is_latest || turn.has_timed_out())
     }
 }

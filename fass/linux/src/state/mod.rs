@@ -23,6 +23,7 @@
 //! - A fault takes an instance away wherever it is: no core is asked for.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicU32;
 
 use fass::platform::SubtaskRunner;
 use sched_dag::engine::{Engine, FaultCost, PlatformPort};
@@ -91,6 +92,8 @@ pub(crate) struct State {
     pub(crate) faults: Vec<Fault>,
     /// The cores that have to look for work.
     called: Vec<CoreId>,
+    /// The words on which threads of drivers may sleep that a question was just posted for.
+    pub(crate) rung: Vec<Arc<AtomicU32>>,
     pub(crate) processors: Box<[u32]>,
     pub(crate) levels: Option<Levels>,
     pub(crate) time: RunTime,
@@ -137,6 +140,7 @@ pub(crate) struct ThreadPort<'s> {
     active: &'s [Number],
     workers: &'s [Worker],
     opened: &'s mut u64,
+    rung: &'s mut Vec<Arc<AtomicU32>>,
 }
 
 impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
@@ -159,6 +163,11 @@ impl PlatformPort<Box<SubtaskRunner>> for ThreadPort<'_> {
     fn start(&mut self, core: CoreId, _: &mut Box<SubtaskRunner>) -> u64 {
         self.workers[self.active[core.index()]].run();
         self.now_ns()
+    }
+
+    /// A thread that sleeps is woken when the lock has been given back.
+    fn wait(&mut self, _: CoreId, runner: &mut Box<SubtaskRunner>, _: u64) {
+        self.rung.extend(runner.body.bell());
     }
 
     fn forward(&mut self, request: Request) -> bool {
@@ -214,6 +223,7 @@ impl State {
             opened: 0,
             faults: Vec::with_capacity(dags),
             called: Vec::with_capacity(2 * cores),
+            rung: Vec::with_capacity(workers),
             processors,
             levels,
             time: RunTime::NOT_BEGUN,
@@ -266,6 +276,7 @@ impl State {
             active: &self.active,
             workers,
             opened: &mut self.opened,
+            rung: &mut self.rung,
         };
         (&mut self.engine, port)
     }

@@ -30,13 +30,9 @@ fn serve<Q: Send + Sync + 'static>(
 ) -> thread::JoinHandle<()> {
     let is_over = Arc::clone(is_over);
     thread::spawn(move || {
-        let me = thread::current();
-        driver.on_question(move || me.unpark());
         while !is_over.load(Relaxed) {
-            match driver.question() {
-                Some((ticket, question)) => answer(&mut driver, ticket, question),
-                // It may have been asked before the bell was there.
-                None => thread::park_timeout(ms(5)),
+            if let Some((ticket, question)) = linux::next_question(&mut driver, ms(5)) {
+                answer(&mut driver, ticket, question);
             }
         }
     })

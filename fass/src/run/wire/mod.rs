@@ -346,7 +346,7 @@ impl Effect for SendCompletion {
         self.0.show_staged();
     }
 
-    fn wait(&mut self, _ended_ns: u64, _limit_ns: u64) -> bool {
+    fn wait(&mut self, _: (u64, u64), _: &mut dyn FnMut(Request)) -> bool {
         self.0.show_staged();
         false
     }

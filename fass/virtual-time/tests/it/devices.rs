@@ -1,9 +1,14 @@
 //! Answers of devices: which of them are taken, and which are given back.
 
-use crate::support::{Seen, commit, every, ms, taking, work};
+use std::future::poll_fn;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::Poll;
+
+use crate::support::{Seen, commit, every, ms, named, run, taking, work};
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::shared::{Asker, DeviceDriver, TimedOut, create_device};
-use fass::{Dag, OverrunPolicy};
+use fass::{Dag, OverrunPolicy, Unique, WaitFault, create_dag, finish_create_dags, sleep};
 use virtual_time::VirtualTime;
 
 type OneQuestion = (Dag, DeviceDriver<(), u32>);
@@ -89,4 +94,157 @@ fn an_answer_whose_job_is_gone_is_given_back() {
     assert_eq!(of_ended.answer(tickets[1], 4), Err(4));
     machine.run();
     assert_eq!(kept.all(), [Err(TimedOut)], "of the second job");
+}
+
+/// Runs a DAG whose first subtask asks a device that echoes after 1 ms, and whose second one gets what
+/// the first one returns; both wait once, and the second one asks. Returns the message of its fault.
+fn fault_of_asking<Fut>(ask: impl FnMut(Asker<u8, u8>) -> Fut + Send + 'static) -> String
+where
+    Fut: Future<Output = (Unique<Asker<u8, u8>>,)> + Send + 'static,
+{
+    let machine = VirtualTime::new().contain_panics();
+    let (device, driver) = create_device("echo");
+    machine.answers(driver, |number, _| [(ms(1), number)]);
+    let dag = every(20, "faulty");
+    let ask = dag.jobs(2).using(device.asking()).async_source(ask);
+    ask.writes(&["echo"]).register(named("ask").wait(ms(3)));
+    let passed = |(echo,): (Unique<Asker<u8, u8>>,)| async move { _ = echo.into_inner().ask(2).await };
+    let passed = dag.async_subtask(passed).reads(&["echo"]);
+    passed.register(named("passed").wait(ms(3)));
+    let report = run(&machine, &[dag]);
+    report.panics[0].message.clone()
+}
+
+#[test]
+fn a_wait_is_of_one_instance_once_and_an_asker_of_one_subtask() {
+    let outside = WaitFault::Outside.to_string();
+    let polled_again = |echo: Asker<u8, u8>| async move {
+        let mut answer = echo.ask(1);
+        assert_eq!((&mut answer).await, Ok(1));
+        _ = (&mut answer).await;
+        unreachable!("it has no second answer");
+    };
+    assert_eq!(fault_of_asking(polled_again), outside);
+    let passed_on = |echo: Asker<u8, u8>| async move {
+        assert_eq!(echo.ask(1).await, Ok(1));
+        (Unique::new(echo),)
+    };
+    assert_eq!(fault_of_asking(passed_on), outside);
+}
+
+#[test]
+fn a_wait_that_is_kept_for_a_later_job_is_a_fault_there() {
+    type Kept = Arc<Mutex<Option<Pin<Box<dyn Future<Output = ()> + Send>>>>>;
+    let machine = VirtualTime::new().contain_panics();
+    let (dag, kept) = (every(20, "keeps"), Kept::default());
+    let keep = move || {
+        let kept = Arc::clone(&kept);
+        async move {
+            let older = kept.lock().unwrap().take();
+            if let Some(older) = older {
+                return older.await;
+            }
+            let mut own = Some(Box::pin(sleep(ms(1))));
+            poll_fn(|context| {
+                let Some(mut wait) = own.take() else {
+                    return Poll::Ready(());
+                };
+                let polled = wait.as_mut().poll(context);
+                *kept.lock().unwrap() = Some(wait);
+                polled
+            })
+            .await;
+        }
+    };
+    dag.jobs(2).async_source(keep).register(named("keep").wait(ms(1)));
+    let report = run(&machine, &[dag]);
+    assert_eq!(report.dag("keeps").statistics().completed, 1);
+    assert_eq!(report.panics[0].message, WaitFault::Outside.to_string());
+}
+
+#[test]
+fn a_question_releases_the_dag_that_serves_it_and_that_time_counts() {
+    // The DAG that serves is of another cluster, or takes longer than the wait.
+    for (sizes, delayed, expected) in [
+        (&[][..], false, [Ok(7), Ok(7)]),
+        (&[1, 1], false, [Ok(7), Ok(7)]),
+        (&[], true, [Err(TimedOut), Ok(7)]),
+    ] {
+        let machine = VirtualTime::new().contain_panics();
+        let machine = machine.cores(2).clusters(sizes);
+        let (kept, keep) = Seen::shared();
+        let (device, mut driver) = create_device::<(), u32>("served");
+        let (asks, serves) = (every(20, "asks"), create_dag());
+        let ask = move |device: Asker<(), u32>| {
+            let keep = keep.clone();
+            async move {
+                work(2);
+                keep.add(device.ask(()).await);
+            }
+        };
+        let ask = asks.jobs(2).using(device.asking()).async_source(ask);
+        ask.register(named("ask").wait(ms(4)));
+        serves.name("serves").relative_deadline(ms(10));
+        assert!(device.served_by(&serves.sporadic(ms(10))));
+        assert!(!device.served_by(&serves.sporadic(ms(10))), "one alone counts");
+        let mut is_first = delayed;
+        let serve = move || {
+            work(if std::mem::take(&mut is_first) { 5 } else { 3 });
+            let (ticket, ()) = driver.question().expect("it was released for one");
+            let answered = driver.answer(ticket, 7);
+            assert!(answered.is_ok() || delayed);
+        };
+        serves.source(serve).register(named("serve"));
+        if !sizes.is_empty() {
+            asks.cluster(0);
+            serves.cluster(1);
+        }
+        let report = run(&machine, &[asks, serves]);
+        assert_eq!(kept.all(), expected);
+        let released: Vec<u64> = report.dag("serves").jobs().map(|job| job.release_ns).collect();
+        // Not before the wait has begun (R3).
+        assert_eq!(released, [2_000_000, 22_000_000]);
+        assert_eq!(report.dag("asks").statistics().misses, 0);
+    }
+}
+
+#[test]
+fn the_faults_of_a_driver_are_those_of_its_dag() {
+    let machine = VirtualTime::new().contain_panics();
+    let (kept, keep) = Seen::shared();
+    let (device, mut driver) = create_device::<(), u32>("served");
+    let (asks, serves) = (every(20, "asks"), create_dag());
+    let ask = move |device: Asker<(), u32>| {
+        let keep = keep.clone();
+        async move { keep.add(device.ask(()).await) }
+    };
+    let ask = asks.jobs(3).using(device.asking()).async_source(ask);
+    ask.register(named("ask").wait(ms(4)));
+    serves.name("serves").relative_deadline(ms(10));
+    device.served_by(&serves.sporadic(ms(10)));
+    let mut job = 0;
+    let serve = move || {
+        job += 1;
+        assert!(job < 2, "the driver fails");
+        let (ticket, ()) = driver.question().expect("it was released for one");
+        driver.answer(ticket, job).expect("it waits");
+    };
+    serves.source(serve).register(named("serve"));
+    let report = run(&machine, &[asks, serves]);
+    assert_eq!(kept.all(), [Ok(1), Err(TimedOut), Err(TimedOut)]);
+    let dags = ["asks", "serves"].map(|dag| report.dag(dag).statistics().faults);
+    assert_eq!((dags, report.panics.len()), ([0, 1], 1));
+}
+
+#[test]
+fn a_device_that_a_dag_serves_needs_that_dag_in_the_commit() {
+    let _machine = VirtualTime::new();
+    let (device, _driver) = create_device::<(), u32>("served");
+    let (asks, serves) = (every(20, "asks"), create_dag());
+    device.served_by(&serves.sporadic(ms(10)));
+    let ask = |device: Asker<(), u32>| async move { _ = device.ask(()).await };
+    let ask = asks.using(device.asking()).async_source(ask);
+    ask.register(named("ask").wait(ms(4)));
+    let error = finish_create_dags(&[asks]).expect_err("nobody serves it");
+    assert_eq!(error.faults()[0].code(), "signal_not_committed", "{error}");
 }
