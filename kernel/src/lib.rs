@@ -34,7 +34,12 @@
 //! 4. **A core without work halts**, and is woken by the core that has some.
 //! 5. **`unsafe` is in the executive's `machine` and `memory`, and in `entry` and `start`** alone,
 //!    each block with the invariant that it relies on.
-//! 6. **Apps are not trusted**: what they say is verified at commit.
+//! 6. **Apps are not trusted**: what they say is verified at commit, and nothing here lets one change
+//!    a core's interrupts:
+//!
+//! ```compile_fail,E0425
+//! kernel::set_heartbeat(core::time::Duration::from_nanos(1));
+//! ```
 //!
 //! # Rooms, from top to bottom
 //!
@@ -70,7 +75,6 @@ pub use front::report::MemoryInUse;
 pub use front::{print, println};
 #[doc(inline)]
 pub use sched_dag::engine::Run;
-pub use start::CLOCK;
 
 /// Returns the number of timer interrupts that all cores have taken since boot.
 ///
@@ -82,17 +86,6 @@ pub use start::CLOCK;
 #[must_use]
 pub fn timer_interrupts() -> u64 {
     executive::interrupts::timer_interrupts()
-}
-
-/// Interrupts every core each `period` from now on, besides what scheduling needs; back to normal
-/// if 0. For tests of the kernel's own robustness.
-///
-/// ```no_run
-/// kernel::set_heartbeat(core::time::Duration::from_micros(50));
-/// ```
-pub fn set_heartbeat(period: core::time::Duration) {
-    let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
-    executive::run::heartbeat::set_heartbeats(period_ns);
 }
 
 /// Reports whether functions may use AVX: the processor has it, and the word `avx=off` is

@@ -74,10 +74,7 @@ where
 /// let (_sonar, mut driver) = fass::shared::create_device::<(), u32>("sonar");
 /// assert!(linux::next_question(&mut driver, Duration::from_millis(1)).is_none());
 /// ```
-pub fn next_question<Q, A>(
-    driver: &mut DeviceDriver<Q, A>,
-    most: Duration,
-) -> Option<(Ticket, Q)> {
+pub fn next_question<Q, A>(driver: &mut DeviceDriver<Q, A>, most: Duration) -> Option<(Ticket, Q)> {
     let bell = driver.bell();
     let most_ns = u64::try_from(most.as_nanos()).unwrap_or(u64::MAX);
     let until_ns = sys::now_ns().saturating_add(most_ns);

@@ -58,8 +58,12 @@ pub(crate) fn latest() -> Option<Control> {
 }
 
 pub(crate) fn set(control: Option<Control>) {
-    *LATEST.write().unwrap_or_else(PoisonError::into_inner) = control;
+    let mut latest = LATEST.write().unwrap_or_else(PoisonError::into_inner);
+    let older = std::mem::replace(&mut *latest, control);
     LATEST.clear_poison();
+    drop(latest);
+    // It may be the last one of what the app's functions own.
+    drop(older);
 }
 
 impl std::fmt::Debug for Control {

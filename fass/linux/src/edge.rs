@@ -106,6 +106,19 @@ fn of_run(clock_ns: u64) -> u64 {
     clock_ns.saturating_sub(EPOCH_NS.load(Ordering::Relaxed))
 }
 
+/// Whether the time that functions are told is recorded or replayed.
+static TELLS: AtomicBool = AtomicBool::new(false);
+
+static CLOCK: Clock = sys::now_ns;
+
+/// Returns the clock of functions.
+pub(crate) fn clock() -> &'static Clock {
+    match TELLS.load(Ordering::Relaxed) {
+        true => &TOLD,
+        false => &CLOCK,
+    }
+}
+
 /// Tells functions the time where that is recorded or replayed.
 static TOLD: Clock = || {
     let clock_ns = sys::now_ns();
@@ -117,9 +130,8 @@ pub(crate) fn launch(plan: &mut Plan) -> Result<(), LaunchError> {
     let mut edge = get();
     let mut file = unpoisoned(&FILE);
     let launched = edge.launch(plan, file.as_mut().map(BootRecord::file));
-    if launched.map_err(LaunchError::new)? {
-        fass::platform::set_clock(&TOLD);
-    }
+    let tells = launched.map_err(LaunchError::new)?;
+    TELLS.fetch_or(tells, Ordering::Relaxed);
     IS_ON.store(edge.is_on(), Ordering::Relaxed);
     Ok(())
 }

@@ -21,7 +21,8 @@
 //! - From the commit on, nothing is allocated for a release, a preemption or a completion;
 //!   a completion that concerns its own core makes no system call but to read clocks.
 //! - No thread holds the scheduler's lock below the level of what computes.
-//! - A panic in a function ends its DAG alone, in a program that unwinds.
+//! - A panic in a function ends its DAG alone, in a program that unwinds, whatever its destructors
+//!   do.
 //! - No end of the program, however sudden, leaves anything at a raised level.
 //!
 //! # What is not
@@ -44,6 +45,7 @@ mod level;
 mod look_out;
 mod machine;
 mod office;
+mod panics;
 mod platform;
 mod state;
 #[allow(

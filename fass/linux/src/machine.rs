@@ -22,6 +22,7 @@ use fass::shared::{Signal, Wire};
 use crate::control::{self, Control};
 use crate::edge::{self, FILE, File, IS_LIVE, LEFT, unpoisoned};
 use crate::level::{Levels, Seats, USUAL_TOP};
+use crate::panics;
 use crate::platform::HOST;
 use crate::platform::{self, Run, Threads};
 use crate::sys;
@@ -182,6 +183,7 @@ impl Linux {
             IS_OURS.get_or_init(|| fass::platform::install(&HOST).is_ok()),
             "another platform is installed; `Linux` must be the program's only one"
         );
+        panics::contain();
         let cores = u32::try_from(processors.len()).unwrap_or(u32::MAX);
         let mut threads = HOST.threads();
         assert!(

@@ -11,7 +11,7 @@ use std::time::Duration;
 use fass::Occupation;
 use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
-use fass::platform::{LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
+use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
 use sched_dag::engine::{self, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, PendingRequests, Request, WaitId};
 use sched_dag::{DagId, Journal, Scheduler, TaskSet};
@@ -22,8 +22,7 @@ use crate::level::Levels;
 use crate::office::Office;
 use crate::state::{Fault, Number, RunTime, State};
 use crate::sys;
-use crate::team::Budgets;
-use crate::team::{Team, with_own_worker};
+use crate::team::{self, Budgets, Team, with_own_worker};
 
 /// The platform of the program.
 pub(crate) struct Host {
@@ -69,6 +68,14 @@ impl Platform for Host {
     #[inline]
     fn now_ns(&self) -> u64 {
         sys::now_ns()
+    }
+
+    fn clock(&self) -> &'static Clock {
+        edge::clock()
+    }
+
+    fn may_call_app(&self) -> bool {
+        team::may_call_app()
     }
 
     fn execute_for(&self, duration: Duration, how: Occupation) {

@@ -26,20 +26,19 @@
 //! it sees for itself whether that is too much.
 
 use std::cell::{Cell, RefCell};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use fass::platform::SubtaskRunner;
 use sched_dag::engine::{NextAction, PlatformPort as _};
-use sched_dag::{ClusterId, CoreId, Subtask, TaskSet, Vertex};
+use sched_dag::{ClusterId, CoreId, Instance, Subtask, TaskSet, Vertex};
 
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
 use crate::office::Office;
 use crate::state::{Left, Number, State};
 use crate::worker::{Lead, Worker};
-use crate::{edge, sys};
+use crate::{edge, panics, sys};
 
 thread_local! {
     /// The run and the number of the worker that this thread is.
@@ -62,6 +61,23 @@ pub fn is_of_run() -> bool {
 /// Calls a function with the worker that the calling thread is; `None` if it is none.
 pub(crate) fn with_own_worker<R>(look: impl FnOnce(&Worker) -> R) -> Option<R> {
     OWN.with_borrow(|own| own.as_ref().map(|(team, me)| look(&team.workers[*me])))
+}
+
+/// Reports whether the calling thread may call the app's code: not one that decides, or holds the
+/// scheduler's lock.
+pub(crate) fn may_call_app() -> bool {
+    with_own_worker(|worker| !worker.has_returned()).unwrap_or(!is_of_run())
+}
+
+/// Ends the instance that the calling thread runs, which can neither return nor unwind, and reports
+/// whether there is one. The thread is to do nothing any more.
+pub(crate) fn strand(cause: &str) -> bool {
+    let own = OWN.with_borrow(Clone::clone);
+    let instance = edge::here().0;
+    own.zip(instance).is_some_and(|((team, me), instance)| {
+        team.strand(me, instance, cause);
+        true
+    })
 }
 
 /// All that the threads of a cluster share.
@@ -251,14 +267,14 @@ impl Team {
     #[inline]
     fn execute(&self, runner: &mut SubtaskRunner) -> Result<(), String> {
         edge::note_running(Some(runner.instance));
-        let body = AssertUnwindSafe(|| match self.turns.get(runner.vertex.index()) {
+        let outcome = panics::caught(|| match self.turns.get(runner.vertex.index()) {
             Some(clock) if runner.body.may_wait() => Self::take_turn(runner, clock),
             _ => {
                 runner.run();
                 Ok(())
             }
         });
-        let outcome = catch_unwind(body).unwrap_or_else(|panic| Err(message(&*panic)));
+        let outcome = outcome.flatten();
         edge::note_running(None);
         outcome
     }
@@ -461,13 +477,6 @@ const AT_ONCE: usize = 16;
 /// The worker's instance was ended while it ran.
 pub(crate) struct Abandoned;
 
-/// Returns a panic's message.
-fn message(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied();
-    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    text.unwrap_or("a panic without a message").to_owned()
-}
-
 /// The latest look at an instance that has a budget.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
@@ -633,6 +642,33 @@ impl Team {
         }
         self.workers.iter().for_each(|worker| worker.call());
         None
+    }
+
+    /// Ends the instance of a worker whose thread goes on with nothing, and with it its DAG.
+    fn strand(&self, me: Number, instance: Instance, cause: &str) {
+        let workers = &self.workers;
+        workers[me].report(self.levels);
+        let mut state = self.lock();
+        if !state.abandoned.contains(&me) {
+            let (seat, vertex) = (
+                state.seats[me].take(),
+                state.engine.task_set.vertex(instance),
+            );
+            let core = seat.unwrap_or_else(|| state.core_of(me));
+            state.abandoned.push(me);
+            match seat {
+                Some(core) => {
+                    state.engine.placement.lose(core.index());
+                    state.replace(core, workers);
+                }
+                None => state.engine.placement.lose_parked(vertex),
+            }
+            state.fail(workers, (core, vertex), None, (cause.to_owned(), false));
+            state.report_left(core, workers);
+            self.announce(&state);
+        }
+        self.call(state);
+        workers[me].bring(self.levels, Role::Abandoned);
     }
 
     /// Ends a core's instance, which has exceeded its budget, and with it its DAG: its function

@@ -150,7 +150,8 @@ fn narrowed(bits: u64) -> f32 {
     f64::from_bits(bits) as f32
 }
 
-/// A parameter of whatever type, for a platform that lets people set it.
+/// A parameter of whatever type, for a platform that lets people set it. Nothing else is one, as
+/// people are served with interrupts disabled where the cores are busy.
 ///
 /// ```
 /// use fass::shared::{Parameter, Tunable};
@@ -166,7 +167,7 @@ fn narrowed(bits: u64) -> f32 {
 ///     ["gain = 0.5 (f64 from 0 to 2, at first 0.5)", "lights = false (bool, at first true)"]
 /// );
 /// ```
-pub trait Tunable: Send + Sync {
+pub trait Tunable: sealed::Sealed + Send + Sync {
     /// Returns its name.
     fn name(&self) -> &str;
 
@@ -279,6 +280,8 @@ impl<T: ParameterValue> Parameter<T> {
         is_within
     }
 }
+
+impl<T> sealed::Sealed for Parameter<T> {}
 
 impl<T: ParameterValue> Tunable for Parameter<T> {
     fn name(&self) -> &str {

@@ -165,12 +165,15 @@ pub fn finish_create_dags_with(
         Arc::clone(&staleness),
     );
     match platform.launch(plan) {
-        Ok(()) => Ok(Commit {
-            warnings,
-            answers,
-            staleness,
-            task_set,
-        }),
+        Ok(()) => {
+            platform::clock::set_clock(platform.clock());
+            Ok(Commit {
+                warnings,
+                answers,
+                staleness,
+                task_set,
+            })
+        }
         Err(error) => Err(CommitError::of(Fault::NotLaunched(error), warnings)),
     }
 }

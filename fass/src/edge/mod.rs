@@ -30,6 +30,7 @@ use recording::{DagHeader, Header, Schema, Stream};
 use sched_dag::journal::EventKind;
 use sched_dag::{DagId, DriverNotice, Instance, TaskSet};
 
+use crate::platform::with_edge;
 use crate::run::plan::Plan;
 
 pub use excerpt::Excerpt;
@@ -125,9 +126,10 @@ pub trait Crossing: Send {
         clock_ns
     }
 
-    /// Lends the recorded value of a channel and a job, if there is one.
-    fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        let _ = (channel, job, take);
+    /// Returns the recorded value of a channel and a job, if there is one.
+    fn find(&self, channel: u16, job: u64) -> Option<&'static [u8]> {
+        let _ = (channel, job);
+        None
     }
 
     /// Returns the work of core 0; the first time only. Of the last jobs there is a file when
@@ -292,6 +294,41 @@ pub const fn recorded(what: EventKind) -> Option<recording::EntryKind> {
         // All else follows from these when the functions are called again.
         _ => None,
     }
+}
+
+/// Lets people look at what crosses, from the next commit on. Nothing, where no platform has an edge.
+///
+/// ```
+/// fass::edge::let_look(); // there is no platform
+/// assert!(!fass::edge::watch(Some("pose")) && fass::edge::take_seen(&mut []).is_none());
+/// assert_eq!(fass::edge::objections(), [None, None]);
+/// ```
+pub fn let_look() {
+    with_edge(Edge::let_look);
+}
+
+/// Keeps the latest value of a recorded topic from now on, or nothing. Reports whether there is such
+/// a topic.
+///
+/// See [`let_look`].
+pub fn watch(topic: Option<&str>) -> bool {
+    with_edge(|edge| edge.watch(topic)).unwrap_or(false)
+}
+
+/// Takes that value out, if there is a new one.
+///
+/// See [`let_look`].
+pub fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
+    with_edge(|edge| edge.take_seen(into)).flatten()
+}
+
+/// Returns why a recording, or a replay, could not be what was wished, and how a replay differs from
+/// its recording, if that is so.
+///
+/// See [`let_look`].
+#[must_use]
+pub fn objections() -> [Option<String>; 2] {
+    with_edge(|edge| edge.objections()).unwrap_or_default()
 }
 
 /// The sender of a recording, if there is one.
@@ -512,11 +549,10 @@ impl Edge {
         self.echo.as_mut()?.take(into)
     }
 
-    /// Lends a recorded value.
-    pub fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        if let Some(crossing) = &self.crossing {
-            crossing.lend(channel, job, take);
-        }
+    /// Returns a recorded value, which outlasts the edge's lock: what reads it is the app's.
+    #[must_use]
+    pub fn find(&self, channel: u16, job: u64) -> Option<&'static [u8]> {
+        self.crossing.as_ref()?.find(channel, job)
     }
 
     /// Returns why the wish could not be met, and how a replay differs from its recording, if that

@@ -69,12 +69,12 @@ pub fn execute_for(duration: Duration, how: Occupation) {
 }
 
 /// The clock: the platform's, unless it has named another one.
-static CLOCK: CurrentIndex<Clock> = CurrentIndex::new(&(ASK_THE_PLATFORM as Clock));
+static CLOCK: CurrentIndex<Clock> = CurrentIndex::new(&ASK_THE_PLATFORM);
 
 /// Tells the time, as [`now_ns`] does.
 pub type Clock = fn() -> u64;
 
-const ASK_THE_PLATFORM: Clock = || expect_installed().now_ns();
+pub(super) static ASK_THE_PLATFORM: Clock = || expect_installed().now_ns();
 
 /// Returns the platform's time in nanoseconds.
 ///
@@ -94,19 +94,7 @@ pub fn now_ns() -> u64 {
     CLOCK.get()()
 }
 
-/// Replaces the clock behind [`now_ns`], which is [`Platform::now_ns`](super::Platform::now_ns) at first.
-///
-/// For platforms: one that records the time that functions are told sets a clock that does so, and
-/// all others one that takes fewer instructions.
-///
-/// # Examples
-///
-/// ```standalone_crate
-/// static HALF_PAST: fass::platform::Clock = || 30;
-///
-/// fass::platform::set_clock(&HALF_PAST);
-/// assert_eq!(fass::now_ns(), 30);
-/// ```
-pub fn set_clock(clock: &'static Clock) {
+/// Replaces the clock behind [`now_ns`].
+pub(crate) fn set_clock(clock: &'static Clock) {
     CLOCK.set(clock);
 }

@@ -4,6 +4,62 @@
 //! installs itself once, as a logger or an allocator does, before the app
 //! commits its DAGs. The commit asks it for the policy and the cores to verify
 //! against, and leaves the [`Plan`] with it.
+//!
+//! # What is kept from apps
+//!
+//! Whatever is called under a lock of the platform's, or in its interrupts, is no app's to give: the
+//! clock, work at the edge, what happens when a question is there, the ends of topics, parameters.
+//!
+//! ```compile_fail,E0603
+//! fass::platform::with_edge(|_| panic!("under a lock"));
+//! ```
+//!
+//! ```compile_fail,E0425
+//! static CLOCK: fass::platform::Clock = || panic!("wherever time is told");
+//! fass::platform::set_clock(&CLOCK);
+//! ```
+//!
+//! ```compile_fail,E0599
+//! let (_device, driver) = fass::shared::create_device::<(), ()>("sonar");
+//! driver.on_question(|| panic!("in the scheduler's step"));
+//! ```
+//!
+//! ```compile_fail,E0277
+//! struct Bomb;
+//!
+//! impl fass::MulRecv for Bomb {
+//!     type Items = ();
+//!     fn recv_all(&mut self) -> impl Future<Output = ()> + Send {
+//!         std::future::ready(())
+//!     }
+//!     fn grant(&mut self, _: u64) {}
+//!     fn discard_all(&mut self, _: u64) {
+//!         panic!("where a job is cut");
+//!     }
+//! }
+//! ```
+//!
+//! ```compile_fail,E0277
+//! struct Bomb;
+//!
+//! impl fass::shared::Tunable for Bomb {
+//!     fn name(&self) -> &str {
+//!         panic!("in the heartbeat");
+//!     }
+//!     fn set_text(&self, _: &str) -> bool {
+//!         true
+//!     }
+//!     fn write_allowed(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+//!         Ok(())
+//!     }
+//!     fn write(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+//!         Ok(())
+//!     }
+//!     fn share(&self) -> std::sync::Arc<dyn fass::shared::Tunable> {
+//!         std::sync::Arc::new(Bomb)
+//!     }
+//! }
+//! ```
 
 pub(crate) mod clock;
 mod run_config;
@@ -21,7 +77,7 @@ use crate::edge::{Begin, Edge};
 use crate::run::line::RecordedValue;
 use crate::run::log::{Field, Level, LogLine};
 
-pub use clock::{Clock, set_clock};
+pub use clock::Clock;
 pub use run_config::RunConfig;
 pub use sched_dag::lifecycle::Request;
 
@@ -80,6 +136,20 @@ pub trait Platform: Sync {
 
     /// Returns the time since the platform's start, in nanoseconds.
     fn now_ns(&self) -> u64;
+
+    /// Returns the clock behind [`crate::now_ns`], which is [`now_ns`](Self::now_ns) at first. It is
+    /// asked for at the installation and after each launch: a platform that records the time which
+    /// functions are told has a clock that does so, and any other one that takes fewer
+    /// instructions.
+    fn clock(&self) -> &'static Clock {
+        &clock::ASK_THE_PLATFORM
+    }
+
+    /// Reports whether the caller may call the app's code: it holds no lock of the platform's, and
+    /// interrupts are enabled. Only a debug build asks ([`call_app`]).
+    fn may_call_app(&self) -> bool {
+        true
+    }
 
     /// Occupies the calling instance's core for `duration` of execution time.
     fn execute_for(&self, duration: Duration, how: Occupation);
@@ -152,9 +222,11 @@ pub trait Platform: Sync {
         ask_edge(self, |edge| edge.is_replay()).unwrap_or(false)
     }
 
-    /// Lends the recorded value of a channel and a job to `take`, if there is one.
+    /// Lends the recorded value of a channel and a job to `take`, if there is one. What takes it may
+    /// be the app's, so no lock is held.
     fn replay(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        self.at_edge(&mut |edge| edge.lend(channel, job, take));
+        let found = ask_edge(self, |edge| edge.find(channel, job)).flatten();
+        found.into_iter().for_each(|bytes| call_app(|| take(bytes)));
     }
 
     /// Takes a line of the [log](mod@crate::log) from the function that runs here. Adds which
@@ -248,16 +320,33 @@ impl core::error::Error for AlreadyInstalled {}
 /// ```
 pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> {
     if PLATFORM.set(platform) {
+        clock::set_clock(platform.clock());
         Ok(())
     } else {
         Err(AlreadyInstalled)
     }
 }
 
-/// Does `work` with what the installed platform keeps at its edge, if it does.
+/// Calls code of the app's: the gate through which all of it is called, `docs/architecture.md` lists
+/// what that is. It is in an instance, or in the app's main function. A debug build panics if it is
+/// under a lock of the platform's, or with interrupts disabled.
 ///
-/// See [`Platform::at_edge`].
-pub fn with_edge<T>(work: impl FnOnce(&mut Edge) -> T) -> Option<T> {
+/// ```
+/// assert_eq!(fass::platform::call_app(|| 7), 7);
+/// ```
+#[inline(always)]
+pub fn call_app<T>(call: impl FnOnce() -> T) -> T {
+    debug_assert!(
+        installed().is_none_or(|platform| platform.may_call_app()),
+        "the app's code is called under a lock, or with interrupts disabled; call it in an instance, \
+         or in the app's main function"
+    );
+    call()
+}
+
+/// Does `work` with what the installed platform keeps at its edge, if it does: under a lock, so it is
+/// none of the app's.
+pub(crate) fn with_edge<T>(work: impl FnOnce(&mut Edge) -> T) -> Option<T> {
     ask_edge(installed()?, work)
 }
 

@@ -17,6 +17,7 @@ use super::effect::{Effect, MutedEffect};
 use super::latest::Staleness;
 use super::line::LineOf;
 use super::turn::{TurnEffects, TurnState};
+use crate::platform::call_app;
 
 /// A committed set of DAGs, ready to be scheduled.
 ///
@@ -270,7 +271,7 @@ impl SubtaskCode {
             self.job
         );
         self.job = job;
-        self.subtask.take_turn(job);
+        call_app(|| self.subtask.take_turn(job));
         self.job = NO_JOB;
     }
 

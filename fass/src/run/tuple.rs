@@ -26,6 +26,14 @@ use core::task::{Context, Poll};
 use super::message::{Message, MessageType};
 use super::topic::{Ports, Publisher, Subscriber};
 
+mod sealed {
+    /// Kept to this crate: what is granted and discarded is so in the scheduler's steps.
+    pub trait Sealed {}
+
+    impl<Ends> Sealed for super::Subscribers<Ends> {}
+    impl<Ends> Sealed for super::Publishers<Ends> {}
+}
+
 /// Receives all inputs of an instance at once.
 ///
 /// # Examples
@@ -41,7 +49,7 @@ use super::topic::{Ports, Publisher, Subscriber};
     message = "`{Self}` does not receive a subtask's inputs",
     note = "the receivers are generated from the argument tuple: `<Args as VecToSubs>::Subs`"
 )]
-pub trait MulRecv {
+pub trait MulRecv: sealed::Sealed {
     /// The tuple that one job's inputs form.
     type Items;
 
@@ -77,7 +85,7 @@ pub trait MulRecv {
     message = "`{Self}` does not send a subtask's outputs",
     note = "the senders are generated from the result tuple: `<Ret as VecToPubs>::Pubs`"
 )]
-pub trait MulSend {
+pub trait MulSend: sealed::Sealed {
     /// The tuple that one job's outputs form.
     type Items;
 
@@ -119,7 +127,7 @@ pub trait MulSend {
     note = "a subtask takes one tuple of at most 16 messages; with one input topic that is `({Self},)`, comma included",
     note = "every message must be `Clone + Send + 'static`, or a `fass::Unique`"
 )]
-pub trait VecToSubs: Sized + Send + 'static {
+pub trait VecToSubs: sealed::Sealed + Sized + Send + 'static {
     /// The number of elements, which is that of the input topics.
     const ARITY: usize;
 
@@ -169,7 +177,7 @@ pub trait VecToSubs: Sized + Send + 'static {
     note = "a subtask returns one tuple of at most 16 messages; with one output topic that is `({Self},)`, comma included",
     note = "every message must be `Clone + Send + 'static`, or a `fass::Unique`"
 )]
-pub trait VecToPubs: Sized + Send + 'static {
+pub trait VecToPubs: sealed::Sealed + Sized + Send + 'static {
     /// The number of elements, which is that of the output topics.
     const ARITY: usize;
 
@@ -280,6 +288,8 @@ macro_rules! implement_arity {
                     self.job = job;
                 }
             }
+
+            impl<$($Item: Message),*> sealed::Sealed for ($($Item,)*) {}
 
             impl<$($Item: Message),*> VecToSubs for ($($Item,)*) {
                 type Subs = Subscribers<($(Subscriber<$Item>,)*)>;

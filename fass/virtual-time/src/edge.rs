@@ -263,7 +263,9 @@ impl Edge {
 
     /// Lends the recorded value of a channel of the plan.
     pub(crate) fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        self.of_replay(|replay| replay.value(channel, job).into_iter().for_each(take));
+        // Copied, as what takes it may be the app's, and ask for the time.
+        let value = self.of_replay(|replay| replay.value(channel, job).map(<[u8]>::to_vec));
+        value.as_deref().into_iter().for_each(take);
     }
 
     /// Returns the record of the run so far.

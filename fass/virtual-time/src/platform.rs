@@ -11,7 +11,7 @@ use std::time::Duration;
 use fass::Occupation;
 use fass::edge::{Begin, RecordedValue};
 use fass::log::{Level, LogLine, set_level};
-use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig, set_clock};
+use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig};
 use fass::shared::{DeviceDriver, Wire};
 use recording::{Channel, Entry, EntryKind};
 use sched_dag::lifecycle::{Request, WaitId};
@@ -39,7 +39,6 @@ pub(crate) fn make_current() -> Rc<Machine> {
         IS_OURS.get_or_init(|| fass::platform::install(&HostPlatform).is_ok()),
         "another platform is installed; virtual time must be the program's only platform"
     );
-    set_clock(&TOLD);
     set_level(Some(Level::Debug));
     let machine = Rc::new(Machine::default());
     CURRENT.set(Rc::downgrade(&machine));
@@ -188,6 +187,10 @@ impl Platform for HostPlatform {
 
     fn now_ns(&self) -> u64 {
         expect_current().now_ns.get()
+    }
+
+    fn clock(&self) -> &'static Clock {
+        &TOLD
     }
 
     fn execute_for(&self, duration: Duration, _how: Occupation) {

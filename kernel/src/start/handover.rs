@@ -39,14 +39,6 @@ use crate::watch::{self, panic};
 /// An app: sets up its DAGs, runs them and reports.
 pub(crate) type App = fn(&Machine) -> Result<(), AppError>;
 
-/// The clock of functions, unless time is recorded or replayed.
-///
-/// ```no_run
-/// // To be told the time though the run is recorded, and leave no trace of it there:
-/// fass::platform::set_clock(&kernel::CLOCK);
-/// ```
-pub static CLOCK: fass::platform::Clock = clock::now_ns;
-
 /// The last processor that can be reached without x2APIC; the next id means all of them.
 const LAST_SHORT_ID: u32 = 254;
 
@@ -235,7 +227,6 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
     }
     // A second installation would come from a second boot, which there is not.
     let _ = fass::platform::install(&KERNEL);
-    fass::platform::set_clock(&CLOCK);
     announce(info, name, layout.total_bytes, &rate);
     finish(if *probes {
         probe::run()

@@ -10,5 +10,4 @@ mod handover;
 mod probe;
 mod settings;
 
-pub use handover::CLOCK;
 pub(crate) use handover::start;

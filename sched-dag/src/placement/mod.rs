@@ -164,6 +164,13 @@ impl<Body, Parked> Placement<Body, Parked> {
         self.forget_target(0, vertex);
     }
 
+    /// Takes note that such an instance was ended, and its body stays on a stack that goes on with
+    /// nothing.
+    pub fn lose_parked(&mut self, vertex: Vertex) {
+        *self.body_state(vertex) = BodyState::Lost;
+        self.forget_target(0, vertex);
+    }
+
     /// The scheduler knows that the instance has ended: nobody is to run it.
     fn forget_target(&mut self, core: usize, vertex: Vertex) {
         let wants_it = |seat: &CoreSlot| seat.target == vertex;

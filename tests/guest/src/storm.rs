@@ -10,6 +10,7 @@ use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
+use executive::run::heartbeat::set_heartbeats;
 use fass::finish_create_dags;
 use kernel::{AppError, Machine, json};
 
@@ -17,7 +18,7 @@ use crate::checksum::checksum;
 use crate::single::{named, single_every};
 
 /// The time between two interrupts of one core.
-const INTERRUPT_PERIOD: Duration = Duration::from_micros(5);
+const INTERRUPT_PERIOD_NS: u64 = 5_000;
 
 /// Longer than any storm, so that the one job is never late.
 const PERIOD: Duration = Duration::from_secs(3600);
@@ -44,9 +45,9 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
         single_every(PERIOD, &name, 1, named("compute"), compute)
     });
     finish_create_dags(&dags.collect::<Vec<_>>())?;
-    kernel::set_heartbeat(INTERRUPT_PERIOD);
+    set_heartbeats(INTERRUPT_PERIOD_NS);
     let run = machine.run()?;
-    kernel::set_heartbeat(Duration::ZERO);
+    set_heartbeats(0);
 
     let diverged = findings.diverged.load(Ordering::Relaxed);
     json::emit("storm", |line| {

@@ -7,7 +7,6 @@ use std::thread;
 use std::time::Duration;
 
 use crate::support::{alone, mechanisms, ms};
-use fass::platform::with_edge;
 use fass::shared::{Asker, DeviceDriver, create_device};
 use fass::{Dag, SubtaskAttributes, create_dag, finish_create_dags};
 use linux::Mechanism;
@@ -83,8 +82,8 @@ fn part() {
     machine.run().expect("it is committed");
     let (outcome, _) = machine.end_recording(true);
     linux::Linux::end_record().expect("it is written");
-    let objections = with_edge(|edge| edge.objections());
-    assert_eq!(objections, Some([None, None]));
+    let objections = fass::edge::objections();
+    assert_eq!(objections, [None, None]);
     let compared = outcome.map(|outcome| (outcome.compared, outcome.divergence));
     assert_eq!(compared, replays.then_some((20, None)));
     let results = results.lock().expect("nobody panics");

@@ -96,6 +96,50 @@ fn a_thread_answers_and_what_is_late_or_told_twice_changes_nothing() {
 }
 
 #[test]
+fn a_question_releases_the_dag_that_answers_and_its_fault_is_that_dags() {
+    for (mechanism, fails) in mechanisms().flat_map(|of| [(of, false), (of, true)]) {
+        const JOBS: u64 = 12;
+        let alone = alone(2, mechanism);
+        let (device, mut driver) = create_device::<u64, u64>("served");
+        let (asks, serves) = (every(ms(5), "asks"), create_dag());
+        let counts = Arc::new([const { AtomicU64::new(0) }; 2]);
+        let (seen, mut job) = (Arc::clone(&counts), 0);
+        let ask = move |device: Asker<u64, u64>| {
+            let (asked, seen) = (job, Arc::clone(&seen));
+            job += 1;
+            async move {
+                let answer = device.ask(asked).await;
+                assert!(answer.is_err() || answer == Ok(asked * 10));
+                seen[usize::from(answer.is_err())].fetch_add(1, Relaxed);
+            }
+        };
+        asks.jobs(JOBS).in_flight(1);
+        let ask = asks.using(device.asking()).async_source(ask);
+        let limit = if fails { ms(4) } else { MINUTE };
+        ask.register(SubtaskAttributes::named("ask").wait(limit));
+        serves.name("serves").relative_deadline(MINUTE).in_flight(1);
+        device.served_by(&serves.sporadic(Duration::from_micros(1)));
+        let serve = move || {
+            let (ticket, asked) = driver.question().expect("it was released for one");
+            assert!(!fails, "the driver fails");
+            driver.answer(ticket, asked * 10).expect("it waits");
+        };
+        serves
+            .source(serve)
+            .register(SubtaskAttributes::named("serve"));
+        finish_create_dags(&[asks, serves]).unwrap();
+        let run = alone.machine.run().unwrap();
+        assert_eq!(breaches(&run), []);
+        let counts = [0, 1].map(|which| counts[which].load(Relaxed));
+        assert_eq!(counts, if fails { [0, JOBS] } else { [JOBS, 0] });
+        let faults = run.faults().iter();
+        let faults: Vec<_> = faults.map(|fault| fault.instance.dag.0).collect();
+        assert_eq!(faults, if fails { vec![1] } else { vec![] });
+        assert_eq!(run.statistics("asks").completed, JOBS);
+    }
+}
+
+#[test]
 fn what_waits_has_no_core_so_a_function_on_the_only_one_can_answer() {
     for mechanism in mechanisms() {
         let alone = alone(1, mechanism);

@@ -271,8 +271,13 @@ impl Replay {
     /// Returns the recorded value of a channel of the plan.
     #[must_use]
     pub fn value(&self, channel: u16, job: u64) -> Option<&[u8]> {
+        self.bytes.get(self.place(channel, job)?)
+    }
+
+    /// Returns where that is in the recording.
+    fn place(&self, channel: u16, job: u64) -> Option<Range<usize>> {
         let (_, place) = &self.values[self.find(channel, job)?];
-        self.bytes.get(place.clone())
+        Some(place.clone())
     }
 
     /// Returns the number of a recorded value.
@@ -578,12 +583,9 @@ impl Crossing for OfMachine {
         told.unwrap_or(clock_ns)
     }
 
-    fn lend(&self, channel: u16, job: u64, take: &mut dyn FnMut(&[u8])) {
-        if let Some(value) =
-            (self.replay.as_ref()).and_then(|(replay, _)| replay.value(channel, job))
-        {
-            take(value);
-        }
+    fn find(&self, channel: u16, job: u64) -> Option<&'static [u8]> {
+        let (replay, _) = self.replay.as_ref()?;
+        self.bytes.get(replay.place(channel, job)?)
     }
 
     fn drain(&mut self) -> Option<Box<dyn Drain>> {

@@ -108,7 +108,8 @@ where
     let dag = every(20, "faulty");
     let ask = dag.jobs(2).using(device.asking()).async_source(ask);
     ask.writes(&["echo"]).register(named("ask").wait(ms(3)));
-    let passed = |(echo,): (Unique<Asker<u8, u8>>,)| async move { _ = echo.into_inner().ask(2).await };
+    let passed =
+        |(echo,): (Unique<Asker<u8, u8>>,)| async move { _ = echo.into_inner().ask(2).await };
     let passed = dag.async_subtask(passed).reads(&["echo"]);
     passed.register(named("passed").wait(ms(3)));
     let report = run(&machine, &[dag]);
@@ -156,7 +157,9 @@ fn a_wait_that_is_kept_for_a_later_job_is_a_fault_there() {
             .await;
         }
     };
-    dag.jobs(2).async_source(keep).register(named("keep").wait(ms(1)));
+    dag.jobs(2)
+        .async_source(keep)
+        .register(named("keep").wait(ms(1)));
     let report = run(&machine, &[dag]);
     assert_eq!(report.dag("keeps").statistics().completed, 1);
     assert_eq!(report.panics[0].message, WaitFault::Outside.to_string());
@@ -186,7 +189,10 @@ fn a_question_releases_the_dag_that_serves_it_and_that_time_counts() {
         ask.register(named("ask").wait(ms(4)));
         serves.name("serves").relative_deadline(ms(10));
         assert!(device.served_by(&serves.sporadic(ms(10))));
-        assert!(!device.served_by(&serves.sporadic(ms(10))), "one alone counts");
+        assert!(
+            !device.served_by(&serves.sporadic(ms(10))),
+            "one alone counts"
+        );
         let mut is_first = delayed;
         let serve = move || {
             work(if std::mem::take(&mut is_first) { 5 } else { 3 });
@@ -201,7 +207,11 @@ fn a_question_releases_the_dag_that_serves_it_and_that_time_counts() {
         }
         let report = run(&machine, &[asks, serves]);
         assert_eq!(kept.all(), expected);
-        let released: Vec<u64> = report.dag("serves").jobs().map(|job| job.release_ns).collect();
+        let released: Vec<u64> = report
+            .dag("serves")
+            .jobs()
+            .map(|job| job.release_ns)
+            .collect();
         // Not before the wait has begun (R3).
         assert_eq!(released, [2_000_000, 22_000_000]);
         assert_eq!(report.dag("asks").statistics().misses, 0);

@@ -22,6 +22,8 @@ pub struct Kernel {
     coincidence_ns: AtomicU64,
     /// Whether a commit is the kernel's own, to measure overheads with.
     calibrates: AtomicBool,
+    /// Whether the time that functions are told is recorded or replayed.
+    tells: AtomicBool,
 }
 
 /// The platform that apps on this machine are built for.
@@ -29,6 +31,7 @@ pub static KERNEL: Kernel = Kernel {
     terms: SpinLock::new(RunConfig::of_cores(1)),
     coincidence_ns: AtomicU64::new(0),
     calibrates: AtomicBool::new(false),
+    tells: AtomicBool::new(false),
 };
 
 impl Kernel {
@@ -48,6 +51,8 @@ impl Kernel {
         self.coincidence_ns.store(coincidence_ns, Ordering::Relaxed);
     }
 }
+
+static CLOCK: Clock = clock::now_ns;
 
 /// Tells functions the time where that is recorded or replayed.
 static TOLD: Clock = || {
@@ -75,6 +80,17 @@ impl Platform for Kernel {
 
     fn now_ns(&self) -> u64 {
         clock::now_ns()
+    }
+
+    fn clock(&self) -> &'static Clock {
+        match self.tells.load(Ordering::Relaxed) {
+            true => &TOLD,
+            false => &CLOCK,
+        }
+    }
+
+    fn may_call_app(&self) -> bool {
+        interrupt_flag::are_enabled()
     }
 
     fn execute_for(&self, duration: Duration, how: Occupation) {
@@ -125,9 +141,7 @@ impl Platform for Kernel {
                 }
                 Ok(launched)
             });
-            if launched? {
-                fass::platform::set_clock(&TOLD);
-            }
+            self.tells.fetch_or(launched?, Ordering::Relaxed);
             stacks::watch(&mut plan);
         }
         execution::prepare(plan, &terms, coincidence_ns)

@@ -12,8 +12,8 @@ use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
 use fass::commit::CoreDivision;
-use fass::edge::Edge;
-use fass::platform::{RunConfig, with_edge};
+use fass::edge;
+use fass::platform::{RunConfig, call_app};
 use fass::shared::{Signal, Tunable, Wire};
 use fass::{Dag, Policy, Preemption};
 use sched_dag::engine::Run;
@@ -124,14 +124,14 @@ impl<S: System> Machine<S> {
             input: RefCell::new(None),
             verdict,
         };
-        let result = app(&machine);
+        let result = call_app(|| app(&machine));
         if result.is_ok() && machine.module.get().is_some() && !machine.has_asked.get() {
             crate::println!(
                 "warning: the app takes no file, and has not looked at the one it was given"
             );
         }
         let complaint = machine.verdict.complaint();
-        match with_edge(|edge| edge.objections()).unwrap_or_default() {
+        match edge::objections() {
             [Some(refusal), _] => Err(UsageError::new(refusal).into()),
             [None, other] => AppError::or_complaint(result, complaint.or(other)),
         }
@@ -363,7 +363,7 @@ impl<S: System> Machine<S> {
     /// ```
     pub fn show_topics(&self) {
         if self.has_console() {
-            with_edge(Edge::let_look);
+            edge::let_look();
             // Once is enough.
             TOPICS.set(Box::leak(Box::new(TopicCommands::<S::Run>::new())));
         }

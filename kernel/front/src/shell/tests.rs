@@ -2,7 +2,10 @@
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::time::Duration;
 
+use fass::Occupation;
+use fass::platform::{LaunchError, Plan, Platform, RunConfig};
 use sched_dag::{CommitOptions, DagSpec, Policy, SubtaskSpec, TopicPort, verify};
 
 use super::topics::TopicCommands;
@@ -70,11 +73,28 @@ impl LiveRun for NoRun {
     }
 }
 
+/// A platform that is not to be asked for the time.
+struct Untold;
+
+impl Platform for Untold {
+    fn terms(&self) -> RunConfig {
+        RunConfig::of_cores(1)
+    }
+
+    fn now_ns(&self) -> u64 {
+        panic!("it is told to the function that is interrupted")
+    }
+
+    fn execute_for(&self, _: Duration, _: Occupation) {}
+
+    fn launch(&self, _: Plan) -> Result<(), LaunchError> {
+        Ok(())
+    }
+}
+
 #[test]
 fn what_is_typed_is_asked_of_the_run_and_no_function_is_told_the_time_for_it() {
-    static TOLD: fass::platform::Clock =
-        || panic!("it is told to the function that is interrupted");
-    fass::platform::set_clock(&TOLD);
+    fass::platform::install(&Untold).expect("it is the only one");
     TOPICS.set(Box::leak(Box::new(TopicCommands::<NoRun>::new())));
     let typed =
         b"pause lidar\nresume 0\npause radar\necho points\necho off\nhz points\n\x03shutdown\n";
