@@ -6,6 +6,8 @@
 //! the healthy DAG met their deadlines before, while and after that happened, and what
 //! it cost the doomed DAG, under each [`Policy`].
 //!
+//! The crime may be a [driver's](served), whose DAG the questions of a third one release.
+//!
 //! A [`restless`] DAG commits one crime after the other, thousands of them, and goes on.
 
 #![cfg_attr(not(test), no_std)]
@@ -19,6 +21,7 @@ use alloc::format;
 use alloc::vec;
 use core::time::Duration;
 
+use fass::shared::{Asker, TimedOut, create_device};
 use fass::{Dag, FaultLimit, Occupation, SubtaskAttributes, create_dag};
 
 use crimes::{Crime, RECURRING, Unpunished};
@@ -123,6 +126,48 @@ pub fn doomed_at_leisure(crime: Crime) -> Dag {
     pipeline("doomed", 1, Some(crime), None, Policy::End)
 }
 
+/// Builds a DAG that asks a device once a job, and the doomed one, which the questions release and
+/// which answers, until it commits `crime` in its job [`FATAL_JOB`]. The first one holds the answers
+/// against that, and would fail itself.
+#[must_use]
+pub fn served(crime: Crime) -> [Dag; 2] {
+    let (device, mut driver) = create_device::<u64, u64>("served");
+    let (asks, serves) = (create_dag(), create_dag());
+    let attributes = |part: &str| SubtaskAttributes::named(part).priority(1);
+    let mut jobs = 0_u64..;
+    let ask = move |device: Asker<u64, u64>| {
+        let job = jobs.next().unwrap_or_default();
+        async move {
+            let expected = if job < FATAL_JOB {
+                Ok(job)
+            } else {
+                Err(TimedOut)
+            };
+            assert_eq!(device.ask(job).await, expected);
+        }
+    };
+    asks.name("asks").jobs(JOBS).period(PERIOD);
+    let ask = asks
+        .relative_deadline(PERIOD)
+        .using(device.asking())
+        .async_source(ask);
+    ask.register(attributes("ask").wait(2 * EXECUTION));
+    serves.name("doomed").relative_deadline(PERIOD);
+    device.served_by(&serves.sporadic(PERIOD / 2));
+    let serve = move || {
+        fass::execute_for(EXECUTION, Occupation::Hold);
+        if let Some((ticket, job)) = driver.question() {
+            if job == FATAL_JOB {
+                let Unpunished = crime();
+            }
+            let _ = driver.answer(ticket, job);
+        }
+    };
+    let process = attributes("process").wcet(EXECUTION).budget(BUDGET);
+    serves.source(serve).register(process);
+    [asks, serves]
+}
+
 /// Builds source -> middle -> sink; the middle has a WCET if it has a budget.
 fn pipeline(
     name: &str,
@@ -190,6 +235,18 @@ fn pipeline(
 mod tests {
     use super::*;
     use virtual_time::VirtualTime;
+
+    #[test]
+    fn a_driver_answers_until_its_crime() {
+        let machine = VirtualTime::new().cores(1).contain_panics();
+        let [asks, serves] = served(|| panic!("in a driver"));
+        fass::finish_create_dags(&[healthy(), asks, serves]).unwrap();
+        let report = machine.run();
+        let faults = ["healthy", "asks", "doomed"].map(|dag| report.dag(dag).statistics().faults);
+        assert_eq!(faults, [0, 0, 1]);
+        assert_eq!(report.dag("doomed").statistics().completed, FATAL_JOB);
+        assert!(report.dags().all(|dag| dag.statistics().misses == 0));
+    }
 
     #[test]
     fn both_meet_every_deadline_without_a_crime() {

@@ -1,5 +1,5 @@
-//! Boots into one fault after the other and shows which DAGs survive; with `faults=N` into N of one
-//! DAG, and shows what memory they cost.
+//! Boots into one fault after the other and shows which DAGs survive; with `by=driver` each is that of
+//! a device's driver; with `faults=N` into N of one DAG, and shows what memory they cost.
 
 #![no_std]
 #![no_main]
@@ -7,11 +7,13 @@
 extern crate alloc;
 
 use alloc::format;
+use alloc::vec;
 
 use fass::finish_create_dags;
 use faults::crimes::{CRIMES, Crime};
-use faults::{FATAL_JOB, JOBS, PERIOD, POLICIES, Policy, doomed, healthy, restless};
+use faults::{FATAL_JOB, JOBS, PERIOD, POLICIES, Policy, doomed, healthy, restless, served};
 use kernel::{AppError, Machine, Run, json, println};
+use sched_dag::DagStatistics;
 
 kernel::entry!(main);
 
@@ -23,8 +25,9 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let only = options.text("fault");
     let times = options.number("faults", 0..=1_000_000, 0)?;
+    let by_driver = options.choice("by", &[("subtask", false), ("driver", true)])?;
     machine.offer_clusters()?;
-    options.finish(&["fault", "faults", "clusters"])?;
+    options.finish(&["fault", "faults", "by", "clusters"])?;
     if let Ok(times @ 1..) = u32::try_from(times) {
         return endure(machine, times);
     }
@@ -43,11 +46,13 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     println!("the doomed one is at fault in its job {FATAL_JOB}.");
     machine.accept_faults(); // here they are what is wanted
     let mut counts = [0; 3];
-    for (on_fault, policy) in POLICIES {
+    // A driver's DAG is not made anew: its questions would go on to nobody.
+    let policies = if by_driver { &POLICIES[..1] } else { &POLICIES };
+    for &(on_fault, policy) in policies {
         println!("The doomed DAG's policy: {on_fault}");
         for (name, crime) in CRIMES {
             if only.is_none_or(|only| only == name) {
-                let verdict = commit_crime(machine, (name, crime), (on_fault, policy))?;
+                let verdict = commit_crime(machine, (name, crime), (on_fault, policy), by_driver)?;
                 counts[verdict as usize] += 1;
             }
         }
@@ -118,8 +123,13 @@ fn commit_crime(
     machine: &Machine,
     (name, crime): (&str, Crime),
     (on_fault, policy): (&str, Policy),
+    by_driver: bool,
 ) -> Result<Verdict, AppError> {
-    let dags = [healthy(), doomed(crime, policy)];
+    let mut dags = vec![healthy()];
+    match by_driver {
+        true => dags.extend(served(crime)),
+        false => dags.push(doomed(crime, policy)),
+    }
     machine.spread(&dags);
     finish_create_dags(&dags)?;
     let run = machine.run()?;
@@ -138,7 +148,9 @@ fn commit_crime(
         Policy::End => (FATAL_JOB, 0),
         Policy::Restart | Policy::FallBack => (JOBS - 1, 1),
     };
-    let verdict = if healthy_jobs < JOBS || (doomed_jobs, lost_jobs) != expected {
+    let in_time = |asks: DagStatistics| (asks.completed, asks.misses) == (JOBS, 0);
+    let asks_fail = by_driver && !in_time(*run.statistics("asks"));
+    let verdict = if asks_fail || healthy_jobs < JOBS || (doomed_jobs, lost_jobs) != expected {
         Verdict::Harmful
     } else if [before, during, after] == totals {
         Verdict::Contained

@@ -164,16 +164,15 @@ pub fn finish_create_dags_with(
         &answers,
         Arc::clone(&staleness),
     );
-    match platform.launch(plan) {
-        Ok(()) => {
-            platform::clock::set_clock(platform.clock());
-            Ok(Commit {
-                warnings,
-                answers,
-                staleness,
-                task_set,
-            })
-        }
+    let launched = platform.launch(plan);
+    platform::clock::set_clock(platform.clock());
+    match launched {
+        Ok(()) => Ok(Commit {
+            warnings,
+            answers,
+            staleness,
+            task_set,
+        }),
         Err(error) => Err(CommitError::of(Fault::NotLaunched(error), warnings)),
     }
 }

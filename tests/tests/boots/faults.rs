@@ -31,6 +31,27 @@ fn a_thousand_faults_cost_no_more_than_a_hundred() {
     }
 }
 
+/// Each crime is that of a device's driver, whose DAG the questions of another one release.
+#[test]
+fn the_faults_of_a_driver_end_its_dag_alone() {
+    for (cores, words) in [(1, ""), (2, ""), (4, ""), (2, " clusters=1,1")] {
+        let words = format!("by=driver{words}");
+        let outcome = Guest::new("faults").cores(cores).word(&words).succeed();
+        let (verdicts, faults) = (outcome.lines("containment"), outcome.lines("fault"));
+        assert_eq!(
+            [verdicts.len(), faults.len()],
+            [18; 2],
+            "{}",
+            outcome.tail()
+        );
+        for (verdict, fault) in verdicts.iter().zip(&faults) {
+            verdict.reads([("verdict", "contained")]);
+            fault.reads([("dag_name", "doomed"), ("subtask_name", "process")]);
+            fault.has([("job", 10)]);
+        }
+    }
+}
+
 #[test]
 fn what_faults_have_left_on_the_heap_is_named() {
     let outcome = Guest::test("left").succeed();

@@ -87,8 +87,8 @@ fn run_all() {
             let in_a_future = waits.async_source(in_a_future);
             in_a_future.register(SubtaskAttributes::named("fails").wait(ms(1)));
             let healthy = chain("healthy", 3, 20, ms(1), 20);
-            finish_create_dags(&[plain, waits, healthy]).unwrap();
-            let run = alone.machine.run().unwrap();
+            finish_create_dags(&[plain, waits, healthy]).expect("they are right");
+            let run = alone.machine.run().expect("it is committed");
             assert_eq!(breaches(&run), []);
             let faults = run.faults().iter();
             let mut faults: Vec<_> = faults
