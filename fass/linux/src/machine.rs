@@ -26,7 +26,7 @@ use crate::panics;
 use crate::platform::HOST;
 use crate::platform::{self, Run, Threads};
 use crate::sys;
-use crate::team::with_own_worker;
+use crate::team::{self, with_own_worker};
 use crate::worker::Worker;
 
 /// How the scheduler's decisions are carried out.
@@ -183,7 +183,7 @@ impl Linux {
             IS_OURS.get_or_init(|| fass::platform::install(&HOST).is_ok()),
             "another platform is installed; `Linux` must be the program's only one"
         );
-        panics::contain();
+        panics::contain(team::strand);
         let cores = u32::try_from(processors.len()).unwrap_or(u32::MAX);
         let mut threads = HOST.threads();
         assert!(

@@ -14,16 +14,15 @@ use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 use std::thread;
 
-use crate::team;
-
 /// The messages of panics that the standard library lets nothing survive.
 const LAST: [&str; 2] = [
     "panic in a destructor during cleanup",
     "panic in a function that cannot unwind",
 ];
 
-/// Adds what keeps such a panic to its DAG to the hook that is there, once.
-pub(crate) fn contain() {
+/// Adds what keeps such a panic to its DAG to the hook that is there, once. `strand` gives the calling
+/// thread's instance up, if it has one, and reports that.
+pub(crate) fn contain(strand: fn(&str) -> bool) {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         // It has told of the panics before the last one, and may take that for the program's end.
@@ -31,7 +30,7 @@ pub(crate) fn contain() {
         panic::set_hook(Box::new(move |info| {
             let text = info.payload().downcast_ref::<&str>();
             if let Some(text) = text.filter(|text| LAST.contains(text))
-                && team::strand(text)
+                && strand(text)
             {
                 loop {
                     thread::park();

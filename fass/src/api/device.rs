@@ -34,7 +34,6 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use core::fmt;
 use core::pin::Pin;
-use core::ptr;
 use core::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering, fence};
 use core::task::{Context, Poll};
 use core::time::Duration;
@@ -341,8 +340,7 @@ struct QuestionPost<Q, A> {
 impl<Q: Send + Sync, A: Send + Sync> Effect for QuestionPost<Q, A> {
     fn happen(&mut self, _: u64, _: &mut dyn FnMut(Request)) {}
 
-    fn bind(&mut self, turn: &TurnState) {
-        let turn = ptr::from_ref(turn).addr();
+    fn bind(&mut self, turn: usize) {
         self.cell.turn.store(turn, Ordering::Relaxed);
     }
 
@@ -587,7 +585,7 @@ impl<Q, A> Future for PendingAnswer<'_, Q, A> {
         let this = self.get_mut();
         // A question of another subtask, which was passed the handle, would go out with a wait of
         // this one's.
-        let turn = turn_of(context.waker()).map_or(0, |turn| ptr::from_ref(turn).addr());
+        let turn = turn_of(context.waker()).map_or(0, TurnState::address);
         if turn != this.cell.turn.load(Ordering::Relaxed) {
             WaitFault::Outside.raise()
         }

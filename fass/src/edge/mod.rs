@@ -30,7 +30,6 @@ use recording::{DagHeader, Header, Schema, Stream};
 use sched_dag::journal::EventKind;
 use sched_dag::{DagId, DriverNotice, Instance, TaskSet};
 
-use crate::platform::with_edge;
 use crate::run::plan::Plan;
 
 pub use excerpt::Excerpt;
@@ -294,41 +293,6 @@ pub const fn recorded(what: EventKind) -> Option<recording::EntryKind> {
         // All else follows from these when the functions are called again.
         _ => None,
     }
-}
-
-/// Lets people look at what crosses, from the next commit on. Nothing, where no platform has an edge.
-///
-/// ```
-/// fass::edge::let_look(); // there is no platform
-/// assert!(!fass::edge::watch(Some("pose")) && fass::edge::take_seen(&mut []).is_none());
-/// assert_eq!(fass::edge::objections(), [None, None]);
-/// ```
-pub fn let_look() {
-    with_edge(Edge::let_look);
-}
-
-/// Keeps the latest value of a recorded topic from now on, or nothing. Reports whether there is such
-/// a topic.
-///
-/// See [`let_look`].
-pub fn watch(topic: Option<&str>) -> bool {
-    with_edge(|edge| edge.watch(topic)).unwrap_or(false)
-}
-
-/// Takes that value out, if there is a new one.
-///
-/// See [`let_look`].
-pub fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
-    with_edge(|edge| edge.take_seen(into)).flatten()
-}
-
-/// Returns why a recording, or a replay, could not be what was wished, and how a replay differs from
-/// its recording, if that is so.
-///
-/// See [`let_look`].
-#[must_use]
-pub fn objections() -> [Option<String>; 2] {
-    with_edge(|edge| edge.objections()).unwrap_or_default()
 }
 
 /// The sender of a recording, if there is one.

@@ -73,7 +73,8 @@ use sched_dag::lifecycle::WaitId;
 use sched_dag::{DagId, TaskSet};
 
 use crate::Occupation;
-use crate::edge::{Begin, Edge};
+use crate::edge::{Begin, Edge, WatchedValue};
+use crate::run::gate::guard;
 use crate::run::line::RecordedValue;
 use crate::run::log::{Field, Level, LogLine};
 
@@ -82,6 +83,7 @@ pub use run_config::RunConfig;
 pub use sched_dag::lifecycle::Request;
 
 pub use crate::run::cell::SetOnce;
+pub use crate::run::gate::call_app;
 pub use crate::run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
 
 /// A machine that schedules committed DAGs.
@@ -321,32 +323,51 @@ impl core::error::Error for AlreadyInstalled {}
 pub fn install(platform: &'static dyn Platform) -> Result<(), AlreadyInstalled> {
     if PLATFORM.set(platform) {
         clock::set_clock(platform.clock());
+        guard(|| expect_installed().may_call_app());
         Ok(())
     } else {
         Err(AlreadyInstalled)
     }
 }
 
-/// Calls code of the app's: the gate through which all of it is called, `docs/architecture.md` lists
-/// what that is. It is in an instance, or in the app's main function. A debug build panics if it is
-/// under a lock of the platform's, or with interrupts disabled.
+/// Lets people look at what crosses, from the next commit on. Nothing, where no platform has an edge.
 ///
 /// ```
-/// assert_eq!(fass::platform::call_app(|| 7), 7);
+/// fass::platform::let_look(); // there is no platform
+/// assert!(!fass::platform::watch(Some("pose")) && fass::platform::take_seen(&mut []).is_none());
+/// assert_eq!(fass::platform::objections(), [None, None]);
 /// ```
-#[inline(always)]
-pub fn call_app<T>(call: impl FnOnce() -> T) -> T {
-    debug_assert!(
-        installed().is_none_or(|platform| platform.may_call_app()),
-        "the app's code is called under a lock, or with interrupts disabled; call it in an instance, \
-         or in the app's main function"
-    );
-    call()
+pub fn let_look() {
+    with_edge(Edge::let_look);
+}
+
+/// Keeps the latest value of a recorded topic from now on, or nothing. Reports whether there is such
+/// a topic.
+///
+/// See [`let_look`].
+pub fn watch(topic: Option<&str>) -> bool {
+    with_edge(|edge| edge.watch(topic)).unwrap_or(false)
+}
+
+/// Takes that value out, if there is a new one.
+///
+/// See [`let_look`].
+pub fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
+    with_edge(|edge| edge.take_seen(into)).flatten()
+}
+
+/// Returns why a recording, or a replay, could not be what was wished, and how a replay differs from
+/// its recording, if that is so.
+///
+/// See [`let_look`].
+#[must_use]
+pub fn objections() -> [Option<String>; 2] {
+    with_edge(|edge| edge.objections()).unwrap_or_default()
 }
 
 /// Does `work` with what the installed platform keeps at its edge, if it does: under a lock, so it is
 /// none of the app's.
-pub(crate) fn with_edge<T>(work: impl FnOnce(&mut Edge) -> T) -> Option<T> {
+fn with_edge<T>(work: impl FnOnce(&mut Edge) -> T) -> Option<T> {
     ask_edge(installed()?, work)
 }
 

@@ -15,8 +15,6 @@ use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 use sched_dag::lifecycle::{ModeEntry, Request};
 use sched_dag::{DagId, ModeId};
 
-use super::turn::TurnState;
-
 /// An effect without its signals.
 pub(crate) struct MutedEffect(pub(crate) Box<dyn Effect>);
 
@@ -49,8 +47,8 @@ pub(crate) trait Effect: Send {
         false
     }
 
-    /// Takes note of the turns of its subtask, if that may wait.
-    fn bind(&mut self, _turn: &TurnState) {}
+    /// Takes note of the turns of its subtask, by their address, if that may wait.
+    fn bind(&mut self, _turn: usize) {}
 
     /// Returns the word that the latest wait has changed, if a thread of the platform may sleep on
     /// it: once.

@@ -12,6 +12,7 @@ pub(crate) mod answers;
 )]
 pub(crate) mod cell;
 pub(crate) mod effect;
+pub(crate) mod gate;
 pub(crate) mod latest;
 pub(crate) mod line;
 pub mod log;

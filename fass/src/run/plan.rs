@@ -14,10 +14,10 @@ use sched_dag::lifecycle::{Lifecycle, Request};
 use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, WAITS, engine};
 
 use super::effect::{Effect, MutedEffect};
+use super::gate::call_app;
 use super::latest::Staleness;
 use super::line::LineOf;
 use super::turn::{TurnEffects, TurnState};
-use crate::platform::call_app;
 
 /// A committed set of DAGs, ready to be scheduled.
 ///

@@ -137,6 +137,11 @@ impl TurnState {
         }
     }
 
+    /// Returns what tells it from those of other subtasks.
+    pub(crate) fn address(&self) -> usize {
+        core::ptr::from_ref(self).addr()
+    }
+
     /// Reports whether the instance of a job has started and not returned.
     pub(crate) fn is_of(&self, job: u64) -> bool {
         self.job.load(Ordering::Relaxed) == job
@@ -267,7 +272,8 @@ pub(crate) struct TurnEffects {
 
 impl TurnEffects {
     pub(crate) fn new(turn: Arc<TurnState>, mut real: Vec<Box<dyn Effect>>) -> Self {
-        real.iter_mut().for_each(|effect| effect.bind(&turn));
+        real.iter_mut()
+            .for_each(|effect| effect.bind(turn.address()));
         Self { turn, real }
     }
 }

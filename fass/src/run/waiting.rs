@@ -8,7 +8,6 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::pin::{Pin, pin};
-use core::ptr;
 use core::task::{Context, Poll, Waker};
 use core::time::Duration;
 
@@ -57,7 +56,7 @@ impl WaitStep {
         let Some(turn) = turn_of(context.waker()) else {
             WaitFault::Outside.raise()
         };
-        let address = ptr::from_ref(turn).addr();
+        let address = turn.address();
         let Some((begun_in, job, count)) = self.begun else {
             // The first poll is in the turn that ends with this wait.
             turn.begin(self.end);

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::thread;
 
 use crate::support::{alone, alone_on, breaches, chain, mechanisms, ms};
-use fass::edge;
+use fass::platform;
 use fass::shared::Parameter;
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use linux::{Control, Linux, Mechanism};
@@ -168,7 +168,7 @@ fn after_a_run_there_can_be_another() {
 fn a_topic_is_seen_and_what_is_set_is_for_the_jobs_to_come() {
     for mechanism in mechanisms() {
         let alone = alone(1, mechanism);
-        edge::let_look();
+        platform::let_look();
         let gain = Parameter::new("gain", 10, 1..=1000_u64);
         let dag = create_dag();
         dag.name("scaling").record::<u64>("scaled");
@@ -192,12 +192,12 @@ fn a_topic_is_seen_and_what_is_set_is_for_the_jobs_to_come() {
                     None => thread::sleep(ms(1)),
                 }
             };
-            let is_seen = |topic| edge::watch(Some(topic));
+            let is_seen = |topic| platform::watch(Some(topic));
             assert_eq!(["gian", "scaled"].map(is_seen), [false, true]);
             let wait_for = |gain: u64| {
                 let mut buffer = [0; 64];
                 loop {
-                    match edge::take_seen(&mut buffer) {
+                    match platform::take_seen(&mut buffer) {
                         Some(seen) => {
                             let expected = (gain * (seen.job + 1)).to_string();
                             if seen.shown(&buffer).to_string() == expected {

@@ -82,7 +82,7 @@ fn part() {
     machine.run().expect("it is committed");
     let (outcome, _) = machine.end_recording(true);
     linux::Linux::end_record().expect("it is written");
-    let objections = fass::edge::objections();
+    let objections = fass::platform::objections();
     assert_eq!(objections, [None, None]);
     let compared = outcome.map(|outcome| (outcome.compared, outcome.divergence));
     assert_eq!(compared, replays.then_some((20, None)));

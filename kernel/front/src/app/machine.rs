@@ -12,8 +12,7 @@ use core::cell::{Cell, RefCell};
 use core::time::Duration;
 
 use fass::commit::CoreDivision;
-use fass::edge;
-use fass::platform::{RunConfig, call_app};
+use fass::platform::{self, RunConfig, call_app};
 use fass::shared::{Signal, Tunable, Wire};
 use fass::{Dag, Policy, Preemption};
 use sched_dag::engine::Run;
@@ -131,7 +130,7 @@ impl<S: System> Machine<S> {
             );
         }
         let complaint = machine.verdict.complaint();
-        match edge::objections() {
+        match platform::objections() {
             [Some(refusal), _] => Err(UsageError::new(refusal).into()),
             [None, other] => AppError::or_complaint(result, complaint.or(other)),
         }
@@ -363,7 +362,7 @@ impl<S: System> Machine<S> {
     /// ```
     pub fn show_topics(&self) {
         if self.has_console() {
-            edge::let_look();
+            platform::let_look();
             // Once is enough.
             TOPICS.set(Box::leak(Box::new(TopicCommands::<S::Run>::new())));
         }

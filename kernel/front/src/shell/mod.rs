@@ -18,8 +18,8 @@ use core::fmt::{self, Display};
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use fass::edge::{self, WatchedValue};
-use fass::platform::SetOnce;
+use fass::edge::WatchedValue;
+use fass::platform::{self, SetOnce};
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, DagSnapshot, Scheduler, TaskSet};
@@ -79,12 +79,12 @@ pub trait LiveRun {
 
     /// Has the values of a topic kept to be seen, or none; reports whether it is recorded.
     fn watch(topic: Option<&str>) -> bool {
-        edge::watch(topic)
+        platform::watch(topic)
     }
 
     /// Takes the latest value that is to be seen, if there is a new one.
     fn take_seen(into: &mut [u8]) -> Option<WatchedValue> {
-        edge::take_seen(into)
+        platform::take_seen(into)
     }
 }
 
