@@ -151,7 +151,7 @@ pub fn served(crime: Crime) -> [Dag; 2] {
         .relative_deadline(PERIOD)
         .using(device.asking())
         .async_source(ask);
-    ask.register(attributes("ask").wait(2 * EXECUTION));
+    ask.register(attributes("ask").wait(3 * EXECUTION));
     serves.name("doomed").relative_deadline(PERIOD);
     device.served_by(&serves.sporadic(PERIOD / 2));
     let serve = move || {

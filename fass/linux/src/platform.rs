@@ -132,6 +132,7 @@ impl Platform for Host {
             return Err(LaunchError::new(line));
         }
         edge::launch(&mut plan)?;
+        plan.restore().map_err(LaunchError::new)?;
         edge::commit(&plan, &threads.terms);
         let divided = lifecycle::divide(&plan.task_set, plan.lifecycle.as_deref());
         let (letters, parts) = divided.map_err(LaunchError::new)?;

@@ -694,7 +694,14 @@ impl Team {
 
 #[cfg(test)]
 mod tests {
-    use super::pause_ns;
+    use super::{RELEASES, may_call_app, pause_ns};
+
+    #[test]
+    fn the_thread_that_decides_calls_nothing_of_the_apps() {
+        assert!(may_call_app());
+        RELEASES.set(true);
+        assert!(!may_call_app());
+    }
 
     #[test]
     fn an_instance_at_the_end_of_its_budget_gets_time_to_exceed_it() {

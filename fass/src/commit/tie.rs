@@ -129,6 +129,7 @@ pub(crate) fn tie(
         lifecycle,
         staleness,
         lines,
+        begins: Vec::new(),
     }
 }
 

@@ -239,6 +239,12 @@ impl LineOf {
     }
 }
 
+impl fmt::Debug for KeptState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("KeptState")
+    }
+}
+
 impl fmt::Debug for LineOf {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("LineOf")

@@ -4,6 +4,7 @@
 //! it then calls [`SubtaskCode::run`] there. A body never decides anything.
 
 use alloc::boxed::Box;
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::sync::atomic::AtomicU32;
@@ -16,7 +17,7 @@ use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, WAITS, engine};
 use super::effect::{Effect, MutedEffect};
 use super::gate::call_app;
 use super::latest::Staleness;
-use super::line::LineOf;
+use super::line::{KeptState, LineOf};
 use super::turn::{TurnEffects, TurnState};
 
 /// A committed set of DAGs, ready to be scheduled.
@@ -59,9 +60,26 @@ pub struct Plan {
     pub staleness: Arc<Vec<Staleness>>,
     /// The ways of recorded values, by channel.
     pub(crate) lines: Vec<LineOf>,
+    /// The states that a replay begins with, and what to say of one that cannot be that.
+    pub(crate) begins: Vec<(Arc<KeptState>, Vec<u8>, String)>,
 }
 
 impl Plan {
+    /// Gives the states what a replay begins with. A platform that replays calls it in its launch,
+    /// where it holds no lock: reading a value, and dropping the one before it, is the app's code.
+    ///
+    /// # Errors
+    ///
+    /// In words: a state cannot be what is recorded.
+    pub fn restore(&mut self) -> Result<(), String> {
+        for (kept, value, complaint) in self.begins.drain(..) {
+            if !call_app(|| kept.state.restore(&value)) {
+                return Err(complaint);
+            }
+        }
+        Ok(())
+    }
+
     /// Has recorded states written down twice in so many jobs at least, for a platform that keeps
     /// no more than what enters these.
     ///

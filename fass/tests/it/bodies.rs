@@ -12,10 +12,23 @@ use std::sync::atomic::{AtomicI64, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use crate::support::{PERIOD, Shared, commit, inside, named, panic_message, run_job};
+use crate::support::{PERIOD, Shared, commit, inside, named, panic_message, run_job, under_a_lock};
 use common::random::Random;
 use fass::platform::{Plan, SubtaskCode};
 use fass::{Dag, Unique, create_dag};
+
+#[cfg(debug_assertions)]
+#[test]
+fn a_debug_build_calls_nothing_of_the_apps_under_a_lock() {
+    let dag = create_dag();
+    let plain = named("plain");
+    dag.register_periodic_subtask(|| panic!("it is called"), [], PERIOD, plain);
+    dag.relative_deadline(PERIOD);
+    let [body] = Shared::all(commit(&[dag]));
+    let told = panic_message(|| under_a_lock(|| body.run(0)));
+    let begins = "the app's code is called under a lock, or with interrupts disabled";
+    assert!(told.starts_with(begins), "{told}");
+}
 
 #[test]
 fn a_platform_that_keeps_no_order_is_told() {

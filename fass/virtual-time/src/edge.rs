@@ -174,7 +174,7 @@ impl Edge {
         edge::name(&mut header, "virtual time", &plan.task_set);
         if let Some(replay) = self.replay.borrow_mut().as_mut() {
             replay.fit(&header, &plan.task_set)?;
-            replay.prepare(plan)?;
+            replay.prepare(plan);
         }
         if let Some(jobs) = most_jobs {
             plan.keep_states_of(jobs);

@@ -281,7 +281,9 @@ impl Platform for HostPlatform {
             )));
         }
         let launched = machine.edge.launch(&mut plan, settings.most_jobs);
-        launched.map_err(LaunchError::new)?;
+        launched
+            .and_then(|()| plan.restore())
+            .map_err(LaunchError::new)?;
         machine.edge.commit(&plan, &settings.terms);
         machine.plan.set(Some(plan.number));
         let session = Session::new(plan, settings.terms.scheduler, &machine);

@@ -378,14 +378,10 @@ impl Replay {
         }
     }
 
-    /// Makes what is replayed release the jobs that are recorded, and lose none on the way, with
-    /// the states that it begins with.
-    ///
-    /// # Errors
-    ///
-    /// In words: a state cannot be what is recorded.
-    pub fn prepare(&self, plan: &mut Plan) -> Result<(), String> {
-        self.restore(plan)?;
+    /// Makes what is replayed release the jobs that are recorded, and lose none on the way. The plan
+    /// has the states that it begins with ([`Plan::restore`]).
+    pub fn prepare(&self, plan: &mut Plan) {
+        self.restore(plan);
         let task_set = Arc::make_mut(&mut plan.task_set);
         for dag in (0..).map(DagId).take(task_set.dags().len()) {
             // No other signals come: without a last job, it would end no run, or keep none going.
@@ -406,7 +402,6 @@ impl Replay {
                 }
             }
         }
-        Ok(())
     }
 
     /// Returns the job behind a DAG's last one, if its inputs are recorded.
@@ -422,25 +417,24 @@ impl Replay {
         guard(plan, &self.passed);
     }
 
-    /// Gives the states what they were when the replay begins, and has them looked at in each job:
-    /// they are compared wherever they are recorded.
-    fn restore(&self, plan: &Plan) -> Result<(), String> {
+    /// Notes what the states were when the replay begins, and has them looked at in each job: they
+    /// are compared wherever they are recorded.
+    fn restore(&self, plan: &mut Plan) {
         for (channel, of) in (0..).zip(&plan.lines) {
             let begin = self.begins[of.dag.index()];
             let state = of.state.as_ref();
             let state = state.inspect(|state| state.keep_every(1));
             if let Some(kept) = state.filter(|_| begin > 0)
                 && let Some(value) = self.value(channel, begin)
-                && !kept.state.restore(value)
             {
                 let topic = &self.own.channels[usize::from(channel)].topic;
-                return Err(format!(
+                let complaint = format!(
                     "state `{topic}` cannot be what the recording has of job {begin}; record it \
                      again"
-                ));
+                );
+                (plan.begins).push((Arc::clone(kept), value.to_vec(), complaint));
             }
         }
-        Ok(())
     }
 }
 

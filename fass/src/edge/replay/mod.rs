@@ -545,7 +545,7 @@ impl Crossing for OfMachine {
             replay.begin_before(dag, job);
         }
         replay.fit(&self.own, &plan.task_set)?;
-        replay.prepare(plan)?;
+        replay.prepare(plan);
         replay.guard(plan);
         self.lines = mem::take(&mut plan.lines);
         let signals = SignalTimes::take_over(plan, &mut replay);

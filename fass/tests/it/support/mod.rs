@@ -20,6 +20,7 @@ pub(crate) const PERIOD: Duration = Duration::from_millis(10);
 thread_local! {
     static PLAN: RefCell<Option<Plan>> = const { RefCell::new(None) };
     static ANSWER: Cell<Option<WaitId>> = const { Cell::new(None) };
+    static IS_LOCKED: Cell<bool> = const { Cell::new(false) };
     static MEANWHILE: RefCell<Option<Box<dyn FnOnce()>>> = const { RefCell::new(None) };
 }
 
@@ -36,6 +37,9 @@ impl Platform for Keeper {
         0
     }
     fn execute_for(&self, _: Duration, _: Occupation) {}
+    fn may_call_app(&self) -> bool {
+        !IS_LOCKED.get()
+    }
     fn answer(&self, _: u64, wait: WaitId) {
         ANSWER.set(Some(wait));
     }
@@ -54,6 +58,14 @@ impl Platform for Keeper {
 pub(crate) fn install() {
     static IS_OURS: OnceLock<bool> = OnceLock::new();
     assert!(IS_OURS.get_or_init(|| fass::platform::install(&Keeper).is_ok()));
+}
+
+/// Does something as if under a lock of the platform's.
+pub(crate) fn under_a_lock<T>(action: impl FnOnce() -> T) -> T {
+    IS_LOCKED.set(true);
+    let done = action();
+    IS_LOCKED.set(false);
+    done
 }
 
 /// Takes the wait that a device has answered last.

@@ -142,6 +142,7 @@ impl Platform for Kernel {
                 Ok(launched)
             });
             self.tells.fetch_or(launched?, Ordering::Relaxed);
+            plan.restore().map_err(LaunchError::new)?;
             stacks::watch(&mut plan);
         }
         execution::prepare(plan, &terms, coincidence_ns)
