@@ -6,9 +6,9 @@
 
 use std::cell::Cell;
 use std::io::{self, Write};
-use std::panic;
+use std::panic::Location;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Barrier, Mutex, MutexGuard, Once, PoisonError};
+use std::sync::{Arc, Barrier, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -50,18 +50,11 @@ thread_local! {
     static PANICKED: Cell<Option<(Instance, String)>> = const { Cell::new(None) };
 }
 
-/// Has the places of panics in instances noted, besides what is done at panics anyway.
-pub(crate) fn note_places() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let before = panic::take_hook();
-        panic::set_hook(Box::new(move |info| {
-            if let (Some(instance), Some(place)) = (RUNNING.get(), info.location()) {
-                PANICKED.set(Some((instance, place.to_string())));
-            }
-            before(info);
-        }));
-    });
+/// Notes the place of a panic, if this thread runs an instance.
+pub(crate) fn note_place(place: &Location<'_>) {
+    if let Some(instance) = RUNNING.get() {
+        PANICKED.set(Some((instance, place.to_string())));
+    }
 }
 
 /// Takes the place at which an instance of this thread has panicked, if it has.

@@ -14,14 +14,16 @@ use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 use std::thread;
 
+use crate::edge;
+
 /// The messages of panics that the standard library lets nothing survive.
 const LAST: [&str; 2] = [
     "panic in a destructor during cleanup",
     "panic in a function that cannot unwind",
 ];
 
-/// Adds what keeps such a panic to its DAG to the hook that is there, once. `strand` gives the calling
-/// thread's instance up, if it has one, and reports that.
+/// Adds to the hook that is there, once: places are noted, and a panic that cannot unwind is kept to
+/// its DAG. `strand` gives the calling thread's instance up, and reports whether it has one.
 pub(crate) fn contain(strand: fn(&str) -> bool) {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -36,6 +38,7 @@ pub(crate) fn contain(strand: fn(&str) -> bool) {
                     thread::park();
                 }
             }
+            info.location().into_iter().for_each(edge::note_place);
             before(info);
         }));
     });

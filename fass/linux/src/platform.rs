@@ -250,7 +250,6 @@ impl Deref for Run {
 /// Starts the threads of a committed plan, waits for the end of all its jobs, and
 /// returns what happened. Releases count from `epoch_ns`, or from right now.
 pub(crate) fn run(launched: Launched, epoch_ns: Option<u64>) -> Run {
-    edge::note_places();
     let (threads, Control { office, teams }) = (&launched.threads, &launched.control);
     let workers = teams.iter().map(|team| {
         let numbers = 0..team.workers.len();

@@ -694,12 +694,12 @@ impl Team {
 
 #[cfg(test)]
 mod tests {
-    use super::{RELEASES, may_call_app, pause_ns};
+    use super::{IS_OF_RUN, may_call_app, pause_ns};
 
     #[test]
     fn the_thread_that_decides_calls_nothing_of_the_apps() {
         assert!(may_call_app());
-        RELEASES.set(true);
+        IS_OF_RUN.set(true);
         assert!(!may_call_app());
     }
 

@@ -219,34 +219,6 @@ fn a_question_releases_the_dag_that_serves_it_and_that_time_counts() {
 }
 
 #[test]
-fn the_faults_of_a_driver_are_those_of_its_dag() {
-    let machine = VirtualTime::new().contain_panics();
-    let (kept, keep) = Seen::shared();
-    let (device, mut driver) = create_device::<(), u32>("served");
-    let (asks, serves) = (every(20, "asks"), create_dag());
-    let ask = move |device: Asker<(), u32>| {
-        let keep = keep.clone();
-        async move { keep.add(device.ask(()).await) }
-    };
-    let ask = asks.jobs(3).using(device.asking()).async_source(ask);
-    ask.register(named("ask").wait(ms(4)));
-    serves.name("serves").relative_deadline(ms(10));
-    device.served_by(&serves.sporadic(ms(10)));
-    let mut job = 0;
-    let serve = move || {
-        job += 1;
-        assert!(job < 2, "the driver fails");
-        let (ticket, ()) = driver.question().expect("it was released for one");
-        driver.answer(ticket, job).expect("it waits");
-    };
-    serves.source(serve).register(named("serve"));
-    let report = run(&machine, &[asks, serves]);
-    assert_eq!(kept.all(), [Ok(1), Err(TimedOut), Err(TimedOut)]);
-    let dags = ["asks", "serves"].map(|dag| report.dag(dag).statistics().faults);
-    assert_eq!((dags, report.panics.len()), ([0, 1], 1));
-}
-
-#[test]
 fn a_device_that_a_dag_serves_needs_that_dag_in_the_commit() {
     let _machine = VirtualTime::new();
     let (device, _driver) = create_device::<(), u32>("served");
