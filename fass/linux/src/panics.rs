@@ -6,7 +6,7 @@
 //! the instance as one whose budget is exceeded: its DAG is ended, a spare worker has its place, and
 //! its thread, with all that is on its stack, sleeps to the end of the program.
 //!
-//! What is in no instance still ends the program so, and so does all of it in a program that replaces
+//! Such a panic in no instance still ends the program, and so does any in a program that replaces
 //! the hook. From such a fault on nobody can replace it: `set_hook` waits for the thread in the hook.
 
 use std::any::Any;

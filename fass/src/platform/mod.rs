@@ -7,7 +7,7 @@
 //!
 //! # What is kept from apps
 //!
-//! Whatever is called under a lock of the platform's, or in its interrupts, is no app's to give: the
+//! Code that is called under a lock of the platform's, or in its interrupts, is no app's to give: the
 //! clock, work at the edge, what happens when a question is there, the ends of topics, parameters.
 //!
 //! ```compile_fail,E0603
