@@ -88,8 +88,6 @@ pub struct Qemu {
     pub module: Option<PathBuf>,
     /// The file for the bytes that the guest sends to QEMU's debug port; `None`: no such port.
     pub records: Option<PathBuf>,
-    /// Let idle time take its time, also where instructions are counted.
-    pub is_paced: bool,
     /// Forward the bytes written to [`Running`]'s input to the guest's serial port.
     pub has_input: bool,
     /// Have the guest end in order before it is killed, by ctrl-C at its first serial port.
@@ -115,7 +113,6 @@ impl Default for Qemu {
             guest_words: String::new(),
             module: None,
             records: None,
-            is_paced: false,
             has_input: false,
             stops: false,
             second: None,
@@ -129,14 +126,7 @@ impl Qemu {
     /// Returns QEMU's arguments for booting `image` with its serial output
     /// going to `serial`. For a [`Loader`] with a firmware `image` is a whole stick.
     pub fn arguments(&self, image: &Path, serial: &Path) -> Vec<OsString> {
-        let (machine, cores) = (self.machine, self.cores);
-        // A person cannot type into time that is skipped.
-        let idle = if self.is_paced {
-            "sleep=on"
-        } else {
-            "sleep=off"
-        };
-        let mode = self.mode.arguments().replace("sleep=off", idle);
+        let (machine, mode, cores) = (self.machine, self.mode.arguments(), self.cores);
         let mut arguments = words(&format!(
             "-machine {machine} {mode} -smp {cores} -m {}M",
             self.memory_mib

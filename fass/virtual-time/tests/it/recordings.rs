@@ -228,14 +228,17 @@ fn a_fault_that_does_not_come_again_is_told() {
 #[test]
 fn a_job_that_a_survived_fault_has_cost_is_lost_in_the_replay_too() {
     let build = || {
-        let dag = demo("demo", &["in"]);
-        let fails = |(n,): (u64,)| assert!(n != 1, "one");
-        dag.survive_faults(FaultLimit {
+        let dag = every(10, "demo");
+        let make = || |(n,): (u64,)| assert!(n != 1, "one");
+        dag.jobs(3).record::<u64>("in").survive_faults(FaultLimit {
             faults: 1,
             window: 2,
             in_all: 1,
         });
-        dag.register_subtask(fails, vec!["in"], vec![], named("fails"));
+        let source = dag.source(job_numbers(0)).writes(&["in"]);
+        source.register(named("source"));
+        let sink = dag.restarting(make).reads(&["in"]);
+        sink.register(named("fails"));
         [dag]
     };
     let machine = || VirtualTime::new().contain_panics();

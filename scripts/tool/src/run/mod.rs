@@ -151,8 +151,8 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         Some(path) => path.into(),
         None => image::build(&app)?,
     };
-    // A firmware takes minutes where instructions are counted.
-    let otherwise = match longest.loader.needs_stick() {
+    // Interactive runs need real time; a firmware takes minutes where instructions are counted.
+    let otherwise = match is_live(options) || longest.loader.needs_stick() {
         true => Mode::Threads,
         false => Mode::Deterministic,
     };
@@ -221,6 +221,13 @@ fn describe(
     dags: Option<&Prepared>,
 ) -> Qemu {
     let words = words(options, dags, screen::guest_words(options)).join(" ");
+    // Emulated cores take much longer than their instructions say, and no budget is for that.
+    let budgets = match mode {
+        Mode::Threads if options.is_given("console") && !words.contains("budget_factor=") => {
+            " budget_factor=0"
+        }
+        _ => "",
+    };
     Qemu {
         program: program.into(),
         mode,
@@ -228,10 +235,9 @@ fn describe(
         loader: loading::chosen(options),
         cores: options.number("cores").unwrap_or(1),
         memory_mib,
-        guest_words: format!("mode={mode} {words}").trim_end().into(),
+        guest_words: format!("mode={mode} {words}{budgets}").trim_end().into(),
         module: None,
         records: None,
-        is_paced: is_live(options),
         has_input: options.is_given("console"),
         stops: screen::can_stop(options),
         second: handed::second(options),
