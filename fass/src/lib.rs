@@ -126,6 +126,7 @@ pub mod shared {
     //! | [`Signal`] | a subtask or a driver, and the DAG that it releases | [`Dag::sporadic`](crate::Dag::sporadic) |
     //! | [`Wire`] | DAGs and the outside: bytes in packets | [`Wire::new`] |
     //! | [`Device`] | a subtask that asks and waits, and what answers | [`create_device`] |
+    //! | [`Lock`]ed data | what else shares no edge | [`Lock::new`] |
     //! | [`Parameter`] | DAGs and people who tune them | [`Parameter::new`] |
     //! | [`Switch`] | a DAG and those that pause and resume it | [`Dag::switching`](crate::Dag::switching) |
     //! | [`Modes`] | groups of DAGs, of which one runs | [`Modes::new`] |
@@ -140,6 +141,7 @@ pub mod shared {
     pub use crate::api::lifecycle::{
         Mode, ModeSwitch, ModeUse, Modes, Shutdown, ShutdownUse, Switch, SwitchUse, shutting_down,
     };
+    pub use crate::api::lock::{LONGEST_SECTION, Lock, LockUse};
     pub use crate::api::parameter::{
         Parameter, ParameterError, ParameterUse, ParameterValue, Tunable,
     };

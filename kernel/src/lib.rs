@@ -64,10 +64,11 @@ mod watch;
 #[doc(hidden)]
 pub use boot::memory_functions;
 
-pub use crate::app::lock::Event;
+pub use crate::app::event::Event;
 pub use app::bare_machine::Machine;
-pub use app::lock::Lock;
 pub use executive::memory::heap::KernelHeap;
+#[doc(inline)]
+pub use fass::shared::Lock;
 pub use front::app::ending::AppError;
 #[doc(inline)]
 pub use front::named::{console, json, options};

@@ -50,6 +50,8 @@ pub struct DagSpec {
     pub states: Vec<StateSpec>,
     /// Topics whose latest value subtasks of any DAG read.
     pub latest: Vec<LatestSpec>,
+    /// The locks whose sections its subtasks enter.
+    pub locks: Vec<LockUse>,
 }
 
 impl DagSpec {
@@ -109,6 +111,30 @@ pub struct StateUser {
     pub subtask: usize,
     /// Whether it changes the state rather than only reads it.
     pub updates: bool,
+}
+
+/// A subtask's use of a lock: each instance enters some *sections*, of which those of one lock
+/// exclude each other, on all cores. An instance in one is not preempted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LockUse {
+    /// The subtask by position in `subtasks`.
+    pub subtask: usize,
+    /// The lock's name; those of one name count as one lock.
+    pub lock: String,
+    /// The time that no section of it exceeds; `None`: nobody has stated one.
+    pub longest_ns: Option<u64>,
+    /// The most sections that an instance enters.
+    pub sections: u32,
+    /// Whether there is another use of it in the commit; the verification finds out.
+    pub is_shared: bool,
+}
+
+impl LockUse {
+    /// Returns the longest wait for a section of it on a machine of so many cores, which take turns.
+    pub(crate) fn turn_ns(&self, cores: u32) -> u64 {
+        let others = u64::from(cores.saturating_sub(1)) * u64::from(self.is_shared);
+        self.longest_ns.unwrap_or(u64::MAX).saturating_mul(others)
+    }
 }
 
 /// A topic of which the latest complete value is read by subtasks that wait for

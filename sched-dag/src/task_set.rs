@@ -24,7 +24,7 @@ use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
-use crate::spec::{PINS, WAITS, Wait};
+use crate::spec::{LockUse, PINS, WAITS, Wait};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -63,6 +63,7 @@ pub struct Dag {
     pub(crate) graph: Graph,
     pub(crate) state_precedences: Box<[StatePrecedence]>,
     pub(crate) topics: Box<[Topic]>,
+    pub(crate) locks: Box<[LockUse]>,
 }
 
 /// An edge that two subtasks have because they share a state.
@@ -89,6 +90,8 @@ pub struct Subtask {
     pub(crate) priority: Priority,
     pub(crate) non_preemptive: bool,
     pub(crate) relative_deadline_ns: u64,
+    /// The longest that an instance waits to enter all its sections.
+    pub(crate) lock_wait_ns: u64,
 }
 
 /// The graph of a DAG, and the core of each subtask.
@@ -371,6 +374,18 @@ impl Dag {
     pub fn state_precedences(&self) -> &[StatePrecedence] {
         &self.state_precedences
     }
+
+    /// Returns the uses of locks.
+    #[must_use]
+    pub fn locks(&self) -> &[LockUse] {
+        &self.locks
+    }
+
+    /// Returns the first use of a lock of which no longest section is stated.
+    #[must_use]
+    pub fn unbounded_lock(&self) -> Option<&LockUse> {
+        self.locks.iter().find(|of| of.longest_ns.is_none())
+    }
 }
 
 impl Subtask {
@@ -407,12 +422,26 @@ impl Subtask {
         Some(core::iter::once(first).chain(later).collect())
     }
 
-    /// Returns a time that none of its segments exceeds: the WCET of the longest one, or of all
-    /// together if that is all that is known.
+    /// Returns the WCET, and its [waits for locks](Self::lock_wait_ns).
+    pub(crate) fn locking_wcet_ns(&self) -> Option<u64> {
+        self.wcet_ns?.checked_add(self.lock_wait_ns)
+    }
+
+    /// Returns the WCETs of its segments, of which the first has all waits for locks.
+    pub(crate) fn locking_segments_ns(&self) -> Option<Vec<u64>> {
+        let mut segments = self.segments_ns()?;
+        segments[0] = segments[0].checked_add(self.lock_wait_ns)?;
+        Some(segments)
+    }
+
+    /// Returns a time that none of its segments exceeds, waits for locks included: that of the
+    /// longest one, or of all together if that is all that is known.
     #[must_use]
     pub fn longest_segment_ns(&self) -> Option<u64> {
-        let segments = self.segments_ns();
-        segments.map_or(self.wcet_ns, |segments| segments.into_iter().max())
+        let segments = self.locking_segments_ns();
+        segments.map_or(self.locking_wcet_ns(), |segments| {
+            segments.into_iter().max()
+        })
     }
 
     /// Returns its WCET with what each of its segments is charged, `None` if there is none or the
@@ -420,7 +449,7 @@ impl Subtask {
     #[must_use]
     pub fn charged_ns(&self, of_segment_ns: u64) -> Option<u64> {
         let charge_ns = of_segment_ns.checked_mul(1 + self.waits.len() as u64)?;
-        self.wcet_ns?.checked_add(charge_ns)
+        self.locking_wcet_ns()?.checked_add(charge_ns)
     }
 
     /// Returns the stack that it needs, in bytes, if the app stated one.

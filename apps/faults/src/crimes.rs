@@ -18,7 +18,7 @@ pub struct Unpunished;
 pub type Crime = fn() -> Unpunished;
 
 /// Every crime, by name.
-pub const CRIMES: [(&str, Crime); 18] = [
+pub const CRIMES: [(&str, Crime); 19] = [
     ("panic", panic),
     ("panic_in_message", panic_twice),
     ("null_write", write_to_null),
@@ -35,6 +35,7 @@ pub const CRIMES: [(&str, Crime); 18] = [
     ("overflow_in_wait", || overflow_in(&wait)),
     ("overflow_in_lock", || overflow_in(&lock)),
     ("panic_in_section", panic_in_section),
+    ("unstated_section", enter_unstated),
     ("endless_loop", loop_for_ever),
     ("endless_wait", wait_for_ever),
 ];
@@ -162,16 +163,28 @@ fn wait() {
     EVENT.wait(EVENT.version(), fass::now_ns() + 1_000);
 }
 
-static SHARED: Lock<u32> = Lock::new(0);
+/// What the doomed DAG's middle subtask states. A fault in a section loses the lock: each crime has
+/// its own.
+pub static LOCKS: [Lock<u32>; 4] = [
+    Lock::new("free", 0),
+    Lock::new("shared", 0),
+    Lock::new("taken twice", 0),
+    Lock::new("held", 0),
+];
 
 fn lock() {
-    static FREE: Lock<u32> = Lock::new(0);
-    FREE.with(|free| *free = free.wrapping_add(1));
+    LOCKS[0].with(|free| *free = free.wrapping_add(1));
+}
+
+/// Enters a section of a lock that its subtask does not state.
+fn enter_unstated() -> Unpunished {
+    static UNSTATED: Lock<u32> = Lock::new("unstated", 0);
+    UNSTATED.with(|_| Unpunished)
 }
 
 /// Panics while it holds a lock, which is lost with that, or because the lock is lost.
 fn panic_in_section() -> Unpunished {
-    SHARED.with(|_| panic!("a panic in a section"))
+    LOCKS[1].with(|_| panic!("a panic in a section"))
 }
 
 /// Computes without end.

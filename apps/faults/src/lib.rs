@@ -21,10 +21,10 @@ use alloc::format;
 use alloc::vec;
 use core::time::Duration;
 
-use fass::shared::{Asker, TimedOut, create_device};
+use fass::shared::{Asker, LockUse, TimedOut, create_device};
 use fass::{Dag, FaultLimit, Occupation, SubtaskAttributes, create_dag};
 
-use crimes::{Crime, RECURRING, Unpunished};
+use crimes::{Crime, LOCKS, RECURRING, Unpunished};
 
 /// The time between two jobs of either DAG, and their relative deadline.
 pub const PERIOD: Duration = Duration::from_millis(10);
@@ -168,6 +168,14 @@ pub fn served(crime: Crime) -> [Dag; 2] {
     [asks, serves]
 }
 
+/// What the middle subtask is lent of its locks.
+type Locked = ((), (), (), ());
+
+fn locks() -> (LockUse, LockUse, LockUse, LockUse) {
+    let [free, shared, twice, held] = LOCKS.each_ref().map(|lock| lock.entering(u32::MAX));
+    (free, shared, twice, held)
+}
+
 /// Builds source -> middle -> sink; the middle has a WCET if it has a budget.
 fn pipeline(
     name: &str,
@@ -189,7 +197,7 @@ fn pipeline(
         (job,)
     };
     dag.register_periodic_subtask(read, [input.as_str()], PERIOD, attributes("read"));
-    let process = move |(job,): (u64,)| {
+    let process = move |_: Locked, (job,): (u64,)| {
         fass::execute_for(EXECUTION, Occupation::Hold);
         if let Some(crime) = crime.filter(|_| job == FATAL_JOB) {
             let Unpunished = crime();
@@ -200,23 +208,31 @@ fn pipeline(
         Some(budget) => attributes("process").wcet(EXECUTION).budget(budget),
         None => attributes("process"),
     };
+    let locks = locks();
     let topics = (vec![&*input], vec![&*output]);
     match policy {
-        Policy::End => dag.register_subtask(process, topics.0, topics.1, middle),
+        Policy::End => {
+            (dag.using(locks).subtask(process))
+                .reads(&topics.0)
+                .writes(&topics.1)
+                .register(middle);
+        }
         Policy::Restart => {
             dag.survive_faults(FAULT_LIMIT);
-            dag.restarting(move || process)
+            dag.using(locks)
+                .restarting(move || process)
                 .reads(&topics.0)
                 .writes(&topics.1)
                 .register(middle);
         }
         Policy::FallBack => {
             dag.survive_faults(FAULT_LIMIT);
-            let innocent = |(job,): (u64,)| {
+            let innocent = |_: Locked, (job,): (u64,)| {
                 fass::execute_for(EXECUTION, Occupation::Hold);
                 (job,)
             };
-            dag.falling_back(process, innocent)
+            dag.using(locks)
+                .falling_back(process, innocent)
                 .reads(&topics.0)
                 .writes(&topics.1)
                 .register(middle);

@@ -31,7 +31,7 @@ const FOREVER: Duration = Duration::from_secs(1_000_000);
 /// Runs all jobs.
 pub(crate) fn run(machine: &Machine, experiment: Experiment) -> Result<Outcome, AppError> {
     let shared = Arc::new(Cores {
-        graph: Lock::new(experiment.graph()),
+        graph: Lock::new("graph", experiment.graph()),
         event: Event::new(),
         epoch_ns: AtomicU64::new(u64::MAX),
         has_keeper: AtomicBool::new(false),
@@ -64,11 +64,12 @@ fn workers(cores: u32, shared: &Arc<Cores>) -> Dag {
     let workers: Vec<UntypedSubtask> = (0..cores)
         .map(|_| {
             let own = Arc::clone(shared);
-            let worker = move |_| {
+            let worker = move |(), _| {
                 own.wait_for_epoch();
                 own.work();
             };
-            dag.register_untyped_subtask(worker, SubtaskAttributes::default())
+            dag.using(shared.graph.entering(u32::MAX))
+                .register_untyped_subtask(worker, SubtaskAttributes::default())
         })
         .collect();
     let sink = dag.register_untyped_subtask(|_| (), SubtaskAttributes::named("end"));

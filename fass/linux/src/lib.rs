@@ -47,6 +47,7 @@ mod machine;
 mod office;
 mod panics;
 mod platform;
+mod section;
 mod state;
 #[allow(
     unsafe_code,

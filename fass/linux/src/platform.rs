@@ -11,15 +11,16 @@ use std::time::Duration;
 use fass::Occupation;
 use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
-use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig, SubtaskRunner};
+use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig, SubtaskRunner};
 use sched_dag::engine::{self, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, PendingRequests, Request, WaitId};
-use sched_dag::{DagId, Journal, Scheduler, TaskSet};
+use sched_dag::{DagId, Instance, Journal, Scheduler, TaskSet};
 
 use crate::control::{self, Control};
 use crate::edge::{self, File, Sending};
 use crate::level::Levels;
 use crate::office::Office;
+use crate::section;
 use crate::state::{Fault, Number, RunTime, State};
 use crate::sys;
 use crate::team::{self, Budgets, Team, with_own_worker};
@@ -106,6 +107,14 @@ impl Platform for Host {
         if let Some(control) = control::latest().filter(is_its) {
             control.office.send(None, Request::Answer(wait));
         }
+    }
+
+    fn running(&self) -> Option<Instance> {
+        edge::here().0
+    }
+
+    fn section(&self, lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
+        section::with(lock, section)
     }
 
     fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {

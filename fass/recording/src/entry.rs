@@ -310,6 +310,9 @@ crate::recordable! {
         pub move_ns: u64,
         /// By DAG, which test gave its bound, or why there is none. Since version 8.
         pub answers: Vec<String>,
+        /// The uses of locks: DAG and subtask, the lock, its longest section, if it is stated, and
+        /// the most sections of an instance. Since version 8.
+        pub locks: Vec<(u32, u32, String, Option<u64>, u32)>,
     }
 
     /// A DAG of a [`Commit`].

@@ -207,15 +207,15 @@ impl<'b> Chunk<'b> {
                 text.map(Chunk::Text)
             }
             COMMIT => {
-                // In version 7 it ends before the answers, in version 6 before the pins, and in
+                // In version 7 it ends before the answers and locks, in version 6 before the pins, and in
                 // version 5 before the waits: all that follows is 0.
                 let of_before = |lacks: usize| {
-                    let bytes = [payload, &[0; 24][..lacks]].concat();
+                    let bytes = [payload, &[0; 28][..lacks]].concat();
                     Commit::from_bytes(&bytes).ok()
                 };
                 let commit = Commit::from_bytes(payload);
                 let commit = commit
-                    .or_else(|wrong| [4, 20, 24].into_iter().find_map(of_before).ok_or(wrong));
+                    .or_else(|wrong| [8, 24, 28].into_iter().find_map(of_before).ok_or(wrong));
                 commit.map(Chunk::Commit)
             }
             EVENTS => Events::read(payload).map(Chunk::Events),

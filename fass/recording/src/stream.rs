@@ -33,7 +33,7 @@ pub const MAGIC: [u8; 8] = *b"\x89FASSREC";
 /// those before 5 no commits, events and times, and no [states](crate::Role::State); those before 6
 /// no [waits](Commit::waits) and no [answers](crate::Role::Answer); those before 7 no
 /// [pins](Commit::pins) and [affinities](Commit::affinities); those before 8 no
-/// [answers](Commit::answers).
+/// [answers](Commit::answers) and [locks](Commit::locks).
 pub const VERSION: u16 = 8;
 
 /// The kinds of frames.

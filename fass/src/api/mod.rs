@@ -19,6 +19,7 @@ pub(crate) mod dag;
 pub(crate) mod device;
 pub(crate) mod latest;
 pub(crate) mod lifecycle;
+pub(crate) mod lock;
 pub(crate) mod parameter;
 pub(crate) mod record;
 pub(crate) mod replaceable;

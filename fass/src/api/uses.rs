@@ -24,6 +24,7 @@
 //! | [`Wire::writing`](crate::shared::Wire::writing) | `WireWriter` | a wait |
 //! | [`Parameter::reading`](crate::shared::Parameter::reading) | `T` | input |
 //! | [`Device::asking`](crate::shared::Device::asking) | `Asker<Q, A>` | a wait |
+//! | [`Lock::entering`](crate::shared::Lock::entering) | `()` | blocking |
 //!
 //! Several uses are a tuple of up to 8, and give a tuple. Since the function borrows
 //! all of them for one call only, nothing can be kept beyond the instance.
@@ -64,7 +65,7 @@ pub(crate) mod sealed {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is nothing that a subtask uses",
     label = "should be a use, or a tuple of up to 8 uses",
-    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()`, `wire.reading(decode)`, `wire.writing()`, `parameter.reading()` and `device.asking()`"
+    note = "uses are `state.update()`, `state.read()`, `latest.sample()`, `signal.raising()`, `dag.switching()`, `mode.entering()`, `shutting_down()`, `wire.receiving(decode)`, `wire.sending()`, `wire.reading(decode)`, `wire.writing()`, `parameter.reading()`, `device.asking()` and `lock.entering(1)`"
 )]
 pub trait Uses: sealed::Sealed {
     /// The argument of the function.

@@ -186,6 +186,8 @@ pub struct UnprovenDag {
     subtasks: Vec<SubtaskLabel>,
     /// The other DAG that the reason is about.
     other: Option<DagLabel>,
+    /// The lock that the reason is about.
+    lock: String,
 }
 
 impl UnprovenDag {
@@ -210,20 +212,26 @@ impl UnprovenDag {
                 lacking.map(|(id, _)| id).collect()
             }
             NotProvenReason::SubtaskBeyondPeriod { subtask }
-            | NotProvenReason::Pinned { subtask } => vec![subtask],
+            | NotProvenReason::Pinned { subtask }
+            | NotProvenReason::UnboundedLock { subtask, .. } => vec![subtask],
             NotProvenReason::PathBeyondDeadline { sink, .. }
             | NotProvenReason::NoSinkBound { sink } => vec![sink],
             _ => Vec::new(),
         };
         let labels = subtasks.into_iter();
         let other = match reason {
-            NotProvenReason::DelayedBy { dag } => Some(dag),
+            NotProvenReason::DelayedBy { dag } | NotProvenReason::UnboundedLock { dag, .. } => {
+                Some(dag)
+            }
             _ => None,
         };
+        let of = other.unwrap_or(dag);
+        let unbounded = task_set.dag(of).unbounded_lock();
         Self {
             reason,
-            subtasks: labels.map(|id| task_set.subtask_label(dag, id)).collect(),
+            subtasks: labels.map(|id| task_set.subtask_label(of, id)).collect(),
             other: other.map(|other| task_set.label(other)),
+            lock: unbounded.map_or(String::new(), |of| of.lock.clone()),
         }
     }
 }
@@ -246,6 +254,12 @@ impl fmt::Display for UnprovenDag {
             (NotProvenReason::SubtaskBeyondPeriod { .. }, [subtask, ..], _) => write!(
                 f,
                 "{subtask} alone takes more than a period; split it or lengthen the period"
+            ),
+            (NotProvenReason::UnboundedLock { .. }, [subtask, ..], Some(dag)) => write!(
+                f,
+                "{subtask} of {dag} enters lock `{}`, which has no longest section, and keeps what \
+                 shares its cores waiting there; state one by `Lock::longest`",
+                self.lock
             ),
             (NotProvenReason::Pinned { .. }, [subtask, ..], _) => write!(
                 f,

@@ -6,6 +6,7 @@
 //! it.
 
 use alloc::format;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use recording::{
@@ -16,7 +17,7 @@ use sched_dag::analysis::Overheads;
 use sched_dag::engine::Run;
 use sched_dag::law::Histogram;
 use sched_dag::{
-    Dag, DagId, Instance, Journal, OnFault, OverrunPolicy, PINS, Policy, Preemption,
+    Dag, DagId, Instance, Journal, LockUse, OnFault, OverrunPolicy, PINS, Policy, Preemption,
     SchedulerOptions, SubtaskId, TaskSet, Vertex,
 };
 
@@ -168,6 +169,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
         waits: waits(task_set),
         pins: pins(task_set),
         affinities: affinities(task_set),
+        locks: locks(task_set),
         move_ns: overheads.of_a_move_ns(options.preemption),
         answers: plan.proven.answers.clone(),
     }
@@ -188,6 +190,18 @@ fn affinities(task_set: &TaskSet) -> Vec<(u32, u32)> {
     let cores =
         dags.flat_map(|(dag, of_dag)| of_dag.affinity().iter().map(move |core| (dag, *core)));
     cores.collect()
+}
+
+fn locks(task_set: &TaskSet) -> Vec<(u32, u32, String, Option<u64>, u32)> {
+    let mut all = Vec::new();
+    for (dag, of_dag) in (0..).zip(task_set.dags()) {
+        let told = |of: &LockUse| {
+            let subtask = u32::try_from(of.subtask).unwrap_or(u32::MAX);
+            (dag, subtask, of.lock.clone(), of.longest_ns, of.sections)
+        };
+        all.extend(of_dag.locks().iter().map(told));
+    }
+    all
 }
 
 fn waits(task_set: &TaskSet) -> Vec<(u32, u32, u64, Option<u64>)> {

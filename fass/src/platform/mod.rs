@@ -70,7 +70,7 @@ use core::time::Duration;
 
 use recording::Channel;
 use sched_dag::lifecycle::WaitId;
-use sched_dag::{DagId, TaskSet};
+use sched_dag::{DagId, Instance, TaskSet};
 
 use crate::Occupation;
 use crate::edge::{Begin, Edge, WatchedValue};
@@ -82,6 +82,7 @@ pub use clock::Clock;
 pub use run_config::RunConfig;
 pub use sched_dag::lifecycle::Request;
 
+pub use crate::api::lock::LockWords;
 pub use crate::run::cell::SetOnce;
 pub use crate::run::gate::call_app;
 pub use crate::run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
@@ -181,6 +182,23 @@ pub trait Platform: Sync {
     fn answer(&self, plan: u64, wait: WaitId) {
         let _ = (plan, wait);
         panic!("this platform takes no answers of devices; let no subtask wait for one");
+    }
+
+    /// Returns the instance that the caller is, if it is one. A platform that does not define this
+    /// lets every function enter every [`Lock`](crate::shared::Lock).
+    fn running(&self) -> Option<Instance> {
+        None
+    }
+
+    /// Calls `section` once nobody else is in a section of the lock that these are the words of, and
+    /// puts the caller's preemption off for that time, for
+    /// [`LONGEST_SECTION`](crate::shared::LONGEST_SECTION) at most. Returns for how many nanoseconds;
+    /// `None`, and does not call it, if the caller is in a section already. A platform of one thread,
+    /// which runs function after function, need not define this.
+    fn section(&self, lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
+        let _ = lock;
+        section();
+        Some(0)
     }
 
     /// Lends `work` what the platform keeps at its edge, under its lock; a platform that keeps

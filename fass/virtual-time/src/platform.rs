@@ -3,19 +3,21 @@
 //! The installed platform itself has no state. Everything it is asked, it asks the calling
 //! thread's current machine.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::rc::{Rc, Weak};
 use std::sync::OnceLock;
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release};
+use std::thread;
 use std::time::Duration;
 
 use fass::Occupation;
 use fass::edge::{Begin, RecordedValue};
 use fass::log::{Level, LogLine, set_level};
-use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig};
+use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig};
 use fass::shared::{DeviceDriver, Wire};
 use recording::{Channel, Entry, EntryKind};
 use sched_dag::lifecycle::{Request, WaitId};
-use sched_dag::{DagId, JobOutcome, TaskSet};
+use sched_dag::{DagId, Instance, JobOutcome, TaskSet};
 
 use crate::job::JobShown;
 use crate::machine::{Arrival, Machine, RunError, Session};
@@ -24,6 +26,17 @@ use crate::{VirtualTime, nanoseconds};
 
 thread_local! {
     static CURRENT: RefCell<Weak<Machine>> = const { RefCell::new(Weak::new()) };
+    static IS_IN_SECTION: Cell<bool> = const { Cell::new(false) };
+}
+
+/// A section, which a panic ends, too.
+struct Held<'l>(&'l LockWords);
+
+impl Drop for Held<'_> {
+    fn drop(&mut self) {
+        self.0.state.store(0, Release);
+        IS_IN_SECTION.set(false);
+    }
 }
 
 /// The clock of functions, whose answers are recorded.
@@ -224,6 +237,26 @@ impl Platform for HostPlatform {
             let answer = Arrival::Request(Request::Answer(wait));
             machine.keep(machine.now_ns.get(), answer);
         }
+    }
+
+    fn running(&self) -> Option<Instance> {
+        current()?.running.get()
+    }
+
+    fn section(&self, lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
+        if IS_IN_SECTION.replace(true) {
+            return None;
+        }
+        let (free, taken) = (0, 1);
+        // Functions take turns; another machine's thread may have the lock, and will give it back.
+        while (lock.state.compare_exchange(free, taken, Acquire, Relaxed)).is_err() {
+            thread::yield_now();
+        }
+        let _held = Held(lock);
+        let executed_ns = || Some(current()?.executed_ns.get().unwrap_or(0));
+        let entered_ns = executed_ns();
+        section();
+        Some(executed_ns().unwrap_or(0) - entered_ns.unwrap_or(0))
     }
 
     fn crosses(&self) -> bool {

@@ -31,12 +31,15 @@
 
 #[doc(hidden)]
 pub mod entry;
+mod event;
 #[allow(unsafe_code, reason = "an allocator that counts")]
 mod heap;
 mod linux_system;
-mod lock;
 mod output;
 
+pub use event::Event;
+#[doc(inline)]
+pub use fass::shared::Lock;
 pub use front::app::ending::AppError;
 #[doc(inline)]
 pub use front::named::{console, json, options};
@@ -46,7 +49,6 @@ pub use front::{print, println};
 #[doc(hidden)]
 pub use heap::Heap;
 pub use linux_system::Machine;
-pub use lock::{Event, Lock};
 #[doc(inline)]
 pub use sched_dag::engine::Run;
 

@@ -7,4 +7,4 @@
 
 pub(crate) mod bare_machine;
 mod calibration;
-pub(crate) mod lock;
+pub(crate) mod event;

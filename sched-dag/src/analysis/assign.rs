@@ -66,6 +66,10 @@ texts! {
         Confined =
             "it states cores of a cluster, and the commit is to make the clusters; leave its affinity \
              and the cores of its subtasks out";
+        /// It enters a lock without a longest section.
+        UnboundedLock =
+            "it enters a lock without a longest section, in which it keeps what shares its cores \
+             waiting; state one by `Lock::longest`";
         /// Its need of cores is not known.
         Unknown(error: TaskError) = "{error}";
         /// A path of it, overheads included, takes longer than a job has, on any number of cores.
@@ -91,10 +95,17 @@ texts! {
 /// The first DAG that gets no cores: heavy and waiting ones in the order of the commit, then light ones,
 /// the densest first.
 pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(), NotAssigned> {
-    let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
+    let dags = task_set.dags().iter();
+    let overheads = settings
+        .overheads
+        .with_sections(dags.clone(), settings.cores);
+    let overhead_ns = overheads.of_an_instance_ns(settings.preemption);
     let overhead_ns = overhead_ns.ok_or(TaskError::VolumeOverflow);
     let mut tasks = Vec::with_capacity(task_set.dags().len());
-    for (dag, model) in task_set.dags().iter().enumerate() {
+    for (dag, model) in dags.enumerate() {
+        if model.unbounded_lock().is_some() {
+            return Err(refused(dag, AssignmentFailure::UnboundedLock));
+        }
         if model.states_cluster() {
             return Err(refused(dag, AssignmentFailure::Stated));
         }
@@ -159,7 +170,10 @@ fn lend_cores(
         return None;
     }
     let with_moves = AnalysisSettings {
-        overheads: settings.overheads.with_moves(),
+        overheads: settings
+            .overheads
+            .with_sections(task_set.dags().iter(), settings.cores)
+            .with_moves(),
         ..*settings
     };
     let overhead_ns = (with_moves.overheads).of_an_instance_ns(settings.preemption)?;

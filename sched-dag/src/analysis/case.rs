@@ -14,7 +14,7 @@ use super::set::{EquationSet, constrained};
 use super::task::{Task, TaskError};
 use super::workload::WorkloadBursts;
 use super::{AnalysisSettings, NotProvenReason};
-use crate::ids::{DagId, to_u32};
+use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
 use crate::policy::{Policy, Preemption};
 use crate::spec::PINS;
@@ -51,11 +51,11 @@ fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
 pub(super) fn of_cluster<'a>(
     settings: &AnalysisSettings,
     cores: u32,
-    dags: impl Iterator<Item = &'a Dag>,
+    dags: impl Iterator<Item = &'a Dag> + Clone,
 ) -> AnalysisSettings {
     AnalysisSettings {
         cores,
-        overheads: settings.overheads.among(dags),
+        overheads: settings.overheads.among(dags, settings.cores),
         ..*settings
     }
 }
@@ -214,12 +214,18 @@ fn analysable(
 ) -> Vec<Option<Task>> {
     let overhead = settings.overheads.of_an_instance_ns(settings.preemption);
     let mut tasks: Vec<Option<Task>> = dags.iter().map(|_| None).collect();
+    let unbounded = own.iter().find_map(|&dag| {
+        let of = dags[dag].unbounded_lock()?;
+        let (dag, subtask) = (dag_id(dag), SubtaskId(to_u32(of.subtask)));
+        Some(NotProvenReason::UnboundedLock { dag, subtask })
+    });
     for &dag in own {
         let task = overhead
             .ok_or(TaskError::VolumeOverflow)
             .and_then(|overhead_ns| Task::from_dag(&dags[dag], overhead_ns));
         reasons[dag] = match &task {
             _ if settings.cores == 0 => Some(NotProvenReason::NoCores),
+            _ if unbounded.is_some() => unbounded,
             Ok(_) => None,
             Err(error) => Some(NotProvenReason::Unknown(*error)),
         };

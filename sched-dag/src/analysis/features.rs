@@ -154,6 +154,7 @@ impl Features {
             relative_deadline_ns,
             in_flight,
             subtasks,
+            locks,
             name: _,
             graph_hash: _,
             // Bounds hold for any offsets and any of the jobs.
@@ -178,6 +179,7 @@ impl Features {
         let own = Self::SPORADIC
             .if_so(*activation == Activation::Sporadic)
             .and(Self::LATE_DEADLINES.if_so(relative_deadline_ns > period_ns))
+            .and(Self::OVERHEADS.if_so(!locks.is_empty()))
             .and(Self::FEW_IN_FLIGHT.if_so(room_ns < u128::from(*relative_deadline_ns)));
         subtasks.iter().map(Self::of_subtask).fold(own, Self::and)
     }
@@ -186,7 +188,9 @@ impl Features {
         let Subtask {
             waits,
             name: _,
+            // The analysis sees their sum.
             wcet_ns: _,
+            lock_wait_ns: _,
             wcet_source: _,
             budget_ns: _,
             stack_bytes: _,

@@ -259,6 +259,10 @@ texts! {
             "subtasks of its cluster are pinned, and the test for that needs deadlines within periods, \
              preemption, no waits, and in each group of DAGs static priorities that rank whole DAGs; \
              see to these, or leave the cores out";
+        /// A subtask of its cluster enters a lock of which no longest section is stated.
+        UnboundedLock { dag: DagId, subtask: SubtaskId } =
+            "subtask {} of dag {} enters a lock without a longest section, in which it keeps what \
+             shares its cores waiting; state one by `Lock::longest`", subtask.0, dag.0;
         /// The analysis reached one of its limits on time or size of numbers.
         Limit =
             "the analysis reached a limit; use a coarser unit of time, or deadlines of fewer \

@@ -106,12 +106,32 @@ impl Overheads {
         }
     }
 
-    /// Returns them in a cluster with these DAGs.
+    /// Returns them where subtasks of these DAGs enter sections of locks.
+    ///
+    /// An instance that is given a core may find another one there that is in a section: once at
+    /// its start and, paid for by the one that has preempted it, once when it goes on. If it is
+    /// preempted while it waits for a section, it waits for its turn anew. `docs/proving.md` has the
+    /// argument.
+    pub(super) fn with_sections<'a>(self, dags: impl Iterator<Item = &'a Dag>, cores: u32) -> Self {
+        let (mut longest_ns, mut turn_ns) = (0, 0);
+        for of in dags.flat_map(Dag::locks) {
+            longest_ns = of.longest_ns.unwrap_or(u64::MAX).max(longest_ns);
+            turn_ns = of.turn_ns(cores).max(turn_ns);
+        }
+        let sections_ns = longest_ns.saturating_mul(2).saturating_add(turn_ns);
+        Self {
+            interrupt_ns: self.interrupt_ns.saturating_add(sections_ns),
+            ..self
+        }
+    }
+
+    /// Returns them in a cluster with these DAGs, on a machine of so many cores in all.
     #[must_use]
-    pub fn among<'a>(self, mut dags: impl Iterator<Item = &'a Dag>) -> Self {
-        match PINS && dags.any(Dag::is_confined) {
-            true => self.with_moves(),
-            false => self,
+    pub fn among<'a>(self, dags: impl Iterator<Item = &'a Dag> + Clone, cores: u32) -> Self {
+        let of = self.with_sections(dags.clone(), cores);
+        match PINS && dags.clone().any(Dag::is_confined) {
+            true => of.with_moves(),
+            false => of,
         }
     }
 

@@ -157,7 +157,8 @@ impl WitnessText {
             for subtask in dag.subtasks() {
                 let keeps =
                     subtask.is_non_preemptive() || settings.preemption == Preemption::Disabled;
-                let (wcet, priority) = (subtask.wcet_ns().unwrap_or(0), subtask.priority().0);
+                let (wcet, priority) =
+                    (subtask.locking_wcet_ns().unwrap_or(0), subtask.priority().0);
                 self.line(format_args!(
                     "subtask {wcet} {priority} {}",
                     u8::from(keeps)
@@ -192,7 +193,7 @@ impl WitnessText {
         if limits_ns.len() == 0 {
             return;
         }
-        let segments_ns = subtask.segments_ns();
+        let segments_ns = subtask.locking_segments_ns();
         let segments_ns = segments_ns.unwrap_or(alloc::vec![0; limits_ns.len() + 1]);
         let later = limits_ns.zip(&segments_ns[1..]);
         let later = later.flat_map(|(limit_ns, &segment_ns)| [limit_ns, segment_ns]);

@@ -25,7 +25,7 @@ use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
 use crate::policy::Priority;
-use crate::spec::{DagSpec, PINS, WAITS};
+use crate::spec::{DagSpec, LockUse, PINS, WAITS};
 use crate::task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
@@ -45,8 +45,29 @@ pub(super) fn build(
         return None;
     }
     let dags = findings.specs.iter().zip(shapes).zip(bases);
-    let dags = dags.map(|((spec, shape), base)| build_dag(options, spec, shape, base));
+    let dags = dags.map(|((spec, shape), base)| {
+        let mut dag = build_dag(options, spec, shape, base);
+        dag.locks = locks(spec, findings.specs);
+        for of in &dag.locks {
+            let wait_ns = &mut dag.subtasks[of.subtask].lock_wait_ns;
+            let all_ns = of.turn_ns(options.cores).saturating_mul(of.sections.into());
+            *wait_ns = wait_ns.saturating_add(all_ns);
+        }
+        dag
+    });
     Some(TaskSet::new(dags.collect(), options.clusters.sizes()))
+}
+
+/// Returns a DAG's uses of locks, with whether there are others.
+fn locks(spec: &DagSpec, all: &[&DagSpec]) -> Box<[LockUse]> {
+    let of = spec.locks.iter().map(|of| {
+        let others = all.iter().flat_map(|spec| &spec.locks);
+        LockUse {
+            is_shared: others.filter(|other| other.lock == of.lock).count() > 1,
+            ..of.clone()
+        }
+    });
+    of.collect()
 }
 
 /// Returns for each DAG without priorities the number of its first one:
@@ -132,6 +153,7 @@ fn build_dag(
             },
             non_preemptive: subtask.non_preemptive,
             relative_deadline_ns: deadlines_ns[index],
+            lock_wait_ns: 0,
         });
     // One that states a deadline is a sink, though a shared state may put it before another.
     let is_sink = |subtask: &SubtaskId| {
@@ -166,6 +188,7 @@ fn build_dag(
         graph,
         state_precedences: state_precedences.into_boxed_slice(),
         topics: topics_of(spec),
+        locks: Box::default(),
     }
 }
 

@@ -15,6 +15,7 @@ mod input;
 #[allow(unsafe_code, reason = "what the kernel must report")]
 mod kernel_crimes;
 mod large;
+mod locks;
 mod occupation;
 mod overrun;
 mod preemption;
@@ -51,6 +52,7 @@ const TESTS: &[(&str, Test)] = &[
     ("exceeded", single::exceeded),
     ("input", input::run),
     ("large", large::run),
+    ("locks", locks::run),
     ("overrun", overrun::run),
     ("recorded", recorded::run),
     ("recorded_long", recorded::long),

@@ -67,7 +67,7 @@ fn attacks_harm_their_own_dag_alone() {
                     "panic",
                     "a machine line of kind `verdict` is the kernel's to print",
                 ),
-                ("lock_twice", "panic", "taken by its holder"),
+                ("lock_twice", "panic", "in a section already"),
                 ("lock_loop", "budget overrun", "budget of 6ms"),
                 ("flood", "", ""),
             ],

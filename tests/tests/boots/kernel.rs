@@ -62,8 +62,14 @@ fn faults_are_contained(guest: &Guest) {
     // The lock is lost with the first one's section, although its stack is used again.
     let said = faults.iter().filter_map(|line| line.text_at("message"));
     let section: Vec<&str> = said.filter(|said| said.contains("section")).collect();
-    let lost = "a fault has ended a section of this lock; its data may be half changed";
-    assert_eq!(section, ["a panic in a section", lost, lost]);
+    let lost = "lock `shared`: a fault has ended a section, and its data may be half changed";
+    let unstated = "lock `unstated`: the subtask enters a section and has not stated that, by \
+                    `dag.using(lock.entering(N))`";
+    let first = ["a panic in a section", unstated];
+    assert_eq!(
+        section,
+        [first, [lost, unstated], [lost, unstated]].as_flattened()
+    );
 }
 
 #[test]

@@ -19,6 +19,7 @@ mod in_bochs;
 mod input;
 mod join_latency;
 mod kernel;
+mod locks;
 mod module;
 mod new_app;
 mod on_screen;

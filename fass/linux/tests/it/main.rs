@@ -2,6 +2,7 @@
 
 mod ends;
 mod lives;
+mod locks;
 mod panics;
 mod recordings;
 #[path = "../support/mod.rs"]

@@ -49,6 +49,7 @@ fn commit() -> Commit {
         affinities: vec![(0, 0), (0, 2)],
         move_ns: 7,
         answers: vec!["dag `fast` takes at most 7ns".into()],
+        locks: vec![(0, 1, "seen".into(), Some(9), 2)],
         ..Commit::default()
     }
 }
@@ -311,7 +312,7 @@ fn a_commit_of_a_version_before_has_no_waits_pins_or_answers() {
         ..Commit::default()
     };
     // Versions 5, 6 and 7 end it before the numbers of these, and no version elsewhere.
-    for (lacks, is_one) in [(24, true), (20, true), (4, true), (12, false), (17, false)] {
+    for (lacks, is_one) in [(28, true), (24, true), (8, true), (12, false), (17, false)] {
         let mut bytes = Stream::begin(Vec::new()).end();
         let end = bytes.split_off(10);
         let payload = to_bytes(&commit);

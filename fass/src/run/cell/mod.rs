@@ -329,6 +329,24 @@ impl<T> Deref for ReadClaim<'_, T> {
     }
 }
 
+/// A value that one at a time may change, and nobody looks at.
+pub(crate) struct ExclusiveCell<T>(SharedCell<T>);
+
+// SAFETY: by the claim invariant threads have one `&mut T` between them, as no claim is made for a
+// look. `T: Send` because one thread after another has it.
+unsafe impl<T: Send> Sync for ExclusiveCell<T> {}
+
+impl<T> ExclusiveCell<T> {
+    pub(crate) const fn new(value: T) -> Self {
+        Self(SharedCell::new(value))
+    }
+
+    /// Claims the value, unless somebody else has a claim.
+    pub(crate) fn change(&self) -> Option<WriteClaim<'_, T>> {
+        self.0.change()
+    }
+}
+
 impl<T> Drop for WriteClaim<'_, T> {
     fn drop(&mut self) {
         self.0.claims.store(0, Ordering::Release);

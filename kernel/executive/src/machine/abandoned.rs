@@ -5,8 +5,8 @@
 //!
 //! **Frames invariant**: what lies on a context's stack is reached from that context alone.
 //! Functions, messages and states are `'static`, so they hold no reference to a frame, and the
-//! kernel lends nothing of one to others but its [`CriticalSection`](super::context::CriticalSection)s, which
-//! end when the context is recovered.
+//! kernel lends nothing of one to others but the lock of its section, which ends when the context is
+//! recovered.
 
 use super::context::Parked;
 use super::{paint, section};
@@ -22,13 +22,13 @@ impl AbandonedContext {
         Self(left)
     }
 
-    /// Returns the context, to [begin anew](Parked::restart). Locks that it held are lost.
+    /// Returns the context, to [begin anew](Parked::restart). The data of a lock that it held is lost.
     ///
     /// By the frames invariant nobody else knows of what lay on its stack.
     #[must_use]
     pub fn recover(self) -> Parked {
         let Self(mut parked) = self;
-        section::lose_all(parked.context());
+        section::end(parked.context());
         parked.reset();
         paint::spoil(&parked.context().stack());
         parked

@@ -12,9 +12,11 @@
 use core::cell::UnsafeCell;
 use core::fmt;
 use core::ops::Range;
-use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicU64, Ordering};
 
 use alloc::boxed::Box;
+
+use fass::platform::LockWords;
 
 /// The general registers as `interrupt.s` and the processor push them.
 #[derive(Debug, Default)]
@@ -133,19 +135,13 @@ pub struct Context {
     sections: SectionNote,
 }
 
-/// A section that a context is in, or is about to be in; see [`section`](super::section).
-#[derive(Debug)]
-pub(super) struct CriticalSection {
-    pub(super) holder: *const AtomicPtr<Context>,
-    /// The one that it is in.
-    pub(super) outer: *mut CriticalSection,
-}
-
-/// A context's note of its sections.
+/// A context's note of its section; see [`section`](super::section).
 #[derive(Debug)]
 pub(super) struct SectionNote {
-    /// The innermost one; null if there is none.
-    pub(super) innermost: AtomicPtr<CriticalSection>,
+    /// The lock that it is in a section of, or waits for; null if there is none.
+    pub(super) lock: AtomicPtr<LockWords>,
+    /// The core on which it waits, counted from 1.
+    pub(super) waits_on: AtomicU32,
     /// When a preemption was put off first; 0 if none was.
     pub(super) put_off_ns: AtomicU64,
 }
@@ -153,7 +149,8 @@ pub(super) struct SectionNote {
 impl SectionNote {
     const fn new() -> Self {
         Self {
-            innermost: AtomicPtr::new(core::ptr::null_mut()),
+            lock: AtomicPtr::new(core::ptr::null_mut()),
+            waits_on: AtomicU32::new(0),
             put_off_ns: AtomicU64::new(0),
         }
     }

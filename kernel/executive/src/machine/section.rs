@@ -4,153 +4,149 @@
 //! not trusted. Interrupts stay enabled in a section, so what happens there is the
 //! app's: a fault is contained, a budget ends it. Only preemption is put off until the
 //! section ends, as a holder that were preempted would block every core that wants the
-//! lock. It is put off for [`LONGEST_NS`] at most: the section of a holder that never
+//! lock. It is put off for [`LONGEST_SECTION`] at most: the section of a holder that never
 //! returns delays other instances for that time, and no longer.
 //!
-//! **Holder invariant**: `holder` is null, or the context that alone touches `data`, or for good
-//! [`LOST`] once a fault has ended a holder.
+//! Waiting cores take turns in a circle: who leaves gives the turn to the next core that waits. So
+//! one that waits sees each other core in the lock once at most. A context that waits can be
+//! preempted; it gives up its turn with its core.
 //!
-//! **Section invariant**: from a context's innermost [`CriticalSection`] on, each lies in a frame of
-//! [`ContextLock::with`] on that context's stack that has not returned, and names a lock that this
-//! frame borrows.
+//! **Section invariant**: while the lock of a context's [`SectionNote`] is not null, it is that of a
+//! frame of [`with`] on the context's stack that has not returned, and borrowed by it.
 
-use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicPtr, Ordering};
+use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
 
-use super::context::{Context, CriticalSection, SectionNote};
+use fass::platform::LockWords;
+use fass::shared::LONGEST_SECTION;
+
+use super::context::Context;
 use super::this_core::{self, Core};
 use super::timer::{self, Alarm};
-use super::{cpu, interrupt_flag, local_apic, vector};
+use super::{clock, cpu, interrupt_flag, local_apic, vector};
 
-/// Stands where the holder does, once a fault has ended one.
-const LOST: *mut Context = core::ptr::without_provenance_mut(align_of::<Context>());
+/// The bit of a lock's state that says so.
+const IS_HELD: u32 = 1;
 
-/// For how long a section may put off its core's preemption.
-const LONGEST_NS: u64 = 1_000_000;
+const LONGEST_NS: u64 = LONGEST_SECTION.subsec_nanos() as u64;
 
-/// Data that one context at a time may use.
-#[derive(Debug)]
-pub struct ContextLock<T> {
-    holder: AtomicPtr<Context>,
-    data: UnsafeCell<T>,
-}
-
-// SAFETY: by the holder invariant one context at a time reaches the data, so sharing
-// this moves the data between cores, for which `T: Send` suffices.
-unsafe impl<T: Send> Sync for ContextLock<T> {}
-
-/// Why the data cannot be had, now or ever.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LockRefusal {
-    /// The caller is in a section of it.
-    HeldByCaller,
-    /// A fault has ended its holder.
-    HolderEnded,
-}
-
-impl<T> ContextLock<T> {
-    /// Guards `data`.
-    pub const fn new(data: T) -> Self {
-        Self {
-            holder: AtomicPtr::new(core::ptr::null_mut()),
-            data: UnsafeCell::new(data),
-        }
+/// Waits for a lock, and calls `section` in it. Returns how long that took; `None`, without a call,
+/// if the caller is in a section.
+pub fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
+    if with_core(|core| is_in_section(core.context())) {
+        return None;
     }
-
-    /// Waits for the data and lends it to `section`.
-    pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> Result<R, LockRefusal> {
-        let mut own_section = CriticalSection {
-            holder: &raw const self.holder,
-            outer: core::ptr::null_mut(),
-        };
-        let own = loop {
-            let own = enter(&mut own_section);
-            let place = core::ptr::from_ref(own).cast_mut();
-            let free = core::ptr::null_mut();
-            let (acquire, relaxed) = (Ordering::Acquire, Ordering::Relaxed);
-            let Err(holder) = (self.holder).compare_exchange(free, place, acquire, relaxed) else {
-                break own;
-            };
-            leave(own, &own_section);
-            if holder == place {
-                return Err(LockRefusal::HeldByCaller);
-            }
-            if holder == LOST {
-                return Err(LockRefusal::HolderEnded);
-            }
-            cpu::relax();
-        };
-        // SAFETY: this context is the holder, and no section of it is open (that was
-        // refused), so this is the only reference (holder invariant).
-        let result = section(unsafe { &mut *self.data.get() });
-        self.holder.store(core::ptr::null_mut(), Ordering::Release);
-        leave(own, &own_section);
-        Ok(result)
+    while !with_core(|core| enter(lock, core)) {
+        cpu::relax();
     }
+    let entered_ns = clock::now_ns();
+    section();
+    let took_ns = clock::now_ns().saturating_sub(entered_ns);
+    with_core(|core| leave(lock, core));
+    Some(took_ns)
 }
 
-/// Keeps the caller from being preempted, for [`LONGEST_NS`] at most.
-fn enter(section: &mut CriticalSection) -> &'static Context {
+/// Does `work` on the core that it gets.
+fn with_core<R>(work: impl FnOnce(&'static Core) -> R) -> R {
     let were_enabled = interrupt_flag::disable();
-    let own = this_core::get().context();
-    let innermost = &own.sections().innermost;
-    section.outer = innermost.load(Ordering::Relaxed);
-    innermost.store(section, Ordering::Release);
+    let result = work(this_core::get());
     if were_enabled {
         interrupt_flag::enable();
     }
-    own
+    result
 }
 
-/// Ends what `enter` has begun, and does what was put off.
-fn leave(own: &Context, section: &CriticalSection) {
-    let SectionNote {
-        innermost,
-        put_off_ns,
-    } = own.sections();
-    innermost.store(section.outer, Ordering::Release);
-    if section.outer.is_null() && put_off_ns.swap(0, Ordering::Relaxed) != 0 {
-        let were_enabled = interrupt_flag::disable();
-        local_apic::send(this_core::get().apic_id(), vector::WAKE);
-        if were_enabled {
-            interrupt_flag::enable();
-        }
+fn is_in_section(context: &Context) -> bool {
+    !context.sections().lock.load(Relaxed).is_null()
+}
+
+/// Enters a section, or waits for the turn of the core. Interrupts are disabled.
+fn enter(lock: &LockWords, core: &Core) -> bool {
+    let here = core.index + 1;
+    let state = lock.state.load(Relaxed);
+    let turn = state >> 1;
+    let is_anothers = turn != 0 && turn != here && waits(lock, turn - 1);
+    let taken = state | IS_HELD;
+    // The turn is in the word, so that no release comes in between.
+    let enters = state != taken
+        && !is_anothers
+        && (lock.state.compare_exchange(state, taken, Acquire, Relaxed)).is_ok();
+    let (word, bit) = bit_of(core.index);
+    match enters {
+        true => lock.waiting[word].fetch_and(!bit, Relaxed),
+        // Its line is left to the holder while nothing changes.
+        false if waits(lock, core.index) => 0,
+        false => lock.waiting[word].fetch_or(bit, Relaxed),
+    };
+    let note = core.context().sections();
+    note.waits_on.store(if enters { 0 } else { here }, Relaxed);
+    (note.lock).store(core::ptr::from_ref(lock).cast_mut(), Release);
+    enters
+}
+
+/// Ends a section, and does what was put off. Interrupts are disabled.
+fn leave(lock: &LockWords, core: &Core) {
+    release(lock, core.index);
+    let note = core.context().sections();
+    note.lock.store(core::ptr::null_mut(), Release);
+    if note.put_off_ns.swap(0, Relaxed) != 0 {
+        local_apic::send(core.apic_id(), vector::WAKE);
     }
 }
 
-/// Ends the sections of a context that was abandoned in them: what they guard is lost.
-pub(super) fn lose_all(context: &Context) {
-    let SectionNote {
-        innermost,
-        put_off_ns,
-    } = context.sections();
-    let mut next = innermost.swap(core::ptr::null_mut(), Ordering::Acquire);
+/// Gives the lock back, and the turn to the next core that waits.
+fn release(lock: &LockWords, here: u32) {
+    let cores = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
+    let mut others = (here + 1..cores).chain(0..here);
+    let next = others.find(|&core| waits(lock, core));
+    let turn = next.map_or(0, |core| core + 1);
+    lock.state.store(turn << 1, Release);
+}
+
+fn waits(lock: &LockWords, core: u32) -> bool {
+    let (word, bit) = bit_of(core);
+    lock.waiting[word].load(Relaxed) & bit != 0
+}
+
+const fn bit_of(core: u32) -> (usize, u64) {
+    ((core / 64) as usize, 1 << (core % 64))
+}
+
+/// Gives the turn up of a context that loses its core, if it waits. Interrupts are disabled.
+pub fn stop_waiting(context: &Context) {
+    let note = context.sections();
+    let Some(core) = note.waits_on.load(Relaxed).checked_sub(1) else {
+        return;
+    };
+    note.waits_on.store(0, Relaxed);
+    // SAFETY: by the section invariant a frame borrows it.
+    if let Some(lock) = unsafe { note.lock.swap(core::ptr::null_mut(), Acquire).as_ref() } {
+        let (word, bit) = bit_of(core);
+        lock.waiting[word].fetch_and(!bit, Relaxed);
+    }
+}
+
+/// Ends the section of a context that was abandoned in it. Interrupts are disabled.
+pub(super) fn end(context: &Context) {
+    stop_waiting(context);
+    let note = context.sections();
     // SAFETY: by the section invariant it lies in a frame, which nothing has used since.
-    while let Some(section) = unsafe { next.as_ref() } {
-        let own = core::ptr::from_ref(context).cast_mut();
-        // SAFETY: by the section invariant the frame borrows the lock.
-        let holder = unsafe { &*section.holder };
-        let (release, relaxed) = (Ordering::Release, Ordering::Relaxed);
-        // A context that was about to enter waits for another one's.
-        let _ = holder.compare_exchange(own, LOST, release, relaxed);
-        next = section.outer;
+    if let Some(lock) = unsafe { note.lock.swap(core::ptr::null_mut(), Acquire).as_ref() } {
+        release(lock, this_core::get().index);
     }
-    put_off_ns.store(0, Ordering::Relaxed);
+    note.put_off_ns.store(0, Relaxed);
 }
 
 /// Puts off the preemption of what runs on this core, `core`, if it is in a section.
 /// Reports whether it is put off. In an interrupt handler.
 pub fn puts_off(core: &Core, now_ns: u64) -> bool {
-    let SectionNote {
-        innermost,
-        put_off_ns,
-    } = core.context().sections();
-    if innermost.load(Ordering::Relaxed).is_null() {
+    let note = core.context().sections();
+    if !is_in_section(core.context()) || note.waits_on.load(Relaxed) != 0 {
         return false;
     }
-    let first_ns = match put_off_ns.load(Ordering::Relaxed) {
+    let put_off_ns = &note.put_off_ns;
+    let first_ns = match put_off_ns.load(Relaxed) {
         0 => {
-            put_off_ns.store(now_ns.max(1), Ordering::Relaxed);
+            put_off_ns.store(now_ns.max(1), Relaxed);
             now_ns
         }
         first_ns => first_ns,
@@ -165,5 +161,5 @@ pub fn puts_off(core: &Core, now_ns: u64) -> bool {
 
 /// Reports whether a preemption on this core has been put off. In an interrupt handler.
 pub fn has_put_off(core: &Core) -> bool {
-    core.context().sections().put_off_ns.load(Ordering::Relaxed) != 0
+    core.context().sections().put_off_ns.load(Relaxed) != 0
 }

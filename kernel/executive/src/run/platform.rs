@@ -6,13 +6,13 @@ use core::time::Duration;
 use fass::Occupation;
 use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
-use fass::platform::{Clock, LaunchError, Plan, Platform, RunConfig};
+use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig};
 use sched_dag::lifecycle::WaitId;
-use sched_dag::{DagId, WAITS};
+use sched_dag::{DagId, Instance, WAITS};
 
 use super::{edge, execution, occupation, record, stacks};
 use crate::machine::spinlock::SpinLock;
-use crate::machine::{clock, interrupt_flag, this_core};
+use crate::machine::{clock, interrupt_flag, section, this_core};
 
 /// The one kernel, as `fass` sees it.
 pub struct Kernel {
@@ -111,6 +111,19 @@ impl Platform for Kernel {
         }
     }
 
+    fn running(&self) -> Option<Instance> {
+        let were_enabled = interrupt_flag::disable();
+        let running = execution::running(this_core::get());
+        if were_enabled {
+            interrupt_flag::enable();
+        }
+        running
+    }
+
+    fn section(&self, lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
+        section::with(lock, section)
+    }
+
     fn at_edge(&self, work: &mut dyn FnMut(&mut Edge)) {
         work(&mut edge::get());
     }
@@ -120,11 +133,7 @@ impl Platform for Kernel {
     }
 
     fn log(&self, mut line: LogLine) {
-        let were_enabled = interrupt_flag::disable();
-        line.instance = execution::running(this_core::get());
-        if were_enabled {
-            interrupt_flag::enable();
-        }
+        line.instance = self.running();
         line.at_ns = execution::since_epoch(clock::now_ns());
         line.keep();
     }

@@ -348,7 +348,7 @@ pub(super) fn note(run: &Run, overheads: Overheads) {
     };
     for (dag, model) in (0..).map(DagId).zip(set.dags()) {
         let shares = |other: &&Dag| other.cluster() == model.cluster();
-        let overheads = overheads.among(set.dags().iter().filter(shares));
+        let overheads = overheads.among(set.dags().iter().filter(shares), run.options().cores);
         let overhead_ns = overheads.of_an_instance_ns(run.options().preemption);
         for (subtask, of_subtask) in (0..).map(SubtaskId).zip(model.subtasks()) {
             let Some(wcet_ns) = of_subtask.wcet_ns() else {

@@ -13,8 +13,8 @@ use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::JudgeOptions;
 use sched_dag::{
     Activation, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, CoreId, DagId, DagSpec,
-    FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions, SubtaskId,
-    SubtaskSpec, TaskSet, Wait, verify,
+    FaultLimit, LockUse, OnFault, OverrunPolicy, Policy, Preemption, Priority, SchedulerOptions,
+    SubtaskId, SubtaskSpec, TaskSet, Wait, verify,
 };
 
 use crate::options::Parsed;
@@ -377,6 +377,17 @@ impl Committed {
             let place = specs.get_mut(DagId(dag).index());
             let place = place.ok_or_else(|| in_commit("an affinity is of no dag".into()))?;
             place.affinity.push(core);
+        }
+        for (dag, subtask, lock, longest_ns, sections) in &told.locks {
+            let place = subtask_of(&mut specs, *dag, *subtask);
+            place.ok_or_else(|| in_commit("a lock is of no subtask".into()))?;
+            specs[DagId(*dag).index()].locks.push(LockUse {
+                subtask: SubtaskId(*subtask).index(),
+                lock: lock.clone(),
+                longest_ns: *longest_ns,
+                sections: *sections,
+                is_shared: false,
+            });
         }
         let clusters = match &told.clusters[..] {
             [] => CoreDivision::Undivided,

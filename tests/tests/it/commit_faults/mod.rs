@@ -310,7 +310,11 @@ fn every_reason_against_a_proof_is_listed() {
             NotProvenReason::SpanBeyondLimit { .. } => NotProvenReason::NoBoundByPeriod,
             NotProvenReason::NoBoundByPeriod => NotProvenReason::Pinned { subtask },
             NotProvenReason::Pinned { .. } => NotProvenReason::BesidePinned,
-            NotProvenReason::BesidePinned => NotProvenReason::Limit,
+            NotProvenReason::BesidePinned => NotProvenReason::UnboundedLock {
+                dag: DagId(1),
+                subtask,
+            },
+            NotProvenReason::UnboundedLock { .. } => NotProvenReason::Limit,
             NotProvenReason::Limit => NotProvenReason::NoCores,
             NotProvenReason::NoCores => NotProvenReason::Unknown(TaskError::VolumeOverflow),
             NotProvenReason::Unknown(TaskError::VolumeOverflow) => {

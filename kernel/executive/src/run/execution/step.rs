@@ -197,6 +197,7 @@ impl ClusterRun {
             );
             // The hold, or the turn, was the instance's.
             turns::leave(core);
+            section::stop_waiting(core.context());
             timer::set(Alarm::Hold, u64::MAX);
         }
         let next = match self.engine.placement.take_suspended(here) {

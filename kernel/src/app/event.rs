@@ -1,17 +1,7 @@
-//! A lock for what instances of an app share, and waiting for what another core does.
+//! Waiting for what another core does.
 //!
-//! A DAG needs none: its values move along its edges. This is for what is no DAG,
-//! such as the publish/subscribe baseline that DAGs are compared with, where
-//! several cores change one state.
-//!
-//! The holder is not preempted, or else it would block every core that wants the lock.
-//! So a section delays all that its core should do next: keep it short. One that takes
-//! longer than 1 ms is preempted all the same.
-//!
-//! A fault in a section ends the holder's DAG, as anywhere, and the lock is lost with
-//! it: the data may be half changed. An instance that waits for it, or takes it later, panics.
-//!
-//! # Events
+//! A DAG needs none of it: in a DAG an instance becomes ready when its inputs are there. This is for
+//! what is no DAG, such as the publish/subscribe baseline that DAGs are compared with.
 //!
 //! An [`Event`] is a count that only goes up: its *version*. A waiter has read the
 //! version, then looked for what it wants in vain, and now waits until the
@@ -32,62 +22,13 @@
 //! # }
 //! ```
 //!
-//! A waiting core halts; its instance keeps it, as the scheduler knows nothing of
-//! this. So waits belong to what is no DAG (see [`Lock`]): in a DAG an
-//! instance becomes ready when its inputs are there and never waits.
+//! A waiting core halts; its instance keeps it, as the scheduler knows nothing of this.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use executive::machine::section::{ContextLock, LockRefusal};
 use executive::machine::timer::{self, Alarm};
 use executive::machine::{clock, interrupt_flag, this_core, turns};
 use executive::text::console;
-
-/// Data that one instance at a time may use.
-///
-/// ```no_run
-/// use kernel::Lock;
-///
-/// static SEEN: Lock<u64> = Lock::new(0);
-///
-/// fn saw_one() -> u64 {
-///     SEEN.with(|seen| {
-///         *seen += 1;
-///         *seen
-///     })
-/// }
-/// ```
-#[derive(Debug)]
-pub struct Lock<T>(ContextLock<T>);
-
-impl<T> Lock<T> {
-    /// Makes a lock that is free.
-    #[must_use]
-    pub const fn new(data: T) -> Self {
-        Self(ContextLock::new(data))
-    }
-
-    /// Waits until nobody uses the data and lends it to `section`.
-    ///
-    /// # Panics
-    ///
-    /// If the caller is in a section of this lock already, or a fault has ended an
-    /// instance that was.
-    #[track_caller]
-    pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
-        match self.0.with(section) {
-            Ok(result) => result,
-            Err(LockRefusal::HeldByCaller) => {
-                panic!(
-                    "a lock is taken by its holder, which would wait for ever; end the section first"
-                )
-            }
-            Err(LockRefusal::HolderEnded) => {
-                panic!("a fault has ended a section of this lock; its data may be half changed")
-            }
-        }
-    }
-}
 
 /// Something that cores wait for.
 ///

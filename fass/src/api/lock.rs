@@ -1,0 +1,300 @@
+//! Locks: data that instances change in sections of their functions, one at a time.
+//!
+//! A DAG needs none: its values move along its edges, and what its subtasks share is a
+//! [`State`](crate::shared::State). A lock is for what is no DAG, such as a driver's registers that
+//! subtasks of several DAGs change.
+//!
+//! For our purposes a *section* is one call of [`Lock::with`]. Sections of one lock exclude each
+//! other, on all cores, and waiting cores take turns. Where instances are preempted, one in a section
+//! is not, or else it would block every core that wants the lock: so a section delays all that its core
+//! should do next. Hence a lock states its [longest section](Lock::longest), and a subtask how many it
+//! [enters](Lock::entering); the analysis charges for both.
+//!
+//! # What is guaranteed
+//!
+//! - An instance whose subtask does not state the lock, or fewer sections, fails before it enters.
+//! - Where a lock has no longest section, no DAG on the cores of its users has a bound.
+//! - A section that takes longer than stated is said in the [log](mod@crate::log): bounds do not
+//!   hold then. One that takes longer than [`LONGEST_SECTION`] is preempted.
+//!
+//! # What is not
+//!
+//! - A fault in a section loses the lock: its data may be half changed, and what enters it later fails.
+//! - Sections do not nest, of different locks neither.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::mem::ManuallyDrop;
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::Relaxed};
+use core::time::Duration;
+
+use sched_dag::Instance;
+
+use super::dag::Dag;
+use super::uses::{ResettableUses, Uses, sealed};
+use crate::platform::{expect_installed, installed};
+use crate::run::cell::{ExclusiveCell, SetOnce};
+use crate::run::replaceable::Reset;
+
+/// For how long a section may put off its core's preemption.
+pub const LONGEST_SECTION: Duration = Duration::from_millis(1);
+
+/// The words by which a platform keeps the sections of a lock apart; 0 in a lock that nobody has or
+/// wants.
+#[derive(Debug)]
+pub struct LockWords {
+    /// Whether somebody is in a section, and above that bit whose turn is next.
+    pub state: AtomicU32,
+    /// The cores that wait, as bits.
+    pub waiting: [AtomicU64; 4],
+}
+
+/// Data that one instance at a time may use.
+///
+/// ```
+/// use core::time::Duration;
+/// use fass::shared::Lock;
+/// use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+///
+/// static SEEN: Lock<u64> = Lock::new("seen", 0).longest(Duration::from_micros(2));
+///
+/// let machine = virtual_time::VirtualTime::new();
+/// let (dag, period) = (create_dag(), Duration::from_millis(10));
+/// dag.jobs(3).period(period).relative_deadline(period);
+/// dag.using(SEEN.entering(1))
+///     .source(|()| SEEN.with(|seen| *seen += 1))
+///     .register(SubtaskAttributes::named("look"));
+/// finish_create_dags(&[dag]).unwrap();
+/// machine.run();
+/// assert_eq!(SEEN.with(|seen| *seen), 3);
+/// ```
+pub struct Lock<T> {
+    name: &'static str,
+    longest_ns: Option<u64>,
+    /// The longest section that was said to be too long.
+    said_ns: AtomicU64,
+    first_user: SetOnce<Arc<LockUser>>,
+    words: LockWords,
+    data: ExclusiveCell<T>,
+}
+
+/// A subtask that enters sections, among those of its lock.
+struct LockUser {
+    is_taken: AtomicBool,
+    /// The latest instance: its DAG and subtask, and its job.
+    ids: AtomicU64,
+    job: AtomicU64,
+    /// How many sections it may still enter.
+    left: AtomicU32,
+    next: SetOnce<Arc<Self>>,
+}
+
+/// What a subtask states: that its instances enter sections of a lock. Made by [`Lock::entering`].
+#[must_use = "a use has no effect until a subtask is registered with it"]
+pub struct LockUse {
+    name: &'static str,
+    longest_ns: Option<u64>,
+    permit: Arc<Permit>,
+}
+
+/// What a subtask may enter.
+pub struct Permit {
+    user: Arc<LockUser>,
+    sections: u32,
+}
+
+impl<T> Lock<T> {
+    /// Makes a lock that is free. Locks of one name count as one in the analysis.
+    #[must_use]
+    pub const fn new(name: &'static str, data: T) -> Self {
+        Self {
+            name,
+            longest_ns: None,
+            said_ns: AtomicU64::new(0),
+            first_user: SetOnce::new(),
+            words: LockWords {
+                state: AtomicU32::new(0),
+                waiting: [const { AtomicU64::new(0) }; 4],
+            },
+            data: ExclusiveCell::new(data),
+        }
+    }
+
+    /// States the longest time that a section takes, with what interrupts it.
+    ///
+    /// # Panics
+    ///
+    /// If that is longer than [`LONGEST_SECTION`].
+    #[must_use]
+    pub const fn longest(mut self, section: Duration) -> Self {
+        assert!(
+            section.as_nanos() <= LONGEST_SECTION.as_nanos(),
+            "a section of more than 1 ms is preempted, and no bound holds; make it shorter"
+        );
+        self.longest_ns = Some(section.as_secs() * 1_000_000_000 + section.subsec_nanos() as u64);
+        self
+    }
+
+    /// States that each instance of a subtask enters so many sections at most.
+    pub fn entering(&self, sections: u32) -> LockUse {
+        let mut place = &self.first_user;
+        let user = loop {
+            place.set(Arc::default());
+            let Some(user) = place.get() else { continue };
+            if !user.is_taken.swap(true, Relaxed) {
+                break Arc::clone(user);
+            }
+            place = &user.next;
+        };
+        LockUse {
+            name: self.name,
+            longest_ns: self.longest_ns,
+            permit: Arc::new(Permit { user, sections }),
+        }
+    }
+
+    /// Waits until nobody uses the data and lends it to `section`.
+    ///
+    /// The app's main function needs no statement: no run goes on then.
+    ///
+    /// # Panics
+    ///
+    /// If the caller is an instance that has not stated it, or fewer sections; if it is in a
+    /// section already; or if a fault has ended a section of this lock.
+    #[track_caller]
+    pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
+        let (platform, name) = (expect_installed(), self.name);
+        if let Some(instance) = platform.running() {
+            self.admit(instance);
+        }
+        let (mut section, mut result) = (Some(section), None);
+        let took_ns = platform.section(&self.words, &mut || {
+            // What a fault has ended never gives its claim back.
+            if let (Some(section), Some(data)) = (section.take(), self.data.change()) {
+                let mut data = ManuallyDrop::new(data);
+                result = Some(section(&mut data));
+                drop(ManuallyDrop::into_inner(data));
+            }
+        });
+        let Some(took_ns) = took_ns else {
+            panic!("lock `{name}`: the caller is in a section already; end that first")
+        };
+        let Some(result) = result else {
+            panic!("lock `{name}`: a fault has ended a section, and its data may be half changed")
+        };
+        self.judge(took_ns);
+        result
+    }
+
+    #[track_caller]
+    fn admit(&self, instance: Instance) {
+        let (mut next, mut is_stated) = (self.first_user.get(), false);
+        while let Some(user) = next {
+            if user.is_of(instance) {
+                is_stated = true;
+                let left = user.left.load(Relaxed);
+                if left > 0 {
+                    user.left.store(left - 1, Relaxed);
+                    return;
+                }
+            }
+            next = user.next.get();
+        }
+        let fault = match is_stated {
+            true => "enters more sections than it states; state them all",
+            false => "enters a section and has not stated that",
+        };
+        let name = self.name;
+        panic!("lock `{name}`: the subtask {fault}, by `dag.using(lock.entering(N))`")
+    }
+
+    fn judge(&self, took_ns: u64) {
+        let longest_ns = self.longest_ns.unwrap_or(u64::MAX);
+        if took_ns > longest_ns && self.said_ns.fetch_max(took_ns, Relaxed) < took_ns {
+            let text = "a section has taken longer than its lock states, so no bound holds";
+            let lock = self.name;
+            crate::log!(
+                Error,
+                text,
+                lock = lock,
+                took_ns = took_ns,
+                longest_ns = longest_ns
+            );
+        }
+    }
+}
+
+/// The ids of no instance.
+const NOBODY: u64 = u64::MAX;
+
+fn ids(instance: Instance) -> u64 {
+    u64::from(instance.dag.0) << 32 | u64::from(instance.subtask.0)
+}
+
+impl LockUser {
+    fn is_of(&self, instance: Instance) -> bool {
+        self.ids.load(Relaxed) == ids(instance) && self.job.load(Relaxed) == instance.job
+    }
+}
+
+impl Default for LockUser {
+    fn default() -> Self {
+        Self {
+            is_taken: AtomicBool::new(false),
+            ids: AtomicU64::new(NOBODY),
+            job: AtomicU64::new(0),
+            left: AtomicU32::new(0),
+            next: SetOnce::new(),
+        }
+    }
+}
+
+impl Drop for Permit {
+    fn drop(&mut self) {
+        self.user.ids.store(NOBODY, Relaxed);
+        self.user.is_taken.store(false, Relaxed);
+    }
+}
+
+impl sealed::Sealed for LockUse {}
+
+impl Uses for LockUse {
+    type Borrowed<'a> = ();
+    type Held = Arc<Permit>;
+    type Guard<'a> = ();
+
+    fn hold(self, dag: &Dag, subtask: usize) -> Arc<Permit> {
+        dag.draft.borrow_mut().spec.locks.push(sched_dag::LockUse {
+            subtask,
+            lock: self.name.into(),
+            longest_ns: self.longest_ns,
+            sections: self.permit.sections,
+            is_shared: false,
+        });
+        self.permit
+    }
+
+    fn enter(held: &mut Arc<Permit>) {
+        if let Some(instance) = installed().and_then(|platform| platform.running()) {
+            let Permit { user, sections } = &**held;
+            user.left.store(*sections, Relaxed);
+            user.job.store(instance.job, Relaxed);
+            user.ids.store(ids(instance), Relaxed);
+        }
+    }
+
+    fn borrow((): &mut ()) {}
+}
+
+impl ResettableUses for LockUse {
+    fn another(held: &Arc<Permit>) -> Arc<Permit> {
+        Arc::clone(held)
+    }
+
+    fn states(_: &Arc<Permit>) -> Vec<Arc<dyn Reset>> {
+        Vec::new()
+    }
+}
+
+shown_as!(Lock<T>, |of| of.name);
+shown_as!(LockUse, |of| of.name);
