@@ -25,8 +25,11 @@ const LINES: u64 = 10;
 
 type Work = Box<dyn FnMut() + Send>;
 
-/// Disturbances, each with its name.
-const CAUSES: [(&str, fn() -> Vec<Dag>); 9] = [
+/// A disturbance: its name, and what makes its DAGs.
+type Cause = (&'static str, fn() -> Vec<Dag>);
+
+/// All of them.
+const CAUSES: [Cause; 9] = [
     ("none", Vec::new),
     ("releases", releases),
     ("wakes", wakes),
