@@ -181,7 +181,8 @@ impl WitnessText {
             }
             for &sink in dag.sinks() {
                 let deadline_ns = dag.subtask(sink).relative_deadline_ns();
-                if deadline_ns < dag.relative_deadline_ns() {
+                // One that shares a state may precede others, which the graph alone does not tell.
+                if deadline_ns < dag.relative_deadline_ns() || !dag.successors(sink).is_empty() {
                     self.line(format_args!("due {} {deadline_ns}", sink.0));
                 }
             }

@@ -68,8 +68,10 @@ fn sinks(case: &AnalysisInput<'_>, _: Responses<'_>, found: &mut SinkBounds) {
 }
 
 fn certificate(case: &AnalysisInput<'_>, bounds: &[Option<DagBound>], text: &mut WitnessText) {
-    let by_demand = |bound: &DagBound| bound.test == SchedulabilityTest::Demand;
-    if (case.relation.ranks_sinks || bounds.iter().flatten().any(by_demand))
+    let is_used = |bound: &DagBound| {
+        case.relation.ranks_sinks || bound.test == SchedulabilityTest::Demand
+    };
+    if bounds.iter().flatten().any(is_used)
         && let Some((busy, times)) = demand(case)
     {
         let numbers = core::iter::once(busy).chain(times);
