@@ -97,7 +97,7 @@ pub(crate) fn hashed(text: &str) -> String {
 }
 
 /// Returns why bounds do not hold for the DAGs that a witness states: the analysis, which virtual
-/// time judges in [`kinds`](super::kinds), does not prove as much.
+/// time judges in [`together`](super::together), does not prove as much.
 fn unsound(text: &str, lines: &[String]) -> Option<String> {
     let (task_set, settings) = stated(text)?;
     let analysed = answer(&task_set, &settings);
@@ -171,6 +171,8 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
         preemption: Preemption::Enabled,
         cores,
         clusters: sched_dag::CoreDivision::Undivided,
+        is_lent: false,
+        dispatch_ns: 0,
     };
     // Only a shared state makes a sink precede another subtask.
     let task_set = sample.task_set()?;

@@ -1,10 +1,11 @@
 //! Random task sets from a seed.
 
 use common::random::Random;
-use sched_dag::analysis::{AnalysisSettings, Overheads};
+use sched_dag::analysis::{AnalysisSettings, Overheads, assign};
 use sched_dag::{
-    Activation, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagSpec, Policy,
-    Preemption, SubtaskOrder, TaskSet, Wait, verify,
+    Activation, AssignmentReason, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, Dag,
+    DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, StateSpec, StateUser,
+    SubtaskOrder, SubtaskSpec, TaskSet, Wait, verify,
 };
 
 use super::drawn::set;
@@ -17,6 +18,9 @@ pub(crate) struct Sample {
     pub(crate) preemption: Preemption,
     pub(crate) cores: u32,
     pub(crate) clusters: CoreDivision,
+    /// Whether the commit assigns cores, which DAGs may lend.
+    pub(crate) is_lent: bool,
+    pub(crate) dispatch_ns: u64,
 }
 
 impl Sample {
@@ -25,7 +29,10 @@ impl Sample {
             policy: self.policy,
             preemption: self.preemption,
             cores: self.cores,
-            overheads: Overheads::default(),
+            overheads: Overheads {
+                dispatch_ns: self.dispatch_ns,
+                ..Overheads::default()
+            },
         }
     }
 
@@ -34,84 +41,233 @@ impl Sample {
         let options = CommitOptions::new(self.policy, self.cores)
             .with_construction(ConstructionPolicy::any_graph())
             .with_clusters(self.clusters.clone());
-        Some(verify(&self.specs, &options).ok()?.task_set)
-    }
-}
-
-/// A kind of task sets, which differ in what the analysis has cases for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Kind {
-    pub(crate) is_edf: bool,
-    /// Whether each subtask keeps its core; `None`: some do.
-    pub(crate) keeps: Option<bool>,
-    pub(crate) is_divided: bool,
-    /// Whether some sinks have deadlines of their own.
-    pub(crate) has_sinks: bool,
-    /// Whether an order is fixed for some DAGs.
-    pub(crate) is_fixed: bool,
-}
-
-impl Kind {
-    pub(crate) const COUNT: usize = 48;
-
-    /// Returns the kind of a number below the count.
-    pub(crate) const fn number(number: usize) -> Self {
-        Self {
-            is_edf: number % 2 == 1,
-            is_divided: number / 2 % 2 == 1,
-            has_sinks: number / 4 % 2 == 1,
-            is_fixed: number / 8 % 2 == 1,
-            keeps: [Some(false), Some(true), None][number / 16],
+        let mut task_set = verify(&self.specs, &options).ok()?.task_set;
+        if self.is_lent {
+            assign(&mut task_set, &self.settings()).ok()?;
         }
+        Some(task_set)
+    }
+
+    /// Returns the features of each cluster of what a commit has made of it.
+    pub(crate) fn features(&self, task_set: &TaskSet) -> Vec<u32> {
+        let mut subtasks = self.specs.iter().flat_map(|spec| &spec.subtasks);
+        let is_preempted = self.preemption == Preemption::Enabled;
+        let some_keep = is_preempted && subtasks.any(|subtask| subtask.non_preemptive);
+        let clusters = task_set.clusters().map(|cluster| {
+            let cores = task_set.cores_of(cluster, self.cores).len();
+            let of_machine = mask(&[
+                ("static", self.policy == Policy::StaticPriority),
+                ("edf", self.policy == Policy::Edf),
+                ("preempt", is_preempted && !some_keep),
+                ("keep", !is_preempted),
+                ("somekeep", some_keep),
+                ("one core", cores == 1),
+                ("clusters", task_set.is_divided()),
+            ]);
+            let dags = self.specs.iter().zip(task_set.dags());
+            let here = dags.filter(|(_, dag)| dag.cluster() == cluster);
+            here.fold(of_machine, |all, (spec, dag)| all | of_dag(spec, dag))
+        });
+        clusters.collect()
     }
 }
 
-/// Draws a task set of any kind.
+/// What a set or a run may have, which a test of schedulability may model or not.
+pub(crate) const FEATURES: [&str; 20] = [
+    "static", "edf", "preempt", "keep", "somekeep", "one core", "clusters", "pins", "groups",
+    "lent", "sinks", "waits", "overlap", "few", "sporadic", "order", "states", "faults", "pauses",
+    "modes",
+];
+
+/// Returns the bits of those features that there are.
+pub(crate) fn mask(features: &[(&str, bool)]) -> u32 {
+    let present = features.iter().filter(|(_, is_present)| *is_present);
+    present.fold(0, |all, (name, _)| all | bit(name))
+}
+
+fn bit(name: &str) -> u32 {
+    let at = FEATURES.iter().position(|feature| *feature == name);
+    1 << at.expect("a feature")
+}
+
+/// Returns the features of a DAG that was committed.
+fn of_dag(spec: &DagSpec, dag: &Dag) -> u32 {
+    use AssignmentReason::{Member, Owner};
+    let any = |is: fn(&SubtaskSpec) -> bool| spec.subtasks.iter().any(is);
+    mask(&[
+        ("pins", any(|of| of.core.is_some())),
+        ("groups", !spec.affinity.is_empty()),
+        (
+            "lent",
+            matches!(dag.why_there(), Some(Owner { .. } | Member { .. })),
+        ),
+        ("sinks", any(|of| of.relative_deadline_ns.is_some())),
+        ("waits", any(|of| !of.waits.is_empty())),
+        ("overlap", spec.relative_deadline_ns > spec.period_ns),
+        ("few", spec.in_flight.is_some()),
+        ("sporadic", dag.is_sporadic()),
+        ("order", spec.order == SubtaskOrder::Fixed),
+        ("states", !spec.states.is_empty()),
+    ])
+}
+
+/// Draws a task set with any features but lent cores.
 pub(crate) fn sample(random: &mut Random) -> Sample {
-    let kind = Kind::number(random.index(Kind::COUNT));
-    sample_of(kind, random)
+    let mut sample = sample_with(0, random);
+    sample.is_lent = false;
+    sample
 }
 
-/// Draws a task set for up to 5 cores.
-pub(crate) fn sample_of(kind: Kind, random: &mut Random) -> Sample {
-    let cores = random.within(1 + u32::from(kind.is_divided)..=5);
+/// Draws a task set for up to 5 cores with the wanted features, where these go together.
+pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
+    let wants = |name| wanted & bit(name) != 0;
+    let is_lent = wants("lent") || random.chance(8);
+    // What lends cores has few of the others, or no core is left to lend.
+    let share = if is_lent { 5 } else { 20 };
+    let drawn = (0..FEATURES.len()).map(|feature| u32::from(random.chance(share)) << feature);
+    let all = drawn.fold(wanted, |all, drawn| all | drawn);
+    let has_one = wants("one core") && !is_lent;
+    let is_divided = all & bit("clusters") != 0 && !has_one && !is_lent;
+    let is_edf = !is_lent && !wants("static") && (wants("edf") || random.once_in(2));
+    let keeps = ["preempt", "keep", "somekeep"]
+        .into_iter()
+        .rfind(|kind| wants(kind));
+    let any = random.one_of(&["preempt", "preempt", "keep", "somekeep"]);
+    let keeps = keeps.unwrap_or(any);
+
+    let most = if has_one { 1 } else { 5 };
+    let mut cores = random.within(1 + u32::from(is_divided)..=most);
     let first = random.within(1..=(cores - 1).max(1));
-    let sizes = match kind.is_divided {
-        true => vec![first, cores - first],
-        false => vec![cores],
-    };
+    let mut sizes = vec![cores];
+    if is_divided {
+        sizes = vec![first, cores - first];
+    }
     let mut specs = set(random, 1, &sizes);
+    if is_lent || !is_divided && !has_one && random.chance(30) {
+        (specs, cores) = super::lent::set(random);
+        sizes = vec![cores];
+    }
+    // Less load than a set is drawn for leaves more to prove.
+    let slack = if is_lent { 4 } else { random.within(4..=16) };
     for (spec, number) in specs.iter_mut().zip(0..) {
-        for (position, subtask) in spec.subtasks.iter_mut().enumerate() {
-            let first = number == 0 && position == 0;
-            subtask.non_preemptive = kind.keeps.is_none() && (first || random.once_in(2));
+        spec.cluster = is_divided.then_some(ClusterId(number % 2));
+        let own = [(); 3].map(|()| u32::try_from(random.number() >> 32).unwrap_or(0));
+        let own = if number == 0 {
+            all
+        } else {
+            all & own[0] & (own[1] | own[2])
+        };
+        spec.period_ns = spec.period_ns.map(|ns| ns * slack / 4);
+        spec.relative_deadline_ns = spec.relative_deadline_ns.map(|ns| ns * slack / 4);
+        for (place, subtask) in spec.subtasks.iter_mut().enumerate() {
+            let first = number == 0 && place == 0;
+            subtask.non_preemptive = keeps == "somekeep" && (first || random.once_in(2));
         }
-        if kind.has_sinks && (number == 0 || random.once_in(3)) {
-            draw_sinks(random, spec);
-        }
-        if kind.is_fixed && (number == 0 || random.once_in(3)) {
-            spec.order = SubtaskOrder::Fixed;
-        }
-        if random.once_in(8) {
-            spec.activation = Activation::Sporadic;
-        }
-        if random.once_in(10) {
-            spec.in_flight = Some(random.within(1..=2));
-        }
-        spec.cluster = kind.is_divided.then_some(ClusterId(number % 2));
+        add(spec, own, random);
+    }
+    if !is_lent {
+        confine(&mut specs, &sizes, all, random);
     }
     Sample {
         specs,
-        policy: [Policy::StaticPriority, Policy::Edf][usize::from(kind.is_edf)],
-        preemption: match kind.keeps {
-            Some(true) => Preemption::Disabled,
+        policy: [Policy::StaticPriority, Policy::Edf][usize::from(is_edf)],
+        preemption: match keeps {
+            "keep" => Preemption::Disabled,
             _ => Preemption::Enabled,
         },
         cores,
-        clusters: match kind.is_divided {
+        clusters: match is_divided {
             true => CoreDivision::Of(sizes),
             false => CoreDivision::Undivided,
         },
+        is_lent,
+        dispatch_ns: random.within(0..=5_u64).saturating_sub(3),
+    }
+}
+
+/// Gives a DAG features of its own, and what becomes of its faults and overruns.
+fn add(spec: &mut DagSpec, own: u32, random: &mut Random) {
+    let has = |name| own & bit(name) != 0;
+    if has("overlap") {
+        let period_ns = spec.period_ns.unwrap_or(1);
+        spec.relative_deadline_ns = Some(period_ns + random.within(1..=3 * period_ns));
+    }
+    spec.in_flight = has("few").then(|| random.within(1..=2));
+    if has("sporadic") {
+        spec.activation = Activation::Sporadic;
+    }
+    if has("order") {
+        spec.order = SubtaskOrder::Fixed;
+    }
+    if has("states") && spec.subtasks.len() > 1 {
+        let later = random.within(1..=spec.subtasks.len() - 1);
+        let users = [random.within(0..=later - 1), later];
+        let updates = true;
+        let users = users.map(|subtask| StateUser { subtask, updates });
+        let (name, users) = ("shared".into(), users.into());
+        spec.states.push(StateSpec { name, users });
+    }
+    if has("sinks") {
+        draw_sinks(random, spec);
+    }
+    if has("waits") {
+        draw_waits(random, spec);
+    }
+    if random.once_in(2) {
+        let [faults, in_all] = [9, 20].map(|most| random.within(1..=most));
+        let window = random.within(1..=9);
+        spec.on_fault = OnFault::DropJob(FaultLimit {
+            faults,
+            window,
+            in_all,
+        });
+    }
+    use OverrunPolicy::{Abort, Queue, Skip};
+    spec.overrun = random.one_of(&[Queue, Skip, Abort]);
+    if random.once_in(25) {
+        for subtask in &mut spec.subtasks {
+            (subtask.wcet_ns, subtask.waits) = (None, Vec::new());
+        }
+    }
+}
+
+/// Pins subtasks: of some DAGs all, in an order that edges fix, of others some in none; and leaves
+/// parts of clusters to what is not pinned.
+fn confine(specs: &mut [DagSpec], sizes: &[u32], all: u32, random: &mut Random) {
+    let mut owned = vec![0; sizes.len()];
+    let splits = sizes.iter().map(|&cores| random.within(0..=cores - 1));
+    let splits: Vec<u32> = splits.collect();
+    // In every other set all that is pinned has its order.
+    let kinds = random.one_of(&[3, 6]) * usize::from(all & bit("pins") != 0);
+    for spec in specs {
+        let cluster = spec.cluster.unwrap_or_default().index();
+        let (cores, first, split) = (sizes[cluster], owned[cluster], splits[cluster]);
+        match random.index(kinds.max(1)) {
+            1 | 2 | 5 if first < cores => {
+                owned[cluster] = random.within(first + 1..=cores);
+                let mut latest = vec![None; cores as usize];
+                for (number, subtask) in spec.subtasks.iter_mut().enumerate() {
+                    let core = random.within(first..=owned[cluster] - 1);
+                    subtask.core = Some(core);
+                    let before = latest[core as usize].replace(number);
+                    spec.edges.extend(before.map(|before| (before, number)));
+                }
+                spec.edges.sort_unstable();
+                spec.edges.dedup();
+            }
+            3 => {
+                for subtask in &mut spec.subtasks {
+                    let core = random.within(0..=cores - 1);
+                    subtask.core = random.chance(40).then_some(core);
+                }
+            }
+            _ => {}
+        }
+        if all & bit("groups") != 0 {
+            let groups = [0..split.max(1), split..cores];
+            let group = random.index(2) * usize::from(split > 0);
+            spec.affinity = groups[group].clone().collect();
+        }
     }
 }
 
@@ -122,30 +278,25 @@ fn draw_sinks(random: &mut Random, spec: &mut DagSpec) {
     let least = wcets.max().unwrap_or(1).min(deadline).max(deadline / 4);
     for (position, subtask) in spec.subtasks.iter_mut().enumerate() {
         if spec.edges.iter().all(|&(from, _)| from != position) && !random.once_in(3) {
-            subtask.relative_deadline_ns = Some(random.within(least..=deadline));
+            let latest = random.one_of(&[least, deadline]);
+            subtask.relative_deadline_ns = Some(random.within(least..=latest));
         }
     }
 }
 
 /// Gives some subtasks waits, whose segments may be unknown.
-pub(crate) fn draw_waits(random: &mut Random, specs: &mut [DagSpec]) {
-    for spec in specs {
-        let room = spec
-            .period_ns
-            .unwrap_or(8)
-            .min(spec.relative_deadline_ns.unwrap_or(8))
-            / 8;
-        for subtask in &mut spec.subtasks {
-            let mut left_ns = subtask.wcet_ns.unwrap_or(0);
-            let are_known = !random.once_in(5);
-            while random.once_in(4) && left_ns > 1 {
-                let segment_ns = random.within(1..=left_ns - 1);
-                left_ns -= segment_ns;
-                subtask.waits.push(Wait {
-                    limit_ns: random.within(0..=room),
-                    segment_ns: are_known.then_some(segment_ns),
-                });
-            }
+pub(crate) fn draw_waits(random: &mut Random, spec: &mut DagSpec) {
+    let room = spec.period_ns.min(spec.relative_deadline_ns).unwrap_or(8) / 8;
+    for subtask in &mut spec.subtasks {
+        let mut left_ns = subtask.wcet_ns.unwrap_or(0);
+        let are_known = !random.once_in(5);
+        while random.once_in(4) && left_ns > 1 {
+            let segment_ns = random.within(1..=left_ns - 1);
+            left_ns -= segment_ns;
+            subtask.waits.push(Wait {
+                limit_ns: random.within(0..=room),
+                segment_ns: are_known.then_some(segment_ns),
+            });
         }
     }
 }

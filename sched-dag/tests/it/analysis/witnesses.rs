@@ -10,9 +10,9 @@ use sched_dag::analysis::{AnalysisResult, DagBound, NotProvenReason, answer, ass
 use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, SubtaskId, TaskSet};
 
 use super::forged;
-use super::kinds::tighter;
-use super::random::{Sample, draw_waits, sample};
+use super::random::{Sample, sample};
 use super::simulate::{commit, spec};
+use super::together::tighter;
 use super::{FP, lent, settings};
 use crate::support::number;
 
@@ -41,20 +41,16 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     let mut to_alter = Vec::new();
     for seed in 0..=number("WITNESS_SETS", 1_000) {
         let mut random = Random::new(seed);
-        let mut sample = match seed {
+        let sample = match seed {
             0 => full_core(),
             1 => behind_unknown(),
             _ => sample(&mut random),
         };
-        if seed % 3 == 2 {
-            draw_waits(&mut random, &mut sample.specs);
-        }
         let is_divided = sample.clusters != CoreDivision::Undivided;
         let Some(task_set) = sample.task_set() else {
             continue;
         };
         let mut settings = sample.settings();
-        settings.overheads.dispatch_ns = random.within(0..=2.min(seed));
         settings.overheads.ready_ns = u64::from(seed % 4 == 2);
         let path = folder.join(seed.to_string());
         fs::write(&path, witness(&task_set, &settings)).unwrap();
@@ -65,7 +61,7 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
         for test in tests(&answer, &path) {
             let count = by_test.entry(test).or_default();
             *count += 1;
-            is_new |= *count <= 4;
+            is_new |= *count <= 2;
         }
         // What is altered is one witness.
         if seed == 1 || is_new && !is_divided {
@@ -90,7 +86,10 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     let [refused, same, sound] = counts.fold([0; 3], |[a, b, c], [d, e, f]| [a + d, b + e, c + f]);
     println!("altered: {refused} refused, {same} prove the same bounds, {sound} sound ones");
     // More of the same are numbers that the checker no longer computes.
-    assert!(refused > 2_000 && same <= 23, "{refused}, {same}");
+    assert!(
+        refused > 2_000 && same * 200 <= refused,
+        "{refused}, {same}"
+    );
     assert!(sound > 100, "no statement was altered: {sound}");
     assert!(by_test.len() >= 12, "some test was never used: {by_test:?}");
     fs::remove_dir_all(&folder).unwrap();
@@ -271,7 +270,8 @@ fn lines(task_set: &TaskSet, answer: &AnalysisResult) -> Vec<String> {
             for (sink, own_ns) in model.sinks().iter().zip(&answer.sinks_ns[dag]) {
                 let due_ns = model.subtask(*sink).relative_deadline_ns();
                 let own_ns = own_ns.expect("as its DAG has one");
-                if due_ns < deadline_ns || own_ns < bound_ns {
+                let is_inner = !model.successors(*sink).is_empty();
+                if due_ns < deadline_ns || own_ns < bound_ns || is_inner {
                     lines.push(format!("{begin}sink {}: at most {own_ns} ns", sink.0));
                 }
             }
@@ -310,5 +310,7 @@ fn full_core() -> Sample {
         preemption: Preemption::Enabled,
         cores: 1,
         clusters: CoreDivision::Undivided,
+        is_lent: false,
+        dispatch_ns: 0,
     }
 }

@@ -15,13 +15,12 @@ mod releases;
 mod waits;
 mod walk;
 
+use crate::support::number;
 use crate::support::set::{self, Set};
-use crate::support::{Script, driver, number};
 use common::random::Random;
 use devices::Counts;
 use releases::SAID;
 use sched_dag::journal::EventKind;
-use sched_dag::law::{JudgeOptions, dispatch_violations, violations};
 use sched_dag::lifecycle::{Request, WaitId};
 use sched_dag::{DagId, Instance};
 use walk::{Step, Walk};
@@ -153,33 +152,6 @@ fn every_order_of_events_keeps_the_rules() {
         let states = explore::explore(set)?;
         println!("{states} states");
         Ok(())
-    });
-}
-
-#[test]
-fn virtual_time_keeps_the_rules_where_instances_fail() {
-    let draw = |random: &mut Random| set::draw_disturbed(random).without_waits();
-    check(3_000, draw, |set, random| {
-        let mut signals: Vec<(u64, Request)> = Vec::new();
-        let dags = (0..).map(DagId).take(set.specs.len());
-        for dag in dags.filter(|&dag| set.is_sporadic(dag)) {
-            let times_ns = (0..random.within(0..=10)).map(|_| random.within(0..=60));
-            signals.extend(times_ns.map(|at_ns| (at_ns, Request::Signal(dag))));
-        }
-        signals.sort_by_key(|&(at_ns, _)| at_ns);
-        let run = Script::new(|instance| set.execution_ns(instance))
-            .failing(|instance| set.fails(instance))
-            .replacing(|instance| instance.subtask.0 != 1)
-            .asking(signals)
-            .run(driver(&set.specs(), set.options));
-        let events = || run.events.iter().copied();
-        let found = violations(&run.task_set, JudgeOptions::EXACT, events());
-        let of_dispatch =
-            dispatch_violations(&run.task_set, &set.options, JudgeOptions::EXACT, events());
-        match found.first().or(of_dispatch.first()) {
-            None => Ok(()),
-            Some(first) => Err(first.to_string()),
-        }
     });
 }
 

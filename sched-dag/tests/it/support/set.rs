@@ -251,13 +251,6 @@ impl Set {
         self.specs.clone()
     }
 
-    /// Returns it with subtasks that do not wait.
-    pub(crate) fn without_waits(mut self) -> Self {
-        let subtasks = self.specs.iter_mut().flat_map(|spec| &mut spec.subtasks);
-        subtasks.for_each(|subtask| subtask.waits.clear());
-        self
-    }
-
     /// Reports whether a DAG takes signals.
     pub(crate) fn is_sporadic(&self, dag: DagId) -> bool {
         self.specs[dag.index()].activation == Activation::Sporadic

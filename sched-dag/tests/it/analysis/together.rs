@@ -1,0 +1,232 @@
+//! Every bound against virtual time, in sets that have all features together.
+//!
+//! A set is drawn for a pair of [`FEATURES`], and with any of the others besides. Of its runs the
+//! worst so far is varied, again and again: its releases, executions and waits, as long as what
+//! responds comes no further away from its bound. Every other run has faults, pauses or modes, too.
+//! No job or sink that has a bound may respond later, miss a deadline, or find no room, and the law
+//! judges the first run of each climb. Offsets and activations are no matter of the analysis:
+//! half of the climbs have sporadic DAGs alone, so that any job may come at any time.
+//!
+//! A failure prints its seed, set and run. `ANALYSIS_SEED=n` draws its set alone;
+//! `ANALYSIS_JOBS=n` simulates so many jobs, on all processors. How many jobs had a bound is printed
+//! by pairs of features; of 10^8 each pair that has any has 10^5.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread;
+
+use common::random::Random;
+use sched_dag::analysis::{AnalysisResult, AnalysisSettings, answer, fix_orders};
+use sched_dag::{Activation, TaskSet};
+
+use super::climb::Case;
+use super::random::{FEATURES, sample_with};
+use crate::support::number;
+
+/// How many jobs are simulated where no other number is wanted.
+const JOBS: u64 = 400_000;
+
+/// How often the worst run of a climb is varied.
+const STEPS: u64 = 10;
+
+/// How many there are in the long form, where a pair of features has a thousandth of them.
+const ENOUGH: u64 = 100_000_000;
+
+const COUNT: usize = FEATURES.len();
+
+const PAIRS: u64 = (COUNT * COUNT) as u64;
+
+/// What has been simulated.
+#[derive(Default)]
+struct Coverage {
+    /// Drawn, and those of their DAGs that have a bound.
+    dags: u64,
+    bounds: u64,
+    jobs: u64,
+    by_test: BTreeMap<String, u64>,
+    /// Jobs of DAGs with a bound, by two features that their cluster or their run has.
+    of_pairs: [[u64; COUNT]; COUNT],
+    /// Sinks with a smaller bound than their job, and sets of which a fixed order shortens one.
+    tighter_sinks: u64,
+    shortened: u64,
+    breaches: Vec<String>,
+}
+
+impl Coverage {
+    /// Returns a pair of features with the fewest jobs of those that have any, and how many.
+    fn rarest(&self) -> (u64, u64) {
+        let jobs = (0..).zip(self.of_pairs.iter().flatten().copied());
+        let rarest = jobs.filter(|(_, jobs)| *jobs > 0).min_by_key(|of| of.1);
+        rarest.unwrap_or_default()
+    }
+
+    fn is_over(&self, wanted: u64) -> bool {
+        let is_thin = wanted >= ENOUGH && self.rarest().1 < ENOUGH / 1000;
+        let has_enough = self.jobs >= wanted && !(is_thin && self.jobs < 2 * wanted);
+        has_enough || self.breaches.len() > 9
+    }
+
+    fn add(&mut self, answer: &AnalysisResult, is_shorter: bool) {
+        self.dags += answer.bounds.len() as u64;
+        self.shortened += u64::from(is_shorter);
+        self.tighter_sinks += tighter(answer);
+        for bound in answer.bounds.iter().flatten() {
+            self.bounds += 1;
+            *self.by_test.entry(bound.test.to_string()).or_default() += 1;
+        }
+    }
+
+    /// Adds the jobs of each set of features.
+    fn count(&mut self, counts: BTreeMap<u32, u64>) {
+        for (features, jobs) in counts {
+            self.jobs += jobs;
+            let has = |feature: &usize| features >> feature & 1 == 1;
+            for one in (0..COUNT).filter(has) {
+                for other in (0..COUNT).filter(has) {
+                    self.of_pairs[one][other] += jobs;
+                }
+            }
+        }
+    }
+}
+
+/// Draws the set of a seed, and climbs.
+fn climb(seed: u64, all: &Mutex<Coverage>) {
+    let mut random = Random::new(seed);
+    let all = || all.lock().expect("no thread panics with it");
+    let pair = [seed % PAIRS / COUNT as u64, seed % COUNT as u64];
+    let mut sample = sample_with(1 << pair[0] | 1 << pair[1], &mut random);
+    for is_sporadic in [false, true] {
+        for spec in sample.specs.iter_mut().filter(|_| is_sporadic) {
+            spec.activation = Activation::Sporadic;
+        }
+        let Some(mut task_set) = sample.task_set() else {
+            return;
+        };
+        let (features, settings) = (sample.features(&task_set), sample.settings());
+        let free = answer(&task_set, &settings);
+        fix_orders(&mut task_set, &settings);
+        let answer = answer(&task_set, &settings);
+        let order = is_no_longer(&answer, &free);
+        let is_proven = answer.bounds.iter().all(Option::is_some);
+        if order.is_none() || answer.is_proven() != is_proven {
+            let found = format!("seed {seed}: {free:?}, {answer:?} of {sample:?}");
+            all().breaches.push(found);
+        }
+        if !is_sporadic {
+            all().add(&answer, order == Some(true));
+        }
+        let task_set = Arc::new(task_set);
+        let case = Case {
+            task_set,
+            settings,
+            answer,
+            features,
+        };
+        for is_disturbed in [false, true] {
+            match case.climb(&mut random, is_disturbed, STEPS) {
+                Ok(counts) => all().count(counts),
+                Err(found) => {
+                    let found = format!("seed {seed}: {found}\n{sample:?}\n{:?}", case.answer);
+                    return all().breaches.push(found);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn bounds_hold_whatever_features_come_together() {
+    let only = number("ANALYSIS_SEED", 0);
+    let wanted = number("ANALYSIS_JOBS", JOBS) * u64::from(only == 0);
+    let threads = match wanted > JOBS {
+        true => thread::available_parallelism().map_or(1, usize::from),
+        false => 1,
+    };
+    let (drawn, all) = (AtomicU64::new(0), Mutex::new(Coverage::default()));
+    let now = || all.lock().expect("no thread panics with it");
+    let work = || {
+        loop {
+            let number = drawn.fetch_add(1, Ordering::Relaxed);
+            // In the long form every other set is drawn for what is rare.
+            let pair = match wanted > JOBS && number % 2 == 1 {
+                true => now().rarest().0,
+                false => number / 2 * 7 % PAIRS,
+            };
+            let seed = number * PAIRS + pair;
+            climb(if only > 0 { only } else { seed }, &all);
+            if now().is_over(wanted) {
+                return;
+            }
+        }
+    };
+    thread::scope(|scope| (0..threads).for_each(|_| _ = scope.spawn(work)));
+    let all = now();
+    println!(
+        "{} bounds of {} DAGs: {:?}",
+        all.bounds, all.dags, all.by_test
+    );
+    println!(
+        "{} jobs, {} sinks with a smaller bound than their job, {} sets that a fixed order shortens",
+        all.jobs, all.tighter_sinks, all.shortened
+    );
+    println!("jobs with a bound, in thousands, by pairs of features:");
+    for (name, row) in FEATURES.iter().zip(&all.of_pairs) {
+        let row = row.iter().map(|jobs| format!("{:>7}", jobs.div_ceil(1000)));
+        println!("{name:>9}{}", row.collect::<String>());
+    }
+    assert!(all.breaches.is_empty(), "{}", all.breaches.join("\n"));
+    if only == 0 {
+        assert!(all.by_test.len() >= 9, "some test was never used");
+        assert!(4 * all.bounds > all.dags, "too few bounds say little");
+        assert!(all.tighter_sinks > 0 && all.shortened > 0, "too few");
+        let alone = (0..COUNT).map(|feature| all.of_pairs[feature][feature]);
+        assert!(alone.min() > Some(wanted / 500), "some feature is rare");
+        let (_, least) = all.rarest();
+        let is_thin = wanted >= ENOUGH && least < ENOUGH / 1000;
+        assert!(!is_thin, "a pair has {least} jobs");
+    }
+}
+
+/// Returns the first job or sink of some runs that does not keep its bound.
+pub(crate) fn breach(
+    task_set: &TaskSet,
+    settings: &AnalysisSettings,
+    answer: &AnalysisResult,
+    random: &mut Random,
+) -> Option<String> {
+    let case = Case {
+        task_set: Arc::new(task_set.clone()),
+        settings: *settings,
+        answer: answer.clone(),
+        features: Vec::new(),
+    };
+    case.climb(random, false, 2).err()
+}
+
+/// Counts the sinks with a smaller bound than their job.
+pub(crate) fn tighter(answer: &AnalysisResult) -> u64 {
+    let pairs = answer.bounds.iter().zip(&answer.sinks_ns);
+    let counts = pairs.map(|(whole, sinks_ns)| {
+        let whole_ns = whole.map(|whole| whole.bound_ns);
+        sinks_ns.iter().filter(|&&ns| ns < whole_ns).count() as u64
+    });
+    counts.sum()
+}
+
+/// Reports whether bounds are shorter than others; `None`: one is longer.
+fn is_no_longer(fixed: &AnalysisResult, free: &AnalysisResult) -> Option<bool> {
+    // None is longer than all.
+    let [fixed, free] = [fixed, free].map(|answer| {
+        let bounds = answer
+            .bounds
+            .iter()
+            .map(|bound| bound.map(|bound| bound.bound_ns));
+        bounds
+            .map(|bound| bound.unwrap_or(u64::MAX))
+            .collect::<Vec<_>>()
+    });
+    let is_longer = fixed.iter().zip(&free).any(|(fixed, free)| fixed > free);
+    (!is_longer).then_some(fixed != free)
+}
