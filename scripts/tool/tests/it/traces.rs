@@ -89,7 +89,7 @@ fn a_file_without_a_trace_or_with_a_damaged_one_is_2() {
 check-trace good.rec none.log | check-trace: none.log: there is no run in it; `./scripts/run --trace FILE` keeps one
 check-trace good.rec nothing.log | check-trace: nothing.log: there is no run in it; `./scripts/run --trace FILE` keeps one
 check-trace good.rec empty.rec | check-trace: empty.rec: no run of the file has an event
-check-trace good.rec cut.rec | check-trace: cut.rec: at byte 24: expected a frame of the length that it states, and more after it
+check-trace good.rec cut.rec | check-trace: cut.rec: there is no run in it; `./scripts/run --trace FILE` keeps one
 check-trace good.rec strange.rec | check-trace: strange.rec: events of run 0: Event { time_ns: 6, what: Ready, core: CoreId(0), dag: DagId(0), job: 0, subtask: Some(SubtaskId(1)) } is of nothing that was committed
 check-trace | which files?
 check-trace none | none: cannot be read
