@@ -24,7 +24,7 @@ use crate::system;
 pub fn most_stripped_bytes(app: &str) -> u64 {
     // `hand-off` and `join-latency` measure: their workloads and baselines are in the image.
     let own = match app {
-        "dag-file" | "drone" | "hand-off" | "join-latency" | "replay" => 624 << 10,
+        "dag-file" | "drone" | "faults" | "hand-off" | "join-latency" | "replay" => 624 << 10,
         "autoware" | "cruise" | "gait" => 704 << 10,
         // It has all of that, and waits.
         "camera" => 752 << 10,

@@ -55,7 +55,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let bound_ns = answer.verdict.bound().map_or(0, |bound| bound.as_nanos());
     let run = machine.run()?;
     json::emit("locks", |line| {
-        line.text("answer", &format!("{answer}"))
+        line.text("answer", format!("{answer}"))
             .number("bound_ns", u64::try_from(bound_ns).unwrap_or(u64::MAX))
             .number(
                 "longest_ns",

@@ -11,7 +11,7 @@
 //! one that waits sees each other core in the lock once at most. A context that waits can be
 //! preempted; it gives up its turn with its core.
 //!
-//! **Section invariant**: while the lock of a context's [`SectionNote`] is not null, it is that of a
+//! **Section invariant**: while the lock of a context's `SectionNote` is not null, it is that of a
 //! frame of [`with`] on the context's stack that has not returned, and borrowed by it.
 
 use core::sync::atomic::Ordering::{Acquire, Relaxed, Release};
