@@ -56,6 +56,9 @@ fn run(machine: &Linux, seed: u64, random: &mut Random) -> Run {
         subtask.computes = !random.once_in(4);
         // Sometimes it is exceeded.
         subtask.budget = random.once_in(20).then(|| ms(1));
+        if let (Some(budget), Some(wcet)) = (subtask.budget, &mut subtask.wcet) {
+            *wcet = budget.min(*wcet);
+        }
     }
     machine.change(|terms| {
         terms.scheduler.policy = set.policy;

@@ -40,7 +40,7 @@ fn the_faults_of_a_driver_end_its_dag_alone() {
         let (verdicts, faults) = (outcome.lines("containment"), outcome.lines("fault"));
         assert_eq!(
             [verdicts.len(), faults.len()],
-            [18; 2],
+            [19; 2],
             "{}",
             outcome.tail()
         );

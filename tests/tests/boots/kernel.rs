@@ -40,7 +40,7 @@ fn output_that_does_not_fit_is_counted() {
 fn faults_are_contained(guest: &Guest) {
     let outcome = guest.succeed();
     let (verdicts, faults) = (outcome.lines("containment"), outcome.lines("fault"));
-    assert_eq!(verdicts.len(), 3 * 18, "{}", outcome.tail());
+    assert_eq!(verdicts.len(), 3 * 19, "{}", outcome.tail());
     assert_eq!(faults.len(), verdicts.len(), "{}", outcome.tail());
     for (verdict, fault) in verdicts.iter().zip(&faults) {
         // The jobs that the DAG at fault has completed, of 30, and those that it has lost.

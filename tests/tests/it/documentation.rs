@@ -25,7 +25,7 @@ const FILES: [&str; 8] = [
     "sched-dag/src/engine/run.rs",
     "kernel/front/src/options.rs",
     "kernel/front/src/text/json.rs",
-    "kernel/src/app/lock.rs",
+    "kernel/src/app/event.rs",
     "sched-dag/src/law/distribution.rs",
     "kernel/front/src/text/mod.rs",
 ];

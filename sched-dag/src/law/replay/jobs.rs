@@ -41,6 +41,7 @@ use crate::ids::{DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind};
 use crate::law::sweep::DispatchState;
 use crate::law::{Violation, latest};
+use crate::policy::OverrunPolicy;
 
 /// The state of a job as the events so far tell it.
 #[derive(Default)]
@@ -246,6 +247,12 @@ impl JournalReplay<'_> {
     fn open_job(&mut self, event: &Event, release_ns: Option<u64>, mut begun: JobState) {
         let Event { dag, job, .. } = *event;
         let moment = self.moment(event);
+        // Only what is skipped at its deadline misses it at that instant (rule 4).
+        let early = self.dag(dag).given_up.take_if(|missed| missed.job == job);
+        if let (Some(event), Some(deadline_ns)) = (early, self.deadline_ns(dag, job)) {
+            self.found
+                .push(Violation::MissedEarly { event, deadline_ns });
+        }
         // Judged when it was written; by now only the latest one of its run is known.
         if let (Some(missed), Some(deadline_ns)) = (&mut begun.missed, self.deadline_ns(dag, job)) {
             missed.time_ns = deadline_ns + 1;
@@ -320,9 +327,14 @@ impl JournalReplay<'_> {
     }
 
     /// R4 for a job that has missed its deadline before it was released.
-    fn missed_while_waiting(&self, event: &Event) -> Option<Violation> {
+    fn missed_while_waiting(&mut self, event: &Event) -> Option<Violation> {
         let event = *event;
         let deadline_ns = self.deadline_ns(event.dag, event.job)?;
+        let may_be_given_up = self.task_set.dag(event.dag).overrun() == OverrunPolicy::Abort;
+        if event.time_ns == deadline_ns && may_be_given_up {
+            self.dag(event.dag).given_up = Some(event);
+            return None;
+        }
         if event.time_ns <= deadline_ns {
             return Some(Violation::MissedEarly { event, deadline_ns });
         }

@@ -117,6 +117,8 @@ struct DagReplay {
     jobs: BTreeMap<u64, JobState>,
     /// The jobs that are due and not released.
     waiting: Backlog,
+    /// The latest waiting job that missed its deadline at that instant, and is to be skipped.
+    given_up: Option<Event>,
     /// How many jobs were released and are not complete.
     in_flight: u32,
     /// All jobs before this one are forgotten or not complete.
