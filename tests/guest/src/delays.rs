@@ -120,7 +120,7 @@ fn faults(budget_us: u64, work: fn()) -> Vec<Dag> {
         window: 1,
         in_all: 1_000,
     });
-    let attributes = named("fails").priority(5).wcet(us(60));
+    let attributes = named("fails").priority(5).wcet(us(budget_us));
     let made = move || move |()| work();
     (dag.restarting(made)).register(attributes.budget(us(budget_us)));
     alloc::vec![dag]
