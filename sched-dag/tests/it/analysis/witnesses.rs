@@ -314,3 +314,101 @@ fn full_core() -> Sample {
         dispatch_ns: 0,
     }
 }
+
+/// `low` waits for `high`, which is pinned in part: it may be pending and leave core 0 to `low`, so that
+/// two of its jobs come close together. `low` takes 28, and without what was left before, 20.
+const PINNED_IN_PART: &str = "\
+machine 2 static 0
+dag 0 100 100 1 1 0 owner
+subtask 10 0 0
+pin 0 1
+dag 1 20 20 1 2 1 high
+subtask 1 1 0
+subtask 9 1 0
+edge 0 1
+pin 0 1
+affinity 0
+dag 2 100 100 1 1 0 low
+subtask 10 2 0
+affinity 0
+hash 0
+graph 0 10 10
+levels 10
+cover 0
+part 0
+graph 1 10 10
+levels 10 9
+cover 0 1
+part 0 1
+graph 2 10 10
+levels 10
+cover 0
+part 0
+bound 0 30 paths 1 1 0 0 20
+chain 0
+other 1 20 1 20
+bound 1 20 paths 1 1 0 0 10
+chain 0 1
+other 0 30 1 10
+bound 2 20 sequence 0
+seal 0
+";
+
+/// `low` waits for `high`, which is not of its group, but of its core.
+const GROUPS_OVERLAP: &str = "\
+machine 2 static 0
+dag 0 100 100 1 1 0 low
+subtask 10 5 0
+affinity 0
+dag 1 100 100 1 1 0 high
+subtask 90 1 0
+hash 0
+graph 0 10 10
+levels 10
+cover 0
+part 0
+graph 1 90 90
+levels 90
+cover 0
+part 0
+bound 0 10 paths 1 1 0 0 0
+chain 0
+bound 1 90 paths 1 2 0 0 0
+chain 0
+seal 0
+";
+
+/// Its earlier jobs are too many to be counted one by one.
+const MANY_JOBS: &str = "\
+machine 1 static 0
+dag 0 1 1000000000000 1000000000000 1 0 late
+subtask 1 5 0
+hash 0
+graph 0 1 1
+levels 1
+bound 0 900000000000 overlap 0
+window 1 0
+seal 0
+";
+
+#[test]
+fn what_is_forged_next_to_pinned_subtasks_or_too_large_is_refused() {
+    let many_cores = GROUPS_OVERLAP.replace("machine 2", "machine 1000000000000");
+    let other_digits = MANY_JOBS.replace("machine 1", "machine \u{661}");
+    let forged = [
+        (PINNED_IN_PART, "dag 2: pinned in part"),
+        (GROUPS_OVERLAP, "groups overlap"),
+        (MANY_JOBS, "dag 0: its other jobs"),
+        (&many_cores, "impossible numbers of the machine"),
+        (&other_digits, "is no number of a witness"),
+    ];
+    let file = std::env::temp_dir().join(format!("forged-{}", std::process::id()));
+    for (text, why) in forged {
+        fs::write(&file, super::forged::hashed(text)).expect("a file");
+        let output = output(&[file.display().to_string()]);
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains(why), "{said}");
+    }
+    fs::remove_file(&file).expect("it was written");
+}
