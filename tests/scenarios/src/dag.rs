@@ -58,7 +58,8 @@ pub struct SubtaskText {
     pub(crate) after: Vec<String>,
     /// Its priority, if it is not the one that its DAG's deadline gives it.
     pub priority: Option<u32>,
-    pub(crate) wcet: Option<Duration>,
+    /// The longest that it executes.
+    pub wcet: Option<Duration>,
     /// How long a call of it may compute.
     pub budget: Option<Duration>,
     pub(crate) due: Option<Duration>,

@@ -6,7 +6,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use common::random::Random;
-use sched_dag::analysis::{AnalysisResult, DagBound, NotProvenReason, answer, assign, witness};
+use sched_dag::analysis::{
+    AnalysisResult, AnalysisSettings, DagBound, NotProvenReason, answer, assign, witness,
+};
 use sched_dag::{ClusterId, CoreDivision, Policy, Preemption, SubtaskId, TaskSet};
 
 use super::forged;
@@ -100,6 +102,13 @@ fn every_divided_set_has_a_witness_and_no_altered_one_passes() {
     let folder = std::env::temp_dir().join(format!("lent-{}", std::process::id()));
     fs::create_dir_all(&folder).unwrap();
     let (mut files, mut expected) = (Vec::new(), Vec::new());
+    let mut add = |name: String, task_set: &TaskSet, settings: &AnalysisSettings| {
+        let path = folder.join(name);
+        fs::write(&path, witness(task_set, settings)).unwrap();
+        files.push(path.to_string_lossy().into_owned());
+        expected.push(lines(task_set, &answer(task_set, settings)));
+    };
+    let mut divided = 0;
     for seed in 1..=number("WITNESS_SETS", 300) {
         let (specs, cores) = lent::set(&mut Random::new(seed));
         let mut task_set = commit(&specs, Policy::StaticPriority, cores);
@@ -109,30 +118,21 @@ fn every_divided_set_has_a_witness_and_no_altered_one_passes() {
         if assign(&mut task_set, &settings).is_err() {
             continue;
         }
-        let path = folder.join(seed.to_string());
-        fs::write(&path, witness(&task_set, &settings)).unwrap();
-        files.push(path.to_string_lossy().into_owned());
-        expected.push(lines(&task_set, &answer(&task_set, &settings)));
+        add(seed.to_string(), &task_set, &settings);
+        divided += 1;
     }
-    let divided = files.len();
     for seed in 1..=number("WITNESS_SETS", 300) {
         let (task_set, mut settings) = lent::pinned(&mut Random::new(seed), true);
         settings.overheads.ready_ns = u64::from(seed % 4 == 2);
-        let path = folder.join(format!("pinned-{seed}"));
-        fs::write(&path, witness(&task_set, &settings)).unwrap();
-        files.push(path.to_string_lossy().into_owned());
-        expected.push(lines(&task_set, &answer(&task_set, &settings)));
+        add(format!("pinned-{seed}"), &task_set, &settings);
     }
     let said = accepted(&files);
     for (file, expected) in files.iter().zip(&expected) {
         let said = lines_about(file, &said);
         let agree = said.iter().zip(expected);
         let agree = agree.filter(|(said, it)| said.starts_with(*it)).count();
-        assert_eq!(
-            agree,
-            expected.len().max(said.len()),
-            "{said:?} {expected:?}"
-        );
+        let count = expected.len().max(said.len());
+        assert_eq!(agree, count, "{said:?} {expected:?}");
     }
     // Of one part each, with all forms of pinned subtasks.
     let (mut counts, mut seen) = ([0; 3], BTreeMap::new());
