@@ -97,6 +97,33 @@ fn every_bound_has_a_witness_and_no_altered_one_passes() {
     fs::remove_dir_all(&folder).unwrap();
 }
 
+/// Alters witnesses of one part each, with all forms of pinned subtasks; returns what came of
+/// that, and how many had which forms.
+fn alter_parts(files: &[String]) -> ([usize; 3], BTreeMap<[bool; 3], u32>) {
+    let (mut counts, mut seen) = ([0; 3], BTreeMap::new());
+    for file in files {
+        let text = fs::read_to_string(file).expect("it was written");
+        for part in text.replace("\nmachine ", "\n\0machine ").split('\0') {
+            let forms = [" owner ", " sequence ", " lent "].map(|form| part.contains(form));
+            let count = seen.entry(forms).or_insert(0);
+            if !forms.contains(&true) || *count == 3 {
+                continue;
+            }
+            *count += 1;
+            let alone: String = part
+                .lines()
+                .filter(|line| !line.starts_with("cluster "))
+                .fold(String::new(), |text, line| text + line + "\n");
+            fs::write(file, forged::hashed(&alone)).expect("it can be written");
+            let more = forged::refused(file);
+            for (sum, more) in counts.iter_mut().zip(more) {
+                *sum += more;
+            }
+        }
+    }
+    (counts, seen)
+}
+
 #[test]
 fn every_divided_set_has_a_witness_and_no_altered_one_passes() {
     let folder = std::env::temp_dir().join(format!("lent-{}", std::process::id()));
@@ -134,28 +161,7 @@ fn every_divided_set_has_a_witness_and_no_altered_one_passes() {
         let count = expected.len().max(said.len());
         assert_eq!(agree, count, "{said:?} {expected:?}");
     }
-    // Of one part each, with all forms of pinned subtasks.
-    let (mut counts, mut seen) = ([0; 3], BTreeMap::new());
-    for file in &files[..divided] {
-        let text = fs::read_to_string(file).unwrap();
-        for part in text.replace("\nmachine ", "\n\0machine ").split('\0') {
-            let forms = [" owner ", " sequence ", " lent "].map(|form| part.contains(form));
-            let count = seen.entry(forms).or_insert(0);
-            if !forms.contains(&true) || *count == 3 {
-                continue;
-            }
-            *count += 1;
-            let alone: String = part
-                .lines()
-                .filter(|line| !line.starts_with("cluster "))
-                .fold(String::new(), |text, line| text + line + "\n");
-            fs::write(file, forged::hashed(&alone)).unwrap();
-            let more = forged::refused(file);
-            for (sum, more) in counts.iter_mut().zip(more) {
-                *sum += more;
-            }
-        }
-    }
+    let (counts, seen) = alter_parts(&files[..divided]);
     let [refused, same, sound] = counts;
     println!(
         "{} pass, forms {seen:?}; altered: {refused} refused, {same} the same, {sound} sound",
