@@ -541,7 +541,7 @@ impl<Q, A> Asker<Q, A> {
     ///
     /// # Panics
     ///
-    /// When polled, with a [`WaitFault`](crate::WaitFault), if the wait is not as stated.
+    /// When polled, with a [`WaitFault`], if the wait is not as stated.
     pub fn ask(&self, question: Q) -> PendingAnswer<'_, Q, A> {
         self.ask_if(Some(question))
     }
