@@ -163,7 +163,7 @@ fn wait() {
     EVENT.wait(EVENT.version(), fass::now_ns() + 1_000);
 }
 
-/// What the doomed DAG's middle subtask states. A fault in a section loses the lock: each crime has
+/// The locks that the doomed DAG's middle subtask states. A fault in a section loses the lock: each crime has
 /// its own.
 pub static LOCKS: [Lock<u32>; 4] = [
     Lock::new("free", 0),

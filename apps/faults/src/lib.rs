@@ -168,7 +168,7 @@ pub fn served(crime: Crime) -> [Dag; 2] {
     [asks, serves]
 }
 
-/// What the middle subtask is lent of its locks.
+/// The uses of locks that the middle subtask is lent.
 type Locked = ((), (), (), ());
 
 fn locks() -> (LockUse, LockUse, LockUse, LockUse) {

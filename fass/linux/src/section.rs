@@ -10,7 +10,7 @@ use fass::platform::LockWords;
 
 use crate::sys;
 
-/// Whoever reads or changes a lock's words has this one.
+/// Taken by a thread that reads or changes a lock's words.
 static WORDS: Mutex<()> = Mutex::new(());
 static RELEASED: Condvar = Condvar::new();
 

@@ -34,20 +34,11 @@ use super::dag::Dag;
 use super::uses::{ResettableUses, Uses, sealed};
 use crate::platform::{expect_installed, installed};
 use crate::run::cell::{ExclusiveCell, SetOnce};
+use crate::run::lock_words::LockWords;
 use crate::run::replaceable::Reset;
 
 /// For how long a section may put off its core's preemption.
 pub const LONGEST_SECTION: Duration = Duration::from_millis(1);
-
-/// The words by which a platform keeps the sections of a lock apart; 0 in a lock that nobody has or
-/// wants.
-#[derive(Debug)]
-pub struct LockWords {
-    /// Whether somebody is in a section, and above that bit whose turn is next.
-    pub state: AtomicU32,
-    /// The cores that wait, as bits.
-    pub waiting: [AtomicU64; 4],
-}
 
 /// Data that one instance at a time may use.
 ///
@@ -89,7 +80,8 @@ struct LockUser {
     next: SetOnce<Arc<Self>>,
 }
 
-/// What a subtask states: that its instances enter sections of a lock. Made by [`Lock::entering`].
+/// The statement of a subtask that its instances enter sections of a lock. Made by [`Lock::entering`].
+/// See [`Lock`].
 #[must_use = "a use has no effect until a subtask is registered with it"]
 pub struct LockUse {
     name: &'static str,
@@ -97,7 +89,7 @@ pub struct LockUse {
     permit: Arc<Permit>,
 }
 
-/// What a subtask may enter.
+/// The sections that a subtask may enter. See [`Lock`].
 pub struct Permit {
     user: Arc<LockUser>,
     sections: u32,

@@ -82,9 +82,9 @@ pub use clock::Clock;
 pub use run_config::RunConfig;
 pub use sched_dag::lifecycle::Request;
 
-pub use crate::api::lock::LockWords;
 pub use crate::run::cell::SetOnce;
 pub use crate::run::gate::call_app;
+pub use crate::run::lock_words::LockWords;
 pub use crate::run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
 
 /// A machine that schedules committed DAGs.

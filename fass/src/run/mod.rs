@@ -15,6 +15,7 @@ pub(crate) mod effect;
 pub(crate) mod gate;
 pub(crate) mod latest;
 pub(crate) mod line;
+pub(crate) mod lock_words;
 pub mod log;
 pub(crate) mod message;
 pub(crate) mod plan;

@@ -1,6 +1,6 @@
 //! The verdict at commit: what the tests find, or why there is no bound.
 //!
-//! [`answer`] asks the [tests](super::bound_tests) for the jobs of each cluster and then for their
+//! [`answer`] asks the [tests](super::schedulability) for the jobs of each cluster and then for their
 //! sinks. A DAG of which a sink has no bound within its own deadline is not proven. What is certain
 //! (missing WCETs, a path longer than the deadline, a subtask longer than the period, more work
 //! than cores) is said instead of what a test says.
@@ -8,9 +8,9 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::bound_tests::{JobBounds, bound_jobs, bound_sinks};
 use super::case::{AnalysisInput, dag_id, of_cluster, with_case};
 use super::ratio::Ratio;
+use super::schedulability::{JobBounds, bound_jobs, bound_sinks};
 use super::task::Task;
 use super::{AnalysisResult, AnalysisSettings, DagBound, NotProven, NotProvenReason};
 use crate::ids::{SubtaskId, to_u32};

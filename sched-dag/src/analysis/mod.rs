@@ -22,7 +22,7 @@
 //! | `ratio` | sums of utilisations | |
 //! | `ranks` | which DAG may delay which | |
 //! | `case`, `overheads` | the DAGs of a cluster that can be analysed, with what they are charged | |
-//! | `features`, `bound_tests` | what enters a DAG; the tests, each with what it covers | Joseph and Pandya 1986; Baruah 1990 |
+//! | `features`, `schedulability` | what enters a DAG; the tests, each with what it covers | Joseph and Pandya 1986; Baruah 1990 |
 //! | `judge` | the verdict at commit, also for sinks with deadlines of their own | |
 //! | `assign` | the commit's own clusters, dedicated cores | Li 2014; Baruah 2015 |
 //! | `list_schedule`, `fixed_order` | orders that the commit fixes | Graham 1969 |
@@ -68,7 +68,6 @@
 
 mod assign;
 mod blocking;
-mod bound_tests;
 mod case;
 mod cover;
 mod features;
@@ -84,6 +83,7 @@ mod overheads;
 mod pipelined;
 mod ranks;
 mod ratio;
+mod schedulability;
 mod set;
 mod task;
 mod waiting;

@@ -59,9 +59,9 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::AnalysisSettings;
-use super::bound_tests::{write_certificates, write_terms};
 use super::case::{AnalysisInput, of_cluster, with_case};
 use super::cover::{heaviest, peel};
+use super::schedulability::{write_certificates, write_terms};
 use super::witness_text::WitnessText;
 use super::workload::WorkloadBursts;
 use crate::fnv::{EMPTY, fnv_1a};

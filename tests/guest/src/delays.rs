@@ -1,4 +1,4 @@
-//! What can delay an instance besides the model, provoked at all moments around its release.
+//! Delays of an instance besides the model, provoked at all moments around its release.
 //!
 //! In each run a disturbance comes every 1.003 ms, next to two DAGs of 1 kHz with a bound: a more
 //! urgent and a less urgent one. So from job to job it comes 3 us later to them. All functions hold
@@ -20,7 +20,7 @@ use crate::single::{named, single_every};
 /// How often a disturbance comes, and how often each DAG with a bound is released.
 const TIMES: u64 = 60;
 
-/// What is said in a disturbance.
+/// The text of a disturbance.
 const LINES: u64 = 10;
 
 type Work = Box<dyn FnMut() + Send>;

@@ -1,4 +1,4 @@
-//! Whatever delays an instance is charged: with the overheads that the kernel measures, bounds hold
+//! All that delays an instance is charged: with the overheads that the kernel measures, bounds hold
 //! next to everything that takes time besides the model (`docs/proving.md`).
 
 use harness::{Guest, Members, Said};

@@ -32,13 +32,13 @@ pub(crate) struct Case {
     pub(crate) features: Vec<u32>,
 }
 
-/// What happens in a run besides the periodic releases.
+/// The events of a run besides the periodic releases.
 #[derive(Clone, Debug)]
 struct Scenario {
     until_ns: u64,
     /// By DAG, the signals of a sporadic one, ascending.
     signals_ns: Vec<Vec<u64>>,
-    /// What part of its WCET each segment takes, and what part of its limit the wait after it.
+    /// The part of its WCET that each segment takes, and what part of its limit the wait after it.
     parts: Vec<u32>,
     requests: Vec<(u64, Request)>,
     modes: Vec<Vec<DagId>>,
@@ -402,7 +402,7 @@ impl SubtaskBody for Body<'_> {
     fn replace(&mut self) {}
 }
 
-/// What a run depends on, and the requests that are to come, in order.
+/// All that a run depends on, and the requests that are to come, in order.
 struct World<'s> {
     case: &'s Case,
     scenario: &'s Scenario,

@@ -72,7 +72,7 @@ impl Sample {
     }
 }
 
-/// What a set or a run may have, which a test of schedulability may model or not.
+/// The features that a set or a run may have, which a test of schedulability may model or not.
 pub(crate) const FEATURES: [&str; 20] = [
     "static", "edf", "preempt", "keep", "somekeep", "one core", "clusters", "pins", "groups",
     "lent", "sinks", "waits", "overlap", "few", "sporadic", "order", "states", "faults", "pauses",

@@ -37,7 +37,7 @@ const COUNT: usize = FEATURES.len();
 
 const PAIRS: u64 = (COUNT * COUNT) as u64;
 
-/// What has been simulated.
+/// The counts of simulated jobs.
 #[derive(Default)]
 struct Coverage {
     /// Drawn, and those of their DAGs that have a bound.

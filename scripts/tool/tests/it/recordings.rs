@@ -14,7 +14,7 @@ use crate::support::{assert_refused, call, folder, refusal, succeed};
 
 type Value = (String, Option<f64>, [i16; 2], Vec<u64>);
 
-/// What the commit has said of its DAG.
+/// The commit's answer about its DAG.
 const ANSWER: &str = "dag `eye` takes at most 7ms, by multiple paths";
 
 /// A recording of 5,000 values, and of other entries.
