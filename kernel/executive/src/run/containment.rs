@@ -36,7 +36,7 @@ use crate::machine::fault::CpuException;
 use crate::machine::interrupt::Interrupted;
 use crate::machine::spinlock::SpinLock;
 use crate::machine::timer::{self, Alarm};
-use crate::machine::{cpu, interrupt_flag, this_core};
+use crate::machine::{clock, cpu, interrupt_flag, this_core};
 use crate::text::backtrace::{Backtrace, CodeLocation};
 use fass::edge::Excerpt;
 use front::json;
@@ -49,6 +49,9 @@ const NAME_BYTES: usize = 60;
 
 /// How many notes can wait to be told.
 const PLACES: usize = 8;
+
+/// How long a run that is over awaits the end of an instance that a note is of.
+const LONGEST_END_NS: u64 = 100_000_000;
 
 /// A contained fault, as its report states it.
 struct FaultNote {
@@ -186,10 +189,13 @@ pub fn end_overrun(interrupted: &mut Interrupted, now_ns: u64) {
     end_noted(note, interrupted);
 }
 
-/// Ends the instance of a note, and keeps that.
+/// Keeps a note, and ends its instance. In this order, for the end may be that of the run, which
+/// awaits its notes.
 fn end_noted(note: FaultNote, interrupted: &mut Interrupted) {
-    let cost = Some(end_interrupted(interrupted));
-    keep(FaultNote { cost, ..note });
+    let instance = note.instance;
+    keep(note);
+    let cost = end_interrupted(interrupted);
+    WAITING.lock_uninterrupted().settle(instance, cost);
 }
 
 /// Ends this core's instance, whose context a handler has interrupted.
@@ -238,7 +244,27 @@ pub fn tell_fault() -> bool {
     note.is_some()
 }
 
+/// Tells of all faults of a run that is over, as its names are known no longer. The last one may
+/// just be ending on another core; a note of what never ends is dropped.
+pub fn tell_last_faults() {
+    let until_ns = clock::now_ns() + LONGEST_END_NS;
+    while HAS_WAITING.load(Ordering::Relaxed) {
+        if tell_fault() {
+            continue;
+        }
+        if clock::now_ns() > until_ns {
+            WAITING.lock().clear();
+        }
+        cpu::relax();
+    }
+}
+
 impl NoteQueue {
+    fn clear(&mut self) {
+        self.count = 0;
+        HAS_WAITING.store(false, Ordering::Relaxed);
+    }
+
     /// Adds what the latest fault of an instance has cost.
     fn settle(&mut self, instance: Instance, cost: FaultCost) {
         for place in &mut self.places {

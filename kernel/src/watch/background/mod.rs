@@ -212,7 +212,7 @@ impl Background {
             line.end_run();
         }
         tell_log(execution::task_set);
-        while containment::tell_fault() {}
+        containment::tell_last_faults();
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;
