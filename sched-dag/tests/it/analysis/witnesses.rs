@@ -252,6 +252,10 @@ fn the_checker_has_help_and_refuses_command_lines() {
         assert_eq!(output.status.code(), Some(code));
         assert!(said.starts_with(begin.as_bytes()), "{word}");
     }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/check-witness");
+    let full = fs::File::create("/dev/full").unwrap();
+    let help = Command::new("python3").arg(script).arg("--help");
+    assert_eq!(help.stdout(full).status().unwrap().code(), Some(2));
 }
 
 /// Returns how the lines begin that the checker is to say.
