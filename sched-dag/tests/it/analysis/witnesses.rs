@@ -254,7 +254,8 @@ fn the_checker_has_help_and_refuses_command_lines() {
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/check-witness");
     let full = fs::File::create("/dev/full").unwrap();
-    let help = Command::new("python3").arg(script).arg("--help");
+    let mut help = Command::new("python3");
+    help.arg(script).arg("--help");
     assert_eq!(help.stdout(full).status().unwrap().code(), Some(2));
 }
 
