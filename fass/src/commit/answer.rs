@@ -54,6 +54,7 @@ use crate::draft::checks::{Drafts, writer_of};
 use crate::draft::fault::{CountedNoun, UnprovenDag};
 use crate::platform::RunConfig;
 use crate::run::latest::Staleness;
+use crate::run::plan::CommitWords;
 
 /// An accepted commit.
 ///
@@ -460,7 +461,7 @@ impl Verdict {
 /// The answers of one commit.
 #[derive(Clone, Debug)]
 pub(crate) struct CommitAnswers {
-    pub(crate) of_dags: Vec<DagAnswer>,
+    pub(crate) of_dags: Arc<[DagAnswer]>,
     /// The position of the first DAG that fails.
     pub(crate) first_unproven: Option<usize>,
     /// The bounds, for the platform.
@@ -502,15 +503,12 @@ impl CommitAnswers {
                 verdict,
             }
         });
-        let of_dags: Vec<DagAnswer> = of_dags.collect();
-        let answers = of_dags.iter().map(ToString::to_string).collect();
         let bounds_ns = (answer.bounds.iter()).map(|bound| Some(bound.as_ref()?.bound_ns));
         Self {
-            of_dags,
+            of_dags: of_dags.collect(),
             proven: ProvenBounds {
                 bounds_ns: bounds_ns.collect(),
                 sink_bounds_ns: answer.sinks_ns,
-                answers,
             },
             first_unproven: answer.first_failing.map(|failing| failing.dag.index()),
             settings,
@@ -529,6 +527,12 @@ impl CommitAnswers {
             let certain = unproven.is_certain();
             certain.then(|| (answer.dag.clone(), unproven.to_string()))
         })
+    }
+}
+
+impl CommitWords for Arc<[DagAnswer]> {
+    fn in_words(&self) -> Vec<String> {
+        self.iter().map(ToString::to_string).collect()
     }
 }
 

@@ -211,7 +211,7 @@ fn divide_to_prove(
 /// Returns a fault for each DAG that demands a proof and has none.
 fn lacking_proofs(drafts: &Drafts, answers: &CommitAnswers) -> Vec<Fault> {
     let demanding =
-        (drafts.iter().zip(&answers.of_dags)).filter(|(draft, _)| draft.borrow().demands_proof);
+        (drafts.iter().zip(&*answers.of_dags)).filter(|(draft, _)| draft.borrow().demands_proof);
     let lacking = demanding.filter_map(|(_, answer)| {
         Some(Fault::NotProven {
             dag: answer.dag.clone(),

@@ -125,6 +125,7 @@ pub(crate) fn tie(
         number,
         bodies,
         proven: answers.proven.clone(),
+        answers: Box::new(Arc::clone(&answers.of_dags)),
         after_fault: drafts.iter().map(handler).collect(),
         lifecycle,
         staleness,

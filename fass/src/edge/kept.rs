@@ -171,7 +171,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
         affinities: affinities(task_set),
         locks: locks(task_set),
         move_ns: overheads.of_a_move_ns(options.preemption),
-        answers: plan.proven.answers.clone(),
+        answers: plan.answers.in_words(),
     }
 }
 

@@ -7,6 +7,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::fmt;
 use core::sync::atomic::AtomicU32;
 
 use sched_dag::engine::{Alternate, ProvenBounds};
@@ -47,6 +48,8 @@ pub struct Plan {
     pub bodies: Vec<Vec<SubtaskCode>>,
     /// The response times that the commit has proven ([`Commit::answers`](crate::commit::Commit::answers)).
     pub proven: ProvenBounds,
+    /// What the commit has answered, for those who keep the run.
+    pub(crate) answers: Box<dyn CommitWords>,
     /// By DAG, the one that gets a signal when a fault ends it
     /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the
     /// scheduler.
@@ -62,6 +65,12 @@ pub struct Plan {
     pub(crate) lines: Vec<LineOf>,
     /// The states that a replay begins with, and what to say of one that cannot be that.
     pub(crate) begins: Vec<(Arc<KeptState>, Vec<u8>, String)>,
+}
+
+/// The answers of a commit, put in words where somebody wants them.
+pub(crate) trait CommitWords: fmt::Debug + Send + Sync {
+    /// Says by DAG which test has proven a bound, or why there is none.
+    fn in_words(&self) -> Vec<String>;
 }
 
 impl Plan {

@@ -1,6 +1,5 @@
 //! A run that has ended: its model, its times, its counts, on whatever platform.
 
-use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::cell::OnceCell;
@@ -53,8 +52,6 @@ pub struct ProvenBounds {
     pub bounds_ns: Vec<Option<u64>>,
     /// By DAG, of its sinks, in the order of [`Dag::sinks`](crate::Dag::sinks).
     pub sink_bounds_ns: Vec<Vec<Option<u64>>>,
-    /// By DAG, the commit's answer in words: which test gave the bound, or why there is none.
-    pub answers: Vec<String>,
 }
 
 /// The numbers of a run that its platform knows.

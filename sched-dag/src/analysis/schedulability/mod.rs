@@ -43,10 +43,11 @@ impl BoundTest {
         self.covers.cover(case.entering[dag])
     }
 
-    /// Reports of each DAG whether it covers it, if it does one.
-    fn asked(&self, case: &AnalysisInput<'_>) -> Option<Vec<bool>> {
-        let asked = (0..case.members.len()).map(|dag| self.is_for(case, dag));
-        Some(asked.collect()).filter(|asked: &Vec<bool>| asked.contains(&true))
+    /// Notes of each DAG whether it covers it, and reports whether it does one.
+    fn ask(&self, case: &AnalysisInput<'_>, asked: &mut Vec<bool>) -> bool {
+        asked.clear();
+        asked.extend((0..case.members.len()).map(|dag| self.is_for(case, dag)));
+        asked.contains(&true)
     }
 }
 
@@ -131,8 +132,7 @@ pub(super) fn bound_jobs(case: &AnalysisInput<'_>) -> JobBounds {
         asked: Vec::new(),
     };
     for test in TESTS {
-        if let Some(asked) = test.asked(case) {
-            found.asked = asked;
+        if test.ask(case, &mut found.asked) {
             (test.jobs)(case, &mut found);
         }
     }
@@ -159,8 +159,7 @@ pub(super) fn bound_sinks(
         asked: Vec::new(),
     };
     for test in TESTS {
-        if let Some(asked) = test.asked(case) {
-            found.asked = asked;
+        if test.ask(case, &mut found.asked) {
             (test.sinks)(case, responses, &mut found);
         }
     }
@@ -174,7 +173,7 @@ pub(super) fn write_certificates(
     text: &mut WitnessText,
 ) {
     for (test, of) in TESTS.iter().zip(WITNESSES) {
-        if test.asked(case).is_some() {
+        if (0..case.members.len()).any(|dag| test.is_for(case, dag)) {
             (of.certificate)(case, bounds, text);
         }
     }

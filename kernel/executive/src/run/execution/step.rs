@@ -131,6 +131,9 @@ impl ClusterRun {
     }
 
     /// Shows all cores when the next event is, and whether nothing is left to be done.
+    ///
+    /// Inlined into each step: as a call the way to a preemption takes six instructions more.
+    #[inline(always)]
     pub(super) fn publish(&self) {
         let next = self.engine.scheduler.next_event_ns();
         let next = next.map_or(u64::MAX, |next| {
