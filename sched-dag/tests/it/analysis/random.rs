@@ -148,7 +148,13 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
         sizes = vec![cores];
     }
     // Less load than a set is drawn for leaves more to prove.
-    let slack = if is_lent { 4 } else { random.within(4..=16) };
+    let most = match is_lent {
+        true => 4,
+        // Next to what is pinned each core counts for itself.
+        false if all & bit("pins") != 0 => 48,
+        false => 16,
+    };
+    let slack = random.within(4..=most);
     for (spec, number) in specs.iter_mut().zip(0..) {
         spec.cluster = is_divided.then_some(ClusterId(number % 2));
         let own = [(); 3].map(|()| u32::try_from(random.number() >> 32).unwrap_or(0));
