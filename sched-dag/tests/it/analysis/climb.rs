@@ -1,5 +1,10 @@
 //! Runs of one set, from which a climb to the worst goes.
+//!
+//! When each wait ends, and whether its instance is told that this is its limit, follows from what is
+//! drawn, and is judged in each run: W2 and W7.
 
+use std::cell::Cell;
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -14,9 +19,6 @@ use sched_dag::{Dag, DagId, Instance, ModeId, SchedulerOptions, Subtask, Subtask
 
 use super::random::mask;
 
-/// How many runs are drawn, before the worst is varied.
-const DRAWN: u64 = 4;
-
 /// Jobs have so many execution times of their own, in turn.
 const JOBS: u64 = 8;
 
@@ -30,6 +32,16 @@ pub(crate) struct Case {
     pub(crate) answer: AnalysisResult,
     /// By cluster.
     pub(crate) features: Vec<u32>,
+}
+
+/// What has happened in the runs of a climb.
+#[derive(Default)]
+pub(crate) struct Climbed {
+    /// By features, the jobs with a bound.
+    pub(crate) jobs: BTreeMap<u32, u64>,
+    /// Ends of waits: by an answer before the limit, at the limit, by the limit, and by a cut; and
+    /// those at the instant at which they began.
+    pub(crate) ends: [u64; 5],
 }
 
 /// The events of a run besides the periodic releases.
@@ -58,28 +70,28 @@ fn part(drawn: u32, most: u64) -> u64 {
 }
 
 impl Case {
-    /// Draws runs, and varies the worst one `steps` times. Returns by features how many jobs there
-    /// were with a bound; the error is the first breach, with its run.
+    /// Draws runs, and varies the worst one so many times; where nothing is proven, one run is
+    /// drawn. The error is the first breach, with its run.
     pub(crate) fn climb(
         &self,
         random: &mut Random,
         is_disturbed: bool,
-        steps: u64,
-    ) -> Result<BTreeMap<u32, u64>, String> {
+        [drawn, varied]: [u64; 2],
+    ) -> Result<Climbed, String> {
         let bounds = (0..).zip(&self.answer.bounds);
         let proven = bounds.filter_map(|(dag, bound)| bound.map(|_| dag));
         let proven: Vec<usize> = proven.collect();
-        let Some(&target) = proven.get(random.index(proven.len().max(1))) else {
-            return Ok(BTreeMap::new());
-        };
-        let mut counts = BTreeMap::new();
+        let target = proven.get(random.index(proven.len().max(1)));
+        let steps = target.map_or(1, |_| drawn + varied);
+        let target = target.copied().unwrap_or(0);
+        let mut climbed = Climbed::default();
         let mut worst: Option<(u64, Scenario)> = None;
-        for step in 0..DRAWN + steps {
+        for step in 0..steps {
             let scenario = match &worst {
-                Some((_, worst)) if step >= DRAWN => self.varied(worst, random),
+                Some((_, worst)) if step >= drawn => self.varied(worst, random),
                 _ => self.drawn(target, is_disturbed, random),
             };
-            let run = self.run(&scenario, target, step == 0, &mut counts);
+            let run = self.run(&scenario, target, step == 0, &mut climbed);
             let nearness = run.map_err(|found| {
                 let (signals, requests) = (&scenario.signals_ns, &scenario.requests);
                 format!("{found}\nsignals {signals:?}, {requests:?}")
@@ -88,7 +100,7 @@ impl Case {
                 worst = Some((nearness, scenario));
             }
         }
-        Ok(counts)
+        Ok(climbed)
     }
 
     fn drawn(&self, target: usize, is_disturbed: bool, random: &mut Random) -> Scenario {
@@ -229,16 +241,22 @@ impl Case {
         scenario: &Scenario,
         target: usize,
         is_judged: bool,
-        counts: &mut BTreeMap<u32, u64>,
+        climbed: &mut Climbed,
     ) -> Result<u64, String> {
         let options = SchedulerOptions {
             policy: self.settings.policy,
             preemption: self.settings.preemption,
             cores: self.settings.cores,
         };
+        let drawn = Drawn {
+            case: self,
+            scenario,
+            wrongly_told: Cell::new(None),
+        };
         let dags = (0..).map(DagId).zip(self.task_set.dags());
         let bodies = dags.clone().flat_map(|(dag, model)| {
             let subtasks = (0..).map(SubtaskId).zip(model.subtasks());
+            let drawn = &drawn;
             subtasks.map(move |(subtask, model)| Body {
                 instance: Instance {
                     dag,
@@ -247,11 +265,11 @@ impl Case {
                 },
                 turn: 0,
                 model,
+                drawn,
             })
         });
         let mut world = World {
-            case: self,
-            scenario,
+            drawn: &drawn,
             requests: BTreeMap::new(),
             asked: 0,
         };
@@ -278,7 +296,8 @@ impl Case {
                 return Err(format!("the law finds: {first}"));
             }
         }
-        self.judge(&events, scenario, target, counts)
+        drawn.judge_ends(&events, &mut climbed.ends)?;
+        self.judge(&events, scenario, target, &mut climbed.jobs)
     }
 
     /// Holds responses against bounds.
@@ -364,11 +383,98 @@ impl Case {
     }
 }
 
+/// All that a run depends on.
+struct Drawn<'s> {
+    case: &'s Case,
+    scenario: &'s Scenario,
+    /// The last wait of which an instance was told an end that it did not have.
+    wrongly_told: Cell<Option<WaitId>>,
+}
+
+impl Drawn<'_> {
+    fn part(&self, of: Instance, turn: u32) -> u32 {
+        let vertices = self.case.task_set.vertices() as u64;
+        let vertex = u64::from(self.case.task_set.vertex(of).0);
+        let segment = u64::from(turn.min(SEGMENTS - 1));
+        let at = (of.job % JOBS * vertices + vertex) * u64::from(SEGMENTS) + segment;
+        self.scenario.parts[usize::try_from(at).expect("an index")]
+    }
+
+    /// Returns how long an instance waits at most: some for less than their subtask states.
+    fn limit_ns(&self, wait: WaitId) -> u64 {
+        let Instance { dag, subtask, .. } = wait.instance;
+        let stated = &self.case.task_set.dag(dag).subtask(subtask).waits()[wait.number as usize];
+        let is_shorter = self.part(wait.instance, wait.number) >> 29 == 7;
+        stated.limit_ns >> u32::from(is_shorter)
+    }
+
+    /// Returns after what time a wait has its answer. Of those that take all of their limit, some
+    /// have it too late.
+    fn answer_ns(&self, wait: WaitId) -> u64 {
+        let (limit_ns, job) = (self.limit_ns(wait), wait.instance.job);
+        let answer_ns = part(self.part(wait.instance, wait.number) >> 16, limit_ns);
+        let is_late = answer_ns == limit_ns && !job.is_multiple_of(2);
+        answer_ns + (1 + job % 8) * u64::from(is_late)
+    }
+
+    /// Holds the end of each wait against its answer and its limit.
+    fn judge_ends(&self, events: &[Event], ends: &mut [u64; 5]) -> Result<(), String> {
+        if let Some(wait) = self.wrongly_told.get() {
+            return Err(format!("{wait:?} ended otherwise than was told"));
+        }
+        let mut present: BTreeMap<Instance, (WaitId, u64)> = BTreeMap::new();
+        let mut begun: HashMap<Instance, u32> = HashMap::new();
+        for event in events {
+            let Some(instance) = event.instance() else {
+                continue;
+            };
+            if event.what == EventKind::Wait {
+                let count = begun.entry(instance).or_default();
+                let number = *count;
+                *count += 1;
+                present.insert(instance, (WaitId { instance, number }, event.time_ns));
+                continue;
+            }
+            let Some((wait, since_ns)) = present.remove(&instance) else {
+                continue;
+            };
+            let (limit_ns, answer_ns) = (self.limit_ns(wait), self.answer_ns(wait));
+            let end_ns = since_ns + limit_ns.min(answer_ns);
+            let is_right = match event.what {
+                EventKind::Wake => event.time_ns == end_ns,
+                EventKind::Cancelled => event.time_ns <= end_ns,
+                _ => false,
+            };
+            if !is_right {
+                return Err(format!(
+                    "{wait:?} since {since_ns}: {event:?}, not {end_ns}"
+                ));
+            }
+            let is_cut = event.what == EventKind::Cancelled;
+            let way = match answer_ns.cmp(&limit_ns) {
+                _ if is_cut => 3,
+                Ordering::Less => 0,
+                Ordering::Equal => 1,
+                Ordering::Greater => 2,
+            };
+            ends[way] += 1;
+            ends[4] += u64::from(!is_cut && end_ns == since_ns);
+        }
+        let until_ns = self.scenario.until_ns;
+        let mut left = present.into_values();
+        let overdue = left.find(|(wait, since_ns)| {
+            since_ns + self.limit_ns(*wait).min(self.answer_ns(*wait)) < until_ns
+        });
+        overdue.map_or(Ok(()), |(wait, _)| Err(format!("{wait:?} has no end")))
+    }
+}
+
 /// The function of a subtask, which takes all waits that it states.
 struct Body<'s> {
     instance: Instance,
     turn: u32,
     model: &'s Subtask,
+    drawn: &'s Drawn<'s>,
 }
 
 impl SubtaskBody for Body<'_> {
@@ -384,14 +490,25 @@ impl SubtaskBody for Body<'_> {
 
     fn discard(&mut self, _: u64) {}
 
+    fn wake(&mut self, has_timed_out: bool) {
+        let (instance, number) = (self.instance, self.turn - 1);
+        let wait = WaitId { instance, number };
+        if has_timed_out != (self.drawn.answer_ns(wait) > self.drawn.limit_ns(wait)) {
+            self.drawn.wrongly_told.set(Some(wait));
+        }
+    }
+
     fn has_effects(&self) -> bool {
         true
     }
 
     fn complete(&mut self, _: u64, ask: &mut dyn FnMut(Request)) {
-        if let Some(wait) = self.model.waits().get(self.turn as usize) {
+        if (self.turn as usize) < self.model.waits().len() {
+            let (instance, number) = (self.instance, self.turn);
             self.turn += 1;
-            ask(Request::Wait(wait.limit_ns));
+            ask(Request::Wait(
+                self.drawn.limit_ns(WaitId { instance, number }),
+            ));
         }
     }
 
@@ -402,10 +519,9 @@ impl SubtaskBody for Body<'_> {
     fn replace(&mut self) {}
 }
 
-/// All that a run depends on, and the requests that are to come, in order.
+/// The requests that are to come, in order.
 struct World<'s> {
-    case: &'s Case,
-    scenario: &'s Scenario,
+    drawn: &'s Drawn<'s>,
     requests: BTreeMap<(u64, u64), Request>,
     asked: u64,
 }
@@ -414,14 +530,6 @@ impl World<'_> {
     fn ask(&mut self, at_ns: u64, request: Request) {
         self.requests.insert((at_ns, self.asked), request);
         self.asked += 1;
-    }
-
-    fn part(&self, of: Instance, turn: u32) -> u32 {
-        let vertices = self.case.task_set.vertices() as u64;
-        let vertex = u64::from(self.case.task_set.vertex(of).0);
-        let segment = u64::from(turn.min(SEGMENTS - 1));
-        let at = (of.job % JOBS * vertices + vertex) * u64::from(SEGMENTS) + segment;
-        self.scenario.parts[usize::try_from(at).expect("an index")]
     }
 }
 
@@ -437,14 +545,15 @@ impl<'s> Workload<Body<'s>> for World<'_> {
             (Some(whole_ns), Some(stated_ns), 0) => whole_ns - stated_ns,
             (.., turn) => waits[turn as usize - 1].segment_ns.unwrap_or(0),
         };
-        let executed_ns = part(self.part(body.instance, body.turn), wcet_ns);
-        Some(executed_ns + self.case.settings.overheads.dispatch_ns)
+        let executed_ns = part(self.drawn.part(body.instance, body.turn), wcet_ns);
+        Some(executed_ns + self.drawn.case.settings.overheads.dispatch_ns)
     }
 
     fn fails(&mut self, instance: Instance) -> bool {
-        let drawn = u64::from(self.part(instance, 0)) ^ instance.job << 32;
-        let drawn = drawn ^ u64::from(self.case.task_set.vertex(instance).0) << 16;
-        let faults = self.scenario.faults;
+        let drawn = u64::from(self.drawn.part(instance, 0)) ^ instance.job << 32;
+        let vertex = self.drawn.case.task_set.vertex(instance);
+        let drawn = drawn ^ u64::from(vertex.0) << 16;
+        let faults = self.drawn.scenario.faults;
         faults > 0 && Random::new(drawn).once_in(faults)
     }
 
@@ -453,20 +562,21 @@ impl<'s> Workload<Body<'s>> for World<'_> {
     }
 
     fn waits(&mut self, wait: WaitId, now_ns: u64) {
-        let model = self.case.task_set.dag(wait.instance.dag);
-        let of_wait = model.subtask(wait.instance.subtask).waits()[wait.number as usize];
-        let drawn = self.part(wait.instance, wait.number) >> 16;
-        let answer_ns = part(drawn, of_wait.limit_ns);
-        // Some that take all of their limit have no answer.
-        if answer_ns < of_wait.limit_ns || wait.instance.job.is_multiple_of(2) {
-            self.ask(now_ns + answer_ns, Request::Answer(wait));
+        let at_ns = now_ns + self.drawn.answer_ns(wait);
+        self.ask(at_ns, Request::Answer(wait));
+        // Some have it twice.
+        if self
+            .drawn
+            .part(wait.instance, wait.number)
+            .is_multiple_of(5)
+        {
+            self.ask(at_ns + wait.instance.job % 8, Request::Answer(wait));
         }
     }
 
     fn next_request_ns(&self) -> Option<u64> {
-        self.requests
-            .first_key_value()
-            .map(|((at_ns, _), _)| *at_ns)
+        let first = self.requests.first_key_value();
+        first.map(|((at_ns, _), _)| *at_ns)
     }
 
     fn take_request(&mut self, now_ns: u64) -> Option<Request> {

@@ -7,7 +7,6 @@ mod climb;
 #[path = "../../../../scripts/tool/src/random.rs"]
 mod drawn;
 mod forged;
-mod lent;
 mod one_core;
 mod random;
 mod simulate;
@@ -16,7 +15,6 @@ mod waits;
 mod witnesses;
 mod worked;
 
-use common::random::Random;
 use sched_dag::analysis::{
     AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, TaskError, answer, fix_orders,
 };
@@ -25,9 +23,7 @@ use sched_dag::{
     SubtaskId, SubtaskOrder, verify,
 };
 
-use random::sample;
 use simulate::{commit, responses, spec};
-use together::breach;
 
 const FP: (Policy, Preemption) = (Policy::StaticPriority, Preemption::Enabled);
 const DIAMOND: [(usize, usize); 4] = [(0, 1), (0, 2), (1, 3), (2, 3)];
@@ -39,35 +35,6 @@ fn settings((policy, preemption): (Policy, Preemption), cores: u32) -> AnalysisS
         cores,
         overheads: Overheads::default(),
     }
-}
-
-/// A DAG with a WCET of 0 gets no bound, and neither does what it may delay; where
-/// others have one, they keep it.
-#[test]
-fn no_bound_rests_on_a_wcet_of_zero() {
-    let mut bounds = 0;
-    for seed in 1..3_000 {
-        let mut random = Random::new(seed);
-        let mut sample = sample(&mut random);
-        let dag = random.index(sample.specs.len());
-        let subtasks = &mut sample.specs[dag].subtasks;
-        let subtask = random.index(subtasks.len());
-        for subtask in subtasks.iter_mut() {
-            subtask.wcet_ns.get_or_insert(1);
-        }
-        subtasks[subtask].wcet_ns = Some(0);
-        let Some(task_set) = sample.task_set() else {
-            continue;
-        };
-        let answer = answer(&task_set, &sample.settings());
-        let subtask = SubtaskId(u32::try_from(subtask).unwrap());
-        let missing = NotProvenReason::Unknown(TaskError::MissingWcet { subtask });
-        assert_eq!(answer.reasons[dag], Some(missing), "seed {seed}");
-        let breach = breach(&task_set, &sample.settings(), &answer, &mut random);
-        assert_eq!(breach, None, "seed {seed}");
-        bounds += answer.bounds.iter().flatten().count();
-    }
-    assert!(bounds > 200, "too few bounds say little: {bounds}");
 }
 
 #[test]

@@ -4,11 +4,12 @@ use common::random::Random;
 use sched_dag::analysis::{AnalysisSettings, Overheads, assign};
 use sched_dag::{
     Activation, AssignmentReason, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, Dag,
-    DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, StateSpec, StateUser,
-    SubtaskOrder, SubtaskSpec, TaskSet, Wait, verify,
+    DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority, StateSpec,
+    StateUser, SubtaskOrder, SubtaskSpec, TaskSet, Wait, verify,
 };
 
 use super::drawn::set;
+use super::simulate::spec;
 
 /// A task set with the platform it runs on.
 #[derive(Debug)]
@@ -85,7 +86,8 @@ pub(crate) fn mask(features: &[(&str, bool)]) -> u32 {
     present.fold(0, |all, (name, _)| all | bit(name))
 }
 
-fn bit(name: &str) -> u32 {
+/// Returns the bit of a feature.
+pub(crate) fn bit(name: &str) -> u32 {
     let at = FEATURES.iter().position(|feature| *feature == name);
     1 << at.expect("a feature")
 }
@@ -111,13 +113,6 @@ fn of_dag(spec: &DagSpec, dag: &Dag) -> u32 {
     ])
 }
 
-/// Draws a task set with any features but lent cores.
-pub(crate) fn sample(random: &mut Random) -> Sample {
-    let mut sample = sample_with(0, random);
-    sample.is_lent = false;
-    sample
-}
-
 /// Draws a task set for up to 5 cores with the wanted features, where these go together.
 pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
     let wants = |name| wanted & bit(name) != 0;
@@ -136,40 +131,35 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
     let keeps = keeps.unwrap_or(any);
 
     let most = if has_one { 1 } else { 5 };
-    let mut cores = random.within(1 + u32::from(is_divided)..=most);
+    let cores = random.within(1 + u32::from(is_divided)..=most);
     let first = random.within(1..=(cores - 1).max(1));
-    let mut sizes = vec![cores];
-    if is_divided {
-        sizes = vec![first, cores - first];
-    }
+    let mut sizes = match is_divided {
+        true => vec![first, cores - first],
+        false => vec![cores],
+    };
     let mut specs = set(random, 1, &sizes);
     if is_lent || !is_divided && !has_one && random.chance(30) {
-        (specs, cores) = super::lent::set(random);
-        sizes = vec![cores];
+        (specs, sizes[0]) = heavy_set(random);
     }
-    // Less load than a set is drawn for leaves more to prove.
-    let most = match is_lent {
-        true => 4,
-        // Next to what is pinned each core counts for itself.
-        false if all & bit("pins") != 0 => 48,
-        false => 16,
-    };
-    let slack = random.within(4..=most);
+    // Less load than a set is drawn for leaves more to prove, the more so next to what is pinned,
+    // where each core counts for itself.
+    let most = [16, 48][usize::from(all & bit("pins") != 0)];
+    let slack = random.within(4..=if is_lent { 4 } else { most });
     for (spec, number) in specs.iter_mut().zip(0..) {
         spec.cluster = is_divided.then_some(ClusterId(number % 2));
-        let own = [(); 3].map(|()| u32::try_from(random.number() >> 32).unwrap_or(0));
-        let own = if number == 0 {
-            all
-        } else {
-            all & own[0] & (own[1] | own[2])
-        };
         spec.period_ns = spec.period_ns.map(|ns| ns * slack / 4);
         spec.relative_deadline_ns = spec.relative_deadline_ns.map(|ns| ns * slack / 4);
         for (place, subtask) in spec.subtasks.iter_mut().enumerate() {
             let first = number == 0 && place == 0;
             subtask.non_preemptive = keeps == "somekeep" && (first || random.once_in(2));
         }
-        add(spec, own, random);
+        let own = [(); 3].map(|()| u32::try_from(random.number() >> 32).unwrap_or(0));
+        let others = if number == 0 {
+            all
+        } else {
+            own[0] & (own[1] | own[2])
+        };
+        add(spec, all & others, random);
     }
     if !is_lent {
         confine(&mut specs, &sizes, all, random);
@@ -181,7 +171,7 @@ pub(crate) fn sample_with(wanted: u32, random: &mut Random) -> Sample {
             "keep" => Preemption::Disabled,
             _ => Preemption::Enabled,
         },
-        cores,
+        cores: sizes.iter().sum(),
         clusters: match is_divided {
             true => CoreDivision::Of(sizes),
             false => CoreDivision::Undivided,
@@ -230,11 +220,36 @@ fn add(spec: &mut DagSpec, own: u32, random: &mut Random) {
     }
     use OverrunPolicy::{Abort, Queue, Skip};
     spec.overrun = random.one_of(&[Queue, Skip, Abort]);
-    if random.once_in(25) {
-        for subtask in &mut spec.subtasks {
-            (subtask.wcet_ns, subtask.waits) = (None, Vec::new());
+    if random.once_in(20) {
+        // Not known, which a WCET of 0 says, too.
+        let (count, wcet_ns) = (spec.subtasks.len(), random.one_of(&[None, Some(0)]));
+        for subtask in &mut spec.subtasks[random.index(count)..] {
+            (subtask.wcet_ns, subtask.waits) = (wcet_ns, Vec::new());
         }
     }
+}
+
+/// Draws DAGs that are heavy now and then, of which the one with the shorter deadline is the more
+/// urgent, and for how many cores.
+fn heavy_set(random: &mut Random) -> (Vec<DagSpec>, u32) {
+    let (cores, count) = (random.within(2..=5), random.within(2..=5));
+    let dags = (0..count).map(|_| {
+        let count = random.within(1..=9);
+        let wcets: Vec<u64> = (0..count).map(|_| random.within(1..=9)).collect();
+        let edges: Vec<_> = random.edges(count, 30).collect();
+        let deadline = wcets.iter().sum::<u64>() * random.within(50..=200) / 100;
+        let deadline = deadline.max(9);
+        let period = deadline + random.within(0..=deadline / 2);
+        spec(period, deadline, &wcets, &edges, 0)
+    });
+    let mut specs: Vec<DagSpec> = dags.collect();
+    let mut order: Vec<&mut DagSpec> = specs.iter_mut().collect();
+    order.sort_by_key(|dag| dag.relative_deadline_ns);
+    for (rank, dag) in (0..).zip(order) {
+        let subtasks = dag.subtasks.iter_mut();
+        subtasks.for_each(|subtask| subtask.priority = Some(Priority(rank)));
+    }
+    (specs, cores)
 }
 
 /// Pins subtasks: of some DAGs all, in an order that edges fix, of others some in none; and leaves
@@ -291,7 +306,7 @@ fn draw_sinks(random: &mut Random, spec: &mut DagSpec) {
 }
 
 /// Gives some subtasks waits, whose segments may be unknown.
-pub(crate) fn draw_waits(random: &mut Random, spec: &mut DagSpec) {
+fn draw_waits(random: &mut Random, spec: &mut DagSpec) {
     let room = spec.period_ns.min(spec.relative_deadline_ns).unwrap_or(8) / 8;
     for subtask in &mut spec.subtasks {
         let mut left_ns = subtask.wcet_ns.unwrap_or(0);

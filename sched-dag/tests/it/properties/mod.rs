@@ -8,7 +8,6 @@
 //! Each set comes from a seed. More or other sets: `SCHED_DAG_SETS=100000 SCHED_DAG_SEED=7 cargo
 //! test -p sched-dag --test it properties`.
 
-mod devices;
 mod explore;
 mod pins;
 mod releases;
@@ -18,7 +17,6 @@ mod walk;
 use crate::support::number;
 use crate::support::set::{self, Set};
 use common::random::Random;
-use devices::Counts;
 use releases::SAID;
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Request, WaitId};
@@ -153,32 +151,4 @@ fn every_order_of_events_keeps_the_rules() {
         println!("{states} states");
         Ok(())
     });
-}
-
-#[test]
-fn virtual_time_keeps_the_rules_where_instances_wait() {
-    let mut counts = Counts::default();
-    check(3_000, set::draw_waiting, |set, random| {
-        devices::judge(set, random, &mut counts)
-    });
-    println!("{counts:?}");
-    if number("SCHED_DAG_SETS", 3_000) >= 3_000 {
-        let least = counts.ends.iter().chain([&counts.of_no_length]).min();
-        assert!(least > Some(&100), "something is rare: {counts:?}");
-    }
-}
-
-/// `cargo test --release -p sched-dag --test it a_million -- --ignored --nocapture`
-#[test]
-#[ignore = "takes minutes where it is not optimized"]
-fn a_million_jobs_with_waits_keep_the_rules() {
-    let (mut counts, mut seed) = (Counts::default(), number("SCHED_DAG_SEED", 1));
-    while counts.jobs < 1_000_000 {
-        let mut random = Random::new(seed);
-        let set = set::draw_waiting(&mut random);
-        let judged = devices::judge(&set, &mut random, &mut counts);
-        judged.unwrap_or_else(|found| panic!("seed {seed}: {found}\n{set:?}"));
-        seed += 1;
-    }
-    println!("up to seed {seed}: {counts:?}");
 }

@@ -16,8 +16,6 @@ pub(crate) struct Set {
     pub(crate) specs: Vec<DagSpec>,
     /// The seed of execution times, of faults, and of what a driver is free to choose.
     pub(crate) choices: u64,
-    /// Whether one instance of ten takes no time.
-    pub(crate) has_instances_of_no_length: bool,
 }
 
 /// Whether releases may find no room.
@@ -83,11 +81,6 @@ pub(crate) fn draw_disturbed(random: &mut Random) -> Set {
         true => with_waits(set, random),
         false => set,
     }
-}
-
-/// Draws a set in which subtasks wait.
-pub(crate) fn draw_waiting(random: &mut Random) -> Set {
-    with_waits(draw_disturbed(random), random)
 }
 
 /// Draws a set of at most three subtasks.
@@ -190,7 +183,6 @@ fn draw_within(random: &mut Random, limits: &Limits, overruns: Overruns) -> Set 
         options,
         specs: specs.collect(),
         choices: random.number(),
-        has_instances_of_no_length: false,
     }
 }
 
@@ -260,12 +252,7 @@ impl Set {
     pub(crate) fn execution_ns(&self, instance: Instance) -> u64 {
         let of_dag = self.choices ^ u64::from(instance.dag.0);
         let longest_ns = Random::new(of_dag).within(1..=8);
-        let mut random = self.of(instance);
-        let execution_ns = random.within(1..=longest_ns);
-        match self.has_instances_of_no_length && random.chance(10) {
-            true => 0,
-            false => execution_ns,
-        }
+        self.of(instance).within(1..=longest_ns)
     }
 
     /// Returns how long an instance waits at most, if it has that wait: the limit that its subtask
@@ -279,26 +266,6 @@ impl Set {
             true => random.within(0..=stated_ns),
             false => stated_ns,
         })
-    }
-
-    /// Returns after what time a wait has its answer: at once, before its limit, at the limit or
-    /// beyond it.
-    pub(crate) fn answer_ns(&self, wait: WaitId) -> u64 {
-        let limit_ns = self.limit_ns(wait).expect("it is a wait");
-        let mut random = self.of_wait(wait);
-        random.number();
-        random.number();
-        match random.index(4) {
-            0 => 0,
-            1 => random.within(0..=limit_ns),
-            2 => limit_ns,
-            _ => limit_ns + random.within(1..=9),
-        }
-    }
-
-    /// Reports whether a wait has its answer twice, which one of five has.
-    pub(crate) fn answers_twice(&self, wait: WaitId) -> bool {
-        self.of_wait(wait).once_in(5)
     }
 
     /// Returns what is drawn for one wait.
