@@ -5,7 +5,7 @@ use sched_dag::analysis::{AnalysisSettings, Overheads, assign};
 use sched_dag::{
     Activation, AssignmentReason, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, Dag,
     DagSpec, FaultLimit, OnFault, OverrunPolicy, Policy, Preemption, Priority, StateSpec,
-    StateUser, SubtaskOrder, SubtaskSpec, TaskSet, Wait, verify,
+    StateUser, SubtaskId, SubtaskOrder, SubtaskSpec, TaskSet, Wait, verify,
 };
 
 use super::drawn::set;
@@ -96,6 +96,8 @@ pub(crate) fn bit(name: &str) -> u32 {
 fn of_dag(spec: &DagSpec, dag: &Dag) -> u32 {
     use AssignmentReason::{Member, Owner};
     let any = |is: fn(&SubtaskSpec) -> bool| spec.subtasks.iter().any(is);
+    let deadline_ns = dag.relative_deadline_ns();
+    let is_tighter = |sink: &SubtaskId| dag.subtask(*sink).relative_deadline_ns() < deadline_ns;
     mask(&[
         ("pins", any(|of| of.core.is_some())),
         ("groups", !spec.affinity.is_empty()),
@@ -103,9 +105,9 @@ fn of_dag(spec: &DagSpec, dag: &Dag) -> u32 {
             "lent",
             matches!(dag.why_there(), Some(Owner { .. } | Member { .. })),
         ),
-        ("sinks", any(|of| of.relative_deadline_ns.is_some())),
+        ("sinks", dag.sinks().iter().any(is_tighter)),
         ("waits", any(|of| !of.waits.is_empty())),
-        ("overlap", spec.relative_deadline_ns > spec.period_ns),
+        ("overlap", deadline_ns > dag.period_ns()),
         ("few", spec.in_flight.is_some()),
         ("sporadic", dag.is_sporadic()),
         ("order", spec.order == SubtaskOrder::Fixed),

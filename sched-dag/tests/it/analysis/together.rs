@@ -219,6 +219,10 @@ fn bounds_hold_whatever_features_come_together() {
         "{} jobs, {} sinks with a smaller bound than their job, {} sets that a fixed order shortens",
         all.jobs, all.tighter_sinks, all.shortened
     );
+    println!(
+        "ends of waits before, at, by the limit, by a cut, at once: {:?}; divided by attempts: {:?}",
+        all.ends, all.by_attempt
+    );
     println!("jobs with a bound, in thousands, by pairs of features:");
     for (name, row) in FEATURES.iter().zip(&all.of_pairs) {
         let row = row.iter().map(|jobs| format!("{:>7}", jobs.div_ceil(1000)));
