@@ -10,14 +10,14 @@ use sched_dag::law::{
     Histogram, InstanceRecord, JobRecord, JudgeOptions, RunRecord, RunTally, Violation,
     dispatch_violations, violations,
 };
-use sched_dag::{DagId, Instance, JobOutcome, SubtaskId, Wait};
+use sched_dag::{CoreId, DagId, Instance, JobOutcome, SubtaskId, Wait};
 
 use crate::support::events::events;
 use crate::support::set::{self, Overruns, Set};
 use crate::support::{self, PREEMPTIVE, Run, Script, Spec, commit, driver, number};
 
 fn for_each_run(mut with: impl FnMut(u64, &mut Random, &Set, &Run)) {
-    let (count, first_seed) = (number("JOURNALS", 500), number("JOURNAL_SEED", 1));
+    let (count, first_seed) = (number("JOURNALS", 1_000), number("JOURNAL_SEED", 1));
     println!("{count} sets from seed {first_seed} on");
     for seed in first_seed..first_seed + count {
         let mut random = Random::new(seed);
@@ -78,7 +78,7 @@ fn the_latest_events_have_the_latest_jobs_whole() {
 }
 
 /// Kinds of events that no run may lack.
-const NEEDED: [EventKind; 8] = [
+const NEEDED: [EventKind; 9] = [
     EventKind::Released,
     EventKind::Ready,
     EventKind::Cancelled,
@@ -87,13 +87,15 @@ const NEEDED: [EventKind; 8] = [
     EventKind::Resume,
     EventKind::Finish,
     EventKind::Completed,
+    EventKind::Missed,
 ];
 
 #[test]
 fn a_journal_with_one_event_changed_breaks_a_rule() {
-    // Deleted, doubled, later, earlier, and swapped with the next of its instance.
-    let mut counts = [0; 5];
-    let few = number("JOURNALS", 15);
+    // Deleted, doubled, later, earlier, swapped with the next of its instance, on another core, and
+    // followed by a miss that is made up.
+    let mut counts = [0; 7];
+    let few = number("JOURNALS", 80);
     for_each_run(|seed, _, set, run| {
         if seed > few {
             return;
@@ -113,13 +115,24 @@ fn a_journal_with_one_event_changed_breaks_a_rule() {
             let next = next.filter(|_| event.instance().is_some());
             let next = next.map(|next| place + 1 + next);
             let next_is = |what: EventKind| next.is_some_and(|next| run.events[next].what == what);
-            // An instance may be cancelled without having been ready.
-            if event.what != EventKind::Ready || !next_is(EventKind::Cancelled) {
+            let has = |what: &[EventKind]| {
+                let mut all = run.events.iter();
+                let of = |event: &Event| (event.dag, event.job);
+                all.any(|other| of(other) == of(event) && what.contains(&other.what))
+            };
+            let is_optional = match event.what {
+                // An instance may be cancelled without having been ready.
+                EventKind::Ready => next_is(EventKind::Cancelled),
+                EventKind::Missed => has(&[EventKind::Aborted, EventKind::Skipped]),
+                _ => false,
+            };
+            if !is_optional {
                 objects(0, event, &|events| _ = events.remove(place));
             }
             objects(1, event, &|events| events.insert(place, *event));
             // How long an instance executes, no rule says.
-            if !matches!(event.what, EventKind::Cancelled | EventKind::Finish) {
+            let is_fixed = !matches!(event.what, EventKind::Cancelled | EventKind::Finish);
+            if is_fixed && !(is_optional && event.what == EventKind::Missed) {
                 objects(2, event, &|events| events[place].time_ns += 1);
                 if event.time_ns > 0 {
                     objects(3, event, &|events| events[place].time_ns -= 1);
@@ -130,9 +143,18 @@ fn a_journal_with_one_event_changed_breaks_a_rule() {
                     (events[place].what, events[next].what) = (events[next].what, event.what);
                 });
             }
+            if event.what == EventKind::Finish && set.options.cores > 1 {
+                let core = CoreId((event.core.0 + 1) % set.options.cores);
+                objects(5, event, &|events| events[place].core = core);
+            }
+            let is_late = has(&[EventKind::Missed, EventKind::Aborted]);
+            if event.what == EventKind::Completed && !is_late {
+                let what = EventKind::Missed;
+                objects(6, event, &|events| events.push(Event { what, ..*event }));
+            }
         }
     });
-    println!("deleted, doubled, later, earlier, swapped: {counts:?}");
+    println!("deleted, doubled, later, earlier, swapped, elsewhere, made up: {counts:?}");
     assert!(counts.iter().all(|count| *count > 300));
 }
 

@@ -3,7 +3,6 @@
 
 mod dag_files;
 mod files;
-mod lies;
 mod lines;
 #[path = "../../src/record/tests/made.rs"]
 #[allow(dead_code, reason = "each program uses a part of this")]
@@ -12,9 +11,6 @@ mod on_linux;
 mod oracle_schedules;
 mod published_schedules;
 mod recordings;
-#[path = "../../../../sched-dag/tests/it/support/mod.rs"]
-mod sets;
 #[path = "../support.rs"]
 mod support;
-mod trace_of_virtual_time;
 mod traces;
