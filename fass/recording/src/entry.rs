@@ -306,7 +306,7 @@ crate::recordable! {
         /// The affinities: a DAG, and one of the cores of its cluster that alone execute what of it is
         /// not pinned. Since version 7, too.
         pub affinities: Vec<(u32, u32)>,
-        /// So much more is charged where subtasks are pinned. Since version 7, too.
+        /// A move to another core takes so much, where subtasks are pinned. Since version 7, too.
         pub move_ns: u64,
         /// By DAG, which test gave its bound, or why there is none. Since version 8.
         pub answers: Vec<String>,

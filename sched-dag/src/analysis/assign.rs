@@ -31,6 +31,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use super::case::of_cluster;
 use super::lending::{LendingAnswer, LendingPlan, lend_amid};
 use super::multi_path::multi_path;
 use super::ratio::{Ratio, sort_largest_first};
@@ -96,10 +97,8 @@ texts! {
 /// the densest first.
 pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(), NotAssigned> {
     let dags = task_set.dags().iter();
-    let overheads = settings
-        .overheads
-        .with_sections(dags.clone(), settings.cores);
-    let overhead_ns = overheads.of_an_instance_ns(settings.preemption);
+    let all = of_cluster(settings, settings.cores, dags.clone());
+    let overhead_ns = all.overheads.of_an_instance_ns(settings.preemption);
     let overhead_ns = overhead_ns.ok_or(TaskError::VolumeOverflow);
     let mut tasks = Vec::with_capacity(task_set.dags().len());
     for (dag, model) in dags.enumerate() {
@@ -115,7 +114,8 @@ pub fn assign(task_set: &mut TaskSet, settings: &AnalysisSettings) -> Result<(),
         let task = overhead_ns.and_then(|overhead_ns| Task::from_dag(model, overhead_ns));
         tasks.push(task.map_err(|error| refused(dag, AssignmentFailure::Unknown(error)))?);
     }
-    let attempts = match lend_cores(task_set, settings) {
+    let bursts = WorkloadBursts::of(task_set.dags().iter().map(|dag| (dag, false)), &all);
+    let attempts = match lend_cores(task_set, &bursts, &tasks, settings) {
         None => None,
         Some(Ok(())) => return Ok(()),
         Some(Err(failed)) => failed.try_into().ok(),
@@ -155,6 +155,8 @@ fn take_if_proven(
 /// each attempt failed.
 fn lend_cores(
     task_set: &mut TaskSet,
+    bursts: &WorkloadBursts,
+    tasks: &[Task],
     settings: &AnalysisSettings,
 ) -> Option<Result<(), Vec<DagId>>> {
     let is_plain = |dag: &Dag| {
@@ -169,19 +171,8 @@ fn lend_cores(
     if !applies {
         return None;
     }
-    let with_moves = AnalysisSettings {
-        overheads: settings
-            .overheads
-            .with_sections(task_set.dags().iter(), settings.cores)
-            .with_moves(),
-        ..*settings
-    };
-    let overhead_ns = (with_moves.overheads).of_an_instance_ns(settings.preemption)?;
-    let tasks = (task_set.dags().iter()).map(|dag| Task::from_dag(dag, overhead_ns).ok());
-    let tasks: Vec<Task> = tasks.collect::<Option<_>>()?;
     let tasks: Vec<&Task> = tasks.iter().collect();
-    let bursts = WorkloadBursts::of(task_set.dags().iter(), &with_moves);
-    let LendingAnswer { plan, failed } = lend_amid(&bursts, &tasks, settings.cores)?;
+    let LendingAnswer { plan, failed } = lend_amid(bursts, &tasks, settings.cores)?;
     let Some(plan) = plan else {
         let failed = failed.into_iter().map(|dag| DagId(to_u32(dag)));
         return Some(Err(failed.collect()));

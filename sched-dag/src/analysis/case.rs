@@ -13,7 +13,7 @@ use super::ranks::{PreemptionMix, RankRelation};
 use super::set::{EquationSet, constrained};
 use super::task::{Task, TaskError};
 use super::workload::WorkloadBursts;
-use super::{AnalysisSettings, NotProvenReason};
+use super::{AnalysisResult, AnalysisSettings, NotProvenReason};
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
 use crate::policy::{Policy, Preemption};
@@ -27,7 +27,7 @@ pub(super) fn with_case(
     own: &[usize],
     settings: &AnalysisSettings,
     reasons: &mut [Option<NotProvenReason>],
-    work: impl FnOnce(&AnalysisInput<'_>, &mut [Option<NotProvenReason>]),
+    work: impl FnOnce(&AnalysisInput<'_>, AnalysisResult, &mut [Option<NotProvenReason>]),
 ) {
     let relation = RankRelation::new(dags, own, settings.policy, settings.preemption);
     let tasks = analysable(dags, own, &relation, settings, reasons);
@@ -38,8 +38,9 @@ pub(super) fn with_case(
         .filter_map(|&dag| tasks[dag].as_ref())
         .collect();
     let relation = relation.among(&members);
-    let case = AnalysisInput::new(dags, own, (&members, &tasks), relation, settings);
-    work(&case, reasons);
+    let mut case = AnalysisInput::new(dags, own, (&members, &tasks), relation, settings);
+    let verdict = case.settle();
+    work(&case, verdict, reasons);
 }
 
 /// Reports whether cores of a cluster with these DAGs are told apart.
@@ -51,7 +52,7 @@ fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
 pub(super) fn of_cluster<'a>(
     settings: &AnalysisSettings,
     cores: u32,
-    dags: impl Iterator<Item = &'a Dag> + Clone,
+    dags: impl Iterator<Item = &'a Dag>,
 ) -> AnalysisSettings {
     AnalysisSettings {
         cores,
@@ -64,8 +65,8 @@ pub(super) fn of_cluster<'a>(
 pub(super) struct AnalysisInput<'a> {
     /// All DAGs of the commit.
     all: &'a [Dag],
-    /// Whether no other DAG is on these cores, one that cannot be analysed either.
-    is_only_one: bool,
+    /// The positions of those on these cores, also of those that cannot be analysed.
+    own: &'a [usize],
     /// Those of this case; elsewhere a DAG is a position in this list.
     pub(super) members: &'a [usize],
     pub(super) tasks: &'a [&'a Task],
@@ -82,7 +83,7 @@ pub(super) struct AnalysisInput<'a> {
 impl<'a> AnalysisInput<'a> {
     fn new(
         all: &'a [Dag],
-        own: &[usize],
+        own: &'a [usize],
         (members, tasks): (&'a [usize], &'a [&'a Task]),
         relation: RankRelation,
         settings: &'a AnalysisSettings,
@@ -93,7 +94,7 @@ impl<'a> AnalysisInput<'a> {
         });
         let mut case = Self {
             all,
-            is_only_one: own.len() == 1,
+            own,
             members,
             tasks,
             settings,
@@ -103,11 +104,43 @@ impl<'a> AnalysisInput<'a> {
             is_pinned: is_pinned(own.iter().map(|&dag| &all[dag])),
             entering: Vec::new(),
         };
-        let own = own.iter().map(|&dag| &all[dag]);
-        case.set.bursts = WorkloadBursts::of(own, settings);
+        case.set.bursts = case.bursts(|_| false);
         case.entering = case.features();
         case.complete();
         case
+    }
+
+    /// Returns the bursts of the DAGs of the commit on these cores, some of which may fall behind.
+    fn bursts(&self, fall_behind: impl Fn(usize) -> bool) -> WorkloadBursts {
+        let own = self.own.iter();
+        let own = own.map(|&dag| (&self.all[dag], fall_behind(dag)));
+        WorkloadBursts::of(own, self.settings)
+    }
+
+    /// Answers, and lets those fall behind that have no bound, until the bounds of the others rest on
+    /// no such one.
+    fn settle(&mut self) -> AnalysisResult {
+        let mut has_bound = vec![false; self.all.len()];
+        for &dag in self.members {
+            has_bound[dag] = true;
+        }
+        loop {
+            let mut verdict = self.verdict();
+            for (&dag, bound) in self.members.iter().zip(&verdict.bounds) {
+                has_bound[dag] &= bound.is_some();
+            }
+            let bursts = self.bursts(|dag| !has_bound[dag]);
+            let is_settled = bursts == self.set.bursts;
+            self.set.bursts = bursts;
+            if let Some(place) = self.set.bursts.endless {
+                let dag = dag_id(self.own[place]);
+                verdict.refuse(NotProvenReason::BesideBacklog { dag });
+                return verdict;
+            }
+            if is_settled {
+                return verdict;
+            }
+        }
     }
 
     /// Returns by DAG the features that enter it.
@@ -139,6 +172,35 @@ impl<'a> AnalysisInput<'a> {
         self.has_pins(other) || is_kept || ranked && shares
     }
 
+    /// Returns the cores that execute what of a DAG is not pinned.
+    pub(super) fn group(&self, dag: usize) -> Vec<u32> {
+        match self.dag(dag).affinity() {
+            [] => (0..self.settings.cores).collect(),
+            cores => cores.to_vec(),
+        }
+    }
+
+    /// Returns the DAGs with subtasks that are pinned to cores of a DAG's group, and how long it takes
+    /// to go on elsewhere with what a job of each finds there.
+    fn moves(&self, dag: usize) -> Vec<(usize, u128)> {
+        let group = self.group(dag);
+        let is_free = |subtask: &Subtask| subtask.core().is_none();
+        if group.len() == 1 || !self.dag(dag).subtasks().iter().any(is_free) {
+            return Vec::new();
+        }
+        let takes = |other: usize| {
+            let subtasks = self.dag(other).subtasks().iter();
+            let starts = subtasks.filter(|of| of.core().is_some_and(|core| group.contains(&core)));
+            let starts = starts.map(|of| 1 + of.waits().len() as u128);
+            (
+                other,
+                starts.sum::<u128>() * u128::from(self.set.bursts.move_ns),
+            )
+        };
+        let all = (0..self.members.len()).map(takes);
+        all.filter(|(_, takes)| *takes > 0).collect()
+    }
+
     /// Returns how many cores count for a DAG where cores are told apart.
     fn counted_cores(&self, dag: usize) -> u32 {
         match (self.has_pins(dag), self.dag(dag).affinity().len()) {
@@ -163,7 +225,7 @@ impl<'a> AnalysisInput<'a> {
 
     /// Reports whether a DAG has all cores whenever it needs them.
     pub(super) fn is_alone(&self, dag: usize) -> bool {
-        let blocked = self.relation.preemption != PreemptionMix::All && !self.is_only_one;
+        let blocked = self.relation.preemption != PreemptionMix::All && self.own.len() > 1;
         let mut others = 0..self.members.len();
         !blocked && !others.any(|other| self.relation.may_outrank(other, dag))
     }
@@ -190,6 +252,7 @@ impl<'a> AnalysisInput<'a> {
                 self.set.count_on(dag, self.counted_cores(dag));
             }
             self.set.forbid_overlap(vec![true; self.members.len()]);
+            self.set.moves = (0..self.members.len()).map(|dag| self.moves(dag)).collect();
         } else if self.set.has_waits() {
             let entering = self.entering.iter();
             let with_waits = entering.map(|features| features.cover(Features::WAITS));

@@ -161,7 +161,7 @@ impl Features {
             offset_ns: _,
             first_job: _,
             jobs: _,
-            // What is proven neither overruns nor fails.
+            // What is proven neither overruns nor fails, and what others may is in the bursts.
             overrun: _,
             on_fault: _,
             // A case has the DAGs of one cluster.

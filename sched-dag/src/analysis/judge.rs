@@ -41,8 +41,7 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
             &own,
             &settings,
             &mut answer.reasons,
-            |case, reasons| {
-                let mut verdict = case.verdict();
+            |case, mut verdict, reasons| {
                 bound(case, &mut verdict, &mut answer.sinks_ns);
                 let first = first_own(&own, reasons).or(verdict.first_failing);
                 *first_failing = first_failing.or(first);
@@ -59,6 +58,15 @@ pub fn answer(task_set: &TaskSet, settings: &AnalysisSettings) -> AnalysisResult
     answer.first_failing = (first.and_then(|dag| first_own(&[dag], &answer.reasons)))
         .or_else(|| first_own(&all, &answer.reasons));
     answer
+}
+
+impl AnalysisResult {
+    /// Takes all bounds away for one reason.
+    pub(super) fn refuse(&mut self, reason: NotProvenReason) {
+        for (bound, own) in self.bounds.iter_mut().zip(&mut self.reasons) {
+            *own = own.or(bound.take().map(|_| reason));
+        }
+    }
 }
 
 impl AnalysisInput<'_> {

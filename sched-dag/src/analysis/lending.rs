@@ -348,9 +348,10 @@ impl<'a> MemberPlacing<'a> {
         for owner in owners {
             let task = members[owner.dag].task;
             let (late_ns, _) = late_and_limit_ns(bursts, task);
+            let times_ns = (owner.schedule.length_ns(), late_ns);
             let own = supplies[owner.first_core..].iter_mut();
             for (supply, list) in own.zip(&owner.schedule.cores) {
-                *supply = CoreSupply::of(task.period_ns(), list, late_ns);
+                *supply = CoreSupply::of(task.period_ns(), list, times_ns);
             }
         }
         Self {

@@ -24,7 +24,8 @@
 //! - `(q - j) x >= max(1, B_j) + sum of min(busy(r), x) + sum of W_h(r) clipped to x`.
 //!
 //! *Long steps* (bursts, in `workload`) take `E(r)` from every core. An owner's subtasks are late by
-//! as much then, so its lists are shifted; and `E(r)`, or `(q - j) E(r)`, is added on the right.
+//! as much then, so its lists are shifted; and `E(r)`, or `(q - j) E(r)`, is added on the right. So is,
+//! on several cores, the time for going on elsewhere with what an owner's subtask finds on its core.
 //!
 //! Assumes: `D <= T` for all, subtasks that can be preempted and do not wait, and bounds that all
 //! owners and more urgent members keep. Releases may be sporadic.
@@ -47,6 +48,8 @@ use crate::ids::to_u32;
 pub struct CoreSupply {
     /// The owner's period; without an owner any.
     period_ns: u64,
+    /// When the owner's jobs are complete, from their releases on.
+    response_ns: u64,
     /// The owner's subtasks on this core, in the order of their starts.
     tails: Vec<ListTail>,
 }
@@ -63,12 +66,17 @@ impl CoreSupply {
     /// A core that nobody owns.
     pub(super) const UNOWNED: Self = Self {
         period_ns: 1,
+        response_ns: 0,
         tails: Vec::new(),
     };
 
-    /// Describes a core with the list of an owner, whose subtasks are late by so much at most; even
-    /// then it ends within its period.
-    pub(super) fn of(period_ns: u64, list: &[ScheduledSubtask], late_ns: u64) -> Self {
+    /// Describes a core with a list of an owner whose lists together have a length, and whose subtasks
+    /// are late by so much at most; even then it ends within its period.
+    pub(super) fn of(
+        period_ns: u64,
+        list: &[ScheduledSubtask],
+        (length_ns, late_ns): (u64, u64),
+    ) -> Self {
         let mut work_ns = 0;
         let tails = list.iter().rev().map(|of| {
             work_ns += of.finish_ns - of.start_ns;
@@ -79,7 +87,11 @@ impl CoreSupply {
         });
         let mut tails: Vec<ListTail> = tails.collect();
         tails.reverse();
-        Self { period_ns, tails }
+        Self {
+            period_ns,
+            response_ns: length_ns.saturating_add(late_ns),
+            tails,
+        }
     }
 
     /// Returns the most time that the owner executes on this core in any window of a length, both
@@ -110,6 +122,13 @@ impl CoreSupply {
             }
         }
         busiest
+    }
+
+    /// Adds the time that it takes members to go on with another core, as the owner's subtasks take
+    /// this one.
+    fn add_moves(&self, bursts: &mut WorkloadBursts) {
+        let takes = self.tails.len() as u128 * u128::from(bursts.move_ns);
+        bursts.add(self.period_ns.into(), self.response_ns.into(), takes);
     }
 
     /// Returns the busy time as work of one core, as far as it surely grows.
@@ -230,7 +249,9 @@ impl<'a> MemberTask<'a> {
             span: None,
         };
         let mut busy = [WorkloadSegment::NONE; 2];
+        let mut bursts = self.bursts.clone();
         for core in cores {
+            core.add_moves(&mut bursts);
             let of_core = core.at(window_ns);
             busy = [
                 busy[0].and(of_core),
@@ -254,7 +275,7 @@ impl<'a> MemberTask<'a> {
                 plain.push(in_window);
                 clipped.push(in_window.least(workload.over(waiting_ns)));
             }
-            let lost = self.bursts.on(free, window_ns);
+            let lost = bursts.on(free, window_ns);
             plain.push(lost);
             clipped.push(lost);
             [(false, plain), (true, clipped)].map(|(is_clipped, works)| LentForm {
@@ -290,7 +311,7 @@ mod tests {
             start_ns,
             finish_ns,
         });
-        CoreSupply::of(period_ns, &list.collect::<Vec<_>>(), 0)
+        CoreSupply::of(period_ns, &list.collect::<Vec<_>>(), (0, 0))
     }
 
     fn bound(task: &Task, cores: &[&CoreSupply], above: &[(&Task, u64)]) -> Option<u64> {

@@ -134,7 +134,7 @@ pub struct AnalysisSettings {
 pub struct AnalysisResult {
     /// The bound of each DAG, in the order of the commit; `None`: not proven.
     ///
-    /// A bound stands for itself: DAGs that are not proven do not weaken it.
+    /// A bound stands for itself: whatever DAGs do that are not proven, it holds.
     pub bounds: Vec<Option<DagBound>>,
     /// The bound of each sink of each DAG, in the order of [`Dag::sinks`]: the most time
     /// from a job's nominal release to the sink's finish. `None`: its DAG is not proven.
@@ -254,11 +254,11 @@ texts! {
             "subtask {} is pinned, and no test bounds the response time of its DAG as on one core; pin \
              all its subtasks, to cores that no other DAG is pinned to, with an edge from each to the \
              next one on its core, or leave the cores out", subtask.0;
-        /// It shares a cluster with pinned subtasks, on terms that their test does not cover.
-        BesidePinned =
-            "subtasks of its cluster are pinned, and the test for that needs deadlines within periods, \
-             preemption, no waits, and in each group of DAGs static priorities that rank whole DAGs; \
-             see to these, or leave the cores out";
+        /// A DAG of its cluster is not proven, and may release any number of jobs in a row.
+        BesideBacklog { dag: DagId } =
+            "dag {}, which shares its cores, is not proven and queues releases that find no room: many \
+             in a row may keep the scheduler from all others; see to that one first, or let it skip \
+             or abort jobs", dag.0;
         /// A subtask of its cluster enters a lock of which no longest section is stated.
         UnboundedLock { dag: DagId, subtask: SubtaskId } =
             "subtask {} of dag {} enters a lock without a longest section, in which it keeps what \

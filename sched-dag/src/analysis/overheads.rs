@@ -8,8 +8,10 @@
 //! - if instances can be preempted, one inter-processor interrupt: an instance
 //!   preempts at most one other, when it becomes ready, so the one that
 //!   preempts is charged. The switches back to the preempted instance are the
-//!   preempting one's second switch. Where subtasks are pinned, an instance may in addition
-//!   [move](Overheads::of_a_move_ns) one other, and pays for that, too.
+//!   preempting one's second switch.
+//!
+//! A pinned instance may [move](Overheads::of_a_move_ns) another one to an idle core, which goes on
+//! there at once. That is no charge of an instance, but a term of the bounds in `set`.
 //!
 //! These are of a step in which few instances become ready. For each one that does, `ready` is
 //! what it adds to a step, whatever is then delayed: `workload` has that term of the bounds.
@@ -20,7 +22,6 @@
 
 use crate::law::MeasuredCosts;
 use crate::policy::Preemption;
-use crate::spec::PINS;
 use crate::task_set::Dag;
 
 /// Measured costs, each a worst case; all 0 by default.
@@ -95,8 +96,8 @@ impl Overheads {
         }
     }
 
-    /// Returns what each instance is charged besides where subtasks are pinned: one that preempts
-    /// there may move another one to a core of its group, which preempts a third one.
+    /// Returns how long it takes to go on with an instance on another core of its group, since a
+    /// pinned one takes its core.
     #[must_use]
     pub fn of_a_move_ns(&self, preemption: Preemption) -> u64 {
         let switches = self.context_switch_ns.saturating_mul(2);
@@ -106,13 +107,15 @@ impl Overheads {
         }
     }
 
-    /// Returns them where subtasks of these DAGs enter sections of locks.
+    /// Returns them in a cluster with these DAGs, whose subtasks may enter sections of locks, on a
+    /// machine of so many cores in all.
     ///
     /// An instance that is given a core may find another one there that is in a section: once at
     /// its start and, paid for by the one that has preempted it, once when it goes on. If it is
     /// preempted while it waits for a section, it waits for its turn anew. `docs/proving.md` has the
     /// argument.
-    pub(super) fn with_sections<'a>(self, dags: impl Iterator<Item = &'a Dag>, cores: u32) -> Self {
+    #[must_use]
+    pub fn among<'a>(self, dags: impl Iterator<Item = &'a Dag>, cores: u32) -> Self {
         let (mut longest_ns, mut turn_ns) = (0, 0);
         for of in dags.flat_map(Dag::locks) {
             longest_ns = of.longest_ns.unwrap_or(u64::MAX).max(longest_ns);
@@ -121,25 +124,6 @@ impl Overheads {
         let sections_ns = longest_ns.saturating_mul(2).saturating_add(turn_ns);
         Self {
             interrupt_ns: self.interrupt_ns.saturating_add(sections_ns),
-            ..self
-        }
-    }
-
-    /// Returns them in a cluster with these DAGs, on a machine of so many cores in all.
-    #[must_use]
-    pub fn among<'a>(self, dags: impl Iterator<Item = &'a Dag> + Clone, cores: u32) -> Self {
-        let of = self.with_sections(dags.clone(), cores);
-        match PINS && dags.clone().any(Dag::is_confined) {
-            true => of.with_moves(),
-            false => of,
-        }
-    }
-
-    /// Returns them where subtasks are pinned.
-    pub(super) fn with_moves(self) -> Self {
-        let move_ns = self.of_a_move_ns(Preemption::Enabled);
-        Self {
-            interrupt_ns: self.interrupt_ns.saturating_add(move_ns),
             ..self
         }
     }

@@ -8,8 +8,11 @@
 //! ```text
 //! machine CORES POLICY OVERHEAD_NS            static or edf
 //! bursts READY_NS LATE                        only if it takes time to make instances ready
+//! moves MOVE_NS                               likewise to move them, where subtasks are pinned
 //! cluster CLUSTER CLUSTERS                    only of divided cores: which it is, of how many
 //! dag DAG PERIOD DEADLINE IN_FLIGHT SUBTASKS EDGES "NAME"
+//! queue WAITING                               of `bursts`, the most releases that wait for room: none, or
+//!                                             1 for each job in flight; without it any number
 //! subtask WCET PRIORITY KEEPS_ITS_CORE        (a WCET of 0 is an unknown one)
 //! edge FROM TO
 //! wait SUBTASK WCET LIMIT WCET ..             of segments and waits, likewise
@@ -63,7 +66,7 @@ use super::case::{AnalysisInput, of_cluster, with_case};
 use super::cover::{heaviest, peel};
 use super::schedulability::{write_certificates, write_terms};
 use super::witness_text::WitnessText;
-use super::workload::WorkloadBursts;
+use super::workload::waiting_rooms;
 use crate::fnv::{EMPTY, fnv_1a};
 use crate::ids::to_u32;
 use crate::policy::{Policy, Preemption};
@@ -86,32 +89,39 @@ pub fn witness(task_set: &TaskSet, settings: &AnalysisSettings) -> String {
 
 fn whole(dags: &[Dag], place: Option<(u32, usize)>, settings: &AnalysisSettings) -> String {
     let mut text = WitnessText(String::new());
-    text.statement(dags, place, settings);
-    text.hash("hash");
     let all: Vec<usize> = (0..dags.len()).collect();
     let mut reasons = alloc::vec![None; dags.len()];
-    with_case(dags, &all, settings, &mut reasons, |case, reasons| {
-        let bounds = case.verdict().bounds;
-        for dag in 0..case.members.len() {
-            text.graph(case, dag);
-        }
-        let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
-        let responses: Vec<Option<u64>> = responses.collect();
-        write_certificates(case, &bounds, &mut text);
-        for (dag, bound) in bounds.iter().enumerate() {
-            match bound {
-                Some(bound) => write_terms(case, &responses, dag, *bound, &mut text),
-                None => text.line(format_args!("unproven {}", case.members[dag])),
+    with_case(
+        dags,
+        &all,
+        settings,
+        &mut reasons,
+        |case, verdict, reasons| {
+            text.machine(place, case);
+            text.statement(dags, case);
+            text.hash("hash");
+            let bounds = verdict.bounds;
+            for dag in 0..case.members.len() {
+                text.graph(case, dag);
             }
-        }
-        for (dag, _) in reasons
-            .iter()
-            .enumerate()
-            .filter(|(_, reason)| reason.is_some())
-        {
-            text.line(format_args!("unproven {dag}"));
-        }
-    });
+            let responses = bounds.iter().map(|bound| bound.map(|bound| bound.bound_ns));
+            let responses: Vec<Option<u64>> = responses.collect();
+            write_certificates(case, &bounds, &mut text);
+            for (dag, bound) in bounds.iter().enumerate() {
+                match bound {
+                    Some(bound) => write_terms(case, &responses, dag, *bound, &mut text),
+                    None => text.line(format_args!("unproven {}", case.members[dag])),
+                }
+            }
+            for (dag, _) in reasons
+                .iter()
+                .enumerate()
+                .filter(|(_, reason)| reason.is_some())
+            {
+                text.line(format_args!("unproven {dag}"));
+            }
+        },
+    );
     text.hash("seal");
     text.0
 }
@@ -122,12 +132,8 @@ impl WitnessText {
         self.line(format_args!("{word} {hash}"));
     }
 
-    fn statement(
-        &mut self,
-        dags: &[Dag],
-        place: Option<(u32, usize)>,
-        settings: &AnalysisSettings,
-    ) {
+    fn machine(&mut self, place: Option<(u32, usize)>, case: &AnalysisInput<'_>) {
+        let (settings, bursts) = (case.settings, &case.set.bursts);
         let policy = match settings.policy {
             Policy::StaticPriority => "static",
             Policy::Edf => "edf",
@@ -135,14 +141,20 @@ impl WitnessText {
         let overhead_ns = settings.overheads.of_an_instance_ns(settings.preemption);
         let (cores, overhead_ns) = (settings.cores, overhead_ns.unwrap_or(u64::MAX));
         self.line(format_args!("machine {cores} {policy} {overhead_ns}"));
-        let bursts = WorkloadBursts::of(dags.iter(), settings);
         if !bursts.are_none() {
             let ready_ns = settings.overheads.ready_ns;
             self.line(format_args!("bursts {ready_ns} {}", bursts.late_ns));
         }
+        if case.is_pinned() && bursts.move_ns > 0 {
+            self.line(format_args!("moves {}", bursts.move_ns));
+        }
         if let Some((cluster, clusters)) = place {
             self.line(format_args!("cluster {cluster} {clusters}"));
         }
+    }
+
+    fn statement(&mut self, dags: &[Dag], case: &AnalysisInput<'_>) {
+        let (settings, bursts) = (case.settings, &case.set.bursts);
         for (id, dag) in dags.iter().enumerate() {
             let edges = dag.graph.successors.edges();
             self.line(format_args!(
@@ -154,6 +166,9 @@ impl WitnessText {
                 edges.len(),
                 dag.name(),
             ));
+            if let Some(waiting) = waiting_rooms(dag).filter(|_| !bursts.are_none()) {
+                self.line(format_args!("queue {waiting}"));
+            }
             for subtask in dag.subtasks() {
                 let keeps =
                     subtask.is_non_preemptive() || settings.preemption == Preemption::Disabled;

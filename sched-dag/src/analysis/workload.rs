@@ -51,14 +51,21 @@
 //! for steps before its own is late, at most by `late = charge + E(late)` with `late = 0` on
 //! the right.
 //!
+//! A DAG may *fall behind*, as none of its bounds is known: with `k` jobs in flight, `k` of them are
+//! complete in the window besides those that it releases, so `carry = k T`. Where releases wait
+//! for room, one completion releases `k` at most. If that makes no more ready than [`WIDE`], it is
+//! charged as any other; else [`OverrunPolicy::Abort`] and signals let `k` wait, so that both bursts
+//! have one `k T` more, and with [`OverrunPolicy::Queue`] there is no end to them.
+//!
 //! In the equations all cores are busy for so long. The workloads of the DAGs do not grow by
-//! it. A DAG without bound counts as if it kept up.
+//! it.
 
 use alloc::vec::Vec;
 
 use super::AnalysisSettings;
 use super::task::Task;
 use crate::ids::SubtaskId;
+use crate::policy::OverrunPolicy;
 use crate::task_set::Dag;
 
 /// A DAG, or a part of one, that may execute next to the DAG under analysis.
@@ -283,47 +290,82 @@ const WIDE: usize = 16;
 /// The most evaluations of a sum, which then counts as endless.
 const STEP_LIMIT: u32 = 1024;
 
+/// Returns how many releases of a DAG may wait for room at most, by the jobs that it may have in
+/// flight; `None`: any number.
+pub(super) const fn waiting_rooms(dag: &Dag) -> Option<u128> {
+    match dag.overrun() {
+        OverrunPolicy::Skip => Some(0),
+        // One signal is kept.
+        OverrunPolicy::Queue if !dag.is_sporadic() => None,
+        OverrunPolicy::Abort | OverrunPolicy::Queue => Some(1),
+    }
+}
+
 /// The bursts of the DAGs that share cores.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct WorkloadBursts {
     /// How late a release is at most.
     pub(super) late_ns: u64,
+    /// How long it takes to go on with an instance on another core.
+    pub(super) move_ns: u64,
+    /// The place of the first DAG that falls behind and may have any number of them.
+    pub(super) endless: Option<usize>,
     /// `T`, `carry` and `burst`.
     repeated: Vec<[u128; 3]>,
 }
 
 impl WorkloadBursts {
-    /// Returns those of DAGs, be they analysable or not.
-    pub(super) fn of<'a>(dags: impl Iterator<Item = &'a Dag>, settings: &AnalysisSettings) -> Self {
-        let mut bursts = Self::default();
-        if settings.overheads.ready_ns == 0 {
-            return bursts;
-        }
-        for dag in dags {
+    /// Returns those of DAGs, be they analysable or not, each with whether it may fall behind.
+    pub(super) fn of<'a>(
+        dags: impl Iterator<Item = (&'a Dag, bool)>,
+        settings: &AnalysisSettings,
+    ) -> Self {
+        let mut bursts = Self {
+            move_ns: settings.overheads.of_a_move_ns(settings.preemption),
+            ..Self::default()
+        };
+        let ready_ns = u128::from(settings.overheads.ready_ns);
+        for (place, (dag, falls_behind)) in dags.filter(|_| ready_ns > 0).enumerate() {
             let ids = (0..).map(SubtaskId).take(dag.subtasks().len());
             let beyond = ids.map(|id| dag.successors(id).len().saturating_sub(WIDE));
             // Any number of waits may end at once, whenever their jobs are not complete.
             let wakes = dag.subtasks().iter().map(|subtask| subtask.waits().len());
+            let (sources, later) = (dag.sources().len(), beyond.chain(wakes).sum::<usize>());
             let period = u128::from(dag.period_ns());
-            let deadline = u128::from(dag.relative_deadline_ns());
-            for (carry, count) in [
-                (0, dag.sources().len()),
-                (deadline, beyond.chain(wakes).sum::<usize>()),
-            ] {
-                let takes = count as u128 * u128::from(settings.overheads.ready_ns);
-                let same = |other: &&mut [u128; 3]| other[..2] == [period, carry];
-                match bursts.repeated.iter_mut().find(same) {
-                    Some(other) => other[2] += takes,
-                    None => bursts.repeated.push([period, carry, takes]),
+            let in_flight = dag.in_flight() as usize;
+            let room = in_flight as u128 * period;
+            let is_wide = sources.saturating_mul(in_flight) > WIDE || later > 0;
+            let carries = match waiting_rooms(dag) {
+                _ if !falls_behind => [0, dag.relative_deadline_ns().into()],
+                _ if !is_wide => [0, 0],
+                Some(waiting) => [waiting * room, (waiting + 1) * room],
+                None => {
+                    bursts.endless.get_or_insert(place);
+                    [0, 0]
                 }
+            };
+            for (carry, count) in carries.into_iter().zip([sources, later]) {
+                bursts.add(period, carry, count as u128 * ready_ns);
             }
         }
-        bursts.repeated.retain(|burst| burst[2] > 0);
         let charge_ns = settings.overheads.of_an_instance_ns(settings.preemption);
         let late_ns = charge_ns.and_then(|charge_ns| bursts.after(charge_ns));
         // If lateness has no end, each window counts as full of bursts, and nothing is proven.
-        bursts.late_ns = late_ns.unwrap_or(u64::MAX);
+        bursts.late_ns = match late_ns.filter(|_| bursts.endless.is_none()) {
+            _ if bursts.are_none() => 0,
+            late_ns => late_ns.unwrap_or(u64::MAX),
+        };
         bursts
+    }
+
+    /// Adds one of each period, for jobs that may have been released a time `carry` before.
+    pub(super) fn add(&mut self, period: u128, carry: u128, takes: u128) {
+        let same = |other: &&mut [u128; 3]| other[..2] == [period, carry];
+        match self.repeated.iter_mut().find(same) {
+            Some(other) => other[2] += takes,
+            None if takes > 0 => self.repeated.push([period, carry, takes]),
+            None => {}
+        }
     }
 
     pub(super) fn are_none(&self) -> bool {

@@ -76,14 +76,6 @@ fn sinks(case: &AnalysisInput<'_>, _: Responses<'_>, found: &mut SinkBounds) {
     }
 }
 
-/// Says why a DAG has no bound that no test is asked about.
-pub(super) fn refusal(case: &AnalysisInput<'_>, dag: usize) -> NotProvenReason {
-    match case.is_pinned() {
-        true => PinnedCluster::of(case).refusals[dag].unwrap_or(NotProvenReason::BesidePinned),
-        false => NotProvenReason::NoBound,
-    }
-}
-
 /// The owners and groups of a cluster.
 struct PinnedCluster {
     /// By core, what its owner leaves.
@@ -124,8 +116,9 @@ impl PinnedCluster {
                 && let Some(bound_ns) = owner_bound_ns(case, owner)
             {
                 let task = case.tasks[owner];
-                let late_ns = bound_ns - task.length_ns();
-                let supply = CoreSupply::of(task.period_ns(), &cluster.lists[core], late_ns);
+                let length_ns = task.length_ns();
+                let times_ns = (length_ns, bound_ns - length_ns);
+                let supply = CoreSupply::of(task.period_ns(), &cluster.lists[core], times_ns);
                 cluster.supplies[core] = supply;
             }
         }
@@ -213,8 +206,8 @@ impl PinnedCluster {
         let delayed = |other: usize| NotProvenReason::DelayedBy {
             dag: case.id(other),
         };
-        let cores = self.group(case, dag);
-        for owner in cores.iter().filter_map(|&core| self.owners[core]) {
+        let cores = case.group(dag);
+        for owner in cores.iter().filter_map(|&core| self.owners[core as usize]) {
             if responses[owner].is_none() {
                 return Err(delayed(owner));
             }
@@ -231,24 +224,18 @@ impl PinnedCluster {
                 continue;
             }
             if case.relation.may_outrank(dag, other) {
-                return Err(NotProvenReason::BesidePinned);
+                return Err(NotProvenReason::NoBound);
             }
             let response_ns = response_ns.ok_or_else(|| delayed(other))?;
             above.push((other, of(other), response_ns));
         }
         Ok(MemberTerms {
             own: of(dag),
-            cores: cores.iter().map(|&core| &self.supplies[core]).collect(),
+            cores: (cores.iter())
+                .map(|&core| &self.supplies[core as usize])
+                .collect(),
             above,
         })
-    }
-
-    /// Returns the cores of a member's group.
-    fn group(&self, case: &AnalysisInput<'_>, dag: usize) -> Vec<usize> {
-        match case.dag(dag).affinity() {
-            [] => (0..self.supplies.len()).collect(),
-            cores => cores.iter().map(|&core| core as usize).collect(),
-        }
     }
 
     /// Returns when an owner's subtask finishes after the release, at the latest.

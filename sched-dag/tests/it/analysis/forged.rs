@@ -6,8 +6,8 @@
 
 use std::fs;
 
-use sched_dag::analysis::{AnalysisSettings, answer};
-use sched_dag::{DagSpec, Policy, Preemption, Priority, SubtaskSpec, TaskSet, Wait};
+use sched_dag::analysis::{AnalysisSettings, Overheads, answer};
+use sched_dag::{DagSpec, OverrunPolicy, Policy, Preemption, Priority, SubtaskSpec, TaskSet, Wait};
 
 use super::random::Sample;
 use super::simulate::spec;
@@ -126,7 +126,7 @@ fn unsound(text: &str, lines: &[String]) -> Option<String> {
 /// Returns the DAGs that a witness states, and on what they run; if verification takes them.
 fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     let mut dags: Vec<DagSpec> = Vec::new();
-    let (mut machine, mut ready_ns) = ((0, Policy::Edf, 0), 0);
+    let (mut machine, mut ready_ns, mut move_ns) = ((0, Policy::Edf, 0), 0, 0);
     for line in text.lines().take_while(|line| !line.starts_with("hash ")) {
         let words: Vec<&str> = line.split(' ').collect();
         let number = |at: usize| words[at].parse::<u64>().expect("a number");
@@ -138,6 +138,9 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
             }
             ("machine", _) => machine = (small(1), Policy::Edf, number(3)),
             ("bursts", _) => ready_ns = number(1),
+            ("moves", _) => move_ns = number(1),
+            ("queue", Some(dag)) if number(1) == 0 => dag.overrun = OverrunPolicy::Skip,
+            ("queue", Some(dag)) => dag.overrun = OverrunPolicy::Abort,
             ("dag", _) => dags.push(DagSpec {
                 in_flight: Some(small(4)),
                 ..spec(number(2), number(3), &[], &[], 0)
@@ -164,12 +167,11 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
             _ => panic!("{line}"),
         }
     }
-    let (cores, policy, dispatch_ns) = machine;
     let sample = Sample {
         specs: dags,
-        policy,
+        policy: machine.1,
         preemption: Preemption::Enabled,
-        cores,
+        cores: machine.0,
         clusters: sched_dag::CoreDivision::Undivided,
         is_lent: false,
         dispatch_ns: 0,
@@ -177,6 +179,11 @@ fn stated(text: &str) -> Option<(TaskSet, AnalysisSettings)> {
     // Only a shared state makes a sink precede another subtask.
     let task_set = sample.task_set()?;
     let mut settings = sample.settings();
-    (settings.overheads.dispatch_ns, settings.overheads.ready_ns) = (dispatch_ns, ready_ns);
+    settings.overheads = Overheads {
+        dispatch_ns: machine.2 - move_ns,
+        interrupt_ns: move_ns,
+        ready_ns,
+        ..Overheads::default()
+    };
     Some((task_set, settings))
 }

@@ -19,8 +19,8 @@ use sched_dag::analysis::{
     AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest, TaskError, answer, fix_orders,
 };
 use sched_dag::{
-    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Policy, Preemption,
-    SubtaskId, SubtaskOrder, verify,
+    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, OverrunPolicy,
+    Policy, Preemption, SubtaskId, SubtaskOrder, verify,
 };
 
 use simulate::{commit, responses, spec};
@@ -192,6 +192,42 @@ fn what_becomes_ready_at_once_is_charged_whatever_its_rank() {
     assert_eq!(on(Policy::StaticPriority, 1, wide)[0], Some(12 + 2 * 2));
 }
 
+/// A DAG that is held up releases its jobs late, one after the other, and each of them in a step that
+/// may take as long as what it makes ready.
+#[test]
+fn what_falls_behind_is_charged_for_all_that_it_releases_late() {
+    let fork: Vec<(usize, usize)> = (1..=18).map(|branch| (0, branch)).collect();
+    let urgent = spec(10_000, 1_000, &[100], &[], 0);
+    let hog = spec(10_000, 10_000, &[4_000, 4_000], &[], 1);
+    let beside = |sources: usize, edges: &[(usize, usize)], overrun| {
+        let mut last = spec(50, 50, &vec![1; sources], edges, 2);
+        (last.overrun, last.in_flight) = (overrun, Some(1));
+        let specs = [urgent.clone(), hog.clone(), last];
+        let mut with = settings(FP, 2);
+        with.overheads.ready_ns = 1;
+        answer(&commit(&specs, FP.0, 2), &with)
+    };
+    let bound = |sources, edges: &[_], overrun| {
+        let answer = beside(sources, edges, overrun);
+        assert_eq!(answer.reasons[2], Some(NotProvenReason::NoBound));
+        answer.bounds[0].ok_or(answer.reasons[0])
+    };
+    let backlog = Err(Some(NotProvenReason::BesideBacklog { dag: DagId(2) }));
+    // There is no end to what may wait, but what a completion makes ready is charged up to 16.
+    let many = |sources| bound(sources, &[], OverrunPolicy::Queue);
+    assert_eq!(many(17), backlog);
+    assert_eq!(many(16).map(|of| of.bound_ns), Ok(103 + 4 * 16));
+    assert_eq!(bound(19, &fork, OverrunPolicy::Queue), backlog);
+    // By period, and one more that may have been in flight, or that has waited for it.
+    let both = |overrun| {
+        [bound(17, &[], overrun), bound(19, &fork, overrun)].map(|of| of.map(|of| of.bound_ns))
+    };
+    let of_skips = [103 + 4 * 17, 103 + 3 + 4 * 2];
+    assert_eq!(both(OverrunPolicy::Skip), of_skips.map(Ok));
+    let of_aborts = [103 + 6 * 17, 103 + 4 + 5 * 2];
+    assert_eq!(both(OverrunPolicy::Abort), of_aborts.map(Ok));
+}
+
 #[test]
 fn overheads_beside_pinned_subtasks_count_in_each_bound() {
     let mut owner = spec(10, 10, &[3], &[], 0);
@@ -209,8 +245,8 @@ fn overheads_beside_pinned_subtasks_count_in_each_bound() {
     };
     // It has both cores: one is always free, and a whole unit is halved and rounded up.
     assert_eq!(bounds(&member, 0, 0), [3, 6]);
-    // The owner may move it to the other core.
-    assert_eq!(bounds(&member, 0, 1), [3 + 2, 5 + 2 + 1]);
+    // Twice the owner moves it to the other core; and of what the owner takes each has half.
+    assert_eq!(bounds(&member, 0, 1), [3 + 1, 5 + 1 + 2 + 2]);
     member.affinity = vec![0];
     assert_eq!(bounds(&member, 0, 0), [3, 5 + 3]);
     // Releases are 2 late, and so is the owner: at 12 it may come for the second time in 14.

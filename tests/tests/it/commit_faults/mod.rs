@@ -309,8 +309,8 @@ fn every_reason_against_a_proof_is_listed() {
             },
             NotProvenReason::SpanBeyondLimit { .. } => NotProvenReason::NoBoundByPeriod,
             NotProvenReason::NoBoundByPeriod => NotProvenReason::Pinned { subtask },
-            NotProvenReason::Pinned { .. } => NotProvenReason::BesidePinned,
-            NotProvenReason::BesidePinned => NotProvenReason::UnboundedLock {
+            NotProvenReason::Pinned { .. } => NotProvenReason::BesideBacklog { dag: DagId(1) },
+            NotProvenReason::BesideBacklog { .. } => NotProvenReason::UnboundedLock {
                 dag: DagId(1),
                 subtask,
             },
