@@ -155,36 +155,20 @@ impl PinnedCluster {
     /// Bounds the responses of owners, and then those of members, the most urgent first.
     fn bound(&self, case: &AnalysisInput<'_>, found: &mut JobBounds) {
         let count = case.members.len();
-        let (mut bounds, mut reasons) = (vec![None; count], self.refusals.clone());
+        let mut bounds = vec![None; count];
         let owned = (0..count).filter(|&dag| self.refusals[dag].is_none() && !is_member(case, dag));
         for dag in owned {
-            let (task, length_ns) = (case.tasks[dag], case.tasks[dag].length_ns());
             bounds[dag] = owner_bound_ns(case, dag);
-            reasons[dag] = match length_ns > task.relative_deadline_ns() {
-                true => Some(NotProvenReason::LengthBeyondDeadline { length_ns }),
-                false => bounds[dag].is_none().then_some(NotProvenReason::NoBound),
-            };
         }
         let mut steps = STEP_LIMIT;
         for &dag in case.order.iter().filter(|&&dag| is_member(case, dag)) {
-            if self.refusals[dag].is_some() {
-                continue;
-            }
-            let response = self.terms(case, dag, &bounds).and_then(|terms| {
-                let response = terms.own.respond(&terms.cores, &terms.above(), &mut steps);
-                response.ok_or(NotProvenReason::NoBound)
+            bounds[dag] = self.terms(case, dag, &bounds).and_then(|terms| {
+                let above = terms.above();
+                terms.own.respond(&terms.cores, &above, &mut steps)
             });
-            match response {
-                Ok(bound_ns) => bounds[dag] = Some(bound_ns),
-                Err(reason) => reasons[dag] = Some(reason),
-            }
         }
-        let is_own = |dag: &usize| {
-            let reason = reasons[*dag];
-            reason.is_some_and(|reason| !matches!(reason, NotProvenReason::DelayedBy { .. }))
-        };
-        found.first_failing = case.order.iter().copied().find(is_own);
-        found.reasons = reasons;
+        // Of all others the next test says why.
+        found.reasons = self.refusals.clone();
         for (dag, bound_ns) in bounds.into_iter().enumerate() {
             let test = match is_member(case, dag) {
                 true => SchedulabilityTest::Member,
@@ -202,15 +186,10 @@ impl PinnedCluster {
         case: &'a AnalysisInput<'_>,
         dag: usize,
         responses: &[Option<u64>],
-    ) -> Result<MemberTerms<'a>, NotProvenReason> {
-        let delayed = |other: usize| NotProvenReason::DelayedBy {
-            dag: case.id(other),
-        };
+    ) -> Option<MemberTerms<'a>> {
         let cores = case.group(dag);
         for owner in cores.iter().filter_map(|&core| self.owners[core as usize]) {
-            if responses[owner].is_none() {
-                return Err(delayed(owner));
-            }
+            responses[owner]?;
         }
         let of = |dag| MemberTask::of(case.tasks[dag], to_u32(cores.len()), &case.set.bursts);
         let mut above = Vec::new();
@@ -224,12 +203,11 @@ impl PinnedCluster {
                 continue;
             }
             if case.relation.may_outrank(dag, other) {
-                return Err(NotProvenReason::NoBound);
+                return None;
             }
-            let response_ns = response_ns.ok_or_else(|| delayed(other))?;
-            above.push((other, of(other), response_ns));
+            above.push((other, of(other), response_ns?));
         }
-        Ok(MemberTerms {
+        Some(MemberTerms {
             own: of(dag),
             cores: (cores.iter())
                 .map(|&core| &self.supplies[core as usize])
@@ -296,7 +274,7 @@ fn write_member(
 ) {
     let (id, task) = (case.members[dag], case.tasks[dag]);
     let cluster = PinnedCluster::of(case);
-    let Ok(terms) = cluster.terms(case, dag, responses) else {
+    let Some(terms) = cluster.terms(case, dag, responses) else {
         return;
     };
     if let [core] = terms.cores[..] {

@@ -20,12 +20,12 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use common::random::Random;
+use sched_dag::OverrunPolicy::{Abort, Queue, Skip};
 use sched_dag::analysis::{AnalysisSettings, Overheads, answer, fix_orders};
 use sched_dag::journal::EventKind;
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, DriverNotice, Instance,
-    OverrunPolicy, Policy, Preemption, Scheduler, SchedulerOptions, SubtaskId, SubtaskOrder,
-    SubtaskSpec, verify,
+    CommitOptions, ConstructionPolicy, DagId, DagSpec, Decision, DriverNotice, Instance, Policy,
+    Preemption, Scheduler, SchedulerOptions, SubtaskId, SubtaskOrder, SubtaskSpec, verify,
 };
 
 use crate::options::{Command, Takes as Value, options};
@@ -183,11 +183,7 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
     let (mixed, pinned) = (random.once_in(6), random.once_in(2));
     let first = random.within(1..=2 * cores).min(cores);
     for spec in &mut specs {
-        spec.overrun = random.one_of(&[
-            OverrunPolicy::Queue,
-            OverrunPolicy::Skip,
-            OverrunPolicy::Abort,
-        ]);
+        spec.overrun = random.one_of(&[Queue, Skip, Abort]);
         if random.once_in(4) {
             widen(spec, random);
         }
@@ -201,11 +197,8 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
             spec.relative_deadline_ns = Some(period_ns);
         }
         let room = if pinned { random.within(1..=4) } else { 1 };
-        if random.once_in(3) {
-            stretch(spec, random.within(5..=40), room);
-        } else {
-            stretch(spec, 1, room);
-        }
+        let is_slow = random.once_in(3);
+        stretch(spec, if is_slow { random.within(5..=40) } else { 1 }, room);
         let percent = random.one_of(&[0, 0, 50, 100]);
         for subtask in spec.subtasks.iter_mut().filter(|_| pinned) {
             let core = random.within(0..=cores - 1);
