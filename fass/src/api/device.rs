@@ -393,7 +393,7 @@ impl<Q, A> Device<Q, A> {
     /// sporadic DAG that it releases has the driver. It answers at once, or starts what answers
     /// later. Reports whether it is the first signal of the device, which alone counts.
     ///
-    /// To be called before the commit, which must have the signal's DAG, too.
+    /// To be called before the commit, which must have the signal's DAG, too; after it no signal counts.
     ///
     /// ```
     /// use core::time::Duration;
@@ -424,7 +424,10 @@ impl<Q, A> Device<Q, A> {
     /// assert!(report.dag("asks").jobs().all(|job| job.response_time_ns() == Some(1_000_000)));
     /// ```
     pub fn served_by(&self, signal: &Signal) -> bool {
-        self.0.server.set(Arc::clone(&signal.target))
+        // Behind the commit nobody checks whether the signal is one of the plan's.
+        let asking = self.0.asking.get();
+        let is_committed = asking.is_some_and(|(dag, _)| dag.get().is_some());
+        !is_committed && self.0.server.set(Arc::clone(&signal.target))
     }
 }
 

@@ -230,3 +230,17 @@ fn a_device_that_a_dag_serves_needs_that_dag_in_the_commit() {
     let error = finish_create_dags(&[asks]).expect_err("nobody serves it");
     assert_eq!(error.faults()[0].code(), "signal_not_committed", "{error}");
 }
+
+#[test]
+fn behind_the_commit_no_signal_is_a_devices_server() {
+    let machine = VirtualTime::new();
+    let (device, _driver) = create_device::<(), u32>("served");
+    let asks = every(20, "asks");
+    let ask = |device: Asker<(), u32>| async move { _ = device.ask(()).await };
+    let ask = asks.jobs(2).using(device.asking()).async_source(ask);
+    ask.register(named("ask").wait(ms(4)));
+    finish_create_dags(&[asks]).unwrap();
+    // Its DAG is in no plan, or in another one.
+    assert!(!device.served_by(&create_dag().sporadic(ms(10))));
+    assert_eq!(machine.run().jobs.len(), 2);
+}
