@@ -3,10 +3,11 @@
 //! what a run is judged by, misuse a lock. The guest is the image `guest-tests`, which
 //! commits attacks next to a healthy DAG that must meet every deadline.
 
-use harness::{Guest, Members, Said};
+use harness::{Guest, Members, Said, lawful_runs};
 use tool::Outcome;
 use tool::places;
 use tool::protocol::{MachineLine, Status};
+use tool::record::COUNTED_TOLERANCE_NS;
 
 /// Boots one attack, or those that can be one after the other, on so many cores.
 fn attacks(word: &str, cores: u64) -> Guest {
@@ -118,6 +119,18 @@ fn a_dag_that_uses_up_the_heap_in_small_pieces_ends_alone() {
             let mut of_attack = told.lines().filter(|line| line.contains(attack));
             assert!(of_attack.any(|line| line.contains(place)), "{told}");
         }
+    }
+}
+
+#[test]
+fn a_commit_in_an_instance_leaves_the_runs_record_whole() {
+    for cores in [1, 2] {
+        let outcome = attacks("attack=commit", cores).word("events=on").succeed();
+        let refused = "the platform did not take the plan: other DAGs are committed already";
+        harm_nobody(&outcome, &[("commit", "panic", refused)]);
+        let runs = lawful_runs(&outcome, COUNTED_TOLERANCE_NS);
+        assert_eq!(runs.len(), 1);
+        assert_eq!(runs[0].task_set.dags().len(), 2);
     }
 }
 

@@ -139,6 +139,7 @@ impl Platform for Kernel {
     }
 
     fn launch(&self, mut plan: Plan) -> Result<(), LaunchError> {
+        execution::refuse_another()?;
         let terms = self.terms();
         let coincidence_ns = self.coincidence_ns.load(Ordering::Relaxed);
         if !self.calibrates.load(Ordering::Relaxed) {

@@ -12,9 +12,9 @@ mod output;
 
 use alloc::vec::Vec;
 
-use fass::finish_create_dags;
-use faults::crimes::Crime;
-use faults::{JOBS, Policy, doomed, doomed_at_leisure, healthy};
+use fass::{SubtaskAttributes, create_dag, finish_create_dags};
+use faults::crimes::{Crime, Unpunished};
+use faults::{JOBS, PERIOD, Policy, doomed, doomed_at_leisure, healthy};
 use kernel::{AppError, Machine, json};
 
 /// Whether the crime has a budget.
@@ -50,11 +50,21 @@ const TOGETHER: [Attack; 12] = [
 ];
 
 /// The others.
-const ALONE: [Attack; 3] = [
+const ALONE: [Attack; 4] = [
+    ("commit", commit, Time::Unlimited),
     ("leak_strings", heap::leak_strings, Time::Unlimited),
     ("keep_boxes", heap::keep_boxes, Time::Unlimited),
     ("forge_list", output::forge_list, Time::Limited),
 ];
+
+/// Commits DAGs while others run, which the kernel refuses.
+fn commit() -> Unpunished {
+    let dag = create_dag();
+    dag.period(PERIOD).relative_deadline(PERIOD);
+    dag.register_untyped_subtask(|_| (), SubtaskAttributes::named("second"));
+    let refused = finish_create_dags(&[dag]).expect_err("others run");
+    panic!("{refused}")
+}
 
 /// Commits the attack that the command line names, or those that can be one after the other, and
 /// prints what came of each.

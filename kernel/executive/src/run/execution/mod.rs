@@ -82,15 +82,21 @@ struct ClusterRun {
 /// Time 0 of the run, on the clock.
 static EPOCH_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
+/// Reports, as an error, that a plan is prepared or runs. To be asked before anything is done for
+/// another one, as an instance may commit, too.
+pub fn refuse_another() -> Result<(), LaunchError> {
+    match cluster::nth(0).execution.lock().is_some() {
+        true => Err(LaunchError::new(
+            "other DAGs are committed already; run them first, or commit all in one call",
+        )),
+        false => Ok(()),
+    }
+}
+
 /// Prepares a plan to be run; a dispatch waits for so long for further events of the same
 /// instant. Takes all memory that the run will need.
 pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result<(), LaunchError> {
     let options = terms.scheduler;
-    if cluster::nth(0).execution.lock().is_some() {
-        return Err(LaunchError::new(
-            "other DAGs are committed already; run them first, or commit all in one call",
-        ));
-    }
     port::provide(&plan.task_set, options)?;
     let lifecycle = plan.lifecycle.take();
     let task_set = &plan.task_set;
