@@ -7,6 +7,9 @@
 //! while the step has interrupts disabled, and so are released late. Then the preempted instances
 //! go on. All have budgets, so that each dispatch sets an alarm.
 //!
+//! Once the cores are idle, two DAGs more are released next to one that loses each job to an
+//! exception, from job to job at another moment. Nobody is told of these faults.
+//!
 //! Steps are the longer, the more becomes ready at once. An app that has more of this is charged
 //! by the number (`Overheads::ready_ns`).
 
@@ -16,17 +19,19 @@ use core::time::Duration;
 
 use fass::commit::{ConstructionPolicy, OverheadSource, Overheads, finish_create_dags_with};
 use fass::platform::Platform;
-use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag, execute_for};
+use fass::{
+    Dag, FaultLimit, Occupation, SubtaskAttributes, UntypedSubtask, create_dag, execute_for,
+};
 use sched_dag::law::MeasuredCosts;
 
-use executive::machine::clock;
+use executive::machine::{clock, cpu};
 use executive::run::platform::KERNEL;
-use executive::run::{execution, worker};
+use executive::run::{containment, execution, worker};
 use front::app::ending::AppError;
 use front::json;
 
-const PERIOD: Duration = Duration::from_millis(1);
-const JOBS: u64 = 20;
+const PERIOD: Duration = Duration::from_micros(1_250);
+const JOBS: u32 = 20;
 /// How long an instance takes that is to be preempted, and when it is.
 const BUSY: Duration = Duration::from_micros(400);
 const INTO_IT: Duration = Duration::from_micros(100);
@@ -37,6 +42,11 @@ const AT_ONCE: u64 = 10;
 /// How many are due while that is being decided, and how far from each other.
 const DURING_IT: u32 = 4;
 const APART: Duration = Duration::from_micros(2);
+/// When in a period the cores are idle.
+const IDLE: Duration = Duration::from_micros(1_100);
+/// How much later a fault comes in each job, and before what it comes in the first one.
+const STEP: Duration = Duration::from_micros(1);
+const BEFORE: Duration = Duration::from_micros(15);
 /// Nothing comes near it.
 const BUDGET: Duration = Duration::from_secs(10);
 /// Time for the cores to get ready.
@@ -81,7 +91,8 @@ fn run() -> Result<MeasuredCosts, AppError> {
     execution::set_epoch(clock::now_ns() + LEAD_NS)
         .ok_or_else(|| failure("nothing is committed"))?;
     execution::arm_all();
-    worker::wait_in_background(|| false);
+    worker::wait_in_background(containment::forget_fault);
+    containment::take_last_faults(containment::forget_fault);
     let ended = execution::take_run().ok_or_else(|| failure("nothing was run"))?;
     let costs = ended.journal().costs(ended.task_set());
     costs.ok_or_else(|| failure("there is no memory for their journal; give the machine more"))
@@ -113,13 +124,32 @@ fn dags() -> Vec<Dag> {
         urgent(&single);
         single
     });
-    [busy, wide, long].into_iter().chain(singles).collect()
+    let next_to_it = [IDLE; 2].map(|at| {
+        let single = dag(at, PERIOD);
+        urgent(&single);
+        single
+    });
+    let dags = [busy, wide, long].into_iter().chain(singles);
+    dags.chain(next_to_it).chain([faulty()]).collect()
+}
+
+/// Makes a DAG whose instances do nothing but fail.
+fn faulty() -> Dag {
+    let dag = dag(IDLE - BEFORE, PERIOD);
+    dag.period(PERIOD + STEP).survive_faults(FaultLimit {
+        faults: 1,
+        window: 1,
+        in_all: JOBS,
+    });
+    let fail = || |()| cpu::access_nothing();
+    (dag.restarting(fail)).register(SubtaskAttributes::named("fails").budget(BUDGET));
+    dag
 }
 
 fn dag(offset: Duration, deadline: Duration) -> Dag {
     let dag = create_dag();
     dag.period(PERIOD).relative_deadline(deadline);
-    dag.offset(offset).jobs(JOBS);
+    dag.offset(offset).jobs(JOBS.into());
     dag
 }
 

@@ -30,34 +30,35 @@ pub struct MeasuredCosts {
 }
 
 impl MeasuredCosts {
-    /// Measures the events of a whole run without faults, which are in their order, core by core:
+    /// Measures the events of a whole run, which are in their order, core by core:
     /// an instance is owed a core from when it waits and the core on which it goes on has
-    /// finished another one. ([`judge_dispatch`](super::judge_dispatch) asks the rule itself,
+    /// finished another one, or has begun one that a fault ended: all of that one's time counts as
+    /// what the fault took. ([`judge_dispatch`](super::judge_dispatch) asks the rule itself,
     /// with ten times the code: which instance was to run, whichever core took it.)
     #[must_use]
     pub fn of_cores(task_set: &TaskSet, events: impl Iterator<Item = Event> + Clone) -> Self {
         let mut costs = Self::of_releases(task_set, events.clone());
         let mut waiting: Vec<(Instance, u64)> = Vec::new();
-        // When each core finished an instance last.
-        let mut free_ns: Vec<u64> = Vec::new();
+        // When each core finished an instance last, and began one.
+        let mut cores: Vec<(u64, u64)> = Vec::new();
         for event in events {
             let Some(instance) = event.instance() else {
                 continue;
             };
             let core = event.core.0 as usize;
+            cores.resize(cores.len().max(core + 1), (0, 0));
+            let (free_ns, begun_ns) = &mut cores[core];
             match event.what {
                 EventKind::Ready | EventKind::Suspend | EventKind::Wake => {
                     waiting.push((instance, event.time_ns))
                 }
-                EventKind::Finish | EventKind::Wait => {
-                    free_ns.resize(free_ns.len().max(core + 1), 0);
-                    free_ns[core] = event.time_ns;
-                }
+                EventKind::Finish | EventKind::Wait => *free_ns = event.time_ns,
+                EventKind::Ended => *free_ns = *begun_ns,
                 EventKind::Start | EventKind::Resume => {
                     costs.dispatches += u64::from(event.what == EventKind::Start);
-                    let free_ns = free_ns.get(core).copied().unwrap_or(0);
+                    *begun_ns = event.time_ns;
                     let waits = waiting.iter().position(|(other, _)| *other == instance);
-                    let since_ns = waits.map(|place| waiting.swap_remove(place).1.max(free_ns));
+                    let since_ns = waits.map(|place| waiting.swap_remove(place).1.max(*free_ns));
                     // One that was not seen to become ready, or be suspended, is owed nothing.
                     let owed_ns = event.time_ns.saturating_sub(since_ns.unwrap_or(u64::MAX));
                     costs.owed_ns = costs.owed_ns.max(owed_ns);

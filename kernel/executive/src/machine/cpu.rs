@@ -51,6 +51,12 @@ pub fn ask_for_end() {
     unsafe { asm!("int {}", const super::vector::END) };
 }
 
+/// Fails by a page fault.
+pub fn access_nothing() {
+    // SAFETY: reads nothing, for the first page is mapped nowhere.
+    unsafe { asm!("test byte ptr [8], 0", options(nostack, readonly)) };
+}
+
 /// Continues on another stack, for good.
 ///
 /// # Safety

@@ -244,12 +244,18 @@ pub fn tell_fault() -> bool {
     note.is_some()
 }
 
-/// Tells of all faults of a run that is over, as its names are known no longer. The last one may
-/// just be ending on another core; a note of what never ends is dropped.
-pub fn tell_last_faults() {
+/// Drops the note of the contained fault that was noted first, and reports whether there was one.
+pub fn forget_fault() -> bool {
+    HAS_WAITING.load(Ordering::Relaxed) && WAITING.lock().take().0.is_some()
+}
+
+/// Takes all faults of a run that is over, each by [`tell_fault`] or [`forget_fault`], as its names
+/// are known no longer. The last one may just be ending on another core; a note of what never ends
+/// is dropped.
+pub fn take_last_faults(take: fn() -> bool) {
     let until_ns = clock::now_ns() + LONGEST_END_NS;
     while HAS_WAITING.load(Ordering::Relaxed) {
-        if tell_fault() {
+        if take() {
             continue;
         }
         if clock::now_ns() > until_ns {

@@ -212,7 +212,7 @@ impl Background {
             line.end_run();
         }
         tell_log(execution::task_set);
-        containment::tell_last_faults();
+        containment::take_last_faults(containment::tell_fault);
         RAN_NS.store(u64::MAX, Ordering::Relaxed);
         let mut sliced = SLICED.lock();
         sliced.status = None;
