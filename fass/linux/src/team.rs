@@ -36,7 +36,7 @@ use sched_dag::{ClusterId, CoreId, Instance, Subtask, TaskSet, Vertex};
 use crate::level::{Levels, Role};
 use crate::look_out::LookOut;
 use crate::office::Office;
-use crate::state::{Left, Number, State};
+use crate::state::{FaultCause, Left, Number, State};
 use crate::worker::{Lead, Worker};
 use crate::{edge, panics, sys};
 
@@ -123,9 +123,6 @@ impl TurnClock {
         subtasks().map(clock).collect()
     }
 }
-
-/// The cause of a fault.
-const OVERRUN: &str = "its budget was exceeded";
 
 impl Team {
     /// Makes it; idle threads poll, and the run's time skips what would pass idly, or not.
@@ -265,7 +262,7 @@ impl Team {
 
     /// Calls the function; the error is a panic's message.
     #[inline]
-    fn execute(&self, runner: &mut SubtaskRunner) -> Result<(), String> {
+    fn execute(&self, runner: &mut SubtaskRunner) -> Result<(), FaultCause> {
         edge::note_running(Some(runner.instance));
         let outcome = panics::caught(|| match self.turns.get(runner.vertex.index()) {
             Some(clock) if runner.body.may_wait() => Self::take_turn(runner, clock),
@@ -274,13 +271,13 @@ impl Team {
                 Ok(())
             }
         });
-        let outcome = outcome.flatten();
+        let outcome = outcome.map_err(FaultCause::Panic).flatten();
         edge::note_running(None);
         outcome
     }
 
     /// Runs a turn of an instance, and adds what it takes to what the others have taken.
-    fn take_turn(runner: &mut SubtaskRunner, clock: &TurnClock) -> Result<(), String> {
+    fn take_turn(runner: &mut SubtaskRunner, clock: &TurnClock) -> Result<(), FaultCause> {
         let goes_on = runner.body.goes_on(runner.instance.job);
         let before_ns = clock.taken_ns.load(Ordering::Relaxed);
         let before_ns = if goes_on { before_ns } else { 0 };
@@ -290,7 +287,7 @@ impl Team {
         let taken_ns = before_ns + sys::own_processor_time_ns().saturating_sub(began_ns);
         clock.taken_ns.store(taken_ns, Ordering::Relaxed);
         match taken_ns > clock.budget_ns {
-            true => Err(OVERRUN.into()),
+            true => Err(FaultCause::Overrun),
             false => Ok(()),
         }
     }
@@ -301,7 +298,7 @@ impl Team {
         &self,
         me: Number,
         runner: Box<SubtaskRunner>,
-        outcome: Result<(), String>,
+        outcome: Result<(), FaultCause>,
     ) -> Result<Option<Box<SubtaskRunner>>, Abandoned> {
         let finish_ns = sys::now_ns();
         let workers = &self.workers;
@@ -333,7 +330,7 @@ impl Team {
         me: Number,
         mut state: MutexGuard<'_, State>,
         mut runner: Box<SubtaskRunner>,
-        outcome: Result<(), String>,
+        outcome: Result<(), FaultCause>,
         finish_ns: u64,
     ) -> Option<Box<SubtaskRunner>> {
         let (workers, vertex) = (&self.workers, runner.vertex);
@@ -373,7 +370,7 @@ impl Team {
                     None => state_now.engine.placement.finish_parked(vertex, runner),
                 }
                 let runner = state_now.engine.placement.take(vertex);
-                state_now.fail(workers, (core, vertex), runner, (cause, false));
+                state_now.fail(workers, (core, vertex), runner, cause);
             }
         }
         if let Some(core) = seat {
@@ -663,7 +660,12 @@ impl Team {
                 }
                 None => state.engine.placement.lose_parked(vertex),
             }
-            state.fail(workers, (core, vertex), None, (cause.to_owned(), false));
+            state.fail(
+                workers,
+                (core, vertex),
+                None,
+                FaultCause::Panic(cause.to_owned()),
+            );
             state.report_left(core, workers);
             self.announce(&state);
         }
@@ -686,8 +688,7 @@ impl Team {
         state.seats[number] = None;
         state.abandoned.push(number);
         state.replace(core, &self.workers);
-        let cause = OVERRUN.to_owned();
-        state.fail(&self.workers, (core, vertex), None, (cause, true));
+        state.fail(&self.workers, (core, vertex), None, FaultCause::Overrun);
         state.report_left(core, &self.workers);
     }
 }

@@ -8,6 +8,7 @@ use core::iter;
 use fass::edge::{RecordingState, ReplayOutcome, Sink};
 use fass::log::LogLine;
 use fass::shared::{Wire, WireCounts};
+use sched_dag::engine::Run;
 use sched_dag::{Dag, DagId, DagSnapshot, TaskSet};
 
 use crate::text::json;
@@ -35,6 +36,13 @@ pub fn show_dag(snapshot: &DagSnapshot, dag: DagId, model: &Dag, print: fn(&DagS
             .number("failed", of.failed)
             .number("restarts", of.restarts);
     });
+}
+
+/// Prints the counts of each DAG of a run that is over.
+pub(crate) fn show_counts(run: &Run) {
+    for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
+        show_dag(run.snapshot(dag), dag, model, print_counts);
+    }
 }
 
 /// Prints the counts of a DAG's jobs.

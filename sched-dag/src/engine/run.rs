@@ -293,10 +293,20 @@ impl Run {
     /// Returns every breach of the model's rules R1 to R4, and whether each instance had one life
     /// and each core one instance at a time. However long something takes is right, for that is
     /// the machine's affair.
-    #[inline(never)]
     pub fn violations(&self) -> impl Iterator<Item = Violation> {
-        let found = law::violations(&self.task_set, self.terms(u64::MAX), self.journal.events());
-        found.into_iter()
+        self.judge(&mut |_| ()).into_iter()
+    }
+
+    /// Works like [`violations`](Self::violations), and tells of its progress: how many events it
+    /// has come to, at each of them.
+    #[inline(never)]
+    pub fn judge(&self, tell: &mut dyn FnMut(u64)) -> Vec<Violation> {
+        let mut count = 0;
+        let events = self.journal.events().inspect(|_| {
+            count += 1;
+            tell(count);
+        });
+        law::violations(&self.task_set, self.terms(u64::MAX), events)
     }
 
     /// Returns every breach of R5 (did the right instances run?) that lasts for longer than

@@ -50,6 +50,14 @@ pub(crate) struct Left {
 /// The number of a worker.
 pub(crate) type Number = usize;
 
+/// The cause of a fault.
+pub(crate) enum FaultCause {
+    /// A panic, with its message.
+    Panic(String),
+    /// The budget.
+    Overrun,
+}
+
 /// A fault of an instance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
@@ -59,8 +67,8 @@ pub struct Fault {
     pub cause: String,
     /// Where, if it has panicked: `file:line:column`.
     pub place: Option<String>,
-    /// Whether it has exceeded its budget. Its function runs on then, in nobody's way, so that
-    /// nothing can take over: the cost is the DAG.
+    /// Whether it has exceeded its budget. Unless it has returned, its function runs on then, in
+    /// nobody's way, so that nothing can take over: the cost is the DAG.
     pub is_overrun: bool,
     /// The cost.
     pub cost: FaultCost,
@@ -298,8 +306,12 @@ impl State {
         workers: &[Worker],
         (core, vertex): (CoreId, Vertex),
         runner: Option<Box<SubtaskRunner>>,
-        (cause, is_overrun): (String, bool),
+        cause: FaultCause,
     ) {
+        let (cause, is_overrun) = match cause {
+            FaultCause::Panic(message) => (message, false),
+            FaultCause::Overrun => ("its budget was exceeded".into(), true),
+        };
         let instance = self.engine.scheduler.instance_of(vertex);
         edge::failed(instance);
         let (engine, mut port) = self.parts(workers);

@@ -13,7 +13,7 @@ use sched_dag::lifecycle::Request;
 use sched_dag::{CoreId, DagId};
 
 use crate::platform::HOST;
-use crate::state::Number;
+use crate::state::{FaultCause, Number};
 use crate::team::Team;
 use crate::{Linux, Mechanism, sys};
 use fass::platform::SubtaskRunner;
@@ -98,7 +98,7 @@ impl Stage {
             "end" | "fail" | "end-in-vain" => {
                 let (worker, runner) = self.running.remove(name).unwrap();
                 let outcome = match what {
-                    "fail" => Err("meant".to_owned()),
+                    "fail" => Err(FaultCause::Panic("meant".to_owned())),
                     _ => Ok(()),
                 };
                 let next = team.complete(worker, runner, outcome);

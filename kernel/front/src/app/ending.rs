@@ -59,12 +59,17 @@ pub enum AppError {
 }
 
 impl AppError {
-    /// Tells of a run that a person has ended, and returns how its app ends.
+    /// Judges a run that a person has ended, and returns how its app ends. Whoever awaits that
+    /// sees that it goes on.
     pub fn after_shutdown(run: &Run) -> Self {
-        for (dag, model) in (0..).map(DagId).zip(run.task_set().dags()) {
-            report::show_dag(run.snapshot(dag), dag, model, report::print_counts);
-        }
-        match run.violations().count() {
+        /// The judge takes a second or so for them, where processors are emulated.
+        const EVENTS: u64 = 1 << 16;
+        let mut tell = |events: u64| {
+            if events.is_multiple_of(EVENTS) {
+                crate::println!("judging the run: {events} events so far");
+            }
+        };
+        match run.judge(&mut tell).len() {
             0 => Self::Shutdown,
             count => Self::Failure(format!("shut down before its end, with {count} violations")),
         }

@@ -20,7 +20,7 @@ use sched_dag::engine::Run;
 use super::ending::AppError;
 use super::ending::{self, RunVerdict};
 use crate::options::{CommandLine, UsageError};
-use crate::report::{HeapUsage, MemoryInUse};
+use crate::report::{self, HeapUsage, MemoryInUse};
 use crate::shell::parameters::ParameterTable;
 use crate::shell::topics::TopicCommands;
 use crate::shell::{LiveRun, PARAMETERS, TOPICS};
@@ -262,9 +262,14 @@ impl<S: System> Machine<S> {
     #[inline(never)]
     fn run_when(&self, epoch_ns: Option<u64>) -> Result<Run, AppError> {
         let run = self.system.run(epoch_ns, self.input.borrow().as_ref())?;
+        let is_shut_down = self.system.is_shut_down();
+        if is_shut_down {
+            // Before anything that may take longer than a person waits.
+            report::show_counts(&run);
+        }
         self.verdict.note(&run);
         ending::note(&run, self.system.terms().overheads);
-        if self.system.is_shut_down() {
+        if is_shut_down {
             return Err(AppError::after_shutdown(&run));
         }
         Ok(run)

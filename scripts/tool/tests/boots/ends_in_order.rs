@@ -102,6 +102,21 @@ fn so_does_the_timeout_which_is_a_failure() {
 }
 
 #[test]
+fn a_long_judgement_is_told_of_after_the_counts() {
+    let folder = folder("judged");
+    let dag = "dag d period 20us\nsubtask a wcet 1us\nend\n";
+    fs::write(folder.join("d.dag"), dag).expect("the tests' folder takes a file");
+    let run = "run --dag d.dag --mode deterministic --cores 1 --jobs 300000";
+    let (child, mut said) = start(&folder, run);
+    await_line(&mut said, "\"kind\":\"progress\"");
+    EndSignals::send(child.id());
+    let (text, code) = end(child, said);
+    assert_eq!(code, BY_PERSON, "{text}");
+    let places = ["dag_status", "judging the run: 65536 events so far"].map(|it| text.find(it));
+    assert!(places[0].is_some() && places[0] < places[1], "{text}");
+}
+
+#[test]
 fn the_second_ctrl_c_kills() {
     // The first ctrl-C is received, and the jobs in flight take long.
     let folder = folder("endless");
