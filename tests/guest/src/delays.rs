@@ -13,7 +13,7 @@ use core::time::Duration;
 use fass::shared::Switch;
 use fass::{Dag, FaultLimit, Occupation, create_dag, execute_for, finish_create_dags, sleep};
 use faults::crimes::RECURRING;
-use kernel::{AppError, Machine, json, println};
+use kernel::{AppError, Lock, Machine, json, println};
 
 use crate::single::{named, single_every};
 
@@ -29,7 +29,7 @@ type Work = Box<dyn FnMut() + Send>;
 type Cause = (&'static str, fn() -> Vec<Dag>);
 
 /// All of them.
-const CAUSES: [Cause; 9] = [
+const CAUSES: [Cause; 10] = [
     ("none", Vec::new),
     ("releases", releases),
     ("wakes", wakes),
@@ -41,9 +41,10 @@ const CAUSES: [Cause; 9] = [
     }),
     ("text", || lines(|line| println!("{line:>60}"))),
     ("backlog", backlog),
+    ("sections", sections),
 ];
 
-fn us(us: u64) -> Duration {
+const fn us(us: u64) -> Duration {
     Duration::from_micros(us)
 }
 
@@ -156,4 +157,18 @@ fn backlog() -> Vec<Dag> {
     over.source(|| hold(100))
         .register(named("holds").priority(99).wcet(us(100)));
     alloc::vec![switch, over]
+}
+
+/// They enter sections of one lock, on each core.
+fn sections() -> Vec<Dag> {
+    static LOCK: Lock<()> = Lock::new("shared", ()).longest(us(25));
+    let single = |number| {
+        let dag = disturbance(&format!("section-{number}"));
+        let attributes = named("enters").priority(5).wcet(us(30));
+        dag.using(LOCK.entering(1))
+            .source(|()| LOCK.with(|_| hold(15)))
+            .register(attributes);
+        dag
+    };
+    (0..4).map(single).collect()
 }
