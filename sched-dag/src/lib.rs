@@ -139,7 +139,7 @@ pub use policy::{
 };
 pub use scheduler::{
     DagPhase, DagSnapshot, DagStatistics, Decision, DriverNotice, EventLog, HandOff, Moment,
-    SKIPS_A_STEP, SKIPS_EVERY_NS, Scheduler, TurnEnd,
+    SKIPS_A_STEP, SKIPS_EVERY_NS, Scheduler, SchedulerQuery, TurnEnd,
 };
 pub use spec::{
     DagSpec, LatestSpec, LockUse, MOST_WAITS, PINS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,

@@ -10,7 +10,7 @@ use std::time::Duration;
 use std::{io, thread};
 
 use sched_dag::lifecycle::Request;
-use sched_dag::{DagId, DagKey, Scheduler, TaskSet};
+use sched_dag::{DagId, DagKey, Scheduler, SchedulerQuery, TaskSet};
 
 use crate::level::Role;
 use crate::office::Office;
@@ -42,7 +42,11 @@ use crate::team::Team;
 /// ```
 ///
 /// A thread that asks it how the run does takes a cluster's lock for a moment, so it has to be one
-/// that nobody preempts meanwhile: [`raise`](Self::raise).
+/// that nobody preempts meanwhile: [`raise`](Self::raise). Nothing of the caller's runs under it:
+///
+/// ```compile_fail,E0624
+/// linux::Control::get().unwrap().with_scheduler(0, |_| panic!("under a lock"));
+/// ```
 #[derive(Clone)]
 pub struct Control {
     pub(crate) office: Arc<Office>,
@@ -163,8 +167,14 @@ impl Control {
         &self.office.task_set
     }
 
-    /// Looks at the scheduler of a cluster, shortly, or changes what its journal records.
-    pub fn with_scheduler<T>(
+    /// Has the scheduler of a cluster answer a question.
+    pub fn ask(&self, cluster: usize, query: SchedulerQuery<'_>) -> Option<u64> {
+        self.with_scheduler(cluster, |scheduler| scheduler.show(query))
+    }
+
+    /// Looks at the scheduler of a cluster, shortly. What it calls is under the cluster's lock, so
+    /// none but this crate says what.
+    pub(crate) fn with_scheduler<T>(
         &self,
         cluster: usize,
         look: impl FnOnce(&mut Scheduler) -> T,

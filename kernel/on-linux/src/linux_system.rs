@@ -25,7 +25,7 @@ use front::shell::{END, IS_SHUT_DOWN, LiveRun, PERIOD_NS, ShellSession};
 use linux::{Connection, Control, EndSignals, Linux};
 use sched_dag::engine::Run;
 use sched_dag::lifecycle::Request;
-use sched_dag::{DagId, Scheduler, TaskSet};
+use sched_dag::{DagId, SchedulerQuery, TaskSet};
 
 use crate::heap;
 
@@ -261,8 +261,8 @@ impl LiveRun for LinuxRun {
         linux::now_ns()
     }
 
-    fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
-        Control::get()?.with_scheduler(cluster, look)
+    fn ask(cluster: usize, query: SchedulerQuery<'_>) -> Option<u64> {
+        Control::get()?.ask(cluster, query)
     }
 
     fn receive() -> Option<u8> {

@@ -72,7 +72,9 @@ use crate::task_set::{Dag, TaskSet};
 pub use crate::scheduler::dispatch::{Decision, HandOff};
 pub use crate::scheduler::log::{DriverNotice, EventLog};
 pub use crate::scheduler::moment::{Moment, TurnEnd};
-pub use crate::scheduler::phase::{DagPhase, DagSnapshot, SKIPS_A_STEP, SKIPS_EVERY_NS};
+pub use crate::scheduler::phase::{
+    DagPhase, DagSnapshot, SKIPS_A_STEP, SKIPS_EVERY_NS, SchedulerQuery,
+};
 
 /// The state of all jobs in flight.
 ///

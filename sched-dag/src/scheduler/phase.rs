@@ -113,7 +113,7 @@ use alloc::vec;
 
 use super::{DagStatistics, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
-use crate::journal::EventKind;
+use crate::journal::{Event, EventKind};
 use crate::policy::{JobOutcome, OnFault};
 
 /// Of how many skips one step tells at most, besides one of each DAG whose backlog it skips: they
@@ -135,6 +135,21 @@ pub enum DagPhase {
     Closed,
     /// A fault or a request has ended it: nothing of it starts any more (E1 to E8).
     Ended,
+}
+
+/// A question that people have to a scheduler, or a wish. It is short.
+#[derive(Debug)]
+pub enum SchedulerQuery<'a> {
+    /// How does a DAG?
+    Dag(DagId, &'a mut Option<DagSnapshot>),
+    /// What are the latest events before this one? The answer is the number of the oldest.
+    Events(u64, &'a mut [Option<Event>]),
+    /// How many events were written?
+    Written,
+    /// Is there room for events? Then the answer is 1.
+    HasRoom,
+    /// Record events from now on, or forget them.
+    Record(bool),
 }
 
 /// A DAG at one instant.
@@ -182,6 +197,19 @@ impl Scheduler {
     #[inline]
     pub fn phase(&self, dag: DagId) -> DagPhase {
         self.dags[dag.index()].jobs.phase
+    }
+
+    /// Answers a question.
+    pub fn show(&mut self, query: SchedulerQuery<'_>) -> u64 {
+        let journal = &mut self.log.journal;
+        match query {
+            SchedulerQuery::Dag(dag, into) => *into = Some(self.snapshot(dag)),
+            SchedulerQuery::Events(end, into) => return journal.copy_back(end, into),
+            SchedulerQuery::Written => return journal.written(),
+            SchedulerQuery::HasRoom => return journal.has_room().into(),
+            SchedulerQuery::Record(on) => journal.record_events(on),
+        }
+        0
     }
 
     /// Returns how a DAG does.

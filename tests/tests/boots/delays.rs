@@ -24,7 +24,10 @@ fn whatever_delays_an_instance_is_charged() {
                 assert!(row.number("jobs") > 60, "{}", row.text);
                 // No job was as short, so the figures are of this run.
                 let least_ns = 19_000;
-                assert!((least_ns..=bound_ns).contains(&longest_ns), "{}", row.text);
+                // Of the calibration before, whose last event is a fault, nothing is left.
+                let is_alone = row.text.contains(r#""none","dag_name":"urgent""#);
+                let most_ns = if is_alone { 25_000 } else { bound_ns };
+                assert!((least_ns..=most_ns).contains(&longest_ns), "{}", row.text);
             }
         }
     }

@@ -12,7 +12,7 @@ use fass::shared::Parameter;
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
 use linux::{Control, Linux, Mechanism};
 use sched_dag::lifecycle::Request;
-use sched_dag::{DagId, DagPhase};
+use sched_dag::{DagId, DagPhase, SchedulerQuery};
 
 #[test]
 fn a_chain_on_one_core_wakes_nobody() {
@@ -136,8 +136,9 @@ fn what_was_asked_for_is_there_once_its_letter_is_taken() {
         let is_there = |request: fn(DagId) -> Request, phase| {
             control.change(dag, request);
             control.wait_for_letters(dag);
-            let found = control.with_scheduler(0, |scheduler| scheduler.phase(dag));
-            found == Some(phase)
+            let mut found = None;
+            control.ask(0, SchedulerQuery::Dag(dag, &mut found));
+            found.is_some_and(|dag| dag.phase == phase)
         };
         let late = (0..100).filter(|_| {
             let is_paused = is_there(Request::Pause, DagPhase::Paused);

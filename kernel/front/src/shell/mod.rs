@@ -22,7 +22,7 @@ use fass::edge::WatchedValue;
 use fass::platform::{self, SetOnce};
 use sched_dag::journal::Event;
 use sched_dag::lifecycle::Request;
-use sched_dag::{Dag, DagId, DagSnapshot, Scheduler, TaskSet};
+use sched_dag::{Dag, DagId, DagSnapshot, SchedulerQuery, TaskSet};
 
 use crate::options::whole_number;
 use crate::text::json;
@@ -71,8 +71,8 @@ pub trait LiveRun {
     /// may be written down for them, and the shell speaks in the middle of theirs.
     fn now_ns() -> u64;
 
-    /// Looks at the scheduler of a cluster, shortly, or changes what its journal records.
-    fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T>;
+    /// Has the scheduler of a cluster answer a question, if a run goes on.
+    fn ask(cluster: usize, query: SchedulerQuery<'_>) -> Option<u64>;
 
     /// Takes a byte that a person has typed.
     fn receive() -> Option<u8>;
@@ -91,7 +91,9 @@ pub trait LiveRun {
 /// Returns how a DAG does, if a run goes on.
 pub fn snapshot<R: LiveRun>(task_set: &TaskSet, dag: DagId) -> Option<DagSnapshot> {
     let cluster = task_set.dag(dag).cluster().index();
-    R::with_scheduler(cluster, |scheduler| scheduler.snapshot(dag))
+    let mut found = None;
+    R::ask(cluster, SchedulerQuery::Dag(dag, &mut found));
+    found
 }
 
 /// Shows the events that the journal of a cluster has last, the latest one first, at most so many
@@ -99,13 +101,11 @@ pub fn snapshot<R: LiveRun>(task_set: &TaskSet, dag: DagId) -> Option<DagSnapsho
 pub fn look_back<R: LiveRun>(cluster: usize, most: u64, take: &mut dyn FnMut(&Event) -> bool) {
     /// How many events are copied under the lock at a time.
     const AT_ONCE: usize = 64;
-    let written = R::with_scheduler(cluster, |scheduler| scheduler.log.journal.written());
-    let mut end = written.unwrap_or(0);
+    let mut end = R::ask(cluster, SchedulerQuery::Written).unwrap_or(0);
     let last = end.saturating_sub(most);
     while end > last {
         let mut buffer = [None; AT_ONCE];
-        let look = |of: &mut Scheduler| of.log.journal.copy_back(end, &mut buffer);
-        let copied = R::with_scheduler(cluster, look);
+        let copied = R::ask(cluster, SchedulerQuery::Events(end, &mut buffer));
         if !buffer.iter().flatten().all(&mut *take) {
             return;
         }
@@ -299,14 +299,11 @@ fn no_command<E: Iterator<Item = &'static dyn Commands>>(
 
 /// Has events recorded from now on, or forgotten.
 fn record<R: LiveRun>(on: bool, task_set: &TaskSet, refuse: Refuse<'_>) {
-    let has_room = R::with_scheduler(0, |scheduler| scheduler.log.journal.has_room());
-    if on && !has_room.unwrap_or(false) {
+    if on && R::ask(0, SchedulerQuery::HasRoom) != Some(1) {
         return refuse(&"there is no room for events; boot without `trace_events=0`");
     }
     for cluster in task_set.clusters() {
-        R::with_scheduler(cluster.index(), |scheduler| {
-            scheduler.log.journal.record_events(on);
-        });
+        R::ask(cluster.index(), SchedulerQuery::Record(on));
     }
     let what = if on { "events" } else { "no events" };
     println!("{what} are recorded");

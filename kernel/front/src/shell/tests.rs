@@ -55,7 +55,7 @@ impl LiveRun for NoRun {
         1_000_000_000
     }
 
-    fn with_scheduler<T>(_: usize, _: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
+    fn ask(_: usize, _: SchedulerQuery<'_>) -> Option<u64> {
         None
     }
 

@@ -43,7 +43,7 @@ use fass::platform::SetOnce;
 use front::report::tell_log;
 use front::shell::{self, END, LiveRun, ShellSession, shut_down};
 use sched_dag::lifecycle::Request;
-use sched_dag::{DagId, Scheduler, TaskSet};
+use sched_dag::{DagId, SchedulerQuery, TaskSet};
 use status::{RunProgress, StatusPrinter};
 
 /// Options of the background.
@@ -286,8 +286,8 @@ impl LiveRun for KernelRun {
         clock::now_ns()
     }
 
-    fn with_scheduler<T>(cluster: usize, look: impl FnOnce(&mut Scheduler) -> T) -> Option<T> {
-        execution::with_scheduler(cluster, look)
+    fn ask(cluster: usize, query: SchedulerQuery<'_>) -> Option<u64> {
+        execution::with_scheduler(cluster, |scheduler| scheduler.show(query))
     }
 
     fn receive() -> Option<u8> {

@@ -249,10 +249,11 @@ impl ClusterRun {
 pub fn find_work() -> CoreWork {
     let core = this_core::get();
     let mut place = cluster::cluster_of(core).execution.lock_uninterrupted();
-    let Some(execution) = place.as_mut() else {
-        return CoreWork::Rest;
+    // Behind a fault that was the run's last event, that may have been taken out.
+    let work = match place.as_mut() {
+        Some(execution) => execution.find_work(core),
+        None => CoreWork::Rest,
     };
-    let work = execution.find_work(core);
     drop(place);
     take_turns(core, work)
 }
