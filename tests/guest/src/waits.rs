@@ -6,6 +6,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use alloc::{format, vec};
 use core::future::pending;
+use core::pin::pin;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
@@ -14,8 +15,8 @@ use fass::shared::{
     shutting_down,
 };
 use fass::{
-    Dag, Occupation, OverrunPolicy, SubtaskAttributes, create_dag, execute_for, finish_create_dags,
-    sleep,
+    Dag, Occupation, OverrunPolicy, SubtaskAttributes, Unique, create_dag, execute_for,
+    finish_create_dags, sleep,
 };
 use kernel::{AppError, Machine, Run, json};
 
@@ -252,6 +253,8 @@ pub(crate) fn faults(machine: &Machine) -> Result<(), AppError> {
     run_one(machine, "paused", &paused())?;
     run_one(machine, "shut down", &shut_down())?;
     run_one(machine, "left out", &left_out())?;
+    run_one(machine, "again", &again())?;
+    run_one(machine, "passed on", &passed_on())?;
     let dropped = Arc::new(AtomicU64::new(0));
     run_one(machine, "aborted", &[aborted(&dropped)])?;
     json::emit("waits_dropped", |line| {
@@ -307,6 +310,34 @@ fn foreign() -> Vec<Dag> {
     };
     let attributes = named("awaits").wait(ms(1));
     vec![waiting("foreign", (Some(2), PERIOD), attributes, awaits)]
+}
+
+/// One that polls a wait after its end.
+fn again() -> Vec<Dag> {
+    let polls = || async {
+        let mut nap = pin!(sleep(ms(1)));
+        nap.as_mut().await;
+        nap.await;
+    };
+    let attributes = named("polls").wait(ms(1)).wait(ms(1));
+    vec![waiting("again", (Some(2), PERIOD), attributes, polls)]
+}
+
+/// One whose second subtask asks by what the first one was lent.
+fn passed_on() -> Vec<Dag> {
+    let (device, _) = create_device::<u8, u8>("silent");
+    let dag = create_dag();
+    (dag.name("passed on").jobs(2).period(PERIOD)).relative_deadline(PERIOD);
+    let lends = |asker: Asker<u8, u8>| async move {
+        let _ = asker.ask(1).await;
+        (Unique::new(asker),)
+    };
+    let lends = dag.using(device.asking()).async_source(lends);
+    (lends.writes(&["asker"])).register(named("lends").wait(ms(1)));
+    let asks =
+        |(asker,): (Unique<Asker<u8, u8>>,)| async move { _ = asker.into_inner().ask(2).await };
+    (dag.async_subtask(asks).reads(&["asker"])).register(named("asks").wait(ms(1)));
+    vec![dag]
 }
 
 /// One that returns without its wait.
