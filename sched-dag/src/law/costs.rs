@@ -170,6 +170,20 @@ mod tests {
     }
 
     #[test]
+    fn all_time_of_what_a_fault_ends_is_owed_to_others() {
+        use EventKind::{Ended, Ready, Start};
+        let happened = events(&[
+            (0, Ready, 0, 0),
+            (1, Start, 0, 0),
+            (2, Ready, 1, 0),
+            (9, Ended, 0, 0),
+            (12, Start, 1, 0),
+        ]);
+        let costs = MeasuredCosts::of_cores(&dags(&[0, 0], false), happened.into_iter());
+        assert_eq!(costs.owed_ns, 10);
+    }
+
+    #[test]
     fn a_release_that_waited_for_an_older_job_is_not_late() {
         use EventKind::{Queued, Released};
         let task_set = dags(&[0, 0], false);
