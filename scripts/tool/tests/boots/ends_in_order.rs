@@ -104,11 +104,12 @@ fn so_does_the_timeout_which_is_a_failure() {
 #[test]
 fn a_long_judgement_is_told_of_after_the_counts() {
     let folder = folder("judged");
-    let dag = "dag d period 20us\nsubtask a wcet 1us\nend\n";
+    let dag = "dag d period 50us\nsubtask a wcet 1us\nend\n";
     fs::write(folder.join("d.dag"), dag).expect("the tests' folder takes a file");
-    let run = "run --dag d.dag --mode deterministic --cores 1 --jobs 300000";
+    // After 20,000 jobs of five events.
+    let run = "run --dag d.dag --mode deterministic --cores 1 --jobs 300000 --append status=1";
     let (child, mut said) = start(&folder, run);
-    await_line(&mut said, "\"kind\":\"progress\"");
+    await_line(&mut said, "\"kind\":\"status\"");
     EndSignals::send(child.id());
     let (text, code) = end(child, said);
     assert_eq!(code, BY_PERSON, "{text}");
