@@ -117,15 +117,25 @@ impl Control {
         self.change(dag, Request::End);
     }
 
-    /// Makes a change to a DAG.
+    /// Has a DAG paused, resumed, closed or ended.
     ///
     /// # Panics
     ///
-    /// If there is no such DAG.
+    /// If there is no such DAG, or the request is another one, which a DAG may not take.
     #[track_caller]
     pub fn change(&self, dag: impl DagKey, request: fn(DagId) -> Request) {
         let dag = self.office.task_set.find(dag);
-        self.office.send(None, request(dag));
+        let request = request(dag);
+        let (Request::Pause(of) | Request::Resume(of) | Request::Close(of) | Request::End(of)) =
+            request
+        else {
+            panic!("a run is asked for another change than to pause, resume, close or end a DAG");
+        };
+        assert_eq!(
+            of, dag,
+            "a change of one DAG is asked for by the name of another"
+        );
+        self.office.send(None, request);
     }
 
     /// Waits until the requests that were left for a DAG's cluster are taken, the run is over, or a

@@ -2,6 +2,7 @@
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::thread;
@@ -140,6 +141,12 @@ fn what_was_asked_for_is_there_once_its_letter_is_taken() {
             control.ask(0, SchedulerQuery::Dag(dag, &mut found));
             found.is_some_and(|dag| dag.phase == phase)
         };
+        // In a step it would be refused under the scheduler's lock.
+        let asks = AssertUnwindSafe(|| control.change(dag, Request::Signal));
+        assert!(
+            catch_unwind(asks).is_err(),
+            "a periodic DAG takes no signal"
+        );
         let late = (0..100).filter(|_| {
             let is_paused = is_there(Request::Pause, DagPhase::Paused);
             !(is_there(Request::Resume, DagPhase::Running) && is_paused)
