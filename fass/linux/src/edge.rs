@@ -141,9 +141,14 @@ pub(crate) fn note_running(instance: Option<Instance>) {
     RUNNING.set(instance);
 }
 
+/// Returns what this thread runs.
+pub(crate) fn running() -> Option<Instance> {
+    RUNNING.get()
+}
+
 /// Returns what this thread runs, and the time of the run.
 pub(crate) fn here() -> (Option<Instance>, u64) {
-    (RUNNING.get(), of_run(sys::now_ns()))
+    (running(), of_run(sys::now_ns()))
 }
 
 /// Takes note that an instance has failed. The cluster's lock is held.

@@ -109,8 +109,15 @@ impl Platform for Host {
         }
     }
 
-    fn running(&self) -> Option<Instance> {
-        edge::here().0
+    fn running(&self) -> Option<(u64, Instance)> {
+        let instance = edge::running()?;
+        Some((team::own_plan()?, instance))
+    }
+
+    fn is_in_run(&self) -> bool {
+        let launched = self.launched.lock();
+        // After the commit the run is still to come.
+        control::latest().is_some() && launched.is_ok_and(|launched| launched.is_none())
     }
 
     fn section(&self, lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {

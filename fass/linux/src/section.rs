@@ -1,21 +1,45 @@
 //! Sections of locks, which exclude each other by a mutex and a condition variable.
 //!
 //! Their holder can be preempted. It then has its core when nothing else has, and gives the lock back.
+//! A thread whose instance is ended in a section may never do so, and is *given up*: nobody waits for
+//! it any more. As it keeps the claim of the data until it returns, what enters sees that the lock is
+//! lost.
 
 use std::cell::Cell;
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use fass::platform::LockWords;
 
 use crate::sys;
 
-/// Taken by a thread that reads or changes a lock's words.
-static WORDS: Mutex<()> = Mutex::new(());
+/// The threads that are given up. Taken by a thread that reads or changes a lock's words.
+static GIVEN_UP: Mutex<Vec<u32>> = Mutex::new(Vec::new());
 static RELEASED: Condvar = Condvar::new();
 
 thread_local! {
     static IS_IN_SECTION: Cell<bool> = const { Cell::new(false) };
+    /// The number of this thread, which no other one ever has, nor 0.
+    static OWN: u32 = {
+        static LATEST: AtomicU32 = AtomicU32::new(0);
+        LATEST.fetch_add(1, Relaxed) + 1
+    };
+}
+
+/// Returns the number of the calling thread.
+pub(crate) fn own() -> u32 {
+    OWN.with(|own| *own)
+}
+
+/// Gives a thread up: nobody waits for the section that it is in, and it enters no further one.
+pub(crate) fn give_up(thread: u32) {
+    given_up().push(thread);
+    RELEASED.notify_all();
+}
+
+/// Takes note that the calling thread, which may have been given up, is about to end.
+pub(crate) fn forget() {
+    given_up().retain(|thread| *thread != own());
 }
 
 /// Waits for a lock, and calls `section` in it. Returns how long that took; `None`, without a call,
@@ -24,12 +48,20 @@ pub(crate) fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
     if IS_IN_SECTION.replace(true) {
         return None;
     }
-    let mut words = words();
-    while lock.state.load(Relaxed) != 0 {
-        words = RELEASED.wait(words).unwrap_or_else(PoisonError::into_inner);
+    let (own, mut given_up) = (own(), given_up());
+    loop {
+        assert!(
+            !given_up.contains(&own),
+            "an instance whose budget is exceeded enters a section; state a longer budget"
+        );
+        let holder = lock.state.load(Relaxed);
+        if holder == 0 || given_up.contains(&holder) {
+            break;
+        }
+        given_up = (RELEASED.wait(given_up)).unwrap_or_else(PoisonError::into_inner);
     }
-    lock.state.store(1, Relaxed);
-    drop(words);
+    lock.state.store(own, Relaxed);
+    drop(given_up);
     // A panic ends the section, too.
     let _held = Held(lock);
     let entered_ns = sys::now_ns();
@@ -37,18 +69,58 @@ pub(crate) fn with(lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
     Some(sys::now_ns().saturating_sub(entered_ns))
 }
 
-fn words() -> MutexGuard<'static, ()> {
-    WORDS.lock().unwrap_or_else(PoisonError::into_inner)
+fn given_up() -> MutexGuard<'static, Vec<u32>> {
+    GIVEN_UP.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 struct Held<'l>(&'l LockWords);
 
 impl Drop for Held<'_> {
     fn drop(&mut self) {
-        let words = words();
-        self.0.state.store(0, Relaxed);
+        let words = given_up();
+        // If this one was given up, it may be another one's by now.
+        let _ = (self.0.state).compare_exchange(own(), 0, Relaxed, Relaxed);
         drop(words);
         RELEASED.notify_all();
         IS_IN_SECTION.set(false);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicU64;
+    use std::sync::mpsc;
+    use std::thread;
+
+    use super::*;
+
+    #[test]
+    fn one_that_is_given_up_holds_nobody_up_and_gives_back_nobody_elses_lock() {
+        let lock = &LockWords {
+            state: AtomicU32::new(0),
+            waiting: [const { AtomicU64::new(0) }; 4],
+        };
+        thread::scope(|scope| {
+            let (tell, told) = mpsc::channel();
+            let (end, ends) = mpsc::channel::<()>();
+            let late = scope.spawn(move || {
+                with(lock, &mut || {
+                    tell.send(own()).unwrap();
+                    // It ends with an error, as the sender is gone.
+                    let _ = ends.recv();
+                })
+            });
+            give_up(told.recv().unwrap());
+            let mut late = Some((end, late));
+            let entered = with(lock, &mut || {
+                if let Some((end, late)) = late.take() {
+                    drop(end);
+                    late.join().unwrap();
+                }
+                assert_eq!(lock.state.load(Relaxed), own());
+            });
+            assert!(entered.is_some());
+        });
+        assert_eq!(lock.state.load(Relaxed), 0);
     }
 }

@@ -38,7 +38,7 @@ use crate::look_out::LookOut;
 use crate::office::Office;
 use crate::state::{FaultCause, Left, Number, State};
 use crate::worker::{Lead, Worker};
-use crate::{edge, panics, sys};
+use crate::{edge, panics, section, sys};
 
 thread_local! {
     /// The run and the number of the worker that this thread is.
@@ -63,6 +63,11 @@ pub(crate) fn with_own_worker<R>(look: impl FnOnce(&Worker) -> R) -> Option<R> {
     OWN.with_borrow(|own| own.as_ref().map(|(team, me)| look(&team.workers[*me])))
 }
 
+/// Returns the number of the plan whose instances the calling thread runs, if it is a worker.
+pub(crate) fn own_plan() -> Option<u64> {
+    OWN.with_borrow(|own| own.as_ref().map(|(team, _)| team.office.plan))
+}
+
 /// Reports whether the calling thread may call the app's code: not one that decides, or holds the
 /// scheduler's lock.
 pub(crate) fn may_call_app() -> bool {
@@ -73,7 +78,7 @@ pub(crate) fn may_call_app() -> bool {
 /// whether there is one. The thread is to do nothing any more.
 pub(crate) fn strand(cause: &str) -> bool {
     let own = OWN.with_borrow(Clone::clone);
-    let instance = edge::here().0;
+    let instance = edge::running();
     own.zip(instance).is_some_and(|((team, me), instance)| {
         team.strand(me, instance, cause);
         true
@@ -225,7 +230,7 @@ impl Team {
                 let outcome = self.execute(&mut runner);
                 match self.complete(me, runner, outcome) {
                     Ok(found) => next = found,
-                    Err(Abandoned) => return,
+                    Err(Abandoned) => return section::forget(),
                 }
             }
         }
@@ -653,6 +658,7 @@ impl Team {
             );
             let core = seat.unwrap_or_else(|| state.core_of(me));
             state.abandoned.push(me);
+            workers[me].give_up_sections();
             match seat {
                 Some(core) => {
                     state.engine.placement.lose(core.index());
@@ -687,6 +693,7 @@ impl Team {
         state.engine.placement.lose(core.index());
         state.seats[number] = None;
         state.abandoned.push(number);
+        self.workers[number].give_up_sections();
         state.replace(core, &self.workers);
         state.fail(&self.workers, (core, vertex), None, FaultCause::Overrun);
         state.report_left(core, &self.workers);

@@ -27,8 +27,8 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 use sched_dag::CoreId;
 
 use crate::level::{Levels, Role};
-use crate::sys;
 use crate::sys::ThreadId;
+use crate::{section, sys};
 
 /// It runs no instance: it waits, or has the scheduler's lock, or is about to take it.
 const REPORTS: u32 = 0;
@@ -40,7 +40,8 @@ const DEMOTED: u32 = 2;
 /// The part of a worker that other threads see.
 #[derive(Debug, Default)]
 pub(crate) struct Worker {
-    thread: OnceLock<ThreadId>,
+    /// Its thread, and that as sections know it.
+    thread: OnceLock<(ThreadId, u32)>,
     mode: AtomicU32,
     /// The number of the core of which it was the active one when it had the lock last, and 1.
     seat: AtomicU32,
@@ -67,12 +68,19 @@ impl Worker {
 
     /// Says which thread it is. To be called by that thread, first of all.
     pub(crate) fn register_thread(&self) {
-        let _ = self.thread.set(sys::thread());
+        let _ = self.thread.set((sys::thread(), section::own()));
     }
 
     /// Returns its thread's number, once it has begun.
     pub(crate) fn thread(&self) -> Option<ThreadId> {
-        self.thread.get().copied()
+        self.thread.get().map(|of| of.0)
+    }
+
+    /// Gives it up as one that enters sections, with the section that it is in.
+    pub(crate) fn give_up_sections(&self) {
+        if let Some((_, thread)) = self.thread.get() {
+            section::give_up(*thread);
+        }
     }
 
     /// Brings its thread to a level, if there are levels.

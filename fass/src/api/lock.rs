@@ -72,7 +72,9 @@ pub struct Lock<T> {
 /// A subtask that enters sections, among those of its lock.
 struct LockUser {
     is_taken: AtomicBool,
-    /// The latest instance: its DAG and subtask, and its job.
+    /// The latest instance: its plan, its DAG and subtask, and its job. A fault may keep the user, and
+    /// these, beyond the plan's run.
+    plan: AtomicU64,
     ids: AtomicU64,
     job: AtomicU64,
     /// How many sections it may still enter.
@@ -151,13 +153,18 @@ impl<T> Lock<T> {
     ///
     /// # Panics
     ///
-    /// If the caller is an instance that has not stated it, or fewer sections; if it is in a
-    /// section already; or if a fault has ended a section of this lock.
+    /// If the caller is an instance that has not stated it, or fewer sections, or while a run goes on
+    /// none; if it is in a section already; or if a fault has ended a section of this lock.
     #[track_caller]
     pub fn with<R>(&self, section: impl FnOnce(&mut T) -> R) -> R {
         let (platform, name) = (expect_installed(), self.name);
-        if let Some(instance) = platform.running() {
-            self.admit(instance);
+        match platform.running() {
+            Some(running) => self.admit(running),
+            None => assert!(
+                !platform.is_in_run(),
+                "lock `{name}`: a thread that is no instance enters a section while a run goes on; \
+                 enter it in a subtask, or before or after the run"
+            ),
         }
         let (mut section, mut result) = (Some(section), None);
         let took_ns = platform.section(&self.words, &mut || {
@@ -179,10 +186,10 @@ impl<T> Lock<T> {
     }
 
     #[track_caller]
-    fn admit(&self, instance: Instance) {
+    fn admit(&self, running: (u64, Instance)) {
         let (mut next, mut is_stated) = (self.first_user.get(), false);
         while let Some(user) = next {
-            if user.is_of(instance) {
+            if user.is_of(running) {
                 is_stated = true;
                 let left = user.left.load(Relaxed);
                 if left > 0 {
@@ -224,8 +231,10 @@ fn ids(instance: Instance) -> u64 {
 }
 
 impl LockUser {
-    fn is_of(&self, instance: Instance) -> bool {
-        self.ids.load(Relaxed) == ids(instance) && self.job.load(Relaxed) == instance.job
+    fn is_of(&self, (plan, instance): (u64, Instance)) -> bool {
+        self.ids.load(Relaxed) == ids(instance)
+            && self.job.load(Relaxed) == instance.job
+            && self.plan.load(Relaxed) == plan
     }
 }
 
@@ -233,6 +242,7 @@ impl Default for LockUser {
     fn default() -> Self {
         Self {
             is_taken: AtomicBool::new(false),
+            plan: AtomicU64::new(0),
             ids: AtomicU64::new(NOBODY),
             job: AtomicU64::new(0),
             left: AtomicU32::new(0),
@@ -267,9 +277,10 @@ impl Uses for LockUse {
     }
 
     fn enter(held: &mut Arc<Permit>) {
-        if let Some(instance) = installed().and_then(|platform| platform.running()) {
+        if let Some((plan, instance)) = installed().and_then(|platform| platform.running()) {
             let Permit { user, sections } = &**held;
             user.left.store(*sections, Relaxed);
+            user.plan.store(plan, Relaxed);
             user.job.store(instance.job, Relaxed);
             user.ids.store(ids(instance), Relaxed);
         }

@@ -184,10 +184,16 @@ pub trait Platform: Sync {
         panic!("this platform takes no answers of devices; let no subtask wait for one");
     }
 
-    /// Returns the instance that the caller is, if it is one. A platform that does not define this
-    /// lets every function enter every [`Lock`](crate::shared::Lock).
-    fn running(&self) -> Option<Instance> {
+    /// Returns the instance that the caller is, if it is one, with its plan's number. A platform that
+    /// does not define this lets every function enter every [`Lock`](crate::shared::Lock).
+    fn running(&self) -> Option<(u64, Instance)> {
         None
+    }
+
+    /// Reports whether a run goes on, so that a caller that is no instance is a thread of the app's
+    /// own. A platform on which an app has none need not define this.
+    fn is_in_run(&self) -> bool {
+        false
     }
 
     /// Calls `section` once nobody else is in a section of the lock that these are the words of, and

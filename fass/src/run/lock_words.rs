@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicU32, AtomicU64};
 /// wants. See [`Platform::section`](crate::platform::Platform::section).
 #[derive(Debug)]
 pub struct LockWords {
-    /// Whether somebody is in a section, and above that bit whose turn is next.
+    /// Whether somebody is in a section, and more that the platform knows, such as whose turn is next.
     pub state: AtomicU32,
     /// The cores that wait, as bits.
     pub waiting: [AtomicU64; 4],

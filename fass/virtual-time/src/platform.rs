@@ -239,8 +239,9 @@ impl Platform for HostPlatform {
         }
     }
 
-    fn running(&self) -> Option<Instance> {
-        current()?.running.get()
+    fn running(&self) -> Option<(u64, Instance)> {
+        let machine = current()?;
+        machine.plan.get().zip(machine.running.get())
     }
 
     fn section(&self, lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {

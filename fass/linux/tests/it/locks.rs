@@ -1,5 +1,10 @@
 //! Locks on threads.
 
+use std::hint;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::thread;
+
 use crate::support::{alone, breaches, mechanisms, ms, spin};
 use fass::shared::Lock;
 use fass::{FaultLimit, SubtaskAttributes, create_dag, finish_create_dags};
@@ -77,4 +82,73 @@ fn a_panic_in_a_section_loses_the_lock_and_what_is_not_stated_is_refused() {
          `dag.using(lock.entering(N))`",
     ];
     assert_eq!(causes, expected);
+}
+
+/// Has a section end by a fault that leaves its thread there, while another instance waits.
+pub(crate) fn lose(section: fn(), cause: &str) {
+    for mechanism in mechanisms() {
+        let alone = alone(2, mechanism);
+        let lost: &Lock<()> = Box::leak(Box::new(Lock::new("lost", ())));
+        let is_in: &AtomicBool = Box::leak(Box::default());
+        let dags = ["ends", "waits"].map(|name| {
+            let dag = create_dag();
+            dag.name(name).jobs(1).period(ms(50));
+            dag.relative_deadline(ms(50));
+            dag
+        });
+        let end = move |()| {
+            lost.with(|()| {
+                is_in.store(true, Relaxed);
+                section();
+            });
+        };
+        let wait = move |()| {
+            while !is_in.load(Relaxed) {
+                thread::yield_now();
+            }
+            lost.with(|()| ());
+        };
+        let attributes = |priority| SubtaskAttributes::named("enters").priority(priority);
+        let source = dags[0].using(lost.entering(1)).source(end);
+        source.register(attributes(0).budget(ms(20)));
+        let source = dags[1].using(lost.entering(1)).source(wait);
+        source.register(attributes(1));
+        finish_create_dags(&dags).expect("they are right");
+        let run = alone.machine.run().expect("it is committed");
+        let causes: Vec<&str> = run.faults().iter().map(|fault| &*fault.cause).collect();
+        let said = "lock `lost`: a fault has ended a section, and its data may be half changed";
+        assert_eq!(causes, [cause, said]);
+    }
+}
+
+#[test]
+fn a_section_that_a_budget_ends_loses_the_lock_and_keeps_nobody_waiting() {
+    static IS_OVER: AtomicBool = AtomicBool::new(false);
+    let compute = || {
+        while !IS_OVER.load(Relaxed) {
+            hint::spin_loop();
+        }
+    };
+    lose(compute, "its budget was exceeded");
+    IS_OVER.store(true, Relaxed);
+}
+
+#[test]
+fn a_thread_of_the_apps_own_enters_no_section_while_a_run_goes_on() {
+    static FREE: Lock<u64> = Lock::new("free", 0);
+    let enter = || thread::spawn(|| FREE.with(|count| *count += 1)).join();
+    let alone = alone(1, Mechanism::Normal);
+    let dag = create_dag();
+    dag.name("spawns").jobs(1).period(ms(20));
+    dag.relative_deadline(ms(20));
+    let spawns = move |_| resume_unwind(enter().expect_err("it is refused"));
+    dag.register_untyped_subtask(spawns, SubtaskAttributes::named("spawns"));
+    finish_create_dags(&[dag]).unwrap();
+    assert!(enter().is_ok());
+    let run = alone.machine.run().unwrap();
+    let said = "lock `free`: a thread that is no instance enters a section while a run goes on; \
+                enter it in a subtask, or before or after the run";
+    assert_eq!(run.faults()[0].cause, said);
+    assert!(enter().is_ok());
+    assert_eq!(FREE.with(|count| *count), 2);
 }

@@ -5,6 +5,7 @@ use std::process::Command;
 use std::sync::mpsc;
 use std::thread;
 
+use crate::locks;
 use crate::support::{alone, breaches, chain, mechanisms, ms};
 use fass::{SubtaskAttributes, create_dag, finish_create_dags, sleep};
 use linux::Control;
@@ -46,6 +47,7 @@ const PART: &str = "FASS_LINUX_PART";
 fn part() {
     if std::env::var(PART).as_deref() == Ok("panics") {
         run_all();
+        locks::lose(|| fail(0), "panic in a destructor during cleanup");
         // The harness would change the panic hook, in which threads sleep from now on.
         std::process::exit(0);
     }

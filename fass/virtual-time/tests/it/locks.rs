@@ -168,3 +168,24 @@ fn a_section_that_takes_longer_than_stated_is_said_once() {
     assert!(said.starts_with("error user/enter[2] "), "{said}");
     assert!(said.ends_with(&format!("{text} {fields}")), "{said}");
 }
+
+#[test]
+fn what_an_earlier_run_has_stated_lets_nobody_enter() {
+    static STATED: Lock<u32> = Lock::new("stated", 0);
+    let earlier = VirtualTime::new();
+    finish_create_dags(&[one("user", Some((&STATED, 9)), None)]).expect("nothing is wrong");
+    earlier.run();
+    // That machine keeps its functions, with what they may enter, as a fault does.
+    let later = VirtualTime::new().contain_panics();
+    let dag = create_dag();
+    dag.name("user")
+        .jobs(1)
+        .period(ms(9))
+        .relative_deadline(ms(9));
+    dag.register_untyped_subtask(|_| STATED.with(|_| ()), named("enters"));
+    finish_create_dags(&[dag]).expect("nothing is wrong");
+    let said = "lock `stated`: the subtask enters a section and has not stated that, by \
+                `dag.using(lock.entering(N))`";
+    is_refused(&later.run(), 0, said);
+    drop(earlier);
+}

@@ -24,6 +24,8 @@ pub struct Kernel {
     calibrates: AtomicBool,
     /// Whether the time that functions are told is recorded or replayed.
     tells: AtomicBool,
+    /// The number of the latest plan.
+    plan: AtomicU64,
 }
 
 /// The platform that apps on this machine are built for.
@@ -32,6 +34,7 @@ pub static KERNEL: Kernel = Kernel {
     coincidence_ns: AtomicU64::new(0),
     calibrates: AtomicBool::new(false),
     tells: AtomicBool::new(false),
+    plan: AtomicU64::new(0),
 };
 
 impl Kernel {
@@ -111,13 +114,13 @@ impl Platform for Kernel {
         }
     }
 
-    fn running(&self) -> Option<Instance> {
+    fn running(&self) -> Option<(u64, Instance)> {
         let were_enabled = interrupt_flag::disable();
         let running = execution::running(this_core::get());
         if were_enabled {
             interrupt_flag::enable();
         }
-        running
+        running.map(|instance| (self.plan.load(Ordering::Relaxed), instance))
     }
 
     fn section(&self, lock: &LockWords, section: &mut dyn FnMut()) -> Option<u64> {
@@ -133,7 +136,7 @@ impl Platform for Kernel {
     }
 
     fn log(&self, mut line: LogLine) {
-        line.instance = self.running();
+        line.instance = self.running().map(|(_, instance)| instance);
         line.at_ns = execution::since_epoch(clock::now_ns());
         line.keep();
     }
@@ -155,6 +158,9 @@ impl Platform for Kernel {
             plan.restore().map_err(LaunchError::new)?;
             stacks::watch(&mut plan);
         }
-        execution::prepare(plan, &terms, coincidence_ns)
+        let number = plan.number;
+        execution::prepare(plan, &terms, coincidence_ns)?;
+        self.plan.store(number, Ordering::Relaxed);
+        Ok(())
     }
 }
