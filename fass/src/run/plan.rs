@@ -48,7 +48,7 @@ pub struct Plan {
     pub bodies: Vec<Vec<SubtaskCode>>,
     /// The response times that the commit has proven ([`Commit::answers`](crate::commit::Commit::answers)).
     pub proven: ProvenBounds,
-    /// What the commit has answered, for those who keep the run.
+    /// The answers of the commit, for those who keep the run.
     pub(crate) answers: Box<dyn CommitWords>,
     /// By DAG, the one that gets a signal when a fault ends it
     /// ([`Dag::on_fault`](crate::Dag::on_fault)): right after the fault, in the same step of the

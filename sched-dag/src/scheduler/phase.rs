@@ -140,15 +140,15 @@ pub enum DagPhase {
 /// A question that people have to a scheduler, or a wish. It is short.
 #[derive(Debug)]
 pub enum SchedulerQuery<'a> {
-    /// How does a DAG?
+    /// The state of a DAG.
     Dag(DagId, &'a mut Option<DagSnapshot>),
-    /// What are the latest events before this one? The answer is the number of the oldest.
+    /// The latest events before this one. The answer is the number of the oldest.
     Events(u64, &'a mut [Option<Event>]),
-    /// How many events were written?
+    /// The number of events that were written.
     Written,
-    /// Is there room for events? Then the answer is 1.
+    /// Room for events: 1 if there is some.
     HasRoom,
-    /// Record events from now on, or forget them.
+    /// The wish to have events recorded from now on, or forgotten.
     Record(bool),
 }
 

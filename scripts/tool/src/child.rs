@@ -91,8 +91,9 @@ impl Child {
     }
 
     /// Works like [`wait`](Self::wait), and shows each complete line of `log`, the child's output,
-    /// to `show` as it comes. `is_well` gets the number of bytes in the log and returns `false` to
-    /// give the child up. `stop`, if given, asks the child to end in order before it is killed.
+    /// to `show` as it comes. `sent` gets the number of bytes in the log, and returns how many the
+    /// child has sent elsewhere, which is progress, too, or `None` to give the child up. `stop`, if
+    /// given, asks the child to end in order before it is killed.
     ///
     /// # Errors
     ///
@@ -103,7 +104,7 @@ impl Child {
         log: &Path,
         show: &mut dyn FnMut(&str),
         mut stop: Option<&mut dyn FnMut(Asked)>,
-        mut is_well: impl FnMut(u64) -> bool,
+        mut sent: impl FnMut(u64) -> Option<u64>,
     ) -> Result<Followed, String> {
         let (mut tail, mut asking) = (Tail::new(log), Asking::new(limit));
         let signals = stop.as_ref().map(|_| EndSignals::catch());
@@ -114,13 +115,17 @@ impl Child {
             // The log may not exist yet, and an error that lasts shows in `finish` below.
             let _ = tail.follow(show);
             let printed_bytes = tail.bytes();
-            if !is_well(printed_bytes) {
+            let Some(sent_bytes) = sent(printed_bytes) else {
                 return false;
-            }
+            };
             let (Some(ask), Some(signals)) = (&mut stop, &signals) else {
                 return true;
             };
-            match asking.step(started.elapsed(), signals.count(), printed_bytes) {
+            match asking.step(
+                started.elapsed(),
+                signals.count(),
+                printed_bytes + sent_bytes,
+            ) {
                 Step::Wait => return true,
                 Step::Ask(why) => {
                     if why == Asked::ByPerson {

@@ -87,7 +87,7 @@ pub fn run_for(
     };
     // Without `stop` the limit kills the program at once, and ctrl-C is not caught.
     let stop: Option<&mut dyn FnMut(Asked)> = if stops { Some(&mut ask) } else { None };
-    let followed = child.follow(limit, log, show, stop, |_| true)?;
+    let followed = child.follow(limit, log, show, stop, |_| Some(0))?;
     let mut outcome = Outcome {
         asked: followed.asked,
         elapsed: child.elapsed(),

@@ -214,7 +214,11 @@ impl Qemu {
         command.args(arguments);
         let is_live = self.second.as_ref().is_some_and(|second| second.is_live);
         let (has_input, stops) = (self.has_input || self.stops || is_live, self.stops);
-        Running::start(command, serial, has_input, stops, self.logs_instructions)
+        let started = Running::start(command, serial, has_input, stops, self.logs_instructions)?;
+        Ok(Running {
+            records: self.records.clone(),
+            ..started
+        })
     }
 }
 
@@ -459,6 +463,8 @@ pub struct Running {
     pub(crate) child: Child,
     serial: PathBuf,
     complaints: Temporary,
+    /// The file that the record goes to, if there is one.
+    records: Option<PathBuf>,
     /// The serial port through which the guest is asked to end, if it listens.
     stop: Option<File>,
     /// The reason why the guest was asked to end, if it was.
@@ -502,6 +508,7 @@ impl Running {
             child,
             serial: serial.to_path_buf(),
             complaints,
+            records: None,
             asked: None,
         })
     }
@@ -519,18 +526,20 @@ impl Running {
     ) -> Result<(Ending, String), String> {
         let complaints = self.complaints.path();
         let mut kvm_failed = false;
-        let is_well = |bytes| {
+        let records = self.records.as_deref();
+        let sent = |bytes| {
             // A short file, read at each look: QEMU does not end by itself after such a message.
             let said = fs::read(complaints).unwrap_or_default();
             let said = String::from_utf8_lossy(&said);
             kvm_failed = KVM_FAILURES.iter().any(|failure| said.contains(failure));
-            !kvm_failed && bytes <= MOST_SERIAL_BYTES
+            let record = records.and_then(|path| fs::metadata(path).ok());
+            (!kvm_failed && bytes <= MOST_SERIAL_BYTES).then(|| record.map_or(0, |file| file.len()))
         };
         // The request may fail: a guest that has just ended does not listen.
         let stop = self.stop.take();
         let mut ask = |_| drop(stop.as_ref().map(|mut stop| stop.write_all(CTRL_C)));
         let ask: Option<&mut dyn FnMut(Asked)> = if stop.is_some() { Some(&mut ask) } else { None };
-        let followed = (self.child).follow(limit, &self.serial, show, ask, is_well)?;
+        let followed = (self.child).follow(limit, &self.serial, show, ask, sent)?;
         self.asked = followed.asked;
         let ending = match followed.waited {
             Waited::Ended(status) => ending_of(status),

@@ -34,7 +34,7 @@ pub(crate) struct Case {
     pub(crate) features: Vec<u32>,
 }
 
-/// What has happened in the runs of a climb.
+/// Counts of what has happened in the runs of a climb.
 #[derive(Default)]
 pub(crate) struct Climbed {
     /// By features, the jobs with a bound.

@@ -7,7 +7,7 @@
 //! judges the first run of each climb. Offsets and activations are no matter of the analysis:
 //! half of the climbs have sporadic DAGs alone, so that any job may come at any time.
 //!
-//! What the commit's own assignment divides, it has proven: each DAG of it. A WCET that is not known,
+//! Of what the commit's own assignment divides it has proven each DAG. A WCET that is not known,
 //! or 0, proves nothing of its DAG. And whatever is proven, each wait ends as it should.
 //!
 //! A failure prints its seed, set and run. `ANALYSIS_SEED=n` draws its set alone;

@@ -270,7 +270,7 @@ fn follow(
         }
         report.read_line(line);
     };
-    let followed = child.follow(LIMIT, &log, &mut show, None, |_| true);
+    let followed = child.follow(LIMIT, &log, &mut show, None, |_| Some(0));
     // The file is ours; one that cannot be removed harms nothing.
     let _ = fs::remove_file(&log);
     Ok((followed?.waited, child.elapsed()))
