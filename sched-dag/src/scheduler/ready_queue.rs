@@ -387,11 +387,23 @@ const BELOW: usize = 4;
 const ABSENT: usize = usize::MAX;
 
 /// A heap with the smallest key on top.
-#[derive(Clone, Debug, Hash)]
+#[derive(Debug, Hash)]
 pub(super) struct IndexedHeap<K> {
     entries: Vec<(K, usize)>,
     /// Where in `entries` each item is.
     positions: Box<[usize]>,
+}
+
+impl<K: Copy> Clone for IndexedHeap<K> {
+    /// Takes the same room: the copy of a `Vec` has none but for what is in it.
+    fn clone(&self) -> Self {
+        let mut entries = Vec::with_capacity(self.positions.len());
+        entries.extend_from_slice(&self.entries);
+        Self {
+            entries,
+            positions: self.positions.clone(),
+        }
+    }
 }
 
 impl<K: Ord + Copy> IndexedHeap<K> {

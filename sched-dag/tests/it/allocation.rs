@@ -10,8 +10,8 @@ use sched_dag::{
     Policy, Preemption, SchedulerOptions, SubtaskSpec, verify,
 };
 
-/// A layered DAG of 40 subtasks that overruns now and then.
-fn dag(random: &mut Random, overrun: OverrunPolicy) -> DagSpec {
+/// A layered DAG of 40 subtasks, some of them perhaps pinned, that overruns now and then.
+fn dag(random: &mut Random, overrun: OverrunPolicy, has_pins: bool) -> DagSpec {
     let edges = (1..40)
         .flat_map(|to| [(random.index(to), to), (random.index(to), to)])
         .collect();
@@ -22,7 +22,12 @@ fn dag(random: &mut Random, overrun: OverrunPolicy) -> DagSpec {
         overrun,
         jobs: Some(300),
         edges,
-        subtasks: vec![SubtaskSpec::default(); 40],
+        subtasks: (0..40)
+            .map(|place| SubtaskSpec {
+                core: (has_pins && place % 3 == 0).then_some(place % 4),
+                ..SubtaskSpec::default()
+            })
+            .collect(),
         ..DagSpec::default()
     }
 }
@@ -43,7 +48,7 @@ impl Workload for Work {
     }
 }
 
-/// Runs a DAG of each overrun policy, and returns what they did.
+/// Runs a DAG of each overrun policy, with pins if the seed is even, and returns what they did.
 fn run(seed: u64, policy: Policy, preemption: Preemption, may_fail: bool) -> [DagStatistics; 3] {
     let mut random = Random::new(seed);
     let overruns = [
@@ -51,7 +56,7 @@ fn run(seed: u64, policy: Policy, preemption: Preemption, may_fail: bool) -> [Da
         OverrunPolicy::Skip,
         OverrunPolicy::Abort,
     ];
-    let specs = overruns.map(|overrun| dag(&mut random, overrun));
+    let specs = overruns.map(|overrun| dag(&mut random, overrun, seed.is_multiple_of(2)));
     let options = CommitOptions::new(policy, 4).with_construction(ConstructionPolicy::any_graph());
     let verified = verify(&specs, &options).expect("right DAGs");
     let options = SchedulerOptions {
@@ -75,9 +80,11 @@ fn run(seed: u64, policy: Policy, preemption: Preemption, may_fail: bool) -> [Da
 fn nothing_is_allocated_from_first_release_to_last_completion() {
     for policy in [Policy::StaticPriority, Policy::Edf] {
         for preemption in [Preemption::Enabled, Preemption::Disabled] {
-            let [queue, skip, abort] = run(1, policy, preemption, false);
-            // The run was worth counting: all policies had something to do.
-            assert!(queue.queued > 0 && skip.skips > 0 && abort.aborts > 0);
+            for seed in [1, 2] {
+                let [queue, skip, abort] = run(seed, policy, preemption, false);
+                // The run was worth counting: all policies had something to do.
+                assert!(queue.queued > 0 && skip.skips > 0 && abort.aborts > 0);
+            }
         }
     }
 }
