@@ -64,17 +64,39 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
         };
         let mut dags = alloc::vec![bounded("urgent", 0), bounded("modest", 9)];
         dags.extend(disturb());
-        finish_create_dags(&dags)?;
-        let run = machine.run()?;
-        for name in ["urgent", "modest"] {
-            json::emit("delay", |line| {
-                line.text("cause", cause)
-                    .text("dag_name", name)
-                    .number("bound_ns", run.bound_ns(name).unwrap_or(0))
-                    .number("longest_ns", run.response_times_ns(name).max().unwrap_or(0))
-                    .number("jobs", run.statistics(name).completed);
-            });
-        }
+        tell(machine, cause, &dags, &["urgent", "modest"])?;
+    }
+    Ok(())
+}
+
+/// Runs DAGs where core 0 is busy for longer than its background may wait, and faults come.
+pub(crate) fn starved(machine: &Machine) -> Result<(), AppError> {
+    machine.offer_overheads()?;
+    machine.options().finish(&["test", "overheads"])?;
+    machine.accept_faults();
+    // Heartbeats come at another moment of each period.
+    let (jobs, period) = (900, us(1_007));
+    let mut dags = faults(5, || hold(60));
+    dags[0].jobs(jobs).period(period).relative_deadline(period);
+    let urgent = named("urgent").priority(0).wcet(us(851));
+    dags.push(single_every(period, "urgent", jobs, urgent, || hold(850)));
+    let busy = named("busy").priority(99);
+    dags.push(single_every(us(20_000), "busy", 5, busy, || hold(20_000)));
+    tell(machine, "starved", &dags, &["urgent"])
+}
+
+/// Runs DAGs, and prints the longest responses of some.
+fn tell(machine: &Machine, cause: &str, dags: &[Dag], names: &[&str]) -> Result<(), AppError> {
+    finish_create_dags(dags)?;
+    let run = machine.run()?;
+    for &name in names {
+        json::emit("delay", |line| {
+            line.text("cause", cause)
+                .text("dag_name", name)
+                .number("bound_ns", run.bound_ns(name).unwrap_or(0))
+                .number("longest_ns", run.response_times_ns(name).max().unwrap_or(0))
+                .number("jobs", run.statistics(name).completed);
+        });
     }
     Ok(())
 }

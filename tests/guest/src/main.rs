@@ -43,6 +43,7 @@ const TESTS: &[(&str, Test)] = &[
     ("crime", crime),
     ("cluster_scale", cluster_scale::run),
     ("delays", delays::run),
+    ("starved", delays::starved),
     ("deaf_alone", |machine| single::deaf(machine, false)),
     ("deaf_beside", |machine| single::deaf(machine, true)),
     ("preemption", preemption::run),

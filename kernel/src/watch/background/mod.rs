@@ -11,8 +11,8 @@
 //!
 //! Under overload the background may never run again, and then a person wants most to see
 //! what goes on, and to stop it. So if it has not run for [`STARVED_NS`], core 0's heartbeat
-//! does the slices instead, and tells of a fault. The heartbeat also notices that an instance keeps its core for
-//! long ([`stall`]).
+//! does the slices instead, and tells of a fault where nothing has a bound, which that would delay
+//! beyond it. The heartbeat also notices that an instance keeps its core for long ([`stall`]).
 //!
 //! # Bytes from the serial port where no conversation takes them
 //!
@@ -106,6 +106,9 @@ static SLICED: SpinLock<SlicedWork> = SpinLock::new(SlicedWork {
 /// When the background ran last, on the clock; `u64::MAX` outside runs.
 static RAN_NS: AtomicU64 = AtomicU64::new(u64::MAX);
 
+/// Whether the heartbeat may tell of a fault: nothing in the run has a bound.
+static TELLS_FAULTS: AtomicBool = AtomicBool::new(false);
+
 impl SlicedWork {
     /// Does a slice. Reports whether there is more to do at once.
     fn slice(&mut self, is_starved: bool) -> bool {
@@ -127,7 +130,9 @@ pub(crate) fn beat(now_ns: u64) {
     if now_ns.saturating_sub(RAN_NS.load(Ordering::Relaxed)) < STARVED_NS {
         return;
     }
-    containment::tell_fault();
+    if TELLS_FAULTS.load(Ordering::Relaxed) {
+        containment::tell_fault();
+    }
     if let Some(mut sliced) = SLICED.try_lock() {
         sliced.slice(true);
     }
@@ -172,6 +177,7 @@ impl Background {
             };
         }
         RAN_NS.store(clock::now_ns(), Ordering::Relaxed);
+        TELLS_FAULTS.store(!execution::has_bound(), Ordering::Relaxed);
         stall::start();
         // What a person says to the console is no event.
         let input = input.filter(|_| wishes.console.is_none());

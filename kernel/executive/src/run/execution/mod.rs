@@ -39,8 +39,8 @@ use port::{CoreRunner, SmpPort};
 pub use port::{arm_all, arm_next_event, keeps_time, since_epoch};
 pub use status::look_at_clearing;
 pub use status::{
-    budget_ns, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal, try_names,
-    with_scheduler,
+    budget_ns, has_bound, jobs_ended, lock_acquisitions, next_event_ns, running, try_journal,
+    try_names, with_scheduler,
 };
 pub use status::{control, nominal_end_ns, task_set};
 use step::RequestQueue;

@@ -12,7 +12,7 @@
 use alloc::sync::Arc;
 use core::sync::atomic::Ordering;
 
-use sched_dag::engine::PlatformPort as _;
+use sched_dag::engine::{PlatformPort as _, ProvenBounds};
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::Request;
 use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet, WAITS};
@@ -91,6 +91,19 @@ pub fn budget_ns(instance: Instance) -> u64 {
         let dag = execution.task_set().dag(instance.dag);
         let subtask = dag.subtask(instance.subtask);
         subtask.most_execution_ns(execution.budget_factor)
+    })
+}
+
+/// Reports whether the commit has proven a bound of anything in this run.
+pub fn has_bound() -> bool {
+    let place = cluster::nth(0).execution.lock();
+    place.as_ref().is_some_and(|execution| {
+        let ProvenBounds {
+            bounds_ns,
+            sink_bounds_ns,
+        } = &execution.proven;
+        let mut all = bounds_ns.iter().chain(sink_bounds_ns.iter().flatten());
+        all.any(Option::is_some)
     })
 }
 
