@@ -134,7 +134,8 @@ pub struct AnalysisSettings {
 pub struct AnalysisResult {
     /// The bound of each DAG, in the order of the commit; `None`: not proven.
     ///
-    /// A bound stands for itself: whatever DAGs do that are not proven, it holds.
+    /// A bound stands for itself: whenever DAGs that are not proven release, and however late they
+    /// are, it holds.
     pub bounds: Vec<Option<DagBound>>,
     /// The bound of each sink of each DAG, in the order of [`Dag::sinks`]: the most time
     /// from a job's nominal release to the sink's finish. `None`: its DAG is not proven.
