@@ -75,7 +75,11 @@ impl Event {
             let mut left = word.swap(0, Ordering::SeqCst);
             while left != 0 {
                 let were_enabled = interrupt_flag::disable();
-                this_core::all()[first + left.trailing_zeros() as usize].wake_up();
+                let core = &this_core::all()[first + left.trailing_zeros() as usize];
+                // Whoever else runs there by now is not interrupted.
+                if core.context().awaits(self.address()) {
+                    core.wake_up();
+                }
                 if were_enabled {
                     interrupt_flag::enable();
                 }
@@ -88,10 +92,11 @@ impl Event {
     /// is `until_ns`, on the clock of [`fass::now_ns`]; `u64::MAX` is never. An idle
     /// core sends text that waits to be printed.
     ///
-    /// No notice is lost. The bit is set before the version is compared, and the
-    /// notifier changes the version before it takes the bits: one of them sees the
+    /// No notice is lost. The context's note and the bit are set before the version is compared,
+    /// and the notifier changes the version before it takes the bits: one of them sees the
     /// other (both orders are sequentially consistent). If it is the notifier, its
-    /// interrupt comes after interrupts were disabled here, and so ends the halt.
+    /// interrupt comes after interrupts were disabled here, and so ends the halt. If it finds
+    /// another context on the core, the halt has ended, and the version is compared again.
     pub fn wait(&self, seen: u64, until_ns: u64) {
         loop {
             interrupt_flag::disable();
@@ -99,10 +104,12 @@ impl Event {
             let core = this_core::get();
             let here = core.index;
             let word = &self.waiting[(here / 64) as usize];
+            core.context().note_awaited(self.address());
             word.fetch_or(1 << (here % 64), Ordering::SeqCst);
             if self.version() != seen || clock::now_ns() >= until_ns {
-                // The bit stays, at worst for one interrupt that means nothing.
-                timer::set(Alarm::Hold, u64::MAX);
+                // The bit stays, and means nothing without the note.
+                core.context().note_awaited(0);
+                turns::end_hold(core);
                 turns::enter();
                 interrupt_flag::enable();
                 return;
@@ -116,5 +123,9 @@ impl Event {
             timer::set(Alarm::Hold, until_ns);
             interrupt_flag::enable_and_halt();
         }
+    }
+
+    fn address(&self) -> usize {
+        core::ptr::from_ref(self).addr()
     }
 }

@@ -13,7 +13,7 @@ use core::time::Duration;
 use fass::shared::Switch;
 use fass::{Dag, FaultLimit, Occupation, create_dag, execute_for, finish_create_dags, sleep};
 use faults::crimes::RECURRING;
-use kernel::{AppError, Lock, Machine, json, println};
+use kernel::{AppError, Event, Lock, Machine, json, println};
 
 use crate::single::{named, single_every};
 
@@ -71,9 +71,6 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
 
 /// Runs DAGs where core 0 is busy for longer than its background may wait, and faults come.
 pub(crate) fn starved(machine: &Machine) -> Result<(), AppError> {
-    machine.offer_overheads()?;
-    machine.options().finish(&["test", "overheads"])?;
-    machine.accept_faults();
     // Heartbeats come at another moment of each period.
     let (jobs, period) = (900, us(1_007));
     let mut dags = faults(5, || hold(60));
@@ -84,7 +81,34 @@ pub(crate) fn starved(machine: &Machine) -> Result<(), AppError> {
     dags.push(single_every(period, "urgent", jobs, urgent, work));
     let busy = named("busy").priority(99);
     dags.push(single_every(us(20_000), "busy", 5, busy, || hold(20_000)));
-    tell(machine, "starved", &dags, &["urgent"])
+    run_one(machine, "starved", &dags)
+}
+
+/// Runs DAGs one of which waits for many events, which happen while others run.
+pub(crate) fn events(machine: &Machine) -> Result<(), AppError> {
+    static EVENTS: [Event; 1_000] = [const { Event::new() }; 1_000];
+    let period = us(1_000);
+    let of =
+        |name, jobs, attributes, work: fn()| single_every(period, name, jobs, attributes, work);
+    let urgent = named("urgent").priority(0).wcet(us(20));
+    let urgent = of("urgent", TIMES + 5, urgent, || hold(19));
+    let waiter = of("waiter", TIMES, named("waiter").priority(6), || {
+        EVENTS.iter().for_each(|event| event.wait(u64::MAX, 0));
+    });
+    waiter.offset(us(950));
+    let notifier = named("notifier").priority(6).budget(us(900));
+    let notifier = of("notifier", TIMES, notifier, || {
+        (0..30).for_each(|_| EVENTS.iter().for_each(Event::notify));
+    });
+    notifier.offset(us(955));
+    run_one(machine, "events", &[urgent, waiter, notifier])
+}
+
+fn run_one(machine: &Machine, cause: &str, dags: &[Dag]) -> Result<(), AppError> {
+    machine.offer_overheads()?;
+    machine.options().finish(&["test", "overheads"])?;
+    machine.accept_faults();
+    tell(machine, cause, dags, &["urgent"])
 }
 
 /// Runs DAGs, and prints the longest responses of some.

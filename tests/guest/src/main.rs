@@ -44,6 +44,7 @@ const TESTS: &[(&str, Test)] = &[
     ("cluster_scale", cluster_scale::run),
     ("delays", delays::run),
     ("starved", delays::starved),
+    ("events", delays::events),
     ("deaf_alone", |machine| single::deaf(machine, false)),
     ("deaf_beside", |machine| single::deaf(machine, true)),
     ("preemption", preemption::run),

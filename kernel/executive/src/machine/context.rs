@@ -12,7 +12,7 @@
 use core::cell::UnsafeCell;
 use core::fmt;
 use core::ops::Range;
-use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 
 use alloc::boxed::Box;
 
@@ -133,6 +133,8 @@ pub struct Context {
     /// Whether what it runs has been found at fault.
     is_at_fault: AtomicBool,
     sections: SectionNote,
+    /// The address of what it waits for, halted; 0 if there is nothing.
+    awaited: AtomicUsize,
 }
 
 /// A context's note of its section; see [`section`](super::section).
@@ -229,6 +231,16 @@ impl Context {
         &self.sections
     }
 
+    /// Notes the address of what the context halts its core for; 0 if that is over.
+    pub fn note_awaited(&self, address: usize) {
+        self.awaited.store(address, Ordering::SeqCst);
+    }
+
+    /// Reports whether the context halts its core for what has an address.
+    pub fn awaits(&self, address: usize) -> bool {
+        self.awaited.load(Ordering::SeqCst) == address
+    }
+
     /// Notes that the context has waited for `ns` without executing.
     pub(super) fn note_waited(&self, ns: u64) {
         self.suspended_ns.fetch_add(ns, Ordering::Relaxed);
@@ -268,6 +280,7 @@ impl Parked {
             budget_end_ns: AtomicU64::new(u64::MAX),
             is_at_fault: AtomicBool::new(false),
             sections: SectionNote::new(),
+            awaited: AtomicUsize::new(0),
         }));
         let mut parked = Self(context);
         parked.reset();
@@ -275,9 +288,10 @@ impl Parked {
     }
 
     /// Sets back what one function would hand on to the next: the vector state's control words,
-    /// and whether it was found at fault.
+    /// whether it was found at fault, and what it waits for.
     pub(super) fn reset(&mut self) {
         self.0.is_at_fault.store(false, Ordering::Relaxed);
+        self.0.note_awaited(0);
         let area: *mut u8 = self.0.save_area.get().cast();
         for (offset, value) in CONTROL {
             // SAFETY: `&mut self` is the one holder of a context that does not run (context

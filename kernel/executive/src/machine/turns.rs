@@ -173,6 +173,14 @@ pub fn leave(core: &Core) {
     }
 }
 
+/// Ends the alarm of an instance's hold. One of the core's turn stays, or that would have no end.
+/// Interrupts are disabled.
+pub fn end_hold(core: &Core) {
+    if core.part() != TimeSlicePart::Computes {
+        timer::set(Alarm::Hold, u64::MAX);
+    }
+}
+
 /// Like [`leave`], and sees to it that the core is not interrupted for a turn's end. Core 0 goes
 /// back to its background.
 #[inline]
