@@ -163,8 +163,8 @@ fn wait() {
     EVENT.wait(EVENT.version(), fass::now_ns() + 1_000);
 }
 
-/// The locks that the doomed DAG's middle subtask states. A fault in a section loses the lock: each crime has
-/// its own.
+/// The locks that the doomed DAG's middle subtask states. A fault in a section loses the lock: each
+/// crime has its own.
 pub static LOCKS: [Lock<u32>; 4] = [
     Lock::new("free", 0),
     Lock::new("shared", 0),

@@ -126,14 +126,10 @@ impl Control {
     pub fn change(&self, dag: impl DagKey, request: fn(DagId) -> Request) {
         let dag = self.office.task_set.find(dag);
         let request = request(dag);
-        let (Request::Pause(of) | Request::Resume(of) | Request::Close(of) | Request::End(of)) =
-            request
-        else {
-            panic!("a run is asked for another change than to pause, resume, close or end a DAG");
-        };
-        assert_eq!(
-            of, dag,
-            "a change of one DAG is asked for by the name of another"
+        use Request::{Close, End, Pause, Resume};
+        assert!(
+            matches!(request, Pause(of) | Resume(of) | Close(of) | End(of) if of == dag),
+            "a DAG is asked for {request:?}; pause, resume, close or end it"
         );
         self.office.send(None, request);
     }
@@ -177,8 +173,12 @@ impl Control {
         &self.office.task_set
     }
 
-    /// Has the scheduler of a cluster answer a question.
+    /// Has the scheduler of a cluster answer a question; `None` if there is no such cluster or DAG.
     pub fn ask(&self, cluster: usize, query: SchedulerQuery<'_>) -> Option<u64> {
+        // Asked here: a panic under the lock would call the app's hook there.
+        if let SchedulerQuery::Dag(dag, _) = &query {
+            self.office.task_set.dags().get(dag.index())?;
+        }
         self.with_scheduler(cluster, |scheduler| scheduler.show(query))
     }
 

@@ -393,7 +393,8 @@ impl<Q, A> Device<Q, A> {
     /// sporadic DAG that it releases has the driver. It answers at once, or starts what answers
     /// later. Reports whether it is the first signal of the device, which alone counts.
     ///
-    /// To be called before the commit, which must have the signal's DAG, too; after it no signal counts.
+    /// To be called before the commit, which must have the signal's DAG, too; after it no signal
+    /// counts.
     ///
     /// ```
     /// use core::time::Duration;

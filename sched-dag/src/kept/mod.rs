@@ -242,7 +242,7 @@ impl Journal {
         let before = |count: usize| {
             let number = end.checked_sub(count as u64 + 1)?;
             let index = usize::try_from(number.checked_sub(self.lost)?).ok()?;
-            let place = self.oldest + index;
+            let place = self.oldest.checked_add(index)?;
             let place = place.checked_sub(self.events.len()).unwrap_or(place);
             Event::unpack(*self.events.get(place)?)
         };
