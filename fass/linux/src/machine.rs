@@ -16,7 +16,7 @@ use std::{fmt, fs};
 
 use fass::Preemption;
 use fass::edge::{BootRecord, EdgeMode, RecordingState, ReplayOutcome};
-use fass::platform::{Platform as _, RunConfig};
+use fass::platform::{DeviceEnd, Platform as _, RunConfig};
 use fass::shared::{Signal, Wire};
 
 use crate::control::{self, Control};
@@ -541,29 +541,36 @@ impl Linux {
     ///
     /// # Errors
     ///
-    /// The system has no more threads.
+    /// The wire is connected already, or the system has no more threads.
     pub fn connect(
         &self,
         wire: &Wire,
         input: impl Read + Send + 'static,
         output: impl Write + Send + 'static,
     ) -> io::Result<Connection> {
+        let Some(end) = DeviceEnd::of(wire).map(Arc::new) else {
+            let why = format!(
+                "wire `{}` has a device already; connect it once",
+                wire.name()
+            );
+            return Err(io::Error::new(ErrorKind::AlreadyExists, why));
+        };
         let has_ended = Arc::new(AtomicBool::new(false));
-        let (own, ended) = (wire.clone(), Arc::clone(&has_ended));
+        let (own, ended) = (Arc::clone(&end), Arc::clone(&has_ended));
         let writer = thread::Builder::new().spawn(move || send(&own, output, &ended))?;
-        let (own, ended) = (wire.clone(), Arc::clone(&has_ended));
+        let ended = Arc::clone(&has_ended);
         let connection = Connection {
             has_ended,
             writer: Some(writer),
         };
         // It may stand in a read for ever, and so nobody waits for it.
-        thread::Builder::new().spawn(move || receive(&own, input, &ended))?;
+        thread::Builder::new().spawn(move || receive(&end, input, &ended))?;
         Ok(connection)
     }
 }
 
 /// Lets arrive what can be read.
-fn receive(wire: &Wire, mut input: impl Read, has_ended: &AtomicBool) {
+fn receive(wire: &DeviceEnd, mut input: impl Read, has_ended: &AtomicBool) {
     let mut bytes = [0; 4096];
     while !has_ended.load(Ordering::Relaxed) {
         match input.read(&mut bytes) {
@@ -579,7 +586,7 @@ fn receive(wire: &Wire, mut input: impl Read, has_ended: &AtomicBool) {
 }
 
 /// Writes what is to go, and ends when nothing is left.
-fn send(wire: &Wire, mut output: impl Write, has_ended: &AtomicBool) {
+fn send(wire: &DeviceEnd, mut output: impl Write, has_ended: &AtomicBool) {
     let mut bytes = Vec::new();
     loop {
         let is_last = has_ended.load(Ordering::Acquire);

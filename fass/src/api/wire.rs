@@ -98,6 +98,8 @@ pub(super) struct WireState {
     pub(super) on_gone: SetOnce<Box<dyn Fn() + Send + Sync>>,
     is_received: AtomicBool,
     is_sent_on: AtomicBool,
+    /// Whether a platform has the device's end.
+    is_connected: AtomicBool,
     /// The signal that its packets raise, if a sporadic DAG begins with them.
     signal: SetOnce<Arc<RequestTarget>>,
 }
@@ -181,6 +183,7 @@ impl Wire {
                 on_gone: SetOnce::new(),
                 is_received: AtomicBool::new(false),
                 is_sent_on: AtomicBool::new(false),
+                is_connected: AtomicBool::new(false),
                 signal: SetOnce::new(),
             }),
         }
@@ -262,45 +265,69 @@ impl Wire {
             unsent_bytes: outgoing.lost.get(),
         }
     }
+}
+
+/// The device's end of a wire. There is one, which the platform takes as it connects the wire:
+/// so a function that holds a handle takes no byte of the DAG that the wire belongs to.
+///
+/// ```compile_fail,E0599
+/// let wire = fass::shared::Wire::new("numbers");
+/// let _ = wire.depart(); // a handle is no device
+/// ```
+#[derive(Debug)]
+pub struct DeviceEnd(Wire);
+
+impl DeviceEnd {
+    /// Takes the device's end of the wire; returns `None` while somebody has it. Dropped, it can
+    /// be taken again.
+    #[must_use]
+    pub fn of(wire: &Wire) -> Option<Self> {
+        let is_taken = wire.shared.is_connected.swap(true, Ordering::Acquire);
+        (!is_taken).then(|| Self(wire.clone()))
+    }
+
+    /// Returns the wire.
+    #[must_use]
+    pub fn wire(&self) -> &Wire {
+        &self.0
+    }
 
     /// Takes bytes that have arrived at `now_ns`, on the clock of [`crate::now_ns`]. Returns
     /// what [`Platform::raise`](crate::platform::Platform::raise) is to be told, if a packet is whole
     /// and a sporadic DAG receives it.
     ///
-    /// For platforms, which have one place that calls this. It may be an interrupt handler.
+    /// It may be called in an interrupt handler.
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
-        let is_whole = self.shared.incoming.arrive(bytes, now_ns);
-        if let Some(tell) = self.shared.on_packet.get().filter(|_| WAITS && is_whole) {
+        let is_whole = self.0.shared.incoming.arrive(bytes, now_ns);
+        if let Some(tell) = self.0.shared.on_packet.get().filter(|_| WAITS && is_whole) {
             tell();
         }
-        let signal = self.shared.signal.get().filter(|_| is_whole)?;
+        let signal = self.0.shared.signal.get().filter(|_| is_whole)?;
         signal.get()
     }
 
     /// Reports whether there is a byte that is to go.
-    ///
-    /// For platforms.
     #[must_use]
     pub fn has_bytes_to_go(&self) -> bool {
-        !self.shared.outgoing.is_empty()
+        !self.0.shared.outgoing.is_empty()
     }
 
     /// Takes the next byte that is to go, if there is one.
-    ///
-    /// For platforms, which have one place that calls this.
     #[must_use]
     pub fn depart(&self) -> Option<u8> {
-        let outgoing = &self.shared.outgoing;
+        let outgoing = &self.0.shared.outgoing;
         let byte = outgoing.take_byte()?;
-        if let Some(tell) = self
-            .shared
-            .on_gone
-            .get()
-            .filter(|_| WAITS && outgoing.is_empty())
-        {
+        let is_last = WAITS && outgoing.is_empty();
+        if let Some(tell) = self.0.shared.on_gone.get().filter(|_| is_last) {
             tell();
         }
         Some(byte)
+    }
+}
+
+impl Drop for DeviceEnd {
+    fn drop(&mut self) {
+        self.0.shared.is_connected.store(false, Ordering::Release);
     }
 }
 

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use crate::support::{commit, run_job};
 use counting::allocated;
-use fass::platform::Request;
+use fass::platform::{DeviceEnd, Request};
 use fass::shared::{Raiser, Received, Sample, Sender, Wire};
 use fass::{SubtaskAttributes, Unique, create_dag};
 use sched_dag::DagId;
@@ -103,6 +103,7 @@ fn states_latest_values_signals_and_wires_allocate_nothing() {
     let source = reader.period(period).using(latest.sample()).source(read);
     source.register(named("read"));
     let mut plan = commit(&[dag, reader, answers]);
+    let wire = DeviceEnd::of(&wire).unwrap();
 
     let before = allocated().0;
     let (mut signals, mut gone) = (0, 0);

@@ -8,7 +8,7 @@ use std::thread;
 
 use crate::no_allocation::counting::allocated;
 use crate::support::{PERIOD, answers, commit, named, panic_message};
-use fass::platform::{Request, SubtaskCode};
+use fass::platform::{DeviceEnd, Request, SubtaskCode};
 use fass::shared::{
     Asker, Device, Raiser, Sample, TimedOut, Wire, WireReader, WireWriter, create_device,
 };
@@ -290,9 +290,11 @@ fn bytes_that_come_or_go_as_a_wait_for_them_begins_end_it_once() {
     uses.async_source(ask).register(stated);
     let mut plan = commit(&[dag]);
     let body = &mut plan.bodies[0][0];
+    let device = DeviceEnd::of(&wire).unwrap();
+    assert!(DeviceEnd::of(&wire).is_none(), "there is one");
     let (arrive, depart) = (
-        || _ = wire.arrive(b"a\n", 0),
-        || while wire.depart().is_none() {},
+        || _ = device.arrive(b"a\n", 0),
+        || while device.depart().is_none() {},
     );
     for job in 0..1_000 {
         let others: [&(dyn Fn() + Sync); 2] = [&arrive, &depart];

@@ -25,7 +25,7 @@ use std::time::Duration;
 
 use fass::edge::Replay;
 use fass::log::LogLine;
-use fass::platform::{Plan, SubtaskRunner};
+use fass::platform::{DeviceEnd, Plan, SubtaskRunner};
 use fass::shared::Wire;
 use sched_dag::engine::{Alternate, FaultCost};
 use sched_dag::journal::EventKind;
@@ -47,8 +47,7 @@ pub(crate) struct Machine {
     pub(crate) settings: RefCell<Settings>,
     /// The edge, which records and replays.
     pub(crate) edge: Edge,
-    /// The wires that are connected, and what has been sent on each.
-    pub(crate) connected: RefCell<Vec<(Wire, Vec<u8>)>>,
+    pub(crate) wires: RefCell<Vec<WireEnd>>,
     /// The time that functions are told: the start of the instance and what it
     /// has executed.
     pub(crate) now_ns: Cell<u64>,
@@ -79,10 +78,13 @@ impl fmt::Debug for Machine {
 /// Something that comes from outside of the scheduler at an instant.
 pub(crate) enum Arrival {
     Request(Request),
-    Bytes(Wire, Vec<u8>),
+    Bytes(Rc<DeviceEnd>, Vec<u8>),
     /// A device gives an answer.
     Answer(Box<dyn FnOnce()>),
 }
+
+/// The device's end of a wire, and what has been sent if the wire is connected.
+pub(crate) type WireEnd = (Rc<DeviceEnd>, Option<Vec<u8>>);
 
 /// Looks for a question of a device, and notes the answers to it.
 type Answering = Box<dyn FnMut(&Machine, u64)>;
@@ -151,9 +153,28 @@ impl Machine {
 
     /// Takes what has been sent on wires.
     pub(crate) fn collect(&self) {
-        for (wire, sent) in self.connected.borrow_mut().iter_mut() {
-            sent.extend(std::iter::from_fn(|| wire.depart()));
+        for (end, sent) in self.wires.borrow_mut().iter_mut() {
+            if let Some(sent) = sent {
+                sent.extend(std::iter::from_fn(|| end.depart()));
+            }
         }
+    }
+
+    /// Returns the place of the device's end of a wire, which this machine takes if it has not
+    /// got it.
+    pub(crate) fn place_of(&self, wire: &Wire) -> usize {
+        let mut wires = self.wires.borrow_mut();
+        wires
+            .iter()
+            .position(|(end, _)| end.wire() == wire)
+            .unwrap_or_else(|| {
+                let Some(end) = DeviceEnd::of(wire) else {
+                    let name = wire.name();
+                    panic!("wire `{name}` has a device already; connect it to one machine");
+                };
+                wires.push((Rc::new(end), None));
+                wires.len() - 1
+            })
     }
 }
 

@@ -116,11 +116,14 @@ impl VirtualTime {
     /// Connects a wire: what is sent on it can be had by [`sent`](Self::sent).
     ///
     /// See [`Wire`].
+    ///
+    /// # Panics
+    ///
+    /// If the wire has a device already; likewise in [`arrive_at`](Self::arrive_at).
     #[must_use = "the machine itself is returned"]
     pub fn connect(self, wire: &Wire) -> Self {
-        let mut connected = self.machine.connected.borrow_mut();
-        connected.push((wire.clone(), Vec::new()));
-        drop(connected);
+        let place = self.machine.place_of(wire);
+        self.machine.wires.borrow_mut()[place].1 = Some(Vec::new());
         self
     }
 
@@ -130,8 +133,10 @@ impl VirtualTime {
     /// See [`Wire`].
     pub fn arrive_at(&self, wire: &Wire, time: Duration, bytes: &[u8]) {
         let at_ns = nanoseconds(time).max(self.machine.now_ns.get());
+        let place = self.machine.place_of(wire);
+        let end = Rc::clone(&self.machine.wires.borrow()[place].0);
         self.machine
-            .keep(at_ns, Arrival::Bytes(wire.clone(), bytes.to_vec()));
+            .keep(at_ns, Arrival::Bytes(end, bytes.to_vec()));
     }
 
     /// Lets a device answer its questions: `answer` is told the question and the job that asks, and
@@ -173,14 +178,14 @@ impl VirtualTime {
     /// If the wire is not connected.
     #[must_use]
     pub fn sent(&self, wire: &Wire) -> Vec<u8> {
-        let connected = self.machine.connected.borrow();
-        match connected.iter().find(|(of, _)| of == wire) {
-            Some((_, sent)) => sent.clone(),
-            None => panic!(
-                "wire `{}` is not connected; call `connect` before the run",
-                wire.name()
-            ),
-        }
+        let wires = self.machine.wires.borrow();
+        let of_wire = wires.iter().find(|(end, _)| end.wire() == wire);
+        of_wire
+            .and_then(|(_, sent)| sent.clone())
+            .unwrap_or_else(|| {
+                let name = wire.name();
+                panic!("wire `{name}` is not connected; call `connect` before the run");
+            })
     }
 }
 

@@ -13,6 +13,7 @@
 use alloc::boxed::Box;
 use alloc::format;
 
+use fass::platform::DeviceEnd;
 use fass::shared::Wire;
 
 use super::{LINE, Line};
@@ -32,7 +33,7 @@ pub(super) const PERIOD_NS: u64 = 1_000_000;
 const FIFO_BYTES: usize = 16;
 
 struct WireConnection {
-    wire: Wire,
+    wire: DeviceEnd,
     port: &'static SerialPort,
     /// Bytes that arrive in each run, in place of those of the port.
     script: Option<&'static [u8]>,
@@ -50,8 +51,13 @@ pub(crate) fn connect(wire: &Wire, script: Option<&'static [u8]>) -> Result<(), 
              --output FILE"
         ))));
     }
+    let Some(end) = DeviceEnd::of(wire) else {
+        return Err(AppError::Failure(format!(
+            "wire `{name}` has a device already; connect it once"
+        )));
+    };
     let connection = Box::leak(Box::new(WireConnection {
-        wire: wire.clone(),
+        wire: end,
         port: &SECOND,
         script,
     }));
@@ -143,7 +149,7 @@ impl Line for WireConnection {
     }
 
     fn report(&self) {
-        tell_wire(&self.wire);
+        tell_wire(self.wire.wire());
     }
 }
 
