@@ -94,7 +94,7 @@ impl MemoryMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::random::Random;
+    use random::Random;
 
     /// Adds ranges (start, end, whether usable) and puts them in order.
     fn ordered(told: impl IntoIterator<Item = (u64, u64, bool)>) -> (Vec<(u64, u64, bool)>, bool) {

@@ -7,9 +7,9 @@ use core::cell::Cell;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use common::random::Random;
 use fass::shared::{Latest, Sample};
 use fass::{Dag, SubtaskAttributes, create_dag, execute_for};
+use random::Random;
 
 use crate::{WCET_OF_ENDS, Workload};
 

@@ -22,9 +22,9 @@ use alloc::sync::Arc;
 use core::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use core::time::Duration;
 
-use common::random::Random;
 use fass::shared::{Asker, Device, DeviceDriver, Ticket, create_device};
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
+use random::Random;
 
 /// The time that `detect` waits at most.
 pub const LIMIT: Duration = ms(8);

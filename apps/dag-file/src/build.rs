@@ -7,8 +7,8 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use common::random::nth;
 use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
+use random::nth;
 use sched_dag::DagSpec;
 
 use crate::execution::{Execution, Times};

@@ -14,7 +14,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use common::random::{nth, scale};
+use random::{nth, scale};
 use replay::lines::quoted;
 use sched_dag::Wait;
 

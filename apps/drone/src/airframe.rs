@@ -5,8 +5,8 @@
 //! west and up; those of the body forward, left and up. Angles are roll, pitch and yaw, turned in
 //! the order yaw, pitch, roll.
 
-use common::random::Random;
 use maths::{sin_cos, tan};
+use random::Random;
 
 use crate::GRAVITY;
 

@@ -2,12 +2,12 @@
 
 use core::time::Duration;
 
-use common::random::Random;
 use fass::shared::{Latest, Mode, ModeSwitch, Modes, Parameter};
 use fass::shared::{Raiser, Sample, Signal};
 use fass::{Dag, FaultLimit, Occupation, OverrunPolicy};
 use fass::{SubtaskAttributes, create_dag, execute_for};
 use maths::{acos, sqrt};
+use random::Random;
 
 use crate::airframe::{Airframe, Force, Measured, Pose, Vector, rotation};
 use crate::attitude::{Estimate, control};

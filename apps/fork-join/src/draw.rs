@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use common::random::{Random, nth};
+use random::{Random, nth};
 
 use crate::WCET;
 

@@ -8,9 +8,35 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use fass::{Dag, SubtaskAttributes};
 
-use common::each_arity;
-
 use crate::{BUDGET, RELATIVE_DEADLINE, WCET_OF_ENDS};
+
+/// Calls a macro with the rows `1: a;`, `2: a b;` and so on to 16: a number and as many names.
+///
+/// The inputs of a subtask are a tuple, and the number of its elements is part of its type. To
+/// choose the number at run time, each arity must be written out; this table does it for all.
+#[macro_export]
+macro_rules! each_arity {
+    ($rows:ident) => {
+        $rows! {
+            1: a;
+            2: a b;
+            3: a b c;
+            4: a b c d;
+            5: a b c d e;
+            6: a b c d e f;
+            7: a b c d e f g;
+            8: a b c d e f g h;
+            9: a b c d e f g h i;
+            10: a b c d e f g h i j;
+            11: a b c d e f g h i j k;
+            12: a b c d e f g h i j k l;
+            13: a b c d e f g h i j k l m;
+            14: a b c d e f g h i j k l m n;
+            15: a b c d e f g h i j k l m n o;
+            16: a b c d e f g h i j k l m n o p;
+        }
+    };
+}
 
 /// How many joins the sink has seen.
 #[derive(Clone, Debug, Default)]

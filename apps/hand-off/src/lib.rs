@@ -23,8 +23,8 @@ use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use common::each_arity;
 use fass::{Dag, Occupation, SubtaskAttributes, VecToSubs, create_dag};
+use fork_join::each_arity;
 
 pub use shape::Shape;
 

@@ -7,7 +7,7 @@
 
 use alloc::vec::Vec;
 
-use common::random::Random;
+use random::Random;
 
 /// The number of subtasks side by side in a layered graph.
 const LAYER: usize = 32;

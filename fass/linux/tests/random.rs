@@ -11,8 +11,8 @@ use std::fs;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use common::random::Random;
 use linux::{Control, Linux, Mechanism, Run};
+use random::Random;
 use scenarios::Scenario;
 use sched_dag::DagId;
 use support::{alone, breaches, ms};

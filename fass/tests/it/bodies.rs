@@ -13,9 +13,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
 use crate::support::{PERIOD, Shared, commit, inside, named, panic_message, run_job, under_a_lock};
-use common::random::Random;
 use fass::platform::{Plan, SubtaskCode};
 use fass::{Dag, Unique, create_dag};
+use random::Random;
 
 #[cfg(debug_assertions)]
 #[test]

@@ -5,8 +5,8 @@
 
 use std::time::Duration;
 
-use common::random::{nth, scale};
 use fass::platform::RunConfig;
+use random::{nth, scale};
 use sched_dag::{Dag, Instance, Subtask, TaskSet};
 
 use crate::{VirtualTime, nanoseconds};

@@ -313,7 +313,7 @@ impl<'a> ChainFlow<'a> {
 mod tests {
     use super::{covering, covers, parallelism, peel, weight, width};
     use crate::analysis::Task;
-    use common::random::Random;
+    use random::Random;
 
     /// The example in which peeling a longest path first goes wrong.
     fn crossing() -> Task {

@@ -464,7 +464,7 @@ impl LentGroup {
 mod tests {
     use super::*;
     use crate::analysis::{InterferenceBound, SubtaskWaits, multi_path_fp};
-    use common::random::Random;
+    use random::Random;
 
     fn lent(tasks: &[Task], cores: u32) -> LendingAnswer {
         lend(&tasks.iter().collect::<Vec<_>>(), cores).expect("it applies")

@@ -302,7 +302,7 @@ mod tests {
     use super::{CoreSupply, MemberTask, STEP_LIMIT};
     use crate::analysis::workload::WorkloadBursts;
     use crate::analysis::{ScheduledSubtask, Task};
-    use common::random::Random;
+    use random::Random;
 
     /// A core with the list of an owner, by starts and finishes.
     fn owned(period_ns: u64, list: &[(u64, u64)]) -> CoreSupply {

@@ -179,7 +179,7 @@ impl ListSchedule {
 mod tests {
     use super::ListSchedule;
     use crate::analysis::{Task, multi_path};
-    use common::random::Random;
+    use random::Random;
 
     /// By core, the subtasks with their starts.
     fn lists(schedule: &ListSchedule) -> Vec<Vec<(usize, u64)>> {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::counting::allocated;
-use common::random::Random;
+use random::Random;
 use sched_dag::virtual_time::{RunOutcome, VirtualTime, Workload};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagId, DagSpec, DagStatistics, Instance, OverrunPolicy,

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::analysis::{
     self, AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest,
 };

@@ -4,7 +4,7 @@
 //! More or other sets: `JOURNALS=100000 JOURNAL_SEED=7 cargo test -p sched-dag --test
 //! rules journal`.
 
-use common::random::Random;
+use random::Random;
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::law::{
     Histogram, InstanceRecord, JobRecord, JudgeOptions, RunRecord, RunTally, Violation,

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeSet;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::lifecycle::{Lifecycle, LifecyclePlan, ModeEntry, Request};
 use sched_dag::{DagId, DagSpec, ModeId};

@@ -1,6 +1,6 @@
 //! Shared states become precedence: which edges, and that they suffice.
 
-use common::random::Random;
+use random::Random;
 use sched_dag::{
     CommitOptions, DagFault, DagId, DagSpec, LatestSpec, Policy, StateSpec, StateUser, SubtaskId,
     SubtaskSpec, TopicPort, verify,

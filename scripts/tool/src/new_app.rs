@@ -539,7 +539,7 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
                 assert!(!texts.concat().contains("/workspace"), "{texts:?}");
             }
             let is_there = ": it is there already; name a folder to be made";
-            let packages = "boot-entry boot-link common executive front linux recording sched-dag";
+            let packages = "boot-entry boot-link executive front linux random recording sched-dag";
             let packages = packages
                 .split(' ')
                 .map(|name| (name, " has it; choose another"));

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::{DagSpec, Priority, SubtaskSpec};
 
 /// Draws up to 4 DAGs for clusters of `clusters` cores, which they take in turn, at least one each:

@@ -15,8 +15,8 @@ use alloc::vec::Vec;
 use alloc::{format, vec};
 use core::time::Duration;
 
-use common::random::{Random, nth};
 use fass::{FaultLimit, OverrunPolicy, Policy, Preemption};
+use random::{Random, nth};
 
 use crate::Scenario;
 use crate::dag::{DagText, Replaced, SubtaskText, Use};

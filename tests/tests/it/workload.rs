@@ -5,10 +5,10 @@
 
 use std::num::NonZeroUsize;
 
-use common::random::Random;
 use harness::workload::{self, Stamping};
 use join_latency::Samples;
 use pub_sub::{ApproximateTime, ExactTime, Parameters, Synchronizer};
+use random::Random;
 
 const JOBS: usize = 2000;
 const QUEUE_SIZE: usize = 1000;

@@ -4,10 +4,10 @@
 use std::collections::HashSet;
 use std::num::NonZeroUsize;
 
-use common::random::Random;
 use pub_sub::{
     AgePenalty, ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer,
 };
+use random::Random;
 
 const SEEDS: u64 = 300;
 

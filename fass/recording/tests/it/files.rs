@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use common::random::Random;
+use random::Random;
 use recording::{
     Channel, Chunk, Commit, CommittedDag, Counted, Crc, DagHeader, DagTimes, Entry, EntryKind,
     Header, MAGIC, MOST_WEIGHTLESS, Malformed, Recordable, Recording, Role, Schema, Stream, Times,

@@ -9,8 +9,8 @@ mod counting;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-use common::random::Random;
 use counting::allocated;
+use random::Random;
 use recording::{Decoder, Encoder, MOST_DEPTH, MOST_GROWTH, Recordable, Schema, Shown, to_bytes};
 
 recording::recordable! {

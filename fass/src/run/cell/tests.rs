@@ -2,7 +2,7 @@
 //! counts shrink so that a run ends.
 
 use super::{SetOnce, SharedCell, ring};
-use common::random::Random;
+use random::Random;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

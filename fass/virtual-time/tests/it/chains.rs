@@ -4,10 +4,10 @@
 //! More or other sets: `CHAINS=100000 CHAIN_SEED=7 cargo test -p virtual-time --test it chains`.
 
 use crate::support::{Seen, every, ms, taking, work};
-use common::random::Random;
 use fass::commit::{ConstructionPolicy, EndToEnd, finish_create_dags_with};
 use fass::shared::{Latest, Sample};
 use fass::{Dag, Policy};
+use random::Random;
 use virtual_time::{InstanceRecord, Report, VirtualTime};
 
 /// The job of the first DAG that a value goes back to.

@@ -8,12 +8,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
 use crate::support::{ms, named};
-use common::random::{Random, nth};
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::shared::{Raiser, Sample, Signal, Uses};
 use fass::{
     Dag, FaultLimit, Occupation, OverrunPolicy, Policy, Preemption, create_dag, execute_for,
 };
+use random::{Random, nth};
 use recording::{Entry, EntryKind, Recording, Role};
 use virtual_time::{PanicRecord, Report, VirtualTime};
 

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use crate::support::{MS, Seen, commit, every, job_numbers, ms, named, run, taking, work};
-use common::random::Random;
 use fass::shared::{Asker, DeviceDriver, TimedOut, create_device};
 use fass::{Dag, OverrunPolicy, SubtaskAttributes, WaitFault, sleep, until};
+use random::Random;
 use virtual_time::{Report, VirtualTime};
 
 /// A DAG of one subtask of that name, whose segments take so long, with sleeps between: in

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::analysis::{AnalysisResult, AnalysisSettings};
 use sched_dag::engine::SubtaskBody;
 use sched_dag::journal::{Event, EventKind, EventSubject};

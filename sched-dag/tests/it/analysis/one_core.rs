@@ -1,6 +1,6 @@
 //! The tests of one core are exact: in virtual time their worst case comes.
 
-use common::random::Random;
+use random::Random;
 use sched_dag::analysis::{AnalysisResult, SchedulabilityTest, answer};
 use sched_dag::{DagSpec, Policy, Preemption, TaskSet};
 

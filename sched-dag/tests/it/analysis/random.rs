@@ -1,6 +1,6 @@
 //! Random task sets from a seed.
 
-use common::random::Random;
+use random::Random;
 use sched_dag::analysis::{AnalysisSettings, Overheads, assign};
 use sched_dag::{
     Activation, AssignmentReason, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, Dag,

@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::analysis::{
     AnalysisResult, NotProvenReason, SchedulabilityTest, TaskError, answer, fix_orders,
 };

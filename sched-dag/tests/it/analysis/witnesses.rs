@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use common::random::Random;
+use random::Random;
 use sched_dag::analysis::{
     AnalysisResult, AnalysisSettings, DagBound, NotProvenReason, answer, witness,
 };

@@ -16,7 +16,7 @@ mod walk;
 
 use crate::support::number;
 use crate::support::set::{self, Set};
-use common::random::Random;
+use random::Random;
 use releases::SAID;
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Request, WaitId};

@@ -16,7 +16,7 @@ pub(crate) mod set;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::journal::{Event, EventKind};
 use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{

@@ -1,6 +1,6 @@
 //! Random sets of DAGs: all that a run depends on comes from one seed.
 
-use common::random::Random;
+use random::Random;
 use sched_dag::lifecycle::WaitId;
 use sched_dag::{
     Activation, DagId, DagSpec, FaultLimit, Instance, OnFault, OverrunPolicy, Policy, Preemption,

@@ -17,7 +17,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::analysis::{AnalysisSettings, Overheads, Task, answer, fix_orders, multi_path};
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption, SubtaskOrder, verify,

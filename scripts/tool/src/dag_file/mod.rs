@@ -421,8 +421,8 @@ mod tests {
     use crate::run::RUN;
     use crate::system::workspace;
     use crate::tests::rows;
-    use common::random::Random;
     use dag_file::{DagFile, Length, Malformed, is_name};
+    use random::Random;
     use std::path::Path;
 
     #[test]

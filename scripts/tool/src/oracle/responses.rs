@@ -19,7 +19,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::OverrunPolicy::{Abort, Queue, Skip};
 use sched_dag::analysis::{AnalysisSettings, Overheads, answer, fix_orders};
 use sched_dag::journal::EventKind;

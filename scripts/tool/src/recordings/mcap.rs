@@ -465,7 +465,7 @@ impl Values<'_, '_> {
 mod tests {
     use super::{of_message, write_message};
     use crate::json::{Value, parse};
-    use common::random::Random;
+    use random::Random;
     use recording::{Recordable, Schema, to_bytes};
 
     /// Returns all types up to a depth of nesting.

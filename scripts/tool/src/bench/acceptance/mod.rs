@@ -16,7 +16,7 @@ use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
 
-use common::random::{Random, nth};
+use random::{Random, nth};
 use sched_dag::analysis::Task;
 
 use crate::files;

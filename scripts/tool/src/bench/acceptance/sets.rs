@@ -9,7 +9,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use common::random::Random;
+use random::Random;
 use sched_dag::analysis::Task;
 
 /// How deadlines relate to periods.

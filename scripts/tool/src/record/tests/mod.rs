@@ -2,7 +2,7 @@
 
 pub(crate) mod made;
 
-use common::random::Random;
+use random::Random;
 use recording::{Chunk, Commit, Recordable, Recording, Stream, Times, Writer};
 
 use super::Record;

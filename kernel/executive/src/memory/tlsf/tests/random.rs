@@ -8,7 +8,7 @@
 use core::ptr::NonNull;
 use std::collections::BTreeMap;
 
-use common::random::Random;
+use random::Random;
 
 use super::heap::TestHeap;
 

@@ -5,6 +5,9 @@
 //! of `n` alone, which [`nth`] gives without the ones before: what one job draws
 //! does not depend on which jobs before it were skipped.
 
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
 use core::ops::RangeInclusive;
 
 const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
