@@ -8,22 +8,10 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, UntypedSubtask, create_dag};
+use fass_dag_file::{Execution, FileDag, Length, Set};
 use random::nth;
-use sched_dag::DagSpec;
 
-use crate::execution::{Execution, Times};
-use crate::file::{FileDag, Set};
-
-/// How long a set runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Length {
-    /// Each DAG releases this number of jobs.
-    Jobs(u64),
-    /// Each DAG releases the jobs of this time in nanoseconds, at least one.
-    Span(u64),
-    /// So many times the longest period of the set: so no DAG ends while others are slowed by it.
-    Periods(u64),
-}
+use crate::times::Times;
 
 /// How a set is run.
 #[derive(Clone, Copy, Debug)]
@@ -36,31 +24,6 @@ pub struct Settings {
     pub occupation: Occupation,
     /// How many jobs there are.
     pub length: Length,
-}
-
-impl Length {
-    /// Returns the same, for the DAGs of a set.
-    #[must_use]
-    pub fn of(self, set: &Set) -> Self {
-        let Self::Periods(count) = self else {
-            return self;
-        };
-        let periods = set.dags.iter().filter_map(|dag| dag.spec.period_ns);
-        Self::Span(periods.max().unwrap_or(0).saturating_mul(count))
-    }
-
-    /// Returns the number of jobs of a DAG.
-    #[must_use]
-    pub fn jobs(self, spec: &DagSpec) -> u64 {
-        match self {
-            Self::Jobs(jobs) | Self::Periods(jobs) => jobs,
-            Self::Span(span_ns) => {
-                let period_ns = spec.period_ns.unwrap_or(0).max(1);
-                let after_offset_ns = span_ns.saturating_sub(spec.offset_ns);
-                after_offset_ns.div_ceil(period_ns).max(1)
-            }
-        }
-    }
 }
 
 /// Builds the DAGs of a set, to be committed with any shape of graph allowed.
@@ -173,8 +136,8 @@ fn register(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parse::parse;
     use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+    use fass_dag_file::parse;
     use virtual_time::VirtualTime;
 
     /// A fork and a join, and a pair without any edge.
@@ -249,17 +212,5 @@ mod tests {
             eye.contains(&8_000_000) && eye.iter().any(|ns| *ns < 5_000_000),
             "{eye:?}"
         );
-    }
-
-    #[test]
-    fn a_span_gives_each_dag_its_jobs() {
-        let file = parse(TEXT).unwrap();
-        let of = |ns, dag: usize| Length::Span(ns).jobs(&file.sets[0].dags[dag].spec);
-        assert_eq!((of(100_000_000, 0), of(100_000_000, 1)), (5, 10));
-        assert_eq!((of(0, 0), of(15_000_001, 1)), (1, 2));
-        // No DAG ends before the slowest one.
-        let set = &file.sets[0];
-        let jobs = [0, 1].map(|dag| Length::Periods(3).of(set).jobs(&set.dags[dag].spec));
-        assert_eq!(jobs, [3, 6]);
     }
 }

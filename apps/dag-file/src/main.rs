@@ -11,9 +11,10 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-use dag_file::{DagFile, Execution, Length, Settings, build, check, parse};
+use dag_file::{Settings, build};
 use fass::Occupation;
 use fass::commit::{ConstructionPolicy, DagAnswer, finish_create_dags_with};
+use fass_dag_file::{DagFile, Execution, Length, check, parse};
 use kernel::options::UsageError;
 use kernel::{AppError, Machine, println};
 use sched_dag::{CommitOptions, Policy};

@@ -5,8 +5,8 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use dag_file::Set;
 use fass::commit::{DagAnswer, SinkAnswer, Verdict};
+use fass_dag_file::Set;
 use kernel::report::{Distribution, Ns};
 use kernel::{Run, json, println};
 use sched_dag::law::Violation;

@@ -36,7 +36,7 @@ use sched_dag::{
     Preemption, Priority, SubtaskId, SubtaskSpec, TaskSet, Wait, verify,
 };
 
-use crate::lines::{Line, Lines, Malformed, cases, of_file, quoted};
+use text::{Line, Lines, Malformed, cases, of_file, quoted};
 
 /// One set of DAGs with its expected schedule.
 #[derive(Debug)]

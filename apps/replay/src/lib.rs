@@ -6,10 +6,6 @@
 //! (`./scripts/oracle schedules --in-kernel`), and also reads the cases with the
 //! code here ([`parse()`]).
 //!
-//! - [`lines`]: words and numbers of a reference file, with line numbers;
-//! - [`shown`]: words of a file, or of a person, in messages;
-//! - [`of_file`]: what a commit would refuse, in the words of a file;
-//! - [`repeated()`]: what stands twice;
 //! - [`Case`], [`parse()`]: what a case says, read strictly;
 //! - [`build`]: DAGs that execute for its times.
 //!
@@ -22,9 +18,6 @@ extern crate alloc;
 
 mod case;
 mod dags;
-pub mod lines;
-pub mod shown;
 
 pub use case::{Case, InstanceTimes, JobTimes, Turn, TurnTimes, parse, parse_block};
 pub use dags::{Computing, Epoch, Scale, build};
-pub use lines::{of_file, repeated};

@@ -10,7 +10,7 @@ use std::env;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use replay::shown::quoted;
+use text::quoted;
 
 use crate::elf;
 use crate::files;

@@ -15,8 +15,7 @@
 
 use std::fmt::{self, Write};
 
-use replay::repeated;
-use replay::shown;
+use text::repeated;
 
 /// The deepest nesting of arrays and objects that is read.
 pub const DEEPEST: usize = 32;
@@ -232,7 +231,7 @@ impl<'t> Parser<'t> {
             Some((_, second)) => {
                 // The column of the second key, where the object went wrong.
                 self.position = starts[second];
-                let key = shown::quoted(&members[second].0);
+                let key = text::quoted(&members[second].0);
                 Err(self.error(format!("key {key} stands twice in one object")))
             }
         }
@@ -368,7 +367,7 @@ impl<'t> Parser<'t> {
                 .filter(|number: &f64| number.is_finite());
             number.map(Value::Decimal)
         };
-        value.ok_or_else(|| self.error(format!("number {} is out of range", shown::quoted(lexeme))))
+        value.ok_or_else(|| self.error(format!("number {} is out of range", text::quoted(lexeme))))
     }
 
     fn digits(&mut self) -> Result<(), JsonError> {

@@ -21,7 +21,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use replay::shown::quoted;
+use text::quoted;
 
 use crate::files;
 use crate::options::{Command, Parsed, Refusal, Takes, options};

@@ -42,7 +42,7 @@ pub const PROGRAM: &str = "qemu-system-x86_64";
 pub const LEAST_MEMORY_MIB: u64 = 16;
 
 /// The most processors that a guest gets.
-pub const MOST_CORES: u64 = replay::lines::MOST_CORES as u64;
+pub const MOST_CORES: u64 = text::MOST_CORES as u64;
 
 /// The other end of a guest's second serial port.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 //!
 //! In a cell `\n` stands for the end of a line, and `\?` for a character that must not be shown.
 
-use replay::lines::Malformed;
+use text::Malformed;
 
 /// Returns the rows of a table, each of so many cells; those that a row leaves out are empty.
 pub(crate) fn rows<const N: usize>(table: &str) -> impl Iterator<Item = [String; N]> {

@@ -12,8 +12,8 @@
 //! hexadecimal digits for any byte. Lines that begin with `#`, and empty lines, are ignored. Times
 //! must not decrease. The guest gets entries: a time in nanoseconds, a length, and the bytes.
 
-use dag_file::time::parse_ns;
-use replay::shown::visible;
+use fass_dag_file::time::parse_ns;
+use text::visible;
 
 /// The most bytes of a line: the guest takes them in one interrupt.
 const MOST_BYTES: usize = 1024;

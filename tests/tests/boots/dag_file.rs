@@ -5,7 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-use dag_file::Length;
+use fass_dag_file::Length;
 use harness::markdown::{blocks, page};
 use harness::{Guest, Members, Said};
 use tool::dag_file::{Import, load};

@@ -21,10 +21,11 @@ pub mod yaml;
 
 use std::path::{Path, PathBuf};
 
-use dag_file::time::parse_ns;
-use dag_file::{DagFile, Execution, FileDag, Length, Malformed, Set, check, is_name, parse};
-use replay::shown::{is_seen, shown};
+use fass_dag_file::time::parse_ns;
+use fass_dag_file::{DagFile, Execution, FileDag, Length, Set, check, is_name, parse};
 use sched_dag::{CommitOptions, CoreDivision, Policy};
+use text::Malformed;
+use text::{is_seen, shown};
 
 use crate::files;
 use crate::options::Parsed;
@@ -421,9 +422,10 @@ mod tests {
     use crate::run::RUN;
     use crate::system::workspace;
     use crate::tests::rows;
-    use dag_file::{DagFile, Length, Malformed, is_name};
+    use fass_dag_file::{DagFile, Length, is_name};
     use random::Random;
     use std::path::Path;
+    use text::Malformed;
 
     #[test]
     fn every_file_name_becomes_a_name_and_its_ending_tells_the_format() {

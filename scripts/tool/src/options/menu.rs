@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use replay::shown::quoted;
+use text::quoted;
 
 use super::{Refusal, nearest};
 

@@ -24,7 +24,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::str::FromStr;
 
-use replay::shown::{quoted, shown, visible};
+use text::{quoted, shown, visible};
 
 use crate::files::Named;
 

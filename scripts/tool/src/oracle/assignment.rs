@@ -16,8 +16,8 @@
 //! end
 //! ```
 
-use replay::lines::{Line, Lines, Malformed, cases};
 use sched_dag::analysis::{CoreOwner, LendingAnswer, LendingPlan, Task, lend};
+use text::{Line, Lines, Malformed, cases};
 
 use super::bounds::{list, parse_task};
 

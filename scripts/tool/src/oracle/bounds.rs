@@ -52,7 +52,7 @@ use sched_dag::analysis::{
     multi_path, multi_path_edf, multi_path_fp, waiting_edf, waiting_fp, width,
 };
 
-use replay::lines::{Line, Lines, Malformed, cases, quoted};
+use text::{Line, Lines, Malformed, cases, quoted};
 
 use super::older_bounds as older;
 

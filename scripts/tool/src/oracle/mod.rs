@@ -28,7 +28,7 @@ use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
-use replay::lines::Malformed;
+use text::Malformed;
 
 use crate::files;
 use crate::options::{Command, Menu, Opt, Refusal, Takes, choices, options};

@@ -25,7 +25,7 @@ use std::num::NonZeroUsize;
 use pub_sub::{
     AgePenalty, ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer,
 };
-use replay::lines::{Line, Lines, Malformed, cases, quoted};
+use text::{Line, Lines, Malformed, cases, quoted};
 
 /// One synchronizer with its arrivals and the expected output.
 #[derive(Debug)]

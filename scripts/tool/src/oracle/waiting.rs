@@ -6,8 +6,8 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use replay::lines::{Malformed, blocks};
 use replay::parse_block;
+use text::{Malformed, blocks};
 
 use super::bounds::{self, BoundsCase};
 use super::schedules::{self, Case};

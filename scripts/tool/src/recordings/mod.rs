@@ -18,7 +18,7 @@ use std::process::{self, ExitCode};
 use recording::{
     Chunk, Commit, Counted, Entry, EntryKind, Recording, Role, Schema, Shown, Times, Writer,
 };
-use replay::shown::{quoted, visible};
+use text::{quoted, visible};
 
 use crate::dot;
 use crate::files::{self, Named};

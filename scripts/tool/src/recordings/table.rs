@@ -13,12 +13,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
 
-use dag_file::time::parse_ns;
+use fass_dag_file::time::parse_ns;
 use recording::{
     Channel, DagHeader, Decoder, Entry, EntryKind, Field, Header, Malformed, Part, Recording, Role,
     Scalar, Schema, Writer, write_json,
 };
-use replay::shown::quoted;
+use text::quoted;
 
 use crate::files;
 use crate::options::Parsed;

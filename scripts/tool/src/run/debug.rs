@@ -20,7 +20,7 @@ use std::process::{self, ExitCode, Stdio};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use replay::shown::quoted;
+use text::quoted;
 
 use super::handed::Handed;
 use super::loading;

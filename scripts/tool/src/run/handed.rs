@@ -11,7 +11,7 @@
 
 use std::path::{Path, PathBuf};
 
-use replay::shown::{quoted, shown};
+use text::{quoted, shown};
 
 use crate::dag_file::Prepared;
 use crate::files::{self, Named, Temporary};

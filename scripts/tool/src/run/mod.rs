@@ -23,7 +23,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use replay::shown::quoted;
+use text::quoted;
 
 use crate::child::Asked;
 use crate::dag_file::{self, Prepared};

@@ -9,7 +9,6 @@ mod lines;
 mod made;
 mod on_linux;
 mod oracle_schedules;
-mod published_schedules;
 mod recordings;
 #[path = "../support.rs"]
 mod support;

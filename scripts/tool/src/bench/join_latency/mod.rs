@@ -19,7 +19,7 @@ use std::process::{self, ExitCode};
 use std::time::Duration;
 
 use recording::Crc;
-use replay::shown::quoted;
+use text::quoted;
 
 use super::frame::{by_plan, draw, judged};
 use crate::files;

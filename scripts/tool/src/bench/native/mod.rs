@@ -23,8 +23,8 @@ use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::{Policy, SubtaskAttributes, create_dag, finish_create_dags};
 use hand_off::Shape;
 use linux::{Linux, Mechanism};
-use replay::shown::quoted;
 use sched_dag::DagId;
+use text::quoted;
 
 use super::frame::{Figure, by_plan};
 use crate::json::Object;

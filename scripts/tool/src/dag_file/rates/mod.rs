@@ -22,9 +22,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use dag_file::{FileDag, FileSubtask, Length, Malformed, Set, check, is_name, no_name, quoted};
+use fass_dag_file::{FileDag, FileSubtask, Length, Set, check, is_name, no_name};
+
 use sched_dag::analysis::Task;
 use sched_dag::{CommitOptions, DagSpec, Policy, SubtaskSpec};
+use text::{Malformed, quoted};
 
 /// A graph in which each subtask may have a timer.
 #[derive(Clone, Debug, Default)]

@@ -8,7 +8,9 @@
 //! Messages take no time here, so a link's `communication_time` is added to the execution time of
 //! its target, which reads the message.
 
-use dag_file::{DagFile, Malformed, Set, is_name, no_name, quoted, repeated, time};
+use fass_dag_file::{DagFile, Set, is_name, no_name, time};
+
+use text::{Malformed, quoted, repeated};
 
 use super::rates::{RateGraph, Subtask, split};
 use super::yaml::{Node, YamlValue, parse};

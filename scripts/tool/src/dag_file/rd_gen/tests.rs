@@ -30,7 +30,7 @@ fn every_generated_file_is_read() {
         let written = file.to_string();
         let lines = written.split_inclusive('\n');
         let lines: String = lines.filter(|line| !line.starts_with('#')).collect();
-        assert_eq!(dag_file::parse(&written).unwrap().to_string(), lines);
+        assert_eq!(fass_dag_file::parse(&written).unwrap().to_string(), lines);
     }
 }
 

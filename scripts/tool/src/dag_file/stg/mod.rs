@@ -10,8 +10,10 @@
 //! A graph becomes a DAG of one job at a time: its period and its deadline are the
 //! sum of its costs.
 
-use dag_file::{DagFile, FileDag, FileSubtask, Malformed, Set, is_name, no_name, quoted, repeated};
+use fass_dag_file::{DagFile, FileDag, FileSubtask, Set, is_name, no_name};
+
 use sched_dag::{DagSpec, SubtaskSpec};
+use text::{Malformed, quoted, repeated};
 
 use crate::json::{Value, parse_with_places};
 use crate::options::did_you_mean;

@@ -8,7 +8,7 @@
 
 use std::collections::HashSet;
 
-use dag_file::{Malformed, quoted};
+use text::{Malformed, quoted};
 
 /// The deepest nesting that is read.
 const DEEPEST: usize = 32;

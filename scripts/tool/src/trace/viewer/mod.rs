@@ -37,7 +37,7 @@ use std::fmt::Write;
 use std::fs;
 use std::process::ExitCode;
 
-use dag_file::time::parse_ns;
+use fass_dag_file::time::parse_ns;
 use sched_dag::chains::SampledJobs;
 use sched_dag::journal::EventKind;
 use sched_dag::law::Violation;

@@ -19,8 +19,7 @@ use core::str::FromStr;
 
 use sched_dag::{DagFault, RejectedDags, sorted_by_key};
 
-use crate::shown::is_seen;
-pub use crate::shown::quoted;
+use crate::shown::{is_seen, quoted};
 
 /// The most cores that a machine has here.
 pub const MOST_CORES: u32 = 64;

@@ -4,7 +4,7 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-use replay::lines::{Line, Malformed, quoted};
+use text::{Line, Malformed, quoted};
 
 use super::{is_name, no_name};
 use crate::time::parse_ns;

@@ -7,7 +7,7 @@ use alloc::format;
 use alloc::string::String;
 use core::fmt;
 
-use replay::lines::quoted;
+use text::quoted;
 
 const UNITS: [(&str, u64); 4] = [
     ("ns", 1),

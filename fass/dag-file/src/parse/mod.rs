@@ -13,10 +13,10 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use replay::lines::{Line, Lines, Malformed, quoted};
-use replay::repeated;
-use replay::shown::is_seen;
 use sched_dag::{ClusterId, DagSpec, OverrunPolicy, Priority, SubtaskOrder, SubtaskSpec, Wait};
+use text::is_seen;
+use text::repeated;
+use text::{Line, Lines, Malformed, quoted};
 
 use keys::Keys;
 

@@ -7,15 +7,15 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use replay::lines::Malformed;
-use replay::of_file;
 use sched_dag::{
     CommitOptions, ConstructionPolicy, DagFault, DagSpec, MOST_FAULTS, SubtaskId, SubtaskLabel,
     sorted_by_key, verify,
 };
+use text::Malformed;
+use text::of_file;
 
-use crate::build::Length;
 use crate::file::{FileDag, Set};
+use crate::length::Length;
 
 /// Verifies a set as its commit will on a machine, with any shape of graph allowed.
 ///

@@ -3,9 +3,10 @@
 
 use std::fs;
 
-use dag_file::{Execution, Length, Set, Settings, build};
+use dag_file::{Settings, build};
 use fass::commit::{ConstructionPolicy, finish_create_dags_with};
 use fass::{Occupation, Policy, Preemption};
+use fass_dag_file::{Execution, Length, Set};
 use tool::dag_file::stg;
 use tool::json::{self, Value};
 use tool::system::workspace;

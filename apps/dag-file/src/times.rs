@@ -9,81 +9,12 @@
 //! takes its WCET, no device answers, which is the worst case of waits. Else the time of an
 //! answer is drawn, too: one of five comes beyond the limit.
 
-use alloc::format;
-use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
+use fass_dag_file::{Execution, WHOLE};
 use random::{nth, scale};
-use replay::lines::quoted;
 use sched_dag::Wait;
-
-/// A millionth, the finest fraction of a WCET.
-const WHOLE: u64 = 1_000_000;
-
-/// How execution times follow from what the file says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Execution {
-    /// Every instance takes its WCET.
-    Wcet,
-    /// Uniformly distributed between two fractions of the WCET, in millionths.
-    Uniform {
-        /// The smallest fraction.
-        least: u64,
-        /// The largest fraction, at most a whole.
-        most: u64,
-    },
-    /// One of the subtask's samples, each with the same probability; the WCET
-    /// where a subtask has none.
-    Samples,
-}
-
-impl Execution {
-    /// The forms that [`parse`](Self::parse) reads, for messages.
-    pub const FORMS: &'static str = "wcet, uniform:0.2..1 (fractions of the WCET) or samples";
-
-    /// Reads `wcet`, `uniform:LO..HI` with fractions of the WCET, or `samples`.
-    ///
-    /// # Errors
-    ///
-    /// In words: it is none of them, or the fractions are no range within 0 to 1.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        match text {
-            "wcet" => return Ok(Self::Wcet),
-            "samples" => return Ok(Self::Samples),
-            _ => {}
-        }
-        let range = text.strip_prefix("uniform:").and_then(|range| {
-            let (least, most) = range.split_once("..")?;
-            Some((fraction(least)?, fraction(most)?))
-        });
-        match range {
-            Some((least, most)) if least <= most && most <= WHOLE => {
-                Ok(Self::Uniform { least, most })
-            }
-            Some(_) => Err(format!(
-                "{}: the fractions must rise and be 1 at most, as in uniform:0.2..1",
-                quoted(text)
-            )),
-            None => Err(format!("{}: give {}", quoted(text), Self::FORMS)),
-        }
-    }
-}
-
-/// Reads a decimal fraction of up to six digits, in millionths.
-fn fraction(text: &str) -> Option<u64> {
-    let (whole, part) = text.split_once('.').unwrap_or((text, "0"));
-    let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
-    if !is_number(whole) || !is_number(part) || part.len() > 6 {
-        return None;
-    }
-    let whole: u64 = whole.parse().ok()?;
-    let missing = u32::try_from(6 - part.len()).ok()?;
-    let part: u64 = part.parse().ok()?;
-    whole
-        .checked_mul(WHOLE)?
-        .checked_add(part * 10_u64.pow(missing))
-}
 
 /// The execution times of one subtask.
 #[derive(Clone, Debug)]
@@ -152,29 +83,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn models_are_read() {
-        assert_eq!(Execution::parse("wcet"), Ok(Execution::Wcet));
-        assert_eq!(Execution::parse("samples"), Ok(Execution::Samples));
-        let (least, most) = (250_000, WHOLE);
-        let uniform = Ok(Execution::Uniform { least, most });
-        assert_eq!(Execution::parse("uniform:0.25..1"), uniform);
-        assert_eq!(Execution::parse("uniform:0.250..1.0"), uniform);
-        for (texts, words) in [
-            (
-                "uniform uniform:1 uniform:a..1 uniform:-1..1 average",
-                "give wcet, ",
-            ),
-            ("uniform:1..0.5 uniform:0..1.000001", "must rise"),
-        ] {
-            for text in texts.split(' ') {
-                let refused = Execution::parse(text).unwrap_err();
-                assert!(refused.contains(words), "{text}");
-            }
-        }
-        assert!(Execution::parse("").is_err());
-    }
-
-    #[test]
     fn times_stay_within_what_was_asked_and_depend_on_the_seed_alone() {
         let times = |execution, seed| Times {
             execution,
@@ -204,6 +112,7 @@ mod tests {
         assert_eq!(none.of_job(3), 1_000_000);
         assert_eq!(times(Execution::Wcet, 9).of_job(5), 1_000_000);
     }
+
     #[test]
     fn segments_divide_the_time_and_devices_answer_in_time_or_not() {
         let wait = |limit_ns, segment_ns| Wait {

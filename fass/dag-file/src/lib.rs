@@ -1,0 +1,32 @@
+//! DAGs that a file describes: reading such a file, writing it, and checking it.
+//!
+//! A *DAG file* is text: DAGs with their subtasks, edges and times, in one or more *sets*; the DAGs
+//! of a set run together, the sets one after the other (`docs/dag-file.md`). The host tool and the
+//! app `dag-file` read and check it by the same code.
+//!
+//! - [`DagFile`]: what a file says; its `Display` is a file again;
+//! - [`parse()`]: reading it, strictly;
+//! - [`check()`]: what the commit would refuse, with the lines at fault;
+//! - [`Execution`], [`Length`]: how long instances execute, and the sets run.
+//!
+//! A reader of another format makes a [`DagFile`] of it, too, with the line
+//! numbers of *that* file, and so all formats share checks and messages.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+mod check;
+mod execution;
+mod file;
+mod length;
+mod parse;
+pub mod time;
+mod write;
+
+pub use check::check;
+pub use execution::{Execution, WHOLE};
+pub use file::{DagFile, FileDag, FileSubtask, Set};
+pub use length::Length;
+pub use parse::{is_name, no_name, parse, refuse_repeated_edge};

@@ -1,0 +1,17 @@
+//! Texts of a file or of a person: read with the places of their words, and shown visibly.
+//!
+//! - [`Lines`]: words and numbers of a file, with line numbers;
+//! - [`quoted`], [`visible`]: words of a file, or of a person, in messages;
+//! - [`of_file`]: what a commit would refuse, in the words of a file;
+//! - [`repeated`]: what stands twice.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+mod lines;
+mod shown;
+
+pub use lines::{Line, Lines, MOST_CORES, Malformed, blocks, cases, of_file, repeated};
+pub use shown::{is_seen, quoted, shown, visible};
