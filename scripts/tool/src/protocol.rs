@@ -8,7 +8,7 @@
 //!
 //! The reader is strict: a line that begins with `{` and is damaged, or lacks
 //! a member that its kind must have, is a fault with its line number. Which
-//! these are is read from the pages that describe the kinds for people. A kind
+//! these are is read from the page that describes the kinds for people. A kind
 //! that has no section there passes, so that an app may add its own.
 
 use std::collections::BTreeMap;
@@ -16,18 +16,14 @@ use std::sync::LazyLock;
 
 use crate::json::{self, Value};
 
-/// The pages that describe the kinds of machine lines, each in a section with a table of its
+/// The page that describes the kinds of machine lines, each in a section with a table of its
 /// members.
-const PAGES: [&str; 3] = [
-    include_str!("../../../docs/serial-protocol.md"),
-    include_str!("../../../docs/app-lines.md"),
-    include_str!("../../../docs/trace-format.md"),
-];
+const PAGE: &str = include_str!("../../../docs/formats.md");
 
 /// The members that each line of a kind has: those of all rows of its section whose first cell
 /// does not call them optional.
 static MEMBERS: LazyLock<BTreeMap<&str, Vec<&str>>> = LazyLock::new(|| {
-    let sections = PAGES.iter().flat_map(|page| page.split("\n#"));
+    let sections = PAGE.split("\n#");
     let kinds = sections.filter_map(|section| section.strip_prefix("## `")?.split_once('`'));
     let members = |text: &'static str| {
         let rows = text.lines();

@@ -1,6 +1,6 @@
 //! The one printer of machine lines: one JSON object a line, `{` in column 0.
 //!
-//! `docs/serial-protocol.md` lists the kinds. An object is described by a
+//! `docs/formats.md` lists the kinds. An object is described by a
 //! closure that names its fields, so printing one allocates nothing.
 //!
 //! A run is judged by some of the kinds (`KERNELS`). Those are the kernel's to print:

@@ -73,7 +73,7 @@ static DEBUG: LazyLock<Command> = LazyLock::new(|| Command {
     ]),
     notes: "\
 gdb is installed if it is missing. Budgets are off. In mode deterministic time stands still
-while the guest is stopped, and each run stops where the last one did; docs/debugging.md has a
+while the guest is stopped, and each run stops where the last one did; docs/watching.md has a
 worked example.
 
 exit codes: gdb's; 1 a failure; 2 a refused command line

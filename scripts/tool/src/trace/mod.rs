@@ -130,7 +130,7 @@ chains: from a source to a sink, from DAG to DAG by samples of latest values
   reaction time           from what a release just misses to the first output of it
 
 For each run there is a machine line of kind `trace_check`, and one of kind `chain`
-for each chain; docs/trace-format.md explains them.
+for each chain; docs/formats.md explains them.
 
 exit codes: 0 no breach; 1 some; 2 a refused command line, or a file without a
 well-formed trace with events

@@ -348,7 +348,7 @@ lost
 #[test]
 fn every_violation_is_documented() {
     let (file, below) = (
-        "docs/debugging.md",
+        "docs/watching.md",
         "| rule | code | it says |\n|---|---|---|\n",
     );
     let page = fs::read_to_string(workspace().join(file)).unwrap();

@@ -158,7 +158,7 @@ pub static TRACE: Command = Command {
     },
     notes: "\
 Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
-chrome://tracing, or at https://www.speedscope.app. docs/seeing.md explains the picture.
+chrome://tracing, or at https://www.speedscope.app. docs/watching.md explains the picture.
 
 exit codes: 0 all is well; 1 the output cannot be written; 2 a refused command
 line, or a file without a well-formed trace with events
