@@ -18,7 +18,7 @@
 //!
 //! Guaranteed: every job of every DAG responds within its bound, if the plan is enforced: owners'
 //! subtasks on their cores in the order of the lists and above all else, members on the cores of
-//! their group by deadline (ties by position) and below owners. See `docs/analysis.md`, "Lent cores".
+//! their group by deadline (ties by position) and below owners. See `docs/bounds.md`, "Lent cores".
 //!
 //! Not guaranteed: that a set which is not proven misses a deadline, or that no other division
 //! would prove it. DAGs with `D > T` and DAGs that wait are not covered.
@@ -199,7 +199,7 @@ impl LendingPlan {
     }
 }
 
-/// Divides cores among DAGs by the analysis of lent cores in `docs/analysis.md`.
+/// Divides cores among DAGs by the analysis of lent cores in `docs/bounds.md`.
 ///
 /// `None` if it does not apply: there is no core, a DAG has `D > T`, or a subtask waits.
 #[must_use]

@@ -3,7 +3,7 @@
 //! A heavy DAG *owns* cores: it executes there by a [list schedule](super::ListSchedule), and nothing
 //! wins over it. What its lists leave is *lent* to a *group*: some cores, and DAGs that are its
 //! *members*, the more urgent first by deadline. On cores of a group on which no owner's subtask
-//! executes, ready subtasks of its members do. Proofs are in `docs/analysis.md`, "Lent cores"; here
+//! executes, ready subtasks of its members do. Proofs are in `docs/bounds.md`, "Lent cores"; here
 //! in short.
 //!
 //! *Busy time.* In a window of length `r` the owner, of period `T`, executes on one of its cores for
@@ -43,7 +43,7 @@ use crate::ids::to_u32;
 
 /// The time that one core supplies besides its owner's subtasks.
 ///
-/// See the analysis of lent cores in `docs/analysis.md`.
+/// See the analysis of lent cores in `docs/bounds.md`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoreSupply {
     /// The owner's period; without an owner any.

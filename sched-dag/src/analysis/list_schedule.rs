@@ -8,7 +8,7 @@
 //! A run keeps to these times if it keeps to the lists: each subtask executes on its core only and
 //! after the one before it, with nothing that wins over it. Then each ends at its time after the
 //! release, or earlier, whatever is shorter than its WCET; a schedule made anew by shorter times
-//! might take longer (R. L. Graham's anomalies, 1969). The proof is in `docs/analysis.md`, "Lent
+//! might take longer (R. L. Graham's anomalies, 1969). The proof is in `docs/bounds.md`, "Lent
 //! cores".
 //!
 //! Limits make some cores end early. [`ListSchedule::squeezed`] lowers them as far as it finds

@@ -63,8 +63,8 @@
 //! - The cores must be identical and serve these DAGs only. Where they are divided, each
 //!   cluster is analysed by itself.
 //! - The form of overlapping jobs rests on the argument given in its module and on that
-//!   evidence, not on a reviewed proof. The multi-path bound is proven in
-//!   `docs/multi-path-bound.md`, waits and lent cores in `docs/analysis.md`.
+//!   evidence, not on a reviewed proof. The multi-path bound, waits and lent cores are proven in
+//!   `docs/bounds.md`.
 
 mod assign;
 mod blocking;

@@ -1,6 +1,6 @@
 //! The multi-path bound: one job of a DAG at a time, alone or among others.
 //!
-//! Statement, proof and what was checked are in `docs/multi-path-bound.md`; here in short. Let
+//! Statement, proof and what was checked are in `docs/bounds.md`; here in short. Let
 //! `C_j` be the most work of `j + 1` disjoint chains of the DAG (see `cover`), and
 //! `B_j = volume - C_j`. Look at a job at any instant at which its longest remaining path
 //! does not shrink. Then a ready subtask waits, so all `m` cores are busy, and the

@@ -3,7 +3,7 @@
 //! A subtask with waits is segments with a wait between any two: each wait has a limit, after
 //! which it ends whatever a device does, and no core is held meanwhile. Such subtasks are
 //! *self-suspending*, and most tests of the literature are wrong for them. These forms are
-//! proven in `docs/analysis.md`, "Subtasks that wait"; here in short.
+//! proven in `docs/bounds.md`, "Subtasks that wait"; here in short.
 //!
 //! Follow a job back from the segment that ends last: to the release, the end of the latest
 //! predecessor or the end of its own wait, whichever made it eligible. That gives a path `P`. At

@@ -385,5 +385,5 @@ fn assert_drawn(document: &str, pictures: usize) {
 fn the_pages_pictures_are_what_their_commands_draw() {
     assert_drawn("README.md", 1);
     assert_drawn("docs/guide.md", 2);
-    assert_drawn("docs/multi-path-bound.md", 1);
+    assert_drawn("docs/bounds.md", 1);
 }

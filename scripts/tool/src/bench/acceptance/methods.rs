@@ -6,7 +6,7 @@
 //! - *V-Fed*: virtually-federated scheduling (X. Jiang, N. Guan, H. Liang, Y. Tang, L. Qiao, W. Yi,
 //!   RTSS 2021; with light DAGs: X. Jiang, H. Liang, N. Guan, Y. Tang, L. Qiao, Y. Wang, IEEE TPDS
 //!   34(1), 2023);
-//! - *lent*: the analysis of lent cores in `docs/analysis.md`;
+//! - *lent*: the analysis of lent cores in `docs/bounds.md`;
 //! - *fluid*: the density test of DAG-Fluid (F. Guan, L. Peng, J. Qiao, IEEE TC 71(8), 2022).
 //!
 //! V-Fed and fluid stand here for comparison only: no scheduler of this project does what they
