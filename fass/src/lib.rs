@@ -105,7 +105,7 @@
 //! be in flight. The crate names no kernel and needs only `alloc`; its `unsafe` is in
 //! `run/cell`.
 //!
-//! `docs/paper-map.md` relates the paper's figures 3 and 4 to this code.
+//! `docs/paper.md` relates the paper's figures 3 and 4 to this code.
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;

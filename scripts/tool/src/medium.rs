@@ -55,7 +55,7 @@ pub static TABLE: Command = Command {
     notes: "\
 The ISO boots by GRUB, under BIOS and UEFI. `cp FILE /dev/DEVICE` writes it to a stick,
 and what was there is lost. The application needs UEFI, and no GRUB: a stick with a FAT file
-system keeps what it has, and gets one file more. docs/stick.md says how, and what is known of
+system keeps what it has, and gets one file more. docs/pc.md says how, and what is known of
 real PCs.
 
 DAGs of a file: `./scripts/run --dag FILE --print-dag > MODULE` makes the module for

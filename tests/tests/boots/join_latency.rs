@@ -93,7 +93,7 @@ fn lost_inputs_make_a_condition_worthless() {
 /// Long runs, and several boots, since what the host does to a boot is rare: without
 /// `kernel/executive/src/machine/counted_time.rs` one boot in ten is another, one in four where
 /// the host is busy. One of some 150 differed with it, probably for one of two
-/// reasons that were found and are gone now (docs/evaluation.md). Too few boots have been seen since to claim that none
+/// reasons that were found and are gone now (docs/paper.md). Too few boots have been seen since to claim that none
 /// is left, so one of four is let pass.
 #[test]
 fn long_runs_print_the_same_bytes() {

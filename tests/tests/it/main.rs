@@ -3,6 +3,5 @@
 mod commit_faults;
 mod divided;
 mod documentation;
-mod platforms;
 mod published_schedules;
 mod workload;

@@ -4,7 +4,7 @@
 //! with another first line is another condition's, and is measured anew.
 //!
 //! *Publication* i of a topic is that of job i. The *last publication* of i is the time when all
-//! parallel subtasks have published it. `docs/evaluation.md` explains the metrics, and which of
+//! parallel subtasks have published it. `docs/paper.md` explains the metrics, and which of
 //! them can be compared.
 
 use std::collections::BTreeMap;

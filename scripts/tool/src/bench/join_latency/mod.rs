@@ -131,7 +131,7 @@ writes into DIR:
   plots/*.svg         if python3 has matplotlib
 
 Interrupted, it keeps the conditions that are complete; run again with the same
-options, it measures the others only. docs/evaluation.md explains the metrics.
+options, it measures the others only. docs/paper.md explains the metrics.
 
 exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command line
 ",
