@@ -55,7 +55,7 @@ fn run(machine: &Linux, seed: u64, random: &mut Random) -> Run {
         subtask.priority = Some(random.within(0..=9));
         subtask.computes = !random.once_in(4);
         // Sometimes it is exceeded.
-        subtask.budget = random.once_in(20).then(|| ms(1));
+        subtask.budget = (subtask.waits.is_empty() && random.once_in(20)).then(|| ms(1));
         if let (Some(budget), Some(wcet)) = (subtask.budget, &mut subtask.wcet) {
             *wcet = budget.min(*wcet);
         }

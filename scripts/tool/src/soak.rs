@@ -59,15 +59,16 @@ static SOAK: Command = Command {
     notes: "\
 A round draws 3 to 8 DAGs of 3 to 12 subtasks with random graphs and execution
 times, for a load of 60 to 140 percent, and runs them twice. Drawn are, too: the
-policy, what becomes of jobs that overrun, clusters, faults, pauses, and whether
-instances hold their cores or compute. Checked are: values; rules R1 to R5, by
-the guest from its record and by the host from the trace; every job completed,
-skipped or aborted, as the overrun policy allows, or lost by a fault that was
-drawn; no allocation while jobs run; heap and stacks after the second run as
-before it, but for what a fault keeps. Then it prints how many events there were
-of each kind, and how many DAGs had which combination of policies, division of
-the cores, faults, restarts and pauses. The last line is `N passed, M failed`, in
-rounds; a failure is printed with the command that runs its round again.
+policy, what becomes of jobs that overrun, clusters, pins, deadlines of sinks,
+waits, signals, faults, pauses, modes, and whether instances hold their cores or
+compute. Checked are: values; rules R1 to R5, by the guest from its record and by
+the host from the trace; every job completed, skipped or aborted, as the overrun
+policy allows, or lost by a fault that was drawn; no allocation while jobs run;
+heap and stacks after the second run as before it, but for what a fault keeps.
+Then it prints how many events there were of each kind, and how many DAGs had
+which combination of policies, division of the cores, faults, restarts and
+pauses. The last line is `N passed, M failed`, in rounds; a failure is printed
+with the command that runs its round again.
 With --jobs, random sets with all features of DAGs together are first run in
 virtual time, each run varied towards a response beyond its bound; then it
 prints how many of those jobs each pair of features had.

@@ -282,6 +282,9 @@ fn attributes(subtask: &SubtaskText) -> SubtaskAttributes {
     }
     for wait in &subtask.waits {
         attributes = attributes.wait(wait.limit);
+        if let Some(wcet) = wait.wcet {
+            attributes = attributes.wcet(wcet);
+        }
     }
     if let Some(core) = subtask.core {
         attributes = attributes.core(core);

@@ -54,7 +54,8 @@ pub struct DagText {
 pub struct SubtaskText {
     pub(crate) name: String,
     pub(crate) takes: Vec<Duration>,
-    pub(crate) waits: Vec<WaitText>,
+    /// Its waits.
+    pub waits: Vec<WaitText>,
     pub(crate) after: Vec<String>,
     /// Its priority, if it is not the one that its DAG's deadline gives it.
     pub priority: Option<u32>,
@@ -76,12 +77,13 @@ pub struct SubtaskText {
 
 /// A wait of a subtask.
 #[derive(Clone, Debug)]
-pub(crate) struct WaitText {
+pub struct WaitText {
     pub(crate) limit: Duration,
     /// When a device answers in the first calls; none if it sleeps.
     pub(crate) answered: Vec<Duration>,
-    /// How long the segment behind it takes in the first calls.
+    /// How long the segment behind it takes in the first calls, and at most.
     pub(crate) takes: Vec<Duration>,
+    pub(crate) wcet: Option<Duration>,
 }
 
 impl WaitText {
@@ -97,6 +99,7 @@ impl WaitText {
                 limit,
                 answered,
                 takes: times(words)?,
+                wcet: None,
             }),
             _ => Err("a wait is `wait LIMIT then TIMES`".into()),
         }

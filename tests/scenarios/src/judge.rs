@@ -48,8 +48,8 @@ impl Scenario {
     }
 
     /// Holds what each DAG's counters say against each other, against the record, and against what
-    /// functions have counted themselves, of a scenario without signals, modes and an asked end.
-    /// Returns what does not hold, a line each.
+    /// functions have counted themselves, of a scenario without an asked end. Returns what does not
+    /// hold, a line each.
     #[allow(clippy::too_many_lines, reason = "a list of claims")]
     pub fn judge_accounts<'a>(
         &self,
@@ -57,9 +57,11 @@ impl Scenario {
         record: &RunRecord,
         statistics: impl Fn(DagId) -> &'a DagStatistics,
     ) -> Vec<String> {
-        let pauses = |name| {
+        let pauses = |name: &String| {
             let mut subtasks = self.dags.iter().flat_map(|dag| &dag.subtasks);
+            let mut modes = self.modes.iter();
             subtasks.any(|of| matches!(&of.uses, Use::Switches(other, _) if other == name))
+                || modes.any(|(_, dags)| dags.contains(name))
         };
         let (mut wrong, mut all_faults) = (vec![], 0);
         for (id, text) in (0..).map(DagId).zip(&self.dags) {
@@ -80,15 +82,17 @@ impl Scenario {
                 outcomes.filter(|of| *of == Some(outcome)).count() as u64
             };
             let late = recorded(JobOutcome::Missed);
-            let are_all_to_run = text.overrun == OverrunPolicy::Queue && !pauses(&text.name);
+            let may_skip = text.overrun != OverrunPolicy::Queue || pauses(&text.name);
+            let are_all_to_run = !may_skip && !text.is_sporadic;
             let to_fail = text.subtasks.iter().map(|of| of.fails.len() as u64).sum();
             let is_ended = faults > restarts;
             all_faults += faults;
             let due = released + skips;
+            let jobs = if text.is_sporadic { due } else { text.jobs };
             let claims = [
                 (
                     "each job is released or skipped",
-                    text.jobs == due || is_ended && text.jobs > due,
+                    jobs == due || is_ended && jobs > due,
                 ),
                 (
                     "each released job is completed, aborted, or lost by a fault",
@@ -109,11 +113,11 @@ impl Scenario {
                 ),
                 (
                     "late jobs are misses",
-                    (late..=text.jobs).contains(&counts.misses),
+                    (late..=jobs).contains(&counts.misses),
                 ),
                 (
                     "jobs are skipped only if that is allowed",
-                    skips == 0 || !are_all_to_run,
+                    skips == 0 || may_skip,
                 ),
                 (
                     "jobs are aborted only if that is allowed",

@@ -2,10 +2,12 @@
 //!
 //! A *round* is a number that with a seed gives one scenario, the same everywhere. Drawn are the
 //! policy, the load, the DAGs with their graphs and times, how each treats jobs that overrun, and
-//! whether cores are divided. Two of three rounds have *trouble*: functions that fail, after which
-//! their DAG ends or goes on, and DAGs that pause others, over and over. In one of eight rounds
-//! instances compute, and these have none: where cores take turns, the report of a fault is a
-//! longer turn than others may have to wait.
+//! whether cores are divided. Each of these is in about half of the rounds: some subtasks are
+//! pinned, some wait, sinks have deadlines of their own, DAGs release others, and two modes take
+//! turns. Two of three rounds have *trouble*: functions that fail, after which their DAG ends or
+//! goes on, and DAGs that pause others, over and over. In one of eight rounds instances compute,
+//! and these have none: where cores take turns, the report of a fault is a longer turn than others
+//! may have to wait.
 //!
 //! Every DAG by itself could be served forever: no subtask takes longer than most of a period, and
 //! no path longer than the deadline. So what is late is due to other DAGs.
@@ -19,7 +21,7 @@ use fass::{FaultLimit, OverrunPolicy, Policy, Preemption};
 use random::{Random, nth};
 
 use crate::Scenario;
-use crate::dag::{DagText, Replaced, SubtaskText, Use};
+use crate::dag::{DagText, Replaced, SubtaskText, Use, WaitText};
 
 /// The periods to draw from, the more urgent first.
 const PERIODS_MS: [u64; 6] = [2, 5, 10, 20, 50, 100];
@@ -37,8 +39,15 @@ struct Round {
     share: u64,
     dags: u64,
     computes: bool,
-    is_divided: bool,
+    /// Cores by cluster.
+    clusters: Vec<u32>,
     has_trouble: bool,
+    has_pins: bool,
+    has_sinks: bool,
+    has_waits: bool,
+    /// Whether each DAG but the first is released by the one before it.
+    is_released: Vec<bool>,
+    modes: Vec<(String, Vec<String>)>,
 }
 
 impl Scenario {
@@ -57,19 +66,36 @@ impl Scenario {
         // Where instructions are counted, all cores together compute as much as one.
         let together = if computes { 1 } else { u64::from(cores) };
         let mean_percent = u64::midpoint(LEAST_PERCENT, 100);
+        let is_divided = cores > 1 && random.once_in(2);
+        let has_trouble = !computes && !random.once_in(3);
+        let [has_pins, has_sinks, has_waits, releases, has_modes] =
+            [(); 5].map(|()| random.once_in(2));
         let drawn = Round {
             length,
             share: load * together * 1_000_000 / mean_percent / sizes.iter().sum::<u64>(),
             dags: sizes.len() as u64,
             computes,
-            is_divided: cores > 1 && random.once_in(2),
-            has_trouble: !computes && !random.once_in(3),
+            clusters: match is_divided {
+                true => vec![cores / 2, cores - cores / 2],
+                false => vec![cores],
+            },
+            has_trouble,
+            has_pins,
+            has_sinks,
+            has_waits,
+            is_released: (0..sizes.len())
+                .map(|number| number > 0 && releases && random.once_in(3))
+                .collect(),
+            modes: match has_modes {
+                true => modes(sizes.len() as u64, is_divided, random),
+                false => vec![],
+            },
         };
         let title = format!("round {round}: {name}, {load} % of {cores} cores");
         Self {
             cores,
-            clusters: match drawn.is_divided {
-                true => vec![cores / 2, cores - cores / 2],
+            clusters: match is_divided {
+                true => drawn.clusters.clone(),
                 false => vec![],
             },
             policy,
@@ -80,9 +106,23 @@ impl Scenario {
             dags: ((0..).zip(sizes))
                 .map(|(number, size)| drawn.dag(number, size, random))
                 .collect(),
+            modes: drawn.modes,
             ..Self::new(&title)
         }
     }
+}
+
+/// Draws two modes: one with all DAGs of a cluster but the first two, and one with some of them.
+fn modes(dags: u64, is_divided: bool, random: &mut Random) -> Vec<(String, Vec<String>)> {
+    let all = (2..dags).filter(|number| !is_divided || number % 2 == 0);
+    let some = all
+        .clone()
+        .filter(|number| *number == 2 || random.once_in(2));
+    let some = some.map(name_of).collect();
+    vec![
+        ("all".into(), all.map(name_of).collect()),
+        ("some".into(), some),
+    ]
 }
 
 impl Round {
@@ -91,6 +131,7 @@ impl Round {
         reason = "draws in an order on which each seed's round depends"
     )]
     fn dag(&self, number: u64, size: u64, random: &mut Random) -> DagText {
+        let at = usize::try_from(number).unwrap_or(0);
         let urgency = random.index(PERIODS_MS.len());
         let period_ns = PERIODS_MS[urgency] * 1_000_000;
         let length_ns = u64::try_from(self.length.as_nanos()).unwrap_or(u64::MAX);
@@ -116,18 +157,38 @@ impl Round {
             before.sort_unstable();
             before.dedup();
             let start_ns = before.iter().map(|before| ends_ns[*before]).max();
-            ends_ns.push(start_ns.unwrap_or(0) + wcet_ns);
-            let mut take = |_| wcet_ns / 100 * random.within(LEAST_PERCENT..=100);
+            // The first ones may have other uses.
+            let waits = self.has_waits && place > 2 && random.once_in(3);
+            let limit_ns = random.within(0..=period_ns / 8) * u64::from(waits);
+            let segment_ns = wcet_ns / (1 + u64::from(waits));
+            ends_ns.push(start_ns.unwrap_or(0) + wcet_ns + limit_ns);
+            let mut take = |_| segment_ns / 100 * random.within(LEAST_PERCENT..=100);
+            let mut takes = || {
+                let times = (0..jobs.min(MOST_TIMES)).map(&mut take);
+                times.map(Duration::from_nanos).collect()
+            };
             subtasks.push(SubtaskText {
                 name: format!("{}-{place}", name_of(number)),
-                takes: (0..jobs.min(MOST_TIMES))
-                    .map(|job| Duration::from_nanos(take(job)))
-                    .collect(),
+                takes: takes(),
+                waits: match waits {
+                    true => vec![WaitText {
+                        limit: Duration::from_nanos(limit_ns),
+                        answered: match place % 2 {
+                            0 => vec![Duration::from_nanos(limit_ns / 2)],
+                            _ => vec![],
+                        },
+                        takes: takes(),
+                        wcet: Some(Duration::from_nanos(segment_ns)),
+                    }],
+                    false => vec![],
+                },
+                core: (self.has_pins && random.once_in(4))
+                    .then(|| random.within(0..=self.cores_of(number) - 1)),
                 after: (before.iter())
                     .map(|before| subtasks[*before].name.clone())
                     .collect(),
                 priority: u32::try_from(urgency).ok(),
-                wcet: Some(Duration::from_nanos(wcet_ns)),
+                wcet: Some(Duration::from_nanos(segment_ns)),
                 is_non_preemptive: random.once_in(16),
                 computes: self.computes,
                 ..SubtaskText::default()
@@ -148,7 +209,8 @@ impl Round {
                 OverrunPolicy::Skip,
                 OverrunPolicy::Abort,
             ][random.index(3)],
-            cluster: self.is_divided.then_some(u32::from(number % 2 == 1)),
+            cluster: (self.clusters.len() > 1).then_some(u32::from(number % 2 == 1)),
+            is_sporadic: self.is_released[at],
             subtasks,
             ..DagText::default()
         };
@@ -158,14 +220,48 @@ impl Round {
             dag.subtasks[0].uses = Use::Switches(other, calls(3));
             dag.subtasks[0].when = calls(1);
         }
+        if self.is_released.get(at + 1) == Some(&true) {
+            dag.subtasks[1].uses = Use::Raises(name_of(number + 1));
+            dag.subtasks[1].when = (0..jobs).filter(|_| random.chance(80)).collect();
+        }
+        if let Some((name, _)) = self.modes.get(at) {
+            let entered = [Use::Enters, Use::EntersIdle][random.index(2)](name.clone());
+            dag.subtasks[2].uses = entered;
+            dag.subtasks[2].when = (number..jobs).step_by(5).collect();
+        }
         if self.has_trouble && random.once_in(2) {
             dag.fail(random);
         }
+        if self.has_sinks {
+            dag.give_sinks_deadlines(&ends_ns, periods * period_ns, random);
+        }
+        if dag.is_sporadic {
+            // A run would wait for the last one of a number.
+            dag.jobs = 0;
+        }
         dag
+    }
+
+    /// Returns how many cores a DAG has.
+    fn cores_of(&self, number: u64) -> u32 {
+        let cluster = usize::from(number % 2 == 1) % self.clusters.len();
+        self.clusters[cluster]
     }
 }
 
 impl DagText {
+    /// Gives some sinks that do nothing else deadlines of their own, not before they can end.
+    fn give_sinks_deadlines(&mut self, ends_ns: &[u64], deadline_ns: u64, random: &mut Random) {
+        for (place, end_ns) in ends_ns.iter().enumerate() {
+            let (_, is_read) = self.shape(&self.subtasks[place]);
+            let subtask = &mut self.subtasks[place];
+            if !is_read && subtask.uses == Use::Nothing && random.once_in(2) {
+                let due_ns = random.within(*end_ns..=deadline_ns);
+                subtask.due = Some(Duration::from_nanos(due_ns));
+            }
+        }
+    }
+
     /// Adds a subtask of which a call fails. It has no WCET: the report of a fault takes its time.
     fn fail(&mut self, random: &mut Random) {
         const REPLACED: [Replaced; 3] = [Replaced::Never, Replaced::Anew, Replaced::ByFallback];

@@ -24,6 +24,9 @@ fn random_sets_break_no_rule_and_leave_nothing_behind() {
         ("dag_ended", 5),
         ("off", 10),
         ("on", 10),
+        ("wake", 500),
+        ("signalled", 100),
+        ("entered", 20),
     ];
     for (what, least) in least {
         assert!(report.events[what] >= least, "{what}: {report:#?}");
