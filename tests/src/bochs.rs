@@ -17,7 +17,6 @@ use tool::install;
 use tool::medium::Medium;
 use tool::outcome::judge_lines;
 use tool::protocol::Transcript;
-use tool::qemu::Loader;
 use tool::system::{find_program, host_load, new_log};
 
 use crate::guest::built;
@@ -43,7 +42,7 @@ pub fn succeed(command: &str, package: &str, words: &str, model: &str, cores: u6
         install::ensure(&install::BOCHS)?;
         let program = find_program("bochs").ok_or("there is no program `bochs`")?;
         let words = format!("{words} end=off");
-        let iso = Medium::new(Loader::Bios, &built(package)?, &words, None)?;
+        let iso = Medium::new(&built(package)?, &words, None)?;
         if !command.is_empty() {
             put_before(command, iso.path())?;
         }

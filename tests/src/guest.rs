@@ -240,26 +240,13 @@ impl Guest {
     }
 
     /// Builds the image if need be, boots it and waits for the end, whatever
-    /// that is. Where the firmware has read a file wrongly from its stick, and the application
-    /// of UEFI says so, it boots again, twice at most (decision 29).
+    /// that is.
     ///
     /// # Panics
     ///
     /// Panics if QEMU or the image is missing and cannot be had.
     #[must_use]
     pub fn boot(&self) -> Outcome {
-        const READ_WRONGLY: &str = "was read wrongly: try again";
-        let mut outcome = self.boot_once();
-        for _ in 0..2 {
-            if outcome.serial.contains(READ_WRONGLY) {
-                outcome = self.boot_once();
-            }
-        }
-        outcome
-    }
-
-    /// Boots it, whatever the firmware has read.
-    fn boot_once(&self) -> Outcome {
         let run = || {
             let image = match &self.image {
                 Some(file) => install::ensure_qemu().map(|()| file.clone())?,

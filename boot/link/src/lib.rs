@@ -1,40 +1,25 @@
-//! Linker arguments that make an app's binary a bootable image, and the application of UEFI
-//! that brings an image into memory.
+//! Linker arguments that make an app's binary a bootable image.
 //!
-//! An app's build script calls [`link_image`] (that of all apps here is `boot/link/image.rs`), that
-//! of `boot-efi` [`link_efi`]. The arguments apply to the package's binaries alone, so the host
-//! tests, examples and docs of the same package link as any other Rust program does.
+//! An app's build script calls [`link_image`] (that of all apps here is `boot/link/image.rs`). The
+//! arguments apply to the package's binaries alone, so the host tests, examples and docs of the
+//! same package link as any other Rust program does.
 
 #![forbid(unsafe_code)]
 
-/// The arguments for the C compiler that drives the link, besides the script and
-/// [`IMAGE`] or [`EFI`].
+/// The arguments for the C compiler that drives the link, besides the script.
 ///
-/// No start files and no libraries: the program brings its own entry point. Pages of
+/// No start files and no libraries: the program brings its own entry point. Not
+/// position-independent: the loader places the image where the script says. Pages of
 /// 4 KiB, so that each section can have its own access rights without padding
 /// the file to 2 MiB.
-const ARGUMENTS: [&str; 4] = [
+const ARGUMENTS: [&str; 6] = [
     "-nostartfiles",
     "-nostdlib",
     "-Wl,--build-id=none",
     "-Wl,-z,max-page-size=4096",
+    "-static",
+    "-no-pie",
 ];
-
-/// Not position-independent: the loader places the image where the script says.
-const IMAGE: [&str; 2] = ["-static", "-no-pie"];
-
-/// A firmware places its application where it likes.
-const EFI: [&str; 2] = ["-static-pie", "-Wl,-z,norelro"];
-
-/// Tells cargo to link the binary of the package being built as an application of UEFI, in
-/// the form from which the host tool makes one.
-///
-/// # Panics
-///
-/// As [`link_image`].
-pub fn link_efi() {
-    link(EFI, include_str!("../../efi/src/application.ld"));
-}
 
 /// Functions of the same instructions are kept once. Not where a debugger wants each by its name.
 const FOLDED: &str = "-Wl,--icf=all";
@@ -50,7 +35,7 @@ const FOLDED: &str = "-Wl,--icf=all";
 /// If cargo's folder for the package is not there, or takes no file.
 pub fn link_image() {
     // The script lies with the boot code that its symbols serve.
-    link(IMAGE, include_str!("../../entry/src/image.ld"));
+    link(include_str!("../../entry/src/image.ld"));
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
         println!("cargo::rustc-link-arg-bins={FOLDED}");
     }
@@ -72,13 +57,13 @@ pub fn link_image() {
     }
 }
 
-/// Tells cargo to link with these arguments and this linker script. Each package gets a copy of
+/// Tells cargo to link with this linker script. Each package gets a copy of
 /// the script in cargo's folder for it, whose place cargo keeps right if the workspace is moved.
-fn link(kind: [&str; 2], script: &str) {
+fn link(script: &str) {
     let folder = std::env::var("OUT_DIR").expect("cargo names its folder to a build script");
     let copy = std::path::Path::new(&folder).join("script.ld");
     std::fs::write(&copy, script).expect("cargo's folder takes the linker script");
-    for argument in arguments(kind, &copy.display().to_string()) {
+    for argument in arguments(&copy.display().to_string()) {
         println!("cargo::rustc-link-arg-bins={argument}");
     }
     // Nothing else of the package counts, and this one is there.
@@ -97,16 +82,16 @@ fn missing_attributes(main: &str) -> impl Iterator<Item = &'static str> {
 
 /// Returns all arguments, with the linker script at this place. It is an argument by
 /// itself, for in one with others a comma would end it.
-fn arguments<'s>(kind: [&'s str; 2], script: &'s str) -> impl Iterator<Item = &'s str> {
+fn arguments(script: &str) -> impl Iterator<Item = &str> {
     let with_script = ["-Xlinker", "-T", "-Xlinker", script];
-    ARGUMENTS.into_iter().chain(kind).chain(with_script)
+    ARGUMENTS.into_iter().chain(with_script)
 }
 
 #[cfg(test)]
 mod tests {
     #[test]
     fn the_script_is_an_argument_by_itself() {
-        let all: Vec<&str> = super::arguments(super::IMAGE, "/a,b/image.ld").collect();
+        let all: Vec<&str> = super::arguments("/a,b/image.ld").collect();
         assert!(all.ends_with(&["-Xlinker", "-T", "-Xlinker", "/a,b/image.ld"]));
     }
 

@@ -66,60 +66,6 @@ fn loaded_bytes(file: &[u8]) -> Result<u64, String> {
     Ok(end)
 }
 
-/// An address in a position-independent file that must be corrected for the load address.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Correction {
-    /// Its offset from the load address.
-    pub at: u64,
-    /// Its value if the file is loaded at 0.
-    pub address: u64,
-}
-
-/// Returns all addresses to correct for the load address, in ascending order.
-///
-/// # Errors
-///
-/// In words: it is no ELF file, a table points outside it, or it needs relocations of another
-/// kind.
-pub fn corrections(file: &[u8]) -> Result<Vec<Correction>, String> {
-    const SHT_RELA: u64 = 4;
-    /// Kinds of sections with relocations in another form (SHT_REL, SHT_RELR).
-    const OTHERS: [u64; 2] = [9, 19];
-    const ENTRY_BYTES: u64 = 24;
-    const R_X86_64_RELATIVE: u64 = 8;
-    check(file)?;
-    let mut corrections = Vec::new();
-    for section in table(file, 40, 60, SECTION_HEADER_BYTES)? {
-        let kind = number(file, section + 4, 4)?;
-        let bytes = number(file, section + 32, 8)?;
-        // Relocations that are not loaded are for linkers and debuggers.
-        if number(file, section + 8, 8)? & SHF_ALLOC == 0 || bytes == 0 {
-            continue;
-        }
-        if OTHERS.contains(&kind) {
-            return Err("it is to be corrected for its place in an unknown way".into());
-        }
-        let count = if kind == SHT_RELA {
-            bytes / ENTRY_BYTES
-        } else {
-            0
-        };
-        let start = number(file, section + 24, 8)?;
-        for entry in (0..count).map(|index| start.saturating_add(index * ENTRY_BYTES)) {
-            // Any other kind refers to a symbol, which a file of its own must not need.
-            if number(file, entry + 8, 8)? != R_X86_64_RELATIVE {
-                return Err("it has an address of something that is not in it".into());
-            }
-            corrections.push(Correction {
-                at: number(file, entry, 8)?,
-                address: number(file, entry + 16, 8)?,
-            });
-        }
-    }
-    corrections.sort_by_key(|correction| correction.at);
-    Ok(corrections)
-}
-
 /// Makes sure that QEMU's `-kernel` can enter a file: a 64-bit ELF file with Xen's note
 /// of the 32-bit entry address ("x86/HVM direct boot ABI", `docs/misc/pvh.pandoc` of Xen).
 ///

@@ -218,9 +218,6 @@ const FOR_IMAGES: [&str; 4] = [
     "-Cllvm-args=-min-jump-table-entries=8",
 ];
 
-/// The one binary that is no image: firmware chooses its address.
-const PLACED_BY_FIRMWARE: &str = "boot-efi";
-
 /// Builds one target of a package; `target` is its kind and name, as cargo takes them.
 fn build_target(
     package: &str,
@@ -231,7 +228,7 @@ fn build_target(
     let [kind, name] = target;
     let (verb, flags) = match kind {
         // Only `cargo rustc` takes flags for the last crate alone.
-        "--bin" if package != PLACED_BY_FIRMWARE => ("rustc", &FOR_IMAGES[..]),
+        "--bin" => ("rustc", &FOR_IMAGES[..]),
         _ => ("build", &[][..]),
     };
     let failed = |why: &str| format!("cannot build `{name}`: {why}");

@@ -1,8 +1,8 @@
-//! Installing the programs that a command needs, by the system's own package manager.
+//! Installing the programs that a command needs, by `apt-get`.
 //!
 //! A command that needs QEMU installs it if it is missing; one that needs GRUB, a firmware
-//! or Bochs does likewise. The package manager on this system decides the command; the tool
-//! downloads nothing itself. Without a known manager the person is told what to install.
+//! or Bochs does likewise. The tool downloads nothing itself. Without `apt-get` the person is told
+//! what to install.
 
 use std::io;
 use std::path::Path;
@@ -19,13 +19,8 @@ pub struct Need {
     what: &'static str,
     /// The parts by which it is recognized: programs on the `PATH`, and files or folders.
     parts: &'static [&'static str],
-    /// The packages for each of `MANAGERS` in turn, with blanks between; empty if a manager is not
-    /// known to have it.
-    packages: [&'static str; 5],
-}
-
-const fn by_apt(packages: &str) -> [&str; 5] {
-    [packages, "", "", "", ""]
+    /// Debian's packages that bring it, with blanks between.
+    packages: &'static str,
 }
 
 /// The emulator that everything boots in, with the firmware that it brings.
@@ -33,13 +28,7 @@ pub static QEMU: Need = Need {
     name: "QEMU",
     what: "QEMU's system emulator for x86_64",
     parts: &[PROGRAM],
-    packages: [
-        "qemu-system-x86",
-        "qemu-system-x86-core",
-        "qemu-system-x86",
-        "qemu-x86",
-        "qemu-system-x86_64",
-    ],
+    packages: "qemu-system-x86",
 };
 
 /// The debugger.
@@ -47,7 +36,7 @@ pub static GDB: Need = Need {
     name: "gdb",
     what: "GNU's debugger",
     parts: &["gdb"],
-    packages: ["gdb"; 5],
+    packages: "gdb",
 };
 
 /// The programs that make an ISO, for BIOS and for UEFI.
@@ -61,15 +50,7 @@ pub static GRUB: Need = Need {
         "/usr/lib/grub/i386-pc",
         "/usr/lib/grub/x86_64-efi",
     ],
-    packages: by_apt("grub-pc-bin grub-efi-amd64-bin xorriso mtools"),
-};
-
-/// The programs that make a FAT stick.
-pub static MTOOLS: Need = Need {
-    name: "mtools",
-    what: "mtools, which write FAT file systems",
-    parts: &["mformat", "mmd", "mcopy"],
-    packages: ["mtools"; 5],
+    packages: "grub-pc-bin grub-efi-amd64-bin xorriso mtools",
 };
 
 /// UEFI for QEMU.
@@ -77,7 +58,7 @@ pub static OVMF: Need = Need {
     name: "OVMF",
     what: "the firmware that gives QEMU's machines UEFI",
     parts: &[OVMF_FILE],
-    packages: by_apt("ovmf"),
+    packages: "ovmf",
 };
 
 /// The emulator that imitates a PC the most strictly.
@@ -89,22 +70,8 @@ pub static BOCHS: Need = Need {
         "/usr/share/bochs/BIOS-bochs-latest",
         "/usr/lib/x86_64-linux-gnu/bochs/plugins/libbx_sdl2_gui.so",
     ],
-    packages: by_apt("bochs bochs-sdl bochsbios vgabios"),
+    packages: "bochs bochs-sdl bochsbios vgabios",
 };
-
-/// The package managers: the program, its words to update the list of packages, if that is a step
-/// of its own, and its words to install the packages that follow.
-const MANAGERS: [(&str, Option<&str>, &str); 5] = [
-    (
-        "apt-get",
-        Some("update"),
-        "install --yes --no-install-recommends",
-    ),
-    ("dnf", None, "install --assumeyes"),
-    ("pacman", None, "--sync --refresh --noconfirm --needed"),
-    ("zypper", None, "--non-interactive install"),
-    ("apk", None, "add"),
-];
 
 /// Makes sure that QEMU is there, as [`ensure`] does.
 ///
@@ -125,7 +92,6 @@ pub fn ensure_loader(loader: Loader) -> Result<(), String> {
         Loader::Pvh => Ok(()),
         Loader::Bios => ensure(&GRUB),
         Loader::Uefi => ensure(&GRUB).and_then(|()| ensure(&OVMF)),
-        Loader::Efi => ensure(&MTOOLS).and_then(|()| ensure(&OVMF)),
     }
 }
 
@@ -139,11 +105,11 @@ pub fn ensure(need: &Need) -> Result<(), String> {
     let Some(part) = missing(need) else {
         return Ok(());
     };
-    let (update, install) = plan(need, part, |name| find_program(name).is_some(), is_root())?;
+    let [update, install] = plan(need, part, |name| find_program(name).is_some(), is_root())?;
     let name = need.name;
     // One unreachable source fails the whole update, but the needed package may come from another:
     // the installation decides.
-    if let Some(Err(why)) = update.map(|line| run(name, &line)) {
+    if let Err(why) = run(name, &update) {
         eprintln!("{why}");
     }
     run(name, &install).map_err(|why| {
@@ -167,38 +133,37 @@ fn missing(need: &Need) -> Option<&'static str> {
     need.parts.iter().copied().find(|part| !is_there(part))
 }
 
-/// Decides on the commands that update (if there is one) and install, from the programs that exist
-/// and whether we are root.
+/// Returns the beginnings of the commands that update the list of packages and that install some,
+/// from the programs that exist and whether we are root.
 fn plan(
     need: &Need,
     part: &str,
     exists: impl Fn(&str) -> bool,
     root: bool,
-) -> Result<(Option<String>, String), String> {
-    let Need { name, what, .. } = need;
-    let known = MANAGERS.iter().zip(need.packages);
-    let known = known.filter(|(_, packages)| !packages.is_empty());
-    // The first that exists: a system mostly has one, and the order breaks ties.
-    let found = known.clone().find(|((manager, ..), _)| exists(manager));
-    let ((manager, update, install), packages) = found.ok_or_else(|| {
-        let known: Vec<&str> = known.map(|((manager, ..), _)| *manager).collect();
-        format!(
-            "{name} is missing, and none of the package managers that are known to have it \
-                 is here ({}); install the package that brings `{part}` ({what}) and start again",
-            known.join(", ")
-        )
-    })?;
+) -> Result<[String; 2], String> {
+    let Need {
+        name,
+        what,
+        packages,
+        ..
+    } = need;
+    if !exists("apt-get") {
+        return Err(format!(
+            "{name} is missing, and `apt-get`, by which it would be installed, is not here; install \
+             the package that brings `{part}` ({what}) and start again"
+        ));
+    }
     if !root && !exists("sudo") {
         return Err(format!(
             "{name} is missing, and installing it takes root or `sudo`; as root, install \
              `{packages}` and start again"
         ));
     }
-    let program = format!("{}{manager}", if root { "" } else { "sudo " });
-    Ok((
-        update.map(|words| format!("{program} {words}")),
-        format!("{program} {install} {packages}"),
-    ))
+    let program = if root { "apt-get" } else { "sudo apt-get" };
+    Ok([
+        format!("{program} update"),
+        format!("{program} install --yes --no-install-recommends {packages}"),
+    ])
 }
 
 fn run(name: &str, line: &str) -> Result<(), String> {
@@ -228,71 +193,37 @@ mod tests {
 
     fn lines(need: &Need, programs: &[&str], root: bool) -> Result<String, String> {
         let exists = |name: &str| programs.contains(&name);
-        let (update, install) = plan(need, need.parts[0], exists, root)?;
-        let update = update.map_or(String::new(), |line| format!("{line}; "));
-        Ok(update + &install)
+        plan(need, need.parts[0], exists, root).map(|lines| lines.join("; "))
     }
 
     #[test]
-    fn each_manager_is_asked_without_questions_and_by_others_than_root_through_sudo() {
-        let (root, qemu) = (true, &QEMU);
-        let apt = "apt-get update; apt-get install --yes --no-install-recommends";
+    fn apt_is_asked_without_questions_and_by_others_than_root_through_sudo() {
+        let install = "install --yes --no-install-recommends";
+        let qemu = format!("apt-get update; apt-get {install} qemu-system-x86");
+        assert_eq!(lines(&QEMU, &["apt-get"], true), Ok(qemu));
         let grub = "grub-pc-bin grub-efi-amd64-bin xorriso mtools";
-        for (need, programs, root, expected) in [
-            (
-                qemu,
-                &["apt-get"][..],
-                root,
-                format!("{apt} qemu-system-x86"),
-            ),
-            (&GRUB, &["apt-get"], root, format!("{apt} {grub}")),
-            (
-                qemu,
-                &["dnf", "sudo"],
-                !root,
-                "sudo dnf install --assumeyes qemu-system-x86-core".into(),
-            ),
-            (
-                qemu,
-                &["pacman"],
-                root,
-                "pacman --sync --refresh --noconfirm --needed qemu-system-x86".into(),
-            ),
-            (
-                qemu,
-                &["zypper"],
-                root,
-                "zypper --non-interactive install qemu-x86".into(),
-            ),
-            (qemu, &["apk"], root, "apk add qemu-system-x86_64".into()),
-        ] {
-            assert_eq!(lines(need, programs, root), Ok(expected));
-        }
+        let grub = format!("sudo apt-get update; sudo apt-get {install} {grub}");
+        assert_eq!(lines(&GRUB, &["apt-get", "sudo"], false), Ok(grub));
     }
 
     #[test]
     fn who_cannot_install_is_told_what_to_install() {
-        for (need, programs, root, parts) in [
+        for (need, program, root, parts) in [
             (
                 &QEMU,
-                &["dnf"][..],
+                "apt-get",
                 false,
-                ["root or `sudo`", "`qemu-system-x86-core`"],
+                ["root or `sudo`", "`qemu-system-x86`"],
             ),
             (
                 &QEMU,
-                &["sudo"],
+                "dnf",
                 true,
-                ["apt-get, dnf, pacman, zypper, apk", "`qemu-system-x86_64`"],
+                ["`apt-get`", "brings `qemu-system-x86_64`"],
             ),
-            (
-                &GRUB,
-                &["dnf"],
-                true,
-                ["(apt-get)", "brings `grub-mkrescue`"],
-            ),
+            (&GRUB, "dnf", true, ["`apt-get`", "brings `grub-mkrescue`"]),
         ] {
-            let refusal = lines(need, programs, root).unwrap_err();
+            let refusal = lines(need, &[program], root).unwrap_err();
             assert!(parts.iter().all(|part| refusal.contains(part)), "{refusal}");
         }
     }

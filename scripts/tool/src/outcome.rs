@@ -79,7 +79,7 @@ pub fn boot_with_input(
     let medium = needs_stick.then(|| {
         qemu.check_words()?;
         let module = qemu.module.as_deref();
-        Medium::new(qemu.loader, image, &qemu.guest_words, module)
+        Medium::new(image, &qemu.guest_words, module)
     });
     let medium = medium.transpose()?;
     let loaded = medium.as_ref().map_or(image, Medium::path);

@@ -164,7 +164,7 @@ impl Qemu {
             let drive = file_value("if=none,id=stick,format=raw,readonly=on,file=", image);
             let mut arguments: Vec<OsString> = vec!["-drive".into(), drive];
             arguments.extend(words("-device qemu-xhci -device usb-storage,drive=stick"));
-            if self.loader.is_by_uefi() {
+            if self.loader == Loader::Uefi {
                 arguments.extend(["-bios", OVMF_FILE].map(OsString::from));
             }
             // Words and module are on the stick already.
@@ -355,8 +355,6 @@ named! {
         Bios = "bios",
         /// GRUB, started from a stick by UEFI.
         Uefi = "uefi",
-        /// An application of our own, started from a stick by UEFI.
-        Efi = "efi",
     }
 }
 
@@ -366,21 +364,11 @@ impl Loader {
         self != Loader::Pvh
     }
 
-    /// Reports whether GRUB passes the words on.
-    pub fn is_grub(self) -> bool {
-        matches!(self, Loader::Bios | Loader::Uefi)
-    }
-
-    /// Reports whether the firmware is UEFI.
-    pub fn is_by_uefi(self) -> bool {
-        matches!(self, Loader::Uefi | Loader::Efi)
-    }
-
     /// Returns the least memory in MiB with which the loader has been seen to reach the image.
     pub fn least_memory_mib(self) -> u64 {
         match self {
             Loader::Pvh | Loader::Bios => LEAST_MEMORY_MIB,
-            Loader::Uefi | Loader::Efi => 96,
+            Loader::Uefi => 96,
         }
     }
 }
@@ -637,7 +625,6 @@ mod tests {
             ),
             (Loader::Bios, &[stick], &["-kernel", "jobs", "-bios"]),
             (Loader::Uefi, &[stick, firmware], &["-kernel", "jobs"]),
-            (Loader::Efi, &[stick, firmware], &["-kernel", "jobs"]),
         ] {
             let guest = Qemu {
                 loader,

@@ -2,7 +2,6 @@
 
 mod attacks;
 mod autoware;
-mod by_efi;
 mod by_grub;
 mod camera;
 mod cruise;

@@ -110,10 +110,10 @@ fn rows_of(guest: &Guest, cores: u64, model: &str) -> (Vec<String>, String) {
     (rows, pages)
 }
 
-/// The demo's table, of UEFI without GRUB, and of GRUB under a BIOS.
+/// The demo's table, by UEFI and by a BIOS.
 #[test]
 fn what_a_run_says() {
-    for loader in [Loader::Efi, Loader::Bios] {
+    for loader in [Loader::Uefi, Loader::Bios] {
         let guest = Guest::new("fork-join").from_stick(loader);
         let (rows, pages) = rows_of(&guest.word("jobs=3 subtasks=2"), 2, "max");
         // Written through (T), and not uncached (C) as a device's: so the kernel marks the
@@ -142,7 +142,7 @@ fn what_a_run_says() {
 #[test]
 fn why_a_machine_or_a_word_is_refused() {
     let guest = |loader| Guest::new("fork-join").from_stick(loader);
-    let (bios, efi) = (guest(Loader::Bios), guest(Loader::Efi));
+    let (bios, uefi) = (guest(Loader::Bios), guest(Loader::Uefi));
     let word = "`avx=512`: allowed are on, off";
     for (guest, cores, model, why) in [
         (
@@ -158,7 +158,7 @@ fn why_a_machine_or_a_word_is_refused() {
             "each core needs 144 KiB of memory",
         ),
         (bios.word("avx=512"), 2, "max", word),
-        (efi.word("avx=512"), 2, "max", word),
+        (uefi.word("avx=512"), 2, "max", word),
     ] {
         let (rows, _) = rows_of(&guest, cores, model);
         let all = rows.join("\n");

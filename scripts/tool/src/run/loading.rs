@@ -42,7 +42,7 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
              {loader}` does; give --machine q35, or leave --boot out"
         ));
     }
-    if loader.is_by_uefi() && mode == Some(Mode::Deterministic) {
+    if loader == Loader::Uefi && mode == Some(Mode::Deterministic) {
         return Err(
             "`--mode deterministic`: UEFI has been given up after minutes where instructions \
              are counted; give --mode threads, or --boot bios"

@@ -143,7 +143,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
     // The words of the longest mode name are checked, as the mode is chosen only after the build.
     let longest = describe(named.unwrap_or(Mode::Deterministic));
     longest.check_words().map_err(Refusal::Usage)?;
-    if longest.loader.is_grub() {
+    if longest.loader.needs_stick() {
         medium::check_words(&longest.guest_words).map_err(Refusal::Usage)?;
     }
     let log = Log::choose(options, &app)?;

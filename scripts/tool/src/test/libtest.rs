@@ -31,13 +31,9 @@ const AT_ONCE: usize = 2;
 const BOOTS: &str = "boots";
 
 /// The programs that modules of boot tests need besides QEMU.
-const NEEDS: [(&str, &[&Need]); 5] = [
+const NEEDS: [(&str, &[&Need]); 4] = [
     ("debugger::", &[&install::GDB]),
-    ("by_efi::", &[&install::MTOOLS, &install::OVMF]),
-    (
-        "on_screen::",
-        &[&install::GRUB, &install::MTOOLS, &install::OVMF],
-    ),
+    ("on_screen::", &[&install::GRUB, &install::OVMF]),
     ("by_grub::", &[&install::GRUB, &install::OVMF]),
     ("in_bochs::", &[&install::GRUB, &install::BOCHS]),
 ];

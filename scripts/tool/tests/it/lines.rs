@@ -100,7 +100,6 @@ run --output - | `--output -`: standard output is
 run --dag x --output y | `--output` and `--dag` exclude
 run --boot bios --machine microvm | `--machine microvm`: it has no firmware
 run --boot uefi --mode deterministic | give --mode threads
-run --boot efi --mode deterministic | give --mode threads
 bench bounds --cores 2,2 | `--cores`: `2` stands twice
 bench bounds sets.txt --seed 2 | bench bounds: `--seed` is for random sets; leave it or the files out
 bench native --only join,join | `--only`: `join` stands twice
