@@ -88,7 +88,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
 /// # Errors
 ///
 /// In words, with the file.
-pub(crate) fn read_at(path: &Path) -> Result<Vec<u8>, String> {
+pub fn read_at(path: &Path) -> Result<Vec<u8>, String> {
     read(path).map_err(|why| format!("`{}`: {why}", shown_path(path)))
 }
 
@@ -143,7 +143,7 @@ pub(crate) fn why_full(path: &Path) -> Option<String> {
 /// # Errors
 ///
 /// In words, with the file.
-pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), String> {
+pub fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), String> {
     let written = fs::create_dir_all(folder_of(path)).and_then(|()| fs::write(path, content));
     written.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
 }

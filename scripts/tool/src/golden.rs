@@ -16,7 +16,7 @@ use std::sync::Mutex;
 use crate::system::workspace;
 
 /// The variable by which `--bless` reaches test programs: the path of the list of rewritten files.
-pub(crate) const BLESSED: &str = "TOOL_BLESSED";
+pub const BLESSED: &str = "TOOL_BLESSED";
 
 /// A text that is kept in a file.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +49,7 @@ impl Golden<'_> {
     /// # Errors
     ///
     /// In words: they differ, and the golden was not rewritten.
-    pub(crate) fn compare(&self, said: &str, list: Option<&Path>) -> Result<(), String> {
+    pub fn compare(&self, said: &str, list: Option<&Path>) -> Result<(), String> {
         let Golden { file, below, text } = self;
         if *text == said {
             return Ok(());

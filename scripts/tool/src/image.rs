@@ -51,7 +51,7 @@ pub fn apps() -> Vec<String> {
 }
 
 /// Reads the name of a package; `None` for the manifest of a workspace alone.
-pub(crate) fn package_name(manifest: &str) -> Option<String> {
+pub fn package_name(manifest: &str) -> Option<String> {
     let package = manifest.split("[package]").nth(1)?;
     let line = package.lines().find(|line| line.starts_with("name"))?;
     Some(line.split('"').nth(1)?.into())

@@ -3,27 +3,23 @@
 //! Some words. A *guest* is one boot of an image in QEMU. Its *serial log* is
 //! all it printed, lines for people and machine lines mixed. Its *ending* is
 //! how QEMU's process ended; its *verdict* is its own last line. The tool's
-//! *subcommands* (`run`, `test`, ...) are called by the scripts in `scripts/`.
+//! *subcommands* (`run`, `image`, ...) are called by the scripts in `scripts/`.
 //!
-//! The library serves two callers: the program (`main.rs`), and the tests, its own and
-//! the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
+//! The library serves the program (`main.rs`), the laboratory (`scripts/lab`), and the tests, its
+//! own and the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
 //!
 //! - [`json`], [`protocol`]: the guest's output, read strictly;
 //! - [`elf`], [`image`], [`medium`], [`places`], [`tiny`]: images and media to boot;
 //! - [`child`], [`qemu`], [`outcome`]: the boot, and the judgement of its end;
 //! - [`install`], [`probe`], [`system`]: programs and abilities of the host;
 //! - [`options`]: command lines by a table; [`files`]: the files they name; [`output`],
-//!   [`progress`]: printing without a panic, and progress of long work; [`random`]: task sets that
-//!   are drawn; `svg`: pictures;
+//!   [`progress`]: printing without a panic, and progress of long work; [`svg`]: pictures;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`golden`]: texts of the tree that tests hold to their word;
 //! - [`trace`]: the events of a run, checked against the model's rules;
 //! - [`recordings`]: the inputs of a run, and conversion to and from other formats;
 //! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
-//! - [`mod@bench`]: measurements, compared with a baseline;
-//! - [`oracle`]: reference schedules, bounds and synchronizers;
-//! - [`run`](mod@run), [`test`](mod@test), [`soak`](mod@soak),
-//!   [`new_app`](mod@new_app): the subcommands.
+//! - [`run`](mod@run), [`new_app`](mod@new_app): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
 //! as good that did not say so twice. It uses the standard library only, and
@@ -35,7 +31,6 @@
 #[macro_use]
 pub mod output;
 
-pub mod bench;
 pub mod child;
 pub mod dag_file;
 pub mod debian;
@@ -49,7 +44,6 @@ pub mod json;
 pub mod medium;
 pub mod new_app;
 pub mod options;
-pub mod oracle;
 pub mod outcome;
 pub mod places;
 pub mod probe;
@@ -58,14 +52,11 @@ pub mod progress;
 pub mod proof;
 pub mod protocol;
 pub mod qemu;
-pub mod random;
 pub mod record;
 pub mod recordings;
 pub mod run;
-pub mod soak;
-mod svg;
+pub mod svg;
 pub mod system;
-pub mod test;
 pub mod tiny;
 pub mod trace;
 pub mod wire_script;

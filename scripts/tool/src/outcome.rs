@@ -137,7 +137,7 @@ impl Outcome {
     }
 
     /// Makes the outcome of a guest that was not asked to end and did not complain.
-    pub(crate) fn of(ending: Ending, serial: String, log: &Path, image: &Path) -> Outcome {
+    pub fn of(ending: Ending, serial: String, log: &Path, image: &Path) -> Outcome {
         Outcome {
             ending,
             transcript: Transcript::read(&serial),

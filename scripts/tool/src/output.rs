@@ -71,15 +71,15 @@ fn note(written: io::Result<()>) {
     }
 }
 
-/// Returns the exit code of the tool, whose work has ended with `code`. If some output could not be
+/// Returns the exit code of a program whose work has ended with `code`. If some output could not be
 /// written, says so and makes success a failure.
-pub fn conclude(code: ExitCode) -> ExitCode {
+pub fn conclude(program: &str, code: ExitCode) -> ExitCode {
     // Standard output buffers: the last write error shows only in a flush.
     note(stdout().flush());
     let Some(error) = LOST.get() else {
         return code;
     };
-    eprintln!("fass-tool: standard output could not be written: {error}");
+    eprintln!("{program}: standard output could not be written: {error}");
     // Another code than success already says more than a lost line would.
     if code == ExitCode::SUCCESS {
         return ExitCode::FAILURE;
@@ -89,7 +89,7 @@ pub fn conclude(code: ExitCode) -> ExitCode {
 
 /// A table that grows row by row.
 #[derive(Debug)]
-pub(crate) struct Table {
+pub struct Table {
     /// Whether the cells of a column begin at the left, how wide it is, and the decimals of its
     /// numbers.
     columns: Vec<(bool, usize, usize)>,
@@ -100,7 +100,7 @@ impl Table {
     /// Makes a table, below a line if there is a `title`. A column is `heading:width`, or
     /// `heading:width.decimals`, or `heading:<width` if its cells begin at the left; `|` stands
     /// between.
-    pub(crate) fn new(title: &str, columns: &str) -> Self {
+    pub fn new(title: &str, columns: &str) -> Self {
         // The formats are literals of this crate; a missing number means no width or no decimals.
         let number = |digits: &str| digits.parse().unwrap_or(0);
         let column = |column| {
@@ -120,7 +120,7 @@ impl Table {
     }
 
     /// Adds a row with a cell for each column.
-    pub(crate) fn row(&mut self, cells: &[&dyn Display]) {
+    pub fn row(&mut self, cells: &[&dyn Display]) {
         let cells: Vec<String> = (cells.iter().zip(&self.columns))
             // Rounding is for floats only; integers and text take no precision.
             .map(|(cell, &(_, _, decimals))| match decimals {
@@ -132,13 +132,13 @@ impl Table {
     }
 
     /// Adds a line between the rows, or after them.
-    pub(crate) fn line(&mut self, line: &str) {
+    pub fn line(&mut self, line: &str) {
         self.text += line;
         self.text.push('\n');
     }
 
     /// Adds a row of cells that are text already.
-    pub(crate) fn cells(&mut self, cells: impl IntoIterator<Item = String>) {
+    pub fn cells(&mut self, cells: impl IntoIterator<Item = String>) {
         let cells = cells.into_iter().zip(&self.columns);
         let cells = cells.map(|(cell, &(begins_left, width, _))| match begins_left {
             true => format!("{cell:<width$}"),
@@ -149,13 +149,13 @@ impl Table {
     }
 
     /// Returns the table, or the part that was added since the last call.
-    pub(crate) fn text(&mut self) -> String {
+    pub fn text(&mut self) -> String {
         mem::take(&mut self.text)
     }
 }
 
 /// Formats a time in the largest unit that it reaches, with three decimals (none for ns).
-pub(crate) fn shown(ns: u64) -> String {
+pub fn shown(ns: u64) -> String {
     let units = [(1_000_000_000, "s"), (1_000_000, "ms"), (1_000, "us")];
     match units.into_iter().find(|(unit, _)| ns >= *unit) {
         None => format!("{ns} ns"),
@@ -165,7 +165,7 @@ pub(crate) fn shown(ns: u64) -> String {
 }
 
 /// Formats a time as [`shown`] does, without trailing zeros.
-pub(crate) fn briefly(ns: u64) -> String {
+pub fn briefly(ns: u64) -> String {
     let text = shown(ns);
     match text.split_once(' ') {
         Some((number, unit)) if number.contains('.') => {

@@ -448,7 +448,7 @@ impl fmt::Display for Ending {
 #[derive(Debug)]
 pub struct Running {
     /// Its input is the guest's serial port, its output the log of instructions, if wanted.
-    pub(crate) child: Child,
+    pub child: Child,
     serial: PathBuf,
     complaints: Temporary,
     /// The file that the record goes to, if there is one.

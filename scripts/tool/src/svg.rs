@@ -6,12 +6,12 @@ use std::fmt::Write;
 
 /// A picture.
 #[derive(Debug, Default)]
-pub(crate) struct Svg(String);
+pub struct Svg(String);
 
 // Writing into a `String` cannot fail.
 impl Svg {
     /// Adds text on a line that ends in the middle, begins or ends at a point, as `anchor` says.
-    pub(crate) fn text(&mut self, (x, y): (u64, u64), anchor: &str, text: &str) {
+    pub fn text(&mut self, (x, y): (u64, u64), anchor: &str, text: &str) {
         let text = text.replace('&', "&amp;").replace('<', "&lt;");
         let _ = writeln!(
             self.0,
@@ -20,7 +20,7 @@ impl Svg {
     }
 
     /// Adds a box with its left upper corner at a point.
-    pub(crate) fn rect(&mut self, (x, y): (u64, u64), (width, height): (u64, u64), fill: &str) {
+    pub fn rect(&mut self, (x, y): (u64, u64), (width, height): (u64, u64), fill: &str) {
         let _ = writeln!(
             self.0,
             "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"3\" \
@@ -29,7 +29,7 @@ impl Svg {
     }
 
     /// Adds a line with attributes.
-    pub(crate) fn line(&mut self, (x1, y1): (u64, u64), (x2, y2): (u64, u64), style: &str) {
+    pub fn line(&mut self, (x1, y1): (u64, u64), (x2, y2): (u64, u64), style: &str) {
         let _ = writeln!(
             self.0,
             "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" {style}/>"
@@ -37,12 +37,12 @@ impl Svg {
     }
 
     /// Adds a path in SVG's own words, with attributes.
-    pub(crate) fn path(&mut self, path: &str, style: &str) {
+    pub fn path(&mut self, path: &str, style: &str) {
         let _ = writeln!(self.0, "<path d=\"{path}\" {style}/>");
     }
 
     /// Returns the picture as the text of a file.
-    pub(crate) fn into_text(self, (width, height): (u64, u64)) -> String {
+    pub fn into_text(self, (width, height): (u64, u64)) -> String {
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
              viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"13\">\n\

@@ -62,7 +62,7 @@ pub fn cargo() -> Command {
 
 /// Runs cargo, whose errors go to standard error as they come. Returns its JSON messages, and an
 /// error if it failed.
-pub(crate) fn messages_of(cargo: &mut Command) -> (Vec<Value>, Result<(), String>) {
+pub fn messages_of(cargo: &mut Command) -> (Vec<Value>, Result<(), String>) {
     let output = match cargo.stdin(Stdio::null()).stderr(Stdio::inherit()).output() {
         Ok(output) => output,
         Err(error) => return (Vec::new(), Err(format!("cannot start cargo: {error}"))),
@@ -82,7 +82,7 @@ pub(crate) fn messages_of(cargo: &mut Command) -> (Vec<Value>, Result<(), String
 /// # Errors
 ///
 /// In words, with the program and the last lines of its error output.
-pub(crate) fn run(command: &mut Command) -> Result<String, String> {
+pub fn run(command: &mut Command) -> Result<String, String> {
     let name = command.get_program().display().to_string();
     let output = command.stdin(Stdio::null()).output();
     let output = output.map_err(|why| format!("`{name}` did not start: {why}"))?;
@@ -114,7 +114,7 @@ pub fn find_program(name: impl AsRef<OsStr>) -> Option<PathBuf> {
 
 /// Returns all files below a folder but the generated and hidden ones, sorted; `enters` decides for
 /// each folder whether to descend.
-pub(crate) fn files_below(root: &Path, enters: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
+pub fn files_below(root: &Path, enters: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut folders = vec![root.to_path_buf()];
     while let Some(folder) = folders.pop() {

@@ -2,8 +2,6 @@
 //!
 //! In a cell `\n` stands for the end of a line, and `\?` for a character that must not be shown.
 
-use text::Malformed;
-
 /// Returns the rows of a table, each of so many cells; those that a row leaves out are empty.
 pub(crate) fn rows<const N: usize>(table: &str) -> impl Iterator<Item = [String; N]> {
     table.lines().filter(|row| !row.is_empty()).map(|row| {
@@ -18,18 +16,4 @@ pub(crate) fn rows<const N: usize>(table: &str) -> impl Iterator<Item = [String;
 pub(crate) fn altered(text: &str, [from, to]: [&str; 2]) -> String {
     assert!(text.contains(from), "{from}");
     text.replacen(from, to, 1)
-}
-
-/// Makes sure that `parse` refuses a text once it is altered: in each row are a part, another in its
-/// place, the line of the fault, and words of its reason.
-pub(crate) fn assert_malformed<T: std::fmt::Debug>(
-    parse: impl Fn(&str) -> Result<T, Malformed>,
-    text: &str,
-    table: &str,
-) {
-    for [from, to, line, reason] in rows(table) {
-        let fault = parse(&altered(text, [&from, &to])).expect_err(&to);
-        assert_eq!(fault.line.to_string(), line, "{to}: {fault}");
-        assert!(fault.reason.contains(&reason), "{fault}\n  not: {reason}");
-    }
 }

@@ -6,12 +6,12 @@ use std::fs;
 use super::{PAGES, without_numbers};
 use crate::fault_page::{documented_faults, with_names_of};
 use crate::markdown::{Block, blocks, page};
+use lab::test::TEST;
 use tool::golden::Golden;
 use tool::new_app::NEW_APP;
 use tool::options::Command;
 use tool::run::RUN;
 use tool::system::workspace;
-use tool::test::TEST;
 use tool::trace::{CHECK_TRACE, TRACE};
 
 #[path = "../../../fass/virtual-time/examples/vision.rs"]

@@ -4,8 +4,8 @@
 //! completion and release, fall on the same instant run so without a window,
 //! too: with each event decided at once, as in apps.
 
-use tool::oracle::in_kernel::{Settings, run};
-use tool::oracle::schedules::{Case, check, parse};
+use lab::oracle::in_kernel::{Settings, run};
+use lab::oracle::schedules::{Case, check, parse};
 
 const PUBLIC: &str = include_str!("../../oracle/schedules.txt");
 

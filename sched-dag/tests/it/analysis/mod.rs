@@ -4,7 +4,7 @@
 //! are worked examples, and the counterexamples to forms that look like bounds and are not.
 
 mod climb;
-#[path = "../../../../scripts/tool/src/random.rs"]
+#[path = "../../../../scripts/lab/src/random.rs"]
 mod drawn;
 mod forged;
 mod one_core;

@@ -1,11 +1,13 @@
 //! A first word that chooses a function for the words after it: `bench WHAT`, `oracle KIND`.
 
+use std::env;
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use text::quoted;
 
 use super::{Refusal, nearest};
+use crate::output;
 
 /// The words to choose from.
 #[derive(Debug)]
@@ -43,6 +45,16 @@ macro_rules! choices {
 pub use choices;
 
 impl Menu {
+    /// Runs the program that offers this menu, from the folder in which a script was called.
+    pub fn carry_out(&self) -> ExitCode {
+        if let Some(folder) = env::var_os("TOOL_CALLED_IN") {
+            // Set by `scripts/tool/start`. If the folder is gone, we stay where we are.
+            let _ = env::set_current_dir(folder);
+        }
+        let words: Vec<OsString> = env::args_os().skip(1).collect();
+        output::conclude(self.invocation, self.run(&words))
+    }
+
     /// Runs the chosen function, shows the help text, or refuses the word with exit code 2.
     pub fn run(&self, words: &[OsString]) -> ExitCode {
         match self.choose(words) {

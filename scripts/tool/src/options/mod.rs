@@ -92,7 +92,7 @@ impl Refusal {
 impl Command {
     /// Parses a command line, runs `work` on it, and returns the exit code. Help, refusals and
     /// failures are printed here.
-    pub(crate) fn carry_out(
+    pub fn carry_out(
         &self,
         words: &[OsString],
         work: impl FnOnce(&Parsed) -> Result<ExitCode, Refusal>,
@@ -108,8 +108,11 @@ impl Command {
     }
 
     /// Parses a command line that must be valid; for tests.
-    #[cfg(test)]
-    pub(crate) fn right(&self, line: &str) -> Parsed {
+    ///
+    /// # Panics
+    ///
+    /// Panics if it is refused.
+    pub fn right(&self, line: &str) -> Parsed {
         let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
         let parsed = self.parse(&words);
         parsed.unwrap_or_else(|refusal| panic!("`{line}` gave {refusal:?}"))
@@ -312,6 +315,7 @@ pub struct Opt {
 /// Makes the options of a [`Command`]. The doc comment of each is its help sentence; then come the
 /// name, a short form, `in` and the group that it starts, a colon and the value it takes, and `or`
 /// with the default.
+#[macro_export]
 macro_rules! options {
     ($(
         $(#[doc = $help:literal])+
@@ -330,7 +334,7 @@ macro_rules! options {
         ),*]
     };
 }
-pub(crate) use options;
+pub use options;
 
 /// A value that follows an option.
 #[derive(Clone, Copy, Debug)]

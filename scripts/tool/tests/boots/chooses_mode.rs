@@ -5,47 +5,20 @@
 //! QEMU; so the tests run on any host. The last test uses the host as it is.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use tool::qemu::{PROGRAM, Qemu};
+use tool::qemu::Qemu;
 use tool::tiny::{TinyEnd, tiny_image};
 use tool::{image, install, probe, system};
 
-use crate::support::{Called, command, folder, succeed};
+use crate::support::{STOPS, assert_kvm_refused, call_by, folder, stub, succeed};
 
 /// A limit that no busy host reaches.
 const FAR: Duration = Duration::from_secs(120);
 
-/// As QEMU 7.2 does where the host's KVM does not know an instruction.
-const STOPS: &str = "echo 'KVM internal error. Suberror: 1' >&2; exec sleep 600";
 /// As QEMU 7.2 does where there is no device.
 const IS_ABSENT: &str = "echo 'Could not access KVM kernel module: No such file or directory' >&2
     echo 'qemu-system-x86_64: failed to initialize kvm: No such file or directory' >&2; exit 1";
-
-/// Makes a folder with a program of QEMU's name that does `under_kvm` in place of KVM.
-fn stub(name: &str, under_kvm: &str) -> PathBuf {
-    install::ensure_qemu().expect("QEMU");
-    let folder = folder(name);
-    let real = system::find_program(PROGRAM).expect("QEMU");
-    let real = real.display();
-    let script = format!(
-        "#!/bin/sh\ncase \"$*\" in *'-accel kvm'*) {under_kvm};; esac\nexec {real} \"$@\"\n"
-    );
-    let stub = folder.join(PROGRAM);
-    fs::write(&stub, script).expect("the script is written");
-    fs::set_permissions(&stub, fs::Permissions::from_mode(0o755)).expect("it is ours");
-    folder
-}
-
-/// Calls the tool with a folder in front of the `PATH`.
-fn call_by(stub: &Path, line: &str) -> Called {
-    let path = std::env::var("PATH").expect("a PATH");
-    let mut command = command(system::workspace(), line.split(' '));
-    command.env("PATH", format!("{}:{path}", stub.display()));
-    Called::of(command.output().expect("the tool starts"))
-}
 
 #[test]
 fn the_probe_passes_where_nothing_is_wrong() {
@@ -90,28 +63,10 @@ fn without_a_named_mode_a_useless_kvm_costs_a_sentence() {
 
 #[test]
 fn a_named_kvm_that_is_of_no_use_is_refused_by_every_command_that_boots() {
-    let stub = stub("refused", STOPS);
-    for line in [
+    assert_kvm_refused(&[
         "run --mode kvm",
         "run --dag apps/dag-file/examples/demo.dag --mode kvm",
-        "soak --short --mode kvm",
-        "oracle schedules --in-kernel --mode kvm --cores-up-to 1 tests/oracle/schedules.txt",
-        "bench hand-off --mode kvm",
-        "bench join-latency --mode kvm --out target/no-such-folder",
-    ] {
-        let called = call_by(&stub, line);
-        assert_eq!(called.code, Some(1), "{line}");
-        let complaint = called.complaint;
-        // Where an image is built first, a slow host says how long that takes.
-        let mut lines = complaint
-            .lines()
-            .filter(|line| !line.ends_with(" s so far"));
-        let refusal = lines.next().unwrap_or_default();
-        assert_eq!(lines.next(), None, "{line}: {complaint}");
-        let words = "`--mode kvm`: KVM is of no use here: KVM could not run the guest any further, \
-                     QEMU was killed (KVM internal error. Suberror: 1); use deterministic or threads";
-        assert!(refusal.contains(words), "{line}: {complaint}");
-    }
+    ]);
 }
 
 #[test]

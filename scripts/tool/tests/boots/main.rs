@@ -8,7 +8,9 @@ mod ends_in_order;
 mod images;
 mod keeps;
 mod prove;
-mod soak;
-#[path = "../support.rs"]
+#[path = "../support/mod.rs"]
 mod support;
 mod tiny_guest;
+
+/// The program that these tests call.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_fass-tool");

@@ -9,6 +9,7 @@ use std::process::Command;
 
 use tool::system::workspace;
 
+use crate::PROGRAM;
 use crate::support::{assert_refused, call, folder, refusal};
 
 fn demo() -> String {
@@ -28,8 +29,7 @@ run --mode deterministic --dag f.dag --dot ./f.dag | run: `--dag f.dag` and `--d
 run --mode deterministic --image f.dag --trace f.dag | run: `--image f.dag` and `--trace f.dag` are one file, which would be overwritten; name another
 run --mode deterministic --serial new --dot new | run: `--serial new` and `--dot new` are one file, which would be overwritten; name another
 trace f.dag -o f.dag | trace: `f.dag` and `--out f.dag` are one file, which would be overwritten; name another
-check-trace f.dag ./f.dag | are one file; give it once
-oracle synchronizer f.dag f.dag | are one file; give it once";
+check-trace f.dag ./f.dag | are one file; give it once";
     assert_refused(&folder, rows);
     let kept = fs::read_to_string(folder.join("f.dag"));
     assert_eq!(kept.expect("the file"), demo());
@@ -49,7 +49,6 @@ fn a_refused_command_empties_no_file() {
         "run --serial old.log --app none",
         "run --serial old.log --dot old.dot --image bad.dag",
         "run --serial old.log --qemu /none",
-        "bench hand-off --listing old.log --scale",
         "trace bad.dag -o old.log",
     ] {
         refusal(&folder, line.split(' '));
@@ -67,14 +66,12 @@ fn what_is_no_file_or_not_the_right_one_is_2_before_the_work() {
     assert!(status.expect("mkfifo is there").success());
     fs::create_dir(folder.join("sub.json")).expect("a folder");
     fs::write(folder.join("file"), "no image").expect("a file");
-    symlink(env!("CARGO_BIN_EXE_fass-tool"), folder.join("tool")).expect("a link");
+    symlink(PROGRAM, folder.join("tool")).expect("a link");
     let rows = "
 run --serial file/x | name another
 run --trace none/x | name another
 run --dot file/x | `--dot file/x`: cannot be written: 
 run --dot file/x | name another
-bench join-latency --deterministic --out file/x | name another
-bench hand-off --listing none/x | name another
 run --dag /dev/zero | it is a device or a pipe
 run --dag pipe | it is a device or a pipe
 run --dag none | none: cannot be read
@@ -89,31 +86,8 @@ run --trace pipe | it is a named pipe
 run --dot pipe | it is a named pipe
 check-trace sub.json | it is a folder
 check-trace /dev/zero | it is a device or a pipe
-trace pipe | it is a device or a pipe
-oracle bounds /dev/zero | it is a device or a pipe
-bench bounds sub.json | bench bounds: sub.json: cannot be read: it is a folder; name another file
-bench bounds late.txt | bench bounds: late.txt: case a: a DAG has D > T, which no method here covers; leave the case out
-bench bounds torn.txt | bench bounds: torn.txt:4: the file ends where a `end` record should be";
-    let set = "case a 2 1\ndag 8 9 1 0\nwcet 3\n";
-    fs::write(folder.join("late.txt"), format!("{set}end\n")).expect("a file");
-    fs::write(folder.join("torn.txt"), set).expect("a file");
+trace pipe | it is a device or a pipe";
     assert_refused(&folder, rows);
-}
-
-#[test]
-fn sets_of_files_are_counted_by_file() {
-    let folder = folder("sets");
-    // 9 of work by 8 on two cores, and on one.
-    let set = |cores: u32| format!("case on-{cores} {cores} 1\ndag 8 8 3 0\nwcet 3 3 3\nend\n");
-    fs::write(folder.join("both.txt"), set(2) + &set(1)).expect("a file");
-    fs::write(folder.join("one.txt"), set(1)).expect("a file");
-    let printed = call(&folder, ["bench", "bounds", "both.txt", "one.txt"]);
-    assert_eq!(printed.code, Some(0), "{}", printed.complaint);
-    let rows = printed.out.lines().skip(2);
-    let rows: Vec<Vec<&str>> = rows.map(|row| row.split_whitespace().collect()).collect();
-    let both = ["2", "50.0", "50.0", "50.0", "50.0", "50.0", "both.txt"];
-    let one = ["1", "0.0", "0.0", "0.0", "0.0", "0.0", "one.txt"];
-    assert_eq!(rows, [both, one]);
 }
 
 #[test]
@@ -125,14 +99,7 @@ fn a_name_need_not_be_utf_8() {
     let printed = call(&folder, with_odd("run --print-dag --dag"));
     assert_eq!(printed.code, Some(0), "{}", printed.complaint);
     assert!(printed.out.starts_with("dag "), "{}", printed.out);
-    for line in [
-        "run --cores",
-        "run --append",
-        "bench",
-        "",
-        "new-app",
-        "soak --mode",
-    ] {
+    for line in ["run --cores", "run --append", "", "new-app"] {
         let said = refusal(&folder, with_odd(line));
         assert!(said.contains('\u{fffd}'), "{said}");
     }

@@ -8,46 +8,18 @@ use std::process::{Command, Stdio};
 
 use tool::system::workspace;
 
-use crate::support::{assert_refused, call, command, folder, refusal};
+use crate::PROGRAM;
+use crate::support::{
+    assert_explained, assert_needs_room, assert_refused, assert_visible, call,
+    code_without_readers, folder, refusal,
+};
 
 /// Every command, by the words that name it.
-const COMMANDS: &str = "run, boot, test, new-app, check-trace, trace, recording, soak, bench, \
-    bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle assignment, \
-    oracle bounds, oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer, \
-    oracle waiting";
-
-/// Runs the tool with the other ends of both its outputs closed; returns its exit code.
-fn code_without_readers(line: &str) -> Option<i32> {
-    let closed = || {
-        let (reader, writer) = io::pipe().expect("a pipe");
-        drop(reader);
-        writer
-    };
-    let mut command = command(workspace(), line.split(' '));
-    command.stdout(closed()).stderr(closed());
-    let status = command.status().expect("the tool can be started");
-    status.code()
-}
+const COMMANDS: &str = "run, boot, new-app, check-trace, trace, recording";
 
 #[test]
 fn every_command_explains_itself_and_names_an_unknown_option() {
-    for name in COMMANDS.split(", ") {
-        let (help, unknown) = (format!("{name} --help"), format!("{name} --frobnicate"));
-        let explained = call(workspace(), help.split(' '));
-        assert_eq!(explained.code, Some(0), "{name}");
-        let usage = format!("usage: ./scripts/{name} ");
-        assert!(explained.out.contains(&usage), "{}", explained.out);
-        let script = name.split(' ').next().unwrap_or_default();
-        assert!(workspace().join("scripts").join(script).is_file(), "{name}");
-
-        let said = refusal(workspace(), unknown.split(' '));
-        let words = format!("{name}: unknown option `--frobnicate`; ");
-        assert!(said.starts_with(&words), "{said}");
-        assert!(said.ends_with("--help"), "{said}");
-
-        assert_eq!(code_without_readers(&help), Some(0), "{name}");
-        assert_eq!(code_without_readers(&unknown), Some(2), "{name}");
-    }
+    assert_explained(COMMANDS);
 }
 
 #[test]
@@ -57,7 +29,6 @@ fn that_no_one_reads_is_no_failure_and_that_there_is_no_room_is_one() {
     let log = folder.join("good.rec").display().to_string();
     for line in [
         "run --print-dag --dag apps/dag-file/examples/rd-gen/gnp_01.yaml",
-        "oracle synchronizer tests/oracle/synchronizer.txt",
         &format!("trace {log}"),
         &format!("check-trace {log}"),
     ] {
@@ -66,15 +37,8 @@ fn that_no_one_reads_is_no_failure_and_that_there_is_no_room_is_one() {
     for line in [
         "run --help",
         "run --print-dag --dag apps/dag-file/examples/demo.dag",
-        "oracle synchronizer tests/oracle/synchronizer.txt",
     ] {
-        let full = fs::File::create("/dev/full").expect("the device is there");
-        let mut command = command(workspace(), line.split(' '));
-        let output = command.stdout(full).output().expect("it starts");
-        let said = String::from_utf8(output.stderr).expect("UTF-8");
-        assert_eq!(output.status.code(), Some(1), "{line}: {said}");
-        let words = "fass-tool: standard output could not be written: No space left on device";
-        assert!(said.starts_with(words), "{said}");
+        assert_needs_room("fass-tool", line);
     }
 }
 
@@ -82,10 +46,6 @@ fn that_no_one_reads_is_no_failure_and_that_there_is_no_room_is_one() {
 fn what_does_not_fit_is_refused_with_the_remedy() {
     let rows = "
 run --coers 3 | run: unknown option `--coers`; did you mean `--cores`?
-oracle schedules --in-kernal | oracle schedules: unknown option `--in-kernal`; did you mean `--in-kernel`?
-bench hand-of | bench: unknown WHAT `hand-of`; did you mean `hand-off`?
-oracle bound | oracle: unknown KIND `bound`; did you mean `bounds`?
-tset | fass-tool: unknown SUBCOMMAND `tset`; did you mean `test`?
 run --app dag-file --mode deterministic | run: app `dag-file` runs the DAGs of a file; name one by `--dag FILE`
 run --execution wcet | `--execution` needs `--dag FILE`
 run --from a/1 | run: `--from` needs `--replay FILE`; give it, too
@@ -100,14 +60,6 @@ run --output - | `--output -`: standard output is
 run --dag x --output y | `--output` and `--dag` exclude
 run --boot bios --machine microvm | `--machine microvm`: it has no firmware
 run --boot uefi --mode deterministic | give --mode threads
-bench bounds --cores 2,2 | `--cores`: `2` stands twice
-bench bounds sets.txt --seed 2 | bench bounds: `--seed` is for random sets; leave it or the files out
-bench native --only join,join | `--only`: `join` stands twice
-bench join-latency --once --mode threads | `--once`
-bench join-latency --subtasks 2,2 --deterministic | `--subtasks`: `2` stands twice
-bench join-latency --policies exact,exact | `--policies`: `exact` stands twice
-bench join-latency --mode threads --deterministic | exclude
-bench join-latency --on linux --once | `--once` is for guests
 new-app | new-app: which name? give one, such as `./scripts/new-app brake-assist`
 new-app fork-join | new-app: there is an app `fork-join` already; choose another name, or edit apps/fork-join
 new-app one two | new-app: `two`: only one NAME is allowed, and `one` is one
@@ -124,29 +76,18 @@ new-app one --git https://example.org | new-app: `--git` is for a repository; ad
 /// In each line, a word stands for a character that a terminal would obey.
 #[test]
 fn what_a_message_repeats_cannot_rewrite_the_terminal() {
-    for word in ["\u{1b}[2J", "a\nb", "\u{202e}abc", "\u{feff}"] {
-        for line in [
-            "run --cores WORD",
-            "run WORD",
-            "run --app WORD",
-            "run --set WORD=",
-            "run --dag WORD",
-            "run --dag apps/dag-file/examples/demo.dag --graph WORD",
-            "run --dag apps/dag-file/examples/demo.dag --clusters 1WORD1",
-            "run --image WORD",
-            "check-trace WORD",
-            "oracle bounds WORD",
-            "bench WORD",
-            "bench join-latency --policies fassWORDexact",
-            "new-app WORD",
-            "soak --mode WORD",
-        ] {
-            let words = line.split(' ').map(|given| given.replace("WORD", word));
-            let said = refusal(workspace(), words);
-            let is_raw = |character: char| !matches!(character, ' '..='~');
-            assert!(!said.contains(is_raw), "{line}: {said:?}");
-        }
-    }
+    assert_visible(&[
+        "run --cores WORD",
+        "run WORD",
+        "run --app WORD",
+        "run --set WORD=",
+        "run --dag WORD",
+        "run --dag apps/dag-file/examples/demo.dag --graph WORD",
+        "run --dag apps/dag-file/examples/demo.dag --clusters 1WORD1",
+        "run --image WORD",
+        "check-trace WORD",
+        "new-app WORD",
+    ]);
     assert!(refusal(workspace(), ["run", "--set", "gain=1\n2"]).contains("\\n"));
 }
 
@@ -177,8 +118,7 @@ fn that_another_command_builds_is_said_and_help_does_not_wait_for_it() {
     assert_eq!(line, waiting);
 
     // A tool that is built answers while the lock is held.
-    let built = env!("CARGO_BIN_EXE_fass-tool");
-    fs::copy(built, target.join("tool/fass-tool")).expect("the folder takes a program");
+    fs::copy(PROGRAM, target.join("tool/fass-tool")).expect("the folder takes a program");
     let output = run_help().output().expect("the script can be started");
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     assert_eq!(output.stderr, b"");

@@ -8,8 +8,10 @@ mod lines;
 #[allow(dead_code, reason = "each program uses a part of this")]
 mod made;
 mod on_linux;
-mod oracle_schedules;
 mod recordings;
-#[path = "../support.rs"]
+#[path = "../support/mod.rs"]
 mod support;
 mod traces;
+
+/// The program that these tests call.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_fass-tool");

@@ -4,9 +4,9 @@
 //! By SCHED_FIFO where the host allows it, and without preemption where it does not.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::support::{Called, call, command, folder, succeed};
+use crate::support::{call, folder, succeed};
 use tool::protocol::{MachineLine, Transcript};
 use tool::record::Record;
 use tool::system::workspace;
@@ -76,45 +76,6 @@ fn a_dag_file_is_run_and_drawn_with_its_cores_divided_as_on_the_machine() {
         assert_eq!(clusters == [1, 1], cores > 1, "{clusters:?}");
         check_trace(&folder, 1);
     }
-}
-
-/// Makes a folder of all programs that there are but QEMU's, and of no package manager.
-fn programs_without_qemu() -> PathBuf {
-    const MANAGERS: [&str; 5] = ["apt-get", "dnf", "pacman", "zypper", "apk"];
-    let folder = folder("without-qemu");
-    let path = std::env::var_os("PATH").expect("there is one");
-    for file in std::env::split_paths(&path).filter_map(|path| fs::read_dir(path).ok()) {
-        for file in file.flatten() {
-            let name = file.file_name().to_string_lossy().into_owned();
-            if !name.starts_with("qemu-") && !MANAGERS.contains(&&*name) {
-                // Of two programs of one name the first counts.
-                let _ = std::os::unix::fs::symlink(file.path(), folder.join(name));
-            }
-        }
-    }
-    folder
-}
-
-#[test]
-fn the_evaluation_is_repeated_with_its_baselines_without_qemu() {
-    let folder = folder("evaluation");
-    let bench =
-        "bench join-latency --on linux --subtasks 2 --policies fass,exact --jobs 4 --out out";
-    let mut command = command(&folder, bench.split(' '));
-    let output = command.env("PATH", programs_without_qemu()).output();
-    let called = Called::of(output.expect("the tool can be started"));
-    let said = called.out;
-    assert_eq!(called.code, Some(0), "{said}{}", called.complaint);
-    let conditions = "2 conditions of 4 jobs; mode linux, 4 cores";
-    assert!(said.contains(conditions), "{said}");
-    for joins in ["FasS (DAG)", "ExactTime"] {
-        let row = said.lines().find(|line| line.contains(joins));
-        let row: Vec<&str> = row.expect("a row").split_whitespace().collect();
-        // All four jobs are joined, each with its own values.
-        let mut parts = row.windows(3);
-        assert!(parts.any(|part| part == ["1.000", "4", "0"]), "{said}");
-    }
-    assert!(folder.join("out/summary.json").is_file());
 }
 
 #[test]

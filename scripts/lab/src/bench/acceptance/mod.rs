@@ -1,0 +1,367 @@
+//! Acceptance by utilization: the share of random sets for which a method finds room.
+//!
+//! For each number of cores, for deadlines equal to periods and below them, and for each
+//! utilization, the same random sets are given to all methods. No time is measured, so the results
+//! are the same on every host. They are a table, a CSV file and a picture. Sets of a file can be
+//! counted in the same way, in the form of the oracle's reference files.
+//!
+//! - here: points, and what is written of them;
+//! - `methods`: the methods; `sets`: how sets are drawn; `picture`: the curves.
+
+mod methods;
+mod picture;
+mod sets;
+
+use std::fmt::Write;
+use std::ops::Range;
+use std::path::Path;
+
+use random::{Random, nth};
+use sched_dag::analysis::Task;
+
+use crate::oracle;
+use crate::oracle::assignment::{self, AssignmentCase};
+use methods::METHODS;
+use sets::{Deadlines, draw};
+use tool::files;
+use tool::output::Table;
+use tool::progress::Progress;
+
+/// The utilizations of the points, in percent of the cores, and their distance.
+const PERCENTS: Range<u64> = 20..100;
+const STEP: usize = 5;
+
+/// Sets that were counted, and how many of them each method accepts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct AcceptanceCounts {
+    sets: u64,
+    accepted: [u64; METHODS.len()],
+}
+
+impl AcceptanceCounts {
+    /// Counts a set, in which no DAG has `D > T`.
+    fn add(&mut self, tasks: &[Task], cores: u32) {
+        let tasks: Vec<&Task> = tasks.iter().collect();
+        self.sets += 1;
+        for (count, method) in self.accepted.iter_mut().zip(&METHODS) {
+            *count += u64::from((method.accepts)(&tasks, cores));
+        }
+    }
+
+    /// Returns the shares of the sets in percent, as cells of a table.
+    fn shares(&self) -> impl Iterator<Item = String> {
+        let share = |count| format!("{:.1}", 100.0 * count as f64 / self.sets as f64);
+        self.accepted.into_iter().map(share)
+    }
+}
+
+/// Sets of one kind.
+#[derive(Debug)]
+struct Point {
+    cores: u32,
+    deadlines: Deadlines,
+    /// The utilization in percent of the cores.
+    percent: u64,
+    counts: AcceptanceCounts,
+}
+
+/// Counts sets at all points, writes `acceptance.csv` and `acceptance.svg` into a folder, and
+/// returns a table.
+///
+/// # Errors
+///
+/// In words: a file cannot be written.
+pub(super) fn measure(cores: &[u32], sets: u64, seed: u64, out: &Path) -> Result<String, String> {
+    let mut points = points(cores);
+    let mut progress = Progress::new(points.len() as u64, "points");
+    for (done, point) in (0..).zip(&mut points) {
+        progress.show(done);
+        point.count(sets, seed);
+    }
+    progress.wipe();
+    files::write(&out.join("acceptance.csv"), csv(&points))?;
+    files::write(&out.join("acceptance.svg"), picture::draw(&points))?;
+    Ok(table(&points))
+}
+
+/// Returns the points in the order of their cores, deadlines and utilizations, nothing counted yet.
+fn points(cores: &[u32]) -> Vec<Point> {
+    let mut points = Vec::new();
+    for &cores in cores {
+        for deadlines in Deadlines::ALL {
+            points.extend(PERCENTS.step_by(STEP).map(|percent| Point {
+                cores,
+                deadlines,
+                percent,
+                counts: AcceptanceCounts::default(),
+            }));
+        }
+    }
+    points
+}
+
+impl Point {
+    /// Draws sets and counts them. They depend on the seed and on the kind of the point, not on what
+    /// other points there are.
+    fn count(&mut self, sets: u64, seed: u64) {
+        let kind = u64::from(self.cores) << 16 | self.percent << 8 | self.deadlines as u64;
+        let mut random = Random::new(nth(seed, kind));
+        for _ in 0..sets {
+            let set = draw(&mut random, self.cores, self.percent, self.deadlines);
+            self.counts.add(&set, self.cores);
+        }
+    }
+
+    /// Returns the kind as the first columns of the file and of the table.
+    fn kind(&self) -> [String; 3] {
+        let utilization = format!("{:.2}", self.percent as f64 / 100.0);
+        let deadlines = self.deadlines.names().0.into();
+        [self.cores.to_string(), deadlines, utilization]
+    }
+}
+
+/// Returns a row for each point: numbers of sets.
+fn csv(points: &[Point]) -> String {
+    let methods = METHODS.each_ref().map(|method| method.name).join(",");
+    let mut text = format!("cores,deadlines,utilization,sets,{methods}\n");
+    for point in points {
+        let (kind, AcceptanceCounts { sets, accepted }) = (point.kind().join(","), point.counts);
+        let counts = accepted.map(|count| count.to_string()).join(",");
+        // Writing into a `String` cannot fail.
+        let _ = writeln!(text, "{kind},{sets},{counts}");
+    }
+    text
+}
+
+/// Returns the columns of the methods.
+fn columns() -> String {
+    METHODS
+        .each_ref()
+        .map(|method| format!("{}:12", method.name))
+        .join("|")
+}
+
+/// Returns a row for each point: shares of the sets.
+fn table(points: &[Point]) -> String {
+    let title = "random sets accepted, in percent\n";
+    let columns = format!("cores:5|deadlines:13|U / m:7|{}", columns());
+    let mut table = Table::new(title, &columns);
+    for point in points {
+        table.cells(point.kind().into_iter().chain(point.counts.shares()));
+    }
+    table.text()
+}
+
+/// The sets of a file, which is as the oracle's of assignments, with or without answers.
+pub(super) struct SetFile {
+    name: String,
+    sets: Vec<AssignmentCase>,
+}
+
+impl SetFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    ///
+    /// In words: it cannot be read, or no method is for one of its sets.
+    pub(super) fn read(path: &Path) -> Result<Self, String> {
+        let name = files::shown_path(path);
+        let sets = oracle::read([path].into_iter(), assignment::parse_sets)?;
+        let is_beyond = |task: &Task| task.relative_deadline_ns() > task.period_ns();
+        match sets.iter().find(|set| set.tasks.iter().any(is_beyond)) {
+            None => Ok(Self { name, sets }),
+            Some(set) => Err(format!(
+                "{name}: case {}: a DAG has D > T, which no method here covers; leave the case out",
+                set.name
+            )),
+        }
+    }
+}
+
+/// Counts the sets of files; returns a table with a row for each file.
+pub(super) fn of_files(files: &[SetFile]) -> String {
+    let columns = format!("sets:6|{}|  file:<6", columns());
+    let mut table = Table::new("sets accepted, in percent\n", &columns);
+    for SetFile { name, sets } in files {
+        let mut counts = AcceptanceCounts::default();
+        for set in sets {
+            counts.add(&set.tasks, set.cores);
+        }
+        let shares = counts.shares().chain([format!("  {name}")]);
+        table.cells([counts.sets.to_string()].into_iter().chain(shares));
+    }
+    table.text()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::bounds::terms;
+    use sched_dag::analysis::{answer, assign};
+    use sched_dag::{AssignmentReason, DagSpec, Policy, SubtaskSpec, verify};
+
+    const LENT: usize = 3;
+
+    /// Points of 2 and 4 cores with counts of their own, of 200 sets.
+    fn counted() -> Vec<Point> {
+        let mut points = points(&[2, 4]);
+        for (nth, point) in (0..).zip(&mut points) {
+            point.counts.sets = 200;
+            point.counts.accepted = [nth, 2 * nth, 100, 200 - nth, 200];
+        }
+        points
+    }
+
+    #[test]
+    fn the_file_and_the_table_hold_what_was_counted() {
+        let points = counted();
+        let (text, table) = (csv(&points), table(&points));
+        let (lines, rows): (Vec<_>, Vec<_>) = (text.lines().collect(), table.lines().collect());
+        let header = "cores,deadlines,utilization,sets,graham,multi_path,v_fed,lent,fluid";
+        assert_eq!(
+            (lines[0], lines.len(), rows.len()),
+            (header, 1 + 64, 2 + 64)
+        );
+        assert_eq!(lines[1], "2,implicit,0.20,200,0,0,100,200,200");
+        assert_eq!(lines[1 + 17], "2,constrained,0.25,200,17,34,100,183,200");
+        assert_eq!(lines[1 + 63], "4,constrained,0.95,200,63,126,100,137,200");
+        let cells: Vec<&str> = rows[2 + 17].split_whitespace().collect();
+        let expected = "2 constrained 0.25 8.5 17.0 50.0 91.5 100.0";
+        assert_eq!(cells.join(" "), expected);
+    }
+
+    #[test]
+    fn the_picture_shows_what_was_counted() {
+        let picture = picture::draw(&counted());
+        for method in &METHODS {
+            assert!(picture.contains(&format!(">{}</text>", method.title)));
+        }
+        for title in [
+            "m = 2, D = T",
+            "m = 2, D ≤ T",
+            "m = 4, D = T",
+            "m = 4, D ≤ T",
+        ] {
+            assert_eq!(picture.matches(&format!(">{title}</text>")).count(), 1);
+        }
+        // The curves of a panel begin at 20 % and end at 95 %, each at the height of its share.
+        let curves: Vec<&str> = picture.lines().filter(|line| line.contains(" L")).collect();
+        assert_eq!(curves.len(), 4 * METHODS.len());
+        let ends = |curve: &str| {
+            let path = curve.split('"').nth(1).unwrap_or_default();
+            let (first, last) = (path.split_once(" L"), path.rsplit_once(" L"));
+            let (first, last) = (first.unwrap().0, last.unwrap().1);
+            [first, last].map(|end| {
+                let (x, y) = end.trim_start_matches('M').split_once(' ').unwrap();
+                [x, y].map(|pixel| pixel.parse::<u64>().unwrap())
+            })
+        };
+        let (left, top) = picture::CORNER;
+        let (width, height) = picture::FIELD;
+        let right = left + 75 * width / 80;
+        // The widest is drawn first: 200 and 185 of 200, then 0 and 15.
+        let y = |accepted: u64| top + height - (accepted * height + 100) / 200;
+        assert_eq!(ends(curves[0]), [[left, y(200)], [right, y(185)]]);
+        assert_eq!(ends(curves[1]), [[left, y(0)], [right, y(15)]]);
+        assert_eq!(ends(curves[3]), [[left, y(100)], [right, y(100)]]);
+        // Then come the constrained ones of 2 cores, below, and those of 4 cores, on the right.
+        let below = ends(curves[METHODS.len() + 4]);
+        let beside = ends(curves[2 * METHODS.len() + 4]);
+        assert_eq!(
+            below,
+            [[left, top], [right, top]].map(|[x, y]| [x, y + picture::STEP.1])
+        );
+        assert_eq!(
+            beside,
+            [[left, top], [right, top]].map(|[x, y]| [x + picture::STEP.0, y])
+        );
+    }
+
+    #[test]
+    fn a_point_depends_on_nothing_but_its_kind_and_the_seed() {
+        let drawn = |cores, percent, seed| {
+            let mut points = points(cores);
+            points.retain(|point| (point.cores, point.percent) == (4, percent));
+            let [implicit, constrained] = &mut points[..] else {
+                panic!("{points:?}");
+            };
+            implicit.count(6, seed);
+            constrained.count(6, seed);
+            [implicit.counts, constrained.counts]
+        };
+        assert_eq!(drawn(&[2, 4], 80, 1), drawn(&[4], 80, 1));
+        assert_ne!(drawn(&[4], 80, 1), drawn(&[4], 80, 2));
+        // All methods accept a light load.
+        let all = AcceptanceCounts {
+            sets: 6,
+            accepted: [6; METHODS.len()],
+        };
+        assert_eq!(drawn(&[4], 20, 1)[0], all);
+    }
+
+    /// Returns whether a commit divides cores by lending them, and proves all DAGs.
+    fn is_committed(tasks: &[Task], cores: u32) -> bool {
+        let spec = |(number, task): (usize, &Task)| DagSpec {
+            name: format!("dag {number}"),
+            period_ns: Some(task.period_ns()),
+            relative_deadline_ns: Some(task.relative_deadline_ns()),
+            subtasks: (task.wcets_ns().iter())
+                .map(|&wcet_ns| SubtaskSpec {
+                    wcet_ns: Some(wcet_ns),
+                    ..SubtaskSpec::default()
+                })
+                .collect(),
+            edges: sets::edges(task),
+            ..DagSpec::default()
+        };
+        let specs: Vec<DagSpec> = tasks.iter().enumerate().map(spec).collect();
+        let (options, settings) = terms(Policy::StaticPriority, cores);
+        let Ok(verified) = verify(&specs, &options) else {
+            // A WCET is beyond its deadline.
+            return false;
+        };
+        let mut task_set = verified.task_set;
+        let is_assigned = assign(&mut task_set, &settings).is_ok();
+        let is_lent = task_set.dags().iter().all(|dag| {
+            use AssignmentReason::{Member, Owner, Whole};
+            matches!(
+                dag.why_there(),
+                Some(Whole { .. } | Owner { .. } | Member { .. })
+            )
+        });
+        is_assigned && is_lent && answer(&task_set, &settings).is_proven()
+    }
+
+    #[test]
+    fn lent_cores_accept_the_sets_that_a_commit_proves() {
+        let text = include_str!("../../../../../tests/oracle/lent.txt");
+        let expected = text.lines().filter(|line| line.starts_with("attempt"));
+        let kinds = ["case", "dag", "wcet", "edge", "end"];
+        let is_bare = |line: &&str| {
+            kinds
+                .iter()
+                .any(|kind| line.split(' ').next() == Some(kind))
+        };
+        let bare: Vec<&str> = text.lines().filter(is_bare).collect();
+        let sets = assignment::parse_sets(text).unwrap();
+        let bare = assignment::parse_sets(&bare.join("\n")).unwrap();
+        assert_eq!((sets.len(), bare.len()), (60, 60));
+        for ((set, bare), expected) in sets.iter().zip(&bare).zip(expected) {
+            let mut counts = AcceptanceCounts::default();
+            counts.add(&bare.tasks, bare.cores);
+            let is_accepted = expected != "attempt -";
+            assert_eq!(
+                counts.accepted[LENT],
+                u64::from(is_accepted),
+                "{}",
+                set.name
+            );
+            assert_eq!(
+                is_committed(&set.tasks, set.cores),
+                is_accepted,
+                "{}",
+                set.name
+            );
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Acceptance by utilization as a picture: a panel for each number of cores and kind of deadlines,
+//! with a curve for each method.
+//!
+//! Methods differ by colour and by dashes. The lent cores' curve is the widest and lies below the
+//! others, so that one which coincides with it shows on it.
+
+use super::methods::METHODS;
+use super::sets::Deadlines;
+use super::{PERCENTS, Point};
+use tool::svg::Svg;
+
+/// The size of a panel's field of curves.
+pub(super) const FIELD: (u64, u64) = (224, 180);
+/// The distance of the left upper corners of two panels.
+pub(super) const STEP: (u64, u64) = (286, 252);
+/// The corner of the first field, right of the labels and below the legend.
+pub(super) const CORNER: (u64, u64) = (64, 108);
+/// The utilizations, in percent, at the ends of a field.
+const ENDS: (u64, u64) = (PERCENTS.start, 100);
+
+/// How the methods' curves are drawn: in the order of the methods.
+const STYLES: [&str; METHODS.len()] = [
+    "stroke=\"#7f7f7f\" stroke-width=\"1.6\" stroke-dasharray=\"2 3\"",
+    "stroke=\"#0072b2\" stroke-width=\"1.8\" stroke-dasharray=\"7 3\"",
+    "stroke=\"#b5179e\" stroke-width=\"1.8\" stroke-dasharray=\"8 3 2 3\"",
+    "stroke=\"#f08c2e\" stroke-width=\"4\"",
+    "stroke=\"#1b1b1b\" stroke-width=\"1.3\"",
+];
+/// The curve that lies below the others.
+const LOWEST: usize = 3;
+
+/// Draws points, which are in the order of their cores, deadlines and utilizations.
+pub(super) fn draw(points: &[Point]) -> String {
+    let mut svg = Svg::default();
+    let sets = points.first().map_or(0, |point| point.counts.sets);
+    let title = format!("Random sets of DAGs that a method accepts, of {sets} a point");
+    svg.text((CORNER.0, 24), "start", &title);
+    legend(&mut svg);
+    let rows = Deadlines::ALL.len() as u64;
+    let kind = |point: &Point| (point.cores, point.deadlines);
+    let mut panels = 0;
+    for curve in points.chunk_by(|one, other| kind(one) == kind(other)) {
+        panel(&mut svg, (panels / rows, panels % rows), curve);
+        panels += 1;
+    }
+    // The legend takes the room of three panels.
+    let width = CORNER.0 + (panels / rows).max(3) * STEP.0 - 20;
+    svg.into_text((width, CORNER.1 + rows * STEP.1 - 16))
+}
+
+/// Draws the name of each method next to a piece of its curve, in two rows.
+fn legend(svg: &mut Svg) {
+    for (place, (method, style)) in (0..).zip(METHODS.iter().zip(STYLES)) {
+        let (x, y) = (CORNER.0 + place % 3 * 270, 44 + place / 3 * 20);
+        svg.line((x, y), (x + 40, y), style);
+        svg.text((x + 48, y + 4), "start", method.title);
+    }
+}
+
+/// Draws the axes and curves of a panel at a place, by columns and rows.
+fn panel(svg: &mut Svg, (column, row): (u64, u64), curve: &[Point]) {
+    let (left, top) = (CORNER.0 + column * STEP.0, CORNER.1 + row * STEP.1);
+    let (right, bottom) = (left + FIELD.0, top + FIELD.1);
+    let x = |percent: u64| left + (percent - ENDS.0) * FIELD.0 / (ENDS.1 - ENDS.0);
+    // Rounded to the nearest pixel.
+    let y = |count: u64, of: u64| bottom - (2 * count * FIELD.1 + of) / (2 * of).max(1);
+    let grey = "stroke=\"#333333\" stroke-opacity=\"0.15\"";
+    for accepted in [0, 25, 50, 75, 100] {
+        let y = y(accepted, 100);
+        svg.line((left, y), (right, y), grey);
+        svg.text((left - 6, y + 4), "end", &format!("{accepted} %"));
+    }
+    for percent in (ENDS.0..=ENDS.1).step_by(20) {
+        svg.line((x(percent), top), (x(percent), bottom), grey);
+        let label = format!("{:.1}", percent as f64 / 100.0);
+        svg.text((x(percent), bottom + 17), "middle", &label);
+    }
+    let axes = format!("M{left} {top} V{bottom} H{right}");
+    svg.path(&axes, "fill=\"none\" stroke=\"#333333\"");
+    if let Some(Point {
+        cores, deadlines, ..
+    }) = curve.first()
+    {
+        let title = format!("m = {cores}, {}", deadlines.names().1);
+        svg.text((left, top - 10), "start", &title);
+    }
+    svg.text((right, bottom + 34), "end", "utilization / m");
+    let others = (0..METHODS.len()).filter(|method| *method != LOWEST);
+    for method in [LOWEST].into_iter().chain(others) {
+        let ends = curve.iter().map(
+            |Point {
+                 percent, counts, ..
+             }| {
+                format!(
+                    "{} {}",
+                    x(*percent),
+                    y(counts.accepted[method], counts.sets)
+                )
+            },
+        );
+        let path = format!("M{}", ends.collect::<Vec<_>>().join(" L"));
+        svg.path(&path, &format!("fill=\"none\" {}", STYLES[method]));
+    }
+}

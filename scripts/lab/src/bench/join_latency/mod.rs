@@ -1,0 +1,535 @@
+//! The paper's evaluation: join latency by a DAG, by equal and by close stamps.
+//!
+//! A *condition* is a policy that joins, the number N of parallel subtasks, and a seed. Each is one
+//! boot of the app `join-latency`, which prints the times of all executions and joins. They are
+//! kept as one file for each condition, from which everything else is computed: samples, summary,
+//! pictures, table. So an interruption loses nothing, and a file is not measured again as long as
+//! it was measured under the same conditions (image, QEMU, all options).
+//!
+//! - here: the plan, the conditions and their boots;
+//! - `figures`: from the guest's lines to figures, and their output.
+
+mod figures;
+
+use std::ffi::OsString;
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{self, ExitCode};
+use std::time::Duration;
+
+use recording::Crc;
+use text::quoted;
+
+use super::frame::{by_plan, draw, judged};
+use figures::ConditionFigures;
+use tool::files;
+use tool::options::{Command, Parsed, Takes, options};
+use tool::program::ProgramOrder;
+use tool::progress::Progress;
+use tool::qemu::{Mode, PROGRAM, Qemu};
+use tool::{image, install, outcome, probe, program, system};
+
+/// Runs `bench join-latency` with the words after its name.
+pub(super) fn run(words: &[OsString]) -> ExitCode {
+    by_plan(&TABLE, words, JoinPlan::new, |plan| {
+        measure_all(plan).map(|()| true)
+    })
+}
+
+/// Measures the missing conditions, and writes all results.
+fn measure_all(plan: &JoinPlan) -> Result<(), String> {
+    let (setting, why) = Setting::new(plan)?;
+    let (conditions, jobs, cores) = (plan.conditions.len(), plan.jobs, plan.cores);
+    let (mode, version) = (setting.mode_name(), &setting.version);
+    println!("{conditions} conditions of {jobs} jobs; mode {mode}, {cores} cores; {version}");
+    println!("time: {}", setting.meaning());
+    if let Some(why) = why {
+        println!("{why}");
+    }
+    let folder = plan.out.join("conditions");
+    let made = fs::create_dir_all(&folder);
+    made.map_err(|error| format!("cannot make `{}`: {error}", folder.display()))?;
+    let mut progress = Progress::new(conditions as u64, "conditions");
+    let mut measured = Vec::new();
+    for (condition, over) in plan.conditions.iter().zip(0..) {
+        progress.show(over);
+        let statement = setting.statement(condition);
+        let file = folder.join(format!("{}.csv", condition.file_stem()));
+        let read = |text: String| figures::read(&text, &statement, condition.subtasks);
+        // A file of other conditions, or a damaged one, reads as none.
+        let samples = match fs::read_to_string(&file).ok().and_then(read) {
+            Some(samples) => samples,
+            None => {
+                let text = setting.measure(condition)?;
+                write_whole(&file, &text)?;
+                read(text).ok_or_else(|| format!("{condition}: its times are damaged"))?
+            }
+        };
+        measured.push((*condition, ConditionFigures::of(&samples)));
+        // After each condition: an interruption leaves figures for those measured so far.
+        let summary = figures::summary_json(&setting, &measured);
+        write_whole(&plan.out.join("summary.json"), &summary)?;
+        write_whole(
+            &plan.out.join("samples.csv"),
+            &figures::samples_csv(&measured),
+        )?;
+    }
+    progress.wipe();
+    if let Err(line) = draw("join_latency.py", &plan.out) {
+        eprintln!("{line}");
+    }
+    print!("{}", figures::table(&measured));
+    println!("written: {}", plan.out.display());
+    Ok(())
+}
+
+/// Writes a file whole or not at all: an interruption leaves the old one.
+fn write_whole(path: &Path, text: &str) -> Result<(), String> {
+    let unfinished = path.with_extension("unfinished");
+    files::write(&unfinished, text)?;
+    // A rename within one folder is atomic.
+    let renamed = fs::rename(&unfinished, path);
+    renamed.map_err(|error| format!("cannot write `{}`: {error}", path.display()))
+}
+
+/// The table of `bench join-latency`.
+static TABLE: Command = Command {
+    invocation: "./scripts/bench join-latency",
+    about: "Reproduces the paper's evaluation: joins by a DAG, by equal and by close stamps.",
+    positional: None,
+    options: options! {
+        /// The folder for all results; what is there already is not measured again. If not given,
+        /// target/join-latency, or target/join-latency-on-linux.
+        "out" 'o': Takes::File("DIR");
+        /// Jobs of each condition.
+        "jobs": Takes::Number(1, 100_000), or "2000";
+        /// Parallel subtasks N; a condition has two processors more than the largest.
+        "subtasks": Takes::Numbers(1, 16), or "2,4,6";
+        /// The policies: fass, exact, approximate-MS with the longest interval.
+        "policies": Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
+        /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
+        /// every policy.
+        "repeat": Takes::Number(1, 1000), or "1";
+        /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
+        /// there are fewer.
+        "on": Takes::OneOf(&["machine", "linux"]), or "machine";
+        /// Queue size of the synchronizers.
+        "queue": Takes::Number(1, 100_000), or "1000";
+        /// The meaning of time, see ./scripts/run --help; kvm where it works, else deterministic.
+        "mode": Takes::OneOf(Mode::NAMES);
+        /// The same as --mode deterministic.
+        "deterministic": Takes::Nothing;
+        /// Boot each deterministic condition once, not until two boots agree.
+        "once": Takes::Nothing;
+    },
+    notes: "\
+writes into DIR:
+  summary.json        counts, median, mean, p99, max of each condition
+  samples.csv         each sample of each metric
+  conditions/*.csv    each condition's raw times, written when it is complete
+  plots/*.svg         if python3 has matplotlib
+
+Interrupted, it keeps the conditions that are complete; run again with the same
+options, it measures the others only. docs/paper.md explains the metrics.
+
+exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command line
+",
+};
+
+/// The settings that all conditions share, and the conditions.
+#[derive(Clone, Debug)]
+struct JoinPlan {
+    out: PathBuf,
+    /// For each N all policies, for each of them all seeds.
+    conditions: Vec<Condition>,
+    seeds: Vec<u64>,
+    jobs: u64,
+    queue: u64,
+    cores: u64,
+    memory_mib: u64,
+    /// Whether the conditions are programs of this computer.
+    on_linux: bool,
+    /// The named mode; `None`: the built image decides.
+    named: Option<Mode>,
+    /// Whether a deterministic condition is booted once only.
+    once: bool,
+}
+
+impl JoinPlan {
+    /// Makes the plan from the options.
+    ///
+    /// # Errors
+    ///
+    /// One line with the reason: the options contradict each other.
+    fn new(options: &Parsed) -> Result<JoinPlan, String> {
+        let on_linux = options.text("on") == Some("linux");
+        if on_linux {
+            let why = "is for guests; leave it or `--on linux` out";
+            options.check_without(&["mode", "deterministic", "once"], why)?;
+        }
+        (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
+        options.check_distinct(&["policies", "subtasks"])?;
+        let policies = Policy::list(options.text("policies").unwrap_or_default())?;
+        let mut named = options.text("mode").and_then(Mode::from_name);
+        if options.is_given("deterministic") {
+            let other = named.filter(|mode| *mode != Mode::Deterministic);
+            if let Some(mode) = other {
+                return Err(format!(
+                    "`--mode {mode}` and `--deterministic` exclude each other; give one"
+                ));
+            }
+            named = Some(Mode::Deterministic);
+        }
+        let once = options.is_given("once");
+        if let Some(mode) = named.filter(|mode| once && *mode != Mode::Deterministic) {
+            return Err(format!(
+                "`--once` is for deterministic conditions, and the mode is {mode}, in which each \
+                 is booted once; leave it out"
+            ));
+        }
+        let number = |name| options.number(name).unwrap_or(1);
+        let subtasks: Vec<usize> = options.numbers("subtasks");
+        let seeds: Vec<u64> = (1..=number("repeat")).collect();
+        let of_size = |&subtasks: &usize| {
+            let seeds = &seeds;
+            let of_policy = move |&policy: &Policy| {
+                seeds.iter().map(move |&seed| Condition {
+                    policy,
+                    subtasks,
+                    seed,
+                })
+            };
+            policies.iter().flat_map(of_policy)
+        };
+        let conditions = subtasks.iter().flat_map(of_size).collect();
+        // A core each for source, join and parallel subtasks, so that none waits for one.
+        let cores = subtasks.iter().max().map_or(1, |most| *most as u64) + 2;
+        let folder = match on_linux {
+            true => "target/join-latency-on-linux",
+            false => "target/join-latency",
+        };
+        let jobs = number("jobs");
+        Ok(JoinPlan {
+            out: options.path("out").unwrap_or(Path::new(folder)).into(),
+            conditions,
+            seeds,
+            jobs,
+            queue: number("queue"),
+            cores,
+            // The kernel records each instance, and the app its joins: half a KiB per job and core.
+            memory_mib: 64 + (jobs * cores).div_ceil(2048),
+            on_linux,
+            named,
+            once,
+        })
+    }
+}
+
+/// The policy that joins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Policy {
+    /// The scheduler of the DAG.
+    Fass,
+    /// Equal stamps.
+    Exact,
+    /// Stamps at most this many milliseconds apart.
+    Approximate(u64),
+}
+
+impl Policy {
+    /// Reads a list of names with commas between.
+    fn list(text: &str) -> Result<Vec<Policy>, String> {
+        let policy = |name| {
+            Policy::from_name(name).ok_or_else(|| {
+                format!(
+                    "`--policies`: {} is none; there are fass, exact, and approximate-MS with 1 \
+                     to 1000000 ms",
+                    quoted(name)
+                )
+            })
+        };
+        text.split(',').map(policy).collect()
+    }
+
+    fn from_name(name: &str) -> Option<Policy> {
+        let number = name.strip_prefix("approximate-");
+        let max_interval_ms = number.and_then(|number| number.parse().ok());
+        let close = max_interval_ms.filter(|ms| (1..=1_000_000).contains(ms));
+        let close = close.map(Policy::Approximate);
+        let mut all = [Policy::Fass, Policy::Exact].into_iter().chain(close);
+        // `+7` parses, too, and would be a second name for the same policy.
+        all.find(|policy| policy.to_string() == name)
+    }
+
+    /// Returns its name for people.
+    fn title(self) -> String {
+        match self {
+            Policy::Fass => "FasS (DAG)".into(),
+            Policy::Exact => "ExactTime".into(),
+            Policy::Approximate(ms) => format!("ApproximateTime {ms} ms"),
+        }
+    }
+}
+
+impl fmt::Display for Policy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Policy::Fass => f.write_str("fass"),
+            Policy::Exact => f.write_str("exact"),
+            Policy::Approximate(ms) => write!(f, "approximate-{ms}"),
+        }
+    }
+}
+
+/// The measurement of one boot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Condition {
+    policy: Policy,
+    subtasks: usize,
+    seed: u64,
+}
+
+impl Condition {
+    /// Returns the name of its file, without the ending.
+    fn file_stem(&self) -> String {
+        format!("{}-n{}-seed{}", self.policy, self.subtasks, self.seed)
+    }
+
+    /// Returns its words for the guest.
+    fn guest_words(&self, jobs: u64, queue: u64) -> String {
+        // Inputs of the parallel subtasks must hold their backlog, which grows more slowly than the
+        // jobs.
+        let depth = jobs.clamp(1000, 100_000);
+        let of_queues = format!("queue={queue} depth={depth}");
+        let policy = match self.policy {
+            Policy::Approximate(ms) => format!("approximate max_interval_ms={ms} {of_queues}"),
+            Policy::Exact => format!("exact {of_queues}"),
+            Policy::Fass => "fass".into(),
+        };
+        let (subtasks, seed) = (self.subtasks, self.seed);
+        format!("policy_under_test={policy} subtasks={subtasks} jobs={jobs} seed={seed}")
+    }
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (policy, subtasks) = (self.policy.title(), self.subtasks);
+        write!(f, "{policy}, N = {subtasks}, seed {}", self.seed)
+    }
+}
+
+/// The most boots of a condition in deterministic mode.
+const MOST_BOOTS: usize = 6;
+
+/// The machine for all conditions, and its versions, for the summary.
+#[derive(Debug)]
+struct Setting<'p> {
+    plan: &'p JoinPlan,
+    /// The mode of the guests; `None`: programs of this computer.
+    mode: Option<Mode>,
+    image: PathBuf,
+    /// A checksum of the image: other code gives other times.
+    checksum: String,
+    /// QEMU's version, or Linux's.
+    version: String,
+    /// The commit, marked if the tree differs from it.
+    commit: String,
+}
+
+impl<'p> Setting<'p> {
+    /// Builds the program, settles the mode, and returns the reason for the mode.
+    ///
+    /// # Errors
+    ///
+    /// In words: it cannot be built, or the named mode does not work.
+    fn new(plan: &'p JoinPlan) -> Result<(Self, Option<String>), String> {
+        let mut setting = Self {
+            plan,
+            mode: None,
+            image: PathBuf::new(),
+            checksum: String::new(),
+            version: String::new(),
+            commit: first_line("git", &["describe", "--always", "--abbrev=12", "--dirty"]),
+        };
+        let mut why = None;
+        if plan.on_linux {
+            setting.image = image::build_linux("join-latency", None)?;
+            setting.version = first_line("uname", &["-sr"]);
+        } else {
+            install::ensure_qemu()?;
+            setting.image = image::build("join-latency")?;
+            setting.version = first_line(PROGRAM, &["--version"]);
+            let machine = setting.qemu(&plan.conditions[0], Mode::Deterministic);
+            let (mode, reason) =
+                probe::choose(plan.named, Mode::Deterministic, &machine, &setting.image)?;
+            setting.mode = Some(mode);
+            why = reason.map(|why| format!("mode {mode} because {why}"));
+        }
+        let mut checksum = Crc::new();
+        checksum.update(&fs::read(&setting.image).unwrap_or_default());
+        setting.checksum = format!("{:08x}", checksum.value());
+        Ok((setting, why))
+    }
+
+    /// Returns the name of the meaning of time.
+    fn mode_name(&self) -> &'static str {
+        self.mode.map_or("linux", Mode::name)
+    }
+
+    /// Says in one sentence how far the times can be trusted.
+    fn meaning(&self) -> &'static str {
+        let on_linux = "real nanoseconds on real processors, whatever else this computer does";
+        self.mode.map_or(on_linux, Mode::meaning)
+    }
+
+    /// Returns a statement of everything that a condition's times depend on.
+    fn statement(&self, condition: &Condition) -> String {
+        let (version, checksum) = (&self.version, &self.checksum);
+        let Some(mode) = self.mode else {
+            let words = self.linux_words(condition);
+            return format!("{version}; program {checksum}; {words}");
+        };
+        let qemu = self.qemu(condition, mode);
+        format!(
+            "{version}; image {checksum}; machine {}, {} cores, {} MiB; {}",
+            qemu.machine, qemu.cores, qemu.memory_mib, qemu.guest_words
+        )
+    }
+
+    /// Returns the words of a condition's program on Linux.
+    fn linux_words(&self, condition: &Condition) -> String {
+        let words = condition.guest_words(self.plan.jobs, self.plan.queue);
+        format!("cores={} share=on {words}", self.plan.cores)
+    }
+
+    /// Describes the guest of a condition.
+    fn qemu(&self, condition: &Condition, mode: Mode) -> Qemu {
+        let words = condition.guest_words(self.plan.jobs, self.plan.queue);
+        Qemu {
+            mode,
+            cores: self.plan.cores,
+            memory_mib: self.plan.memory_mib,
+            guest_words: format!("mode={mode} {words}"),
+            ..Qemu::default()
+        }
+    }
+
+    /// Measures one condition, and returns its times. In deterministic mode it boots until two
+    /// boots agree, or [`MOST_BOOTS`] times; then it says so and returns the first boot's times.
+    ///
+    /// Two boots agree because the kernel removes the host's influence from counted time (its
+    /// `machine::counted_time`). That depends on the implementation of QEMU 7.2, so it is checked
+    /// wherever figures are made.
+    fn measure(&self, condition: &Condition) -> Result<String, String> {
+        // Real times never repeat, so a second boot could not confirm them.
+        let is_sure = self.plan.once || self.mode != Some(Mode::Deterministic);
+        let mut seen = Vec::new();
+        while seen.len() < MOST_BOOTS {
+            let times = self.boot_once(condition)?;
+            if is_sure || seen.contains(&times) {
+                if seen.len() > 1 {
+                    eprintln!("{condition}: {} boots until two agreed", seen.len() + 1);
+                }
+                return Ok(times);
+            }
+            seen.push(times);
+        }
+        eprintln!(
+            "{condition}: no two of {MOST_BOOTS} boots agree to the last nanosecond; the first is \
+             kept"
+        );
+        Ok(seen.swap_remove(0))
+    }
+
+    fn boot_once(&self, condition: &Condition) -> Result<String, String> {
+        let jobs = self.plan.jobs;
+        let limit = Duration::from_secs(120 + jobs);
+        let run = |log: &Path| {
+            if let Some(mode) = self.mode {
+                let qemu = self.qemu(condition, mode);
+                return outcome::boot(&qemu, &self.image, log, limit, |_| {});
+            }
+            let words = self.linux_words(condition);
+            let words: Vec<OsString> = words.split(' ').map(OsString::from).collect();
+            let order = ProgramOrder {
+                program: &self.image,
+                words: &words,
+                is_live: false,
+                stops: false,
+                log,
+                limit,
+            };
+            program::run(&order, &mut |_| {})
+        };
+        judged(condition, "join-latency", run, |outcome| {
+            let statement = self.statement(condition);
+            figures::write(&outcome.transcript, &statement, condition.subtasks, jobs)
+        })
+    }
+}
+
+/// Returns the first line of a program's output; `unknown` if it fails.
+fn first_line(program: &str, words: &[&str]) -> String {
+    let mut command = process::Command::new(program);
+    let said = system::run(command.args(words).current_dir(system::workspace()));
+    let said = said.unwrap_or_default();
+    said.lines().next().unwrap_or("unknown").into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(line: &str) -> Result<JoinPlan, String> {
+        JoinPlan::new(&TABLE.right(line))
+    }
+
+    #[test]
+    fn every_combination_is_a_condition() {
+        let plan = plan("--deterministic --repeat 2 --policies fass,exact").unwrap();
+        assert_eq!(plan.conditions.len(), 3 * 2 * 2);
+        assert_eq!((plan.cores, plan.seeds), (8, vec![1, 2]));
+    }
+
+    #[test]
+    fn on_linux_results_have_a_folder_of_their_own() {
+        let out = |line: &str| plan(line).unwrap().out;
+        assert_eq!(out(""), Path::new("target/join-latency"));
+        let on_linux = "target/join-latency-on-linux";
+        assert_eq!(out("--on linux"), Path::new(on_linux));
+        assert_eq!(out("--on linux --out x"), Path::new("x"));
+    }
+
+    #[test]
+    fn policies_are_read_back_and_a_wrong_one_is_named() {
+        let text = "fass,exact,approximate-10";
+        let names = Policy::list(text).map(|all| all.iter().map(Policy::to_string).collect());
+        assert_eq!(names.map(|all: Vec<_>| all.join(",")), Ok(text.into()));
+        for wrong in "fas approximate approximate-0 approximate-+7 approximate- ".split(' ') {
+            let message = Policy::list(&format!("fass,{wrong}")).unwrap_err();
+            assert!(message.contains(&format!("`{wrong}` is none")), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_guest_is_told_what_matters_to_it() {
+        let words = |policy| {
+            Condition {
+                policy,
+                subtasks: 4,
+                seed: 9,
+            }
+            .guest_words(50, 7)
+        };
+        assert_eq!(
+            words(Policy::Fass),
+            "policy_under_test=fass subtasks=4 jobs=50 seed=9"
+        );
+        assert_eq!(
+            words(Policy::Approximate(30)),
+            "policy_under_test=approximate max_interval_ms=30 queue=7 depth=1000 subtasks=4 \
+             jobs=50 seed=9"
+        );
+    }
+}

@@ -1,0 +1,50 @@
+//! Measurements on the host, for people and for machines.
+//!
+//! `bench WHAT` measures one part of the project on this host, in this build, and prints a table
+//! and one JSON object for each figure. Times depend on the host and its load, so none of them has
+//! a limit; counted instructions have. The exit code is 0 if all limits hold, 1 if one does not,
+//! and 2 for a refused command line.
+//!
+//! - [`bounds`]: random sets of DAGs that the analysis proves;
+//! - [`hand_off`]: the way from a completion to its successor, on the machine;
+//! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
+//! - [`native`]: the scheduler on this host's own processors;
+//! - [`sizes`]: the size of each part of an image.
+
+mod acceptance;
+pub mod bounds;
+mod code;
+mod frame;
+pub mod hand_off;
+pub mod join_latency;
+pub mod native;
+pub mod sizes;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use tool::options::{Menu, choices};
+use tool::progress::Lasting;
+
+static BENCH: Menu = Menu {
+    invocation: "./scripts/bench",
+    word: "WHAT",
+    about: "Measures one part of the project.",
+    choices: choices! {
+        "bounds": "random sets that the analysis proves, by load and cores", bounds::run;
+        "hand-off": "from a completion to its successor's first instruction", hand_off::run;
+        "join-latency": "the paper's evaluation: samples, figures, plots and a report",
+            join_latency::run;
+        "native": "the scheduler on this host's own processors, in nanoseconds", native::run;
+        "sizes": "what each part of an image takes of its room", sizes::run;
+    },
+    notes: "Exit code: 0 all limits hold, 1 one does not, 2 the command line is refused.\n",
+};
+
+/// Runs the subcommand.
+pub fn bench(words: &[OsString]) -> ExitCode {
+    // The others report their progress themselves; it prints nothing before it has a result.
+    let is_silent = words.first().is_some_and(|word| word == "sizes");
+    let _lasting = is_silent.then(|| Lasting::new("measuring"));
+    BENCH.run(words)
+}

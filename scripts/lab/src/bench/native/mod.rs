@@ -1,0 +1,525 @@
+//! The cost of the scheduler on the host's own processors.
+//!
+//! The kernel's engine runs on threads of Linux that poll, with the graphs of `bench hand-off` and
+//! empty bodies; only the source does something: once a round it reads the clock. Nothing is
+//! emulated, so the figures can be compared with those of libraries that run task graphs on
+//! threads.
+//!
+//! Other work on the host affects them. Therefore each figure is measured in many short *rounds*,
+//! spread over several passes, and given as minimum, median and 99th percentile: the minimum is the
+//! cost of the code, the others include the host's disturbance.
+//!
+//! - here: rounds of jobs, back to back, and the time of one step;
+//! - `across_cores`: from the last return to the sink's start, and the throughput of two clusters.
+
+mod across_cores;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use fass::{Policy, SubtaskAttributes, create_dag, finish_create_dags};
+use hand_off::Shape;
+use linux::{Linux, Mechanism};
+use sched_dag::DagId;
+use text::quoted;
+
+use super::frame::{Figure, by_plan};
+use tool::json::Object;
+use tool::options::{Command, Parsed, Takes, options};
+use tool::output::Table;
+use tool::progress::Progress;
+
+static TABLE: Command = Command {
+    invocation: "./scripts/bench native",
+    about: "Measures the scheduler on this host's own processors, with empty bodies.",
+    positional: None,
+    options: options! {
+        /// How many rounds of about 20,000 instances each figure has.
+        "rounds": Takes::Number(10, 100_000), or "300";
+        /// The jobs whose joins across cores are measured.
+        "jobs": Takes::Number(100, 10_000_000), or "20000";
+        /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
+        /// layered-1000, dags-1000, join, clusters; all.
+        "only": Takes::Text("NAMES");
+    },
+    notes: "\
+`floor` calls the bodies in topological order, in a loop; `closures` are functions under
+the scheduler, without values, on one and two workers; `typed` are functions with a u64 on each edge (not of
+layered-1000 and dags-1000). `static` and `edf` are the policies.
+`clusters` runs a graph in each of two clusters of one core, next to one on one core alone.
+
+Prints a table and a JSON object for each figure. Times depend on the host and on what
+else it does; compare figures of one run.
+
+Exit code: 0 measured; 1 a run did not complete its jobs; 2 the command line is refused.
+",
+};
+
+/// The name of the workload of joins across cores.
+const JOIN: &str = "join";
+
+/// The name of the workload of two clusters next to one core.
+const CLUSTERS: &str = "clusters";
+
+/// Runs `bench native` with the words after its name.
+pub(super) fn run(words: &[OsString]) -> ExitCode {
+    by_plan(&TABLE, words, NativePlan::read, measure)
+}
+
+/// The plan of the measurement.
+struct NativePlan {
+    rounds: usize,
+    jobs: u64,
+    graphs: Vec<MeasuredGraph>,
+    with_join: bool,
+    with_clusters: bool,
+}
+
+/// The numbers of workers, each a thread with a processor of its own.
+const WORKERS: [u32; 2] = [1, 2];
+
+impl NativePlan {
+    fn read(options: &Parsed) -> Result<Self, String> {
+        options.check_distinct(&["only"])?;
+        let names = MeasuredGraph::ALL.iter().map(|graph| graph.name);
+        let known: Vec<&str> = names.chain([JOIN, CLUSTERS]).collect();
+        let chosen = options.text("only").map(|names| names.split(',').collect());
+        let wanted: Vec<&str> = chosen.unwrap_or_else(|| known.clone());
+        if let Some(name) = wanted.iter().find(|name| !known.contains(name)) {
+            let (name, known) = (quoted(name), known.join(", "));
+            return Err(format!(
+                "`--only`: no workload is called {name}; there are {known}"
+            ));
+        }
+        let number = |name| options.number(name).unwrap_or(0);
+        let is_wanted = |graph: &MeasuredGraph| wanted.contains(&graph.name);
+        Ok(Self {
+            rounds: usize::try_from(number("rounds")).unwrap_or(usize::MAX),
+            jobs: number("jobs"),
+            graphs: MeasuredGraph::ALL.into_iter().filter(is_wanted).collect(),
+            with_join: wanted.contains(&JOIN),
+            with_clusters: wanted.contains(&CLUSTERS),
+        })
+    }
+}
+
+/// A figure in nanoseconds, and its runner and policy.
+type NativeRow = (Figure, &'static str);
+
+/// Measures and prints; true, as no figure has a limit.
+fn measure(plan: &NativePlan) -> Result<bool, String> {
+    // Two workers that poll on one processor would only wait for each other.
+    if linux::processors() < 2 {
+        return Err("this host has one processor for us; two are needed".into());
+    }
+    let total = passes(&plan.graphs, &WORKERS);
+    let (mut progress, mut over) = (Progress::new(total, "passes"), 0);
+    let mut show = || {
+        over += 1;
+        progress.show(over);
+    };
+    let mut rows = Vec::new();
+    for &graph in &plan.graphs {
+        let measured = throughput(graph, &WORKERS, plan.rounds, &mut show)?;
+        rows.extend(measured);
+    }
+    progress.wipe();
+    if plan.with_join {
+        rows.extend(across_cores::join(plan.jobs)?);
+    }
+    let together = match plan.with_clusters {
+        true => across_cores::clusters(plan.rounds, &mut rows)?,
+        false => Vec::new(),
+    };
+    print!("{}", table(&rows));
+    for (graph, times) in &together {
+        println!("{graph}: two clusters of one core each do {times:.2} times what one core does");
+    }
+    for row in &rows {
+        println!("{}", machine_line(row));
+    }
+    for (graph, times) in &together {
+        let line = Object::new().text("kind", "bench");
+        let line = line.text("name", "native-clusters").text("workload", graph);
+        let line = line.number("clusters", 2_u64);
+        println!("{}", line.json("times", &format!("{times:.3}")).into_text());
+    }
+    Ok(true)
+}
+
+fn table(rows: &[NativeRow]) -> String {
+    let columns = ":<14|ns:<38|bodies, policy:<18|workers:8|min:10.1|median:10.1|p99:10.1";
+    let mut table = Table::new("", columns);
+    let mut before = "";
+    for (figure, runner) in rows {
+        let is_same = std::mem::replace(&mut before, &figure.workload) == figure.workload;
+        let [min, median, p99] =
+            [figure.min, figure.median, figure.p99].map(|ns| figure.of_step(ns));
+        let name = if is_same { "" } else { before };
+        table.row(&[
+            &name,
+            &figure.figure,
+            runner,
+            &figure.cores,
+            &min,
+            &median,
+            &p99,
+        ]);
+    }
+    table.text()
+}
+
+fn machine_line((figure, runner): &NativeRow) -> String {
+    let one = |ns| format!("{:.2}", figure.of_step(ns));
+    Object::new()
+        .text("kind", "bench")
+        .text("name", "native")
+        .text("workload", &figure.workload)
+        .text("what", &figure.figure)
+        .text("runner", runner)
+        .number("workers", figure.cores)
+        .number("samples", figure.samples)
+        .json("min_ns", &one(figure.min))
+        .json("median_ns", &one(figure.median))
+        .json("p99_ns", &one(figure.p99))
+        .into_text()
+}
+
+/// The number of turns of each runner: a change of the host's speed meets them all.
+const PASSES: usize = 3;
+
+/// The approximate number of instances of a round: some hundred microseconds.
+const INSTANCES_A_ROUND: usize = 20_000;
+
+/// The way in which the bodies are run.
+#[derive(Clone, Copy)]
+enum Runner {
+    /// A loop over the functions.
+    Floor,
+    /// The scheduler, with functions without values.
+    Closures(Policy),
+    /// The scheduler, with a value on each edge, by static priority.
+    Typed,
+}
+
+impl Runner {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Floor => "floor",
+            Self::Closures(Policy::StaticPriority) => "closures, static",
+            Self::Closures(Policy::Edf) => "closures, edf",
+            Self::Typed => "typed, static",
+        }
+    }
+}
+
+/// Returns the number of passes of [`measure`].
+fn passes(graphs: &[MeasuredGraph], workers: &[u32]) -> u64 {
+    let of_graph = |graph: &MeasuredGraph| (PASSES * runners(*graph, workers).len()) as u64;
+    graphs.iter().map(of_graph).sum()
+}
+
+/// Measures all runners, calling `show` after each pass.
+fn throughput(
+    graph: MeasuredGraph,
+    workers: &[u32],
+    rounds: usize,
+    show: &mut impl FnMut(),
+) -> Result<Vec<NativeRow>, String> {
+    let runners = runners(graph, workers);
+    let mut samples = vec![Vec::new(); runners.len()];
+    for _ in 0..PASSES {
+        for (samples, &(runner, workers)) in samples.iter_mut().zip(&runners) {
+            let rounds_ns = pass(graph, runner, workers, rounds.div_ceil(PASSES));
+            samples.extend(rounds_ns.map_err(|why| {
+                let (graph, runner) = (graph.name, runner.name());
+                format!("{graph}, {runner}: {why}")
+            })?);
+            show();
+        }
+    }
+    let (step, steps) = graph.steps;
+    let per = jobs_a_round(graph) * steps;
+    let of_runner = |(&(runner, workers), samples): (&(Runner, u32), Vec<u64>)| {
+        let what = (u64::from(workers), graph.name, step);
+        (Figure::new(what, per, samples), runner.name())
+    };
+    Ok(runners.iter().zip(samples).map(of_runner).collect())
+}
+
+fn runners(graph: MeasuredGraph, workers: &[u32]) -> Vec<(Runner, u32)> {
+    let mut runners = vec![(Runner::Floor, 1)];
+    for &workers in workers {
+        let policies = [Policy::StaticPriority, Policy::Edf];
+        runners.extend(policies.map(|policy| (Runner::Closures(policy), workers)));
+        runners.extend(graph.has_values().then_some((Runner::Typed, workers)));
+    }
+    runners
+}
+
+fn jobs_a_round(graph: MeasuredGraph) -> u64 {
+    (INSTANCES_A_ROUND / graph.instances()) as u64
+}
+
+/// Runs the rounds, after some to warm up, and returns the time of each in nanoseconds.
+fn pass(
+    graph: MeasuredGraph,
+    runner: Runner,
+    workers: u32,
+    rounds: usize,
+) -> Result<Vec<u64>, String> {
+    let jobs_a_round = jobs_a_round(graph);
+    // One job more: the last round needs an end.
+    let jobs = jobs_a_round * (rounds + rounds / 8) as u64 + 1;
+    let marks = Rounds::default();
+    let mut functions = empty(graph, &marks, jobs_a_round);
+    match runner {
+        Runner::Floor => {
+            for job in 0..jobs {
+                functions.iter_mut().flatten().for_each(|tick| tick(job));
+            }
+        }
+        Runner::Closures(policy) => {
+            let machine = machine(policy, workers)?;
+            commit(graph, jobs, vec![functions]);
+            run_jobs(&machine, jobs)?;
+        }
+        Runner::Typed => {
+            let machine = machine(Policy::StaticPriority, workers)?;
+            commit_typed(graph, jobs, marks.source(jobs_a_round));
+            run_jobs(&machine, jobs)?;
+        }
+    }
+    let times_ns = marks.times_ns();
+    let rounds_ns = times_ns.windows(2).map(|pair| pair[1] - pair[0]);
+    // The rounds at the beginning warm the caches up.
+    Ok(rounds_ns.skip(times_ns.len() / 10).collect())
+}
+
+/// A graph that is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct MeasuredGraph {
+    name: &'static str,
+    /// The shape of each DAG.
+    shape: Shape,
+    /// The number of DAGs, released at once, each with a deadline of its own.
+    dags: u16,
+    /// The name of a step, and the number of steps of a job of all DAGs.
+    steps: (&'static str, u64),
+}
+
+impl MeasuredGraph {
+    const CHAIN: Self = Self::new("chain-64", Shape::Chain(64), 1, ("per hop", 63));
+    const LAYERED: Self = {
+        let (subtasks, seed) = (1_000, 1);
+        let shape = Shape::Layered { subtasks, seed };
+        Self::new("layered-1000", shape, 1, ("per instance", 1_000))
+    };
+    const JOIN: Self = Self::fork_join("fork-join-2", 2);
+    const ALL: [Self; 6] = [
+        Self::CHAIN,
+        Self::JOIN,
+        Self::fork_join("fork-join-4", 4),
+        Self::fork_join("fork-join-6", 6),
+        Self::LAYERED,
+        Self::new("dags-1000", Shape::Chain(1), 1_000, ("per job", 1_000)),
+    ];
+
+    const fn new(name: &'static str, shape: Shape, dags: u16, steps: (&'static str, u64)) -> Self {
+        Self {
+            name,
+            shape,
+            dags,
+            steps,
+        }
+    }
+
+    const fn fork_join(name: &'static str, parallel: usize) -> Self {
+        Self::new(name, Shape::ForkJoin(parallel), 1, ("per job", 1))
+    }
+
+    /// Returns the number of instances of one job of all DAGs.
+    fn instances(self) -> usize {
+        usize::from(self.dags) * self.shape.subtasks()
+    }
+
+    /// Reports whether there is a form with a value on each edge.
+    const fn has_values(self) -> bool {
+        self.dags == 1 && !matches!(self.shape, Shape::Layered { .. })
+    }
+}
+
+/// Returns a time in nanoseconds.
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// The times at which rounds begin and end, in nanoseconds since the first one.
+#[derive(Clone, Debug, Default)]
+struct Rounds(Arc<Mutex<Vec<u64>>>);
+
+impl Rounds {
+    /// Returns the times.
+    fn times_ns(&self) -> Vec<u64> {
+        let times_ns = self.0.lock();
+        times_ns.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Returns the source's function, which reads the clock once in `jobs_a_round` jobs.
+    fn source(&self, jobs_a_round: u64) -> impl FnMut() + Send + 'static {
+        static EPOCH: LazyLock<Instant> = LazyLock::new(Instant::now);
+        let rounds = self.clone();
+        let mut left = 1;
+        move || {
+            left -= 1;
+            if left == 0 {
+                left = jobs_a_round;
+                let mut times_ns = rounds.0.lock().unwrap_or_else(PoisonError::into_inner);
+                times_ns.push(nanoseconds(EPOCH.elapsed()));
+            }
+        }
+    }
+}
+
+/// A period longer than any job, with which releases are back to back.
+const PERIOD: Duration = Duration::from_secs(1);
+
+/// Makes a machine of `workers` threads that poll. Jobs follow one another without a pause, and no
+/// events are recorded. Only one thread of the program may measure at a time.
+fn machine(policy: Policy, workers: u32) -> Result<Linux, String> {
+    let linux = Linux::new(workers, Mechanism::Poll).map_err(|why| why.to_string())?;
+    let linux = linux.with(|to| (to.scheduler.policy, to.most_events) = (policy, 0));
+    Ok(linux.skipping_idle_time())
+}
+
+/// Runs the committed DAGs, and makes sure that each has completed all jobs.
+fn run_jobs(linux: &Linux, jobs: u64) -> Result<(), String> {
+    let run = linux.run().map_err(|why| why.to_string())?;
+    let dags = (0..).map(DagId).take(run.task_set().dags().len());
+    let completed = dags.map(|dag| run.statistics(dag).completed).min();
+    match completed.unwrap_or(0) {
+        least if least == jobs => Ok(()),
+        least => Err(format!("{least} of {jobs} jobs are complete")),
+    }
+}
+
+/// A function without values.
+type Tick = Box<dyn FnMut(u64) + Send>;
+
+/// Makes empty functions for a graph's DAGs, subtask by subtask; the first source counts rounds.
+fn empty(graph: MeasuredGraph, rounds: &Rounds, jobs_a_round: u64) -> Vec<Vec<Tick>> {
+    let of_dag = |_| (0..graph.shape.subtasks()).map(|_| Box::new(|_| ()) as Tick);
+    let mut all: Vec<Vec<Tick>> = (0..graph.dags).map(|dag| of_dag(dag).collect()).collect();
+    let mut source = rounds.source(jobs_a_round);
+    all[0][0] = Box::new(move |_| source());
+    all
+}
+
+fn named(number: usize) -> SubtaskAttributes {
+    SubtaskAttributes::named(&format!("s{number}"))
+}
+
+/// Commits DAGs without values, of any shape; `clusters` has the functions of each cluster.
+fn commit(graph: MeasuredGraph, jobs: u64, clusters: Vec<Vec<Vec<Tick>>>) {
+    let is_divided = clusters.len() > 1;
+    let mut dags = Vec::new();
+    for (cluster, of_dags) in (0..).zip(clusters) {
+        for (number, functions) in (0_u64..).zip(of_dags) {
+            let dag = create_dag();
+            dag.name(&format!("native{cluster}-{number}"));
+            dag.jobs(jobs).in_flight(1).period(PERIOD);
+            // Deadlines in a shuffled order, no two the same: 617 has no divisor in common with
+            // 1,000.
+            let earlier = number * 617 % u64::from(graph.dags);
+            dag.relative_deadline(PERIOD - Duration::from_micros(earlier));
+            if is_divided {
+                dag.cluster(cluster);
+            }
+            let functions = functions.into_iter().enumerate();
+            let subtasks: Vec<_> = functions
+                .map(|(number, tick)| dag.register_untyped_subtask(tick, named(number)))
+                .collect();
+            for (earlier, later) in graph.shape.edges() {
+                dag.precede(&subtasks[earlier], &subtasks[later]);
+            }
+            dags.push(dag);
+        }
+    }
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("the graphs are right");
+}
+
+/// Commits a graph of one DAG with a value on each edge; its source also calls `tick`.
+fn commit_typed(graph: MeasuredGraph, jobs: u64, mut tick: impl FnMut() + Send + 'static) {
+    let dag = create_dag();
+    dag.name("typed").jobs(jobs).in_flight(1);
+    let source = move || {
+        tick();
+        (1u64,)
+    };
+    dag.register_periodic_subtask(source, vec!["t0"], PERIOD, named(0));
+    let sink = graph.shape.subtasks() - 1;
+    // Each subtask writes the topic with its number.
+    let topics: Vec<String> = (0..sink).map(|number| format!("t{number}")).collect();
+    let is_chain = matches!(graph.shape, Shape::Chain(_));
+    for number in 1..sink {
+        let input = &topics[if is_chain { number - 1 } else { 0 }];
+        let body = |(value,): (u64,)| (value,);
+        dag.register_subtask(
+            body,
+            [input.as_str()],
+            [topics[number].as_str()],
+            named(number),
+        );
+    }
+    let last = if is_chain { sink - 1 } else { 1 };
+    let inputs: Vec<&str> = topics[last..].iter().map(String::as_str).collect();
+    let attributes = named(sink);
+    match inputs.len() {
+        1 => dag.register_sink_subtask(|_: (u64,)| (), inputs, PERIOD, attributes),
+        2 => dag.register_sink_subtask(|_: (u64, u64)| (), inputs, PERIOD, attributes),
+        4 => dag.register_sink_subtask(|_: (u64, u64, u64, u64)| (), inputs, PERIOD, attributes),
+        _ => {
+            let body = |_: (u64, u64, u64, u64, u64, u64)| ();
+            dag.register_sink_subtask(body, inputs, PERIOD, attributes)
+        }
+    };
+    finish_create_dags(&[dag]).expect("the graphs are right");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(line: &str) -> Result<NativePlan, String> {
+        NativePlan::read(&TABLE.right(line))
+    }
+
+    #[test]
+    fn workloads_are_chosen_by_name_and_unknown_ones_refused_with_those_there_are() {
+        let chosen = plan("--only fork-join-2,chain-64").expect("right");
+        assert_eq!(chosen.graphs, [MeasuredGraph::CHAIN, MeasuredGraph::JOIN]);
+        assert!(!chosen.with_join && !chosen.with_clusters);
+        let line = plan("--only chain-65").err().expect("refused");
+        assert!(line.contains("called `chain-65`") && line.contains("chain-64, fork-join-2"));
+    }
+
+    /// One test, since only one thread of a program may measure at a time.
+    #[test]
+    fn a_short_run_measures_every_graph_alone_and_in_clusters() {
+        for graph in MeasuredGraph::ALL {
+            let rows = throughput(graph, &[1], 3, &mut || {}).expect("it runs");
+            let expected = 3 + usize::from(graph.has_values());
+            assert_eq!(rows.len(), expected, "{}", graph.name);
+        }
+        let mut rows = Vec::new();
+        // On a host that never gives us both processors there is nothing to measure.
+        if linux::processors() > 1
+            && let Ok(together) = across_cores::clusters(600, &mut rows)
+        {
+            assert_eq!((together.len(), rows.len()), (2, 4));
+        }
+    }
+}

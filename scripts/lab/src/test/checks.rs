@@ -1,0 +1,277 @@
+//! Checks: properties of the whole tree, each counted as one test.
+//!
+//! They hold the promises that no unit test can: no package from elsewhere, no file too long,
+//! layers in order, no crate beyond its budget of lines, nothing for the formatter, the linter and
+//! the documentation to complain of, a hand-off of no more instructions than its baseline, and a
+//! guest under KVM where KVM works. They judge the project's own packages.
+//!
+//! Free disk space is checked before anything is built: a disk that fills up in the middle shows as
+//! an error of the linker, or as a guest without a log.
+
+use std::env;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use super::{
+    CheckFailure, SourceFile, Tally, TestPlan, budgets, layers, none_of, packages, paths, words,
+};
+use crate::bench::hand_off;
+use tool::image;
+use tool::probe;
+use tool::progress::Lasting;
+use tool::qemu::Qemu;
+use tool::recordings;
+use tool::system;
+
+/// The most lines of a source file.
+const MOST_LINES: usize = 800;
+
+/// The folders of the root; cargo's own has what is made, results of measurements included.
+const FOLDERS: [&str; 9] = [
+    "apps",
+    "boot",
+    "docs",
+    "fass",
+    "kernel",
+    "sched-dag",
+    "scripts",
+    "target",
+    "tests",
+];
+
+/// Refuses folders that nobody has planned, such as a command's output.
+fn strange_folders(root: &Path) -> Result<(), String> {
+    let folders = fs::read_dir(root).into_iter().flatten().flatten();
+    let folders = folders.filter(|entry| entry.path().is_dir());
+    let names = folders.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let strange = names.filter(|name| !name.starts_with('.') && !FOLDERS.contains(&&**name));
+    let line = |name| format!("{name}/ is no folder of the project; write results below target/");
+    none_of(strange.map(line).collect())
+}
+
+/// Runs the wanted checks, without those of cargo.
+pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally) {
+    let blessed = plan.blessed.as_deref();
+    let mut run = |name: &str, check: &dyn Fn() -> Result<(), CheckFailure>| {
+        if plan.wants(name) {
+            tally.run(name, check);
+        }
+    };
+    run("Cargo.lock names only our own packages", &|| {
+        let lock = fs::read_to_string(system::workspace().join("Cargo.lock"));
+        Ok(foreign(
+            &lock.map_err(|error| format!("Cargo.lock: {error}"))?,
+        )?)
+    });
+    run("no source file has more than 800 lines", &|| {
+        Ok(complain(sources, is_long)?)
+    });
+    run("no folder of the root is unknown", &|| {
+        Ok(strange_folders(system::workspace())?)
+    });
+    run("every source file opens with an essay", &|| {
+        Ok(complain(sources, lacks_essay)?)
+    });
+    run("no doc sentence begins with a question word", &|| {
+        Ok(complain(sources, words::asks)?)
+    });
+    run("types of a crate have names of their own", &|| {
+        Ok(words::check_names(sources)?)
+    });
+    run("layers name only layers below them", &|| {
+        Ok(layers::check(sources)?)
+    });
+    run(
+        "every path that a page or a comment names is there",
+        &|| Ok(paths::check(sources)?),
+    );
+    run("no crate has more lines than its budget", &|| {
+        Ok(budgets::check(sources, blessed)?)
+    });
+    run("no line escapes the budgets", &|| {
+        Ok(complain(sources, budgets::escape)?)
+    });
+
+    run(
+        "an independent reader opens MCAP files in their test",
+        &|| {
+            let reader = recordings::independent_reader();
+            // A missing reader is reported as skipped, not as a failure.
+            reader.map(drop).map_err(CheckFailure::Skipped)
+        },
+    );
+    // From here on the checks build images and boot guests.
+    if plan.quick {
+        return;
+    }
+    run(
+        "the hand-off takes no more instructions than its baseline",
+        &|| Ok(hand_off::check(blessed)?),
+    );
+    run("a guest runs under KVM", &|| {
+        let image = image::build("fork-join");
+        let probed = image.and_then(|image| probe::kvm(&Qemu::default(), &image));
+        probed.map_err(CheckFailure::Skipped)
+    });
+}
+
+/// Runs the checks that cargo makes, while other things run.
+pub(super) fn lint_all(plan: &TestPlan, sources: &[SourceFile]) -> Tally {
+    let mut tally = Tally::default();
+    let mut run = |name: &str, words: &str, remedy: &str| {
+        if plan.wants(name) {
+            tally.run(name, || match plan.quick {
+                true => Err(CheckFailure::Skipped("left out by --quick".into())),
+                false => Ok(cargo(sources, words, remedy)?),
+            });
+        }
+    };
+    run(
+        "rustfmt has nothing to change",
+        "fmt --check",
+        "run `cargo fmt`",
+    );
+    let clippy = "clippy --quiet --all-targets -- -D warnings";
+    run("clippy has nothing to say", clippy, "see above");
+    let doc = "doc --quiet --no-deps";
+    run("rustdoc has nothing to say", doc, "see above");
+    let private = format!("{doc} --document-private-items");
+    run(
+        "rustdoc has nothing to say of private items",
+        &private,
+        "see above",
+    );
+    tally
+}
+
+/// Runs cargo on the packages of these files; its output is printed only if it fails.
+fn cargo(sources: &[SourceFile], words: &str, remedy: &str) -> Result<(), String> {
+    let mut command = system::cargo();
+    let mut each = words.split(' ');
+    command.args(each.next());
+    // By name, since `--workspace` would also judge apps that are not the project's own.
+    for package in packages(sources) {
+        command.args(["-p", &package]);
+    }
+    command.args(each).env("RUSTDOCFLAGS", "-D warnings");
+    let _lasting = Lasting::new(&format!("cargo {words}"));
+    let output = command.output();
+    let output = output.map_err(|error| format!("cannot start cargo: {error}"))?;
+    if output.status.success() {
+        return Ok(());
+    }
+    eprint!("{}", String::from_utf8_lossy(&output.stdout));
+    eprint!("{}", String::from_utf8_lossy(&output.stderr));
+    Err(format!("`cargo {words}` failed; {remedy}"))
+}
+
+/// Names packages from elsewhere: ours lie in the workspace, and have no `source`.
+fn foreign(lock: &str) -> Result<(), String> {
+    let packages = lock.split("[[package]]").skip(1);
+    let foreign = packages.filter(|package| package.contains("\nsource = "));
+    let name = |package: &str| package.split('"').nth(1).unwrap_or("?").to_string();
+    let names = none_of(foreign.map(name).collect());
+    names.map_err(|names| format!("packages of others: {names}; do without them"))
+}
+
+fn is_long(name: &str, text: &str) -> Option<String> {
+    let lines = text.lines().count();
+    let is_long = name.ends_with(".rs") && lines > MOST_LINES;
+    is_long.then(|| format!("has {lines} lines, split it"))
+}
+
+fn lacks_essay(name: &str, text: &str) -> Option<String> {
+    let mut lines = text.lines();
+    let code = lines.find(|line| !line.trim().is_empty() && !line.starts_with("#!"));
+    let has_essay = code.is_some_and(|line| line.starts_with("//!"));
+    let lacks = name.ends_with(".rs") && !has_essay;
+    lacks.then(|| "does not open with `//!`".to_string())
+}
+
+/// Collects the fault of each file, with its name, on one line.
+fn complain(
+    sources: &[SourceFile],
+    fault: impl Fn(&str, &str) -> Option<String>,
+) -> Result<(), String> {
+    let faults = sources.iter().filter_map(|SourceFile { name, text }| {
+        let fault = fault(name, text)?;
+        Some(format!("{name} {fault}"))
+    });
+    none_of(faults.collect())
+}
+
+/// The most disk space that all tests and images take, built from nothing, in MiB.
+const NEEDED_MIB: u64 = 3 << 10;
+
+/// Makes sure that there is room. If the free space is unknown, only says so.
+///
+/// # Errors
+///
+/// One sentence: the missing space, its place, and the remedy.
+pub(super) fn check() -> Result<(), String> {
+    // The tool itself lies in the target folder, wherever that is.
+    let tool = env::current_exe().unwrap_or_default();
+    let folder = tool.parent().unwrap_or(Path::new("."));
+    let answer = Command::new("df").arg("-Pk").arg(folder).output();
+    let free = answer.map(|answer| free_mib(&String::from_utf8_lossy(&answer.stdout)));
+    let Ok(Some(free_mib)) = free else {
+        let place = folder.display();
+        eprintln!("test: `df -Pk {place}` does not say how much is free; 3 GiB are needed");
+        return Ok(());
+    };
+    judge(free_mib, folder)
+}
+
+fn judge(free_mib: u64, folder: &Path) -> Result<(), String> {
+    if free_mib >= NEEDED_MIB {
+        return Ok(());
+    }
+    Err(format!(
+        "{free_mib} MiB are free where `{}` is, and building all tests takes up to {NEEDED_MIB}; \
+         remove something, or set CARGO_TARGET_DIR to a folder on another disk",
+        folder.display()
+    ))
+}
+
+/// Reads the available space, in MiB, from the output of `df -Pk` for one folder (POSIX, `df`,
+/// under STDOUT): the number before the percentage. Names may contain blanks.
+fn free_mib(said: &str) -> Option<u64> {
+    // From the end, since a device's name may contain blanks, too.
+    let mut words = said.lines().nth(1)?.split_whitespace().rev();
+    words.find(|word| word.ends_with('%'))?;
+    let kib: u64 = words.next()?.parse().ok()?;
+    Some(kib >> 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{foreign, free_mib, judge};
+    use std::path::Path;
+
+    #[test]
+    fn a_package_from_a_registry_is_named() {
+        let own = "version = 4\n\n[[package]]\nname = \"boot\"\nversion = \"0.1.0\"\n";
+        assert_eq!(foreign(own), Ok(()));
+        let with = format!("{own}\n[[package]]\nname = \"libc\"\nsource = \"registry+x\"\n");
+        let fault = foreign(&with).unwrap_err();
+        assert_eq!(fault, "packages of others: libc; do without them");
+    }
+
+    #[test]
+    fn what_df_says_is_read_and_a_full_disk_is_told_with_its_place_and_the_remedy() {
+        let free = |line: &str| free_mib(&format!("Filesystem 1024-blocks Used\n{line}\n"));
+        let usual = "/dev/vda1 264212084 20036928 75248960      22% /";
+        assert_eq!(free(usual), Some(73_485));
+        let odd = "a b:/c 264212084 20036928 1023 100% /with a blank";
+        assert_eq!(free(odd), Some(0));
+        assert_eq!(
+            free("none 0 0 0 - /proc").or(free("")).or(free_mib("")),
+            None
+        );
+        assert_eq!(judge(3072, Path::new("/x")), Ok(()));
+        let line = judge(12, Path::new("/x")).unwrap_err();
+        assert!(line.starts_with("12 MiB are free where `/x` is"), "{line}");
+        assert!(line.contains("set CARGO_TARGET_DIR"), "{line}");
+    }
+}

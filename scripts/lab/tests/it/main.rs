@@ -1,0 +1,12 @@
+//! The laboratory's commands as a person calls them; schedules held against references. Nothing is
+//! booted.
+
+mod files;
+mod lines;
+mod on_linux;
+mod oracle_schedules;
+#[path = "../../../tool/tests/support/mod.rs"]
+mod support;
+
+/// The program that these tests call.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_fass-lab");

@@ -1,0 +1,238 @@
+//! The scheduler against reference schedules, and the refusal of broken files.
+
+use fass::commit::{ConstructionPolicy, finish_create_dags_with};
+use lab::oracle::schedules::{Case, Deviation, check, compare, compare_turns, parse};
+use lab::oracle::waiting::{self, WaitingCase};
+use replay::{Epoch, Scale, build};
+use virtual_time::VirtualTime;
+
+const PUBLIC: &str = include_str!("../../../../tests/oracle/schedules.txt");
+const WITH_WAITS: &str = include_str!("../../../../tests/oracle/waiting.txt");
+const CLUSTERS: &str = include_str!("../../../../tests/oracle/clusters.txt");
+
+/// One core, a chain of two, two jobs that overlap.
+const SMALL: &str = "case small 1 0 1 1
+dag 4 4 0 2 2 1
+sub 1 0 1 1
+sub 4 0 4 4
+edge 0 1
+x 0 0 0 0 1 0
+x 0 0 1 1 5 0
+x 0 1 0 5 6 0
+x 0 1 1 6 10 0
+j 0 0 0 5 5 1
+j 0 1 4 10 6 1
+end
+";
+
+/// Splits a row of a table.
+fn split<const N: usize>(row: &str) -> [&str; N] {
+    let cells: Vec<&str> = row.split(" | ").collect();
+    cells.try_into().expect(row)
+}
+
+#[test]
+fn all_public_schedules_agree() {
+    for (text, count) in [(PUBLIC, 40), (CLUSTERS, 30)] {
+        let cases = parse(text).expect("the file is well formed");
+        assert_eq!(cases.len(), count);
+        assert_cases_agree(&cases);
+    }
+}
+
+#[test]
+fn all_public_schedules_with_waits_agree() {
+    let blocks = waiting::parse(WITH_WAITS).expect("the file is well formed");
+    let schedules = blocks.into_iter().filter_map(|block| match block {
+        WaitingCase::Schedule(case) => Some(*case),
+        WaitingCase::Bounds(_) => None,
+    });
+    let cases: Vec<Case> = schedules.collect();
+    assert_eq!(cases.len(), 40);
+    assert_cases_agree(&cases);
+}
+
+fn assert_cases_agree(cases: &[Case]) {
+    for case in cases {
+        assert_eq!(check(case), Ok(()), "{}", case.name);
+        assert_eq!(built(case, 0, 0), Ok(Deviation::default()), "{}", case.name);
+    }
+}
+
+/// Compares a case with a run, in virtual time, of the DAGs that the app `replay` builds from it,
+/// with units of 1000 ns and this guard.
+fn built(case: &Case, guard_ns: u64, tolerance_ns: u64) -> Result<Deviation, String> {
+    let machine = VirtualTime::new()
+        .cores(case.cores)
+        .clusters(case.clusters.sizes())
+        .policy(case.policy)
+        .preemption(case.preemption);
+    let scale = Scale {
+        unit_ns: 1000,
+        guard_ns,
+    };
+    let dags = build(case, scale, &Epoch::default(), None).expect("short times");
+    finish_create_dags_with(&dags, ConstructionPolicy::any_graph()).expect("any graph is right");
+    let report = machine.run();
+    assert_eq!(report.violations(), []);
+    compare_turns(case, report.events.iter().copied(), 1000, tolerance_ns)?;
+    compare(case, report.task_set(), report.record(), 1000, tolerance_ns)
+}
+
+#[test]
+fn what_is_near_passes_and_by_how_much_is_told() {
+    let case = parse(SMALL).expect("well formed").remove(0);
+    let deviation = Deviation {
+        earliest_ns: -10,
+        latest_ns: 0,
+    };
+    assert_eq!(built(&case, 10, 10), Ok(deviation));
+    let far = "dag 0 job 0 subtask 0: finish: expected 1, found 0.990";
+    assert_eq!(built(&case, 10, 9), Err(far.to_owned()));
+}
+
+/// A part of the small case, its replacement, and the difference that it makes.
+const WRONG: &str =
+    "x 0 1 0 5 6 0 | x 0 1 0 4 6 0 | dag 0 job 1 subtask 0: start: expected 4, found 5
+x 0 1 1 6 10 0 | x 0 1 1 6 11 0 | dag 0 job 1 subtask 1: finish: expected 11, found 10
+j 0 1 4 10 6 1 | j 0 1 5 10 6 1 | dag 0 job 1: release: expected 5, found 4
+j 0 1 4 10 6 1 | j 0 1 4 11 6 1 | dag 0 job 1: finish: expected 11, found 10
+x 0 1 1 6 10 0 | x 0 1 1 6 10 1 | dag 0 job 1 subtask 1: preemptions: expected 1, found 0
+j 0 0 0 5 5 1 | j 0 0 0 5 5 0 | dag 0 job 0: missed: expected 0, found 1
+j 0 1 4 10 6 1 | j 0 1 4 10 7 1 | dag 0 job 1: response: expected 7, found 6";
+
+#[test]
+fn the_first_difference_is_named() {
+    for row in WRONG.lines() {
+        let [from, to, difference] = split(row);
+        let cases = parse(&SMALL.replace(from, to)).expect("still well formed");
+        assert_eq!(check(&cases[0]), Err(difference.to_owned()));
+    }
+}
+
+/// A part of the small case, its replacement, and the line and the reason of the refusal.
+const MALFORMED: &str = r"case small 1 0 1 1 | case small 0 0 1 1 | 1 | expected 1 to 64 cores, found 0
+case small 1 0 1 1 | case small 4294967295 0 1 1 | 1 | expected 1 to 64 cores, found 4294967295
+case small 1 0 1 1 | case small 1 2 1 1 | 1 | expected 0 or 1
+case small 1 0 1 1 | case small 1 0 1 | 1 | takes 5 words
+case small 1 0 1 1 | case small 1 0 1 2 | 6 | expected a `dag` record
+dag 4 4 0 2 2 1 | clusters 1 1\ndag 4 4 0 2 2 1\nin 0 | 2 | clusters of 1 cores in all, found 2
+dag 4 4 0 2 2 1 | clusters 1 0\ndag 4 4 0 2 2 1\nin 0 | 2 | at least 1 core for each cluster
+dag 4 4 0 2 2 1 | clusters 1\ndag 4 4 0 2 2 1 | 4 | expected a `in` record
+dag 4 4 0 2 2 1 | clusters 1\ndag 4 4 0 2 2 1\nin 1 | 4 | no cluster 1
+dag 4 4 0 2 2 1 | dag 4 4 0 2 2 1\nin 0 | 3 | expected a `sub` record
+dag 4 4 0 2 2 1 | dag 0 4 0 2 2 1 | 2 | period of 0
+dag 4 4 0 2 2 1 | dag 4 0 0 2 2 1 | 2 | deadline of 0
+dag 4 4 0 2 2 1 | dag 4 4 0 0 2 1 | 2 | needs at least 1
+dag 4 4 0 2 2 1 | dag 4 4 0 4294967296 2 1 | 2 | too large
+dag 4 4 0 2 2 1 | dag 4 4 0 2 2 2 | 6 | expected a `edge` record
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551615 2 2 1 | 2 | exceeds 18446744073709551615
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551616 2 2 1 | 2 | too large
+dag 4 4 0 2 2 1 | dag 4 4 18446744073709551605 2 2 1 | 1 | may end after
+dag 4 4 0 2 2 1 | dag 4 -4 0 2 2 1 | 2 | not a whole number
+sub 1 0 1 1 | sub 1 0 1 | 3 | for each of 2 jobs, found 1
+sub 1 0 1 1 | sub 1 0 1 2 | 3 | not between 1 and the WCET 1
+sub 1 0 1 1 | sub 1 0 0 1 | 3 | not between 1 and the WCET 1
+sub 1 0 1 1 | sub 1 4294967296 1 1 | 3 | too large
+edge 0 1 | edge 0 2 | 5 | no subtask 2
+edge 0 1 | edge 1 1 | 2 | precedes itself
+1 0 1 1\ndag 4 4 0 2 2 1\nsub 1 0 1 1\nsub 4 0 4 4 | 1 0 1 1\ndag 4 4 0 2 2 2\nsub 1 0 1 1\nsub 4 0 4 4\nedge 1 0 | 2 | subtask 0 -> subtask 1 -> subtask 0
+edge 0 1 | edge 0 1\nsink 2 3 | 6 | no subtask 2
+edge 0 1 | edge 0 1\nsink 1 | 6 | takes 2 words
+edge 0 1 | edge 0 1\nsink 1 3\nsink 1 3 | 7 | twice
+edge 0 1 | edge 0 1\nsink 1 0 | 2 | deadline of 0
+edge 0 1 | edge 0 1\nsink 1 5 | 2 | longer than its DAG's
+edge 0 1 | edge 0 1\nsink 0 3 | 2 | is no sink
+x 0 0 1 1 5 0\n |  | 11 | without 1 `x` records
+x 0 0 1 1 5 0 | x 0 0 0 1 5 0 | 7 | twice
+x 0 0 1 1 5 0 | x 0 2 1 1 5 0 | 7 | no job 2
+x 0 0 1 1 5 0 | x 1 0 1 1 5 0 | 7 | no dag 1
+j 0 1 4 10 6 1 | j 0 1 4 10 6 2 | 11 | expected 0 or 1
+j 0 1 4 10 6 1 | k 0 1 4 10 6 1 | 11 | expected `x`, `s`, `j` or `end`
+end\n |  | 12 | the file ends";
+
+#[test]
+fn malformed_files_are_refused_with_their_line() {
+    for row in MALFORMED.lines() {
+        let row = row.replace(r"\n", "\n");
+        let [from, to, line, reason] = split(&row);
+        let malformed = parse(&SMALL.replacen(from, to, 1)).expect_err(to);
+        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
+        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
+    }
+    assert_eq!(parse("").expect_err("no case").line, 1);
+}
+
+/// One core, and a subtask that waits above another one; its answer comes at the limit.
+const WAITING: &str = "case waiting 1 0 1 2
+dag 20 20 0 1 1 0
+sub 3 0 3
+wait 0 1 2 3 1
+act 0 0 2 3 1
+dag 20 20 0 1 1 0
+sub 4 1 4
+x 0 0 0 0 6 0
+x 1 0 0 2 7 1
+s 0 0 0 0 0 2 5 6
+j 0 0 0 6 6 0
+j 1 0 0 7 7 0
+end
+";
+
+/// Parts of the waiting case, their replacement, and the first difference, if any.
+const WAITS: &str =
+    "act 0 0 2 3 1 | act 0 0 2 4 1 | dag 0 job 0 subtask 0: time-outs: expected 0, found 1
+act 0 0 2 3 1 | act 0 0 2 2 1 | dag 0 job 0 subtask 0: finish: expected 6, found 5
+s 0 0 0 0 0 2 5 6 | s 0 0 0 1 0 2 5 6 | dag 0 job 0 subtask 0: time-outs: expected 1, found 0
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 4 6 | dag 0 job 0 subtask 0 segment 1: start: expected 4, found 5
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 3 5 6 | dag 0 job 0 subtask 0 segment 0: end: expected 3, found 2
+x 1 0 0 2 7 1 | x 1 0 0 2 7 0 | dag 1 job 0 subtask 0: preemptions: expected 0, found 1";
+
+/// Parts of the waiting case, their replacement, and the line and the reason of the refusal.
+const MALFORMED_WAITS: &str = r"wait 0 1 2 3 1 | wait 0 0 2 | 4 | expected 0 waits
+wait 0 1 2 3 1 | wait 0 1 2 3 | 4 | expected 1 waits, each with its segment
+wait 0 1 2 3 1 | wait 0 2 2 3 1 | 4 | expected 2 waits
+wait 0 1 2 3 1 | wait 1 1 2 3 1 | 4 | no subtask 1
+wait 0 1 2 3 1 | wait 0 1 2 18446744073709551615 1 | 1 | may end after
+act 0 0 2 3 1 | act 0 1 2 3 1 | 5 | expected `act 0 0 ..`
+act 0 0 2 3 1 | act 0 0 1 3 1 | 5 | do not come to its execution time 3
+act 0 0 2 3 1 | act 0 0 2 3 1\nwait 0 1 2 3 1 | 6 | has its waits already
+act 0 0 2 3 1 | act 0 0 2 3 | 5 | takes 5 words
+act 0 0 2 3 1\n |  | 5 | expected a `act` record
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 5 | 10 | the spans of 2 segments
+s 0 0 0 0 0 2 5 6 | s 1 0 0 0 0 2 5 6 | 10 | the spans of 0 segments
+s 0 0 0 0 0 2 5 6 | s 0 0 0 0 0 2 5 6\ns 0 0 0 0 0 2 5 6 | 11 | twice
+s 0 0 0 0 0 2 5 6\n |  | 12 | 1 `s` records";
+
+#[test]
+fn waits_agree_and_their_first_difference_is_named() {
+    let checked = |text: &str| check(&parse(text).expect("well formed")[0]);
+    assert_eq!(checked(WAITING), Ok(()));
+    for row in WAITS.lines() {
+        let [from, to, difference] = split(row);
+        let found = checked(&WAITING.replace(from, to));
+        assert_eq!(found, Err(difference.to_owned()), "{to}");
+    }
+    for row in MALFORMED_WAITS.lines() {
+        let row = row.replace(r"\n", "\n");
+        let [from, to, line, reason] = split(&row);
+        let malformed = parse(&WAITING.replacen(from, to, 1)).expect_err(to);
+        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
+        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
+    }
+}
+
+#[test]
+fn far_apart_times_and_as_many_cores_as_there_can_be_are_no_trouble() {
+    let text = "case far 64 1 1 1
+dag 9000000000000000000 9000000000000000000 5 2 1 0
+sub 3 0 1 3
+x 0 0 0 5 6 0
+x 0 1 0 9000000000000000005 9000000000000000008 0
+j 0 0 5 6 1 0
+j 0 1 9000000000000000005 9000000000000000008 3 0
+end
+";
+    let cases = parse(text).expect("well formed");
+    assert_eq!(check(&cases[0]), Ok(()));
+}
