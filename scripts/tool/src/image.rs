@@ -37,10 +37,13 @@ pub fn most_stripped_bytes(app: &str) -> u64 {
     }
 }
 
+/// The folders of apps: those to copy, and those that measure the project itself.
+const FOLDERS: [&str; 2] = ["apps", "apps/lab"];
+
 /// Returns the names of the apps: the packages under `apps/`, sorted.
 pub fn apps() -> Vec<String> {
-    let entries = fs::read_dir(system::workspace().join("apps"));
-    let folders = entries.into_iter().flatten().flatten();
+    let entries = FOLDERS.map(|folder| fs::read_dir(system::workspace().join(folder)));
+    let folders = entries.into_iter().flatten().flatten().flatten();
     let folders = folders.map(|entry| entry.path());
     // A library for apps is not an app.
     let folders = folders.filter(|folder| folder.join("src/main.rs").is_file());
@@ -169,10 +172,10 @@ pub fn build_for_gdb(package: &str) -> Result<PathBuf, String> {
 ///
 /// One line that names the apps that have one.
 pub fn check_linux(app: &str) -> Result<(), String> {
-    let folder = system::workspace().join("apps");
     let has_program = |app: &String| {
-        let program = format!("examples/{}.rs", linux_name(app));
-        folder.join(app).join(program).is_file()
+        let program = format!("{app}/examples/{}.rs", linux_name(app));
+        let file = |folder| system::workspace().join(folder).join(&program);
+        FOLDERS.iter().any(|folder| file(folder).is_file())
     };
     if has_program(&app.into()) {
         return Ok(());

@@ -14,7 +14,8 @@ use std::path::Path;
 use std::process::Command;
 
 use super::{
-    CheckFailure, SourceFile, Tally, TestPlan, budgets, layers, none_of, packages, paths, words,
+    CheckFailure, SourceFile, Tally, TestPlan, apart, budgets, layers, none_of, packages, paths,
+    words,
 };
 use crate::bench::hand_off;
 use tool::image;
@@ -80,6 +81,7 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
         Ok(words::check_names(sources)?)
     });
     run("layers name only layers below them", &|| {
+        apart::check(sources)?;
         Ok(layers::check(sources)?)
     });
     run(

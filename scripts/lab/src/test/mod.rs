@@ -12,6 +12,7 @@
 //! project's rules on lints, format and files, but must pass their tests. A package accepts the
 //! rules by taking the workspace's lints.
 
+mod apart;
 mod budgets;
 mod checks;
 mod layers;

@@ -28,7 +28,7 @@
 //! takes a ready callback out of it, executes it while the graph is free, gives it back, and waits
 //! when nothing is ready. A callback that publishes wakes all workers that wait; the first finds
 //! the
-//! message, the others wait again. (`apps/join-latency` has them.)
+//! message, the others wait again. (`apps/lab/join-latency` has them.)
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;

@@ -8,7 +8,7 @@
 //! That the two do what the originals do is for `./scripts/oracle synchronizer`, on
 //! traces of those.
 
-#[path = "../../../../sched-dag/tests/it/counting.rs"]
+#[path = "../../../../../sched-dag/tests/it/counting.rs"]
 mod counting;
 
 use std::fmt::Write;
