@@ -1,8 +1,7 @@
 //! Violations that a journal can show: the rules, and one row for each breach.
 //!
 //! A row has the code of a breach, the rule, when or by which event it shows, and the text:
-//! what happened, where, and why it must not be. Its documentation begins with the rule, and
-//! is what `docs/watching.md` says of the code.
+//! what happened, where, and why it must not be. Its documentation begins with the rule.
 //!
 //! The phrases of the texts of violations: how they name DAGs and subtasks, and all that
 //! depends on what is wrong.

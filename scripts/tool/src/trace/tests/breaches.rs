@@ -1,10 +1,6 @@
 //! R1 to R5, one life, one core: good traces, and each breach of them.
 
-use std::fs;
-
 use super::*;
-use crate::golden::Golden;
-use crate::system::workspace;
 
 /// One DAG on two cores: `a` precedes `b` and `c`, which precede `d`; T = 100,
 /// D = 90, O = 10.
@@ -343,24 +339,4 @@ lost
     let figures = check(&run, BOUND_NS).figures;
     // At 19 ns itself, something may have been lost.
     assert_eq!((figures.from_ns, figures.events), (20, 5));
-}
-
-#[test]
-fn every_violation_is_documented() {
-    let (file, below) = (
-        "docs/watching.md",
-        "| rule | code | it says |\n|---|---|---|\n",
-    );
-    let page = fs::read_to_string(workspace().join(file)).unwrap();
-    let (_, table) = page.split_once(below).unwrap();
-    let text = &table[..=table.find("\n\n").unwrap()];
-    let row = |(code, meaning): (&&str, &&str)| {
-        let (rule, meaning) = meaning.trim().split_once(": ").unwrap();
-        format!(
-            "| {rule} | `{code}` | {} |\n",
-            meaning.trim_end_matches('.')
-        )
-    };
-    let rows = Violation::CODES.iter().zip(Violation::MEANINGS).map(row);
-    Golden { file, below, text }.assert_is(&rows.collect::<String>());
 }

@@ -70,7 +70,7 @@ fn change<'t>(lines: &mut Vec<&'t str>, from: &str, to: &'t str) {
     lines.splice(places[0]..end, instead);
 }
 
-/// Asserts that the documentation of a violation begins with its rule, as the page's row does.
+/// Asserts that the documentation of a violation begins with its rule.
 fn assert_documented_with_its_rule(breach: &Violation) {
     let code = breach.code();
     let kind = Violation::CODES.iter().position(|it| *it == code).unwrap();
