@@ -323,7 +323,7 @@ impl VirtualTime {
     ///
     /// # Errors
     ///
-    /// See [`RunError`]; `docs/guide.md`, section 12, has an example.
+    /// See [`RunError`].
     pub fn until(&self, dag: &str, job: u64) -> Result<JobShown, RunError> {
         let report = self.run_until(None, Some((dag, job)))?;
         Ok(self.show(&report, report.task_set().find(dag), job))
