@@ -167,17 +167,6 @@ fn the_index_lists_every_decision() {
     }
 }
 
-/// Returns the README, CONTRIBUTING.md and all pages of `docs/`: their paths and texts.
-fn pages() -> Vec<(String, String)> {
-    let mut paths = vec!["README.md".to_string(), "CONTRIBUTING.md".to_string()];
-    for folder in ["docs", "docs/decisions"] {
-        let names = files(folder).into_iter();
-        paths.extend(names.map(|name| format!("{folder}/{name}")));
-    }
-    let read = |path: String| (path.clone(), page(&path));
-    paths.into_iter().map(read).collect()
-}
-
 #[test]
 fn the_architecture_lists_every_lock() {
     let sources = sources_below("kernel");
@@ -234,55 +223,6 @@ fn the_glossary_names_types_that_there_are() {
         }
     }
     assert!(found >= 10, "{found}");
-}
-
-#[test]
-fn every_link_between_pages_leads_somewhere() {
-    for (page, text) in pages() {
-        let links = text.split("](").skip(1);
-        for link in links.filter_map(|rest| rest.split(')').next()) {
-            let target = link.split('#').next().unwrap_or_default();
-            if target.is_empty() || target.contains("://") || target.contains(' ') {
-                continue;
-            }
-            let folder = workspace().join(&page).with_file_name("");
-            assert!(
-                folder.join(target).exists(),
-                "{page}: `{link}` leads nowhere"
-            );
-        }
-    }
-}
-
-#[test]
-fn every_file_that_a_page_names_is_there() {
-    const FOLDERS: [&str; 8] = [
-        "scripts",
-        "sched-dag",
-        "fass",
-        "kernel",
-        "boot",
-        "apps",
-        "tests",
-        "docs",
-    ];
-    // Files that `new-app` makes.
-    const NEW_APPS: [&str; 2] = ["apps/first-steps", "tests/virtual_time.rs"];
-    let mut named = 0;
-    for (page, text) in pages() {
-        for word in text.split('`').skip(1).step_by(2) {
-            let is_path = word.split_once('/').is_some_and(|(folder, rest)| {
-                FOLDERS.contains(&folder) && !rest.contains([' ', '*', '{', '<'])
-            });
-            let is_of_new_app = NEW_APPS.iter().any(|app| word.starts_with(app));
-            if is_path && !is_of_new_app {
-                let is_there = workspace().join(word).exists();
-                assert!(is_there, "{page}: there is no `{word}`");
-                named += 1;
-            }
-        }
-    }
-    assert!(named > 100, "only {named} files are named");
 }
 
 #[test]

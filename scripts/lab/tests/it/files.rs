@@ -1,11 +1,9 @@
 //! The files that a command line of the laboratory names, as the tool's own tests hold them of its
 //! commands.
 
-use std::ffi::OsStr;
 use std::fs;
-use std::os::unix::ffi::OsStrExt;
 
-use crate::support::{assert_refused, call, folder, refusal};
+use crate::support::{assert_refused, call, folder};
 
 #[test]
 fn what_is_no_file_or_not_the_right_one_is_2_before_the_work() {
@@ -43,15 +41,4 @@ fn sets_of_files_are_counted_by_file() {
     let both = ["2", "50.0", "50.0", "50.0", "50.0", "50.0", "both.txt"];
     let one = ["1", "0.0", "0.0", "0.0", "0.0", "0.0", "one.txt"];
     assert_eq!(rows, [both, one]);
-}
-
-#[test]
-fn a_name_need_not_be_utf_8() {
-    let folder = folder("bytes");
-    let odd = OsStr::from_bytes(b"\xff.txt");
-    for line in ["bench", "soak --mode"] {
-        let words = line.split_whitespace().map(OsStr::new).chain([odd]);
-        let said = refusal(&folder, words);
-        assert!(said.contains('\u{fffd}'), "{said}");
-    }
 }
