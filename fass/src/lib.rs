@@ -149,7 +149,7 @@ pub mod shared {
     pub use crate::api::state::{State, StateRead, StateUpdate, StateValue};
     pub use crate::api::uses::{ResettableUses, SubtaskBuilder, Uses};
     pub use crate::api::wire::{
-        Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions,
+        DeviceEnd, Packet, ReceiveUse, Received, SendUse, Sender, Wire, WireCounts, WireOptions,
     };
     pub use crate::api::wire_waits::{ReadUse, WireReader, WireWriter, WriteUse};
     pub use crate::run::wire::Framing;

@@ -1,6 +1,6 @@
 //! WCETs that come from a file: those that runs of the same graph were observed to need.
 //!
-//! The file is text, a record a line; `#` begins a comment. `./scripts/run --observe` writes
+//! The file is text, a record a line; `#` begins a comment. `./scripts/recording --observe` writes
 //! it, and a commit takes it back:
 //!
 //! ```text
@@ -69,7 +69,7 @@ pub struct WcetFault {
 }
 
 const NO_RECORD: &str =
-    "this is no record of a file of WCETs; have one written by `./scripts/run --observe`";
+    "this is no record of a file of WCETs; have one written by `./scripts/recording --observe`";
 const ZERO: &str = "a WCET of 0; give at least 1 ns, or leave the line out";
 const UNKNOWN: &str = "the DAG has no such subtask; observe it again";
 const FOREIGN: &str = "the DAG of this name has another graph now; observe it again";

@@ -16,8 +16,8 @@ use std::{fmt, fs};
 
 use fass::Preemption;
 use fass::edge::{BootRecord, EdgeMode, RecordingState, ReplayOutcome};
-use fass::platform::{DeviceEnd, Platform as _, RunConfig};
-use fass::shared::{Signal, Wire};
+use fass::platform::{Platform as _, RunConfig};
+use fass::shared::{DeviceEnd, Signal, Wire};
 
 use crate::control::{self, Control};
 use crate::edge::{self, FILE, File, IS_LIVE, LEFT, unpoisoned};
@@ -370,35 +370,25 @@ impl Linux {
     /// use linux::{Linux, Mechanism};
     ///
     /// let machine = Linux::new(2, Mechanism::Fifo).expect("two processors are there");
-    /// machine.record("pump", File::create("pump.rec").expect("a file"));
+    /// machine.keep("pump", File::create("pump.rec").expect("a file"));
     /// // build DAGs, name topics by `Dag::record`, commit
     /// machine.run().expect("it is committed");
     /// machine.end_recording(true);
     /// Linux::end_record().expect("the file is written");
     /// ```
-    pub fn record(&self, app: &'static str, to: impl Write + Send + 'static) {
-        self.record_as(app, true, to);
-    }
-
-    /// Works like [`record`](Self::record), and takes also a run of which no value is recorded.
     pub fn keep(&self, app: &'static str, to: impl Write + Send + 'static) {
-        self.record_as(app, false, to);
-    }
-
-    fn record_as(&self, app: &'static str, is_needed: bool, to: impl Write + Send + 'static) {
         self.keep_events(to);
         IS_LIVE.store(true, Ordering::Relaxed);
         let wish = EdgeMode::Record {
             app,
             bytes: ROOM_BYTES,
-            is_needed,
         };
         edge::get().set_wish(Box::leak(Box::new(wish)));
     }
 
     /// Keeps a record without values, each run of it when that is over.
     ///
-    /// See [`record`](Self::record).
+    /// See [`keep`](Self::keep).
     pub fn keep_events(&self, to: impl Write + Send + 'static) {
         *unpoisoned(&FILE) = Some(BootRecord::new(File {
             writer: Box::new(to),

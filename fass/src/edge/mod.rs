@@ -21,7 +21,6 @@ mod replay;
 mod tape;
 
 use alloc::boxed::Box;
-use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use core::fmt;
@@ -51,8 +50,6 @@ pub enum EdgeMode {
         app: &'static str,
         /// The room for what is not drained yet.
         bytes: usize,
-        /// Whether an app of which no topic is recorded is refused.
-        is_needed: bool,
     },
     /// Replay these bytes.
     Replay {
@@ -404,22 +401,21 @@ impl Edge {
         if let Some(echo) = &mut self.echo {
             echo.launch();
         }
-        let (word, is_asked_for, is_needed) = match self.wish {
+        let (is_asked_for, replays) = match self.wish {
             None => return Ok(false),
-            Some(EdgeMode::Record { is_needed, .. }) => ("record", true, *is_needed),
-            Some(EdgeMode::Replay { .. }) => ("replay", true, true),
-            Some(EdgeMode::Latest { .. }) => ("latest", false, false),
+            Some(EdgeMode::Record { .. }) => (true, false),
+            Some(EdgeMode::Replay { .. }) => (true, true),
+            Some(EdgeMode::Latest { .. }) => (false, false),
         };
+        let is_second = is_asked_for && self.is_on;
         let launched = match &mut self.crossing {
-            None if !is_needed => return Ok(false),
+            None if !replays => return Ok(false),
             // Of the other commits all is kept but values.
-            Some(_) if !is_needed && self.is_on && is_asked_for => return Ok(false),
-            None => Err(format!(
-                "`{word}`: no topic of the app is recorded; name topics by `Dag::record`"
-            )),
-            Some(_) if is_asked_for && self.is_on => Err(format!(
-                "`{word}`: a recording is of one commit, and this is another one; leave the word out"
-            )),
+            Some(_) if is_second && !replays => return Ok(false),
+            None => Err("`replay`: no topic of the app is recorded; name topics by `Dag::record`".into()),
+            Some(_) if is_second => Err(
+                "`replay`: a recording is of one commit, and this is another one; leave the word out".into()
+            ),
             Some(crossing) => crossing.launch(plan).map(|()| crossing.drain()),
         };
         match launched {

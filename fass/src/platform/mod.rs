@@ -82,7 +82,6 @@ pub use clock::Clock;
 pub use run_config::RunConfig;
 pub use sched_dag::lifecycle::Request;
 
-pub use crate::api::wire::DeviceEnd;
 pub use crate::run::cell::SetOnce;
 pub use crate::run::gate::call_app;
 pub use crate::run::lock_words::LockWords;

@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 use crate::support::{commit, run_job};
 use counting::allocated;
-use fass::platform::{DeviceEnd, Request};
-use fass::shared::{Raiser, Received, Sample, Sender, Wire};
+use fass::platform::Request;
+use fass::shared::{DeviceEnd, Raiser, Received, Sample, Sender, Wire};
 use fass::{SubtaskAttributes, Unique, create_dag};
 use sched_dag::DagId;
 

@@ -8,9 +8,9 @@ use std::thread;
 
 use crate::no_allocation::counting::allocated;
 use crate::support::{PERIOD, answers, commit, named, panic_message};
-use fass::platform::{DeviceEnd, Request, SubtaskCode};
+use fass::platform::{Request, SubtaskCode};
 use fass::shared::{
-    Asker, Device, Raiser, Sample, TimedOut, Wire, WireReader, WireWriter, create_device,
+    Asker, Device, DeviceEnd, Raiser, Sample, TimedOut, Wire, WireReader, WireWriter, create_device,
 };
 use fass::{Dag, create_dag, sleep, until};
 use sched_dag::DagId;

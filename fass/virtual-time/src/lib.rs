@@ -178,7 +178,7 @@ impl VirtualTime {
         self.set(|settings| settings.terms.overheads = overheads)
     }
 
-    /// Gives the commit a file of WCETs that were observed, as `./scripts/run --observe`
+    /// Gives the commit a file of WCETs that were observed, as `./scripts/recording --observe`
     /// writes it; what it has for the DAGs counts in place of what they state.
     ///
     /// ```

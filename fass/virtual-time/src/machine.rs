@@ -25,8 +25,8 @@ use std::time::Duration;
 
 use fass::edge::Replay;
 use fass::log::LogLine;
-use fass::platform::{DeviceEnd, Plan, SubtaskRunner};
-use fass::shared::Wire;
+use fass::platform::{Plan, SubtaskRunner};
+use fass::shared::{DeviceEnd, Wire};
 use sched_dag::engine::{Alternate, FaultCost};
 use sched_dag::journal::EventKind;
 use sched_dag::lifecycle::{Request, WaitId};

@@ -13,8 +13,7 @@
 //! | `output=FILE` | what the app sends on its wire goes there | |
 //! | `console=off\|on` | whether a person at standard input can talk with a run | `off` |
 //! | `keep=FILE` | the record of the run is written there, also while it goes on | |
-//! | `record=FILE` | the same, and it is an error if no topic is recorded | |
-//! | `events=FILE\|on` | if neither is given: its commits, events and times are, when a run is over; `on` is for lines of the output | |
+//! | `events=FILE\|on` | without `keep`: its commits, events and times are, when a run is over; `on` is for lines of the output | |
 //! | `replay=FILE` | the run replays that recording | |
 //! | `from=DAG/JOB` | from that job on, or the last one before it of which all states are recorded | all jobs |
 //! | `limit_ms=N` | Linux ends the program when a thread has run at a real-time level for so long without waiting; 0: never | 0 |
@@ -181,10 +180,10 @@ pub(crate) fn apply(
         })
         .allocations(crate::heap::allocations_of_runs);
     let replayed = options.text("replay");
-    let words = ["record", "keep", "events"].map(|word| Some((word, options.text(word)?)));
+    let words = ["keep", "events"].map(|word| Some((word, options.text(word)?)));
     match (words.into_iter().flatten().next(), replayed) {
-        (Some(("record" | "keep", _)), Some(_)) => {
-            let line = "`record` and `keep` exclude `replay`; give one";
+        (Some(("keep", _)), Some(_)) => {
+            let line = "`keep` excludes `replay`; give one";
             return Err(UsageError::new(line));
         }
         (Some(("events", "on")), _) => machine.keep_events(ToConsole(RecordLines::new())),
@@ -193,7 +192,6 @@ pub(crate) fn apply(
             let file = file.map_err(|why| UsageError::new(format!("`{word}={path}`: {why}")))?;
             let file = BufWriter::new(file);
             match word {
-                "record" => machine.record(app, file),
                 "keep" => machine.keep(app, file),
                 _ => machine.keep_events(file),
             }

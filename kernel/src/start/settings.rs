@@ -10,10 +10,9 @@
 //! | `wcets=N` | the first N bytes of the loader's module are WCETs that were observed | 0 |
 //! | `keep=N` | the record of the boot is sent, to QEMU's debug port or in lines: commits, events,
 //! times, and what crosses the edge of the run, from a buffer of N KiB; 0: it is not | 0 |
-//! | `record=N` | the same, and it is an error if no topic is recorded | 0 |
-//! | `events=off\|on` | if neither is given: commits, events and times are sent, when a run is
+//! | `events=off\|on` | without `keep`: commits, events and times are sent, when a run is
 //! over | `off` |
-//! | `latest=N` | if neither is given and there is a debug port: the inputs of each DAG's last N
+//! | `latest=N` | without both, where there is a debug port: the inputs of each DAG's last N
 //! jobs, 64 at most, are kept, and sent after a fault; 0: none are | 16 |
 //! | `replay=N` | the next N bytes of the loader's module are a recording, which is replayed | 0 |
 //! | `from=DAG/JOB` | the replay begins with that job, or with the last one before it of which all
@@ -79,15 +78,14 @@ pub(crate) fn set_wish(
     mut module: Option<&'static [u8]>,
 ) -> Result<Option<&'static [u8]>, UsageError> {
     let replay_bytes = options.number("replay", 0..=1 << 32, 0)?;
-    let record_kib = options.number("record", 0..=1 << 20, 0)?;
-    let kib = record_kib.max(options.number("keep", 0..=1 << 20, 0)?);
+    let kib = options.number("keep", 0..=1 << 20, 0)?;
     let jobs = options.number("latest", 0..=64, 16)?;
     if options.choice("events", &[("off", false), ("on", true)])? {
         record::start(false);
     }
     let wish = match (replay_bytes, kib, jobs) {
         (1.., 1.., _) => {
-            let line = "`record` and `keep` exclude `replay`; give one";
+            let line = "`keep` excludes `replay`; give one";
             return Err(UsageError::new(line));
         }
         (1.., 0, _) => {
@@ -102,7 +100,6 @@ pub(crate) fn set_wish(
         (0, 1.., _) => EdgeMode::Record {
             app,
             bytes: usize::try_from(kib * 1024).unwrap_or(0),
-            is_needed: record_kib > 0,
         },
         (0, 0, 1..) => EdgeMode::Latest {
             app,

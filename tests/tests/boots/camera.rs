@@ -30,7 +30,7 @@ fn answers_that_the_machine_or_linux_recorded_are_replayed_on_both_and_on_the_ho
         let log = system::new_log("camera").expect("a folder for logs");
         let file = log.with_extension("rec");
         let name = file.to_string_lossy();
-        let (frames, _) = run(&format!("{place} --record {name}"));
+        let (frames, _) = run(&format!("{place} --keep {name}"));
         assert_eq!(frames.iter().sum::<u64>(), FRAMES);
         // Another seed, or one that is silent: the accelerator would do something else.
         for place in ["--cores 1 --seed 2", "--cores 4", "--on linux --cores 2"] {

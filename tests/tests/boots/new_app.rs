@@ -165,10 +165,10 @@ fn its_report_is_of_all_jobs_also_of_those_whose_events_are_gone() {
 fn in_its_repository_a_run_is_recorded_and_replayed_and_advice_is_for_there() {
     let app = repository("replayed");
     let file = app.join("run.rec").display().to_string();
-    let record = format!("run -- --mode deterministic --record {file}");
+    let record = format!("run -- --mode deterministic --keep {file}");
     cargo(&app, &record);
     let there = app.join("linux.rec").display().to_string();
-    let said = cargo(&app, &format!("run -- --on linux --record {there}"));
+    let said = cargo(&app, &format!("run -- --on linux --keep {there}"));
     assert!(said.contains("on Linux, "), "{said}");
     // What either has recorded, the other repeats.
     for (place, file) in [("--on linux", &file), ("--mode deterministic", &there)] {

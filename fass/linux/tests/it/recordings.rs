@@ -71,7 +71,7 @@ fn part() {
     if replays {
         machine.replay(fs::read(path).expect("it is recorded").leak(), None);
     } else {
-        machine.record("recordings", File::create(path).expect("a file"));
+        machine.keep("recordings", File::create(path).expect("a file"));
     }
     let (dag, results, driver) = squaring(step.parse().expect("a number"));
     finish_create_dags(&[dag]).expect("the DAG is right");

@@ -13,8 +13,7 @@
 use alloc::boxed::Box;
 use alloc::format;
 
-use fass::platform::DeviceEnd;
-use fass::shared::Wire;
+use fass::shared::{DeviceEnd, Wire};
 
 use super::{LINE, Line};
 use crate::options::UsageError;

@@ -591,13 +591,6 @@ impl Parsed {
         other
     }
 
-    /// Returns a copy of the command line without an option.
-    pub fn without(&self, name: &str) -> Parsed {
-        let mut other = self.clone();
-        other.given.remove(name);
-        other
-    }
-
     /// Returns the first positional word, if one was given.
     pub fn positional(&self) -> Option<&str> {
         self.positionals.first().and_then(|word| word.to_str())

@@ -173,7 +173,7 @@ pub const MARGIN_PERCENT: u64 = 20;
 /// Returns a file of the longest calls with a margin. A subtask that never ran is left out.
 pub fn text(all: &[OfDag], margin_percent: u64) -> String {
     let mut text = String::from(
-        "# WCETs that were observed, by `./scripts/run --observe`: a margin in per cent, then of\n\
+        "# WCETs that were observed, by `./scripts/recording --observe`: a margin in per cent, then of\n\
          # each DAG a hash of its names and edges, and of each subtask the longest call and the\n\
          # margin in ns, its number and its name. Observed is not proven: other inputs may take\n\
          # longer. A subtask whose line is taken out keeps the WCET that is stated.\n",

@@ -168,8 +168,11 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         let line = "it has values alone; `./scripts/run --keep FILE` keeps all of a run";
         return Err(format!("`--{name}`: {line}"));
     }
-    for line in drawn_and_proven(&record, options)? {
-        println!("{line}");
+    if let Some(path) = options.path("dot") {
+        println!("{}", draw(&record, path)?);
+    }
+    if let Some(path) = options.path("witness") {
+        println!("{}", proof::write(path, record.proven()?)?);
     }
     if let Some(path) = options.path("observe") {
         let mut observed = Vec::new();
@@ -181,21 +184,13 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes the picture and the witnesses that the options name, and returns lines that announce
-/// them.
-pub(crate) fn drawn_and_proven(record: &Record, options: &Parsed) -> Result<Vec<String>, String> {
-    let mut announced = Vec::new();
-    if let Some(path) = options.path("dot") {
-        files::write_named("dot", path, dot::text(record)?)?;
-        let file = files::shown_path(path);
-        announced.push(format!(
-            "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
-        ));
-    }
-    if let Some(path) = options.path("witness") {
-        announced.push(proof::write(path, record.proven()?)?);
-    }
-    Ok(announced)
+/// Writes the picture of the committed DAGs, and returns a line that announces it.
+pub(crate) fn draw(record: &Record, path: &Path) -> Result<String, String> {
+    files::write_named("dot", path, dot::text(record)?)?;
+    let file = files::shown_path(path);
+    Ok(format!(
+        "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
+    ))
 }
 
 /// Checks the options and all files, before any is opened.

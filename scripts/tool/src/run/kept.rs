@@ -1,7 +1,7 @@
 //! The files that stay of a boot: its record, views of that, and its serial log.
 //!
 //! The record arrives while the guest runs and is completed with the guest's machine lines. It is
-//! written to the files that the options name; views of it (`--dot`, `--witness`) are made from it.
+//! written to the files that the options name; the view `--dot` is made from it.
 //!
 //! Even without such an option a guest sends the inputs of its last jobs before a fault; they are
 //! written to a file next to the log.
@@ -30,7 +30,7 @@ use crate::system;
 const PASSING: [&str; 3] = ["progress", "record", "status"];
 
 /// The options that name a file for the record.
-const FILES: [&str; 3] = ["keep", "record", "trace"];
+const FILES: [&str; 2] = ["keep", "trace"];
 
 /// The buffer in KiB for values that wait for the background to send them.
 const ROOM_KIB: &str = "1024";
@@ -46,11 +46,13 @@ pub(super) struct Kept {
 
 /// Returns the guest's word for the kind of record that the options want.
 pub(super) fn word(options: &Parsed) -> Option<&'static str> {
-    let views = ["trace", "dot", "witness", "observe", "prove"];
-    let all = ["record", "keep"].into_iter();
     // A full record has the events, too, so it prevails over the views.
-    let mut all = all.filter(|name| options.is_given(name));
-    all.next().or(options.given_of(&views).map(|_| "events"))
+    match options.is_given("keep") {
+        true => Some("keep"),
+        false => options
+            .given_of(&["trace", "dot", "prove"])
+            .map(|_| "events"),
+    }
 }
 
 impl Kept {
@@ -291,27 +293,14 @@ pub(super) fn write(
     for line in kept.write(options, &outcome)? {
         screen.say(&line);
     }
-    let wants_views = options.given_of(&["dot", "witness"]).is_some();
-    let views = || recordings::drawn_and_proven(&outcome.record()?, options);
-    // After a failure views would be wrong or missing, and would hide its message.
+    // After a failure the picture would be wrong or missing, and would hide its message.
     if outcome.judge().is_ok() {
-        let views = wants_views.then(views).transpose()?.unwrap_or_default();
-        let warning = handed::warning(options, &outcome);
-        views
-            .iter()
-            .chain(&warning)
-            .for_each(|line| screen.say(line));
-    } else if wants_views
-        && outcome
-            .transcript
-            .of_kind("bound_exceeded")
-            .next()
-            .is_some()
-    {
-        // The commit was in order, and the proof shows which statement has not held. Without one,
-        // the failure itself is the worse news.
-        let views = views().unwrap_or_default();
-        views.iter().for_each(|line| screen.say(line));
+        if let Some(path) = options.path("dot") {
+            screen.say(&recordings::draw(&outcome.record()?, path)?);
+        }
+        if let Some(warning) = handed::warning(options, &outcome) {
+            screen.say(&warning);
+        }
     }
     Ok(Booted {
         outcome,

@@ -51,7 +51,7 @@ const APART: [(&str, &str, &str); 3] = [
         "module",
         "exclude each other: the DAGs are the module",
     ),
-    ("replay", "record", "exclude each other"),
+    ("replay", "keep", "exclude each other"),
     ("replay", "dag", "exclude each other"),
 ];
 
@@ -71,10 +71,10 @@ fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     if let Some(folder) = several::folder(options) {
         return several::run_folder(options, &folder);
     }
-    if several::is_asked_for(options) {
+    if options.is_given("prove") {
         return several::run(options);
     }
-    let why = "needs `--observe FILE` or `--prove`; give one, too";
+    let why = "needs `--prove`; give it, too";
     let apart = options.check_without(&["margin", "seeds"], why);
     apart
         .and_then(|()| options.check_apart(&APART))
@@ -102,9 +102,7 @@ fn check_files(options: &Parsed) -> Result<(), Refusal> {
     ];
     let mut inputs = options.named(&names);
     inputs.extend(handed::input(options));
-    let outputs = [
-        "serial", "trace", "record", "keep", "dot", "witness", "observe", "output",
-    ];
+    let outputs = ["serial", "trace", "keep", "dot", "output"];
     let outputs = options.named(&outputs);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
     kept::check(options).map_err(Refusal::Usage)

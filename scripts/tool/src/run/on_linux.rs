@@ -22,7 +22,7 @@ use crate::qemu::{self, Ending, Mode};
 const FOREIGN: [&str; 6] = ["boot", "gdb", "latest", "machine", "memory", "qemu"];
 
 /// Options that `--on debian` cannot pass on to its guest, and options only for that guest.
-const NOT_IN_GUEST: [&str; 6] = ["console", "input", "keep", "output", "record", "replay"];
+const NOT_IN_GUEST: [&str; 5] = ["console", "input", "keep", "output", "replay"];
 const ONLY_IN_GUEST: [&str; 2] = ["mode", "busy"];
 
 /// The additional time that a guest may take, in which Linux starts.

@@ -1,5 +1,5 @@
-//! More than one run: the files of a folder (`--dag FOLDER`), and runs that measure WCETs
-//! (`--observe`) or compare bounds with response times (`--prove`).
+//! More than one run: the files of a folder (`--dag FOLDER`), and runs that compare bounds with
+//! response times (`--prove`).
 //!
 //! An observed guest records its DAGs and times. `--prove` boots twice: the first run is observed,
 //! the second one commits with the WCETs and overheads of the first, unless the person states them.
@@ -32,24 +32,12 @@ use crate::system;
 /// The platform's overheads; an error in words if no trace was kept.
 type Measurement = Result<MeasuredCosts, String>;
 
-/// Reports whether the options ask for an observed run.
-pub(super) fn is_asked_for(options: &Parsed) -> bool {
-    options.is_given("observe") || options.is_given("prove")
-}
-
-/// Runs the observation or the proof.
+/// Runs the proof.
 pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
     let why = "is for a run that is not observed; leave one of them out";
     let alone = options.check_without(&["console", "gdb", "print-dag"], why);
     alone.map_err(Refusal::Usage)?;
     check_files(options)?;
-    // Without a comparison the exit code says only whether each run was good.
-    if !options.is_given("prove") {
-        return Ok(match observe(options, options.path("observe"))? {
-            Some(_) => ExitCode::SUCCESS,
-            None => ExitCode::FAILURE,
-        });
-    }
     let Some((rows, code)) = prove(options)? else {
         return Ok(ExitCode::FAILURE);
     };
@@ -101,9 +89,9 @@ type Proven = (Vec<ProofRow>, ExitCode);
 /// which has been reported.
 fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
     let log = system::new_log("observed")?;
-    // Without `--observe` the WCETs of the first run lie in a file of ours.
+    // The WCETs of the first run.
     let own = Temporary(Some(log.with_extension("wcets")));
-    let Some(proving) = observe_first(options, own.0.as_deref())? else {
+    let Some(proving) = observe_first(options, own.path())? else {
         return Ok(None);
     };
     let dags = prepare(&proving)?;
@@ -122,7 +110,7 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
 
 /// Observes a run, unless the person states both WCETs and overheads. Returns the command line by
 /// which the next run commits with the measurements; `None` if the run failed.
-fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>, Refusal> {
+fn observe_first(options: &Parsed, own: &Path) -> Result<Option<Parsed>, Refusal> {
     let append = options.text("append").unwrap_or_default();
     let measures = !states_overheads(append);
     if options.is_given("wcets") && !measures {
@@ -131,12 +119,12 @@ fn observe_first(options: &Parsed, own: Option<&Path>) -> Result<Option<Parsed>,
     // The person asked for the second run; the first only prepares it.
     let first = options.with("quiet", NOTHING);
     // WCETs that the person states are not overwritten by observed ones.
-    let file = options.path("observe").or(own);
-    let Some(seen) = observe(&first, file.filter(|_| !options.is_given("wcets")))? else {
+    let file = Some(own).filter(|_| !options.is_given("wcets"));
+    let Some(seen) = observe(&first, file)? else {
         return Ok(None);
     };
     let mut next = options.clone();
-    if let (Some(file), false) = (file, options.is_given("wcets")) {
+    if let Some(file) = file {
         next = next.with("wcets", file);
     }
     if measures {
@@ -162,9 +150,7 @@ fn compare(booted: &Booted) -> Result<Vec<ProofRow>, String> {
 /// Observes a run for each seed, prints the execution times, and writes the file of WCETs. Returns
 /// the overheads; `None` if a run failed, which has been reported.
 fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
-    let observing = options.without("prove");
-    // An empty name observes all the same; only no file is written.
-    let observing = observing.with("observe", file.unwrap_or(Path::new("")));
+    let observing = options.with("prove", OBSERVING);
     // Saturating, since a person's seed may be the largest `u64`.
     let first = options.number("seed").unwrap_or(1);
     let seeds = options.number("seeds").unwrap_or(1);
@@ -195,15 +181,14 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         observed::lines(&all),
     );
     if let Some(path) = file {
-        let place = files::shown_path(path);
-        files::write_named("observe", path, observed::text(&all, margin))?;
-        if options.is_given("observe") && !options.is_given("json") {
-            println!("{place}: the WCETs; `--wcets {place}` commits with them");
-        }
+        files::write(path, observed::text(&all, margin))?;
     }
     // The overheads in the last seed's run stand for those of all.
     Ok(Some(observed::measure(&latest.runs)))
 }
+
+/// The value of `--prove` in its first run, which only observes.
+const OBSERVING: &str = "observing";
 
 /// Prints the rows of a proof.
 fn say_all(options: &Parsed, rows: &[ProofRow]) {
@@ -224,7 +209,7 @@ fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
 /// Returns the word that keeps a run which only observes from judging bounds: its WCETs and
 /// overheads are still to be found.
 pub(super) fn bounds_word(options: &Parsed) -> Option<String> {
-    let observes = options.is_given("observe") && !options.is_given("prove");
+    let observes = options.text("prove") == Some(OBSERVING);
     observes.then(|| "bounds=observe".into())
 }
 
@@ -242,14 +227,12 @@ pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
 }
 
 /// Options that make sense for one file only.
-const FOR_ONE_FILE: [&str; 10] = [
+const FOR_ONE_FILE: [&str; 8] = [
     "print-dag",
     "graph",
     "trace",
     "serial",
     "dot",
-    "witness",
-    "observe",
     "wcets",
     "console",
     "gdb",

@@ -96,8 +96,6 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "print-dag": Takes::Nothing;
         /// All of the run; docs/recordings.md.
         "keep" in "files": Takes::File("FILE");
-        /// As --keep; an error if the app records no topic.
-        "record": Takes::File("FILE");
         /// As --keep, without values; for check-trace.
         "trace": Takes::File("FILE");
         /// Jobs of a DAG to keep for a crash; 16.
@@ -110,18 +108,14 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         "serial": Takes::File("FILE");
         /// The committed DAGs, for `dot -Tsvg FILE`.
         "dot": Takes::File("FILE");
-        /// The bounds' proof, for check-witness.
-        "witness": Takes::File("FILE");
-        /// The times of calls, as WCETs; docs/proving.md.
-        "observe" in "bounds": Takes::File("FILE");
-        /// Per cent that a WCET is above it; 20.
+        /// Measure, commit with that, and compare; docs/proving.md.
+        "prove" in "bounds": Takes::Nothing;
+        /// --prove: per cent that a WCET is above the longest call; 20.
         "margin": Takes::Number(0, 1_000);
-        /// Observe a run for so many seeds; 1.
+        /// --prove: measure so many seeds; 1.
         "seeds": Takes::Number(1, 1_000);
-        /// Commit with WCETs that --observe has written.
+        /// Commit with WCETs that `recording --observe` has written.
         "wcets": Takes::File("FILE");
-        /// Observe, commit with that, and compare with bounds.
-        "prove": Takes::Nothing;
         /// Talk to the kernel, in real time: type `help`.
         "console" in "person": Takes::Nothing;
         /// Bytes for the app's wire; docs/wires.md. -: stdin.

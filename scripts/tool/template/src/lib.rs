@@ -19,7 +19,7 @@ pub const PERIOD: Duration = Duration::from_millis(10);
 #[must_use]
 pub fn build(jobs: u64) -> [Dag; 1] {
     let dag = create_dag();
-    // With `--record FILE` the source's values are recorded, for a replay.
+    // With `--keep FILE` the source's values are recorded, for a replay.
     dag.name("app-template").jobs(jobs).record::<u32>("distance");
     let mut distance = 100_u32;
     let sense = move || {

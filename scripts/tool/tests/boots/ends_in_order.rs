@@ -63,7 +63,7 @@ fn the_first_ctrl_c_ends_a_run_in_order() {
     let gaps = workspace().join("apps/cruise/gaps.txt");
     let machine = format!(
         "run --app cruise --mode deterministic --jobs 100000 --append trace_events=2000 --input {} \
-         --record ended.rec --trace trace.rec",
+         --keep ended.rec --trace trace.rec",
         gaps.display()
     );
     let linux = "run --app fork-join --on linux --cores 1 --jobs 5000 --trace trace.rec";

@@ -44,19 +44,12 @@ fn a_run_that_is_kept_is_judged_drawn_shown_and_replayed() {
     let replayed = succeed(&folder, &format!("{RUN} --policy edf --replay run.kept"));
     assert!(replayed.contains("\"uncompared\":0"), "{replayed}");
 
-    // The commands make the same views of it as the options of a run.
-    let line = "--record values --dot dags.own --witness proof.own";
-    succeed(&folder, &format!("{RUN} {line}"));
-    for file in ["dags", "proof"] {
-        let own = read(&folder, &format!("{file}.own"));
-        assert_eq!(read(&folder, file), own, "{file}");
-    }
-    let (kept, values) = (read(&folder, "run.kept"), read(&folder, "values"));
-    let [kept, values] = [&kept, &values].map(|bytes| Recording::read(bytes).expect("whole"));
-    assert_eq!(kept.header(), values.header());
-    assert!(kept.count() > 0 && kept.count() == values.count());
+    // The command makes the same picture of it as the option of a run.
+    succeed(&folder, &format!("{RUN} --dot dags.own"));
+    assert_eq!(read(&folder, "dags"), read(&folder, "dags.own"));
 
     let bytes = read(&folder, "run.kept");
+    assert!(Recording::read(&bytes).expect("whole").count() > 0);
     fs::write(folder.join("cut"), &bytes[..bytes.len() - 1]).expect("our folder takes a file");
     assert!(succeed(&folder, "recording cut").contains("\nincomplete: "));
     let mut altered = bytes;
@@ -98,7 +91,7 @@ fn the_proof_of_a_bound_that_is_exceeded_is_written() {
     let dags = "dag quick period 10ms\nsubtask only wcet 1us\nend\n";
     fs::write(folder.join("quick.dag"), dags).expect("our folder takes a file");
     // The kernel takes its time, and that is not stated.
-    let line = "run --dag quick.dag --cores 1 --mode deterministic --jobs 3 --witness proof \
+    let line = "run --dag quick.dag --cores 1 --mode deterministic --jobs 3 --keep kept \
                 --append overheads_ns=0,0,0";
     let called = call(&folder, line.split_whitespace());
     assert_eq!(called.code, Some(1), "{}{}", called.out, called.complaint);
@@ -107,6 +100,7 @@ fn the_proof_of_a_bound_that_is_exceeded_is_written() {
             .complaint
             .contains("beyond its proven bound of 1.000 us")
     );
+    succeed(&folder, "recording kept --witness proof");
     assert!(read(&folder, "proof").starts_with(b"machine 1 "));
 }
 
@@ -116,7 +110,7 @@ fn a_replay_of_signals_leaves_no_file_unless_an_instance_has_failed() {
     fs::write(folder.join("gaps"), "1ms \"gap 2350\\n\"\n").expect("our folder takes a file");
     let run = "run --app cruise --mode deterministic --jobs 5 --input gaps --append \
                releases=packets";
-    succeed(&folder, &format!("{run} --record run.rec"));
+    succeed(&folder, &format!("{run} --keep run.rec"));
     let replayed = succeed(&folder, &format!("{run} --replay run.rec"));
     assert!(replayed.contains("\"kind\":\"replayed\""), "{replayed}");
     assert!(!replayed.contains("before the fault"), "{replayed}");

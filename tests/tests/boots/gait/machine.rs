@@ -84,7 +84,7 @@ fn a_walk_that_linux_recorded_is_replayed_on_linux_on_the_machine_and_on_the_hos
         let compared = number("replayed", "compared");
         (number("gait", "digest").expect("the app's line"), compared)
     };
-    let (wanted, _) = digest(&format!("--on linux --cores 2 --record {recorded}"));
+    let (wanted, _) = digest(&format!("--on linux --cores 2 --keep {recorded}"));
     for place in [
         "--on linux --cores 1",
         "--on linux --mechanism poll",
