@@ -19,7 +19,7 @@ use std::time::Duration;
 use sched_dag::DagId;
 use sched_dag::journal::EventKind;
 
-use tool::options::{Command, Parsed, Takes, options};
+use tool::options::{Command, Parsed, Takes, name, options};
 use tool::outcome::{self, Outcome};
 use tool::progress::{Progress, SILENCE};
 use tool::protocol::MachineLine;
@@ -35,26 +35,26 @@ static SOAK: Command = Command {
     positional: None,
     options: options! {
         /// 16 s of guest time instead of 14 minutes; the host takes longer.
-        "short": Takes::Nothing;
+        SHORT: Takes::Nothing;
         /// Processors of the guest.
-        "cores": Takes::Number(1, MOST_CORES), or "4";
+        CORES: Takes::Number(1, MOST_CORES), or "4";
         /// Jobs of random sets to simulate on the host first, which takes minutes for 10^8.
-        "jobs": Takes::Number(1, 1_000_000_000_000);
+        JOBS: Takes::Number(1, 1_000_000_000_000);
         /// The first round.
-        "first": Takes::Number(0, 1_000_000), or "0";
+        FIRST: Takes::Number(0, 1_000_000), or "0";
         /// How many rounds, that is sets of DAGs; 84, with --short 16.
-        "rounds": Takes::Number(1, 1_000_000);
+        ROUNDS: Takes::Number(1, 1_000_000);
         /// Guest time in which each of the two runs of a round releases jobs; 5000, with --short 500.
-        "round-ms": Takes::Number(1, 10_000);
+        ROUND_MS: Takes::Number(1, 10_000);
         /// Seed of all that is random.
-        "seed": Takes::Number(0, u64::MAX), or "1";
+        SEED: Takes::Number(0, u64::MAX), or "1";
         /// The meaning of time; see ./scripts/run --help.
-        "mode": Takes::OneOf(Mode::NAMES), or "deterministic";
+        MODE: Takes::OneOf(Mode::NAMES), or "deterministic";
         /// Microseconds for which an instance may wait for what it is owed; 50, and where time is
         /// real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).
-        "bound-us": Takes::Number(0, 1_000_000_000);
+        BOUND_US: Takes::Number(0, 1_000_000_000);
         /// Guests that run at once; as many as the host has processors, and one where time is real.
-        "side-by-side": Takes::Number(1, 64);
+        SIDE_BY_SIDE: Takes::Number(1, 64);
     },
     notes: "\
 A round draws 3 to 8 DAGs of 3 to 12 subtasks with random graphs and execution
@@ -80,7 +80,7 @@ exit codes: 0 no round failed; 1 some did; 2 a refused command line
 /// Runs the subcommand with the words after its name.
 pub fn soak(words: &[OsString]) -> ExitCode {
     SOAK.carry_out(words, |options| {
-        let are_kept = options.number("jobs").map_or(Ok(true), simulate)?;
+        let are_kept = options.number(name::JOBS).map_or(Ok(true), simulate)?;
         let plan = plan(options);
         let rounds = plan.rounds.end - plan.rounds.start;
         println!(
@@ -116,12 +116,12 @@ fn simulate(jobs: u64) -> Result<bool, String> {
 
 /// Makes the plan from the options.
 fn plan(options: &Parsed) -> SoakPlan {
-    let plan = match options.is_given("short") {
+    let plan = match options.is_given(name::SHORT) {
         true => SoakPlan::SHORT,
         false => SoakPlan::LONG,
     };
     let number = |name, usual| options.number(name).unwrap_or(usual);
-    let mode = options.text("mode").and_then(Mode::from_name);
+    let mode = options.text(name::MODE).and_then(Mode::from_name);
     let mode = mode.unwrap_or(plan.mode);
     // The deterministic bound covers some decisions and a switch; where time is real the host's
     // noise comes on top.
@@ -135,15 +135,15 @@ fn plan(options: &Parsed) -> SoakPlan {
         Mode::Deterministic => std::thread::available_parallelism().map_or(1, usize::from),
         Mode::Kvm | Mode::Threads => 1,
     };
-    let first = number("first", 0);
+    let first = number(name::FIRST, 0);
     SoakPlan {
-        rounds: first..first + number("rounds", plan.rounds.end),
-        round_ms: number("round-ms", plan.round_ms),
-        seed: number("seed", plan.seed),
-        cores: number("cores", plan.cores),
+        rounds: first..first + number(name::ROUNDS, plan.rounds.end),
+        round_ms: number(name::ROUND_MS, plan.round_ms),
+        seed: number(name::SEED, plan.seed),
+        cores: number(name::CORES, plan.cores),
         mode,
-        bound_ns: number("bound-us", usual_us) * 1000,
-        side_by_side: (options.number("side-by-side"))
+        bound_ns: number(name::BOUND_US, usual_us) * 1000,
+        side_by_side: (options.number(name::SIDE_BY_SIDE))
             .map_or(at_once, |given| usize::try_from(given).unwrap_or(at_once)),
     }
 }

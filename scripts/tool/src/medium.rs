@@ -16,7 +16,7 @@ use std::process::{self, ExitCode};
 use crate::files::{self, Temporary};
 use crate::image::{self, Contents};
 use crate::install;
-use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, name, options};
 use crate::qemu::Qemu;
 use crate::system;
 
@@ -30,13 +30,13 @@ pub static TABLE: Command = Command {
     )),
     options: options! {
         /// The app: a package under apps/.
-        "app": Takes::Text("NAME"), or "fork-join";
+        APP: Takes::Text("NAME"), or "fork-join";
         /// The ISO to be made.
-        "iso": Takes::File("FILE");
+        ISO: Takes::File("FILE");
         /// A file that the app finds in memory, as dag-file does its DAGs.
-        "module": Takes::File("MODULE");
+        MODULE: Takes::File("MODULE");
         /// Take this image; build nothing.
-        "image": Takes::File("IMAGE");
+        IMAGE: Takes::File("IMAGE");
     },
     notes: "\
 The ISO boots by GRUB, under BIOS and UEFI. `cp FILE /dev/DEVICE` writes it to a stick,
@@ -60,11 +60,11 @@ pub fn image(words: &[OsString]) -> ExitCode {
 
 /// Checks everything that can be refused, and returns the words for the guest.
 fn check(options: &Parsed) -> Result<String, String> {
-    let outputs = options.named(&["iso"]);
+    let outputs = options.named(&[name::ISO]);
     if outputs.is_empty() {
         return Err("which file? give --iso FILE".into());
     }
-    let inputs = options.named(&["module", "image"]);
+    let inputs = options.named(&[name::MODULE, name::IMAGE]);
     files::check(&inputs, &outputs)?;
     for input in &inputs {
         let (option, place) = (input.option, files::shown_path(input.path));
@@ -74,8 +74,8 @@ fn check(options: &Parsed) -> Result<String, String> {
         };
         read.map_err(|why| format!("`--{option} {place}`: {why}"))?;
     }
-    if !options.is_given("image") {
-        let app = options.text("app").unwrap_or_default();
+    if !options.is_given(name::IMAGE) {
+        let app = options.text(name::APP).unwrap_or_default();
         image::check_app(app)?;
     }
     let words = options.files().map(Path::to_string_lossy);
@@ -91,12 +91,12 @@ fn check(options: &Parsed) -> Result<String, String> {
 
 /// Makes the ISO, and returns a line about it.
 fn make(options: &Parsed, words: &str) -> Result<String, String> {
-    let image = match options.path("image") {
+    let image = match options.path(name::IMAGE) {
         Some(path) => path.into(),
-        None => image::build(options.text("app").unwrap_or_default())?,
+        None => image::build(options.text(name::APP).unwrap_or_default())?,
     };
-    let made = Medium::new(&image, words, options.path("module"))?;
-    let path = options.path("iso").unwrap_or(Path::new(""));
+    let made = Medium::new(&image, words, options.path(name::MODULE))?;
+    let path = options.path(name::ISO).unwrap_or(Path::new(""));
     let place = files::shown_path(path);
     let bytes = fs::copy(made.path(), path)
         .map_err(|why| format!("`--iso {place}`: cannot be written: {why}"))?;
@@ -220,6 +220,7 @@ mod tests {
     use super::check;
     use super::check_words;
     use super::commands;
+    use super::name;
     use crate::system;
 
     /// `tests/tests/boots/by_grub.rs` shows that a module arrives.
@@ -244,12 +245,12 @@ mod tests {
             ("--image /etc/passwd", "`--image /etc/passwd`: is no image"),
             (&"x".repeat(2049), "2049 bytes"),
         ] {
-            let refused = check(&TABLE.right(line).with("iso", &iso)).unwrap_err();
+            let refused = check(&TABLE.right(line).with(name::ISO, &iso)).unwrap_err();
             assert!(refused.contains(words), "{refused}");
         }
         let why = check(&TABLE.right("jobs=3")).unwrap_err();
         assert_eq!(why, "which file? give --iso FILE");
-        let right = check(&TABLE.right("jobs=3 seed=7").with("iso", &iso));
+        let right = check(&TABLE.right("jobs=3 seed=7").with(name::ISO, &iso));
         assert_eq!(right.as_deref(), Ok("jobs=3 seed=7"));
         assert!(!iso.exists());
     }

@@ -24,7 +24,7 @@ use std::process::ExitCode;
 use text::quoted;
 
 use crate::files;
-use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::options::{Command, Parsed, Refusal, Takes, name, options};
 use crate::system::{self, files_below};
 
 /// The table of `new-app`.
@@ -40,10 +40,10 @@ virtual time.",
     )),
     options: options! {
         /// Make the app in this new folder, which is the root of a repository.
-        "out": Takes::File("DIR");
+        OUT: Takes::File("DIR");
         /// --out: take the crates from this git repository, not from the folder of these commands.
         /// Its runner is `fass-tool boot`, which `cargo install --git URL tool` installs.
-        "git": Takes::Text("URL");
+        GIT: Takes::Text("URL");
     },
     notes: "\
 With --out, cargo run boots the app and cargo test tests it; without, it is in apps/,
@@ -101,7 +101,7 @@ fn make(options: &Parsed) -> Result<String, Refusal> {
     let Some(name) = options.positional() else {
         return usage("which name? give one, such as `./scripts/new-app brake-assist`");
     };
-    match (options.path("out"), options.text("git")) {
+    match (options.path(name::OUT), options.text(name::GIT)) {
         (None, Some(_)) => usage("`--git` is for a repository; add its folder, `--out DIR`"),
         (None, None) => create(system::workspace(), name).map(|_| next_steps(name)),
         (Some(out), git) => {

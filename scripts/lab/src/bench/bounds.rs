@@ -29,7 +29,7 @@ use crate::oracle::older_bounds::{Width, graham, long_paths, melani_edf, melani_
 use crate::random::graph;
 use tool::dag_file::stg;
 use tool::files;
-use tool::options::{Command, Parsed, Takes, options};
+use tool::options::{Command, Parsed, Takes, name, options};
 use tool::output::Table;
 use tool::progress::Lasting;
 
@@ -43,13 +43,13 @@ static COMMAND: Command = Command {
     )),
     options: options! {
         /// The numbers of cores.
-        "cores": Takes::Numbers(1, 64), or "4,8,16";
+        CORES: Takes::Numbers(1, 64), or "4,8,16";
         /// Random sets for each number of cores, utilization and kind of deadlines.
-        "sets": Takes::Number(1, 1_000_000), or "200";
+        SETS: Takes::Number(1, 1_000_000), or "200";
         /// The seed of all random sets.
-        "seed": Takes::Number(0, u64::MAX), or "1";
+        SEED: Takes::Number(0, u64::MAX), or "1";
         /// The folder for acceptance.csv and acceptance.svg.
-        "out" 'o': Takes::File("DIR"), or "target/bounds";
+        OUT 'o': Takes::File("DIR"), or "target/bounds";
     },
     notes: "\
 A set has as many DAGs as cores, but 8 at least. Methods: graham, federated scheduling; multi_path,
@@ -74,19 +74,19 @@ struct BoundsPlan {
 
 impl BoundsPlan {
     fn new(options: &Parsed) -> Result<Self, String> {
-        options.check_distinct(&["cores"])?;
+        options.check_distinct(&[name::CORES])?;
         if options.files().len() > 0 {
             let why = "is for random sets; leave it or the files out";
-            options.check_without(&["cores", "sets", "seed", "out"], why)?;
+            options.check_without(&[name::CORES, name::SETS, name::SEED, name::OUT], why)?;
         }
         files::check_once(options.files())?;
-        (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
+        (options.named(&[name::OUT]).iter()).try_for_each(files::check_folder)?;
         Ok(Self {
             files: (options.files().map(SetFile::read)).collect::<Result<_, _>>()?,
-            cores: options.numbers("cores"),
-            sets: options.number("sets").unwrap_or_default(),
-            seed: options.number("seed").unwrap_or_default(),
-            out: options.path("out").unwrap_or(Path::new("")).into(),
+            cores: options.numbers(name::CORES),
+            sets: options.number(name::SETS).unwrap_or_default(),
+            seed: options.number(name::SEED).unwrap_or_default(),
+            out: options.path(name::OUT).unwrap_or(Path::new("")).into(),
         })
     }
 }

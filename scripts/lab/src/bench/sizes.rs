@@ -13,7 +13,7 @@ use std::process::ExitCode;
 use super::code::{self, Frames};
 use super::frame::by_plan;
 use tool::json::Object;
-use tool::options::{Command, Parsed, Takes, options};
+use tool::options::{Command, Parsed, Takes, name, options};
 use tool::{elf, files, image};
 
 static TABLE: Command = Command {
@@ -22,7 +22,7 @@ static TABLE: Command = Command {
     positional: None,
     options: options! {
         /// The app.
-        "app": Takes::Text("APP"), or "fork-join";
+        APP: Takes::Text("APP"), or "fork-join";
     },
     notes: "\
 Builds the image. Prints a table, the largest part first, and a JSON object for each part.
@@ -39,7 +39,7 @@ const LIBRARY: &str = "the library, and what drops values";
 /// Measures, and prints.
 pub(super) fn run(words: &[OsString]) -> ExitCode {
     let app = |options: &Parsed| {
-        let app = options.text("app").unwrap_or_default();
+        let app = options.text(name::APP).unwrap_or_default();
         image::check_app(app).map(|()| app.to_string())
     };
     by_plan(&TABLE, words, app, |app| weigh(app))

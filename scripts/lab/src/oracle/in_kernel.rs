@@ -36,7 +36,7 @@ use sched_dag::law::RunRecord;
 
 use super::schedules::{Deviation, compare, compare_turns};
 use super::{Parse, equal, read};
-use tool::options::{Command, Parsed, Refusal, Takes, options};
+use tool::options::{Command, Parsed, Refusal, Takes, name, options};
 use tool::outcome::{Outcome, boot};
 use tool::progress::Progress;
 use tool::protocol::MachineLine;
@@ -53,17 +53,17 @@ static IN_KERNEL: Command = Command {
     )),
     options: options! {
         /// On the machine, not in virtual time on the host.
-        "in-kernel": Takes::Nothing;
+        IN_KERNEL: Takes::Nothing;
         /// Leave out the cases for more cores.
-        "cores-up-to": Takes::Number(1, MOST_CORES), or "64";
+        CORES_UP_TO: Takes::Number(1, MOST_CORES), or "64";
         /// The length of a unit of time in microseconds.
-        "unit-us": Takes::Number(100, 10_000_000), or "10000";
+        UNIT_US: Takes::Number(100, 10_000_000), or "10000";
         /// Whether execution is simulated, or cores also compute, for half of each unit in all.
-        "work": Takes::OneOf(&["simulate", "compute"]), or "simulate";
+        WORK: Takes::OneOf(&["simulate", "compute"]), or "simulate";
         /// The meaning of time; see ./scripts/run --help.
-        "mode": Takes::OneOf(Mode::NAMES), or "deterministic";
+        MODE: Takes::OneOf(Mode::NAMES), or "deterministic";
         /// The board that QEMU imitates.
-        "machine": Takes::OneOf(Machine::NAMES), or "microvm";
+        MACHINE: Takes::OneOf(Machine::NAMES), or "microvm";
     },
     notes: "\
 Each case runs with its number of cores, its policy, and preemption as it says.
@@ -89,7 +89,7 @@ pub(super) fn command(words: &[OsString], parse: Parse<Case>) -> ExitCode {
 fn run_files(options: &Parsed, parse: Parse<Case>) -> Result<ExitCode, Refusal> {
     let settings = settings(options);
     let mut cases = read(options.files(), parse).map_err(Refusal::Usage)?;
-    let most_cores = options.number("cores-up-to").unwrap_or(MOST_CORES);
+    let most_cores = options.number(name::CORES_UP_TO).unwrap_or(MOST_CORES);
     let all = cases.len();
     // The number of those left out is printed, so that they do not pass unseen.
     cases.retain(|case| u64::from(case.cores) <= most_cores);
@@ -102,13 +102,13 @@ fn run_files(options: &Parsed, parse: Parse<Case>) -> Result<ExitCode, Refusal> 
 }
 
 fn settings(options: &Parsed) -> Settings {
-    let usual = Settings::for_unit(options.number("unit-us").unwrap_or(10_000));
-    let usual = match options.text("work") {
+    let usual = Settings::for_unit(options.number(name::UNIT_US).unwrap_or(10_000));
+    let usual = match options.text(name::WORK) {
         Some("compute") => usual.computing(),
         _ => usual,
     };
-    let mode = options.text("mode").and_then(Mode::from_name);
-    let machine = options.text("machine").and_then(Machine::from_name);
+    let mode = options.text(name::MODE).and_then(Mode::from_name);
+    let machine = options.text(name::MACHINE).and_then(Machine::from_name);
     Settings {
         mode: mode.unwrap_or(usual.mode),
         machine: machine.unwrap_or(usual.machine),

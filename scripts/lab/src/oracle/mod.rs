@@ -109,7 +109,7 @@ static SCHEDULES: Command = of_files(
      in virtual time.",
     options! {
         /// On the bare machine; with options of its own, see schedules --in-kernel --help.
-        "in-kernel": Takes::Nothing;
+        IN_KERNEL: Takes::Nothing;
     },
 );
 

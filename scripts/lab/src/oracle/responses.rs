@@ -29,7 +29,7 @@ use sched_dag::{
 };
 
 use crate::random::set;
-use tool::options::{Command, Takes as Value, options};
+use tool::options::{Command, Takes as Value, name, options};
 use tool::progress::Progress;
 
 static TABLE: Command = Command {
@@ -39,9 +39,9 @@ static TABLE: Command = Command {
     positional: None,
     options: options! {
         /// Sets with a bound to run.
-        "sets": Value::Number(1, 100_000_000), or "1000";
+        SETS: Value::Number(1, 100_000_000), or "1000";
         /// Seed of the first set; each has the next one.
-        "seed": Value::Number(0, u64::MAX), or "1";
+        SEED: Value::Number(0, u64::MAX), or "1";
     },
     notes: "\
 A set has up to 4 DAGs of up to 8 subtasks on up to 5 cores, or more side by side; in some sets
@@ -71,8 +71,8 @@ struct Seen {
 /// Runs `oracle responses` with the words after its name.
 pub(super) fn command(words: &[OsString]) -> ExitCode {
     TABLE.carry_out(words, |options| {
-        let sets = options.number("sets").unwrap_or(1_000);
-        let mut seeds = options.number("seed").unwrap_or(1)..;
+        let sets = options.number(name::SETS).unwrap_or(1_000);
+        let mut seeds = options.number(name::SEED).unwrap_or(1)..;
         let mut progress = Progress::new(sets, "sets with a bound");
         let mut seen = Seen::default();
         while seen.accepted < sets

@@ -20,7 +20,7 @@ static WAITING: Command = of_files(
      bounds with those of the analysis at commit.",
     options! {
         /// The schedules alone, on the bare machine; see schedules --in-kernel --help.
-        "in-kernel": Takes::Nothing;
+        IN_KERNEL: Takes::Nothing;
     },
 );
 

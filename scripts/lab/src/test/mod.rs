@@ -32,7 +32,7 @@ use std::thread;
 use std::time::Instant;
 
 use tool::image::{self, package_name};
-use tool::options::{Command, Refusal, Takes, options};
+use tool::options::{Command, Refusal, Takes, name, options};
 use tool::{elf, files, install, system};
 
 /// The table of `test`.
@@ -45,15 +45,15 @@ pub static TEST: Command = Command {
     )),
     options: options! {
         /// Only what runs on the host: no guests, no images, no lints.
-        "quick": Takes::Nothing;
+        QUICK: Takes::Nothing;
         /// Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.
-        "bless": Takes::Nothing;
+        BLESS: Takes::Nothing;
         /// Only tests where threads meet, under Miri of a nightly toolchain.
-        "miri": Takes::Nothing;
+        MIRI: Takes::Nothing;
         /// Only runs on threads of Linux, under ThreadSanitizer of a nightly toolchain.
-        "thread-sanitizer": Takes::Nothing;
+        THREAD_SANITIZER: Takes::Nothing;
         /// Show every test by name, not only those that fail.
-        "verbose" 'v': Takes::Nothing;
+        VERBOSE 'v': Takes::Nothing;
     },
     notes: "\
 The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
@@ -93,18 +93,19 @@ pub fn test(words: &[OsString]) -> ExitCode {
     TEST.carry_out(words, |options| {
         // Before anything is built: a full disk would show as an error of the linker.
         checks::check()?;
-        let list = options.is_given("bless");
+        let list = options.is_given(name::BLESS);
         let list = list.then(|| system::new_log("blessed"));
         let plan = TestPlan {
             filter: options.positional().map(String::from),
-            quick: options.is_given("quick"),
-            verbose: options.is_given("verbose"),
+            quick: options.is_given(name::QUICK),
+            verbose: options.is_given(name::VERBOSE),
             boots: install::ensure_qemu(),
             blessed: list.transpose()?,
         };
         let mut tally = Tally::default();
         let plan = &plan;
-        let [miri, sanitizer] = ["miri", "thread-sanitizer"].map(|word| options.is_given(word));
+        let [miri, sanitizer] =
+            [name::MIRI, name::THREAD_SANITIZER].map(|word| options.is_given(word));
         if miri {
             nightly::run_miri(plan, &mut tally)?;
         }

@@ -28,7 +28,7 @@ use text::Malformed;
 use text::{is_seen, shown};
 
 use crate::files;
-use crate::options::Parsed;
+use crate::options::{Name, Parsed, name};
 
 /// The settings for reading a file.
 #[derive(Clone, Debug)]
@@ -136,13 +136,13 @@ pub fn load(path: &Path, import: &Import) -> Result<DagFile, Vec<String>> {
 }
 
 /// The options that only mean something together with `--dag`.
-const COMPANIONS: [&str; 6] = [
-    "graph",
-    "unit",
-    "print-dag",
-    "execution",
-    "seconds",
-    "strict-deadlines",
+const COMPANIONS: [Name; 6] = [
+    name::GRAPH,
+    name::UNIT,
+    name::PRINT_DAG,
+    name::EXECUTION,
+    name::SECONDS,
+    name::STRICT_DEADLINES,
 ];
 
 /// The longest periods of a run if nothing is said of its length, as for the guest.
@@ -197,37 +197,37 @@ impl Prepared {
 pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
     let refuse = |line: String| vec![line];
     // Without a file, an option that is about one is a mistake.
-    let Some(path) = options.path("dag") else {
+    let Some(path) = options.path(name::DAG) else {
         let without = options.check_without(&COMPANIONS, "needs `--dag FILE`; give that, too");
         return without.map(|()| None).map_err(refuse);
     };
-    let apart = [("app", "dag"), ("jobs", "seconds")];
+    let apart = [(name::APP, name::DAG), (name::JOBS, name::SECONDS)];
     let apart = apart.map(|(one, other)| (one, other, "exclude each other"));
     options.check_apart(&apart).map_err(refuse)?;
-    if options.number("jobs") == Some(0) {
+    if options.number(name::JOBS) == Some(0) {
         let line = "`--jobs 0` has no end, which is for fork-join; with `--dag` give at least 1";
         return Err(refuse(line.into()));
     }
-    if let Some(text) = options.text("execution") {
+    if let Some(text) = options.text(name::EXECUTION) {
         Execution::parse(text).map_err(|why| refuse(format!("`--execution`: {why}")))?;
     }
-    let unit_ns = match parse_ns(options.text("unit").unwrap_or("1ms")) {
+    let unit_ns = match parse_ns(options.text(name::UNIT).unwrap_or("1ms")) {
         Ok(0) => Err("a unit of 0; give at least 1ns".into()),
         other => other,
     };
     let unit_ns = unit_ns.map_err(|why| refuse(format!("`--unit`: {why}")))?;
     let length = length(options);
-    let cores = options.number("cores").unwrap_or(1);
+    let cores = options.number(name::CORES).unwrap_or(1);
     let import = Import {
         unit_ns,
-        graph: options.text("graph").map(String::from),
+        graph: options.text(name::GRAPH).map(String::from),
         cores: u32::try_from(cores).unwrap_or(u32::MAX),
-        clusters: clusters(options.text("clusters")).map_err(refuse)?,
+        clusters: clusters(options.text(name::CLUSTERS)).map_err(refuse)?,
         length,
     };
     let file = load(path, &import)?;
     let memory_mib = memory_mib(&file, length, cores);
-    if memory_mib > MOST_MEMORY_MIB && !options.is_given("memory") {
+    if memory_mib > MOST_MEMORY_MIB && !options.is_given(name::MEMORY) {
         return Err(refuse(format!(
             "{}: its {} subtasks, their jobs and the file itself need {memory_mib} MiB, and a \
              guest has {MOST_MEMORY_MIB} at most; give fewer subtasks, or fewer jobs by --jobs",
@@ -236,7 +236,7 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         )));
     }
     let limit_s = limit_s(&file, length);
-    let has_limit = options.is_given("timeout") || options.is_given("print-dag");
+    let has_limit = options.is_given(name::TIMEOUT) || options.is_given(name::PRINT_DAG);
     // Printing boots nothing, and a person's limit is a person's choice.
     if limit_s > MOST_S && !has_limit {
         return Err(refuse(format!(
@@ -248,10 +248,10 @@ pub fn prepare(options: &Parsed) -> Result<Option<Prepared>, Vec<String>> {
         )));
     }
     let mut words = Vec::new();
-    if options.is_given("strict-deadlines") {
+    if options.is_given(name::STRICT_DEADLINES) {
         words.push("deadlines=strict".into());
     }
-    if !states_overheads(options.text("append").unwrap_or_default()) {
+    if !states_overheads(options.text(name::APPEND).unwrap_or_default()) {
         words.push(overheads(cores));
     }
     Ok(Some(Prepared {
@@ -276,7 +276,7 @@ fn clusters(text: Option<&str>) -> Result<CoreDivision, String> {
 }
 
 fn length(options: &Parsed) -> Length {
-    match (options.number("seconds"), options.number("jobs")) {
+    match (options.number(name::SECONDS), options.number(name::JOBS)) {
         (Some(seconds), _) => Length::Span(seconds.saturating_mul(1_000_000_000)),
         (None, Some(jobs)) => Length::Jobs(jobs),
         (None, None) => Length::Periods(PERIODS),
@@ -419,6 +419,7 @@ mod tests {
     use super::{
         Format, MOST_S, limit_s, memory_mib, name_of, parse, prepare, rd_gen, stg, translate,
     };
+    use crate::options::name;
     use crate::run::RUN;
     use crate::system::workspace;
     use crate::tests::rows;
@@ -540,7 +541,7 @@ mod tests {
         let name = format!("century-{}.dag", std::process::id());
         let path = std::env::temp_dir().join(name);
         std::fs::write(&path, "dag x period 3153600000s\nsubtask a wcet 1ms\nend\n").unwrap();
-        let prepared = |line: &str| prepare(&RUN.right(line).with("dag", path.clone()));
+        let prepared = |line: &str| prepare(&RUN.right(line).with(name::DAG, path.clone()));
         let said = prepared("--jobs 2").unwrap_err().join("\n");
         let words = "its jobs take 876000 hours or more, and a run has 24 if nobody says how long";
         assert!(said.contains(words), "{said}");

@@ -14,6 +14,7 @@
 //! A command line that was understood is [`Parsed`].
 
 mod menu;
+pub mod name;
 
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
@@ -29,6 +30,7 @@ use text::{quoted, shown, visible};
 use crate::files::Named;
 
 pub use menu::{Choice, Menu, choices};
+pub use name::Name;
 pub use sched_dag::nearest;
 
 /// The exit code of a run that a person has ended early, as a shell has it for ctrl-C.
@@ -148,7 +150,7 @@ impl Command {
             }
             let value = match (option.takes, attached) {
                 (Takes::Nothing, None) => OsStr::new("yes"),
-                (Takes::Nothing, Some(_)) => return Err(takes_no_value(name)),
+                (Takes::Nothing, Some(_)) => return Err(takes_no_value(name.as_str())),
                 (_, Some(value)) => value,
                 // A next word that is an option is no value: the value was forgotten.
                 (_, None) => words
@@ -198,7 +200,7 @@ impl Command {
         self.options
             .iter()
             .find(|option| match name.strip_prefix("--") {
-                Some(long) => option.name == long,
+                Some(long) => option.name.as_str() == long,
                 None => (option.short)
                     .is_some_and(|short| name.strip_prefix('-') == Some(&*short.to_string())),
             })
@@ -213,7 +215,7 @@ impl Command {
             return Err(takes_no_value("help"));
         }
         self.named(&name).ok_or_else(|| {
-            let names = self.options.iter().map(|option| option.name);
+            let names = self.options.iter().map(|option| option.name.as_str());
             let allowed = names.chain(["help"]).collect::<Vec<_>>();
             // Both are compared without dashes: `-jobs` is most often a mistyped `--jobs`.
             let hint = match nearest(name.trim_start_matches('-'), &allowed) {
@@ -298,8 +300,8 @@ fn split(word: &OsStr) -> (&OsStr, Option<&OsStr>) {
 /// One option of a command.
 #[derive(Clone, Copy, Debug)]
 pub struct Opt {
-    /// The long name without its dashes.
-    pub name: &'static str,
+    /// The long name.
+    pub name: Name,
     /// The short form without its dash, such as `q`.
     pub short: Option<char>,
     /// The kind of value that must follow.
@@ -319,11 +321,11 @@ pub struct Opt {
 macro_rules! options {
     ($(
         $(#[doc = $help:literal])+
-        $name:literal $($short:literal)? $(in $group:literal)?: $takes:expr $(, or $default:expr)?;
+        $name:ident $($short:literal)? $(in $group:literal)?: $takes:expr $(, or $default:expr)?;
     )*) => {
         &[$(
             $crate::options::Opt {
-                name: $name,
+                name: $crate::options::name::$name,
                 takes: $takes,
                 help: concat!($($help),+),
                 $(short: Some($short),)?
@@ -382,7 +384,7 @@ impl Takes {
 impl Opt {
     /// A flag without a name, which the others differ from.
     pub const FLAG: Opt = Opt {
-        name: "",
+        name: Name::new(""),
         short: None,
         takes: Takes::Nothing,
         default: "",
@@ -484,18 +486,18 @@ fn is_number(text: &str, range: RangeInclusive<u64>) -> bool {
 #[derive(Clone, Debug)]
 pub struct Parsed {
     options: &'static [Opt],
-    given: BTreeMap<&'static str, OsString>,
+    given: BTreeMap<Name, OsString>,
     positionals: Vec<OsString>,
 }
 
 impl Parsed {
     /// Returns whether the person gave the option (or flag).
-    pub fn is_given(&self, name: &str) -> bool {
-        self.given.contains_key(name)
+    pub fn is_given(&self, name: Name) -> bool {
+        self.given.contains_key(&name)
     }
 
-    fn value(&self, name: &str) -> Option<&OsStr> {
-        if let Some(given) = self.given.get(name) {
+    fn value(&self, name: Name) -> Option<&OsStr> {
+        if let Some(given) = self.given.get(&name) {
             return Some(given);
         }
         let option = self.options.iter().find(|option| option.name == name)?;
@@ -504,31 +506,32 @@ impl Parsed {
 
     /// Returns the option's value or default; `None` if it has neither. For one that
     /// takes a file there is [`path`](Self::path).
-    pub fn text(&self, name: &str) -> Option<&str> {
+    pub fn text(&self, name: Name) -> Option<&str> {
         self.value(name).and_then(OsStr::to_str)
     }
 
     /// Returns the file that the option names, or its default; `None` if it has neither.
-    pub fn path(&self, name: &str) -> Option<&Path> {
+    pub fn path(&self, name: Name) -> Option<&Path> {
         self.value(name).map(Path::new)
     }
 
     /// Returns the files that these options name, of those that are given or have a default.
-    pub fn named(&self, options: &[&'static str]) -> Vec<Named<'_>> {
+    pub fn named(&self, options: &[Name]) -> Vec<Named<'_>> {
         let named = options.iter().filter_map(|option| {
-            let path = self.path(option)?;
+            let path = self.path(*option)?;
+            let option = option.as_str();
             Some(Named { option, path })
         });
         named.collect()
     }
 
     /// Returns a number's value or default; `None` if it has neither.
-    pub fn number(&self, name: &str) -> Option<u64> {
+    pub fn number(&self, name: Name) -> Option<u64> {
         self.text(name).and_then(|value| value.parse().ok())
     }
 
     /// Returns the numbers of a list.
-    pub fn numbers<N: FromStr>(&self, name: &str) -> Vec<N> {
+    pub fn numbers<N: FromStr>(&self, name: Name) -> Vec<N> {
         let words = self.text(name).into_iter().flat_map(|all| all.split(','));
         words.filter_map(|word| word.parse().ok()).collect()
     }
@@ -538,10 +541,10 @@ impl Parsed {
     /// # Errors
     ///
     /// In words, with the option and the value.
-    pub fn check_distinct(&self, options: &[&'static str]) -> Result<(), String> {
+    pub fn check_distinct(&self, options: &[Name]) -> Result<(), String> {
         for option in options {
             let mut before = Vec::new();
-            for value in self.text(option).iter().flat_map(|all| all.split(',')) {
+            for value in self.text(*option).iter().flat_map(|all| all.split(',')) {
                 if before.contains(&value) {
                     let value = quoted(value);
                     return Err(format!("`--{option}`: {value} stands twice; give it once"));
@@ -558,9 +561,9 @@ impl Parsed {
     /// # Errors
     ///
     /// In words, with both names and the third text of the pair, such as "exclude each other".
-    pub fn check_apart(&self, pairs: &[(&str, &str, &str)]) -> Result<(), String> {
+    pub fn check_apart(&self, pairs: &[(Name, Name, &str)]) -> Result<(), String> {
         let both =
-            |(one, other, _): &&(&str, &str, &str)| self.is_given(one) && self.is_given(other);
+            |(one, other, _): &&(Name, Name, &str)| self.is_given(*one) && self.is_given(*other);
         match pairs.iter().find(both) {
             Some((one, other, do_what)) => {
                 Err(format!("`--{one}` and `--{other}` {do_what}; give one"))
@@ -574,18 +577,18 @@ impl Parsed {
     /// # Errors
     ///
     /// The name of one that is, and what `why` says of it.
-    pub fn check_without(&self, names: &[&str], why: &str) -> Result<(), String> {
+    pub fn check_without(&self, names: &[Name], why: &str) -> Result<(), String> {
         let given = self.given_of(names);
         given.map_or(Ok(()), |name| Err(format!("`--{name}` {why}")))
     }
 
     /// Returns the first of these options that is given.
-    pub fn given_of<'n>(&self, names: &[&'n str]) -> Option<&'n str> {
-        names.iter().copied().find(|name| self.is_given(name))
+    pub fn given_of(&self, names: &[Name]) -> Option<Name> {
+        names.iter().copied().find(|name| self.is_given(*name))
     }
 
     /// Returns a copy of the command line with another value of an option.
-    pub fn with(&self, name: &'static str, value: impl AsRef<OsStr>) -> Parsed {
+    pub fn with(&self, name: Name, value: impl AsRef<OsStr>) -> Parsed {
         let mut other = self.clone();
         other.given.insert(name, value.as_ref().into());
         other

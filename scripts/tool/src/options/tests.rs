@@ -4,7 +4,7 @@ use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::Path;
 
-use super::{Command, Parsed, Refusal, Takes};
+use super::{Command, Parsed, Refusal, Takes, name};
 use crate::tests::rows;
 
 static COMMAND: Command = Command {
@@ -13,17 +13,17 @@ static COMMAND: Command = Command {
     positional: None,
     options: options! {
         /// Processors of the guest.
-        "cores": Takes::Number(1, 64), or "8";
+        CORES: Takes::Number(1, 64), or "8";
         /// Parallel subtasks.
-        "subtasks": Takes::Numbers(1, 14);
+        SUBTASKS: Takes::Numbers(1, 14);
         /// The meaning of time.
-        "mode": Takes::OneOf(&["kvm", "deterministic", "threads"]);
+        MODE: Takes::OneOf(&["kvm", "deterministic", "threads"]);
         /// Keep the log.
-        "serial": Takes::File("FILE");
+        SERIAL: Takes::File("FILE");
         /// Only this.
-        "only": Takes::Text("NAME");
+        ONLY: Takes::Text("NAME");
         /// Say less.
-        "quiet" 'q': Takes::Nothing;
+        QUIET 'q': Takes::Nothing;
     },
     notes: "Exit codes: none.",
 };
@@ -51,16 +51,16 @@ fn refusal_of(words: &[OsString]) -> String {
 #[test]
 fn what_is_given_holds_and_else_the_default() {
     let given = parsed("");
-    assert_eq!(given.number("cores"), Some(8));
-    assert_eq!(given.text("mode"), None);
-    assert!(!given.is_given("quiet") && !given.is_given("cores"));
+    assert_eq!(given.number(name::CORES), Some(8));
+    assert_eq!(given.text(name::MODE), None);
+    assert!(!given.is_given(name::QUIET) && !given.is_given(name::CORES));
     let given = parsed("--cores 4 --mode=threads -q --subtasks=2,4,6");
-    assert_eq!(given.number("cores"), Some(4));
-    assert_eq!(given.text("mode"), Some("threads"));
-    assert_eq!(given.text("subtasks"), Some("2,4,6"));
-    assert!(given.is_given("quiet"));
+    assert_eq!(given.number(name::CORES), Some(4));
+    assert_eq!(given.text(name::MODE), Some("threads"));
+    assert_eq!(given.text(name::SUBTASKS), Some("2,4,6"));
+    assert!(given.is_given(name::QUIET));
     for (line, file) in [("--serial=--quiet", "--quiet"), ("--serial -x", "-x")] {
-        assert_eq!(parsed(line).path("serial"), Some(Path::new(file)));
+        assert_eq!(parsed(line).path(name::SERIAL), Some(Path::new(file)));
     }
 }
 
@@ -110,7 +110,7 @@ fn only_a_file_may_have_a_name_that_is_not_utf_8() {
     };
     for words in with("--serial") {
         let parsed = COMMAND.parse(&words).expect("a file may have any name");
-        assert_eq!(parsed.path("serial"), Some(Path::new(odd)));
+        assert_eq!(parsed.path(name::SERIAL), Some(Path::new(odd)));
     }
     for (option, must) in [
         ("--cores", "a number from 1 to 64"),

@@ -17,7 +17,7 @@ use sched_dag::{
     SubtaskId, SubtaskSpec, TaskSet, Wait, verify,
 };
 
-use crate::options::Parsed;
+use crate::options::{Parsed, name};
 use crate::protocol::{MachineLine, Transcript, read_line};
 use crate::qemu::{MOST_CORES, Mode};
 
@@ -608,7 +608,7 @@ impl Run {
 
 /// Returns the bound that a person has chosen, or else the usual one of the run.
 pub fn tolerance_ns(run: &Run, options: &Parsed) -> u64 {
-    let chosen = options.number("bound-us");
+    let chosen = options.number(name::BOUND_US);
     chosen.map_or(run.usual_bound_ns, |bound_us| bound_us.saturating_mul(1000))
 }
 

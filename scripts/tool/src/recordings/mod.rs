@@ -22,7 +22,7 @@ use text::{quoted, visible};
 
 use crate::dot;
 use crate::files::{self, Named};
-use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::options::{Command, Name, Parsed, Refusal, Takes, name, options};
 use crate::output;
 use crate::proof::{self, observed};
 use crate::protocol::Transcript;
@@ -30,7 +30,7 @@ use crate::record::Record;
 use crate::system;
 
 /// The options that write views of the commits and runs of a record.
-const OF_RUNS: [&str; 3] = ["dot", "witness", "observe"];
+const OF_RUNS: [Name; 3] = [name::DOT, name::WITNESS, name::OBSERVE];
 
 /// The table of `recording`.
 pub static RECORDING: Command = Command {
@@ -42,34 +42,34 @@ pub static RECORDING: Command = Command {
     )),
     options: options! {
         /// Write a table of each channel into this folder, and one of what else happened.
-        "csv": Takes::File("DIR");
+        CSV: Takes::File("DIR");
         /// Write an MCAP file, with messages in JSON, for Foxglove and others.
-        "mcap": Takes::File("FILE");
+        MCAP: Takes::File("FILE");
         /// Of a run that was kept (`./scripts/run --keep FILE`): write the committed DAGs to this
         /// file, for Graphviz.
-        "dot": Takes::File("FILE");
+        DOT: Takes::File("FILE");
         /// Of such a run: write what proves the commit's bounds.
-        "witness": Takes::File("FILE");
+        WITNESS: Takes::File("FILE");
         /// Of such a run: write what calls took, as WCETs with a margin of 20 %.
-        "observe": Takes::File("FILE");
+        OBSERVE: Takes::File("FILE");
         /// Show all that is recorded of a job. (What its subtasks compute of it is shown by the
         /// app's own replay.)
-        "until": Takes::Text("DAG/JOB");
+        UNTIL: Takes::Text("DAG/JOB");
         /// Make a recording of a table whose rows are what a source returns.
-        "from-csv": Takes::Nothing;
+        FROM_CSV: Takes::Nothing;
         /// --from-csv: write the recording to this file.
-        "out" 'o': Takes::File("FILE");
+        OUT 'o': Takes::File("FILE");
         /// --from-csv: the DAG of the source.
-        "dag": Takes::Text("NAME");
+        DAG: Takes::Text("NAME");
         /// --from-csv: the topic that it writes.
-        "topic": Takes::Text("NAME");
+        TOPIC: Takes::Text("NAME");
         /// --from-csv: the type of the values, as `Seen { at: [f64; 3], name: text }`, its numbers
         /// in the order of the columns; else each column is a field of type f64.
-        "type": Takes::Text("TYPE");
+        TYPE: Takes::Text("TYPE");
         /// --from-csv: columns that are no part of the values, with commas between.
-        "ignore": Takes::Text("COLUMNS");
+        IGNORE: Takes::Text("COLUMNS");
         /// --from-csv: the time from job to job, such as 10ms; a column release_ns has to agree.
-        "period": Takes::Text("TIME");
+        PERIOD: Takes::Text("TIME");
     },
     notes: "\
 Without an option it says what is in the recording. docs/recordings.md explains all of it.
@@ -91,9 +91,9 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     let input = options.file(question).map_err(Refusal::Usage)?;
     check(input, options).map_err(Refusal::Usage)?;
     let file = input.path;
-    if options.is_given("from-csv") {
+    if options.is_given(name::FROM_CSV) {
         let bytes = table::convert(file, options).map_err(Refusal::Usage)?;
-        let out = options.path("out").unwrap_or(Path::new(""));
+        let out = options.path(name::OUT).unwrap_or(Path::new(""));
         write(out, |out| out.write_all(&bytes))?;
         println!("{}: {} bytes", files::shown_path(out), bytes.len());
         return Ok(());
@@ -104,18 +104,18 @@ fn attempt(options: &Parsed) -> Result<(), Refusal> {
     of_runs(&recording, options).map_err(Refusal::Usage)?;
     let bytes = in_run_time(&recording);
     let rebased = parse(file, &bytes).map_err(Refusal::Usage)?;
-    match options.text("until") {
+    match options.text(name::UNTIL) {
         Some(job) => print!("{}", inputs_until(&rebased, job).map_err(Refusal::Usage)?),
         None => print!("{}", shown(&recording)),
     }
-    if let Some(folder) = options.path("csv") {
+    if let Some(folder) = options.path(name::CSV) {
         for (name, table) in table::tables(&rebased) {
             let path = folder.join(name);
             write(&path, |out| out.write_all(table.as_bytes()))?;
             println!("{}", files::shown_path(&path));
         }
     }
-    if let Some(path) = options.path("mcap") {
+    if let Some(path) = options.path(name::MCAP) {
         let mut messages = 0;
         write(path, |out| {
             messages = mcap::write(&rebased, out)?;
@@ -168,17 +168,17 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         let line = "it has values alone; `./scripts/run --keep FILE` keeps all of a run";
         return Err(format!("`--{name}`: {line}"));
     }
-    if let Some(path) = options.path("dot") {
+    if let Some(path) = options.path(name::DOT) {
         println!("{}", draw(&record, path)?);
     }
-    if let Some(path) = options.path("witness") {
+    if let Some(path) = options.path(name::WITNESS) {
         println!("{}", proof::write(path, record.proven()?)?);
     }
-    if let Some(path) = options.path("observe") {
+    if let Some(path) = options.path(name::OBSERVE) {
         let mut observed = Vec::new();
         observed::add(&mut observed, &record)?;
         let text = observed::text(&observed, observed::MARGIN_PERCENT);
-        files::write_named("observe", path, text)?;
+        files::write_named(name::OBSERVE, path, text)?;
         println!("{}", files::shown_path(path));
     }
     Ok(())
@@ -186,7 +186,7 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
 
 /// Writes the picture of the committed DAGs, and returns a line that announces it.
 pub(crate) fn draw(record: &Record, path: &Path) -> Result<String, String> {
-    files::write_named("dot", path, dot::text(record)?)?;
+    files::write_named(name::DOT, path, dot::text(record)?)?;
     let file = files::shown_path(path);
     Ok(format!(
         "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"
@@ -195,24 +195,30 @@ pub(crate) fn draw(record: &Record, path: &Path) -> Result<String, String> {
 
 /// Checks the options and all files, before any is opened.
 fn check(input: Named<'_>, options: &Parsed) -> Result<(), String> {
-    let of_tables = ["out", "dag", "topic"];
-    if options.is_given("from-csv") {
-        if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(name)) {
+    let of_tables = [name::OUT, name::DAG, name::TOPIC];
+    if options.is_given(name::FROM_CSV) {
+        if let Some(name) = of_tables.into_iter().find(|name| !options.is_given(*name)) {
             return Err(format!("`--from-csv` needs `--{name}`; give it, too"));
         }
         let why = "and `--from-csv` exclude each other; convert what it has written";
-        options.check_without(&["csv", "mcap", "until"], why)?;
+        options.check_without(&[name::CSV, name::MCAP, name::UNTIL], why)?;
         options.check_without(&OF_RUNS, why)?;
     } else {
         let why = "needs `--from-csv`; give it, too";
         options.check_without(&of_tables, why)?;
-        options.check_without(&["type", "ignore", "period"], why)?;
+        options.check_without(&[name::TYPE, name::IGNORE, name::PERIOD], why)?;
     }
     files::check(
         &[input],
-        &options.named(&["out", "mcap", "dot", "witness", "observe"]),
+        &options.named(&[
+            name::OUT,
+            name::MCAP,
+            name::DOT,
+            name::WITNESS,
+            name::OBSERVE,
+        ]),
     )?;
-    (options.named(&["csv"]).iter()).try_for_each(files::check_folder)
+    (options.named(&[name::CSV]).iter()).try_for_each(files::check_folder)
 }
 
 /// Reads a file that must be a recording.

@@ -21,7 +21,7 @@ use recording::{
 use text::quoted;
 
 use crate::files;
-use crate::options::Parsed;
+use crate::options::{Parsed, name};
 
 /// Converts a table to a recording.
 #[allow(
@@ -50,7 +50,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         let why = format!("there are two columns {title}; rename one, or --ignore both");
         return Err(at(1, why));
     }
-    let period_ns = match options.text("period").map(parse_ns) {
+    let period_ns = match options.text(name::PERIOD).map(parse_ns) {
         Some(Err(why)) => return Err(format!("`--period`: {why}")),
         Some(Ok(period_ns)) => Some(period_ns),
         None => None,
@@ -72,7 +72,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
         );
         return Err(at(1, why));
     }
-    let app = options.text("dag").unwrap_or_default();
+    let app = options.text(name::DAG).unwrap_or_default();
     let mut writer = Writer::new(&Header {
         app: app.into(),
         dags: vec![DagHeader {
@@ -83,7 +83,7 @@ pub(super) fn convert(file: &Path, options: &Parsed) -> Result<Vec<u8>, String> 
             dag: 0,
             subtask: 0,
             role: Role::Source,
-            topic: options.text("topic").unwrap_or_default().into(),
+            topic: options.text(name::TOPIC).unwrap_or_default().into(),
             schema: schema.clone(),
         }],
     });
@@ -199,7 +199,7 @@ impl Columns {
 
 /// Returns the names of the columns that are left out of the values.
 fn ignored(options: &Parsed) -> Vec<&str> {
-    let all = options.text("ignore");
+    let all = options.text(name::IGNORE);
     all.map_or(Vec::new(), |all| all.split(',').collect())
 }
 
@@ -212,7 +212,7 @@ fn twice<'t>(titles: &'t [String], options: &Parsed) -> Option<&'t str> {
 
 /// Returns the type of the values.
 fn schema(columns: &Columns, options: &Parsed) -> Result<Schema, String> {
-    let Some(text) = options.text("type") else {
+    let Some(text) = options.text(name::TYPE) else {
         let field = |name: &String| Field {
             name: name.clone(),
             schema: Schema::Scalar(Scalar::F64),

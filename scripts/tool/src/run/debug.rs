@@ -29,7 +29,7 @@ use crate::child;
 use crate::files;
 use crate::image;
 use crate::install;
-use crate::options::{Command, Opt, Parsed, Refusal, Takes, did_you_mean};
+use crate::options::{Command, Name, Opt, Parsed, Refusal, Takes, did_you_mean, name};
 use crate::qemu::{Mode, Qemu};
 use crate::system;
 
@@ -42,9 +42,9 @@ static DEBUG: LazyLock<Command> = LazyLock::new(|| Command {
     about: "Boots an app in QEMU with gdb at it, in an image that gdb shows whole.",
     positional: None,
     options: Vec::leak(vec![
-        of_run("app", None),
+        of_run(name::APP, None),
         Opt {
-            name: "break",
+            name: name::BREAK,
             takes: Takes::Text("PLACES"),
             help: "Where to stop, with commas between: a function, by the end of its path \
                    (control, attitude::control), or FILE:LINE (src/dags.rs:153).",
@@ -52,24 +52,24 @@ static DEBUG: LazyLock<Command> = LazyLock::new(|| Command {
             ..Opt::FLAG
         },
         Opt {
-            name: "commands",
+            name: name::COMMANDS,
             takes: Takes::File("FILE"),
             help: "Have gdb do what this file says once it has stopped, and end; no person is \
                    asked.",
             ..Opt::FLAG
         },
-        of_run("cores", Some("1")),
-        of_run("jobs", None),
-        of_run("seed", None),
-        of_run("memory", None),
-        of_run("mode", Some("deterministic")),
-        of_run("append", None),
-        of_run("module", None),
-        of_run("input", None),
-        of_run("replay", None),
-        of_run("from", None),
-        of_run("image", None),
-        of_run("qemu", None),
+        of_run(name::CORES, Some("1")),
+        of_run(name::JOBS, None),
+        of_run(name::SEED, None),
+        of_run(name::MEMORY, None),
+        of_run(name::MODE, Some("deterministic")),
+        of_run(name::APPEND, None),
+        of_run(name::MODULE, None),
+        of_run(name::INPUT, None),
+        of_run(name::REPLAY, None),
+        of_run(name::FROM, None),
+        of_run(name::IMAGE, None),
+        of_run(name::QEMU, None),
     ]),
     notes: "\
 gdb is installed if it is missing. Budgets are off. In mode deterministic time stands still
@@ -81,7 +81,7 @@ exit codes: gdb's; 1 a failure; 2 a refused command line
 });
 
 /// Returns an option of `run`, with another default if one is given.
-fn of_run(name: &str, default: Option<&'static str>) -> Opt {
+fn of_run(name: Name, default: Option<&'static str>) -> Opt {
     let option = RUN.options.iter().find(|option| option.name == name);
     let option = option.expect("`run` has each of them");
     Opt {
@@ -100,7 +100,7 @@ pub fn debug(words: &[OsString]) -> ExitCode {
 fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let run = as_run(own)?;
     check_files(&run)?;
-    let commands = own.path("commands");
+    let commands = own.path(name::COMMANDS);
     if let Some(path) = commands {
         let place = files::shown_path(path);
         // Read to see that it can be; gdb itself would only complain after the boot.
@@ -112,7 +112,7 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let program = loading::choose_program(&run)?;
     install::ensure(&install::GDB)?;
     let handed = Handed::read(&run, None)?;
-    let mode = run.text("mode").and_then(Mode::from_name);
+    let mode = run.text(name::MODE).and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let mut qemu = super::describe(&run, &program, mode, memory_mib, None);
     qemu.stops = false; // ctrl-C is gdb's
@@ -120,14 +120,14 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     qemu.module = handed.module();
     qemu.check_words().map_err(Refusal::Usage)?;
 
-    let image = match run.path("image") {
+    let image = match run.path(name::IMAGE) {
         Some(path) => path.into(),
         None => {
             eprintln!("building `{app}` by the profile `gdb`");
             image::build_for_gdb(&app)?
         }
     };
-    let places = own.text("break").unwrap_or_default();
+    let places = own.text(name::BREAK).unwrap_or_default();
     let places = resolve(&image, &app, places).map_err(Refusal::Usage)?;
     let log = system::new_log(&format!("{app}-gdb"))?;
     let socket = log.with_extension("socket");
@@ -145,7 +145,8 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
 fn as_run(own: &Parsed) -> Result<Parsed, Refusal> {
     let shared = DEBUG.options.iter().map(|option| option.name);
     let shared = shared.filter(|name| RUN.options.iter().any(|option| option.name == *name));
-    let shared = shared.filter(|name| own.is_given(name) || ["cores", "mode"].contains(name));
+    let shared =
+        shared.filter(|name| own.is_given(*name) || [name::CORES, name::MODE].contains(name));
     let words = shared.filter_map(|name| {
         let mut word = OsString::from(format!("--{name}="));
         word.push(own.path(name)?);

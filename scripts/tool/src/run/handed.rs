@@ -15,7 +15,7 @@ use text::{quoted, shown};
 
 use crate::dag_file::Prepared;
 use crate::files::{self, Named, Temporary};
-use crate::options::{Parsed, Refusal};
+use crate::options::{Parsed, Refusal, name};
 use crate::outcome::Outcome;
 use crate::proof::observed;
 use crate::qemu::Second;
@@ -36,10 +36,13 @@ impl Handed {
     /// Reads the files that the options name, and writes the module.
     pub(super) fn read(options: &Parsed, dags: Option<&Prepared>) -> Result<Handed, Refusal> {
         let read = |path: &Path| observed::read(path).map_err(Refusal::Usage);
-        let text = options.path("wcets").map(read).transpose()?;
+        let text = options.path(name::WCETS).map(read).transpose()?;
         let text = text.unwrap_or_default();
         let replayed = read_replayed(options)?;
-        let own = options.named(&["module"]).first().map(files::read_named);
+        let own = options
+            .named(&[name::MODULE])
+            .first()
+            .map(files::read_named);
         let own = own.transpose().map_err(Refusal::Usage)?;
         let input = script(options)?;
         let is_empty = own.is_none() && text.is_empty() && replayed.is_empty() && input.is_empty();
@@ -81,14 +84,14 @@ impl Handed {
 /// Returns the bytes of the recording for the module; none if no replay is asked for, or on Linux,
 /// where the program reads the file itself.
 fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
-    let Some(path) = options.path("replay") else {
+    let Some(path) = options.path(name::REPLAY) else {
         return Ok(Vec::new());
     };
     let refused = |why| Refusal::Usage(format!("`--replay` {why}"));
     let bytes = recordings::read(path).map_err(refused)?;
     recordings::parse(path, &bytes).map_err(refused)?;
     // Parsed above all the same, so that a damaged file is refused before the build.
-    match options.is_given("on") {
+    match options.is_given(name::ON) {
         true => Ok(Vec::new()),
         false => Ok(bytes),
     }
@@ -97,14 +100,14 @@ fn read_replayed(options: &Parsed) -> Result<Vec<u8>, Refusal> {
 /// Returns the word for the guest's parameters after a blank, if some are given.
 fn parameters(options: &Parsed) -> Result<String, Refusal> {
     let mut parts = Vec::new();
-    if let Some(path) = options.path("params") {
+    if let Some(path) = options.path(name::PARAMS) {
         let place = files::shown_path(path);
         let option = "params";
         let bytes = files::read_named(&Named { option, path }).map_err(Refusal::Usage)?;
         let text = String::from_utf8_lossy(&bytes);
         parts.extend(of_file(&text).map_err(|line| Refusal::Usage(format!("{place}:{line}")))?);
     }
-    if let Some(text) = options.text("set") {
+    if let Some(text) = options.text(name::SET) {
         for part in text.split(',') {
             let shown = shown(part);
             let why = format!("`--set {shown}`: give it as NAME=VALUE, without blanks");
@@ -146,39 +149,39 @@ const STREAM: &str = "-";
 
 /// Reports whether standard input goes to the port.
 pub(super) fn is_live(options: &Parsed) -> bool {
-    options.path("input") == Some(Path::new(STREAM))
+    options.path(name::INPUT) == Some(Path::new(STREAM))
 }
 
 /// Returns the file that `--input` names, if it names one.
 pub(super) fn input(options: &Parsed) -> Vec<Named<'_>> {
     match is_live(options) {
         true => Vec::new(),
-        false => options.named(&["input"]),
+        false => options.named(&[name::INPUT]),
     }
 }
 
 /// Makes sure that `--input` and `--output` go with the other options.
 pub(super) fn check(options: &Parsed) -> Result<(), Refusal> {
     let usage = |line: &str| Err(Refusal::Usage(line.into()));
-    if is_live(options) && options.is_given("console") {
+    if is_live(options) && options.is_given(name::CONSOLE) {
         return usage(
             "`--input -` and `--console` both take standard input; give one, or a file to --input",
         );
     }
-    if options.path("output") == Some(Path::new(STREAM)) {
+    if options.path(name::OUTPUT) == Some(Path::new(STREAM)) {
         return usage("`--output -`: standard output is the guest's text; name a file");
     }
-    if !options.is_given("dag") {
+    if !options.is_given(name::DAG) {
         return Ok(());
     }
     let why = "and `--dag` exclude each other: DAGs of a file have no wire; give --app";
-    let wire = options.check_without(&["input", "output"], why);
+    let wire = options.check_without(&[name::INPUT, name::OUTPUT], why);
     wire.map_err(Refusal::Usage)
 }
 
 /// Returns the script for the guest from the file that `--input` names; empty if it names none.
 fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
-    let Some(path) = options.path("input").filter(|_| !is_live(options)) else {
+    let Some(path) = options.path(name::INPUT).filter(|_| !is_live(options)) else {
         return Ok(Vec::new());
     };
     let place = files::shown_path(path);
@@ -194,8 +197,8 @@ fn script(options: &Parsed) -> Result<Vec<u8>, Refusal> {
 
 /// Returns the other end of the second serial port, if `--input` or `--output` is given.
 pub(super) fn second(options: &Parsed) -> Option<Second> {
-    let output = options.path("output").map(PathBuf::from);
-    (output.is_some() || options.is_given("input")).then(|| Second {
+    let output = options.path(name::OUTPUT).map(PathBuf::from);
+    (output.is_some() || options.is_given(name::INPUT)).then(|| Second {
         is_live: is_live(options),
         output,
     })
@@ -203,7 +206,7 @@ pub(super) fn second(options: &Parsed) -> Option<Second> {
 
 /// Returns a warning if `--output` is given but the app has no wire, so that nothing was sent.
 pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
-    let file = options.path("output").map(files::shown_path)?;
+    let file = options.path(name::OUTPUT).map(files::shown_path)?;
     let has_wire = outcome.transcript.of_kind("wire").next().is_some();
     (!has_wire).then(|| format!("{file}: the app has connected no wire, and so it is empty"))
 }
@@ -212,6 +215,7 @@ pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
 mod tests {
     use super::super::{RUN, prepare};
     use super::{Handed, of_file, pair, second};
+    use crate::options::name;
     use crate::qemu::Second;
     use crate::system::workspace;
     use std::fs;
@@ -219,7 +223,7 @@ mod tests {
     #[test]
     fn dags_of_a_file_are_a_module_that_goes_with_its_value() {
         let demo = workspace().join("apps/dag-file/examples/demo.dag");
-        let options = RUN.right("--jobs 3").with("dag", demo);
+        let options = RUN.right("--jobs 3").with(name::DAG, demo);
         let dags = prepare(&options).unwrap().unwrap();
         let handed = Handed::read(&options, Some(&dags)).unwrap();
         let module = handed.module().unwrap();

@@ -17,7 +17,7 @@ use recording::{Chunk, Header, Recording, Writer};
 use super::screen::Screen;
 use super::{Booted, handed};
 use crate::files::{self, Temporary};
-use crate::options::{Parsed, Refusal};
+use crate::options::{Name, Parsed, Refusal, name};
 use crate::outcome::Outcome;
 use crate::protocol::Status;
 use crate::qemu::Ending;
@@ -30,7 +30,7 @@ use crate::system;
 const PASSING: [&str; 3] = ["progress", "record", "status"];
 
 /// The options that name a file for the record.
-const FILES: [&str; 2] = ["keep", "trace"];
+const FILES: [Name; 2] = [name::KEEP, name::TRACE];
 
 /// The buffer in KiB for values that wait for the background to send them.
 const ROOM_KIB: &str = "1024";
@@ -47,10 +47,10 @@ pub(super) struct Kept {
 /// Returns the guest's word for the kind of record that the options want.
 pub(super) fn word(options: &Parsed) -> Option<&'static str> {
     // A full record has the events, too, so it prevails over the views.
-    match options.is_given("keep") {
+    match options.is_given(name::KEEP) {
         true => Some("keep"),
         false => options
-            .given_of(&["trace", "dot", "prove"])
+            .given_of(&[name::TRACE, name::DOT, name::PROVE])
             .map(|_| "events"),
     }
 }
@@ -131,9 +131,9 @@ impl Kept {
         let part = self.part(&bytes);
         // A file of DAGs takes no replay, and an app whose topics are not recorded refuses one.
         let values = Recording::read(&bytes).is_ok_and(|of| of.count() > 0 && of.lost() == 0);
-        let is_replayed = values && !options.is_given("dag");
+        let is_replayed = values && !options.is_given(name::DAG);
         let [check, trace, show] = ["check-trace", "trace", "recording"].map(system::script);
-        let announce = |(name, path): (&str, &Path)| {
+        let announce = |(name, path): (Name, &Path)| {
             files::write_named(name, path, &bytes)?;
             let file = files::shown_path(path);
             let shown = format!("`{show} {file}` shows what is recorded");
@@ -295,7 +295,7 @@ pub(super) fn write(
     }
     // After a failure the picture would be wrong or missing, and would hide its message.
     if outcome.judge().is_ok() {
-        if let Some(path) = options.path("dot") {
+        if let Some(path) = options.path(name::DOT) {
             screen.say(&recordings::draw(&outcome.record()?, path)?);
         }
         if let Some(warning) = handed::warning(options, &outcome) {
@@ -322,7 +322,7 @@ pub(super) struct Log {
 pub(super) fn check(options: &Parsed) -> Result<(), String> {
     let is_other = |path: &&Path| fs::metadata(path).is_ok_and(|data| !data.is_file());
     options
-        .path("serial")
+        .path(name::SERIAL)
         .filter(is_other)
         .map_or(Ok(()), |path| {
             let place = files::shown_path(path);
@@ -336,7 +336,7 @@ pub(super) fn check(options: &Parsed) -> Result<(), String> {
 impl Log {
     /// Chooses the log's path. The file is made when the guest starts.
     pub(super) fn choose(options: &Parsed, app: &str) -> Result<Log, String> {
-        let named = options.path("serial").map(Path::to_path_buf);
+        let named = options.path(name::SERIAL).map(Path::to_path_buf);
         let stays = named.is_some();
         let path = named.map_or_else(|| system::new_log(app), Ok)?;
         Ok(Log {

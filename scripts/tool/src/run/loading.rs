@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use crate::dag_file::Prepared;
 use crate::files;
 use crate::install;
-use crate::options::{Parsed, Refusal};
+use crate::options::{Parsed, Refusal, name};
 use crate::qemu::{Loader, Machine, Mode, PROGRAM};
 use crate::system;
 
 /// Returns the loader that the options choose.
 pub(super) fn chosen(options: &Parsed) -> Loader {
-    let named = options.text("boot").and_then(Loader::from_name);
+    let named = options.text(name::BOOT).and_then(Loader::from_name);
     named.unwrap_or(Loader::Pvh)
 }
 
@@ -20,7 +20,7 @@ pub(super) fn machine(options: &Parsed) -> Machine {
     if chosen(options).needs_stick() {
         return Machine::Q35;
     }
-    let named = options.text("machine").and_then(Machine::from_name);
+    let named = options.text(name::MACHINE).and_then(Machine::from_name);
     named.unwrap_or(Machine::Microvm)
 }
 
@@ -34,8 +34,8 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
     let microvm = Machine::Microvm.name();
     // Only a board that the person has named: the default gives way to the stick.
     if loader.needs_stick()
-        && options.is_given("machine")
-        && options.text("machine") == Some(microvm)
+        && options.is_given(name::MACHINE)
+        && options.text(name::MACHINE) == Some(microvm)
     {
         return Err(format!(
             "`--machine {microvm}`: it has no firmware that boots from a stick, as `--boot \
@@ -55,7 +55,7 @@ pub(super) fn check(options: &Parsed, mode: Option<Mode>) -> Result<(), String> 
 /// Chooses the memory in MiB: the person's choice or the usual amount, in both cases enough for the
 /// stacks and tables of that many processors.
 pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result<u64, Refusal> {
-    let cores = options.number("cores").unwrap_or(1);
+    let cores = options.number(name::CORES).unwrap_or(1);
     let loader = chosen(options);
     let bytes = |name| {
         let data = options.path(name).and_then(|path| path.metadata().ok());
@@ -64,18 +64,18 @@ pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result
     };
     // A replay also builds a table of its values in memory; twice the file's size is set aside for
     // it.
-    let module_mib = (bytes("module") + 3 * bytes("replay")).div_ceil(1 << 20);
+    let module_mib = (bytes(name::MODULE) + 3 * bytes(name::REPLAY)).div_ceil(1 << 20);
     // Each processor has stacks and tables; a quarter of the memory is for them, the rest is heap.
     let mut least = loader.least_memory_mib().max(8 + cores) + module_mib;
     // The DAG file's estimate is for the usual amount; a person may know that less will do.
-    if let Some(dags) = dags.filter(|_| !options.is_given("memory")) {
+    if let Some(dags) = dags.filter(|_| !options.is_given(name::MEMORY)) {
         least = least.max(dags.memory_mib);
     }
-    let memory_mib = options.number("memory").unwrap_or(least);
+    let memory_mib = options.number(name::MEMORY).unwrap_or(least);
     if memory_mib >= least {
         return Ok(memory_mib);
     }
-    if options.is_given("memory") {
+    if options.is_given(name::MEMORY) {
         let with = match module_mib {
             0 => String::new(),
             mib => format!(" with a module of {mib} MiB,"),
@@ -91,7 +91,7 @@ pub(super) fn choose_memory(options: &Parsed, dags: Option<&Prepared>) -> Result
 
 /// Finds the QEMU to use; installs one if none is named and none is there.
 pub(super) fn choose_program(options: &Parsed) -> Result<PathBuf, Refusal> {
-    if let Some(named) = options.path("qemu") {
+    if let Some(named) = options.path(name::QEMU) {
         return system::find_program(named).ok_or_else(|| {
             let place = files::shown_path(named);
             Refusal::Usage(format!("`--qemu {place}`: there is no such program"))

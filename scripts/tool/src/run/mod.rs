@@ -31,7 +31,7 @@ use crate::files;
 use crate::image;
 use crate::install;
 use crate::medium;
-use crate::options::{BY_PERSON, Parsed, Refusal};
+use crate::options::{BY_PERSON, Name, Parsed, Refusal, name};
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::protocol::{Status, Transcript};
@@ -45,14 +45,14 @@ pub use debug::debug;
 pub use table::RUN;
 
 /// Options that exclude each other in one run that is not observed.
-const APART: [(&str, &str, &str); 3] = [
+const APART: [(Name, Name, &str); 3] = [
     (
-        "dag",
-        "module",
+        name::DAG,
+        name::MODULE,
         "exclude each other: the DAGs are the module",
     ),
-    ("replay", "keep", "exclude each other"),
-    ("replay", "dag", "exclude each other"),
+    (name::REPLAY, name::KEEP, "exclude each other"),
+    (name::REPLAY, name::DAG, "exclude each other"),
 ];
 
 /// Runs the subcommand with the words after its name.
@@ -63,25 +63,25 @@ pub fn run(words: &[OsString]) -> ExitCode {
 fn attempt(options: &Parsed) -> Result<ExitCode, Refusal> {
     // First: the default number of cores depends on the platform.
     let options = &on_linux::settle(options)?;
-    if !options.is_given("replay") {
-        let from = options.check_without(&["from"], "needs `--replay FILE`; give it, too");
+    if !options.is_given(name::REPLAY) {
+        let from = options.check_without(&[name::FROM], "needs `--replay FILE`; give it, too");
         from.map_err(Refusal::Usage)?;
     }
     // Before the checks below: a folder, and an observed run, have rules of their own.
     if let Some(folder) = several::folder(options) {
         return several::run_folder(options, &folder);
     }
-    if options.is_given("prove") {
+    if options.is_given(name::PROVE) {
         return several::run(options);
     }
     let why = "needs `--prove`; give it, too";
-    let apart = options.check_without(&["margin", "seeds"], why);
+    let apart = options.check_without(&[name::MARGIN, name::SEEDS], why);
     apart
         .and_then(|()| options.check_apart(&APART))
         .map_err(Refusal::Usage)?;
     check_files(options)?;
     let dags = prepare(options)?;
-    if let Some(dags) = dags.as_ref().filter(|_| options.is_given("print-dag")) {
+    if let Some(dags) = dags.as_ref().filter(|_| options.is_given(name::PRINT_DAG)) {
         print!("{}", dags.file);
         return Ok(ExitCode::SUCCESS);
     }
@@ -98,11 +98,23 @@ fn prepare(options: &Parsed) -> Result<Option<Prepared>, Refusal> {
 fn check_files(options: &Parsed) -> Result<(), Refusal> {
     handed::check(options)?;
     let names = [
-        "dag", "module", "replay", "image", "qemu", "wcets", "params",
+        name::DAG,
+        name::MODULE,
+        name::REPLAY,
+        name::IMAGE,
+        name::QEMU,
+        name::WCETS,
+        name::PARAMS,
     ];
     let mut inputs = options.named(&names);
     inputs.extend(handed::input(options));
-    let outputs = ["serial", "trace", "keep", "dot", "output"];
+    let outputs = [
+        name::SERIAL,
+        name::TRACE,
+        name::KEEP,
+        name::DOT,
+        name::OUTPUT,
+    ];
     let outputs = options.named(&outputs);
     files::check(&inputs, &outputs).map_err(Refusal::Usage)?;
     kept::check(options).map_err(Refusal::Usage)
@@ -122,7 +134,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         return on_linux::run_app(options, &app, dags, shows);
     }
     let memory_mib = loading::choose_memory(options, dags)?;
-    let named = options.text("mode").and_then(Mode::from_name);
+    let named = options.text(name::MODE).and_then(Mode::from_name);
     loading::check(options, named).map_err(Refusal::Usage)?;
     let program = loading::choose_program(options)?;
     // May install packages, so it comes after the checks of the loader.
@@ -145,7 +157,7 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
         medium::check_words(&longest.guest_words).map_err(Refusal::Usage)?;
     }
     let log = Log::choose(options, &app)?;
-    let image = match options.path("image") {
+    let image = match options.path(name::IMAGE) {
         Some(path) => path.into(),
         None => image::build(&app)?,
     };
@@ -180,13 +192,13 @@ fn boot_app(options: &Parsed, dags: Option<&Prepared>, shows: bool) -> Result<Bo
 fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
     let app = match is_dag_file {
         true => "dag-file",
-        false => options.text("app").unwrap_or_default(),
+        false => options.text(name::APP).unwrap_or_default(),
     };
     if app == "dag-file" && !is_dag_file {
         let line = "app `dag-file` runs the DAGs of a file; name one by `--dag FILE`";
         return Err(Refusal::Usage(line.into()));
     }
-    let Some(path) = options.path("image") else {
+    let Some(path) = options.path(name::IMAGE) else {
         image::check_app(app).map_err(Refusal::Usage)?;
         return Ok(app.into());
     };
@@ -197,7 +209,7 @@ fn choose_app(options: &Parsed, is_dag_file: bool) -> Result<String, Refusal> {
     };
     let of_image = checked.map_err(|why| Refusal::Usage(format!("`--image {place}`: {why}")))?;
     // The default app is no wish: without `--app` an image of any app will do.
-    let wanted = (is_dag_file || options.is_given("app")).then_some(app);
+    let wanted = (is_dag_file || options.is_given(name::APP)).then_some(app);
     match (of_image, wanted) {
         (Some(own), Some(wanted)) if own != wanted => Err(Refusal::Usage(format!(
             "`--image {place}`: the image is of app `{own}`, and {} is wanted; name an image of \
@@ -221,7 +233,7 @@ fn describe(
     let words = words(options, dags, screen::guest_words(options)).join(" ");
     // Emulated cores take much longer than their instructions say, and no budget is for that.
     let budgets = match mode {
-        Mode::Threads if options.is_given("console") && !words.contains("budget_factor=") => {
+        Mode::Threads if options.is_given(name::CONSOLE) && !words.contains("budget_factor=") => {
             " budget_factor=0"
         }
         _ => "",
@@ -231,16 +243,16 @@ fn describe(
         mode,
         machine: loading::machine(options),
         loader: loading::chosen(options),
-        cores: options.number("cores").unwrap_or(1),
+        cores: options.number(name::CORES).unwrap_or(1),
         memory_mib,
         guest_words: format!("mode={mode} {words}{budgets}").trim_end().into(),
         module: None,
         records: None,
-        has_input: options.is_given("console"),
+        has_input: options.is_given(name::CONSOLE),
         stops: screen::can_stop(options),
         second: handed::second(options),
         logs_instructions: false,
-        debugger: options.is_given("gdb").then(|| "tcp::1234".into()),
+        debugger: options.is_given(name::GDB).then(|| "tcp::1234".into()),
     }
 }
 
@@ -248,13 +260,13 @@ fn describe(
 /// person's own.
 fn words(options: &Parsed, dags: Option<&Prepared>, own: Vec<String>) -> Vec<String> {
     let mut words = Vec::new();
-    for name in table::GUEST_WORDS {
+    for name in table::GUEST_WORDS.iter().copied() {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));
     words.extend(own);
     words.extend(several::bounds_word(options));
-    let more = options.text("append").unwrap_or_default();
+    let more = options.text(name::APPEND).unwrap_or_default();
     words.extend(more.split_whitespace().map(String::from));
     words
 }
@@ -262,11 +274,11 @@ fn words(options: &Parsed, dags: Option<&Prepared>, own: Vec<String>) -> Vec<Str
 /// Returns the time limit: the person's, or two minutes and a second for each job, which is
 /// generous also where a job takes its real time. A DAG file states its own.
 fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
-    let jobs = options.number("jobs").unwrap_or(200);
+    let jobs = options.number(name::JOBS).unwrap_or(200);
     let usual = dags.map_or(120 + jobs, |dags| dags.limit_s);
-    let seconds = options.number("timeout").unwrap_or(usual);
-    let is_short = options.is_given("timeout");
-    if options.is_given("gdb") || options.is_given("console") && !is_short {
+    let seconds = options.number(name::TIMEOUT).unwrap_or(usual);
+    let is_short = options.is_given(name::TIMEOUT);
+    if options.is_given(name::GDB) || options.is_given(name::CONSOLE) && !is_short {
         // Under a debugger or a console the person sets the pace: a day.
         return Duration::from_secs(86_400);
     }
@@ -275,7 +287,7 @@ fn limit(options: &Parsed, dags: Option<&Prepared>) -> Duration {
 
 /// Reports whether somebody sends while the guest runs.
 fn is_live(options: &Parsed) -> bool {
-    options.is_given("console") || handed::is_live(options)
+    options.is_given(name::CONSOLE) || handed::is_live(options)
 }
 
 /// Prints the app, its guest, and how far the times can be trusted.
@@ -332,7 +344,7 @@ fn conclude(booted: &Booted, dags: Option<&Prepared>, options: &Parsed) -> ExitC
         let lines = of_file
             .unwrap_or_else(|| format!("the {who} refused its command line: {}", fault.reason));
         // Apps without draws do not know the word `seed`, which `--seeds` adds on its own.
-        let draws_nothing = options.is_given("seeds") && fault.reason.starts_with("`seed`");
+        let draws_nothing = options.is_given(name::SEEDS) && fault.reason.starts_with("`seed`");
         let remedy = match draws_nothing {
             true => "; this app draws nothing by a seed: leave `--seeds` out",
             false => "",

@@ -14,28 +14,41 @@ use super::{Booted, limit};
 use crate::dag_file::Prepared;
 use crate::debian::{Guest, GuestOrder};
 use crate::image;
-use crate::options::{Parsed, Refusal};
+use crate::options::{Name, Parsed, Refusal, name};
 use crate::program;
 use crate::qemu::{self, Ending, Mode};
 
 /// Options that concern QEMU, its guest, or the bare-metal kernel alone.
-const FOREIGN: [&str; 6] = ["boot", "gdb", "latest", "machine", "memory", "qemu"];
+const FOREIGN: [Name; 6] = [
+    name::BOOT,
+    name::GDB,
+    name::LATEST,
+    name::MACHINE,
+    name::MEMORY,
+    name::QEMU,
+];
 
 /// Options that `--on debian` cannot pass on to its guest, and options only for that guest.
-const NOT_IN_GUEST: [&str; 5] = ["console", "input", "keep", "output", "replay"];
-const ONLY_IN_GUEST: [&str; 2] = ["mode", "busy"];
+const NOT_IN_GUEST: [Name; 5] = [
+    name::CONSOLE,
+    name::INPUT,
+    name::KEEP,
+    name::OUTPUT,
+    name::REPLAY,
+];
+const ONLY_IN_GUEST: [Name; 2] = [name::MODE, name::BUSY];
 
 /// The additional time that a guest may take, in which Linux starts.
 const START: Duration = Duration::from_secs(120);
 
 /// Reports whether the options ask for Linux.
 pub(super) fn is_asked_for(options: &Parsed) -> bool {
-    options.text("on") == Some("linux") || is_in_guest(options)
+    options.text(name::ON) == Some("linux") || is_in_guest(options)
 }
 
 /// Reports whether that Linux runs as a guest, in QEMU.
 fn is_in_guest(options: &Parsed) -> bool {
-    options.text("on") == Some("debian")
+    options.text(name::ON) == Some("debian")
 }
 
 /// Refuses options that Linux does not have, and settles the number of cores.
@@ -43,10 +56,10 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
     if !is_asked_for(options) {
         // The reverse case: options of Linux on the bare machine.
         let why = "is for Linux; leave it out, or give `--on linux` or `--on debian`";
-        let on_machine = options.check_without(&["mechanism", "busy"], why);
+        let on_machine = options.check_without(&[name::MECHANISM, name::BUSY], why);
         return on_machine.map(|()| options.clone()).map_err(Refusal::Usage);
     }
-    let on = options.text("on").unwrap_or_default();
+    let on = options.text(name::ON).unwrap_or_default();
     let why = format!("is for the bare machine; leave it or `--on {on}` out");
     let on_linux = options.check_without(&FOREIGN, &why);
     on_linux.map_err(Refusal::Usage)?;
@@ -59,22 +72,22 @@ pub(super) fn settle(options: &Parsed) -> Result<Parsed, Refusal> {
         .check_without(others, &why)
         .map_err(Refusal::Usage)?;
     // Bytes with times make sense only where the times repeat.
-    if options.is_given("input") && !handed::is_live(options) {
+    if options.is_given(name::INPUT) && !handed::is_live(options) {
         let line = "`--input FILE` is for the bare machine, which can repeat its times; with \
             `--on linux` give `--input -`";
         return Err(Refusal::Usage(line.into()));
     }
     // An explicit number stands, even above that of this computer.
-    if options.is_given("cores") {
+    if options.is_given(name::CORES) {
         return Ok(options.clone());
     }
     if is_in_guest(options) {
-        return Ok(options.with("cores", GUEST_CORES));
+        return Ok(options.with(name::CORES, GUEST_CORES));
     }
-    let usual = options.number("cores").unwrap_or(1);
+    let usual = options.number(name::CORES).unwrap_or(1);
     let there = thread::available_parallelism().map_or(1, |count| count.get() as u64);
     // More workers than processors would share them, and the times would say little.
-    Ok(options.with("cores", usual.min(there).to_string()))
+    Ok(options.with(name::CORES, usual.min(there).to_string()))
 }
 
 /// The number of processors of a guest if `--cores` is not given.
@@ -91,7 +104,7 @@ pub(super) fn run_app(
     dags: Option<&Prepared>,
     shows: bool,
 ) -> Result<Booted, Refusal> {
-    let given = options.path("image");
+    let given = options.path(name::IMAGE);
     if given.is_none() {
         image::check_linux(app).map_err(Refusal::Usage)?;
     }
@@ -102,7 +115,7 @@ pub(super) fn run_app(
         .collect();
     words.extend(qemu::words(&handed.words));
     let kept = Kept::new(options, app)?;
-    let replayed = options.path("replay").map(Path::to_path_buf);
+    let replayed = options.path(name::REPLAY).map(Path::to_path_buf);
     // As bytes: the name of a file need not be UTF-8.
     for (name, path) in [("module=", handed.module()), ("replay=", replayed)] {
         if let Some(path) = path {
@@ -125,16 +138,16 @@ pub(super) fn run_app(
         None => image::build_linux(app, None)?,
     };
     let mut screen = Screen::new(options, &image);
-    let mode = options.text("mode").and_then(Mode::from_name);
+    let mode = options.text(name::MODE).and_then(Mode::from_name);
     let mode = mode.unwrap_or(Mode::Deterministic);
     let guest = is_in_guest(options).then(|| {
         let order = GuestOrder {
             program: &image,
             words: &words,
-            with_policy: options.text("mechanism") == Some("sched_ext"),
-            busy: options.number("busy").unwrap_or(0),
+            with_policy: options.text(name::MECHANISM) == Some("sched_ext"),
+            busy: options.number(name::BUSY).unwrap_or(0),
             mode,
-            cores: options.number("cores").unwrap_or(1),
+            cores: options.number(name::CORES).unwrap_or(1),
         };
         Guest::new(&order, &log.path).map_err(Refusal::Failure)
     });
@@ -159,7 +172,7 @@ pub(super) fn run_app(
     let order = program::ProgramOrder {
         program: &image,
         words: &words,
-        is_live: handed::is_live(options) || options.is_given("console"),
+        is_live: handed::is_live(options) || options.is_given(name::CONSOLE),
         stops: true,
         log: &log.path,
         limit,
@@ -199,7 +212,7 @@ fn introduce(
 ) {
     let words: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
     screen.say(&format!("app {app}, words: {}", words.join(" ")));
-    let cores = options.number("cores").unwrap_or(1);
+    let cores = options.number(name::CORES).unwrap_or(1);
     if let Some(mode) = guest {
         screen.say(&format!(
             "on Debian's Linux in QEMU, mode {mode}, {cores} cores"
@@ -225,10 +238,10 @@ fn meaning(mode: Mode) -> &'static str {
 /// Returns the words that only a Linux program gets.
 fn own_words(options: &Parsed) -> Vec<String> {
     let mut words = Vec::new();
-    for name in ["cores", "mechanism", "output"] {
+    for name in [name::CORES, name::MECHANISM, name::OUTPUT] {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
-    words.extend(options.is_given("console").then(|| "console=on".into()));
+    words.extend(options.is_given(name::CONSOLE).then(|| "console=on".into()));
     words.extend(handed::is_live(options).then(|| "input=-".into()));
     words
 }

@@ -17,7 +17,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::handed;
-use crate::options::Parsed;
+use crate::options::{Parsed, name};
 use crate::places;
 use crate::progress::Progress;
 use crate::protocol::{MachineLine, read_line};
@@ -43,10 +43,10 @@ pub(super) struct Screen {
 impl Screen {
     pub(super) fn new(options: &Parsed, image: &Path) -> Screen {
         Screen {
-            people: !options.is_given("json"),
-            machine: options.text("quiet") != Some(NOTHING)
-                && (options.is_given("json") || !options.is_given("console")),
-            quiet: options.is_given("quiet"),
+            people: !options.is_given(name::JSON),
+            machine: options.text(name::QUIET) != Some(NOTHING)
+                && (options.is_given(name::JSON) || !options.is_given(name::CONSOLE)),
+            quiet: options.is_given(name::QUIET),
             on_terminal: system::stderr_moves(),
             bar_is_shown: false,
             first_status: None,
@@ -180,7 +180,7 @@ fn describe(line: &MachineLine, wall_ns: u64, run_ns: u64) -> Option<String> {
 /// Returns the guest's words that the screen needs.
 pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
     let mut words = Vec::new();
-    if options.is_given("console") {
+    if options.is_given(name::CONSOLE) {
         words.push("console=on".into());
     } else {
         words.extend(can_stop(options).then(|| "console=stop".into()));
@@ -193,14 +193,16 @@ pub(super) fn guest_words(options: &Parsed) -> Vec<String> {
 /// port, since QEMU has one standard input.
 pub(super) fn can_stop(options: &Parsed) -> bool {
     let says_otherwise = options
-        .text("append")
+        .text(name::APPEND)
         .is_some_and(|words| words.contains("console="));
     !handed::is_live(options) && !says_otherwise
 }
 
 /// Reports whether a person watches and does not type meanwhile.
 fn is_watched(options: &Parsed) -> bool {
-    let is_silent = options.given_of(&["quiet", "json", "gdb"]).is_some();
+    let is_silent = options
+        .given_of(&[name::QUIET, name::JSON, name::GDB])
+        .is_some();
     stdout().is_terminal() && system::stderr_moves() && !is_silent
 }
 
@@ -211,9 +213,9 @@ fn is_watched(options: &Parsed) -> bool {
 /// Starts when the guest has written to `log`: before its serial port is set up, input is lost.
 pub(super) fn relay(options: &Parsed, log: &Path) -> impl FnOnce(Option<ChildStdin>) + use<> {
     let log = log.to_path_buf();
-    let is_read = options.is_given("console") || handed::is_live(options);
-    let farewell = match options.number("jobs") {
-        _ if !options.is_given("console") => "",
+    let is_read = options.is_given(name::CONSOLE) || handed::is_live(options);
+    let farewell = match options.number(name::JOBS) {
+        _ if !options.is_given(name::CONSOLE) => "",
         Some(0) => "\nshutdown\n",
         _ => "\n",
     };

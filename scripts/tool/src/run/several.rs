@@ -19,7 +19,7 @@ use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::{Format, states_overheads};
 use crate::files::{self, Temporary};
 use crate::json::quoted;
-use crate::options::{Parsed, Refusal};
+use crate::options::{Name, Parsed, Refusal, name};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
@@ -35,7 +35,7 @@ type Measurement = Result<MeasuredCosts, String>;
 /// Runs the proof.
 pub(super) fn run(options: &Parsed) -> Result<ExitCode, Refusal> {
     let why = "is for a run that is not observed; leave one of them out";
-    let alone = options.check_without(&["console", "gdb", "print-dag"], why);
+    let alone = options.check_without(&[name::CONSOLE, name::GDB, name::PRINT_DAG], why);
     alone.map_err(Refusal::Usage)?;
     check_files(options)?;
     let Some((rows, code)) = prove(options)? else {
@@ -57,9 +57,9 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
     let (refused, failed) = each(files, |file| {
         progress.show(over);
         over += 1;
-        let one = options.with("dag", file).with("quiet", NOTHING);
+        let one = options.with(name::DAG, file).with(name::QUIET, NOTHING);
         // The lines of the single runs would drown the one table.
-        let one = one.with("json", "yes");
+        let one = one.with(name::JSON, "yes");
         let Some((proven, code)) = prove(&one)? else {
             return Ok(Status::Failure);
         };
@@ -72,7 +72,7 @@ pub(super) fn of_files(options: &Parsed, files: &[PathBuf]) -> Result<ExitCode, 
     })?;
     progress.wipe();
     say_all(options, &rows);
-    if !options.is_given("json") {
+    if !options.is_given(name::JSON) {
         let (count, summary) = (files.len(), proof::summary(&rows));
         println!("{count} files: {refused} refused, {failed} failed; {summary}");
     }
@@ -111,31 +111,33 @@ fn prove(options: &Parsed) -> Result<Option<Proven>, Refusal> {
 /// Observes a run, unless the person states both WCETs and overheads. Returns the command line by
 /// which the next run commits with the measurements; `None` if the run failed.
 fn observe_first(options: &Parsed, own: &Path) -> Result<Option<Parsed>, Refusal> {
-    let append = options.text("append").unwrap_or_default();
+    let append = options.text(name::APPEND).unwrap_or_default();
     let measures = !states_overheads(append);
-    if options.is_given("wcets") && !measures {
+    if options.is_given(name::WCETS) && !measures {
         return Ok(Some(options.clone()));
     }
     // The person asked for the second run; the first only prepares it.
-    let first = options.with("quiet", NOTHING);
+    let first = options.with(name::QUIET, NOTHING);
     // WCETs that the person states are not overwritten by observed ones.
-    let file = Some(own).filter(|_| !options.is_given("wcets"));
+    let file = Some(own).filter(|_| !options.is_given(name::WCETS));
     let Some(seen) = observe(&first, file)? else {
         return Ok(None);
     };
     let mut next = options.clone();
     if let Some(file) = file {
-        next = next.with("wcets", file);
+        next = next.with(name::WCETS, file);
     }
     if measures {
         let measured = seen?;
-        let margin = options.number("margin").unwrap_or(observed::MARGIN_PERCENT);
+        let margin = options
+            .number(name::MARGIN)
+            .unwrap_or(observed::MARGIN_PERCENT);
         let word = observed::overheads_word(&measured, margin);
         let text =
             format!("\noverheads measured: {measured}; with a margin of {margin} %: {word}\n");
         let line = observed::overheads_line(&measured, margin);
         say(options, &text, [line].into_iter());
-        next = next.with("append", format!("{append} {word}"));
+        next = next.with(name::APPEND, format!("{append} {word}"));
     }
     Ok(Some(next))
 }
@@ -150,17 +152,17 @@ fn compare(booted: &Booted) -> Result<Vec<ProofRow>, String> {
 /// Observes a run for each seed, prints the execution times, and writes the file of WCETs. Returns
 /// the overheads; `None` if a run failed, which has been reported.
 fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>, Refusal> {
-    let observing = options.with("prove", OBSERVING);
+    let observing = options.with(name::PROVE, OBSERVING);
     // Saturating, since a person's seed may be the largest `u64`.
-    let first = options.number("seed").unwrap_or(1);
-    let seeds = options.number("seeds").unwrap_or(1);
+    let first = options.number(name::SEED).unwrap_or(1);
+    let seeds = options.number(name::SEEDS).unwrap_or(1);
     let mut all: Vec<OfDag> = Vec::new();
     let mut latest = Record::default();
     for seed in first..first.saturating_add(seeds) {
         let one = match seeds {
             // An app without draws refuses the word `seed`, so a single run does not get it.
             1 => observing.clone(),
-            _ => observing.with("seed", seed.to_string()),
+            _ => observing.with(name::SEED, seed.to_string()),
         };
         let dags = prepare(&one)?;
         let booted = boot_app(&one, dags.as_ref(), true)?;
@@ -174,7 +176,9 @@ fn observe(options: &Parsed, file: Option<&Path>) -> Result<Option<Measurement>,
         latest = booted.outcome.record()?;
         observed::add(&mut all, &latest)?;
     }
-    let margin = options.number("margin").unwrap_or(observed::MARGIN_PERCENT);
+    let margin = options
+        .number(name::MARGIN)
+        .unwrap_or(observed::MARGIN_PERCENT);
     say(
         options,
         &observed::table(&all, margin),
@@ -198,10 +202,10 @@ fn say_all(options: &Parsed, rows: &[ProofRow]) {
 
 /// Prints a table for people and lines for programs, as the options want.
 fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
-    if !options.is_given("json") {
+    if !options.is_given(name::JSON) {
         print!("{table}");
     }
-    if options.text("quiet") != Some(NOTHING) {
+    if options.text(name::QUIET) != Some(NOTHING) {
         lines.for_each(|line| println!("{line}"));
     }
 }
@@ -209,14 +213,14 @@ fn say(options: &Parsed, table: &str, lines: impl Iterator<Item = String>) {
 /// Returns the word that keeps a run which only observes from judging bounds: its WCETs and
 /// overheads are still to be found.
 pub(super) fn bounds_word(options: &Parsed) -> Option<String> {
-    let observes = options.text("prove") == Some(OBSERVING);
+    let observes = options.text(name::PROVE) == Some(OBSERVING);
     observes.then(|| "bounds=observe".into())
 }
 
 /// Reports a guest's refusal of a WCET file with the file's name and line; returns whether it was
 /// one.
 pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
-    let path = options.path("wcets");
+    let path = options.path(name::WCETS);
     match path.and_then(|path| observed::translate(reason, path)) {
         Some(line) => {
             RUN.report(Refusal::Usage(line));
@@ -227,15 +231,15 @@ pub(super) fn refused(options: &Parsed, reason: &str) -> bool {
 }
 
 /// Options that make sense for one file only.
-const FOR_ONE_FILE: [&str; 8] = [
-    "print-dag",
-    "graph",
-    "trace",
-    "serial",
-    "dot",
-    "wcets",
-    "console",
-    "gdb",
+const FOR_ONE_FILE: [Name; 8] = [
+    name::PRINT_DAG,
+    name::GRAPH,
+    name::TRACE,
+    name::SERIAL,
+    name::DOT,
+    name::WCETS,
+    name::CONSOLE,
+    name::GDB,
 ];
 
 /// Runs all files. A refused or failed one does not keep the others from running;
@@ -246,16 +250,16 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
     for_several.map_err(Refusal::Usage)?;
     // Before any boot, so that a folder without files is refused at once.
     let files = files(folder).map_err(Refusal::Usage)?;
-    if options.is_given("prove") {
+    if options.is_given(name::PROVE) {
         return of_files(options, &files);
     }
-    let shows_lines = options.is_given("json");
+    let shows_lines = options.is_given(name::JSON);
     let mut table = Table::new("", COLUMNS);
     if !shows_lines {
         print!("{}", table.text());
     }
     let (refused, failed) = each(&files, |file| {
-        let one = options.with("dag", file).with("quiet", "yes");
+        let one = options.with(name::DAG, file).with(name::QUIET, "yes");
         let dags = prepare(&one)?;
         let booted = boot_app(&one, dags.as_ref(), false)?;
         let judged = booted.outcome.judge();
@@ -269,7 +273,7 @@ pub(super) fn run_folder(options: &Parsed, folder: &Path) -> Result<ExitCode, Re
         if shows_lines {
             lines(file, &booted.outcome).for_each(|line| println!("{line}"));
         } else {
-            let cores = options.number("cores").unwrap_or(1);
+            let cores = options.number(name::CORES).unwrap_or(1);
             add_rows(&mut table, file, cores, &booted.outcome);
             print!("{}", table.text());
         }
@@ -321,7 +325,7 @@ pub(super) fn worst(refused: usize, failed: usize) -> ExitCode {
 
 /// Returns the folder that `--dag` names, if it is one.
 pub(super) fn folder(options: &Parsed) -> Option<PathBuf> {
-    let path = options.path("dag")?;
+    let path = options.path(name::DAG)?;
     path.is_dir().then(|| path.to_path_buf())
 }
 

@@ -50,7 +50,7 @@ use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
 
 use crate::files;
 use crate::json::{Object, quoted};
-use crate::options::{Command, Parsed, Refusal, Takes, did_you_mean, options};
+use crate::options::{Command, Parsed, Refusal, Takes, did_you_mean, name, options};
 use crate::output::shown as shown_ns;
 use crate::record::{Record, Run, tolerance_ns};
 
@@ -104,15 +104,15 @@ pub static CHECK_TRACE: Command = Command {
         /// Microseconds for which an instance may wait for what it is owed, because a decision
         /// takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 by fifo, 10000
         /// by sched_ext, 100000 where nothing is preempted, else 1000.
-        "bound-us": Takes::Number(0, 1_000_000_000);
+        BOUND_US: Takes::Number(0, 1_000_000_000);
         /// Breaches of a run to be shown; all are counted.
-        "show": Takes::Number(0, u64::MAX), or "20";
+        SHOW: Takes::Number(0, u64::MAX), or "20";
         /// Only the chains that begin with this subtask; with --to.
-        "from": Takes::Text("DAG/SUBTASK");
+        FROM: Takes::Text("DAG/SUBTASK");
         /// Only the chains that end with this subtask; with --from.
-        "to": Takes::Text("DAG/SUBTASK");
+        TO: Takes::Text("DAG/SUBTASK");
         /// Only the machine lines on standard output, the rest on standard error.
-        "json": Takes::Nothing;
+        JSON: Takes::Nothing;
     },
     notes: "\
 rules:
@@ -185,11 +185,11 @@ fn read_file(path: &Path) -> Result<Vec<Run>, String> {
 /// Judges a run, prints the findings, and returns the number of breaches.
 fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> usize {
     let bound_ns = tolerance_ns(run, options);
-    let shown = options.number("show").unwrap_or(u64::MAX);
+    let shown = options.number(name::SHOW).unwrap_or(u64::MAX);
     let shown = usize::try_from(shown).unwrap_or(usize::MAX);
     let findings = check(run, bound_ns);
     let mut table = table(file, run, &findings, bound_ns, shown);
-    table += &chain_table(run, chains, options.is_given("from"));
+    table += &chain_table(run, chains, options.is_given(name::FROM));
     let exceeded: usize = chains.iter().map(|chain| chain.exceeded(bound_ns)).sum();
     if exceeded > 0 {
         let _ = writeln!(
@@ -197,7 +197,7 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
             "  breach {exceeded} times of chains are beyond their bounds"
         );
     }
-    if options.is_given("json") {
+    if options.is_given(name::JSON) {
         eprint!("{table}");
     } else {
         print!("{table}");
@@ -346,7 +346,7 @@ impl MeasuredChain {
 /// In words: there is no such subtask, or no chain between the two.
 fn measure(run: &Run, options: &Parsed) -> Result<Vec<MeasuredChain>, String> {
     let samplings = &run.samplings;
-    let ends = (options.text("from"), options.text("to"));
+    let ends = (options.text(name::FROM), options.text(name::TO));
     let chains = match ends {
         (None, None) => Chain::all(&run.task_set, samplings),
         (Some(from), Some(to)) => {

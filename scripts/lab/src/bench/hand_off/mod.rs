@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use super::frame::{Figure, by_plan};
 use tool::files;
-use tool::options::{Command, Parsed, Takes, options};
+use tool::options::{Command, Name, Parsed, Takes, name, options};
 use tool::progress::Progress;
 use tool::qemu::Mode;
 use tool::{image, install, probe};
@@ -29,16 +29,16 @@ static TABLE: Command = Command {
     positional: None,
     options: options! {
         /// The unit of what is counted: instructions (deterministic), time (kvm, threads), or both.
-        "mode": Takes::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
+        MODE: Takes::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
         /// Compare the instructions with the baseline; one that grew is a failure.
-        "compare": Takes::Nothing;
+        COMPARE: Takes::Nothing;
         /// Write the instructions into the baseline, tests/baselines/hand-off.json.
-        "save-baseline": Takes::Nothing;
+        SAVE_BASELINE: Takes::Nothing;
         /// Instead, count what the workloads cost on more cores and with more subtasks.
-        "scale": Takes::Nothing;
+        SCALE: Takes::Nothing;
         /// Instead, log each instruction of one hop, count them by parts of the code, and write
         /// them to FILE. Needs objdump and addr2line (binutils).
-        "listing": Takes::File("FILE");
+        LISTING: Takes::File("FILE");
     },
     notes: "What each row means stands in docs/performance.md.
 
@@ -68,9 +68,16 @@ impl HandOffPlan {
     ///
     /// The options exclude each other: one line that says why.
     fn new(options: &Parsed) -> Result<Self, String> {
-        let all = ["listing", "scale", "compare", "save-baseline", "mode"].into_iter();
-        let given: Vec<&str> = all.filter(|name| options.is_given(name)).collect();
-        let mode = options.text("mode").and_then(Mode::from_name);
+        let all = [
+            name::LISTING,
+            name::SCALE,
+            name::COMPARE,
+            name::SAVE_BASELINE,
+            name::MODE,
+        ];
+        let given = all.into_iter().filter(|name| options.is_given(*name));
+        let given: Vec<&str> = given.map(Name::as_str).collect();
+        let mode = options.text(name::MODE).and_then(Mode::from_name);
         match given[..] {
             [own @ ("listing" | "scale"), other, ..] => Err(format!(
                 "`--{own}` with `--{other}`: it is a run of its own; leave `--{other}` out"
@@ -83,15 +90,15 @@ impl HandOffPlan {
                      leave `--mode` out"
                 ))
             }
-            _ => files::check(&[], &options.named(&["listing"])),
+            _ => files::check(&[], &options.named(&[name::LISTING])),
         }?;
-        let before = options.is_given("compare").then(baseline::read);
+        let before = options.is_given(name::COMPARE).then(baseline::read);
         Ok(Self {
             mode,
             before: before.transpose()?,
-            saves: options.is_given("save-baseline"),
-            scale: options.is_given("scale"),
-            listing: options.path("listing").map(PathBuf::from),
+            saves: options.is_given(name::SAVE_BASELINE),
+            scale: options.is_given(name::SCALE),
+            listing: options.path(name::LISTING).map(PathBuf::from),
         })
     }
 }

@@ -24,7 +24,7 @@ use text::quoted;
 use super::frame::{by_plan, draw, judged};
 use figures::ConditionFigures;
 use tool::files;
-use tool::options::{Command, Parsed, Takes, options};
+use tool::options::{Command, Parsed, Takes, name, options};
 use tool::program::ProgramOrder;
 use tool::progress::Progress;
 use tool::qemu::{Mode, PROGRAM, Qemu};
@@ -101,27 +101,27 @@ static TABLE: Command = Command {
     options: options! {
         /// The folder for all results; what is there already is not measured again. If not given,
         /// target/join-latency, or target/join-latency-on-linux.
-        "out" 'o': Takes::File("DIR");
+        OUT 'o': Takes::File("DIR");
         /// Jobs of each condition.
-        "jobs": Takes::Number(1, 100_000), or "2000";
+        JOBS: Takes::Number(1, 100_000), or "2000";
         /// Parallel subtasks N; a condition has two processors more than the largest.
-        "subtasks": Takes::Numbers(1, 16), or "2,4,6";
+        SUBTASKS: Takes::Numbers(1, 16), or "2,4,6";
         /// The policies: fass, exact, approximate-MS with the longest interval.
-        "policies": Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
+        POLICIES: Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
         /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
         /// every policy.
-        "repeat": Takes::Number(1, 1000), or "1";
+        REPEAT: Takes::Number(1, 1000), or "1";
         /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
         /// there are fewer.
-        "on": Takes::OneOf(&["machine", "linux"]), or "machine";
+        ON: Takes::OneOf(&["machine", "linux"]), or "machine";
         /// Queue size of the synchronizers.
-        "queue": Takes::Number(1, 100_000), or "1000";
+        QUEUE: Takes::Number(1, 100_000), or "1000";
         /// The meaning of time, see ./scripts/run --help; kvm where it works, else deterministic.
-        "mode": Takes::OneOf(Mode::NAMES);
+        MODE: Takes::OneOf(Mode::NAMES);
         /// The same as --mode deterministic.
-        "deterministic": Takes::Nothing;
+        DETERMINISTIC: Takes::Nothing;
         /// Boot each deterministic condition once, not until two boots agree.
-        "once": Takes::Nothing;
+        ONCE: Takes::Nothing;
     },
     notes: "\
 writes into DIR:
@@ -163,16 +163,16 @@ impl JoinPlan {
     ///
     /// One line with the reason: the options contradict each other.
     fn new(options: &Parsed) -> Result<JoinPlan, String> {
-        let on_linux = options.text("on") == Some("linux");
+        let on_linux = options.text(name::ON) == Some("linux");
         if on_linux {
             let why = "is for guests; leave it or `--on linux` out";
-            options.check_without(&["mode", "deterministic", "once"], why)?;
+            options.check_without(&[name::MODE, name::DETERMINISTIC, name::ONCE], why)?;
         }
-        (options.named(&["out"]).iter()).try_for_each(files::check_folder)?;
-        options.check_distinct(&["policies", "subtasks"])?;
-        let policies = Policy::list(options.text("policies").unwrap_or_default())?;
-        let mut named = options.text("mode").and_then(Mode::from_name);
-        if options.is_given("deterministic") {
+        (options.named(&[name::OUT]).iter()).try_for_each(files::check_folder)?;
+        options.check_distinct(&[name::POLICIES, name::SUBTASKS])?;
+        let policies = Policy::list(options.text(name::POLICIES).unwrap_or_default())?;
+        let mut named = options.text(name::MODE).and_then(Mode::from_name);
+        if options.is_given(name::DETERMINISTIC) {
             let other = named.filter(|mode| *mode != Mode::Deterministic);
             if let Some(mode) = other {
                 return Err(format!(
@@ -181,7 +181,7 @@ impl JoinPlan {
             }
             named = Some(Mode::Deterministic);
         }
-        let once = options.is_given("once");
+        let once = options.is_given(name::ONCE);
         if let Some(mode) = named.filter(|mode| once && *mode != Mode::Deterministic) {
             return Err(format!(
                 "`--once` is for deterministic conditions, and the mode is {mode}, in which each \
@@ -189,8 +189,8 @@ impl JoinPlan {
             ));
         }
         let number = |name| options.number(name).unwrap_or(1);
-        let subtasks: Vec<usize> = options.numbers("subtasks");
-        let seeds: Vec<u64> = (1..=number("repeat")).collect();
+        let subtasks: Vec<usize> = options.numbers(name::SUBTASKS);
+        let seeds: Vec<u64> = (1..=number(name::REPEAT)).collect();
         let of_size = |&subtasks: &usize| {
             let seeds = &seeds;
             let of_policy = move |&policy: &Policy| {
@@ -209,13 +209,13 @@ impl JoinPlan {
             true => "target/join-latency-on-linux",
             false => "target/join-latency",
         };
-        let jobs = number("jobs");
+        let jobs = number(name::JOBS);
         Ok(JoinPlan {
-            out: options.path("out").unwrap_or(Path::new(folder)).into(),
+            out: options.path(name::OUT).unwrap_or(Path::new(folder)).into(),
             conditions,
             seeds,
             jobs,
-            queue: number("queue"),
+            queue: number(name::QUEUE),
             cores,
             // The kernel records each instance, and the app its joins: half a KiB per job and core.
             memory_mib: 64 + (jobs * cores).div_ceil(2048),

@@ -28,7 +28,7 @@ use text::quoted;
 
 use super::frame::{Figure, by_plan};
 use tool::json::Object;
-use tool::options::{Command, Parsed, Takes, options};
+use tool::options::{Command, Parsed, Takes, name, options};
 use tool::output::Table;
 use tool::progress::Progress;
 
@@ -38,12 +38,12 @@ static TABLE: Command = Command {
     positional: None,
     options: options! {
         /// How many rounds of about 20,000 instances each figure has.
-        "rounds": Takes::Number(10, 100_000), or "300";
+        ROUNDS: Takes::Number(10, 100_000), or "300";
         /// The jobs whose joins across cores are measured.
-        "jobs": Takes::Number(100, 10_000_000), or "20000";
+        JOBS: Takes::Number(100, 10_000_000), or "20000";
         /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
         /// layered-1000, dags-1000, join, clusters; all.
-        "only": Takes::Text("NAMES");
+        ONLY: Takes::Text("NAMES");
     },
     notes: "\
 `floor` calls the bodies in topological order, in a loop; `closures` are functions under
@@ -83,10 +83,12 @@ const WORKERS: [u32; 2] = [1, 2];
 
 impl NativePlan {
     fn read(options: &Parsed) -> Result<Self, String> {
-        options.check_distinct(&["only"])?;
+        options.check_distinct(&[name::ONLY])?;
         let names = MeasuredGraph::ALL.iter().map(|graph| graph.name);
         let known: Vec<&str> = names.chain([JOIN, CLUSTERS]).collect();
-        let chosen = options.text("only").map(|names| names.split(',').collect());
+        let chosen = options
+            .text(name::ONLY)
+            .map(|names| names.split(',').collect());
         let wanted: Vec<&str> = chosen.unwrap_or_else(|| known.clone());
         if let Some(name) = wanted.iter().find(|name| !known.contains(name)) {
             let (name, known) = (quoted(name), known.join(", "));
@@ -97,8 +99,8 @@ impl NativePlan {
         let number = |name| options.number(name).unwrap_or(0);
         let is_wanted = |graph: &MeasuredGraph| wanted.contains(&graph.name);
         Ok(Self {
-            rounds: usize::try_from(number("rounds")).unwrap_or(usize::MAX),
-            jobs: number("jobs"),
+            rounds: usize::try_from(number(name::ROUNDS)).unwrap_or(usize::MAX),
+            jobs: number(name::JOBS),
             graphs: MeasuredGraph::ALL.into_iter().filter(is_wanted).collect(),
             with_join: wanted.contains(&JOIN),
             with_clusters: wanted.contains(&CLUSTERS),

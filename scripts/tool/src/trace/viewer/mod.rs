@@ -47,7 +47,7 @@ use super::{JobHistory, Slice, View, picture};
 use super::{check, read_file};
 use crate::files;
 use crate::json::{Object, quoted};
-use crate::options::{Command, Parsed, Refusal, Takes, options};
+use crate::options::{Command, Name, Parsed, Refusal, Takes, name, options};
 use crate::output::briefly;
 use crate::record::{Run, tolerance_ns};
 
@@ -142,19 +142,19 @@ pub static TRACE: Command = Command {
     )),
     options: options! {
         /// Write to this file; else to standard output.
-        "out" 'o': Takes::File("FILE");
+        OUT 'o': Takes::File("FILE");
         /// Draw one run as an SVG instead: its DAGs above their schedule, with bounds and deadlines.
-        "svg": Takes::Nothing;
+        SVG: Takes::Nothing;
         /// How many times the longest period the picture shows.
-        "periods": Takes::Number(1, 1000), or "1";
+        PERIODS: Takes::Number(1, 1000), or "1";
         /// The picture begins at this time of the run, such as 20ms; else at 0.
-        "from": Takes::Text("TIME");
+        FROM: Takes::Text("TIME");
         /// It shows the jobs that are released before this time, whatever --periods says.
-        "until": Takes::Text("TIME");
+        UNTIL: Takes::Text("TIME");
         /// Only the run of this number; else all of them, side by side from time 0.
-        "run": Takes::Number(0, u64::MAX);
+        RUN: Takes::Number(0, u64::MAX);
         /// As for ./scripts/check-trace, whose breaches are shown as markers.
-        "bound-us": Takes::Number(0, 1_000_000_000);
+        BOUND_US: Takes::Number(0, 1_000_000_000);
     },
     notes: "\
 Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
@@ -169,12 +169,12 @@ line, or a file without a well-formed trace with events
 pub fn trace(words: &[OsString]) -> ExitCode {
     TRACE.carry_out(words, |options| {
         let text = draw(options).map_err(Refusal::Usage)?;
-        match options.path("out") {
+        match options.path(name::OUT) {
             None => print!("{text}"),
             Some(out) => {
                 let place = files::shown_path(out);
                 fs::write(out, text).map_err(|error| format!("cannot write {place}: {error}"))?;
-                let by = match options.is_given("svg") {
+                let by = match options.is_given(name::SVG) {
                     true => "in a browser",
                     false => "at https://ui.perfetto.dev",
                 };
@@ -188,10 +188,10 @@ pub fn trace(words: &[OsString]) -> ExitCode {
 /// Converts the runs that the options name.
 fn draw(options: &Parsed) -> Result<String, String> {
     let input = options.file("which file? name a record of a run")?;
-    files::check(&[input], &options.named(&["out"]))?;
+    files::check(&[input], &options.named(&[name::OUT]))?;
     let mut runs = read_file(input.path)?;
     let file = files::shown_path(input.path);
-    if let Some(number) = options.number("run") {
+    if let Some(number) = options.number(name::RUN) {
         let there: Vec<String> = runs.iter().map(|run| run.number.to_string()).collect();
         runs.retain(|run| run.number == number);
         if runs.is_empty() {
@@ -201,18 +201,18 @@ fn draw(options: &Parsed) -> Result<String, String> {
             ));
         }
     }
-    if options.is_given("svg") {
+    if options.is_given(name::SVG) {
         // Without `--run` the first one: a picture has one axis of time.
         let run = runs.first().ok_or("the file has no run")?;
-        let time = |name: &str| {
+        let time = |name: Name| {
             let time = options.text(name).map(parse_ns).transpose();
             time.map_err(|why| format!("`--{name}`: {why}"))
         };
-        let from_ns = time("from")?.unwrap_or(0);
+        let from_ns = time(name::FROM)?.unwrap_or(0);
         let periods = run.task_set.dags().iter().map(Dag::period_ns);
         let longest_ns = periods.max().unwrap_or(0);
-        let span_ns = longest_ns.saturating_mul(options.number("periods").unwrap_or(1));
-        let until_ns = time("until")?.unwrap_or(from_ns.saturating_add(span_ns));
+        let span_ns = longest_ns.saturating_mul(options.number(name::PERIODS).unwrap_or(1));
+        let until_ns = time(name::UNTIL)?.unwrap_or(from_ns.saturating_add(span_ns));
         return picture::draw(run, from_ns..until_ns.max(from_ns));
     }
     // All runs of a file come from one boot, so one bound holds for all.
