@@ -255,7 +255,8 @@ texts! {
             "subtask {} is pinned, and no test bounds the response time of its DAG as on one core; pin \
              all its subtasks, to cores that no other DAG is pinned to, with an edge from each to the \
              next one on its core, or leave the cores out", subtask.0;
-        /// A DAG of its cluster is not proven, and may release any number of jobs in a row.
+        /// A DAG of its cluster is not proven, and may release any number of jobs in a row,
+        /// for a limit of its jobs is not taken into account.
         BesideBacklog { dag: DagId } =
             "dag {}, which shares its cores, is not proven and queues releases that find no room: many \
              in a row may keep the scheduler from all others; see to that one first, or let it skip \

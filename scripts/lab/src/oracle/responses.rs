@@ -227,6 +227,10 @@ fn sample(random: &mut Random) -> (Vec<DagSpec>, SchedulerOptions, Costs) {
         ready_ns: random.within(0..=200),
     };
     let late_ns = random.within(0..=200);
+    for spec in &mut specs {
+        // Fewer and more than are enough for the deadline.
+        spec.in_flight = random.once_in(4).then(|| random.within(1..=8));
+    }
     (specs, options, Costs { overheads, late_ns })
 }
 
