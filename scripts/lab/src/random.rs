@@ -1,7 +1,5 @@
 //! Random sets of DAGs for the analysis.
 
-use std::ops::RangeInclusive;
-
 use random::Random;
 use sched_dag::{DagSpec, Priority, SubtaskSpec};
 
@@ -32,7 +30,7 @@ pub(crate) fn set(random: &mut Random, unit_ns: u64, clusters: &[u32]) -> Vec<Da
 fn dag(random: &mut Random, unit_ns: u64, cores: u64, share: u64, overlaps: bool) -> DagSpec {
     // Some DAGs have long subtasks, which block others.
     let factor = random.one_of(&[1, 1, 6]);
-    let spec = graph(random, 1..=8, 2..=7, unit_ns..=9 * unit_ns, factor);
+    let spec = graph(random, unit_ns, factor);
     let wcets_ns = || spec.subtasks.iter().filter_map(|subtask| subtask.wcet_ns);
     let (volume_ns, longest_ns): (u64, _) = (wcets_ns().sum(), wcets_ns().max().unwrap_or(1));
     let period_ns = (volume_ns * share).div_ceil(cores * 4) + random.within(0..=10 * unit_ns);
@@ -55,19 +53,13 @@ fn dag(random: &mut Random, unit_ns: u64, cores: u64, share: u64, overlaps: bool
     }
 }
 
-/// Draws a graph with a number of subtasks and WCETs, in units, from these ranges. An edge leads
-/// from a subtask to a later one with probability 1 / `once_in`.
-pub(crate) fn graph(
-    random: &mut Random,
-    subtasks: RangeInclusive<usize>,
-    once_in: RangeInclusive<u64>,
-    units: RangeInclusive<u64>,
-    unit_ns: u64,
-) -> DagSpec {
-    let (subtasks, percent) = (random.within(subtasks), 100 / random.within(once_in));
+/// Draws a graph of up to 8 subtasks of 1 to 9 units, or `factor` times as long. An edge leads from
+/// a subtask to a later one with probability 1/2 to 1/7.
+fn graph(random: &mut Random, unit_ns: u64, factor: u64) -> DagSpec {
+    let (subtasks, percent) = (random.within(1..=8), 100 / random.within(2..=7));
     let edges = random.edges(subtasks, percent).collect();
     let subtask = |_| SubtaskSpec {
-        wcet_ns: Some(unit_ns * random.within(units.clone())),
+        wcet_ns: Some(factor * random.within(unit_ns..=9 * unit_ns)),
         ..SubtaskSpec::default()
     };
     DagSpec {

@@ -5,7 +5,7 @@
 //! a limit; counted instructions have. The exit code is 0 if all limits hold, 1 if one does not,
 //! and 2 for a refused command line.
 //!
-//! - [`bounds`]: random sets of DAGs that the analysis proves;
+//! - [`bounds`]: random sets of DAGs that methods of analysis accept;
 //! - [`hand_off`]: the way from a completion to its successor, on the machine;
 //! - [`join_latency`]: the paper's evaluation, on the machine in QEMU;
 //! - [`native`]: the scheduler on this host's own processors;
@@ -31,7 +31,7 @@ static BENCH: Menu = Menu {
     word: "WHAT",
     about: "Measures one part of the project.",
     choices: choices! {
-        "bounds": "random sets that the analysis proves, by load and cores", bounds::run;
+        "bounds": "random sets that methods of analysis accept, by load and cores", bounds::run;
         "hand-off": "from a completion to its successor's first instruction", hand_off::run;
         "join-latency": "the paper's evaluation: samples, figures, plots and a report",
             join_latency::run;

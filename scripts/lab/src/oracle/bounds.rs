@@ -394,7 +394,7 @@ fn compute(name: &str, tasks: &[&Task], cores: u32) -> String {
         "melani_gfp_dm" => bounds(older::melani_fp(&by_deadline, cores, older::Width::Ignored)),
         "gfp_dm_width" => bounds(older::melani_fp(&by_deadline, cores, older::Width::Used)),
         "np_safe_gfp_dm" => bounds(older::np_safe_fp(&by_deadline, cores)),
-        "melani_gedf" => bounds(older::melani_edf(tasks, cores, older::Width::Ignored)),
+        "melani_gedf" => bounds(older::melani_edf(tasks, cores)),
         "mp_gfp_dm" => bounds(by_priority(InterferenceBound::Window)),
         "mp_gfp_dm_clip" => bounds(by_priority(InterferenceBound::Waiting)),
         "mp_gedf" => bounds(multi_path_edf(tasks, cores, InterferenceBound::Window)),

@@ -73,7 +73,7 @@ pub(crate) fn np_safe_fp(tasks: &[&Task], cores: u32) -> Option<Vec<u64>> {
 }
 
 /// Bounds response times under EDF; `None`: not accepted.
-pub(crate) fn melani_edf(tasks: &[&Task], cores: u32, width: Width) -> Option<Vec<u64>> {
+pub(crate) fn melani_edf(tasks: &[&Task], cores: u32) -> Option<Vec<u64>> {
     if !are_constrained(tasks) {
         return None;
     }
@@ -86,7 +86,7 @@ pub(crate) fn melani_edf(tasks: &[&Task], cores: u32, width: Width) -> Option<Ve
             bounds[dag] = least(tasks[dag], cores, 0, |window| {
                 let others = (0..tasks.len()).filter(|&other| other != dag);
                 let workloads = others.map(|other| {
-                    let used = width.width(tasks[other], cores);
+                    let used = u64::from(cores);
                     // No more than the jobs whose deadlines come no later can delay it under EDF.
                     let limit = due(tasks[other], used, bounds[other], deadline);
                     workload(tasks[other], used, bounds[other], window).min(limit)

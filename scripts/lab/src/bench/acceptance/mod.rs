@@ -196,9 +196,11 @@ pub(super) fn of_files(files: &[SetFile]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::bounds::terms;
-    use sched_dag::analysis::{answer, assign};
-    use sched_dag::{AssignmentReason, DagSpec, Policy, SubtaskSpec, verify};
+    use sched_dag::analysis::{AnalysisSettings, Overheads, answer, assign};
+    use sched_dag::{
+        AssignmentReason, CommitOptions, ConstructionPolicy, DagSpec, Policy, Preemption,
+        SubtaskSpec, verify,
+    };
 
     const LENT: usize = 3;
 
@@ -315,7 +317,15 @@ mod tests {
             ..DagSpec::default()
         };
         let specs: Vec<DagSpec> = tasks.iter().enumerate().map(spec).collect();
-        let (options, settings) = terms(Policy::StaticPriority, cores);
+        let policy = Policy::StaticPriority;
+        let options = CommitOptions::new(policy, cores);
+        let options = options.with_construction(ConstructionPolicy::any_graph());
+        let settings = AnalysisSettings {
+            policy,
+            preemption: Preemption::Enabled,
+            cores,
+            overheads: Overheads::default(),
+        };
         let Ok(verified) = verify(&specs, &options) else {
             // A WCET is beyond its deadline.
             return false;
