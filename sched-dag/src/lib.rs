@@ -143,7 +143,7 @@ pub use scheduler::{
 };
 pub use spec::{
     DagSpec, LatestSpec, LockUse, MOST_WAITS, PINS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,
-    TopicPort, WAITS, Wait,
+    TopicPort, Wait,
 };
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 pub use topic::Topic;

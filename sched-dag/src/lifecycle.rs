@@ -78,7 +78,6 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use crate::ids::{ClusterId, DagId, Instance, ModeId, SubtaskId};
 use crate::order::sorted;
 use crate::scheduler::Moment;
-use crate::spec::WAITS;
 use crate::task_set::{Dag, TaskSet};
 
 pub use crate::request::{ModeEntry, Request, WaitId};
@@ -511,7 +510,7 @@ pub fn divide(
                 signals: AtomicU32::new(0),
                 change: AtomicU32::new(NOTHING),
                 end: AtomicU32::new(NOTHING),
-                answers: if WAITS { answers(dag) } else { Box::default() },
+                answers: answers(dag),
             })
             .collect(),
         clusters: task_set
@@ -570,7 +569,7 @@ impl Mailboxes {
                 let place = &self.clusters[to.index()].mode;
                 place.store(packed(mode, entry), Ordering::Release);
             }
-            Request::Answer(wait) if WAITS => {
+            Request::Answer(wait) => {
                 let answers = &of(wait.instance.dag).answers;
                 let place = answers.iter().find(|of| of.0 == wait.instance.subtask);
                 // Of two, the older one comes too late: its instance waits for the other by now.
@@ -581,7 +580,6 @@ impl Mailboxes {
             | Request::GoOn
             | Request::Wait(_)
             | Request::WaitUntil(_)
-            | Request::Answer(_)
             | Request::Step => {}
         }
         sent(to);
@@ -621,7 +619,7 @@ impl Mailboxes {
                 END => take(Request::End(dag)),
                 _ => {}
             }
-            for (subtask, answer) in to.answers.iter().filter(|_| WAITS) {
+            for (subtask, answer) in &to.answers {
                 let word = answer.swap(0, Ordering::Acquire);
                 let wait = wait_of(dag, *subtask, word);
                 wait.into_iter()

@@ -182,15 +182,12 @@ pub struct SubtaskSpec {
     pub outputs: Vec<TopicPort>,
 }
 
-/// Whether subtasks may wait: what the feature `waits` is for. A program without it has no
-/// instruction for waits.
-pub const WAITS: bool = cfg!(feature = "waits");
-
-/// Whether subtasks may be pinned to a core: what the feature `pins` is for, as [`WAITS`].
+/// Whether subtasks may be pinned to a core: what the feature `pins` is for. A program without it
+/// has no instruction for that.
 pub const PINS: bool = cfg!(feature = "pins");
 
 /// The most waits that a subtask may state.
-pub const MOST_WAITS: usize = if WAITS { 254 } else { 0 };
+pub const MOST_WAITS: usize = 254;
 
 /// A wait of a subtask, which each of its instances takes once, and the segment that follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -24,7 +24,7 @@ use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
-use crate::spec::{LockUse, PINS, WAITS, Wait};
+use crate::spec::{LockUse, PINS, Wait};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -404,7 +404,7 @@ impl Subtask {
     /// Returns its waits, in order.
     #[must_use]
     pub const fn waits(&self) -> &[Wait] {
-        if WAITS { &self.waits } else { &[] }
+        &self.waits
     }
 
     /// Returns the sum of its waits' limits.

@@ -33,7 +33,7 @@ use alloc::sync::Arc;
 use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use sched_dag::{DagId, WAITS};
+use sched_dag::DagId;
 
 use super::dag::Dag;
 use super::uses::{Uses, sealed};
@@ -299,7 +299,7 @@ impl DeviceEnd {
     /// It may be called in an interrupt handler.
     pub fn arrive(&self, bytes: &[u8], now_ns: u64) -> Option<(u64, DagId)> {
         let is_whole = self.0.shared.incoming.arrive(bytes, now_ns);
-        if let Some(tell) = self.0.shared.on_packet.get().filter(|_| WAITS && is_whole) {
+        if let Some(tell) = self.0.shared.on_packet.get().filter(|_| is_whole) {
             tell();
         }
         let signal = self.0.shared.signal.get().filter(|_| is_whole)?;
@@ -317,7 +317,7 @@ impl DeviceEnd {
     pub fn depart(&self) -> Option<u8> {
         let outgoing = &self.0.shared.outgoing;
         let byte = outgoing.take_byte()?;
-        let is_last = WAITS && outgoing.is_empty();
+        let is_last = outgoing.is_empty();
         if let Some(tell) = self.0.shared.on_gone.get().filter(|_| is_last) {
             tell();
         }

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use sched_dag::{Activation, DagId, OnFault, SubtaskSpec, TaskSet, WAITS};
+use sched_dag::{Activation, DagId, OnFault, SubtaskSpec, TaskSet};
 
 use super::answer::CommitAnswers;
 use crate::draft::DagDraft;
@@ -113,9 +113,7 @@ pub(crate) fn tie(
         if let (Some(any), Some(around)) = (any, around) {
             any.attach(around, &mut bodies);
         }
-        if WAITS {
-            bodies.iter_mut().for_each(SubtaskCode::hold_effects);
-        }
+        bodies.iter_mut().for_each(SubtaskCode::hold_effects);
         bodies
     })
     .collect();

@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::ptr;
 
-use sched_dag::{DagId, DagLabel, OnFault, SubtaskSpec, WAITS};
+use sched_dag::{DagId, DagLabel, OnFault, SubtaskSpec};
 
 use super::DagDraft;
 use super::fault::Fault;
@@ -30,9 +30,7 @@ pub(crate) fn check_dag(
 ) {
     check_others(drafts, draft, label, faults);
     check_replaceable(draft, label, faults);
-    if WAITS {
-        check_waits(draft, label, faults);
-    }
+    check_waits(draft, label, faults);
     check_inputs(draft, label, faults);
 }
 
@@ -322,7 +320,7 @@ pub(crate) fn check_recorded(drafts: &Drafts, faults: &mut Vec<Fault>) {
             );
             add("source_partly_recorded", text);
         }
-        let asks = draft.devices.iter().filter(|_| WAITS);
+        let asks = draft.devices.iter();
         for (subtask, device) in asks.filter(|(subtask, _)| !is_source(*subtask)) {
             if device.line().is_none() {
                 let (subtask, device) = (draft.label(*subtask), device.name());

@@ -23,7 +23,7 @@ use core::time::Duration;
 use sched_dag::lifecycle::Lifecycle;
 use sched_dag::{
     Activation, DagLabel, DagSpec, LatestSpec, Priority, SubtaskId, SubtaskLabel, SubtaskSpec,
-    TopicPort, WAITS, Wait,
+    TopicPort, Wait,
 };
 
 use crate::run::answers::AnyDevice;
@@ -194,9 +194,8 @@ impl DagDraft {
         // A duration that does not fit into nanoseconds becomes a fault of the commit, not a panic
         // here.
         let wcet_ns = wcet.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
-        // Without the feature their number is enough: the verification refuses any.
         let mut waits = alloc::vec![Wait::default(); attributes.waits.len()];
-        for (wait, (limit, segment)) in waits.iter_mut().zip(attributes.waits).filter(|_| WAITS) {
+        for (wait, (limit, segment)) in waits.iter_mut().zip(attributes.waits) {
             wait.limit_ns = self.convert(limit, Some(subtask), "wait").unwrap_or(0);
             // Else the WCET of the first segment would pass for a sum of which nothing is known for
             // the segments; the verification refuses 0.
@@ -204,9 +203,7 @@ impl DagDraft {
             wait.segment_ns = segment.and_then(|wcet| self.convert(wcet, Some(subtask), "WCET"));
         }
         // The sum; where a part is missing, the verification says so.
-        let later_ns = waits
-            .iter()
-            .filter_map(|wait| wait.segment_ns.filter(|_| WAITS));
+        let later_ns = waits.iter().filter_map(|wait| wait.segment_ns);
         let wcet_ns = wcet_ns.map(|first_ns| later_ns.fold(first_ns, u64::saturating_add));
         let budget = attributes.budget;
         let budget_ns = budget.and_then(|budget| self.convert(budget, Some(subtask), "budget"));
@@ -477,8 +474,7 @@ impl SubtaskAttributes {
     ///
     /// Each instance of an [async subtask](crate::Dag::register_async_subtask) takes its waits one
     /// after the other, each once; what it executes between them are its *segments*. Their WCETs are
-    /// stated where they stand, of all segments or of none. An app whose subtasks wait is built with
-    /// `fass`' feature `waits`:
+    /// stated where they stand, of all segments or of none:
     ///
     /// ```
     /// use core::time::Duration;

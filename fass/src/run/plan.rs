@@ -13,7 +13,7 @@ use core::sync::atomic::AtomicU32;
 use sched_dag::engine::{Alternate, ProvenBounds};
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::{Lifecycle, Request};
-use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, WAITS, engine};
+use sched_dag::{DagId, Instance, SubtaskId, TaskSet, Vertex, engine};
 
 use super::effect::{Effect, MutedEffect};
 use super::gate::call_app;
@@ -173,7 +173,7 @@ struct JobPreview<F> {
 impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
     fn take_turn(&mut self, job: u64) {
         // Once for each job, in the first turn of its instance.
-        let goes_on = WAITS && self.turn().is_some_and(|turn| turn.is_of(job));
+        let goes_on = self.turn().is_some_and(|turn| turn.is_of(job));
         if self.passed != job && (goes_on || (self.look)(job)) {
             return self.subtask.take_turn(job);
         }
@@ -204,7 +204,7 @@ impl<F: FnMut(u64) -> bool + Send> PolledSubtask for JobPreview<F> {
 
 /// Takes a turn of a job whose function is not called.
 fn pass(subtask: &mut dyn PolledSubtask, job: u64) {
-    if !WAITS || subtask.turn().is_none_or(|turn| turn.pass(job)) {
+    if subtask.turn().is_none_or(|turn| turn.pass(job)) {
         subtask.discard(job);
     }
 }
@@ -260,7 +260,7 @@ impl SubtaskCode {
 
     /// Returns the state of its turns, if it may wait.
     fn turn(&self) -> Option<&Arc<TurnState>> {
-        WAITS.then(|| self.subtask.turn()).flatten()
+        self.subtask.turn()
     }
 
     /// Reports whether its instances may wait.

@@ -20,7 +20,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use recording::{Channel, Recordable, Role, Schema};
 use sched_dag::wcets::graph_hash;
-use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort, WAITS};
+use sched_dag::{DagId, DagSpec, SubtaskId, TopicPort};
 
 use super::answers::AnyDevice;
 use super::effect::Effect;
@@ -108,7 +108,7 @@ pub(crate) trait AnyRecorded: AnyLatest {
                 around.push((sample.subtask, looking(line, look)));
             }
         }
-        for (subtask, device) in of.devices.iter().filter(|_| WAITS) {
+        for (subtask, device) in of.devices {
             if let Some((schema, line)) = device.line() {
                 let way = (schema, Arc::clone(&line));
                 open(*subtask, Role::Answer, device.name(), way, None);
@@ -331,7 +331,7 @@ struct ReplayedSource {
 
 impl PolledSubtask for ReplayedSource {
     fn take_turn(&mut self, job: u64) {
-        if !WAITS || self.turn.pass(job) {
+        if self.turn.pass(job) {
             self.outputs.iter_mut().for_each(|send| send(job));
         }
     }

@@ -18,7 +18,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::any::Any;
 
-use sched_dag::{DagSpec, WAITS, Wait, sorted_by_key};
+use sched_dag::{DagSpec, Wait, sorted_by_key};
 
 use super::cell::{Reader, Writer, ring};
 use super::latest::{AnyLatest, Stage};
@@ -235,7 +235,6 @@ impl DagWiring {
                 .map(|latest| (latest.topic().into(), latest.stages()))
                 .collect(),
             waits: (spec.subtasks.iter())
-                .filter(|_| WAITS)
                 .map(|subtask| subtask.waits.to_vec())
                 .collect(),
         }

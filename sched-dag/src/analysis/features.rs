@@ -14,7 +14,6 @@ use super::overheads::Overheads;
 use super::ranks::{PreemptionMix, RankRelation};
 use super::workload::WorkloadBursts;
 use crate::policy::{Activation, Policy};
-use crate::spec::WAITS;
 use crate::task_set::{Dag, Subtask};
 
 /// Some features.
@@ -200,7 +199,7 @@ impl Features {
             non_preemptive: _,
             relative_deadline_ns: _,
         } = subtask;
-        Self::WAITS.if_so(WAITS && !waits.is_empty())
+        Self::WAITS.if_so(!waits.is_empty())
     }
 }
 

@@ -33,7 +33,6 @@ use super::task::Task;
 use super::waiting::{Rounding, beside_span};
 use super::workload::WorkloadSegment;
 use crate::ids::to_u32;
-use crate::spec::WAITS;
 
 /// Bounds the response time of one job alone on `cores` cores; `None` without cores.
 #[must_use]
@@ -118,7 +117,6 @@ impl MultiPathEquations<'_> {
             left_and_blocking,
             bursts,
         } = delays;
-        let left_and_blocking = left_and_blocking.filter(|_| WAITS);
         let oblivious = self.task.oblivious();
         let times = (window_ns, window_ns - oblivious.length_ns());
         let mut plain = vec![WorkloadSegment::NONE; self.left.len()];

@@ -28,7 +28,6 @@ use super::pipelined::{OWN_STEPS, PipelineTerms, STEP_LIMIT, SolverFailure};
 use super::task::Task;
 use super::waiting::{Rounding, with_blocking};
 use super::workload::{InterferingWorkload, WorkloadBursts};
-use crate::spec::WAITS;
 
 /// DAGs with what enters their equations.
 pub(super) struct EquationSet<'a> {
@@ -125,7 +124,7 @@ impl<'a> EquationSet<'a> {
 
     /// Reports whether subtasks wait.
     pub(super) const fn has_waits(&self) -> bool {
-        WAITS && self.is_of_waits
+        self.is_of_waits
     }
 
     /// Accepts no response time beyond a period of those DAGs that waits enter: the forms with
@@ -366,7 +365,7 @@ impl<'a> EquationSet<'a> {
     ) -> DelaySources {
         let blocking = (self.shapes[dag].unblocked).by(blocking_ns, self.cores);
         let (task, rounding) = (self.tasks[dag], self.rounding);
-        let is_coupled = WAITS && (task.has_waits() || rounding == Rounding::Down);
+        let is_coupled = task.has_waits() || rounding == Rounding::Down;
         let left_and_blocking = (is_coupled && !blocking_ns.is_empty())
             .then(|| with_blocking(task, self.cores, &blocking));
         DelaySources {

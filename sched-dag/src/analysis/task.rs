@@ -33,7 +33,6 @@ use core::ops::Add;
 
 use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
-use crate::spec::WAITS;
 use crate::task_set::{Dag, Subtask};
 use crate::worded::texts;
 
@@ -383,13 +382,13 @@ impl Task {
     /// Reports whether a subtask waits.
     #[must_use]
     pub const fn has_waits(&self) -> bool {
-        WAITS && self.waits.is_some()
+        self.waits.is_some()
     }
 
     /// Returns the waits by subtask; empty if no subtask waits.
     #[must_use]
     pub fn waits(&self) -> &[SubtaskWaits] {
-        let waits = self.waits.as_ref().filter(|_| WAITS);
+        let waits = self.waits.as_ref();
         waits.map_or(&[], |waits| &waits.of_subtasks)
     }
 
@@ -397,7 +396,7 @@ impl Task {
     /// this one.
     #[must_use]
     pub fn oblivious(&self) -> &Self {
-        let waits = self.waits.as_ref().filter(|_| WAITS);
+        let waits = self.waits.as_ref();
         waits.map_or(self, |waits| &waits.oblivious)
     }
 

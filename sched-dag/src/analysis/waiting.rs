@@ -39,7 +39,6 @@ use alloc::vec::Vec;
 use super::blocking::Blocking;
 use super::cover::{CoverChain, STEPS};
 use super::task::{SubtaskWaits, Task};
-use crate::spec::WAITS;
 
 /// At which instants a schedule may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,16 +53,16 @@ impl Rounding {
     /// Prepares what so many cores are to execute, to be divided by their number and rounded up.
     pub(super) const fn of(self, sum: u128, cores: u128) -> u128 {
         match self {
-            Self::Down if WAITS => sum.saturating_sub(cores - 1),
-            _ => sum,
+            Self::Down => sum.saturating_sub(cores - 1),
+            Self::Up => sum,
         }
     }
 
     /// Divides what so many cores are to execute.
     pub(super) const fn divide(self, left: u64, cores: u64) -> u64 {
         match self {
-            Self::Down if WAITS => left / cores,
-            _ => left.div_ceil(cores),
+            Self::Down => left / cores,
+            Self::Up => left.div_ceil(cores),
         }
     }
 }

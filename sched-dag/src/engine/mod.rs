@@ -33,7 +33,6 @@ use crate::kept::Journal;
 use crate::lifecycle::{Mailboxes, PendingRequests, Request};
 use crate::placement::{NextWork, Placement};
 use crate::scheduler::{Decision, DriverNotice, HandOff, Moment, Scheduler, TurnEnd};
-use crate::spec::WAITS;
 use crate::task_set::{Dag, TaskSet};
 
 pub use crate::engine::run::{ProvenBounds, Run, RunCounts};
@@ -198,7 +197,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         // Something else belongs to this instant, so the whole step has to be taken.
         if !is_alone || !self.requests.are_none() {
-            if WAITS && let Some(limit_ns) = self.take_wait(vertex, finish_ns) {
+            if let Some(limit_ns) = self.take_wait(vertex, finish_ns) {
                 // Asked here, so that the port need not lie in memory for those that do not wait.
                 let is_alone = is_alone && !port.has_letters();
                 return self.wait((core, vertex), body, (finish_ns, limit_ns), is_alone, port);
@@ -295,7 +294,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     /// idle core. Reports whether that is all of the instant; if not, the step has to be taken.
     #[inline]
     pub fn wake(&mut self, (now_ns, here): (u64, CoreId), port: &mut impl PlatformPort<B>) -> bool {
-        let is_alone = WAITS && self.requests.are_none() && !port.has_letters();
+        let is_alone = self.requests.are_none() && !port.has_letters();
         let woken = match is_alone {
             true => self.scheduler.wake_shortly(now_ns, here),
             false => None,
@@ -320,11 +319,11 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         let instance = self.scheduler.instance_of(vertex);
         let limit_ns = self.take_wait(vertex, finish_ns);
         match limit_ns {
-            Some(_) if WAITS => {
+            Some(_) => {
                 port.wait(core, &mut body, finish_ns);
                 self.placement.wait(core.index(), vertex, body);
             }
-            _ => self.placement.finish_parked(vertex, body),
+            None => self.placement.finish_parked(vertex, body),
         }
         let turn = TurnEnd { instance, limit_ns };
         // By the whole step: its core runs something else by now, so it passes on to nobody.
@@ -335,9 +334,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     #[inline]
     fn take_wait(&mut self, vertex: Vertex, now_ns: u64) -> Option<u64> {
         let release_ns = || self.scheduler.release_ns(vertex);
-        WAITS
-            .then(|| self.requests.take_wait(now_ns, release_ns))
-            .flatten()
+        self.requests.take_wait(now_ns, release_ns)
     }
 
     /// Returns the cost of a fault of the vertex' instance if it comes now.
@@ -419,7 +416,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
             // The port reads the clock as late as it can, right before the function is called.
             let start_ns = port.start(core, body);
             (self.scheduler.log.journal).write(core, EventKind::Start, start_ns, subject);
-        } else if WAITS && let NextWork::Proceed(vertex, body) = &mut next {
+        } else if let NextWork::Proceed(vertex, body) = &mut next {
             self.proceed((core, *vertex), body, port);
         }
         next
@@ -453,7 +450,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     #[inline]
     fn publish(requests: &mut PendingRequests, mut body: B, finish_ns: u64) -> B {
         body.complete(finish_ns, &mut |request| match request {
-            Request::Wait(_) | Request::WaitUntil(_) if WAITS => requests.keep_wait(request),
+            Request::Wait(_) | Request::WaitUntil(_) => requests.keep_wait(request),
             _ => requests.keep(request),
         });
         body
@@ -476,9 +473,7 @@ impl<B: SubtaskBody, P> Engine<B, P> {
                 && let Some(instance) = notice.event.instance()
             {
                 let vertex = self.task_set.vertex(instance);
-                if WAITS {
-                    self.placement.cancel_wait(vertex);
-                }
+                self.placement.cancel_wait(vertex);
                 self.undiscarded.push((vertex, instance.job));
             }
         }

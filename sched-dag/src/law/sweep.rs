@@ -27,7 +27,7 @@ use core::ops::Range;
 
 use crate::ids::{CoreId, DagId, Instance};
 use crate::policy::{Policy, Preemption, SchedulerOptions};
-use crate::spec::{PINS, WAITS};
+use crate::spec::PINS;
 use crate::task_set::TaskSet;
 
 /// The key of R5: the smaller one goes first. No two instances have the same.
@@ -267,7 +267,7 @@ impl<'m> DispatchSweep<'m> {
             DispatchState::Suspended => {
                 self.waiting.insert(key, since);
                 // It begins a segment, whose core it keeps.
-                if WAITS && self.model.keeps_its_core(instance) {
+                if self.model.keeps_its_core(instance) {
                     self.unstarted.insert(key);
                 }
             }

@@ -18,7 +18,6 @@
 use alloc::boxed::Box;
 
 use crate::ids::{CoreId, Vertex};
-use crate::spec::WAITS;
 
 /// Where a subtask's body is.
 #[derive(Debug)]
@@ -237,10 +236,10 @@ impl<Body, Parked> Placement<Body, Parked> {
         let place = self.body_state(vertex);
         let next = match core::mem::replace(place, BodyState::Running) {
             BodyState::Resting(body) => NextWork::Start(vertex, body),
-            BodyState::Waiting(body) if WAITS => NextWork::Proceed(vertex, body),
+            BodyState::Waiting(body) => NextWork::Proceed(vertex, body),
             BodyState::Suspended(context) => NextWork::Continue(context),
             // The core that still has it will say when it no longer has.
-            BodyState::Running | BodyState::Waiting(_) => return NextWork::Nothing,
+            BodyState::Running => return NextWork::Nothing,
             // The subtask of an ended DAG: nothing of it is to run.
             BodyState::Lost => {
                 *place = BodyState::Lost;

@@ -11,7 +11,6 @@ use super::vertices::{InstancePhase, Vertex, VertexTable};
 use super::{DagPhase, EventLog, OWED, Scheduler, earliest_ns};
 use crate::ids::{DagId, Instance};
 use crate::journal::EventKind;
-use crate::spec::WAITS;
 
 impl Scheduler {
     /// Ends an instance that has started.
@@ -87,9 +86,7 @@ impl Scheduler {
     /// that thereby would become ready.
     #[inline]
     pub(super) fn cancel_ready(&mut self, dag: DagId, sequence: u64) {
-        if WAITS {
-            self.cancel_waits(dag, sequence);
-        }
+        self.cancel_waits(dag, sequence);
         let state = &self.dags[dag.index()];
         // In topological order each vertex is looked at after its predecessors, so none becomes
         // ready behind the loop's back.

@@ -4,7 +4,6 @@ use super::{Decision, Scheduler};
 use crate::ids::{CoreId, DagId, Instance, ModeId, to_u32};
 use crate::journal::EventKind;
 use crate::request::Request;
-use crate::spec::WAITS;
 
 /// One instant, in which completions are still taken.
 #[derive(Debug)]
@@ -37,7 +36,7 @@ impl Scheduler {
             Request::Resume(dag) => self.resume(dag),
             Request::Close(dag) => self.close(dag),
             Request::End(dag) => self.end_dag(dag),
-            Request::Answer(wait) if WAITS => self.answer(wait),
+            Request::Answer(wait) => self.answer(wait),
             // These concern the run, not one DAG; the engine serves them.
             Request::Enter(..)
             | Request::ShutDown
@@ -45,7 +44,6 @@ impl Scheduler {
             | Request::GoOn
             | Request::Wait(_)
             | Request::WaitUntil(_)
-            | Request::Answer(_)
             | Request::Step => {}
         }
     }
@@ -85,13 +83,13 @@ impl<'s> Moment<'s> {
     #[inline]
     pub fn end_turn(&mut self, turn: TurnEnd) {
         match turn.limit_ns {
-            Some(limit_ns) if WAITS => {
+            Some(limit_ns) => {
                 let (log, told_ns) = (&mut self.scheduler.log, self.told_ns);
                 log.on_this(EventKind::Wait, told_ns, turn.instance);
                 let limit_ns = told_ns.saturating_add(limit_ns);
                 self.scheduler.begin_wait(turn.instance, limit_ns);
             }
-            _ => self.complete(turn.instance),
+            None => self.complete(turn.instance),
         }
     }
 

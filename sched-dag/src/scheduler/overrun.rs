@@ -44,7 +44,6 @@ use super::Scheduler;
 use crate::ids::DagId;
 use crate::journal::EventKind;
 use crate::policy::{JobOutcome, OverrunPolicy};
-use crate::spec::WAITS;
 
 impl Scheduler {
     /// Releases all jobs of a DAG that are due, and notices deadlines that have
@@ -52,7 +51,7 @@ impl Scheduler {
     #[inline]
     pub(super) fn serve(&mut self, dag: DagId) {
         if dag.index() >= self.dags.len() {
-            return match WAITS && dag.index() < self.skips_timer() {
+            return match dag.index() < self.skips_timer() {
                 true => self.time_out(dag.index()),
                 false => self.tell_skips(),
             };
@@ -141,9 +140,7 @@ impl Scheduler {
 
     #[inline]
     fn make_room(&mut self, dag: DagId) {
-        if WAITS {
-            self.time_out_due();
-        }
+        self.time_out_due();
         let jobs = &self.dags[dag.index()].jobs;
         let sequence = jobs.oldest_uncut();
         let job = sequence.map_or(jobs.first_waiting, |sequence| jobs.job(sequence).number);

@@ -29,7 +29,6 @@ use super::{Decision, HandOff, Scheduler, earliest_ns};
 use crate::ids::{CoreId, DagId, Instance, Vertex};
 use crate::journal::EventKind;
 use crate::request::WaitId;
-use crate::spec::WAITS;
 use crate::task_set::TaskSet;
 
 /// The vertices that may wait, and the latest wait of each.
@@ -51,9 +50,6 @@ struct LatestWait {
 
 impl WaitTable {
     pub(super) fn new(task_set: &TaskSet) -> Self {
-        if !WAITS {
-            return Self::default();
-        }
         let dags = (0..).map(DagId).zip(task_set.dags());
         let vertices: Vec<u32> = dags
             .flat_map(|(id, dag)| {
@@ -75,7 +71,7 @@ impl WaitTable {
 
     /// Returns the number of vertices that may wait, each of which has a timer.
     pub(super) const fn len(&self) -> usize {
-        if WAITS { self.vertices.len() } else { 0 }
+        self.vertices.len()
     }
 
     #[inline]

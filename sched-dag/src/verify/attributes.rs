@@ -14,7 +14,7 @@ use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
-use crate::spec::{DagSpec, MOST_WAITS, PINS, STACK_BYTES, WAITS};
+use crate::spec::{DagSpec, MOST_WAITS, PINS, STACK_BYTES};
 
 /// Checks the attributes of the whole commit.
 pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
@@ -122,7 +122,6 @@ fn check_times(page: &mut DagFindings<'_, '_>) {
         spec.subtasks
             .iter()
             .flat_map(|subtask| subtask.waits.iter())
-            .filter(|_| WAITS)
     };
     let mut limits_ns = waits().map(|wait| wait.limit_ns);
     let waiting = limits_ns.try_fold(0_u64, u64::checked_add);
@@ -212,9 +211,6 @@ fn check_segments(page: &mut DagFindings<'_, '_>, index: usize) {
             subtask,
             count,
         });
-        return;
-    }
-    if !WAITS {
         return;
     }
     let given = stated.waits.iter().filter_map(|wait| wait.segment_ns);

@@ -15,7 +15,7 @@ use super::label::{
 };
 use crate::ids::ClusterId;
 use crate::policy::Priority;
-use crate::spec::{MOST_WAITS, STACK_BYTES, WAITS};
+use crate::spec::{MOST_WAITS, STACK_BYTES};
 use crate::{MAX_ARITY, worded};
 
 worded! {
@@ -184,8 +184,7 @@ worded! {
              each, or to none";
         /// More waits of a subtask than are told apart.
         TooManyWaits { dag: DagLabel, subtask: SubtaskLabel, count: usize } = "too_many_waits",
-            "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; {}",
-            if WAITS { "split it" } else { "build it with `fass`' feature `waits`" };
+            "{subtask} of {dag} states {count} waits, more than {MOST_WAITS}; split it";
         /// A subtask that is pinned to a core which its cluster does not have.
         CoreOutOfRange { dag: DagLabel, subtask: SubtaskLabel, core: u32, cores: u32 } =
             "core_out_of_range",

@@ -25,7 +25,7 @@ use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
 use crate::policy::Priority;
-use crate::spec::{DagSpec, LockUse, PINS, WAITS};
+use crate::spec::{DagSpec, LockUse, PINS};
 use crate::task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
@@ -134,11 +134,7 @@ fn build_dag(
         .map(|(index, subtask)| Subtask {
             name: subtask.name.clone(),
             wcet_ns: subtask.wcet_ns,
-            waits: if WAITS {
-                subtask.waits.as_slice().into()
-            } else {
-                Box::default()
-            },
+            waits: subtask.waits.as_slice().into(),
             wcet_source: match (subtask.wcet_ns, subtask.wcet_margin_percent) {
                 (None, _) => WcetSource::None,
                 (_, None) => WcetSource::Stated,

@@ -8,7 +8,7 @@ use fass::edge::{BootRecord, Edge, RecordedValue};
 use fass::log::LogLine;
 use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig};
 use sched_dag::lifecycle::WaitId;
-use sched_dag::{DagId, Instance, WAITS};
+use sched_dag::{DagId, Instance};
 
 use super::{edge, execution, occupation, record, stacks};
 use crate::machine::spinlock::SpinLock;
@@ -109,9 +109,7 @@ impl Platform for Kernel {
     }
 
     fn answer(&self, plan: u64, wait: WaitId) {
-        if WAITS {
-            execution::answer(plan, wait);
-        }
+        execution::answer(plan, wait);
     }
 
     fn running(&self) -> Option<(u64, Instance)> {

@@ -10,7 +10,6 @@ use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, Instance};
 use crate::journal::{Event, EventKind};
 use crate::policy::{OnFault, SchedulerOptions};
-use crate::spec::WAITS;
 use crate::task_set::{Dag, TaskSet};
 
 /// The findings about R5 in a journal.
@@ -160,7 +159,7 @@ fn wrong_cores(model: &DispatchModel<'_>, events: impl Iterator<Item = Event>) -
         }
         let instance = (event.instance()).filter(|of| model.keeps_its_core(*of))?;
         let lost = match event.what {
-            EventKind::Suspend if WAITS => {
+            EventKind::Suspend => {
                 suspended.insert(instance);
                 false
             }

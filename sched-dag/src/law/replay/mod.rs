@@ -38,7 +38,7 @@ use super::{JudgeOptions, Violation};
 use crate::ids::{CoreId, DagId, Instance, SubtaskId};
 use crate::journal::{Event, EventKind};
 use crate::policy::OnFault;
-use crate::spec::{WAITS, Wait};
+use crate::spec::Wait;
 use crate::task_set::TaskSet;
 use backlog::Backlog;
 use jobs::JobState;
@@ -343,11 +343,13 @@ fn is_allowed(stage: DispatchState, event: &Event) -> bool {
         (DispatchState::Absent, EventKind::Ready | EventKind::Cancelled)
         | (DispatchState::Ready, EventKind::Start | EventKind::Cancelled)
         | (DispatchState::Suspended, EventKind::Resume)
+        | (DispatchState::Waiting, EventKind::Wake | EventKind::Cancelled)
         // Whichever core finds the fault, or ends the DAG, ends the instance.
         | (DispatchState::Running(_) | DispatchState::Suspended, EventKind::Ended) => true,
-        (DispatchState::Running(core), EventKind::Suspend | EventKind::Finish) => core == event.core,
-        (DispatchState::Running(core), EventKind::Wait) => WAITS && core == event.core,
-        (DispatchState::Waiting, EventKind::Wake | EventKind::Cancelled) => WAITS,
+        (
+            DispatchState::Running(core),
+            EventKind::Suspend | EventKind::Finish | EventKind::Wait,
+        ) => core == event.core,
         _ => false,
     }
 }
@@ -406,7 +408,7 @@ impl JournalReplay<'_> {
         let ready_ns = life.ready.map(|ready| ready.time_ns);
         let out_of_turn = life.note(event, moment);
         let stated = task_set.dag(instance.dag).subtask(instance.subtask).waits();
-        let waited = WAITS.then(|| life.wait(event, stated, terms)).flatten();
+        let waited = life.wait(event, stated, terms);
         self.found.extend(out_of_turn);
         self.found.extend(waited.filter(|_| !is_partial));
         let event = *event;

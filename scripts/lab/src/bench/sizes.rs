@@ -61,7 +61,7 @@ fn weigh(app: &str) -> Result<bool, String> {
         let share = 100.0 * *bytes as f64 / stripped.max(1) as f64;
         println!("{bytes:>9} {share:>5.1} %  {part}");
     }
-    let most = image::most_stripped_bytes(app);
+    let most = image::MOST_STRIPPED_BYTES;
     println!("{stripped:>9} bytes of `{app}` in all, of {most} at most");
     for (part, bytes) in &parts {
         let line = Object::new().text("kind", "bench").text("name", "size");

@@ -15,7 +15,7 @@ use core::sync::atomic::Ordering;
 use sched_dag::engine::{PlatformPort as _, ProvenBounds};
 use sched_dag::journal::EventSubject;
 use sched_dag::lifecycle::Request;
-use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet, WAITS};
+use sched_dag::{Dag, DagId, Instance, Journal, Scheduler, SubtaskId, TaskSet};
 
 use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT};
 use super::{ClusterRun, RunnerLoan, divided};
@@ -173,7 +173,7 @@ pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: 
         _ => {}
     }
     let mut woken = CoreSet::default();
-    if WAITS && execution.parts(&mut woken).1.forward(request) {
+    if execution.parts(&mut woken).1.forward(request) {
         drop(place);
         return woken.wake();
     }
