@@ -142,7 +142,7 @@ pub use scheduler::{
     SKIPS_A_STEP, SKIPS_EVERY_NS, Scheduler, SchedulerQuery, TurnEnd,
 };
 pub use spec::{
-    DagSpec, LatestSpec, LockUse, MOST_WAITS, PINS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,
+    DagSpec, LatestSpec, LockUse, MOST_WAITS, STACK_BYTES, StateSpec, StateUser, SubtaskSpec,
     TopicPort, Wait,
 };
 pub use task_set::{Dag, StatePrecedence, Subtask, TaskSet};

@@ -182,10 +182,6 @@ pub struct SubtaskSpec {
     pub outputs: Vec<TopicPort>,
 }
 
-/// Whether subtasks may be pinned to a core: what the feature `pins` is for. A program without it
-/// has no instruction for that.
-pub const PINS: bool = cfg!(feature = "pins");
-
 /// The most waits that a subtask may state.
 pub const MOST_WAITS: usize = 254;
 

@@ -24,7 +24,7 @@ use crate::graph::Graph;
 use crate::ids::{ClusterId, DagId, Instance, SubtaskId, Vertex, to_u32};
 use crate::policy::AssignmentReason;
 use crate::policy::{Activation, OnFault, OverrunPolicy, Priority, SubtaskOrder};
-use crate::spec::{LockUse, PINS, Wait};
+use crate::spec::{LockUse, Wait};
 use crate::topic::Topic;
 use crate::wcets::WcetSource;
 
@@ -117,7 +117,6 @@ impl TaskSet {
         let edges = [&stated.graph.successors.edges(), edges].concat();
         let pinned = cores.iter().copied().map(Some);
         let cores = match cores {
-            _ if !PINS => Vec::new(),
             [] => stated.subtasks.iter().map(Subtask::core).collect(),
             _ => pinned.collect(),
         };
@@ -476,7 +475,7 @@ impl Subtask {
     /// Returns the core of its cluster that alone executes it, counted from 0; `None`: any.
     #[must_use]
     pub const fn core(&self) -> Option<u32> {
-        if PINS { self.core } else { None }
+        self.core
     }
 
     /// Returns the static priority, given or derived from the graph.
@@ -570,9 +569,6 @@ impl TaskSet {
     pub fn cores_of_dag(&self, dag: DagId, all: u32) -> Vec<u32> {
         let dag = self.dag(dag);
         let cluster = self.cores_of(dag.cluster(), all);
-        if !PINS {
-            return cluster.collect();
-        }
         let is_its = |core: &u32| {
             let within = Some(core - cluster.start);
             let is_pinned = dag.subtasks.iter().any(|subtask| subtask.core() == within);
@@ -637,7 +633,7 @@ impl Dag {
     /// ascending, counted from 0; empty: all.
     #[must_use]
     pub const fn affinity(&self) -> &[u32] {
-        if PINS { &self.affinity } else { &[] }
+        &self.affinity
     }
 
     /// Reports whether a cluster is stated, or chosen.

@@ -133,7 +133,7 @@ impl Dag {
     ///
     /// DAGs of a cluster have the same affinity, or no core in common; anything else is a fault at
     /// commit, and so is a core that there is not. Cores that DAGs with an affinity leave idle execute
-    /// no others. An app with affinities is built with `fass`' feature `pins`.
+    /// no others.
     ///
     /// ```
     /// use core::time::Duration;

@@ -20,8 +20,8 @@ use alloc::vec::Vec;
 
 use sched_dag::analysis::{self, NotAssigned};
 use sched_dag::{
-    CommitOptions, ConstructionPolicy, CountLimit, DagId, DagLabel, PINS, Policy, TaskSet,
-    VerifiedDags, Warning, sorted_by_key, wcets,
+    CommitOptions, ConstructionPolicy, CountLimit, DagId, DagLabel, Policy, TaskSet, VerifiedDags,
+    Warning, sorted_by_key, wcets,
 };
 
 use super::answer::{Commit, CommitAnswers, staleness};
@@ -145,7 +145,7 @@ pub fn finish_create_dags_with(
         return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
     let demands_proof = drafts.iter().any(|draft| draft.borrow().demands_proof);
-    if PINS && demands_proof && !terms.assigns {
+    if demands_proof && !terms.assigns {
         divide_to_prove(platform, &mut task_set, &terms, &drafts);
     }
     analysis::fix_orders(&mut task_set, &terms.settings());

@@ -511,8 +511,8 @@ impl SubtaskAttributes {
     /// fault at commit.
     ///
     /// No other core executes it, and on that core it goes before all subtasks that are not pinned,
-    /// whatever their priorities; these share the cores that have nothing pinned to do. An app that
-    /// pins subtasks is built with `fass`' feature `pins`. See [`crate::Dag::affinity`].
+    /// whatever their priorities; these share the cores that have nothing pinned to do. See
+    /// [`crate::Dag::affinity`].
     pub fn core(mut self, core: u32) -> Self {
         self.core = Some(core);
         self

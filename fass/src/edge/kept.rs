@@ -17,7 +17,7 @@ use sched_dag::analysis::Overheads;
 use sched_dag::engine::Run;
 use sched_dag::law::Histogram;
 use sched_dag::{
-    Dag, DagId, Instance, Journal, LockUse, OnFault, OverrunPolicy, PINS, Policy, Preemption,
+    Dag, DagId, Instance, Journal, LockUse, OnFault, OverrunPolicy, Policy, Preemption,
     SchedulerOptions, SubtaskId, TaskSet, Vertex,
 };
 
@@ -177,7 +177,7 @@ fn committed(plan: &Plan, options: &SchedulerOptions, overheads: Overheads) -> C
 
 fn pins(task_set: &TaskSet) -> Vec<(u32, u32, u32)> {
     let mut all = Vec::new();
-    for (dag, of_dag) in (0..).zip(task_set.dags()).filter(|_| PINS) {
+    for (dag, of_dag) in (0..).zip(task_set.dags()) {
         for (subtask, of_subtask) in (0..).zip(of_dag.subtasks()) {
             all.extend(of_subtask.core().map(|core| (dag, subtask, core)));
         }
@@ -186,7 +186,7 @@ fn pins(task_set: &TaskSet) -> Vec<(u32, u32, u32)> {
 }
 
 fn affinities(task_set: &TaskSet) -> Vec<(u32, u32)> {
-    let dags = (0..).zip(task_set.dags()).filter(|_| PINS);
+    let dags = (0..).zip(task_set.dags());
     let cores =
         dags.flat_map(|(dag, of_dag)| of_dag.affinity().iter().map(move |core| (dag, *core)));
     cores.collect()

@@ -41,7 +41,6 @@ use super::workload::WorkloadBursts;
 use super::{AnalysisSettings, answer, fixed_order};
 use crate::ids::{ClusterId, DagId, to_u32};
 use crate::policy::{AssignmentReason, LendingAttempt, Policy, Preemption};
-use crate::spec::PINS;
 use crate::task_set::{Dag, Subtask, TaskSet};
 use crate::worded::texts;
 
@@ -164,8 +163,7 @@ fn lend_cores(
         dag.least_deadline_ns() == dag.relative_deadline_ns()
             && !subtasks.any(Subtask::is_non_preemptive)
     };
-    let applies = PINS
-        && settings.policy == Policy::StaticPriority
+    let applies = settings.policy == Policy::StaticPriority
         && settings.preemption == Preemption::Enabled
         && task_set.dags().iter().all(is_plain);
     if !applies {

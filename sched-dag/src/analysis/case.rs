@@ -17,7 +17,6 @@ use super::{AnalysisResult, AnalysisSettings, NotProvenReason};
 use crate::ids::{DagId, SubtaskId, to_u32};
 use crate::order::sorted_by_key;
 use crate::policy::{Policy, Preemption};
-use crate::spec::PINS;
 use crate::task_set::{Dag, Subtask};
 
 /// Makes the case of those DAGs at the positions `own` that can be analysed, and notes why
@@ -45,7 +44,7 @@ pub(super) fn with_case(
 
 /// Reports whether cores of a cluster with these DAGs are told apart.
 fn is_pinned<'a>(mut dags: impl Iterator<Item = &'a Dag>) -> bool {
-    PINS && dags.any(Dag::is_confined)
+    dags.any(Dag::is_confined)
 }
 
 /// Returns the settings for a cluster of so many cores, with these DAGs.
@@ -157,7 +156,7 @@ impl<'a> AnalysisInput<'a> {
 
     /// Reports whether a subtask of a DAG is pinned.
     fn has_pins(&self, dag: usize) -> bool {
-        PINS && self.dag(dag).is_pinned()
+        self.dag(dag).is_pinned()
     }
 
     /// Reports whether an instance of `other` may go before one of `dag` on a core that counts for
@@ -212,7 +211,7 @@ impl<'a> AnalysisInput<'a> {
 
     /// Reports whether cores of the cluster are told apart.
     pub(super) const fn is_pinned(&self) -> bool {
-        PINS && self.is_pinned
+        self.is_pinned
     }
 
     pub(super) fn dag(&self, dag: usize) -> &'a Dag {

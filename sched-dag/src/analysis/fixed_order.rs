@@ -26,7 +26,6 @@ use super::task::Task;
 use super::{AnalysisResult, AnalysisSettings};
 use crate::ids::{DagId, to_u32};
 use crate::policy::SubtaskOrder;
-use crate::spec::PINS;
 use crate::task_set::{Dag, TaskSet};
 
 /// Fixes the order of each DAG that allows it, where that proves more: a shorter bound of it,
@@ -49,7 +48,7 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &AnalysisSettings) {
         };
         let mut best = free.take().unwrap_or_else(|| answer(task_set, settings));
         // On a core of its own each subtask also keeps off what shares the cluster.
-        let pinned = if PINS { schedule.places() } else { Vec::new() };
+        let pinned = schedule.places();
         for cores in [&pinned[..], &[]] {
             let mut order = task_set.ordered(dag, &schedule.edges(), cores);
             task_set.exchange(dag, &mut order);
@@ -59,9 +58,6 @@ pub fn fix_orders(task_set: &mut TaskSet, settings: &AnalysisSettings) {
                 break;
             }
             task_set.exchange(dag, &mut order);
-            if !PINS {
-                break;
-            }
         }
         // The answer is kept for the next DAG: an analysis of all is the dear part of this loop.
         free = Some(best);

@@ -27,7 +27,6 @@ use core::ops::Range;
 
 use crate::ids::{CoreId, DagId, Instance};
 use crate::policy::{Policy, Preemption, SchedulerOptions};
-use crate::spec::PINS;
 use crate::task_set::TaskSet;
 
 /// The key of R5: the smaller one goes first. No two instances have the same.
@@ -336,9 +335,6 @@ impl<'m> DispatchSweep<'m> {
     /// no instance keeps.
     fn claims(&self) -> BTreeMap<CoreId, Key> {
         let mut claims = BTreeMap::new();
-        if !PINS {
-            return claims;
-        }
         for key in self.waiting.keys().chain(self.running.keys()) {
             if let Place::Core(core) = self.model.place(key.1)
                 && self.known_cores.contains(&core)

@@ -46,7 +46,6 @@ use super::ready_queue::ReadyQueue;
 use super::vertices::{LineId, Vertex, VertexTable};
 use crate::ids::{ClusterId, CoreId, DagId};
 use crate::policy::SchedulerOptions;
-use crate::spec::PINS;
 use crate::task_set::{Dag, TaskSet};
 
 /// The line of the cluster, and those of its cores and groups.
@@ -87,7 +86,7 @@ impl ReadyLines {
             latest: LineId::CLUSTER,
         };
         let is_apart = |(_, vertex)| !vertices.get(vertex).line.is_cluster();
-        if PINS && own_vertices(task_set, cluster).any(is_apart) {
+        if own_vertices(task_set, cluster).any(is_apart) {
             lines.make_apart(task_set, options.cores, cluster, vertices);
         }
         lines
@@ -150,9 +149,7 @@ impl ReadyLines {
     /// Puts an instance in line.
     #[inline]
     pub(super) fn insert(&mut self, line: LineId, key: DispatchKey) {
-        if PINS {
-            self.latest = line;
-        }
+        self.latest = line;
         if line.is_cluster() {
             self.cluster.insert(key);
         } else {
@@ -193,7 +190,7 @@ impl ReadyLines {
     /// Reports whether any is in the line of a core or of a group that states its cores.
     #[inline]
     const fn has_any_apart(&self) -> bool {
-        PINS && self.count > 0
+        self.count > 0
     }
 
     /// Returns the smallest key in a line that is not the cluster's.
@@ -261,7 +258,7 @@ impl ReadyLines {
     pub(super) fn latest_concerns_others(&self, core: CoreId) -> bool {
         let line = self.latest;
         let is_elsewhere = !line.is_cluster() && !self.is_for(line, core);
-        PINS && (is_elsewhere || line.core().is_none() && self.peek_own(core).is_some())
+        is_elsewhere || line.core().is_none() && self.peek_own(core).is_some()
     }
 }
 

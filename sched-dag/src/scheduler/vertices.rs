@@ -27,7 +27,6 @@ use core::ops::Range;
 use super::jobs::Job;
 use crate::ids::{CoreId, DagId, Instance, SubtaskId, to_u32};
 use crate::policy::Preemption;
-use crate::spec::PINS;
 use crate::task_set::TaskSet;
 
 /// The phase of a subtask's next instance.
@@ -45,8 +44,7 @@ pub(super) enum InstancePhase {
     Waiting,
 }
 
-/// The line that a subtask's instances come into: its core's, its group's, or the cluster's, which
-/// without the feature `pins` it is, known when it is compiled.
+/// The line that a subtask's instances come into: its core's, its group's, or the cluster's.
 ///
 /// That of a core is twice the core; that of a group twice the first core of the group, and 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -70,13 +68,15 @@ impl LineId {
 
     #[inline]
     pub(super) fn is_cluster(self) -> bool {
-        !PINS || self == Self::CLUSTER
+        self == Self::CLUSTER
     }
 
     /// Returns the core that it is of.
     #[inline]
     pub(super) fn core(self) -> Option<CoreId> {
-        (PINS && self.0.is_multiple_of(2)).then(|| CoreId(u32::from(self.0) / 2))
+        self.0
+            .is_multiple_of(2)
+            .then(|| CoreId(u32::from(self.0) / 2))
     }
 }
 

@@ -14,7 +14,7 @@ use super::{CommitOptions, DagFindings, MAX_ARITY, VerifyFindings};
 use crate::ids::ClusterId;
 use crate::order::sorted;
 use crate::policy::{OnFault, Policy, Priority};
-use crate::spec::{DagSpec, MOST_WAITS, PINS, STACK_BYTES};
+use crate::spec::{DagSpec, MOST_WAITS, STACK_BYTES};
 
 /// Checks the attributes of the whole commit.
 pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) {
@@ -42,9 +42,7 @@ pub(super) fn check(options: &CommitOptions, findings: &mut VerifyFindings<'_>) 
         warn_of_equal_priorities(findings);
     }
     check_clusters(options, findings);
-    if PINS {
-        check_affinities(options, findings);
-    }
+    check_affinities(options, findings);
     check_names(findings);
 }
 
@@ -333,7 +331,7 @@ fn cores_of(options: &CommitOptions, spec: &DagSpec) -> u32 {
 fn check_cores(options: &CommitOptions, page: &mut DagFindings<'_, '_>) {
     let cores = cores_of(options, page.spec);
     // The scheduler has two lines for each, and one more, in 16 bits.
-    let most = if PINS { cores.min(0x7fff) } else { 0 };
+    let most = cores.min(0x7fff);
     let largest = page.spec.affinity.iter().copied().max();
     if let Some(core) = largest.filter(|&core| core >= most) {
         page.fault(|dag| DagFault::AffinityOutOfRange { dag, core, cores });

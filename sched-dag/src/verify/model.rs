@@ -25,7 +25,7 @@ use crate::graph::Graph;
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::{sort_by_key, sorted_by_key};
 use crate::policy::Priority;
-use crate::spec::{DagSpec, LockUse, PINS};
+use crate::spec::{DagSpec, LockUse};
 use crate::task_set::{Dag, StatePrecedence, Subtask, TaskSet};
 use crate::topic::topics_of;
 use crate::wcets::{WcetSource, graph_hash};
@@ -172,10 +172,7 @@ fn build_dag(
         overrun: spec.overrun,
         on_fault: spec.on_fault,
         cluster: spec.cluster,
-        affinity: match PINS {
-            true => affinity(options, spec).into(),
-            false => Box::default(),
-        },
+        affinity: affinity(options, spec).into(),
         order: spec.order,
         why_there: None,
         first_job: 0,

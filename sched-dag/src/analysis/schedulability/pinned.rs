@@ -26,13 +26,9 @@ use crate::analysis::witness_text::WitnessText;
 use crate::analysis::{NotProvenReason, SchedulabilityTest};
 use crate::ids::{SubtaskId, to_u32};
 use crate::order::sort_by_key;
-use crate::spec::PINS;
 use crate::task_set::Subtask;
 
-/// Nothing at all in a program without pins.
-pub(super) const TEST: BoundTest = if PINS { OF_PINS } else { BoundTest::NONE };
-
-const OF_PINS: BoundTest = BoundTest {
+pub(super) const TEST: BoundTest = BoundTest {
     names: &[SchedulabilityTest::Owner, SchedulabilityTest::Member],
     covers: covers!(
         RANKED BY_DEADLINE ONE_CORE CORES PREEMPTION SINK_DEADLINES INTERLEAVED PINS OVERHEADS
