@@ -14,7 +14,7 @@ use fass::log::LogLine;
 use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig, SubtaskRunner};
 use sched_dag::engine::{self, ProvenBounds};
 use sched_dag::lifecycle::{self, Parts, PendingRequests, Request, WaitId};
-use sched_dag::{DagId, Instance, Journal, Scheduler, TaskSet};
+use sched_dag::{DagId, Instance, Journal, Scheduler};
 
 use crate::control::{self, Control};
 use crate::edge::{self, File, Sending};
@@ -60,10 +60,6 @@ impl Platform for Host {
         threads
             .as_ref()
             .map_or(RunConfig::of_cores(1), |of| of.terms.clone())
-    }
-
-    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-        fass::commit::assign_clusters(self, task_set)
     }
 
     #[inline]

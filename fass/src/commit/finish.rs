@@ -30,7 +30,7 @@ use crate::api::dag::Dag;
 use crate::draft::checks::{self, Drafts};
 use crate::draft::fault::{CommitError, Fault};
 use crate::platform;
-use crate::platform::{LaunchError, Platform, RunConfig};
+use crate::platform::{LaunchError, RunConfig};
 
 /// Verifies DAGs and hands them to the installed platform, which schedules them.
 ///
@@ -140,13 +140,13 @@ pub fn finish_create_dags_with(
         mut warnings,
     } = verify(&drafts, options, terms.wcets.as_deref())?;
     if terms.assigns
-        && let Err(error) = platform.assign(&mut task_set)
+        && let Err(error) = assign_clusters(&mut task_set, &terms)
     {
         return Err(CommitError::of(Fault::NotAssigned(error), warnings));
     }
     let demands_proof = drafts.iter().any(|draft| draft.borrow().demands_proof);
     if demands_proof && !terms.assigns {
-        divide_to_prove(platform, &mut task_set, &terms, &drafts);
+        divide_to_prove(&mut task_set, &terms, &drafts);
     }
     analysis::fix_orders(&mut task_set, &terms.settings());
     let answers = CommitAnswers::new(&task_set, &terms);
@@ -179,12 +179,7 @@ pub fn finish_create_dags_with(
 
 /// Divides cores that are not, where a proof is demanded that only a division gives. DAGs that are
 /// in modes have to stay together, as a mode is entered by one cluster.
-fn divide_to_prove(
-    platform: &dyn Platform,
-    task_set: &mut TaskSet,
-    terms: &RunConfig,
-    drafts: &Drafts,
-) {
+fn divide_to_prove(task_set: &mut TaskSet, terms: &RunConfig, drafts: &Drafts) {
     let is_free = |dag: &sched_dag::Dag| !dag.states_cluster();
     if task_set.is_divided() || !task_set.dags().iter().all(is_free) {
         return;
@@ -194,7 +189,7 @@ fn divide_to_prove(
         return;
     }
     let mut divided = task_set.clone();
-    let is_assigned = platform.assign(&mut divided).is_ok();
+    let is_assigned = assign_clusters(&mut divided, terms).is_ok();
     let cluster = |dag: &DagId| divided.dag(*dag).cluster();
     let of_modes = checks::dags_of_modes(drafts).concat();
     if is_assigned
@@ -301,25 +296,10 @@ fn is_consequence(fault: &sched_dag::DagFault, ours: &[Fault]) -> bool {
     })
 }
 
-/// Divides a platform's cores for a task set, as [`sched_dag::analysis::assign()`] does: what
-/// [`Platform::assign`] is to do, if the commit may.
-///
-/// # Errors
-///
-/// In words: which DAG gets no cores, and why.
-///
-/// ```
-/// use fass::commit::assign_clusters;
-/// use fass::platform::{LaunchError, Platform};
-/// use sched_dag::TaskSet;
-///
-/// /// The `assign` of a platform that always leaves it to the commit.
-/// fn assign(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-///     assign_clusters(platform, task_set)
-/// }
-/// ```
-pub fn assign_clusters(platform: &dyn Platform, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-    analysis::assign(task_set, &platform.terms().settings()).map_err(
+/// Divides a platform's cores for a task set, as [`sched_dag::analysis::assign()`] does; an error
+/// says which DAG gets no cores, and why.
+fn assign_clusters(task_set: &mut TaskSet, terms: &RunConfig) -> Result<(), LaunchError> {
+    analysis::assign(task_set, &terms.settings()).map_err(
         |NotAssigned {
              dag,
              reason,

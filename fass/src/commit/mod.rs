@@ -12,7 +12,7 @@ pub(crate) mod finish;
 mod tie;
 
 pub use answer::{ClusterPlacement, Commit, DagAnswer, EndToEnd, SinkAnswer, Verdict};
-pub use finish::{assign_clusters, finish_create_dags_with};
+pub use finish::finish_create_dags_with;
 pub use sched_dag::analysis::{NotProvenReason, OverheadSource, Overheads, SchedulabilityTest};
 pub use sched_dag::wcets::{WcetFault, WcetSource};
 pub use sched_dag::{

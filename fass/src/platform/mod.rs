@@ -70,7 +70,7 @@ use core::time::Duration;
 
 use recording::Channel;
 use sched_dag::lifecycle::WaitId;
-use sched_dag::{DagId, Instance, TaskSet};
+use sched_dag::{DagId, Instance};
 
 use crate::Occupation;
 use crate::edge::{Begin, Edge, WatchedValue};
@@ -124,18 +124,6 @@ pub use crate::run::plan::{Plan, ReplacementCode, SubtaskCode, SubtaskRunner};
 pub trait Platform: Sync {
     /// Returns on what terms DAGs run: a commit verifies and answers by these.
     fn terms(&self) -> RunConfig;
-
-    /// Divides the cores for these DAGs, by [`assign_clusters`](crate::commit::assign_clusters), if the
-    /// terms leave that to the commit; a platform whose terms never do does not define this. (So
-    /// an image that never divides its cores has none of that code.)
-    ///
-    /// # Errors
-    ///
-    /// If a DAG gets no cores.
-    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-        let _ = task_set;
-        Ok(())
-    }
 
     /// Returns the time since the platform's start, in nanoseconds.
     fn now_ns(&self) -> u64;

@@ -29,7 +29,7 @@ pub struct RunConfig {
     /// How these are divided. If they are, DAGs say which cluster is theirs
     /// ([`Dag::cluster`](crate::Dag::cluster)).
     pub clusters: CoreDivision,
-    /// Whether the commit divides them ([`Platform::assign`](super::Platform::assign)).
+    /// Whether the commit divides them ([`analysis::assign`](sched_dag::analysis::assign())).
     pub assigns: bool,
     /// The cost of the platform's own work for an instance at most, as measured on it. The commit
     /// adds

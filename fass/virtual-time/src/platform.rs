@@ -17,7 +17,7 @@ use fass::platform::{Clock, LaunchError, LockWords, Plan, Platform, RunConfig};
 use fass::shared::{DeviceDriver, Wire};
 use recording::{Channel, Entry, EntryKind};
 use sched_dag::lifecycle::{Request, WaitId};
-use sched_dag::{DagId, Instance, JobOutcome, TaskSet};
+use sched_dag::{DagId, Instance, JobOutcome};
 
 use crate::job::JobShown;
 use crate::machine::{Arrival, Machine, RunError, Session};
@@ -197,10 +197,6 @@ impl Platform for HostPlatform {
         let terms = |machine: Rc<Machine>| machine.settings.borrow().terms.clone();
         // Without a machine, those that one has at first.
         current().map(terms).unwrap_or_default()
-    }
-
-    fn assign(&self, task_set: &mut TaskSet) -> Result<(), LaunchError> {
-        fass::commit::assign_clusters(self, task_set)
     }
 
     fn now_ns(&self) -> u64 {

@@ -17,7 +17,7 @@ use std::time::Duration;
 use fass::platform::RunConfig;
 use fass::shared::{Signal, Wire};
 use front::app::ending::AppError;
-use front::app::machine::{Divisible, System};
+use front::app::machine::System;
 use front::json;
 use front::options::{CommandLine, UsageError};
 use front::report::{self, HeapUsage, tell_log};
@@ -191,8 +191,6 @@ impl System for LinuxSystem {
         heap::usage(usize::try_from(memory_kib() * 1024).unwrap_or(usize::MAX))
     }
 }
-
-impl Divisible for LinuxSystem {}
 
 /// Says which faults there were, as the kernel does at once.
 fn tell_faults(run: &linux::Run) {

@@ -144,9 +144,6 @@ impl System for BareMachine {
     }
 }
 
-#[cfg(feature = "clusters")]
-impl front::app::machine::Divisible for BareMachine {}
-
 fn report_interrupts_off(longest_ns: u64, place: &Location<'_>) {
     let place = fmt::from_fn(|f| write!(f, "{}:{}", place.file(), place.line()));
     crate::println!(

@@ -76,11 +76,6 @@ impl Platform for Kernel {
         terms
     }
 
-    #[cfg(feature = "clusters")]
-    fn assign(&self, task_set: &mut sched_dag::TaskSet) -> Result<(), LaunchError> {
-        fass::commit::assign_clusters(self, task_set)
-    }
-
     fn now_ns(&self) -> u64 {
         clock::now_ns()
     }

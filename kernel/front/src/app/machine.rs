@@ -473,15 +473,7 @@ impl<S: System> Machine<S> {
     pub fn report_memory(&self) {
         S::memory().report();
     }
-}
 
-/// A system whose cores can be divided. The kernel is one with its feature `clusters`: without
-/// that an image has none of the code that divided cores need, and pays nothing for them.
-///
-/// See [`Machine`].
-pub trait Divisible: System {}
-
-impl<S: Divisible> Machine<S> {
     /// Divides the cores, from core 0 on, into clusters of so many each in the commits to come;
     /// no number: they are not divided. Each cluster schedules its own DAGs
     /// ([`fass::Dag::cluster`]).

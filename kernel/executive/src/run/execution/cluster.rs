@@ -4,8 +4,8 @@
 //! writes into its cluster's journal; so the hot path of one cluster touches no word of
 //! another's. The first core of a cluster keeps its time.
 //!
-//! Where the cores are not divided there is one cluster, which has no others to look for; what
-//! only divided cores need is in [`divided`](super::divided).
+//! Where the cores are not divided there is one cluster. How they are divided is in
+//! [`divided`](super::divided).
 //!
 //! Requests of one cluster to others (signals, pauses, modes, the end) are
 //! [letters](sched_dag::lifecycle::Mailboxes): the other cluster's first core is woken, which takes
@@ -37,10 +37,6 @@ pub(super) struct ClusterState {
     pub(super) first_core: AtomicU32,
 }
 
-/// Whether this image can divide its cores. One that cannot has one cluster at an address that
-/// is known to the linker, which is worth some instructions of each hop.
-pub(super) const MAY_DIVIDE: bool = cfg!(feature = "clusters");
-
 /// Cluster 0: of all cores, if they are not divided.
 pub(super) static FIRST: ClusterState = ClusterState::new();
 
@@ -56,16 +52,13 @@ pub(super) const FIRST_SEAT: CoreId = CoreId(0);
 impl ClusterState {
     /// Returns the number of the core in a seat among all cores.
     pub(super) fn core(&self, seat: CoreId) -> u32 {
-        match MAY_DIVIDE {
-            true => self.first_core.load(Ordering::Relaxed) + seat.0,
-            false => seat.0,
-        }
+        self.first_core.load(Ordering::Relaxed) + seat.0
     }
 
     /// Reports whether there may be a letter.
     #[inline]
     pub(super) fn may_have_letters(&self) -> bool {
-        MAY_DIVIDE && self.has_letters.load(Ordering::Relaxed)
+        self.has_letters.load(Ordering::Relaxed)
     }
 
     /// Returns when the timer shall next step the scheduler; `u64::MAX` if never.
@@ -98,10 +91,7 @@ pub(super) fn all() -> impl Iterator<Item = &'static ClusterState> {
 
 /// Returns how many there are.
 pub fn count() -> usize {
-    match MAY_DIVIDE {
-        true => BESIDES.load(Ordering::Relaxed) + 1,
-        false => 1,
-    }
+    BESIDES.load(Ordering::Relaxed) + 1
 }
 
 /// Reports whether there are several.
@@ -113,8 +103,8 @@ pub(super) fn are_divided() -> bool {
 #[inline]
 pub(super) fn nth(number: usize) -> &'static ClusterState {
     match number {
-        1.. if MAY_DIVIDE => another(number),
-        _ => &FIRST,
+        0 => &FIRST,
+        _ => another(number),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The part that only divided cores need: an image without the feature `clusters` has none of it.
+//! Dividing the cores into clusters, and questions that concern several of them.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -9,7 +9,7 @@ use fass::platform::LaunchError;
 use sched_dag::lifecycle::{self, Lifecycle, Parts};
 use sched_dag::{DagId, TaskSet};
 
-use super::cluster::{BESIDES, ClusterState, Letters, MAY_DIVIDE, OTHERS, nth};
+use super::cluster::{BESIDES, ClusterState, Letters, OTHERS, nth};
 use super::{ClusterRun, cluster};
 use crate::machine::this_core;
 
@@ -52,9 +52,8 @@ pub(super) fn divide(
 /// Returns the cluster of a DAG; cluster 0 if there is no run that has it.
 #[inline]
 pub(super) fn of_dag(dag: DagId) -> &'static ClusterState {
-    match MAY_DIVIDE && cluster::are_divided() {
+    match cluster::are_divided() {
         true => among_several(dag),
-        // Known by its address wherever cores cannot be divided.
         false => &cluster::FIRST,
     }
 }

@@ -21,7 +21,6 @@ mod step;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use alloc::sync::Arc;
-use alloc::vec;
 use alloc::vec::Vec;
 
 use fass::platform::{LaunchError, Plan, RunConfig};
@@ -100,10 +99,7 @@ pub fn prepare(mut plan: Plan, terms: &RunConfig, coincidence_ns: u64) -> Result
     port::provide(&plan.task_set, options)?;
     let lifecycle = plan.lifecycle.take();
     let task_set = &plan.task_set;
-    let (letters, lifecycles) = match cluster::MAY_DIVIDE {
-        true => divided::divide(task_set, lifecycle)?,
-        false => (None, vec![lifecycle]),
-    };
+    let (letters, lifecycles) = divided::divide(task_set, lifecycle)?;
     let mut lifecycles = lifecycles.into_iter();
     let heap = crate::memory::heap::usage();
     // Each cluster's journal gets its share of what is free now.
@@ -168,9 +164,7 @@ pub fn take_run() -> Option<Run> {
     let cores = u32::try_from(this_core::all().len()).unwrap_or(u32::MAX);
     let proven = core::mem::take(&mut first.proven);
     let mut run = Run::from_engine(&mut first.engine, proven, cores);
-    if cluster::MAY_DIVIDE {
-        (others.iter_mut()).for_each(|other| run.absorb(&mut other.engine));
-    }
+    (others.iter_mut()).for_each(|other| run.absorb(&mut other.engine));
     status::clear(&mut parts);
     Some(run)
 }

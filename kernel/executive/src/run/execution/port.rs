@@ -14,7 +14,7 @@ use sched_dag::lifecycle::{self, Request};
 use sched_dag::{ClusterId, CoreId, DriverNotice, Preemption, SchedulerOptions, TaskSet};
 
 use super::EPOCH_NS;
-use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, Letters, MAY_DIVIDE};
+use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, Letters};
 use super::loans::RunnerLoan;
 use super::status::note_running;
 use crate::machine::clock;
@@ -67,7 +67,7 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
 
     #[inline]
     fn forward(&mut self, request: Request) -> bool {
-        MAY_DIVIDE && cluster::send_to_others(self.letters, self.id, request, self.woken)
+        cluster::send_to_others(self.letters, self.id, request, self.woken)
     }
 
     #[inline]
@@ -76,9 +76,6 @@ impl PlatformPort<RunnerLoan> for SmpPort<'_> {
     }
 
     fn take_letters(&mut self) -> Option<&lifecycle::Mailboxes> {
-        if !MAY_DIVIDE {
-            return None;
-        }
         self.cluster.has_letters.swap(false, Ordering::AcqRel);
         self.letters.as_deref()
     }
@@ -131,10 +128,7 @@ impl CoreRunner {
     /// Returns the cluster that runs it.
     #[inline]
     pub(super) const fn cluster(&self) -> &'static ClusterState {
-        match cluster::MAY_DIVIDE {
-            true => self.cluster,
-            false => &cluster::FIRST,
-        }
+        self.cluster
     }
 }
 
@@ -222,10 +216,7 @@ pub(super) fn here() -> CoreId {
 /// Returns a core's seat.
 #[inline]
 pub(super) fn seat(core: &Core) -> CoreId {
-    match cluster::MAY_DIVIDE {
-        true => CoreId(core.place.load(Ordering::Relaxed)),
-        false => CoreId(core.index),
-    }
+    CoreId(core.place.load(Ordering::Relaxed))
 }
 
 /// Reports whether a core keeps its cluster's time.

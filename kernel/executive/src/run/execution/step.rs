@@ -23,7 +23,7 @@ use sched_dag::lifecycle::WaitId;
 use sched_dag::placement::NextWork;
 use sched_dag::{CoreId, DagId, Instance, Moment};
 
-use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, Letters, MAY_DIVIDE};
+use super::cluster::{self, ClusterState, CoreSet, FIRST_SEAT, Letters};
 use super::loans::RunnerLoan;
 use super::port::{SmpPort, here, instance_time_ns, seat, since_epoch};
 use super::status::{self, note_running};
@@ -44,10 +44,7 @@ impl ClusterRun {
         woken: &'s mut CoreSet,
     ) -> (&'s mut Engine<RunnerLoan, Parked>, SmpPort<'s>) {
         let port = SmpPort {
-            cluster: match MAY_DIVIDE {
-                true => self.cluster,
-                false => &cluster::FIRST,
-            },
+            cluster: self.cluster,
             id: self.engine.cluster,
             letters: &self.signals.letters,
             woken,
@@ -107,10 +104,7 @@ impl ClusterRun {
     /// Returns the cluster that it is the run of.
     #[inline]
     pub(super) const fn cluster(&self) -> &'static ClusterState {
-        match MAY_DIVIDE {
-            true => self.cluster,
-            false => &cluster::FIRST,
-        }
+        self.cluster
     }
 
     /// Publishes the next event, and sees to it that the first core waits for it: that is to
@@ -125,7 +119,7 @@ impl ClusterRun {
         } else if cluster.next_event_ns() < earlier_ns || is_over() {
             woken.insert(cluster.core(FIRST_SEAT));
         }
-        if MAY_DIVIDE && is_over() {
+        if is_over() {
             woken.insert(0);
         }
     }
@@ -182,7 +176,7 @@ impl ClusterRun {
         let leaves_background = is_background && self.engine.placement.is_wanted(here);
         if !self.engine.placement.must_suspend(here) && !leaves_background {
             // Idle cores other than 0 have no background context to leave: wake them.
-            if MAY_DIVIDE && self.engine.placement.is_wanted(here) {
+            if self.engine.placement.is_wanted(here) {
                 core.wake.store(true, Ordering::Relaxed);
             }
             return None;
