@@ -123,9 +123,6 @@ impl<B: SubtaskBody, P> Engine<B, P> {
     }
 
     /// Tells the scheduler what has happened and what is asked for. The instant stays open.
-    ///
-    /// It is a part of its callers, so that an engine in a static is known by its address in all of
-    /// the scheduler's code, which is worth 2 % of a release.
     #[inline(always)]
     pub fn tell(
         &mut self,
@@ -209,33 +206,12 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         }
         let (done, is_unwritten) = self.scheduler.pass_on(finish_ns, core, vertex);
         if let HandOff::To(next, decision) = done {
-            // Before the body goes back to its place.
-            let from = body.subject();
-            let exchanged = self.placement.exchange(core, vertex, body, next);
-            if !is_unwritten {
-                // Jobs may have been cut on this way, too, and their inputs are given up before
-                // the next function begins.
-                self.act(port);
-            }
-            let Some(mut body) = exchanged else {
-                // It is suspended, so it has been ready before.
-                return NextAction::Look {
-                    is_rescheduled: false,
-                };
+            let hop = (vertex, next, decision.instance.job);
+            // Each way by itself: the frequent one asks nothing twice.
+            return match is_unwritten {
+                true => self.hop::<C, true>((core, finish_ns), hop, body, port),
+                false => self.hop::<C, false>((core, finish_ns), hop, body, port),
             };
-            body.set_job(decision.instance.job);
-            let log = &mut self.scheduler.log;
-            let to = body.subject();
-            let start = (EventKind::Start, port.start(core, &mut body), to);
-            // One entry instead of three: the times of finish and ready are the same.
-            if is_unwritten {
-                let finish = (EventKind::Finish, finish_ns, from);
-                let ready = (EventKind::Ready, log.now_ns(), to);
-                log.journal.write_all(core, [finish, ready, start]);
-            } else {
-                log.journal.write_all(core, [start]);
-            }
-            return NextAction::Run(body);
         }
         self.placement.finish(core.index(), vertex, body);
         self.act(port);
@@ -246,6 +222,44 @@ impl<B: SubtaskBody, P> Engine<B, P> {
         // A job's end may bring the next timer forward or back; the platform sets its alarm anew.
         let is_rescheduled = self.scheduler.log.take_job_event();
         NextAction::Look { is_rescheduled }
+    }
+
+    /// Has a core go on from one vertex to the next, with the next one's instance of a job.
+    #[inline(always)]
+    fn hop<C: PlatformPort<B>, const IS_UNWRITTEN: bool>(
+        &mut self,
+        (core, finish_ns): (CoreId, u64),
+        (vertex, next, job): (Vertex, Vertex, u64),
+        body: B,
+        port: &mut C,
+    ) -> NextAction<B> {
+        // Before the body goes back to its place.
+        let from = body.subject();
+        let exchanged = self.placement.exchange(core, vertex, body, next);
+        if !IS_UNWRITTEN {
+            // Jobs may have been cut on this way, too, and their inputs are given up before
+            // the next function begins.
+            self.act(port);
+        }
+        let Some(mut body) = exchanged else {
+            // It is suspended, so it has been ready before.
+            return NextAction::Look {
+                is_rescheduled: false,
+            };
+        };
+        body.set_job(job);
+        let log = &mut self.scheduler.log;
+        let to = body.subject();
+        let start = (EventKind::Start, port.start(core, &mut body), to);
+        // One entry instead of three: the times of finish and ready are the same.
+        if IS_UNWRITTEN {
+            let finish = (EventKind::Finish, finish_ns, from);
+            let ready = (EventKind::Ready, log.now_ns(), to);
+            log.journal.write_all(core, [finish, ready, start]);
+        } else {
+            log.journal.write_all(core, [start]);
+        }
+        NextAction::Run(body)
     }
 
     /// Takes note that the turn of a core's instance has ended in a wait, which may be all of the

@@ -215,7 +215,7 @@ impl Scheduler {
                 }
                 // The most frequent case of a chain: the successor never enters the queue, and one
                 // entry of the journal tells finish, ready and start.
-                1 if (self.ready).is_next(self.vertices.get(next).line, core) => {
+                1 if (self.ready).is_next(|| self.vertices.get(next).line, core) => {
                     return self.pass(next, core);
                 }
                 // Several, or others in line: only their keys tell which is first.

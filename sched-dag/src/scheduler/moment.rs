@@ -25,8 +25,7 @@ pub struct TurnEnd {
 }
 
 impl Scheduler {
-    /// Does what is asked of one DAG. Compiled with its callers, so that a scheduler in a static is
-    /// known there by its address, which is worth 2 % of a release; and once, as it is rare.
+    /// Does what is asked of one DAG. Compiled once, as it is rare.
     #[cold]
     #[inline]
     fn serve_request(&mut self, request: Request) {

@@ -150,12 +150,15 @@ impl ReadyLines {
     #[inline]
     pub(super) fn insert(&mut self, line: LineId, key: DispatchKey) {
         self.latest = line;
-        if line.is_cluster() {
-            self.cluster.insert(key);
-        } else {
-            self.count += 1;
-            self.apart[line.0 as usize].ready.insert(key);
-        }
+        // One insertion, which can be a part of its callers.
+        let queue = match line.is_cluster() {
+            true => &mut self.cluster,
+            false => {
+                self.count += 1;
+                &mut self.apart[line.0 as usize].ready
+            }
+        };
+        queue.insert(key);
     }
 
     /// Takes an instance out, which waits.
@@ -197,9 +200,15 @@ impl ReadyLines {
     #[inline]
     pub(super) fn peek_in(&self, line: LineId) -> Option<DispatchKey> {
         match self.has_any_apart() {
-            true => self.apart[line.0 as usize].ready.peek(),
+            true => self.peek_apart(line),
             false => None,
         }
+    }
+
+    /// Not a part of its callers, as most sets have no such line.
+    #[inline(never)]
+    fn peek_apart(&self, line: LineId) -> Option<DispatchKey> {
+        self.apart[line.0 as usize].ready.peek()
     }
 
     /// Takes the instance with the smallest key out of a line that is not the cluster's.
@@ -231,7 +240,7 @@ impl ReadyLines {
         self.cluster.pop()
     }
 
-    #[inline]
+    #[inline(never)]
     fn pop_apart(&mut self, core: CoreId) -> Option<DispatchKey> {
         let own = self.pop_in(LineId::of_core(core));
         let group = self.groups[core.index()];
@@ -241,10 +250,19 @@ impl ReadyLines {
         })
     }
 
-    /// Reports whether an instance, the only one that has become ready, comes next on a core that
-    /// has finished its own, and concerns no other one.
+    /// Reports whether an instance, the only one that has become ready and of the line that is asked
+    /// for, comes next on a core that has finished its own, and concerns no other one.
     #[inline]
-    pub(super) fn is_next(&self, line: LineId, core: CoreId) -> bool {
+    pub(super) fn is_next(&self, line: impl FnOnce() -> LineId, core: CoreId) -> bool {
+        // Most sets have no other lines, so a hop asks for none.
+        match self.apart.is_empty() {
+            true => self.is_empty(),
+            false => self.is_next_apart(line(), core),
+        }
+    }
+
+    #[inline]
+    fn is_next_apart(&self, line: LineId, core: CoreId) -> bool {
         let is_first_in_line = match line.is_cluster() {
             true => self.is_empty(),
             false => self.is_for(line, core) && self.peek_in(line).is_none(),
@@ -257,8 +275,9 @@ impl ReadyLines {
     #[inline]
     pub(super) fn latest_concerns_others(&self, core: CoreId) -> bool {
         let line = self.latest;
-        let is_elsewhere = !line.is_cluster() && !self.is_for(line, core);
-        is_elsewhere || line.core().is_none() && self.peek_own(core).is_some()
+        let is_elsewhere = || !line.is_cluster() && !self.is_for(line, core);
+        let is_behind_own = || line.core().is_none() && self.peek_own(core).is_some();
+        !self.apart.is_empty() && (is_elsewhere() || is_behind_own())
     }
 }
 

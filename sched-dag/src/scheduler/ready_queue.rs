@@ -166,7 +166,7 @@ impl ReadyQueue {
     }
 
     /// Returns the smallest key.
-    #[inline]
+    #[inline(always)]
     pub(super) fn peek(&self) -> Option<DispatchKey> {
         if !self.front.is_none() {
             return Some(self.front);
@@ -428,7 +428,7 @@ impl<K: Ord + Copy> IndexedHeap<K> {
     }
 
     /// Puts an item into the heap, or gives it another key.
-    #[inline]
+    #[inline(always)]
     pub(super) fn set(&mut self, item: usize, key: K) {
         let position = self.positions[item];
         let entry = (key, item);

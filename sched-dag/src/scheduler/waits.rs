@@ -180,6 +180,13 @@ impl Scheduler {
         Some(done)
     }
 
+    /// Reports whether subtasks state waits, as those of most sets do not.
+    #[inline]
+    #[must_use]
+    pub const fn has_waits(&self) -> bool {
+        self.waits.len() > 0
+    }
+
     /// Ends the wait whose limit comes first, if it has come by `now_ns`, and gives its instance an
     /// idle core. `None` if that is not all of the instant, of which this may be a part: the step
     /// is to be taken as ever. No request is to be served.

@@ -38,6 +38,9 @@ pub fn set(alarm: Alarm, at_ns: u64) {
 /// Makes sure that the alarm of this core, `core`, is not later than `at_ns`. It may be
 /// earlier: for an alarm whose handler looks at the clock again, that costs an
 /// interrupt now and then instead of a write of the timer each time.
+///
+/// Inlined, as each hop with a budget asks.
+#[inline(always)]
 pub fn set_no_later(core: &Core, alarm: Alarm, at_ns: u64) {
     if core.alarms[alarm as usize].load(Ordering::Relaxed) > at_ns {
         set(alarm, at_ns);

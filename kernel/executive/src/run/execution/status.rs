@@ -158,8 +158,6 @@ pub fn control(dag: DagId, change: fn(DagId) -> Request) {
 /// Serves a request in a step of a cluster's scheduler, or leaves it for the cluster that it
 /// concerns; one to the plan with a number only if that is the one which runs, and as of time 0 if
 /// it has not begun.
-///
-/// This is the only such step, so that the scheduler is known by its address in it, too.
 pub(super) fn serve(plan: Option<u64>, cluster: &'static ClusterState, request: Request) {
     let mut place = cluster.execution.lock();
     let Some(execution) = place.as_mut() else {

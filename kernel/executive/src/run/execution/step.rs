@@ -74,9 +74,11 @@ impl ClusterRun {
     /// Ends the wait whose limit has come, if that is all of a step, and reports whether it is.
     #[inline]
     fn wake(&mut self, now_ns: u64, woken: &mut CoreSet) -> bool {
-        let (may_hand_off, instant) = (self.may_hand_off, (since_epoch(now_ns), here()));
+        if !self.engine.scheduler.has_waits() || !self.may_hand_off {
+            return false;
+        }
         let (engine, mut port) = self.parts(woken);
-        let is_all = may_hand_off && engine.wake(instant, &mut port);
+        let is_all = engine.wake((since_epoch(now_ns), here()), &mut port);
         if is_all {
             self.announce(woken);
         }
@@ -91,13 +93,12 @@ impl ClusterRun {
         let due_ns = *(self.dispatch_due_ns).get_or_insert(waits_until_ns.max(epoch_ns));
         if now_ns < due_ns {
             self.may_hand_off = false;
-            self.announce(woken);
-            return;
+        } else {
+            self.dispatch_due_ns = None;
+            self.may_hand_off = self.coincidence_ns == 0;
+            let (engine, mut port) = self.parts(woken);
+            engine.decide(since_epoch(now_ns), &mut port);
         }
-        self.dispatch_due_ns = None;
-        self.may_hand_off = self.coincidence_ns == 0;
-        let (engine, mut port) = self.parts(woken);
-        engine.decide(since_epoch(now_ns), &mut port);
         self.announce(woken);
     }
 
@@ -109,6 +110,7 @@ impl ClusterRun {
 
     /// Publishes the next event, and sees to it that the first core waits for it: that is to
     /// be woken if it has to be for that, and core 0 if nothing is left to be done here.
+    #[inline(always)]
     fn announce(&self, woken: &mut CoreSet) {
         let cluster = self.cluster();
         let earlier_ns = cluster.next_event_ns();
@@ -265,8 +267,7 @@ fn take_turns(core: &Core, work: CoreWork) -> CoreWork {
 /// Reports that this core has run its instance, and finds what it is to do
 /// next. Interrupts are disabled.
 pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
-    let core = this_core::get();
-    let here = seat(core);
+    let here = here();
     let mut place = finished.cluster().execution.lock_uninterrupted();
     let Some(execution) = place.as_mut() else {
         return CoreWork::Rest;
@@ -288,6 +289,7 @@ pub fn complete(finished: RunnerLoan, finish_ns: u64) -> CoreWork {
             ended.into_iter().for_each(|turn| moment.end_turn(turn));
         }),
     }
+    let core = this_core::get();
     let work = execution.find_work(core);
     drop(place);
     woken.wake();
