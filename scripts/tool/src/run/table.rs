@@ -18,7 +18,6 @@ pub(super) const GUEST_WORDS: &[Name] = &[
     name::EXECUTION,
     name::SUBTASKS,
     name::LONGEST,
-    name::WORK,
     name::OCCUPY,
 ];
 
@@ -78,8 +77,6 @@ Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and ju
         SUBTASKS in "fork-join": Takes::Numbers(1, MOST_SUBTASKS);
         /// Milliseconds of the longest execution.
         LONGEST: Takes::Number(1, 50);
-        /// Whether it really computes.
-        WORK: Takes::OneOf(&["simulate", "compute"]);
         /// How a simulated one has its core.
         OCCUPY: Takes::OneOf(&["hold", "spin"]);
         /// The one to take of a set of task graphs.
