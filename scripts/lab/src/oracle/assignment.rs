@@ -172,6 +172,7 @@ fn of_owner(owner: &CoreOwner, plan: &LendingPlan, period_ns: u64) -> Vec<String
 #[cfg(test)]
 mod tests {
     use super::{check, parse, parse_sets};
+    use crate::tests::{altered, assert_malformed, rows};
 
     const FILE: &str = include_str!("../../../../tests/oracle/lent.txt");
 
@@ -184,120 +185,43 @@ mod tests {
         }
     }
 
-    /// Returns the first public case with one part replaced by another.
-    fn altered(from: &str, to: &str) -> String {
-        let first = FILE.split_inclusive("end\n").next().unwrap();
-        assert!(first.contains(from), "{from}");
-        first.replacen(from, to, 1)
+    fn first() -> &'static str {
+        FILE.split_inclusive("end\n").next().unwrap()
     }
+
+    /// A part of the first case, its replacement, and the difference that it makes.
+    const WRONG: &str = r"attempt 3 | attempt 4 | expected `attempt 4`, computed `attempt 3`
+failed 1 0 0 | failed 1 0 | expected `failed 1 0`, computed `failed 1 0 0`
+order 4 0 0 | order 4 0 1 | expected `order 4 0 1`, computed `order 4 0 0`
+busy 4 271 27 811 | busy 4 271 28 811 | expected `busy 4 271 28 811 27 1216 54`, computed `busy 4 271 27 811 27 1216 54`
+own 4 219 | own 4 220 | expected `own 4 220 0 3`, computed `own 4 219 0 3`
+guest 3 3420 7 4\n |  | expected `end`, computed `guest 3 3420 7 4`
+\nend\n | \nguest 3 1 1\nend\n | expected `guest 3 1 1`, computed `end`
+dag 834 178 | dag 177 178 | D exceeds T, which the analysis does not cover";
 
     #[test]
     fn a_difference_names_the_record() {
-        for (from, to, difference) in [
-            (
-                "attempt 3",
-                "attempt 4",
-                "expected `attempt 4`, computed `attempt 3`",
-            ),
-            (
-                "failed 1 0 0",
-                "failed 1 0",
-                "expected `failed 1 0`, computed `failed 1 0 0`",
-            ),
-            (
-                "order 4 0 0",
-                "order 4 0 1",
-                "expected `order 4 0 1`, computed `order 4 0 0`",
-            ),
-            (
-                "busy 4 271 27 811",
-                "busy 4 271 28 811",
-                "expected `busy 4 271 28 811 27 1216 54`, computed `busy 4 271 27 811 27 1216 54`",
-            ),
-            (
-                "own 4 219",
-                "own 4 220",
-                "expected `own 4 220 0 3`, computed `own 4 219 0 3`",
-            ),
-            (
-                "guest 3 3420 7 4\n",
-                "",
-                "expected `end`, computed `guest 3 3420 7 4`",
-            ),
-            (
-                "\nend\n",
-                "\nguest 3 1 1\nend\n",
-                "expected `guest 3 1 1`, computed `end`",
-            ),
-            (
-                "dag 834 178",
-                "dag 177 178",
-                "D exceeds T, which the analysis does not cover",
-            ),
-        ] {
-            let cases = parse(&altered(from, to)).unwrap();
-            assert_eq!(check(&cases[0]), Err(difference.to_owned()));
+        let checked = |parts: [&str; 2]| check(&parse(&altered(first(), parts)).unwrap()[0]);
+        for [from, to, difference] in rows(WRONG) {
+            assert_eq!(checked([&from, &to]), Err(difference));
         }
-        let spelled = parse(&altered("guest 0 114", "guest 00 0114")).unwrap();
-        assert_eq!(check(&spelled[0]), Ok(()));
+        assert_eq!(checked(["guest 0 114", "guest 00 0114"]), Ok(()));
     }
+
+    /// The same for refusals, with the line and the reason.
+    const MALFORMED: &str = r"attempt 3\n |  | 52 | expected a `attempt` record, found `failed`
+attempt 3 | attempt | 52 | expected `attempt A`, found 0 words
+attempt 3 | attempt x | 52 | `x` is not a whole number
+failed 1 0 0 | failed - - - | 53 | `-` is not a whole number
+own 4 219 0 3 | own 4 219 0 | 64 | expected `own DAG R FIRST C`, found 3 words
+order 4 0 0 | order 4 0 | 62 | expected `order K v s v s ..`, found 2 words
+1216 54 | 1216 | 63 | expected `busy K r B r B r B`, found 6 words
+guest 0 114 7 4 | guest 0 114 | 71 | expected `guest DAG R k k ..`, found 2 words
+\nend\n | \nlent\n | 73 | expected a `end` record, found `lent`";
 
     #[test]
     fn malformed_files_are_refused_with_their_line() {
-        for (from, to, line, reason) in [
-            (
-                "attempt 3\n",
-                "",
-                52,
-                "expected a `attempt` record, found `failed`",
-            ),
-            (
-                "attempt 3",
-                "attempt",
-                52,
-                "expected `attempt A`, found 0 words",
-            ),
-            ("attempt 3", "attempt x", 52, "`x` is not a whole number"),
-            (
-                "failed 1 0 0",
-                "failed - - -",
-                53,
-                "`-` is not a whole number",
-            ),
-            (
-                "own 4 219 0 3",
-                "own 4 219 0",
-                64,
-                "expected `own DAG R FIRST C`, found 3 words",
-            ),
-            (
-                "order 4 0 0",
-                "order 4 0",
-                62,
-                "expected `order K v s v s ..`, found 2 words",
-            ),
-            (
-                "1216 54",
-                "1216",
-                63,
-                "expected `busy K r B r B r B`, found 6 words",
-            ),
-            (
-                "guest 0 114 7 4",
-                "guest 0 114",
-                71,
-                "expected `guest DAG R k k ..`, found 2 words",
-            ),
-            (
-                "\nend\n",
-                "\nlent\n",
-                73,
-                "expected a `end` record, found `lent`",
-            ),
-        ] {
-            let error = parse(&altered(from, to)).unwrap_err();
-            assert_eq!((error.line, error.reason.as_str()), (line, reason), "{to}");
-        }
+        assert_malformed(parse, first(), MALFORMED);
     }
 
     #[test]

@@ -218,7 +218,7 @@ pub(super) fn run(plan: &TestPlan, name: &str, command: Command, tally: &mut Tal
     for test in &failed {
         tally.fail(&format!("{name}: {test}"), "see its output above");
     }
-    tally.pass(report.passed);
+    tally.passed += report.passed;
 
     let died = match waited {
         // A crash, or an exit without the result line, is a failure that no test reports.

@@ -117,7 +117,8 @@ pub fn test(words: &[OsString]) -> ExitCode {
         }
         if let Some(list) = &plan.blessed {
             // Without a rewritten file there is no list.
-            tally.bless(&fs::read_to_string(list).unwrap_or_default());
+            let files = fs::read_to_string(list).unwrap_or_default();
+            tally.blessed = files.lines().map(String::from).collect();
             let _ = fs::remove_file(list);
         }
 
@@ -128,7 +129,7 @@ pub fn test(words: &[OsString]) -> ExitCode {
         }
         match complaint(plan.filter.as_deref(), &tally) {
             Some(line) => Err(Refusal::Usage(line)),
-            None => Ok(ExitCode::from(u8::from(tally.has_failed()))),
+            None => Ok(ExitCode::from(u8::from(!tally.failures.is_empty()))),
         }
     })
 }
@@ -303,11 +304,6 @@ impl Tally {
         self.skips.extend(other.skips);
     }
 
-    /// Counts tests that passed.
-    fn pass(&mut self, tests: u64) {
-        self.passed += tests;
-    }
-
     /// Counts a failure.
     fn fail(&mut self, name: &str, why: &str) {
         // One line for the summary; the whole reason stands above.
@@ -320,19 +316,9 @@ impl Tally {
         self.skips.push(format!("{name}: {why}"));
     }
 
-    /// Records the files of a list, one in each line, as rewritten.
-    fn bless(&mut self, list: &str) {
-        self.blessed.extend(list.lines().map(String::from));
-    }
-
-    /// Returns whether anything failed.
-    fn has_failed(&self) -> bool {
-        !self.failures.is_empty()
-    }
-
     /// Returns whether anything passed or failed, rather than being skipped.
     fn has_run(&self) -> bool {
-        self.passed > 0 || self.has_failed()
+        self.passed > 0 || !self.failures.is_empty()
     }
 
     /// Returns whether nothing was counted at all.
@@ -409,7 +395,7 @@ mod tests {
     fn the_last_line_counts_and_the_reasons_stand_above() {
         let mut tally = Tally::default();
         assert!(tally.is_empty());
-        tally.pass(12);
+        tally.passed = 12;
         assert!(!tally.is_empty());
         assert_eq!(tally.to_string(), "\n12 passed, 0 failed\n");
         tally.run("a check", || Ok(()));
@@ -417,7 +403,7 @@ mod tests {
         tally.run("c", || {
             Err(CheckFailure::Skipped("there is no /dev/kvm".into()))
         });
-        tally.bless("b.md\na.md\nb.md\n");
+        tally.blessed = ["b.md", "a.md"].map(String::from).into();
         let expected = "\nskipped: c: there is no /dev/kvm\nfailed: a::b: left is not right\n\
                         blessed: a.md; read `git diff`\nblessed: b.md; read `git diff`\n\
                         13 passed, 1 failed, 1 skipped\n";

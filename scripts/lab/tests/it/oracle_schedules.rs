@@ -31,6 +31,17 @@ fn split<const N: usize>(row: &str) -> [&str; N] {
     cells.try_into().expect(row)
 }
 
+/// Makes sure that a case is refused with the line and the reason once a part is replaced.
+fn assert_malformed(case: &str, table: &str) {
+    for row in table.lines() {
+        let row = row.replace(r"\n", "\n");
+        let [from, to, line, reason] = split(&row);
+        let malformed = parse(&case.replacen(from, to, 1)).expect_err(to);
+        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
+        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
+    }
+}
+
 #[test]
 fn all_public_schedules_agree() {
     for (text, count) in [(PUBLIC, 40), (CLUSTERS, 30)] {
@@ -153,13 +164,7 @@ end\n |  | 12 | the file ends";
 
 #[test]
 fn malformed_files_are_refused_with_their_line() {
-    for row in MALFORMED.lines() {
-        let row = row.replace(r"\n", "\n");
-        let [from, to, line, reason] = split(&row);
-        let malformed = parse(&SMALL.replacen(from, to, 1)).expect_err(to);
-        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
-        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
-    }
+    assert_malformed(SMALL, MALFORMED);
     assert_eq!(parse("").expect_err("no case").line, 1);
 }
 
@@ -213,13 +218,7 @@ fn waits_agree_and_their_first_difference_is_named() {
         let found = checked(&WAITING.replace(from, to));
         assert_eq!(found, Err(difference.to_owned()), "{to}");
     }
-    for row in MALFORMED_WAITS.lines() {
-        let row = row.replace(r"\n", "\n");
-        let [from, to, line, reason] = split(&row);
-        let malformed = parse(&WAITING.replacen(from, to, 1)).expect_err(to);
-        assert_eq!(malformed.line.to_string(), line, "{to}: {malformed}");
-        assert!(malformed.reason.contains(reason), "{to}: {malformed}");
-    }
+    assert_malformed(WAITING, MALFORMED_WAITS);
 }
 
 #[test]
