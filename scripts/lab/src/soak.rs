@@ -101,7 +101,7 @@ pub fn soak(words: &[OsString]) -> ExitCode {
 /// be. Reports whether it holds.
 fn simulate(jobs: u64) -> Result<bool, String> {
     let mut cargo = system::cargo();
-    for package in ["sched-dag", "common"] {
+    for package in ["sched-dag", "random"] {
         cargo.arg(format!(
             "--config=profile.dev.package.{package}.opt-level=3"
         ));
