@@ -80,6 +80,9 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     run("types of a crate have names of their own", &|| {
         Ok(words::check_names(sources)?)
     });
+    run("no room says more pronouns, nor pages more words", &|| {
+        Ok(words::check_rooms(sources, blessed)?)
+    });
     run("layers name only layers below them", &|| {
         apart::check(sources)?;
         Ok(layers::check(sources)?)
@@ -94,7 +97,17 @@ pub(super) fn run_all(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally
     run("no line escapes the budgets", &|| {
         Ok(complain(sources, budgets::escape)?)
     });
+    run_with_programs(plan, tally);
+}
 
+/// Runs the wanted checks that need programs of the host.
+fn run_with_programs(plan: &TestPlan, tally: &mut Tally) {
+    let blessed = plan.blessed.as_deref();
+    let mut run = |name: &str, check: &dyn Fn() -> Result<(), CheckFailure>| {
+        if plan.wants(name) {
+            tally.run(name, check);
+        }
+    };
     run(
         "an independent reader opens MCAP files in their test",
         &|| {

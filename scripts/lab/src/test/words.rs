@@ -2,12 +2,30 @@
 //!
 //! - A doc sentence says what a thing is or does; none begins with a question word.
 //! - No two types of a crate share a name, and none is called by a question word or a pronoun.
+//! - A sentence that says nouns needs no second reading: in no room do pronouns become more
+//!   frequent, and the pages have no more words than a ceiling, which only a person raises.
 //!
 //! Types of tests and examples, and those within functions and inline modules, are let be.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 use super::{SourceFile, none_of};
+use tool::golden::Golden;
+use tool::system::workspace;
+
+/// The table of rooms, from the workspace's root.
+const TABLE: &str = "tests/baselines/words.txt";
+
+/// The row of the ceiling of words.
+const PAGES: &str = "docs/*.md";
+
+/// The pages that a user reads first, which are rooms of their own.
+const FIRST_PAGES: [&str; 3] = ["README.md", "docs/guide.md", "docs/commands.md"];
+
+/// The words that stand for nouns and are counted.
+const COUNTED: [&str; 5] = ["what", "that", "which", "it", "one"];
 
 /// The words that begin no doc sentence at the beginning of a line.
 const QUESTIONS: [&str; 5] = ["What ", "That which ", "Whatever ", "Who ", "Whoever "];
@@ -75,6 +93,100 @@ pub(super) fn check_names(sources: &[SourceFile]) -> Result<(), String> {
     none_of(faults)
 }
 
+/// Compares pronouns and words with the table; rewrites it if there is a `list` of rewritten files,
+/// where a room has fewer pronouns than it may have.
+///
+/// # Errors
+///
+/// In words: the rooms that have too many.
+pub(super) fn check_rooms(sources: &[SourceFile], list: Option<&Path>) -> Result<(), String> {
+    let table = fs::read_to_string(workspace().join(TABLE));
+    let table = table.map_err(|error| format!("{TABLE}: {error}"))?;
+    let rows = table.lines().filter_map(|line| {
+        let (room, most) = line.split_once(' ')?;
+        Some((room.to_owned(), most.trim().parse().ok()?))
+    });
+    let most: BTreeMap<String, usize> = rows.collect();
+    let there = rooms(sources);
+    if list.is_some() {
+        let lower = |(room, count): (&String, &usize)| {
+            let most = most.get(room).copied().unwrap_or(*count);
+            let least = if room == PAGES {
+                most
+            } else {
+                most.min(*count)
+            };
+            format!("{room:20} {least:>7}\n")
+        };
+        let head = format!("{:20} {:>7}\n", "room", "most");
+        let said = head + &there.iter().map(lower).collect::<String>();
+        let (file, below, text) = (TABLE, "", &*table);
+        Golden { file, below, text }.compare(&said, list)?;
+    }
+    let over = there.iter().filter_map(|(room, count)| {
+        let most = most.get(room).copied().unwrap_or(usize::MAX);
+        (*count > most).then(|| match room == PAGES {
+            true => format!("{room} have {count} words, {most} are allowed; shorten a page"),
+            false => format!(
+                "{room} has {count} of `{}` in 1,000 words, {most} are allowed; say nouns",
+                COUNTED.join("`, `")
+            ),
+        })
+    });
+    none_of(over.collect())
+}
+
+/// Counts the pronouns in 1,000 words of the documentation of each top folder and of the first
+/// pages, and the words of all pages of `docs/`.
+fn rooms(sources: &[SourceFile]) -> BTreeMap<String, usize> {
+    let mut counts = BTreeMap::<String, [usize; 2]>::new();
+    let mut words = 0;
+    for SourceFile { name, text } in sources {
+        let is_page = name.ends_with(".md");
+        let below_docs = name.strip_prefix("docs/");
+        if is_page && below_docs.is_some_and(|page| !page.contains('/')) {
+            words += text.split_whitespace().count();
+        }
+        let is_first = FIRST_PAGES.contains(&&**name);
+        let is_code =
+            name.ends_with(".rs") && !name.contains("/tests") && !name.ends_with("tests.rs");
+        let Some((top, _)) = name.split_once('/').filter(|_| is_code && !is_first) else {
+            if is_first {
+                count(text.lines(), counts.entry(name.clone()).or_default());
+            }
+            continue;
+        };
+        let docs = text.lines().map(str::trim_start);
+        let docs = docs.filter_map(|line| line.strip_prefix("///").or(line.strip_prefix("//!")));
+        count(docs, counts.entry(top.into()).or_default());
+    }
+    let rate = |(room, [pronouns, all]): (String, [usize; 2])| {
+        (room, (pronouns * 1000).div_ceil(all.max(1)))
+    };
+    let mut rooms: BTreeMap<_, _> = counts.into_iter().map(rate).collect();
+    rooms.insert(PAGES.into(), words);
+    rooms
+}
+
+/// Adds the pronouns and the words of these lines, without blocks and names of code.
+fn count<'t>(lines: impl Iterator<Item = &'t str>, [pronouns, all]: &mut [usize; 2]) {
+    let mut is_code = false;
+    for line in lines {
+        let is_fence = line.trim_start().starts_with("```");
+        is_code ^= is_fence;
+        if is_code || is_fence {
+            continue;
+        }
+        for part in line.split('`').step_by(2) {
+            let words = part.split(|letter: char| !letter.is_ascii_alphabetic() && letter != '\'');
+            for word in words.filter(|word| !word.is_empty()) {
+                *all += 1;
+                *pronouns += usize::from(COUNTED.contains(&&*word.to_ascii_lowercase()));
+            }
+        }
+    }
+}
+
 /// Returns the name of the type that a line at the top level of a file defines, if it does.
 fn type_name(line: &str) -> Option<&str> {
     let mut words = line.split([' ', '<', '(', ';', ':', '{']);
@@ -90,7 +202,7 @@ fn type_name(line: &str) -> Option<&str> {
 
 #[cfg(test)]
 mod tests {
-    use super::{asks, check_names};
+    use super::{asks, check_names, rooms};
     use crate::test::SourceFile;
 
     #[test]
@@ -105,6 +217,33 @@ mod tests {
             Some("asks in line 2; say what the item is or does")
         );
         assert_eq!(asks("core.md", &text), None);
+    }
+
+    #[test]
+    fn pronouns_are_counted_by_room_and_words_of_pages_together() {
+        let file = |name: &str, text: &str| SourceFile {
+            name: name.into(),
+            text: text.replace('@', "//"),
+        };
+        let counted = rooms(&[
+            file(
+                "fass/src/a.rs",
+                "@/ The core that waits.\n@! ```\n@! it it\n@! ```\nlet it;\n",
+            ),
+            file("fass/tests/a.rs", "@/ It.\n"),
+            file(
+                "docs/guide.md",
+                "It runs, `that one` too.\n```\nwhat\n```\n",
+            ),
+            file("docs/decisions/1.md", "It.\n"),
+        ]);
+        let row = |room: &str, count: usize| (room.to_owned(), count);
+        let expected = [
+            row("docs/*.md", 8),
+            row("docs/guide.md", 334),
+            row("fass", 250),
+        ];
+        assert_eq!(counted, expected.into());
     }
 
     #[test]
