@@ -194,14 +194,7 @@ impl Guest {
     #[must_use]
     pub fn records(mut self, file: &Path, kib: u64) -> Guest {
         self.qemu.records = Some(file.into());
-        self.word(&format!("record={kib}"))
-    }
-
-    /// Has the guest send to this file what it keeps of the last jobs, if one fails.
-    #[must_use]
-    pub fn keeps(mut self, file: &Path) -> Guest {
-        self.qemu.records = Some(file.into());
-        self
+        self.word(&format!("keep={kib}"))
     }
 
     /// Has the guest replay a recording.

@@ -131,10 +131,7 @@ const FOREIGN: [(&str, &str); 12] = [
     ("avx", "Linux saves all registers"),
     ("x2apic", "interrupts are Linux's"),
     ("smt", "processors are Linux's"),
-    (
-        "latest",
-        "a run is recorded from its begin, by `record=FILE`",
-    ),
+    ("latest", "a run is recorded from its begin, by `keep=FILE`"),
 ];
 
 /// Takes the words, and makes the machine that they describe. Returns what they say besides, and

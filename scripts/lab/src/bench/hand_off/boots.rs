@@ -50,7 +50,7 @@ pub(super) struct Boot {
 pub(super) fn of_mode(mode: Mode) -> Vec<Boot> {
     let all = [
         (Kind::Figures, 1, "part=hand-off"),
-        (Kind::Recorded, 1, "test=values record=1024"),
+        (Kind::Recorded, 1, "test=values keep=1024"),
         (Kind::Figures, 2, "part=elsewhere"),
         (Kind::Figures, MANY, WORKLOADS),
         (Kind::Figures, 64, WORKLOADS),
