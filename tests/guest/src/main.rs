@@ -73,7 +73,6 @@ const TESTS: &[(&str, Test)] = &[
     ("values", values::run),
     ("waits", waits::run),
     ("waits_cost", waits::cost),
-    ("waits_faults", waits::faults),
     ("waits_wire", waits::wire),
 ];
 

@@ -1,24 +1,13 @@
-//! Instances that wait: for a time, for a device that another DAG stands for, for bytes of a wire,
-//! and at the moment of a fault or of an end.
+//! Instances that wait: for a time, for a device that another DAG stands for, and for bytes of a wire.
 
-use alloc::string::String;
 use alloc::sync::Arc;
-use alloc::vec::Vec;
-use alloc::{format, vec};
-use core::future::pending;
-use core::pin::pin;
+use alloc::vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 use core::time::Duration;
 
-use fass::shared::{
-    Asker, DeviceDriver, Shutdown, Switch, Wire, WireReader, WireWriter, create_device,
-    shutting_down,
-};
-use fass::{
-    Dag, Occupation, OverrunPolicy, SubtaskAttributes, Unique, create_dag, execute_for,
-    finish_create_dags, sleep,
-};
-use kernel::{AppError, Machine, Run, json};
+use fass::shared::{Asker, DeviceDriver, Wire, WireReader, WireWriter, create_device};
+use fass::{Dag, Occupation, create_dag, execute_for, finish_create_dags, sleep};
+use kernel::{AppError, Machine, json};
 
 use crate::single::{named, single_every};
 
@@ -195,8 +184,10 @@ pub(crate) fn cost(machine: &Machine) -> Result<(), AppError> {
             }
         };
         let attributes = (0..NAPS).fold(named("naps"), |naps, _| naps.wait(time));
-        let terms = (Some(3), ms(100));
-        finish_create_dags(&[waiting("naps", terms, attributes, naps)])?;
+        let dag = create_dag();
+        (dag.name("naps").jobs(3)).relative_deadline(ms(100));
+        dag.register_periodic_async_subtask(naps, vec![], ms(100), attributes);
+        finish_create_dags(&[dag])?;
         let run = machine.run()?;
         let waited_ns = u64::try_from((time * NAPS).as_nanos()).unwrap_or(u64::MAX);
         let added_ns = longest.load(Ordering::Relaxed).saturating_sub(waited_ns);
@@ -207,226 +198,4 @@ pub(crate) fn cost(machine: &Machine) -> Result<(), AppError> {
         });
     }
     Ok(())
-}
-
-/// A DAG of one subtask that waits.
-fn waiting<Fut>(
-    name: &str,
-    (jobs, period): (Option<u64>, Duration),
-    attributes: SubtaskAttributes,
-    function: impl FnMut() -> Fut + Send + 'static,
-) -> Dag
-where
-    Fut: Future<Output = ()> + Send + 'static,
-{
-    let dag = create_dag();
-    dag.name(name).relative_deadline(period);
-    jobs.into_iter().for_each(|jobs| _ = dag.jobs(jobs));
-    dag.register_periodic_async_subtask(function, vec![], period, attributes);
-    dag
-}
-
-/// Calls a function with the number of each job.
-fn numbered<Fut>(mut function: impl FnMut(u64) -> Fut) -> impl FnMut() -> Fut {
-    let mut jobs = 0..;
-    move || function(jobs.next().unwrap_or(0))
-}
-
-/// Counts what is dropped.
-struct Dropped(Arc<AtomicU64>);
-
-impl Drop for Dropped {
-    fn drop(&mut self) {
-        count(&self.0);
-    }
-}
-
-/// Runs one DAG after the other that is at fault, or is ended, when an instance of it has waited, or
-/// waits.
-pub(crate) fn faults(machine: &Machine) -> Result<(), AppError> {
-    machine.options().finish(&["test"])?;
-    machine.accept_faults();
-    run_one(machine, "panics", &panics())?;
-    run_one(machine, "overruns", &overruns())?;
-    run_one(machine, "foreign", &foreign())?;
-    run_one(machine, "ended", &ended())?;
-    run_one(machine, "paused", &paused())?;
-    run_one(machine, "shut down", &shut_down())?;
-    run_one(machine, "left out", &left_out())?;
-    run_one(machine, "again", &again())?;
-    run_one(machine, "passed on", &passed_on())?;
-    let dropped = Arc::new(AtomicU64::new(0));
-    run_one(machine, "aborted", &[aborted(&dropped)])?;
-    json::emit("waits_dropped", |line| {
-        line.number("futures", dropped.load(Ordering::Relaxed));
-    });
-    Ok(())
-}
-
-fn run_one(machine: &Machine, title: &str, dags: &[Dag]) -> Result<(), AppError> {
-    finish_create_dags(dags)?;
-    let run: Run = machine.run()?;
-    let violations: Vec<String> = run.violations().map(|it| format!("{it}")).collect();
-    json::emit("waits_run", |line| {
-        line.text("title", title)
-            .text("violations", violations.join("; "))
-            .number("allocations", run.allocations());
-    });
-    Ok(())
-}
-
-/// One that panics after a wait in job 1, next to a healthy one.
-fn panics() -> Vec<Dag> {
-    let panics = numbered(|job| async move {
-        sleep(ms(2)).await;
-        assert_eq!(job, 0, "after a wait");
-    });
-    let healthy = || async {
-        sleep(ms(3)).await;
-    };
-    let terms = (Some(3), ms(10));
-    vec![
-        waiting("panics", terms, named("panics").wait(ms(2)), panics),
-        waiting("healthy", terms, named("rests").wait(ms(3)), healthy),
-    ]
-}
-
-/// One with a budget of 3 ms that does not count a wait of 10 ms, and is exceeded after that in job
-/// 1.
-fn overruns() -> Vec<Dag> {
-    let computes = numbered(|job| async move {
-        hold(2);
-        sleep(ms(10)).await;
-        hold(job * 5);
-    });
-    let attributes = named("computes").wait(ms(10)).budget(ms(3));
-    vec![waiting("overruns", (Some(3), PERIOD), attributes, computes)]
-}
-
-/// One that awaits what nobody will ever end.
-fn foreign() -> Vec<Dag> {
-    let awaits = || async {
-        pending::<()>().await;
-    };
-    let attributes = named("awaits").wait(ms(1));
-    vec![waiting("foreign", (Some(2), PERIOD), attributes, awaits)]
-}
-
-/// One that polls a wait after its end.
-fn again() -> Vec<Dag> {
-    let polls = || async {
-        let mut nap = pin!(sleep(ms(1)));
-        nap.as_mut().await;
-        nap.await;
-    };
-    let attributes = named("polls").wait(ms(1)).wait(ms(1));
-    vec![waiting("again", (Some(2), PERIOD), attributes, polls)]
-}
-
-/// One whose second subtask asks by what the first one was lent.
-fn passed_on() -> Vec<Dag> {
-    let (device, _) = create_device::<u8, u8>("silent");
-    let dag = create_dag();
-    (dag.name("passed on").jobs(2).period(PERIOD)).relative_deadline(PERIOD);
-    let lends = |asker: Asker<u8, u8>| async move {
-        let _ = asker.ask(1).await;
-        (Unique::new(asker),)
-    };
-    let lends = dag.using(device.asking()).async_source(lends);
-    (lends.writes(&["asker"])).register(named("lends").wait(ms(1)));
-    let asks =
-        |(asker,): (Unique<Asker<u8, u8>>,)| async move { _ = asker.into_inner().ask(2).await };
-    (dag.async_subtask(asks).reads(&["asker"])).register(named("asks").wait(ms(1)));
-    vec![dag]
-}
-
-/// One that returns without its wait.
-fn left_out() -> Vec<Dag> {
-    let attributes = named("returns").wait(ms(1));
-    vec![waiting(
-        "left out",
-        (Some(2), PERIOD),
-        attributes,
-        || async {},
-    )]
-}
-
-/// One that is ended, as a subtask panics, while the other waits.
-fn ended() -> Vec<Dag> {
-    let dag = create_dag();
-    (dag.name("ended").jobs(2)).in_flight(2);
-    dag.register_periodic_subtask(|| (0_u8, 0_u8), ["a", "b"], PERIOD, named("forks"));
-    let waits = |(_,): (u8,)| async {
-        sleep(ms(10)).await;
-        (0_u8,)
-    };
-    dag.register_async_subtask(waits, ["a"], ["c"], named("waits").wait(ms(15)));
-    let panics = |(_,): (u8,)| -> (u8,) {
-        hold(3);
-        panic!("while the other waits");
-    };
-    dag.register_subtask(panics, ["b"], ["d"], named("panics"));
-    dag.register_sink_subtask(|_: (u8, u8)| (), ["c", "d"], PERIOD, named("joins"));
-    vec![dag]
-}
-
-/// One that is paused while it waits.
-fn paused() -> Vec<Dag> {
-    let rests = || async {
-        sleep(ms(20)).await;
-    };
-    let rests = waiting(
-        "rests",
-        (Some(2), ms(30)),
-        named("rests").wait(ms(20)),
-        rests,
-    );
-    let pauses = create_dag();
-    (pauses.name("pauses").jobs(1).period(PERIOD)).relative_deadline(PERIOD);
-    pauses.offset(ms(10));
-    let pause = |mut rests: Switch<'_>| rests.pause();
-    let pause = pauses.using(rests.switching()).source(pause);
-    pause.register(named("pauses"));
-    vec![rests, pauses]
-}
-
-/// One without a last job, in a run that is ended while it waits.
-fn shut_down() -> Vec<Dag> {
-    let rests = || async {
-        sleep(ms(20)).await;
-    };
-    let rests = waiting(
-        "endless",
-        (None, ms(30)),
-        named("rests").wait(ms(25)),
-        rests,
-    );
-    let ends = create_dag();
-    (ends.name("ends").jobs(1).period(PERIOD)).relative_deadline(PERIOD);
-    ends.offset(ms(10));
-    let end = |mut run: Shutdown<'_>| run.request();
-    ends.using(shutting_down())
-        .source(end)
-        .register(named("ends"));
-    vec![rests, ends]
-}
-
-/// One whose jobs 0 and 1 are aborted by the next one while they wait.
-fn aborted(dropped: &Arc<AtomicU64>) -> Dag {
-    let dropped = Arc::clone(dropped);
-    let rests = move || {
-        let owned = Dropped(Arc::clone(&dropped));
-        async move {
-            sleep(ms(15)).await;
-            drop(owned);
-        }
-    };
-    let dag = waiting(
-        "aborted",
-        (Some(3), ms(10)),
-        named("rests").wait(ms(15)),
-        rests,
-    );
-    dag.in_flight(1).overrun(OverrunPolicy::Abort);
-    dag
 }

@@ -1,5 +1,5 @@
-//! Instances that wait: on one core and on several, undivided and in clusters, and where a fault or
-//! an end comes after a wait, or in it.
+//! Instances that wait: on one core and on several, undivided and in clusters. (Faults and ends, the
+//! scenarios tell.)
 //!
 //! Schedules are told as the events of instances in the order of the journal, with their times in
 //! milliseconds: a core is free at the same tenth at which a wait begins, and an instance goes on
@@ -8,7 +8,6 @@
 use harness::{Guest, Members, Said, lawful_runs};
 use sched_dag::journal::{Event, EventKind};
 use tool::Outcome;
-use tool::protocol::MachineLine;
 use tool::record::COUNTED_TOLERANCE_NS;
 use tool::record::Run;
 
@@ -152,96 +151,9 @@ fn each_wait_is_taken_in_real_time() {
         assert_eq!(right + timed_out, 4, "{}", line.text);
         let run = lawful_runs(&outcome, u64::MAX).remove(0);
         let camera = run.task_set.find("camera");
-        let is_told = |event: &Event| {
-            let preempts = matches!(event.what, EventKind::Suspend | EventKind::Resume);
-            event.dag == camera && !preempts
-        };
-        let jobs = told(&run, is_told, "ask");
-        assert_eq!(jobs.len(), 4);
-        for job in jobs {
-            let words: Vec<&str> = job.split(' ').skip(1).step_by(3).collect();
-            let whole = ["start", "wait", "wake", "wait", "wake", "finish"];
-            assert_eq!(words, whole, "{job}");
-        }
-    }
-}
-
-/// Runs of one line each, with the causes of their faults.
-const RUNS_WITH_FAULTS: [(&str, &str, &str); 10] = [
-    (
-        "panics",
-        "panic",
-        "0.0 start panics, 0.0 wait panics, 2.0 wake panics, 2.0 resume panics, 2.0 finish panics, 10.0 start panics, 10.0 wait panics, 12.0 wake panics, 12.0 resume panics, 12.0 ended panics",
-    ),
-    // A budget of 3 ms, of which 1 ms is left when the wait begins.
-    (
-        "overruns",
-        "budget overrun",
-        "0.0 start computes, 2.0 wait computes, 12.0 wake computes, 12.0 resume computes, 12.0 finish computes, 20.0 start computes, 22.0 wait computes, 32.0 wake computes, 32.0 resume computes, 33.0 ended computes",
-    ),
-    ("foreign", "panic", "0.0 start awaits, 0.0 ended awaits"),
-    // The waiting instance is gone with its DAG, and nothing waits for its limit.
-    (
-        "ended",
-        "panic",
-        "0.0 start forks, 0.0 finish forks, 0.0 start waits, 0.0 wait waits, 0.0 start panics, 3.0 ended panics, 3.0 cancelled waits, 3.0 cancelled joins",
-    ),
-    // No longer than its wait lasts.
-    (
-        "paused",
-        "",
-        "0.0 start rests, 0.0 wait rests, 20.0 wake rests, 20.0 resume rests, 20.0 finish rests",
-    ),
-    (
-        "shut down",
-        "",
-        "0.0 start rests, 0.0 wait rests, 20.0 wake rests, 20.0 resume rests, 20.0 finish rests",
-    ),
-    ("left out", "panic", "0.0 start returns, 0.0 ended returns"),
-    (
-        "again",
-        "panic",
-        "0.0 start polls, 0.0 wait polls, 1.0 wake polls, 1.0 resume polls, 1.0 ended polls",
-    ),
-    (
-        "passed on",
-        "panic",
-        "0.0 start lends, 0.0 wait lends, 1.0 wake lends, 1.0 resume lends, 1.0 finish lends, 1.0 start asks, 1.0 ended asks",
-    ),
-    // The next job's instance takes the place of the one that waits.
-    (
-        "aborted",
-        "",
-        "0.0 start rests, 0.0 wait rests, 10.0 cancelled rests, 10.0 start rests, 10.0 wait rests, 20.0 cancelled rests, 20.0 start rests, 20.0 wait rests, 35.0 wake rests, 35.0 resume rests, 35.0 finish rests",
-    ),
-];
-
-#[test]
-fn a_fault_or_an_end_comes_after_a_wait_or_in_it() {
-    for cores in [1, 4] {
-        let guest = Guest::test("waits_faults").cores(cores);
-        let outcome = guest.word("events=on").succeed();
-        let runs = lawful_runs(&outcome, COUNTED_TOLERANCE_NS);
-        let lines = outcome.lines("waits_run");
-        assert_eq!(
-            (runs.len(), lines.len()),
-            (RUNS_WITH_FAULTS.len(), RUNS_WITH_FAULTS.len())
-        );
-        for ((run, line), (title, _, expected)) in runs.iter().zip(lines).zip(RUNS_WITH_FAULTS) {
-            line.reads([("title", title), ("violations", "")]);
-            line.has([("allocations", 0)]);
-            // The first DAG is the one that it is about.
-            let found = told(run, |event| event.dag.0 == 0, "");
-            assert_eq!(found, [expected], "{title} on {cores} cores");
-        }
-        let causes =
-            |line: &&MachineLine| ["dag_name", "cause"].map(|name| line.member(name).to_owned());
-        let faults = outcome.lines("fault");
-        let faults: Vec<[String; 2]> = faults.iter().map(causes).collect();
-        let expected = RUNS_WITH_FAULTS.map(|(title, cause, _)| [title, cause]);
-        let expected = expected.into_iter().filter(|[_, cause]| !cause.is_empty());
-        assert!(expected.eq(faults), "{}", outcome.tail());
-        // That of each job, whether it was aborted or not.
-        outcome.line("waits_dropped").has([("futures", 3)]);
+        let of_camera = run.events.iter().filter(|event| event.dag == camera);
+        let [waits, wakes] = [EventKind::Wait, EventKind::Wake]
+            .map(|what| of_camera.clone().filter(|event| event.what == what).count());
+        assert_eq!((waits, wakes), (8, 8), "two of each job");
     }
 }

@@ -58,11 +58,17 @@ pub(crate) fn spin(us: u64) {
     execute_for(Duration::from_micros(us), Occupation::Spin);
 }
 
+/// A DAG whose deadline is its period.
+pub(crate) fn every(period: Duration, name: &str) -> Dag {
+    let dag = create_dag();
+    dag.name(name).period(period).relative_deadline(period);
+    dag
+}
+
 /// A DAG that is a chain of so many subtasks, each of which computes for `us` in each job.
 pub(crate) fn chain(name: &str, links: usize, jobs: u64, period: Duration, us: u64) -> Dag {
-    let dag = create_dag();
-    dag.name(name).jobs(jobs);
-    dag.period(period).relative_deadline(period);
+    let dag = every(period, name);
+    dag.jobs(jobs);
     let compute =
         |_| dag.register_untyped_subtask(move |_job| spin(us), SubtaskAttributes::default());
     let subtasks: Vec<_> = (0..links).map(compute).collect();

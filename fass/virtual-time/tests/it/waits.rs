@@ -1,13 +1,11 @@
-//! Subtasks that wait: what a device answers and when, what is left of futures, and each fault. (The
-//! schedules, the scenarios tell.)
+//! Subtasks that wait: limits and shapes of the API, each fault of a wait, and replays. (The schedules,
+//! the scenarios tell.)
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use crate::support::{MS, Seen, commit, every, job_numbers, ms, named, run, taking, work};
+use crate::support::{MS, Seen, commit, every, job_numbers, ms, named, run, taking};
 use fass::shared::{Asker, DeviceDriver, TimedOut, create_device};
-use fass::{Dag, OverrunPolicy, SubtaskAttributes, WaitFault, sleep, until};
+use fass::{Dag, SubtaskAttributes, WaitFault, sleep, until};
 use random::Random;
 use virtual_time::{Report, VirtualTime};
 
@@ -35,33 +33,6 @@ fn responses_ms(report: &Report, dag: &str) -> Vec<u64> {
 }
 
 #[test]
-fn nothing_is_seen_of_an_instance_before_it_has_returned() {
-    let dag = every(20, "pair");
-    dag.jobs(2);
-    let latest = dag.latest::<u64>("time");
-    let (kept, keep) = Seen::shared();
-    let source = move || async move {
-        work(1);
-        sleep(ms(4)).await;
-        (fass::now_ns() / MS,)
-    };
-    let source = dag.async_source(source).writes(&["time"]);
-    source.register(named("source").wait(ms(5)));
-    let sink = move |(time,): (u64,)| keep.add((time, fass::now_ns() / MS));
-    dag.subtask(sink).reads(&["time"]).register(named("sink"));
-    let reader = every(4, "reader");
-    reader.jobs(3);
-    let (samples, sample) = Seen::shared();
-    let read = move |of: Option<fass::shared::Sample<'_, u64>>| sample.add(of.map(|of| *of.value));
-    let read = reader.using(latest.sample()).source(read);
-    read.register(named("read").priority(9));
-    let report = run(&VirtualTime::new().cores(2), &[dag, reader]);
-    assert_eq!(kept.all(), [(5, 5), (25, 25)]);
-    assert_eq!(samples.all(), [None, None, Some(5)], "at 0, 4 and 8 ms");
-    assert_eq!(report.dag("pair").subtask("source")[0].execution_ns, MS);
-}
-
-#[test]
 fn an_instant_of_the_job_counts_from_its_release() {
     let urgent = sleeper("b", 0, 3, &[]);
     let dag = every(20, "a");
@@ -78,45 +49,6 @@ fn an_instant_of_the_job_counts_from_its_release() {
     let report = run(&VirtualTime::new(), &[urgent, dag]);
     // It starts 3 ms late in its first job, and that changes nothing.
     assert_eq!(responses_ms(&report, "a"), [10, 10]);
-}
-
-/// Asks a device in each of 5 jobs, whose answers come when `answers` says, and returns what the
-/// function got, and the response times in milliseconds. The limit is 5 ms, segments take 1 ms.
-fn asking(
-    answers: impl FnMut(u64, u64) -> Vec<(Duration, u64)> + 'static,
-) -> (Vec<Result<u64, TimedOut>>, Vec<u64>) {
-    let (device, driver) = create_device::<u64, u64>("accelerator");
-    let (kept, keep) = Seen::shared();
-    let dag = every(20, "ask");
-    dag.jobs(5);
-    let mut job = 0;
-    let ask = move |device: Asker<u64, u64>| {
-        let (asked, keep) = (job, keep.clone());
-        job += 1;
-        async move { keep.add(device.ask(asked * 10).await) }
-    };
-    let ask = dag.using(device.asking()).async_source(ask);
-    ask.register(taking("ask", 1).wait(ms(5)).wcet(ms(1)));
-    let machine = VirtualTime::new();
-    commit(&[dag]);
-    machine.answers(driver, answers);
-    let report = machine.run();
-    assert_eq!(report.violations(), []);
-    (kept.all(), responses_ms(&report, "ask"))
-}
-
-#[test]
-fn a_device_that_answers_twice_late_or_never_changes_nothing_else() {
-    let (got, responses) = asking(|question, job| match job {
-        0 => vec![(ms(2), question), (ms(2), 99), (ms(4), 98)],
-        // In the midst of the wait of the next job.
-        1 => vec![(ms(22), 97)],
-        3 => vec![],
-        // At once, and at the very instant of the limit, which counts.
-        _ => vec![(ms(if job == 2 { 0 } else { 5 }), question)],
-    });
-    let expected = [Ok(0), Err(TimedOut), Ok(20), Err(TimedOut), Ok(40)];
-    assert_eq!((got, responses), (expected.into(), vec![4, 7, 2, 7, 7]));
 }
 
 #[test]
@@ -251,156 +183,6 @@ fn each_wait_that_is_not_as_stated_is_a_fault_with_a_name() {
     }
     codes.dedup();
     assert_eq!(codes, WaitFault::CODES);
-}
-
-#[test]
-fn what_cannot_wait_or_is_asked_twice_is_a_fault_of_the_commit() {
-    let machine = VirtualTime::new();
-    let dag = every(20, "wrong");
-    let (device, _driver) = create_device::<(), ()>("sonar");
-    let ask = |sonar: Asker<(), ()>| async move { _ = sonar.ask(()).await };
-    for name in ["one", "two"] {
-        let ask = dag.using(device.asking()).async_source(ask);
-        ask.register(named(name).wait(ms(1)));
-    }
-    dag.source(|| ()).register(named("plain").wait(ms(1)));
-    dag.survive_faults(fass::FaultLimit {
-        faults: 1,
-        window: 1,
-        in_all: 1,
-    });
-    let anew = dag.restarting(|| |()| ());
-    anew.register(named("anew").wait(ms(1)));
-    let partly = taking("partly", 1).wait(ms(1)).wait(ms(1)).wcet(ms(1));
-    dag.async_source(|| sleep(ms(1))).register(partly);
-    let construction = fass::commit::ConstructionPolicy {
-        sources: fass::commit::CountLimit::Several,
-        sinks: fass::commit::CountLimit::Several,
-        parts: fass::commit::CountLimit::Several,
-        ..fass::commit::ConstructionPolicy::paper()
-    };
-    let error = fass::commit::finish_create_dags_with(&[dag], construction);
-    let error = error.expect_err("four subtasks are wrong");
-    assert_eq!(
-        error.to_string(),
-        "subtask `plain` of dag `wrong` states waits, and its function is not async; register an \
-         async one, or state no waits\n\
-         subtask `anew` of dag `wrong` states waits, and has another function for after a fault, \
-         which could not have the place of a future that the fault has ended; register an async \
-         one alone, or state no waits\n\
-         subtask `two` of dag `wrong` asks device `sonar`, which another subtask asks; make a \
-         device for each\n\
-         subtask `partly` of dag `wrong` waits, and not each of its segments has a WCET above 0; \
-         give one to each, or to none"
-    );
-    drop(machine);
-}
-
-/// Counts how often one was dropped.
-struct Dropped(Arc<AtomicUsize>);
-
-impl Drop for Dropped {
-    fn drop(&mut self) {
-        self.0.fetch_add(1, Ordering::Relaxed);
-    }
-}
-
-#[test]
-fn the_future_of_an_aborted_job_is_dropped_and_its_wait_taken_back() {
-    let drops = Arc::<AtomicUsize>::default();
-    let (kept, keep) = Seen::shared();
-    let dag = every(10, "abort");
-    dag.jobs(4).in_flight(1).overrun(OverrunPolicy::Abort);
-    let (dropped, mut job) = (Arc::clone(&drops), 0);
-    let f = move || {
-        keep.add((job, dropped.load(Ordering::Relaxed)));
-        let (held, long) = (Dropped(Arc::clone(&dropped)), job == 1);
-        job += 1;
-        async move {
-            sleep(if long { ms(30) } else { ms(2) }).await;
-            drop(held);
-        }
-    };
-    dag.async_source(f)
-        .register(taking("f", 1).wait(ms(30)).wcet(ms(1)));
-    let report = run(&VirtualTime::new(), &[dag]);
-    // Job 1 is aborted in its wait, at the release of job 2.
-    let counts = report.dag("abort").statistics();
-    assert_eq!((counts.completed, counts.aborts), (3, 1));
-    assert_eq!(responses_ms(&report, "abort"), [4, 10, 4, 4]);
-    assert_eq!(kept.all(), [(0, 0), (1, 1), (2, 2), (3, 3)]);
-    assert_eq!(drops.load(Ordering::Relaxed), 4);
-}
-
-#[test]
-fn a_fault_that_costs_a_job_ends_the_waits_of_that_job() {
-    let machine = VirtualTime::new().cores(2).contain_panics();
-    let drops = Arc::<AtomicUsize>::default();
-    let dag = every(20, "both");
-    dag.jobs(3).survive_faults(fass::FaultLimit {
-        faults: 1,
-        window: 1,
-        in_all: 1,
-    });
-    dag.source(job_numbers(0))
-        .writes(&["go"])
-        .register(named("go"));
-    let (kept, keep) = Seen::shared();
-    let held = Arc::clone(&drops);
-    let waits = move |(job,): (u64,)| {
-        let (held, keep) = (Dropped(Arc::clone(&held)), keep.clone());
-        keep.add((job, held.0.load(Ordering::Relaxed)));
-        async move {
-            sleep(ms(5)).await;
-            drop(held);
-            (job,)
-        }
-    };
-    let waits = dag.async_subtask(waits).reads(&["go"]).writes(&["a"]);
-    waits.register(named("waits").wait(ms(5)));
-    let fails = || {
-        |(job,): (u64,)| {
-            work(3);
-            assert_ne!(job, 1, "worn out");
-            (job,)
-        }
-    };
-    let fails = dag.restarting(fails).reads(&["go"]).writes(&["b"]);
-    fails.register(named("fails"));
-    let sink = |(a, b): (u64, u64)| assert_eq!(a, b);
-    dag.subtask(sink).reads(&["a", "b"]).register(named("sink"));
-    let report = run(&machine, &[dag]);
-    let counts = report.dag("both").statistics();
-    assert_eq!((counts.completed, counts.failed), (2, 1));
-    // The future of job 1 is dropped by job 2, before its function is called.
-    assert_eq!(kept.all(), [(0, 0), (1, 1), (2, 2)]);
-    assert_eq!(drops.load(Ordering::Relaxed), 3);
-}
-
-#[test]
-fn a_budget_counts_what_all_segments_execute() {
-    let machine = VirtualTime::new().contain_panics();
-    let dag = every(50, "budget");
-    dag.jobs(2);
-    let mut job = 0;
-    let f = move || {
-        let takes = [2, 3][job];
-        job += 1;
-        async move {
-            work(takes);
-            sleep(ms(20)).await;
-            work(2);
-        }
-    };
-    let attributes = named("f").budget(ms(4)).wait(ms(20));
-    dag.async_source(f).register(attributes);
-    let report = run(&machine, &[dag]);
-    assert_eq!(report.dag("budget").statistics().completed, 1);
-    assert_eq!(
-        report.panics[0].message,
-        "executed for more than its budget of 4ms"
-    );
-    assert_eq!(report.end_ns, 74 * MS, "3 and 1 after a wait of 20");
 }
 
 #[test]
