@@ -19,27 +19,19 @@ const WRONG: &str = r#"
 cycle.dag | end | edge b -> a/end | cycle.dag:5: dag `x` has a cycle: subtask `a` -> subtask `b` -> subtask `a`; remove one
 cycle.yaml | target: 1 | target: 1/- source: 1/  target: 0 | cycle.yaml:10: dag `cycle` has a cycle
 cycle.json | [1,2] | [1,0] | cycle.json:2: dag `a` has a cycle
-key.dag | b wcet | b wect | key.dag:3: unknown key `wect`; a subtask has
 key.yaml | period | perod | key.yaml:4: unknown key `perod`; a node has
-missing.dag | -> b | -> z | missing.dag:4: no subtask `z` stands before this line
 missing.yaml | target: 1 | target: 7 | missing.yaml:9: target: there is no node `7`; add it
-negative.dag | 10ms | -10ms | negative.dag:1: period: `-10ms` is negative; give
 negative.yaml | 5 | -5 | negative.yaml:3: execution_time: `-5` is negative
-overflow.dag | 10ms | 99999999999s | overflow.dag:1: period: `99999999999s` is more than 64 bits
 overflow.yaml | 5 | 99999999999999 | overflow.yaml:3: execution_time: `99999999999999` units of 1ms
 path.yaml | 5/.. | 9000000000000/- id: 1/  execution_time: 18000000000000/links:/- source: 0/  target: 1/ | path.yaml:2: the longest path of dag `path` is more than 64 bits
 zero.yaml | period: 9 | period: 0 | zero.yaml:4: period: it is 0; give more
-zero.dag | a wcet 1ms | a wcet 0ns | zero.dag:2: wcet: it is 0
 late.dag | 10ms | 500000000s offset 18000000000s | late.dag:1: the deadline of the first job of dag `x`
-empty.dag | dag.. |  | empty.dag:1: the file ends where a `dag` record should be; it is empty
 empty.yaml | nodes.. |  | empty.yaml:1: the file is empty
-cut.dag | end/ |  | cut.dag:5: the file ends where `end` should be; a part of it is missing
 cut.yaml |   target: 1/ |  | cut.yaml:8: this link lacks its `source` or its `target`; give both
 both.yaml | target: 1 | target: 1/edges: [] | both.yaml:10: `links` and `edges` both list the edges; keep one
 amid.json | 2,4 | 0,4 | amid.json:2: graph `a`: vertex 1 has cost 0 and stands between others
 same.json | ]}] | ]},/{"name":"a","c":[1]}] | same.json:3: graph `a` stands here twice, first on line 2; rename one
 other.json | graphs | apps | other.json:1: the file has no `graphs`; of JSON a task graph set is read
-brace.dag | dag x | dag {x | brace.dag:1: `{x` is no name
 graph.txt | dag.. | nodes:/ | (read as our format; a name in .yaml or .yml tells RD-Gen's
 "#;
 

@@ -9,7 +9,7 @@ use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use cases::{CASES, PERIOD};
+use cases::{CASES, GRAPHS, PERIOD};
 use fass::{WaitFault, finish_create_dags};
 use harness::fault_page::{self, documented_faults, is_said_by, table};
 use harness::markdown::page;
@@ -83,59 +83,42 @@ fn refused(_machine: virtual_time::VirtualTime, dag: fass::Dag) -> fass::commit:
     fass::commit::finish_create_dags_with(&[dag], any_graph).expect_err("there is a fault")
 }
 
-fn no_cores() -> Vec<DagFault> {
-    let options = CommitOptions::new(Policy::Edf, 0);
-    faults(&[lidar()], &options)
-}
-
-fn edge_out_of_range() -> Vec<DagFault> {
-    let mut dag = lidar();
-    dag.subtasks.push(SubtaskSpec::default());
-    dag.edges.push((0, 1));
-    faults(&[dag], &CommitOptions::new(Policy::Edf, 1))
-}
-
-fn arity_too_large() -> Vec<DagFault> {
+/// Faults that `fass` rules out by its types.
+fn of_the_model() -> Vec<DagFault> {
+    let one = CommitOptions::new(Policy::Edf, 1);
     let topic = |number: u32| TopicPort {
         topic: format!("points {number}"),
         type_id: TypeId::of::<u32>(),
         type_name: "u32",
         can_fan_out: true,
     };
-    let mut dag = lidar();
-    dag.subtasks.push(SubtaskSpec {
-        name: "read".into(),
-        outputs: (0..17).map(topic).collect(),
-        ..SubtaskSpec::default()
-    });
-    faults(&[dag], &CommitOptions::new(Policy::Edf, 1))
-}
-
-fn too_many_dags() -> Vec<DagFault> {
+    let with = |name: &str, edges: &[(usize, usize)], outputs: u32| DagSpec {
+        edges: edges.to_vec(),
+        subtasks: vec![SubtaskSpec {
+            name: name.into(),
+            outputs: (0..outputs).map(topic).collect(),
+            ..SubtaskSpec::default()
+        }],
+        ..lidar()
+    };
     // 2^32 of them take 1 TiB: only the value is made.
-    vec![DagFault::TooManyDags { count: 1 << 32 }]
-}
-
-fn too_many_subtasks() -> Vec<DagFault> {
-    // 2^32 of them take 1 TiB: only the value is made.
-    let dag = label();
-    vec![DagFault::TooManySubtasks {
-        dag,
-        count: 1 << 32,
-    }]
+    let count = 1 << 32;
+    let (id, name) = (DagId(0), "lidar".into());
+    let dag = DagLabel { id, name };
+    [
+        faults(&[lidar()], &CommitOptions::new(Policy::Edf, 0)),
+        faults(&[with("", &[(0, 1)], 0)], &one),
+        faults(&[with("read", &[], 17)], &one),
+        vec![DagFault::TooManyDags { count }],
+        vec![DagFault::TooManySubtasks { dag, count }],
+    ]
+    .concat()
 }
 
 fn lidar() -> DagSpec {
     DagSpec {
         name: "lidar".into(),
         ..DagSpec::default()
-    }
-}
-
-fn label() -> DagLabel {
-    DagLabel {
-        id: DagId(0),
-        name: "lidar".into(),
     }
 }
 
@@ -147,16 +130,9 @@ fn faults(dags: &[DagSpec], options: &CommitOptions) -> Vec<DagFault> {
 #[test]
 fn every_fault_is_found_and_said_as_documented() {
     let documented = documented_faults();
-    let mut said = BTreeMap::<String, String>::new();
-    for faults in [
-        no_cores(),
-        edge_out_of_range(),
-        arity_too_large(),
-        too_many_dags(),
-        too_many_subtasks(),
-    ] {
-        said.extend(faults.iter().map(|it| (it.code().into(), it.to_string())));
-    }
+    let of_the_model = of_the_model().into_iter();
+    let of_the_model = of_the_model.map(|fault| (fault.code().into(), fault.to_string()));
+    let mut said: BTreeMap<String, String> = of_the_model.collect();
     for refused in [
         not_launched(),
         wcets_refused(),
@@ -171,11 +147,16 @@ fn every_fault_is_found_and_said_as_documented() {
 
     let machine = virtual_time::VirtualTime::new();
     let _machine = machine.policy(fass::Policy::StaticPriority);
-    for (code, build) in CASES {
-        let refused = finish_create_dags(&build()).expect_err(code);
-        let fault = refused.faults().iter().find(|fault| fault.code() == *code);
+    let graphs = GRAPHS
+        .lines()
+        .map(|row| row.split_once(" = ").expect("a fault's name"));
+    let graphs = graphs.map(|(code, text)| (code, vec![cases::dag(text)]));
+    let others = CASES.iter().map(|(code, build)| (*code, build()));
+    for (code, dags) in graphs.chain(others) {
+        let refused = finish_create_dags(&dags).expect_err(code);
+        let fault = refused.faults().iter().find(|fault| fault.code() == code);
         let fault = fault.unwrap_or_else(|| panic!("not {code}: {refused}"));
-        said.insert((*code).to_string(), fault.to_string());
+        said.insert(code.to_string(), fault.to_string());
     }
     for (code, text) in &said {
         fault_page::assert_is(code, &documented[code], text);
