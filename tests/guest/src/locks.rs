@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use fass::{Dag, Occupation, SubtaskAttributes, create_dag, execute_for};
-use kernel::{AppError, Lock, Machine, json, println};
+use kernel::{AppError, Lock, Machine, json};
 
 use crate::single::named;
 
@@ -18,27 +18,24 @@ const fn us(us: u64) -> Duration {
     Duration::from_micros(us)
 }
 
-/// Runs them with a longest section of `longest=US`, or none, and sections of `section=US`.
+/// The time of each section, in microseconds, which is a little less than the lock states.
+const SECTION_US: u64 = 300;
+
+/// Runs them.
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     machine.offer_overheads()?;
-    let options = machine.options();
-    let longest_us = options.number("longest", 0..=1000, 0)?;
-    let section_us = options.number("section", 0..=1000, 300)?;
-    options.finish(&["test", "longest", "section", "overheads"])?;
-    let lock = Lock::new("registers", 0_u64);
-    let lock: &'static Lock<u64> = Box::leak(Box::new(match longest_us {
-        0 => lock,
-        longest_us => lock.longest(us(longest_us)),
-    }));
+    machine.options().finish(&["test", "overheads"])?;
+    let lock = Lock::new("registers", 0_u64).longest(us(SECTION_US + 10));
+    let lock: &'static Lock<u64> = Box::leak(Box::new(lock));
     let enter = move || {
         lock.with(|count| {
-            execute_for(us(section_us), Occupation::Hold);
+            execute_for(us(SECTION_US), Occupation::Hold);
             *count += 1;
         });
     };
-    let mut dags = Vec::from([proven(lock, enter, us(section_us))]);
+    let mut dags = Vec::from([proven(lock, enter, us(SECTION_US))]);
     for core in 0..machine.cores() {
-        let attributes = named("low").priority(9).wcet(us(3 * section_us + 30));
+        let attributes = named("low").priority(9).wcet(us(3 * SECTION_US + 30));
         let dag = create_dag();
         // It comes a little later in each job of the proven one.
         let period = us(16_013 + u64::from(core));
@@ -51,12 +48,10 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     }
     let commit = fass::finish_create_dags(&dags)?;
     let answer = commit.answer("proven");
-    println!("{answer}");
     let bound_ns = answer.verdict.bound().map_or(0, |bound| bound.as_nanos());
     let run = machine.run()?;
     json::emit("locks", |line| {
-        line.text("answer", format!("{answer}"))
-            .number("bound_ns", u64::try_from(bound_ns).unwrap_or(u64::MAX))
+        line.number("bound_ns", u64::try_from(bound_ns).unwrap_or(u64::MAX))
             .number(
                 "longest_ns",
                 run.response_times_ns("proven").max().unwrap_or(0),

@@ -74,14 +74,9 @@ fn faults_are_contained(guest: &Guest) {
 
 #[test]
 fn faults_of_a_subtask_end_its_dag_alone() {
-    for cores in [1, 2, 4] {
-        faults_are_contained(&Guest::new("faults").cores(cores));
+    for (cores, words) in [(1, ""), (2, ""), (4, ""), (2, "clusters=1,1")] {
+        faults_are_contained(&Guest::new("faults").cores(cores).word(words));
     }
-}
-
-#[test]
-fn faults_of_a_subtask_end_its_dag_alone_in_its_cluster() {
-    faults_are_contained(&Guest::new("faults").cores(2).word("clusters=1,1"));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::thread;
 
-use crate::support::{alone, alone_on, breaches, chain, mechanisms, ms};
+use crate::support::{alone, alone_on, breaches, chain, every, mechanisms, ms};
 use fass::platform;
 use fass::shared::Parameter;
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
@@ -93,9 +93,7 @@ fn s1_signals_come_from_other_threads_and_from_files() {
 fn a_dag_is_paused_resumed_and_stopped_from_outside() {
     for mechanism in mechanisms() {
         let alone = alone(1, mechanism);
-        let endless = create_dag();
-        endless.name("endless");
-        endless.period(ms(1)).relative_deadline(ms(1));
+        let endless = every(ms(1), "endless");
         let ticks = Arc::new(AtomicU64::new(0));
         let count = Arc::clone(&ticks);
         let tick = move |_job| _ = count.fetch_add(1, Relaxed);

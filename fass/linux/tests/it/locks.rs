@@ -5,9 +5,9 @@ use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::thread;
 
-use crate::support::{alone, breaches, mechanisms, ms, spin};
+use crate::support::{alone, breaches, every, mechanisms, ms, spin};
 use fass::shared::Lock;
-use fass::{FaultLimit, SubtaskAttributes, create_dag, finish_create_dags};
+use fass::{SubtaskAttributes, finish_create_dags};
 use linux::Mechanism;
 
 #[test]
@@ -16,11 +16,8 @@ fn sections_of_a_lock_exclude_each_other() {
     for mechanism in mechanisms() {
         let alone = alone(2, mechanism);
         let of = |name: &str| {
-            let dag = create_dag();
-            dag.name(name)
-                .jobs(100)
-                .period(ms(1))
-                .relative_deadline(ms(1));
+            let dag = every(ms(1), name);
+            dag.jobs(100);
             let add = |[first, second]: &mut [u64; 2]| {
                 *first += 1;
                 spin(20);
@@ -39,63 +36,13 @@ fn sections_of_a_lock_exclude_each_other() {
     }
 }
 
-#[test]
-fn a_panic_in_a_section_loses_the_lock_and_what_is_not_stated_is_refused() {
-    static LOST: Lock<u64> = Lock::new("lost", 0);
-    static OTHER: Lock<u64> = Lock::new("other", 0);
-    let alone = alone(1, Mechanism::Normal);
-    let dag = create_dag();
-    dag.name("careless")
-        .jobs(3)
-        .period(ms(20))
-        .relative_deadline(ms(20));
-    dag.survive_faults(FaultLimit {
-        faults: 1,
-        window: 1,
-        in_all: 9,
-    });
-    let mut jobs = 0_u32..;
-    let source = dag.source(move || (jobs.next().unwrap_or(3),));
-    source
-        .writes(&["job"])
-        .register(SubtaskAttributes::named("source"));
-    let make = || {
-        |(), (job,): (u32,)| match job {
-            0 => LOST.with(|_| panic!("in a section")),
-            1 => LOST.with(|_| ()),
-            _ => OTHER.with(|_| ()),
-        }
-    };
-    let enter = dag.using(LOST.entering(1)).restarting(make);
-    (enter.reads(&["job"]).due(ms(20))).register(SubtaskAttributes::named("enter"));
-    finish_create_dags(&[dag]).unwrap();
-    let run = alone.machine.run().unwrap();
-    let causes: Vec<&str> = run
-        .faults()
-        .iter()
-        .map(|fault| fault.cause.as_str())
-        .collect();
-    let expected = [
-        "in a section",
-        "lock `lost`: a fault has ended a section, and its data may be half changed",
-        "lock `other`: the subtask enters a section and has not stated that, by \
-         `dag.using(lock.entering(N))`",
-    ];
-    assert_eq!(causes, expected);
-}
-
 /// Has a section end by a fault that leaves its thread there, while another instance waits.
 pub(crate) fn lose(section: fn(), cause: &str) {
     for mechanism in mechanisms() {
         let alone = alone(2, mechanism);
         let lost: &Lock<()> = Box::leak(Box::new(Lock::new("lost", ())));
         let is_in: &AtomicBool = Box::leak(Box::default());
-        let dags = ["ends", "waits"].map(|name| {
-            let dag = create_dag();
-            dag.name(name).jobs(1).period(ms(50));
-            dag.relative_deadline(ms(50));
-            dag
-        });
+        let dags = ["ends", "waits"].map(|name| every(ms(50), name).jobs(1).clone());
         let end = move |()| {
             lost.with(|()| {
                 is_in.store(true, Relaxed);
@@ -138,9 +85,8 @@ fn a_thread_of_the_apps_own_enters_no_section_while_a_run_goes_on() {
     static FREE: Lock<u64> = Lock::new("free", 0);
     let enter = || thread::spawn(|| FREE.with(|count| *count += 1)).join();
     let alone = alone(1, Mechanism::Normal);
-    let dag = create_dag();
-    dag.name("spawns").jobs(1).period(ms(20));
-    dag.relative_deadline(ms(20));
+    let dag = every(ms(20), "spawns");
+    dag.jobs(1);
     let spawns = move |_| resume_unwind(enter().expect_err("it is refused"));
     dag.register_untyped_subtask(spawns, SubtaskAttributes::named("spawns"));
     finish_create_dags(&[dag]).unwrap();

@@ -6,8 +6,8 @@ use std::sync::mpsc;
 use std::thread;
 
 use crate::locks;
-use crate::support::{alone, breaches, chain, mechanisms, ms};
-use fass::{SubtaskAttributes, create_dag, finish_create_dags, sleep};
+use crate::support::{alone, breaches, chain, every, mechanisms, ms};
+use fass::{SubtaskAttributes, finish_create_dags, sleep};
 use linux::Control;
 
 /// Panics when it is dropped.
@@ -62,14 +62,7 @@ fn run_all() {
     for mechanism in mechanisms() {
         for (how, cause) in (0..).zip(causes) {
             let alone = alone(2, mechanism);
-            let [plain, waits] = ["plain", "waits"].map(|name| {
-                let dag = create_dag();
-                dag.name(name)
-                    .jobs(4)
-                    .period(ms(2))
-                    .relative_deadline(ms(2));
-                dag
-            });
+            let [plain, waits] = ["plain", "waits"].map(|name| every(ms(2), name).jobs(4).clone());
             let plainly = move |job| {
                 if job == 2 {
                     fail(how);
@@ -122,11 +115,8 @@ fn what_a_run_leaves_is_dropped_under_no_lock() {
     for mechanism in mechanisms() {
         let alone = alone(1, mechanism);
         let (told, tell) = mpsc::channel();
-        let (dag, asks) = (create_dag(), Asks(told));
-        dag.name("asks")
-            .jobs(1)
-            .period(ms(2))
-            .relative_deadline(ms(2));
+        let (dag, asks) = (every(ms(2), "asks"), Asks(told));
+        dag.jobs(1);
         let own = move |_| _ = &asks;
         dag.register_untyped_subtask(own, SubtaskAttributes::named("owns"));
         finish_create_dags(&[dag]).unwrap();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::support::{every, ms, named, taking, ticking, work};
+use crate::support::{every, ms, taking, ticking, work};
 use fass::commit::{
     Commit, ConstructionPolicy, DagAnswer, Fault, OverheadSource, Overheads,
     finish_create_dags_with,
@@ -144,42 +144,6 @@ fn cores_are_divided_for_a_proof_unless_that_parts_the_dags_of_modes() {
 }
 
 #[test]
-fn dags_without_all_wcets_say_so() {
-    let machine = VirtualTime::new().policy(Policy::StaticPriority);
-    let unknown = every(10, "unknown");
-    let source = unknown.register_untyped_subtask(|_| (), taking("source", 1).priority(1));
-    let sink = unknown.register_untyped_subtask(|_| (), named("sink").priority(1));
-    unknown.precede(&source, &sink).jobs(50);
-    let urgent = chain("urgent", 0, [10, 10], [1, 1]);
-    let lax = chain("lax", 2, [10, 10], [1, 1]);
-    let reason = "no WCET above 0 is given for subtask `sink`";
-    let expected = [
-        ["dag `unknown` is not proven", reason],
-        ["dag `urgent` takes at most 2ms", ""],
-        ["dag `lax` is not proven", "dag `unknown`"],
-    ];
-    let (commit, _) = answered(&machine, &[unknown, urgent, lax], &expected);
-    let first = commit.first_unproven().expect("one fails first");
-    assert_eq!(first.dag.name, "unknown");
-}
-
-#[test]
-fn dags_that_are_pinned_to_one_core_are_bounded() {
-    let machine = VirtualTime::new().policy(Policy::StaticPriority);
-    let pinned = ["left", "right"].map(|name| {
-        let dag = every(10, name);
-        dag.register_untyped_subtask(|_| (), taking(name, 1).core(0));
-        dag.jobs(50).clone()
-    });
-    let expected = ["left", "right"].map(|name| format!("dag `{name}` takes at most 2ms"));
-    answered(
-        &machine,
-        &pinned,
-        &expected.each_ref().map(|text| [text.as_str(), ""]),
-    );
-}
-
-#[test]
 fn what_is_certain_to_miss_is_accepted_with_a_warning() {
     let machine = VirtualTime::new().policy(Policy::Edf);
     let long = chain("long", 0, [10, 9], [5, 5]);
@@ -228,34 +192,6 @@ fn overheads_are_added_to_every_wcet() {
     let tight = chain("tight", 0, [10, 5], [2, 3]);
     tight.demand_proof();
     assert_eq!(codes(&[tight]), ["not_proven"]);
-}
-
-#[test]
-fn the_bound_counts_the_precedence_of_a_state() {
-    for (shares, said) in [
-        (false, "dag `map` takes at most 11ms"),
-        (true, "dag `map` takes at most 21ms"),
-    ] {
-        let machine = VirtualTime::new().cores(3);
-        let dag = every(100, "map");
-        dag.jobs(1);
-        let source = dag.register_untyped_subtask(|_| work(1), taking("source", 1));
-        let state = shares.then(|| dag.state("state", 0));
-        for name in ["left", "right"] {
-            let attributes = taking(name, 10);
-            let branch = match &state {
-                Some(state) => (dag.using(state.update()))
-                    .register_untyped_subtask(|_: &mut i32, _| work(10), attributes),
-                None => dag.register_untyped_subtask(|_| work(10), attributes),
-            };
-            dag.precede(&source, &branch);
-        }
-        let any_graph = ConstructionPolicy::any_graph();
-        let commit = finish_create_dags_with(&[dag], any_graph).expect("nothing is wrong");
-        let text = commit.answer("map").to_string();
-        assert!(text.starts_with(said), "{text}");
-        assert_eq!(machine.run().violations(), []);
-    }
 }
 
 #[test]

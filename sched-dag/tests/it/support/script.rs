@@ -14,7 +14,6 @@ use super::{Takes, ask, kind, line, told};
 pub(crate) struct Script<'a, T> {
     takes: T,
     fails: Box<dyn Fn(Instance) -> bool + 'a>,
-    is_replaceable: Box<dyn Fn(Instance) -> bool + 'a>,
     requests: VecDeque<(u64, Request)>,
     /// At which DAG's completions which DAG gets a signal.
     chained: Option<(DagId, DagId)>,
@@ -25,7 +24,6 @@ impl<'a, T: Takes> Script<'a, T> {
         Self {
             takes,
             fails: Box::new(|_| false),
-            is_replaceable: Box::new(|_| true),
             requests: VecDeque::new(),
             chained: None,
         }
@@ -34,14 +32,6 @@ impl<'a, T: Takes> Script<'a, T> {
     pub(crate) fn failing(self, fails: impl Fn(Instance) -> bool + 'a) -> Self {
         let fails = Box::new(fails);
         Self { fails, ..self }
-    }
-
-    pub(crate) fn replacing(self, is: impl Fn(Instance) -> bool + 'a) -> Self {
-        let is_replaceable = Box::new(is);
-        Self {
-            is_replaceable,
-            ..self
-        }
     }
 
     pub(crate) fn asking(self, requests: impl IntoIterator<Item = (u64, Request)>) -> Self {
@@ -77,10 +67,6 @@ impl<T: Takes> Workload for Script<'_, T> {
             self.requests.push_front((0, Request::Signal(to)));
         }
         (self.fails)(instance)
-    }
-
-    fn is_replaceable(&mut self, instance: Instance) -> bool {
-        (self.is_replaceable)(instance)
     }
 
     fn next_request_ns(&self) -> Option<u64> {
