@@ -89,38 +89,3 @@ fn latencies_stay_below_what_the_commit_promises() {
         }
     }
 }
-
-#[test]
-fn a_recorded_run_is_replayed_on_all_cores_and_policies() {
-    let build = |seed| {
-        let system = Workload {
-            seed,
-            ..workload(100, 50)
-        }
-        .build();
-        system.record();
-        finish_create_dags_with(&system.dags, construction()).expect("a sound system");
-        system
-    };
-    let machine = VirtualTime::new().cores(4).policy(Policy::StaticPriority);
-    let recorded = build(1);
-    machine.run();
-    let (recording, wanted) = (machine.recording(), recorded.digest());
-    println!("{wanted:#x}");
-    for cores in [1, 2, 4, 8] {
-        for policy in [Policy::StaticPriority, Policy::Edf] {
-            let machine = VirtualTime::new().cores(cores).policy(policy);
-            let machine = machine.replay(&recording).expect("it is whole");
-            // Of other execution times, so that without a recording it is another run.
-            let replayed = build(2);
-            let report = machine.run();
-            println!("{cores} cores, {policy:?}: {} compared", report.compared);
-            assert_eq!(report.divergence, None, "{cores} cores, {policy:?}");
-            assert_eq!(replayed.digest(), wanted, "{cores} cores, {policy:?}");
-        }
-    }
-    let machine = VirtualTime::new().cores(1);
-    let other = build(2);
-    machine.run();
-    assert_ne!(other.digest(), wanted, "without a recording");
-}

@@ -41,24 +41,6 @@ fn each_frame_has_an_answer_or_a_limit_and_no_bound_is_exceeded() {
 }
 
 #[test]
-fn a_replay_takes_the_answers_of_the_record() {
-    let run = |machine: VirtualTime, seed| {
-        let (dags, counts) = build(50, seed, Conduct::Random, Detection::Asks);
-        finish_create_dags(&dags).expect("it is sound");
-        let report = machine.run();
-        let counts = [&counts.answered, &counts.late].map(|count| count.load(Relaxed));
-        (report, counts, machine)
-    };
-    let (_, recorded, machine) = run(VirtualTime::new().cores(2), 1);
-    let recording = machine.recording();
-    // Another seed: the accelerator would do something else.
-    let machine = VirtualTime::new().cores(1).replay(&recording);
-    let (report, replayed, _) = run(machine.expect("it fits"), 2);
-    assert_eq!((report.compared, report.divergence), (50, None));
-    assert_eq!(replayed, recorded);
-}
-
-#[test]
 fn a_second_answer_is_refused_and_a_silent_device_costs_its_limit() {
     let (_, [answered, late, refused]) = ran(1, Conduct::Twice, Detection::Asks);
     assert_eq!(refused, answered + 2 * late);

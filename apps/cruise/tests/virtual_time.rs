@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cruise::{Releases, build, careful, trusting};
+use cruise::{Releases, build, careful};
 use fass::finish_create_dags;
 use fass::shared::Wire;
 use virtual_time::{Silent, VirtualTime};
@@ -50,23 +50,4 @@ fn released_by_packets_it_answers_each_but_not_too_often() {
     let releases: Vec<u64> = cruise.map(|job| job.release_ns / 1_000_000).collect();
     assert_eq!(releases, [5, 15, 40]);
     assert_eq!(machine.sent(&wire), b"speed 10\nspeed 20\nspeed 30\n");
-}
-
-#[test]
-fn a_decoder_that_trusts_its_input_ends_its_dag_alone() {
-    let wire = Wire::new("radar");
-    let machine = VirtualTime::new().connect(&wire).contain_panics();
-    finish_create_dags(&build(&wire, Releases::Period, trusting, 10)).expect("it is sound");
-    machine.arrive_at(&wire, ms(5), b"gap 2100\n");
-    machine.arrive_at(&wire, ms(15), b"ga\n");
-    let report = machine.run();
-    assert_eq!(report.panics.len(), 1);
-    assert_eq!(
-        (
-            report.dag("cruise").statistics().completed,
-            report.dag("clock").statistics().completed
-        ),
-        (2, 10)
-    );
-    assert_eq!(machine.sent(&wire), b"speed 0\nspeed 10\n");
 }

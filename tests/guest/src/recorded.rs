@@ -1,4 +1,4 @@
-//! A DAG whose topics are recorded: honest, cheating, too much for the buffer, or ended midway.
+//! A DAG whose topics are recorded: honest, cheating, or too much for the buffer.
 
 use alloc::string::ToString;
 use alloc::sync::Arc;
@@ -10,8 +10,6 @@ use core::time::Duration;
 use fass::{Occupation, OverrunPolicy, SubtaskAttributes};
 use fass::{create_dag, execute_for, finish_create_dags};
 use kernel::{AppError, Machine};
-
-use crate::kernel_crimes;
 
 const PERIOD: Duration = Duration::from_millis(20);
 
@@ -26,10 +24,9 @@ const LINKS: usize = 8;
 pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
     let options = machine.options();
     let cheats = options.choice("cheats", &[("no", false), ("yes", true)])?;
-    let dies_in = options.number("dies_in", 0..=1000, 1000)?;
     let step = options.number("step", 1..=1000, 1)?;
     machine.offer_clusters()?;
-    options.finish(&["test", "clusters", "cheats", "dies_in", "step"])?;
+    options.finish(&["test", "clusters", "cheats", "step"])?;
     let named = SubtaskAttributes::named;
     let dag = create_dag();
     dag.name("counts").jobs(50);
@@ -57,14 +54,12 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
         };
         dag.register_subtask(count, vec![waited], vec![output], named(output));
     }
-    let mut job = 0;
-    let sink = move |_: (u64, u64)| {
-        job += 1;
-        if job > dies_in {
-            let _ = kernel_crimes::end_the_machine();
-        }
-    };
-    dag.register_sink_subtask(sink, vec!["first", "second"], PERIOD, named("sink"));
+    dag.register_sink_subtask(
+        |_: (u64, u64)| (),
+        vec!["first", "second"],
+        PERIOD,
+        named("sink"),
+    );
     machine.spread(slice::from_ref(&dag));
     finish_create_dags(&[dag])?;
     machine.run().map(drop)

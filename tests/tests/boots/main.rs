@@ -5,7 +5,6 @@ mod autoware;
 mod by_grub;
 mod camera;
 mod cruise;
-mod cruise_replay;
 mod dag_file;
 mod debian;
 mod delays;

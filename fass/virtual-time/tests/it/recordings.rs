@@ -7,7 +7,7 @@ use std::ops::AddAssign;
 use crate::support::{commit, every, job_numbers, ms, named, run, ticking};
 use fass::shared::{Raiser, Sample, State};
 use fass::{Dag, FaultLimit, create_dag, finish_create_dags};
-use recording::{Channel, Entry, EntryKind, Recording, Role, Writer, to_bytes};
+use recording::{Entry, EntryKind, Recording, Role, Writer, to_bytes};
 use virtual_time::{JobShown, Passed, Report, RunError, SubtaskShown, Value, VirtualTime};
 
 /// A source that counts on.
@@ -77,34 +77,6 @@ fn of<'j>(job: &'j JobShown, subtask: &str) -> &'j SubtaskShown {
 fn value<'p>(passed: &'p [Passed], what: &str) -> &'p Value {
     let found = passed.iter().find(|passed| passed.what == what);
     &found.expect("it passed").value
-}
-
-#[test]
-fn signals_come_when_they_came_and_from_nowhere_else() {
-    let build = |from: u64| {
-        let dag = create_dag();
-        dag.name("button").relative_deadline(ms(5));
-        let signal = dag.record::<u64>("press").sporadic(ms(5));
-        let source = dag.source(counting(from)).writes(&["press"]);
-        source.register(named("press"));
-        commit(&[dag]);
-        signal
-    };
-    let releases = |report: &Report| -> Vec<u64> {
-        let releases = report.jobs.iter().map(|job| job.release_ns / 1_000_000);
-        releases.collect()
-    };
-    let machine = VirtualTime::new();
-    let signal = build(0);
-    for time in [2, 3, 40] {
-        machine.raise_at(&signal, ms(time));
-    }
-    assert_eq!(releases(&machine.run()), [2, 7, 40]);
-    let recording = machine.recording();
-    let machine = VirtualTime::new().replay(&recording).expect("whole");
-    let signal = build(90);
-    machine.raise_at(&signal, ms(20));
-    assert_eq!(releases(&machine.run()), [2, 7, 40]);
 }
 
 /// A DAG, one that samples it and fails at what it finds in a job, and one that this one releases
@@ -523,10 +495,6 @@ fn a_fault_that_follows_from_a_recorded_state_comes_again() {
 #[test]
 fn an_altered_state_is_found() {
     let bytes = crash(kept());
-    let mut flipped = bytes.clone();
-    flipped[bytes.len() / 2] ^= 1;
-    let refused = VirtualTime::new().replay(&flipped).unwrap_err().to_string();
-    assert!(refused.contains("the file is altered"), "{refused}");
     let is_state = |entry: &Entry<'_>, role| entry.what == EntryKind::Value && role == Role::State;
     let shorter = altered(&bytes, |entry, role| match is_state(&entry, role) {
         true => vec![Entry {
@@ -569,56 +537,18 @@ fn an_altered_state_is_found() {
 
 #[test]
 fn a_late_job_of_a_long_recording_is_computed_at_once() {
-    const LAST: u64 = 1_000_050;
-    let bytes = record(&VirtualTime::new(), &[filter(1, |sums| _ = sums.record())]);
-    let short = Recording::read(&bytes).expect("whole");
-    let mut writer = Writer::new(short.header());
-    let place = |role: Role| {
-        let mut channels = (0_u16..).zip(&short.header().channels);
-        let found = channels.find(|(_, channel): &(u16, &Channel)| channel.role == role);
-        found.expect("there is one").0
-    };
-    let [source, result, state] = [Role::Source, Role::Result, Role::State].map(place);
-    let mut sums = (0, 0);
-    for job in 0..=LAST {
-        let mut write = |place, value: &[u8]| {
-            writer.write(&Entry {
-                what: EntryKind::Value,
-                dag: 0,
-                place,
-                job,
-                release_ns: job * 1_000_000,
-                at_ns: job * 1_000_000,
-                value,
-            });
-        };
-        // The jobs between would take the test long to write.
-        let is_written = !(100..LAST - 1_000).contains(&job);
-        if is_written && job % 64 == 0 {
-            write(state, &to_bytes(&sums));
-        }
-        if is_written {
-            write(source, &to_bytes(&job));
-        }
-        sums = add(sums, job);
-        if is_written && job % 1_000 == 0 {
-            write(result, &to_bytes(&sums.1));
-        }
-    }
-    let machine = replaying(&writer.end()).from("filter", LAST);
-    commit(&[filter(2 * LAST, |sums| _ = sums.record())]);
+    const LAST: u64 = 4_050;
+    let long = || filter(LAST + 1, |sums| _ = sums.record());
+    let bytes = record(&VirtualTime::new(), &[long()]);
+    let machine = replaying(&bytes).from("filter", LAST);
+    commit(&[long()]);
     let job = machine.until("filter", LAST).expect("it is there");
-    assert!(
-        job.times
-            .is_some_and(|times| times.release_ns == LAST * 1_000_000)
-    );
+    let release_ns = job.times.map(|times| times.release_ns);
+    assert_eq!(release_ns, Some(LAST * 1_000_000));
     let report = machine.run();
     assert_eq!(found(&report), (vec![], None, None));
-    assert_eq!(
-        (report.jobs.len(), report.compared),
-        (51, 2),
-        "from 1,000,000 on"
-    );
+    // From job 4,032 on, of which the state is recorded, and compared with the results.
+    assert_eq!((report.jobs.len(), report.compared), (19, 20));
 
     let refused = replaying(&bytes).from("filtre", 3);
     let error = finish_create_dags(&[kept()]).unwrap_err().to_string();

@@ -5,7 +5,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use recording::Recording;
+use recording::{EntryKind, Recording};
 use tool::record::Record;
 use tool::system::workspace;
 
@@ -107,12 +107,25 @@ fn the_proof_of_a_bound_that_is_exceeded_is_written() {
 #[test]
 fn a_replay_of_signals_leaves_no_file_unless_an_instance_has_failed() {
     let folder = folder("signals");
-    fs::write(folder.join("gaps"), "1ms \"gap 2350\\n\"\n").expect("our folder takes a file");
-    let run = "run --app cruise --mode deterministic --jobs 5 --input gaps --append \
-               releases=packets";
+    let gaps = workspace().join("apps/cruise/gaps.txt");
+    let run = format!(
+        "run --app cruise --mode deterministic --jobs 30 --input {} --append releases=packets",
+        gaps.display()
+    );
     succeed(&folder, &format!("{run} --keep run.rec"));
-    let replayed = succeed(&folder, &format!("{run} --replay run.rec"));
-    assert!(replayed.contains("\"kind\":\"replayed\""), "{replayed}");
+    let recording = read(&folder, "run.rec");
+    let recording = Recording::read(&recording).expect("whole");
+    let signals = recording.entries();
+    let signals = signals.filter(|entry| entry.what == EntryKind::Signal);
+    let signals = signals.count();
+    assert!(signals > 3, "{signals}");
+    // Packets that arrive in the replay release nothing.
+    let replayed = succeed(
+        &folder,
+        &format!("{run} --cores 2 --policy edf --replay run.rec"),
+    );
+    let said = format!("\"compared\":{signals},\"uncompared\":0");
+    assert!(replayed.contains(&said), "{said}: {replayed}");
     assert!(!replayed.contains("before the fault"), "{replayed}");
 }
 

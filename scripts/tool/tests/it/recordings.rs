@@ -165,38 +165,6 @@ fn a_table_becomes_a_recording_and_the_same_table() {
     assert_eq!(back.expect("a table"), table);
 }
 
-/// The format's own tests show that no altered or cut recording is accepted.
-#[test]
-fn what_is_no_recording_is_refused_in_one_line() {
-    let folder = recorded("recording-refused");
-    let mut altered = recording();
-    altered[100] ^= 4;
-    fs::write(folder.join("altered"), altered).expect("a file");
-    fs::write(folder.join("foreign"), "job,x\n").expect("a file");
-    let rows = "
-recording altered | expected the checksum of all before; the file is altered
-recording foreign | foreign: at byte 0: expected the mark of a recording";
-    assert_refused(&folder, rows);
-}
-
-#[test]
-fn what_ends_too_early_is_shown_as_a_part() {
-    let folder = folder("recording-cut");
-    let bytes = recording();
-    for length in (0..300).step_by(5).chain([bytes.len() - 1]) {
-        fs::write(folder.join("cut"), &bytes[..length]).expect("a file");
-        let said = call(&folder, ["recording", "cut"]);
-        // Without mark and version nothing is known.
-        let (code, lines) = if length < 10 { (2, 1) } else { (0, 0) };
-        assert_eq!(said.code, Some(code), "{length}");
-        assert_eq!(said.complaint.lines().count(), lines, "{}", said.complaint);
-        let is_part = said
-            .out
-            .contains("\nincomplete: it says nothing of what came after");
-        assert_eq!(is_part, code == 0, "{}", said.out);
-    }
-}
-
 /// The lines of a table, the options, and the refusal. A line's end is `/`.
 const WRONG: &str = "
 a,b/1,2/ |  | in.csv:1: there is no column release_ns; say by --period

@@ -22,17 +22,14 @@ struct File(PathBuf);
 impl File {
     /// Makes it.
     fn new() -> File {
-        Self::of(&workspace().join(TABLE).to_string_lossy())
-    }
-
-    /// Makes it of another table.
-    fn of(table: &str) -> File {
+        let table = workspace().join(TABLE);
+        let table = table.to_string_lossy();
         let name = format!("walking-{:?}.rec", std::thread::current().id());
         let out = std::env::temp_dir().join(format!("{}-{name}", std::process::id()));
         let schema = Sample::schema().to_string();
         let words = [
             "--from-csv",
-            table,
+            &table,
             "--dag",
             DAG,
             "--topic",
