@@ -17,7 +17,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use text::visible;
 
-use crate::options::Name;
 use crate::system;
 
 /// The most bytes of an input: far more than a guest or a reader can use.
@@ -108,11 +107,10 @@ pub(crate) fn read_named(named: &Named<'_>) -> Result<Vec<u8>, String> {
 ///
 /// In words, with the option and the file.
 pub(crate) fn write_named(
-    option: Name,
+    option: &str,
     path: &Path,
     content: impl AsRef<[u8]>,
 ) -> Result<(), String> {
-    let option = option.as_str();
     let named = Named { option, path };
     let written = fs::write(path, content);
     written.map_err(|error| format!("{}: cannot be written: {error}", named.words()))

@@ -256,7 +256,7 @@ pub fn write(path: &Path, commits: &[Committed]) -> Result<String, String> {
     for commit in commits {
         let path = file(path, commit.number);
         let text = analysis::witness(&commit.task_set, &commit.settings());
-        files::write_named(name::WITNESS, &path, text)?;
+        files::write_named(name::WITNESS.as_str(), &path, text)?;
         names.push(files::shown_path(&path));
     }
     match names.join(" ") {

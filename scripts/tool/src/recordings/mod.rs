@@ -178,7 +178,7 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
         let mut observed = Vec::new();
         observed::add(&mut observed, &record)?;
         let text = observed::text(&observed, observed::MARGIN_PERCENT);
-        files::write_named(name::OBSERVE, path, text)?;
+        files::write_named(name::OBSERVE.as_str(), path, text)?;
         println!("{}", files::shown_path(path));
     }
     Ok(())
@@ -186,7 +186,7 @@ fn of_runs(recording: &Recording<'_>, options: &Parsed) -> Result<(), String> {
 
 /// Writes the picture of the committed DAGs, and returns a line that announces it.
 pub(crate) fn draw(record: &Record, path: &Path) -> Result<String, String> {
-    files::write_named(name::DOT, path, dot::text(record)?)?;
+    files::write_named(name::DOT.as_str(), path, dot::text(record)?)?;
     let file = files::shown_path(path);
     Ok(format!(
         "{file}: the committed DAGs; `dot -Tsvg {file} -o {file}.svg` draws them"

@@ -134,7 +134,7 @@ impl Kept {
         let is_replayed = values && !options.is_given(name::DAG);
         let [check, trace, show] = ["check-trace", "trace", "recording"].map(system::script);
         let announce = |(name, path): (Name, &Path)| {
-            files::write_named(name, path, &bytes)?;
+            files::write_named(name.as_str(), path, &bytes)?;
             let file = files::shown_path(path);
             let shown = format!("`{show} {file}` shows what is recorded");
             let uses = match is_replayed {
