@@ -412,7 +412,7 @@ impl Linux {
     /// Writes the rest of what a run has recorded. Returns what a replay has found, and how
     /// complete the recording is. `is_over`: the run has not been ended before its time.
     ///
-    /// See [`record`](Self::record).
+    /// See [`keep`](Self::keep).
     pub fn end_recording(&self, is_over: bool) -> (Option<ReplayOutcome>, Option<RecordingState>) {
         let outcome = edge::get().end_run(is_over);
         let left = unpoisoned(&LEFT).take();
@@ -426,7 +426,7 @@ impl Linux {
     ///
     /// Why it could not be written.
     ///
-    /// See [`record`](Self::record).
+    /// See [`keep`](Self::keep).
     pub fn end_record() -> io::Result<()> {
         let Some(file) = unpoisoned(&FILE).take() else {
             return Ok(());

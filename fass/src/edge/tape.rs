@@ -121,7 +121,7 @@ impl Crossing for RunRecorder {
         name(&mut self.header, self.app, &plan.task_set);
         self.provide(plan).ok_or_else(|| {
             alloc::format!(
-                "`record`: there is no memory for a buffer of {} KiB; give the machine more \
+                "`keep`: there is no memory for a buffer of {} KiB; give the machine more \
                  memory, or the buffer less",
                 self.bytes / 1024
             )
