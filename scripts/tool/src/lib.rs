@@ -12,7 +12,7 @@
 //! - [`elf`], [`image`], [`medium`], [`places`], [`tiny`]: images and media to boot;
 //! - [`child`], [`qemu`], [`outcome`]: the boot, and the judgement of its end;
 //! - [`install`], [`probe`], [`system`]: programs and abilities of the host;
-//! - [`options`]: command lines by a table; [`files`]: the files they name; [`output`],
+//! - [`options`](mod@options): command lines by a table; [`files`]: the files they name; [`output`],
 //!   [`progress`]: printing without a panic, and progress of long work; [`svg`]: pictures;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
 //! - [`golden`]: texts of the tree that tests hold to their word;
