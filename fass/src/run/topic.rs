@@ -131,7 +131,9 @@ impl<T: Message> Relay<T> for FanOut<T> {
         // The value itself goes to the last reader, so one reader costs no clone.
         if let Some((last, others)) = self.writers.split_last_mut() {
             // Before the value is moved away.
-            self.stages.iter_mut().for_each(stage);
+            for part in &mut self.stages {
+                stage(part);
+            }
             for writer in others {
                 if let Some(clone) = value.for_another_reader() {
                     put(writer, job, clone);
@@ -139,13 +141,16 @@ impl<T: Message> Relay<T> for FanOut<T> {
             }
             put(last, job, value);
         } else if let Some((last, others)) = self.stages.split_last_mut() {
-            others.iter_mut().for_each(stage);
+            for part in others {
+                stage(part);
+            }
             last.stage(job, value);
         }
     }
 }
 
-#[inline]
+// Always, as `Writer::put`.
+#[inline(always)]
 fn put<T>(writer: &mut Writer<T>, job: u64, value: T) {
     if writer.put(job, value).is_err() {
         no_free_slot(job);

@@ -118,7 +118,8 @@ pub(crate) struct Reader<T> {
 impl<T> Writer<T> {
     /// Puts the value of `job` into a free slot, or gives the value back if all
     /// are taken. Drops the value in a slot that was given up, if it takes that.
-    #[inline]
+    // Always: whether it becomes a call is chance else, and a call costs each reader 20 instructions.
+    #[inline(always)]
     pub(crate) fn put(&mut self, job: u64, value: T) -> Result<(), T> {
         let slot = match self.ring.near(EMPTY_SLOT) {
             Some(slot) => slot,
