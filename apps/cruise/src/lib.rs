@@ -33,9 +33,6 @@ const FRESH_NS: u64 = 50_000_000;
 const WANTED_CM: i32 = 2_000;
 const FASTEST_CM_S: i32 = 3_000;
 
-/// The decoder of a packet: it holds a gap in cm.
-pub type Decoder = fn(&[u8]) -> Option<i32>;
-
 /// The source of `cruise`'s releases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Releases {
@@ -45,22 +42,14 @@ pub enum Releases {
     Packets,
 }
 
-/// Reads a line such as `gap 2350`.
-#[must_use]
-pub fn careful(line: &[u8]) -> Option<i32> {
+/// Decodes a line such as `gap 2350`: a gap in cm.
+fn decode(line: &[u8]) -> Option<i32> {
     let gap = str::from_utf8(line).ok()?.strip_prefix("gap ")?;
     gap.parse().ok().filter(|gap| (0..100_000).contains(gap))
 }
 
-/// Reads such a line as if nothing could be wrong with it: a short one makes it panic.
-#[must_use]
-pub fn trusting(line: &[u8]) -> Option<i32> {
-    let digits = line[4..].iter().map(|digit| i32::from(*digit) - 0x30);
-    Some(digits.fold(0_i32, |gap, digit| gap.wrapping_mul(10).wrapping_add(digit)))
-}
-
 /// Builds the DAGs. Those with a period end after `jobs` jobs.
-pub fn build(wire: &Wire, releases: Releases, decode: Decoder, jobs: u64) -> [Dag; 2] {
+pub fn build(wire: &Wire, releases: Releases, jobs: u64) -> [Dag; 2] {
     let taking = |name, us| SubtaskAttributes::named(name).wcet(Duration::from_micros(us));
     let cruise = create_dag();
     (cruise.name("cruise").record::<Option<i32>>("gap")).record::<i32>("speed");

@@ -7,7 +7,7 @@ extern crate alloc;
 
 use alloc::format;
 
-use cruise::{Releases, build, careful, trusting};
+use cruise::{Releases, build};
 use fass::finish_create_dags;
 use fass::shared::Wire;
 use kernel::{AppError, Machine, println};
@@ -19,17 +19,12 @@ fn main(machine: &Machine) -> Result<(), AppError> {
     let jobs = options.number("jobs", 1..=100_000, 50)?;
     let releases = [("period", Releases::Period), ("packets", Releases::Packets)];
     let releases = options.choice("releases", &releases)?;
-    let trusts = options.choice("decoder", &[("careful", false), ("trusting", true)])?;
     let wire = Wire::new("radar");
     machine.connect(&wire)?;
     machine.offer_clusters()?;
-    options.finish(&["jobs", "releases", "decoder", "input", "clusters"])?;
-    if trusts {
-        machine.accept_faults();
-    }
+    options.finish(&["jobs", "releases", "input", "clusters"])?;
 
-    let decode = if trusts { trusting } else { careful };
-    let dags = build(&wire, releases, decode, jobs);
+    let dags = build(&wire, releases, jobs);
     machine.spread(&dags);
     let commit = finish_create_dags(&dags)?;
     for answer in commit.answers() {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cruise::{Releases, build, careful};
+use cruise::{Releases, build};
 use fass::finish_create_dags;
 use fass::shared::Wire;
 use virtual_time::{Silent, VirtualTime};
@@ -15,7 +15,7 @@ const fn ms(ms: u64) -> Duration {
 fn the_car_follows_fresh_gaps_and_stops_without() {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
-    let dags = build(&wire, Releases::Period, careful, 10);
+    let dags = build(&wire, Releases::Period, 10);
     let commit = finish_create_dags(&dags).expect("it is sound");
     assert!(
         commit
@@ -41,7 +41,7 @@ fn the_car_follows_fresh_gaps_and_stops_without() {
 fn released_by_packets_it_answers_each_but_not_too_often() {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
-    finish_create_dags(&build(&wire, Releases::Packets, careful, 10)).expect("it is sound");
+    finish_create_dags(&build(&wire, Releases::Packets, 10)).expect("it is sound");
     for at in [5, 6, 7, 40] {
         machine.arrive_at(&wire, ms(at), b"gap 2100\n");
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cruise::{Releases, build, careful};
+use cruise::{Releases, build};
 use fass::finish_create_dags;
 use fass::shared::{Wire, WireCounts};
 use harness::Guest;
@@ -20,7 +20,7 @@ const INPUT: &str = include_str!("../../../apps/cruise/gaps.txt");
 fn in_virtual_time(input: &str, releases: Releases) -> (Vec<u8>, WireCounts) {
     let wire = Wire::new("radar");
     let machine = VirtualTime::new().connect(&wire).silent(Silent::Wcet);
-    finish_create_dags(&build(&wire, releases, careful, JOBS)).expect("it is sound");
+    finish_create_dags(&build(&wire, releases, JOBS)).expect("it is sound");
     for (at_ns, bytes) in wire_script::read(input).expect("it is well written") {
         machine.arrive_at(&wire, Duration::from_nanos(at_ns), &bytes);
     }

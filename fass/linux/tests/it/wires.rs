@@ -47,6 +47,8 @@ fn each_packet_is_answered_once_and_in_order() {
             .machine
             .connect(&wire, input, output)
             .expect("threads");
+        let again = alone.machine.connect(&wire, io::empty(), io::sink());
+        assert_eq!(again.unwrap_err().kind(), io::ErrorKind::AlreadyExists);
         // The next question comes when the answer is there, so each has a job.
         let asker = thread::spawn(move || {
             let mut answers = BufReader::new(answers).lines();

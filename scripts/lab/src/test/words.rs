@@ -124,7 +124,10 @@ pub(super) fn check_rooms(sources: &[SourceFile], list: Option<&Path>) -> Result
         Golden { file, below, text }.compare(&said, list)?;
     }
     let over = there.iter().filter_map(|(room, count)| {
-        let most = most.get(room).copied().unwrap_or(usize::MAX);
+        let Some(&most) = most.get(room) else {
+            let line = format!("`{room}` is not in {TABLE}; bless it");
+            return list.is_none().then_some(line);
+        };
         (*count > most).then(|| match room == PAGES {
             true => format!("{room} have {count} words, {most} are allowed; shorten a page"),
             false => format!(
