@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use tool::golden::Golden;
+use lab::golden::Golden;
 
 use crate::markdown::page;
 

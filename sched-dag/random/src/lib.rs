@@ -4,9 +4,15 @@
 //! doi 10.1145/2660193.2660195). Its `n`th number is a function of the seed and
 //! of `n` alone, which [`nth`] gives without the ones before: what one job draws
 //! does not depend on which jobs before it were skipped.
+//!
+//! [`sets`] draws DAGs.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
+
+extern crate alloc;
+
+pub mod sets;
 
 use core::ops::RangeInclusive;
 

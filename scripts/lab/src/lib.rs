@@ -7,7 +7,7 @@
 //! - [`oracle`]: reference schedules, bounds and synchronizers;
 //! - [`soak`](mod@soak): random DAG sets for a long time;
 //! - [`test`](mod@test): every test, and checks of the whole tree;
-//! - `random`: task sets that are drawn.
+//! - [`golden`]: texts of the tree that tests hold to their word.
 
 #![forbid(unsafe_code)]
 
@@ -16,8 +16,8 @@
 extern crate tool;
 
 pub mod bench;
+pub mod golden;
 pub mod oracle;
-mod random;
 pub mod soak;
 pub mod test;
 

@@ -19,7 +19,7 @@ use std::time::Duration;
 use sched_dag::DagId;
 use sched_dag::journal::EventKind;
 
-use tool::options::{Command, Parsed, Takes, name, options};
+use tool::options::{Command, Parsed, Takes, options};
 use tool::outcome::{self, Outcome};
 use tool::progress::{Progress, SILENCE};
 use tool::protocol::MachineLine;
@@ -33,29 +33,7 @@ static SOAK: Command = Command {
     invocation: "./scripts/soak",
     about: "Runs random DAG sets on the bare machine for a long time, and checks everything.",
     positional: None,
-    options: options! {
-        /// 16 s of guest time instead of 14 minutes; the host takes longer.
-        SHORT: Takes::Nothing;
-        /// Processors of the guest.
-        CORES: Takes::Number(1, MOST_CORES), or "4";
-        /// Jobs of random sets to simulate on the host first, which takes minutes for 10^8.
-        JOBS: Takes::Number(1, 1_000_000_000_000);
-        /// The first round.
-        FIRST: Takes::Number(0, 1_000_000), or "0";
-        /// How many rounds, that is sets of DAGs; 84, with --short 16.
-        ROUNDS: Takes::Number(1, 1_000_000);
-        /// Guest time in which each of the two runs of a round releases jobs; 5000, with --short 500.
-        ROUND_MS: Takes::Number(1, 10_000);
-        /// Seed of all that is random.
-        SEED: Takes::Number(0, u64::MAX), or "1";
-        /// The meaning of time; see ./scripts/run --help.
-        MODE: Takes::OneOf(Mode::NAMES), or "deterministic";
-        /// Microseconds for which an instance may wait for what it is owed; 50, and where time is
-        /// real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).
-        BOUND_US: Takes::Number(0, 1_000_000_000);
-        /// Guests that run at once; as many as the host has processors, and one where time is real.
-        SIDE_BY_SIDE: Takes::Number(1, 64);
-    },
+    options: OPTIONS,
     notes: "\
 A round draws 3 to 8 DAGs of 3 to 12 subtasks with random graphs and execution
 times, for a load of 60 to 140 percent, and runs them twice. Drawn are, too: the
@@ -76,6 +54,30 @@ prints how many of those jobs each pair of features had.
 exit codes: 0 no round failed; 1 some did; 2 a refused command line
 ",
 };
+
+options! {
+    /// 16 s of guest time instead of 14 minutes; the host takes longer.
+    SHORT: Takes::Nothing;
+    /// Processors of the guest.
+    CORES: Takes::Number(1, MOST_CORES), or "4";
+    /// Jobs of random sets to simulate on the host first, which takes minutes for 10^8.
+    JOBS: Takes::Number(1, 1_000_000_000_000);
+    /// The first round.
+    FIRST: Takes::Number(0, 1_000_000), or "0";
+    /// How many rounds, that is sets of DAGs; 84, with --short 16.
+    ROUNDS: Takes::Number(1, 1_000_000);
+    /// Guest time in which each of the two runs of a round releases jobs; 5000, with --short 500.
+    ROUND_MS: Takes::Number(1, 10_000);
+    /// Seed of all that is random.
+    SEED: Takes::Number(0, u64::MAX), or "1";
+    /// The meaning of time; see ./scripts/run --help.
+    MODE: Takes::OneOf(Mode::NAMES), or "deterministic";
+    /// Microseconds for which an instance may wait for what it is owed; 50, and where time is
+    /// real, for the host's noise, 10,000 (kvm) or 1,000,000 (threads).
+    BOUND_US: Takes::Number(0, 1_000_000_000);
+    /// Guests that run at once; as many as the host has processors, and one where time is real.
+    SIDE_BY_SIDE: Takes::Number(1, 64);
+}
 
 /// Runs the subcommand with the words after its name.
 pub fn soak(words: &[OsString]) -> ExitCode {
@@ -402,12 +404,16 @@ fn fate(run: &Run, dag: DagId) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::right;
 
     #[test]
     fn a_failures_command_runs_the_same_round() {
-        let drawn = plan(&SOAK.right("--seed 7 --cores 3 --mode threads --side-by-side 1"));
+        let drawn = plan(&right(
+            &SOAK,
+            "--seed 7 --cores 3 --mode threads --side-by-side 1",
+        ));
         let command = drawn.command(42);
-        let again = plan(&SOAK.right(command.split_once(' ').expect("words").1));
+        let again = plan(&right(&SOAK, command.split_once(' ').expect("words").1));
         assert_eq!(
             again,
             SoakPlan {

@@ -5,7 +5,7 @@ pub(crate) mod made;
 #[path = "../../tool/src/tests.rs"]
 mod tables;
 
-pub(crate) use tables::{altered, rows};
+pub(crate) use tables::{altered, right, rows};
 use text::Malformed;
 
 /// Makes sure that `parse` refuses a text once it is altered: in each row are a part, another in its

@@ -22,13 +22,13 @@ use crate::system;
 /// The most bytes that a stripped image may have.
 pub const MOST_STRIPPED_BYTES: u64 = 800 << 10;
 
-/// The folders of apps: those to copy, and those that measure the project itself.
-const FOLDERS: [&str; 2] = ["apps", "apps/lab"];
+/// The folder of the apps.
+const APPS: &str = "apps";
 
-/// Returns the names of the apps: the packages under `apps/`, sorted.
-pub fn apps() -> Vec<String> {
-    let entries = FOLDERS.map(|folder| fs::read_dir(system::workspace().join(folder)));
-    let folders = entries.into_iter().flatten().flatten().flatten();
+/// Returns the names of the apps in a folder of the workspace, sorted.
+pub fn apps(folder: &str) -> Vec<String> {
+    let entries = fs::read_dir(system::workspace().join(folder));
+    let folders = entries.into_iter().flatten().flatten();
     let folders = folders.map(|entry| entry.path());
     // A library for apps is not an app.
     let folders = folders.filter(|folder| folder.join("src/main.rs").is_file());
@@ -51,7 +51,7 @@ pub fn package_name(manifest: &str) -> Option<String> {
 ///
 /// One line that names it and the apps that exist.
 pub fn check_app(name: &str) -> Result<(), String> {
-    let apps = apps();
+    let apps = apps(APPS);
     if apps.iter().any(|app| app == name) {
         return Ok(());
     }
@@ -104,33 +104,6 @@ pub fn check_linux_file(path: &Path) -> Result<Option<String>, String> {
     }
 }
 
-/// The contents of a medium from which a PC boots.
-#[derive(Debug)]
-pub struct Contents<'w> {
-    /// The loaded part of the image.
-    pub image: Vec<u8>,
-    /// The words for its command line.
-    pub words: &'w str,
-    /// A file to leave in memory.
-    pub module: Option<Vec<u8>>,
-}
-
-impl<'w> Contents<'w> {
-    /// Reads the files of image and module.
-    ///
-    /// # Errors
-    ///
-    /// In words: one cannot be read, or the image is no ELF file.
-    pub fn read(image: &Path, words: &'w str, module: Option<&Path>) -> Result<Self, String> {
-        let loaded = elf::loaded(files::read_at(image)?);
-        Ok(Contents {
-            image: loaded.map_err(|why| format!("`{}`: {why}", files::shown_path(image)))?,
-            words,
-            module: module.map(files::read_at).transpose()?,
-        })
-    }
-}
-
 /// Builds the image of a package in release, and returns the file. Cargo's progress and errors go
 /// to standard error as they come.
 ///
@@ -141,16 +114,6 @@ pub fn build(package: &str) -> Result<PathBuf, String> {
     build_target(package, "release", ["--bin", package], None)
 }
 
-/// Builds the image of a package as [`build`] does, but not optimized, so that a debugger shows
-/// every variable.
-///
-/// # Errors
-///
-/// As [`build`].
-pub fn build_for_gdb(package: &str) -> Result<PathBuf, String> {
-    build_target(package, "gdb", ["--bin", package], None)
-}
-
 /// Makes sure that an app has a program for Linux.
 ///
 /// # Errors
@@ -158,14 +121,13 @@ pub fn build_for_gdb(package: &str) -> Result<PathBuf, String> {
 /// One line that names the apps that have one.
 pub fn check_linux(app: &str) -> Result<(), String> {
     let has_program = |app: &String| {
-        let program = format!("{app}/examples/{}.rs", linux_name(app));
-        let file = |folder| system::workspace().join(folder).join(&program);
-        FOLDERS.iter().any(|folder| file(folder).is_file())
+        let program = format!("{APPS}/{app}/examples/{}.rs", linux_name(app));
+        system::workspace().join(program).is_file()
     };
     if has_program(&app.into()) {
         return Ok(());
     }
-    let others: Vec<String> = apps().into_iter().filter(has_program).collect();
+    let others: Vec<String> = apps(APPS).into_iter().filter(has_program).collect();
     Err(format!(
         "app {} has no program for Linux; these have: {}",
         quoted(app),
@@ -188,15 +150,6 @@ pub fn build_linux(app: &str, folder: Option<&Path>) -> Result<PathBuf, String> 
     build_target(app, "linux", ["--example", &linux_name(app)], folder)
 }
 
-/// Builds a test program, to be run on another Linux than this one.
-///
-/// # Errors
-///
-/// Cargo failed, or the package has no such test.
-pub fn build_test(package: &str, test: &str) -> Result<PathBuf, String> {
-    build_target(package, "linux", ["--test", test], None)
-}
-
 /// Flags beyond those of a profile, to make an image small: its addresses are constants, since the
 /// linker script fixes them; no loop is padded; a jump table pays from eight cases on.
 const FOR_IMAGES: [&str; 4] = [
@@ -206,8 +159,12 @@ const FOR_IMAGES: [&str; 4] = [
     "-Cllvm-args=-min-jump-table-entries=8",
 ];
 
-/// Builds one target of a package; `target` is its kind and name, as cargo takes them.
-fn build_target(
+/// Builds one target of a package by a profile; `target` is its kind and name, as cargo takes them.
+///
+/// # Errors
+///
+/// Cargo failed, or the package has no such target.
+pub fn build_target(
     package: &str,
     profile: &str,
     target: [&str; 2],
@@ -260,14 +217,13 @@ fn executable(message: &Value, package: &str) -> Option<PathBuf> {
 
 #[cfg(test)]
 mod tests {
-    use super::{apps, check_app, executable, is_locked};
+    use super::{check_app, executable, is_locked};
     use crate::json;
     use std::fs::File;
     use std::path::PathBuf;
 
     #[test]
     fn an_unknown_app_is_named_with_those_there_are() {
-        assert!(apps().contains(&"fork-join".to_string()), "{:?}", apps());
         assert_eq!(check_app("fork-join"), Ok(()));
         let text = check_app("fork-jion").expect_err("there is no such app");
         let begins = text.starts_with("no app `fork-jion`; there are: ");

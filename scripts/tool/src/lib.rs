@@ -9,17 +9,16 @@
 //! own and the boot tests in `tests/`, which judge an [`Outcome`]. From the bottom up:
 //!
 //! - [`json`], [`protocol`]: the guest's output, read strictly;
-//! - [`elf`], [`image`], [`medium`], [`places`], [`tiny`]: images and media to boot;
+//! - [`elf`], [`image`], [`medium`], [`places`]: images and media to boot;
 //! - [`child`], [`qemu`], [`outcome`]: the boot, and the judgement of its end;
 //! - [`install`], [`probe`], [`system`]: programs and abilities of the host;
 //! - [`options`](mod@options): command lines by a table; [`files`]: the files they name; [`output`],
 //!   [`progress`]: printing without a panic, and progress of long work; [`svg`]: pictures;
 //! - [`mod@dag_file`]: DAGs that a file describes, in any of the formats;
-//! - [`golden`]: texts of the tree that tests hold to their word;
 //! - [`trace`]: the events of a run, checked against the model's rules;
 //! - [`recordings`]: the inputs of a run, and conversion to and from other formats;
 //! - [`dot`]: committed DAGs as a picture; [`proof`]: their bounds, and witnesses of these;
-//! - [`run`](mod@run), [`new_app`](mod@new_app): the subcommands.
+//! - [`run`](mod@run) with its [`run_options`], [`new_app`](mod@new_app): the subcommands.
 //!
 //! It guarantees that no guest runs without a limit, and that no run counts
 //! as good that did not say so twice. It uses the standard library only, and
@@ -37,7 +36,6 @@ pub mod debian;
 pub mod dot;
 pub mod elf;
 pub mod files;
-pub mod golden;
 pub mod image;
 pub mod install;
 pub mod json;
@@ -55,14 +53,17 @@ pub mod qemu;
 pub mod record;
 pub mod recordings;
 pub mod run;
+pub mod run_options;
 pub mod svg;
 pub mod system;
-pub mod tiny;
 pub mod trace;
 pub mod wire_script;
 
 pub use outcome::Outcome;
 pub use qemu::{Machine, Mode};
+
+#[cfg(test)]
+extern crate self as tool;
 
 #[cfg(test)]
 mod tests;

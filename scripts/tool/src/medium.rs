@@ -13,10 +13,11 @@ use std::fs;
 use std::path::Path;
 use std::process::{self, ExitCode};
 
+use crate::elf;
 use crate::files::{self, Temporary};
-use crate::image::{self, Contents};
+use crate::image;
 use crate::install;
-use crate::options::{Command, Parsed, Refusal, Takes, name, options};
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::qemu::Qemu;
 use crate::system;
 
@@ -28,16 +29,7 @@ pub static TABLE: Command = Command {
         Takes::Text("WORD..."),
         "Words for the app and the kernel, such as `jobs=20`.",
     )),
-    options: options! {
-        /// The app: a package under apps/.
-        APP: Takes::Text("NAME"), or "fork-join";
-        /// The ISO to be made.
-        ISO: Takes::File("FILE");
-        /// A file that the app finds in memory, as dag-file does its DAGs.
-        MODULE: Takes::File("MODULE");
-        /// Take this image; build nothing.
-        IMAGE: Takes::File("IMAGE");
-    },
+    options: OPTIONS,
     notes: "\
 The ISO boots by GRUB, under BIOS and UEFI. `cp FILE /dev/DEVICE` writes it to a stick,
 and what was there is lost. docs/pc.md says how, and what is known of real PCs.
@@ -48,6 +40,17 @@ DAGs of a file: `./scripts/run --dag FILE --print-dag > MODULE` makes the module
 exit codes: 0 the file is there; 1 it could not be made; 2 a refused command line
 ",
 };
+
+options! {
+    /// The app: a package under apps/.
+    APP: Takes::Text("NAME"), or "fork-join";
+    /// The ISO to be made.
+    ISO: Takes::File("FILE");
+    /// A file that the app finds in memory, as dag-file does its DAGs.
+    MODULE: Takes::File("MODULE");
+    /// Take this image; build nothing.
+    IMAGE: Takes::File("IMAGE");
+}
 
 /// Runs the subcommand with the words after its name.
 pub fn image(words: &[OsString]) -> ExitCode {
@@ -117,13 +120,15 @@ impl Medium {
     ///
     /// # Errors
     ///
-    /// As [`Contents::read`], or the words are refused, something is missing, `grub-mkrescue`
-    /// failed, or there is no room.
+    /// In words: a file cannot be read, the image is no ELF file, the words are refused, something
+    /// is missing, `grub-mkrescue` failed, or there is no room.
     pub fn new(image: &Path, words: &str, module: Option<&Path>) -> Result<Medium, String> {
-        let contents = Contents::read(image, words, module)?;
+        let loaded = elf::loaded(files::read_at(image)?);
+        let loaded = loaded.map_err(|why| format!("`{}`: {why}", files::shown_path(image)))?;
+        let module = module.map(files::read_at).transpose()?;
         let log = system::new_log("stick")?;
         let medium = Medium(Temporary(Some(log.with_extension("iso"))));
-        write_iso(medium.path(), &contents)?;
+        write_iso(medium.path(), &loaded, words, module.as_deref())?;
         Ok(medium)
     }
 
@@ -159,16 +164,16 @@ pub fn check_words(words: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes the ISO `iso` that boots `contents`. Missing tools are installed.
-fn write_iso(iso: &Path, contents: &Contents<'_>) -> Result<(), String> {
-    check_words(contents.words)?;
+/// Writes the ISO `iso` that boots the image. Missing tools are installed.
+fn write_iso(iso: &Path, image: &[u8], words: &str, module: Option<&[u8]>) -> Result<(), String> {
+    check_words(words)?;
     install::ensure(&install::GRUB)?;
     files::in_folder("iso", |folder| {
         let boot = folder.join("boot");
-        let commands = commands(contents.words, contents.module.is_some());
+        let commands = commands(words, module.is_some());
         files::write(&boot.join("grub/grub.cfg"), commands)?;
-        files::write(&boot.join("image"), &contents.image)?;
-        if let Some(module) = &contents.module {
+        files::write(&boot.join("image"), image)?;
+        if let Some(module) = module {
             files::write(&boot.join("module"), module)?;
         }
         rescue(folder, iso)
@@ -222,6 +227,7 @@ mod tests {
     use super::commands;
     use super::name;
     use crate::system;
+    use crate::tests::right;
 
     /// `tests/tests/boots/by_grub.rs` shows that a module arrives.
     #[test]
@@ -245,12 +251,12 @@ mod tests {
             ("--image /etc/passwd", "`--image /etc/passwd`: is no image"),
             (&"x".repeat(2049), "2049 bytes"),
         ] {
-            let refused = check(&TABLE.right(line).with(name::ISO, &iso)).unwrap_err();
+            let refused = check(&right(&TABLE, line).with(name::ISO, &iso)).unwrap_err();
             assert!(refused.contains(words), "{refused}");
         }
-        let why = check(&TABLE.right("jobs=3")).unwrap_err();
+        let why = check(&right(&TABLE, "jobs=3")).unwrap_err();
         assert_eq!(why, "which file? give --iso FILE");
-        let right = check(&TABLE.right("jobs=3 seed=7").with(name::ISO, &iso));
+        let right = check(&right(&TABLE, "jobs=3 seed=7").with(name::ISO, &iso));
         assert_eq!(right.as_deref(), Ok("jobs=3 seed=7"));
         assert!(!iso.exists());
     }

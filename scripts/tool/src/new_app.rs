@@ -24,7 +24,8 @@ use std::process::ExitCode;
 use text::quoted;
 
 use crate::files;
-use crate::options::{Command, Parsed, Refusal, Takes, name, options};
+use crate::image::package_name;
+use crate::options::{Command, Parsed, Refusal, Takes, options};
 use crate::system::{self, files_below};
 
 /// The table of `new-app`.
@@ -38,13 +39,7 @@ virtual time.",
         Takes::Text("NAME"),
         "The app's name: small letters, digits and hyphens, a letter first, at most 32.",
     )),
-    options: options! {
-        /// Make the app in this new folder, which is the root of a repository.
-        OUT: Takes::File("DIR");
-        /// --out: take the crates from this git repository, not from the folder of these commands.
-        /// Its runner is `fass-tool boot`, which `cargo install --git URL tool` installs.
-        GIT: Takes::Text("URL");
-    },
+    options: OPTIONS,
     notes: "\
 With --out, cargo run boots the app and cargo test tests it; without, it is in apps/,
 ./scripts/run --app NAME boots it and cargo test -p NAME tests it. docs/guide.md shows
@@ -54,6 +49,14 @@ exit codes: 0 the app is there; 1 its files cannot be written; 2 a refused
 command line
 ",
 };
+
+options! {
+    /// Make the app in this new folder, which is the root of a repository.
+    OUT: Takes::File("DIR");
+    /// --out: take the crates from this git repository, not from the folder of these commands.
+    /// Its runner is `fass-tool boot`, which `cargo install --git URL tool` installs.
+    GIT: Takes::Text("URL");
+}
 
 /// The template's name, as a package and as a crate.
 const PLACEHOLDER: (&str, &str) = ("app-template", "app_template");
@@ -262,25 +265,10 @@ fn taken(name: &str) -> String {
 fn package_folder(workspace: &Path, name: &str) -> Option<PathBuf> {
     let manifest = files_below(workspace, |_| true).into_iter().find(|file| {
         let text = || fs::read_to_string(file).unwrap_or_default();
-        file.ends_with("Cargo.toml") && names(&text()).any(|other| other == name)
+        file.ends_with("Cargo.toml") && package_name(&text()).as_deref() == Some(name)
     })?;
     let folder = manifest.parent()?.strip_prefix(workspace);
     folder.ok().map(Path::to_path_buf)
-}
-
-/// Returns the names that a manifest gives to a package, a library or a program, with `-` for `_`.
-/// Names of examples, tests and benchmarks do not clash.
-fn names(manifest: &str) -> impl Iterator<Item = String> {
-    let mut table = "";
-    manifest.lines().filter_map(move |line| {
-        if line.starts_with('[') {
-            table = line.trim_end();
-        }
-        let (key, value) = line.split_once('=')?;
-        let counts = ["[package]", "[lib]", "[[bin]]"].contains(&table);
-        let is_name = counts && key.trim() == "name";
-        is_name.then(|| value.trim().trim_matches('"').replace('_', "-"))
-    })
 }
 
 /// The source of a repository's crates, and of cargo's runner.
@@ -415,8 +403,7 @@ git init                # docs/guide.md goes on from here
 #[cfg(test)]
 mod tests {
     use super::{
-        CrateSource, FILES, MANIFEST, PACKAGES, PLACEHOLDER, check, create, create_repository,
-        names, way,
+        CrateSource, FILES, MANIFEST, PACKAGES, PLACEHOLDER, check, create, create_repository, way,
     };
     use crate::options::Refusal;
     use crate::system::workspace;
@@ -490,14 +477,6 @@ tool | `tool` cannot be an app's name: the package in scripts/tool has it; choos
             );
         }
         assert_eq!(check(workspace(), "brake-assist-2"), Ok(()));
-    }
-
-    #[test]
-    fn an_example_leaves_its_name_to_an_app() {
-        let manifest = "[package]\nname = \"virtual-time\"\n\n[lib]\nname = \"virtual_time\"\n\
-                        [[bin]]\nname = \"tool\"\n[[example]]\nname = \"vision\"\n";
-        let found: Vec<String> = names(manifest).collect();
-        assert_eq!(found, ["virtual-time", "virtual-time", "tool"]);
     }
 
     /// `tests/tests/boots/new_app.rs` shows that the app builds and boots.

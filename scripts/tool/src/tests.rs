@@ -2,6 +2,16 @@
 //!
 //! In a cell `\n` stands for the end of a line, and `\?` for a character that must not be shown.
 
+use std::ffi::OsString;
+
+use tool::options::{Command, Parsed};
+
+/// Parses a command line that a table must accept.
+pub(crate) fn right(table: &Command, line: &str) -> Parsed {
+    let words: Vec<_> = line.split_whitespace().map(OsString::from).collect();
+    table.parse(&words).expect(line)
+}
+
 /// Returns the rows of a table, each of so many cells; those that a row leaves out are empty.
 pub(crate) fn rows<const N: usize>(table: &str) -> impl Iterator<Item = [String; N]> {
     table.lines().filter(|row| !row.is_empty()).map(|row| {

@@ -8,8 +8,8 @@ use std::process::{Command, Output};
 use fass_dag_file::Length;
 use harness::markdown::{blocks, page};
 use harness::{Guest, Members, Said};
+use lab::golden::Golden;
 use tool::dag_file::{Import, load};
-use tool::golden::Golden;
 use tool::protocol::Status;
 use tool::{Outcome, system};
 

@@ -41,7 +41,8 @@ fn run(test: &Path, only: &str) -> String {
 #[test]
 #[ignore = "fetches 145 MB of Debian's; `cargo test -p harness --test boots -- --ignored` runs it"]
 fn the_tests_of_linux_pass_by_sched_ext_too() {
-    let program = image::build_test("linux", "it").expect("it is built");
+    let program = image::build_target("linux", "linux", ["--test", "it"], None);
+    let program = program.expect("it is built");
     // The policy goes with the first program that takes it, so each recording has its guest.
     for (only, passed) in [
         ("lives::", 7),

@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 
 use harness::guide::{documented_output, without_numbers};
 use harness::markdown::{blocks, page};
-use tool::golden::Golden;
+use lab::golden::Golden;
 use tool::new_app::{self, CrateSource};
 use tool::system::{self, workspace};
 

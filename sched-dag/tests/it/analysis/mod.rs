@@ -4,8 +4,6 @@
 //! are worked examples, and the counterexamples to forms that look like bounds and are not.
 
 mod climb;
-#[path = "../../../../scripts/lab/src/random.rs"]
-mod drawn;
 mod forged;
 mod one_core;
 mod random;

@@ -1,6 +1,7 @@
 //! Random task sets from a seed.
 
 use random::Random;
+use random::sets::set;
 use sched_dag::analysis::{AnalysisSettings, Overheads, assign};
 use sched_dag::{
     Activation, AssignmentReason, ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, Dag,
@@ -8,7 +9,6 @@ use sched_dag::{
     StateUser, SubtaskId, SubtaskOrder, SubtaskSpec, TaskSet, Wait, verify,
 };
 
-use super::drawn::set;
 use super::simulate::spec;
 
 /// A task set with the platform it runs on.

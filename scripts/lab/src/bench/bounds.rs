@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use super::acceptance::{self, SetFile};
 use super::frame::by_plan;
 use tool::files;
-use tool::options::{Command, Parsed, Takes, name, options};
+use tool::options::{Command, Parsed, Takes, options};
 use tool::progress::Lasting;
 
 static COMMAND: Command = Command {
@@ -22,16 +22,7 @@ static COMMAND: Command = Command {
         Takes::File("FILE..."),
         "Count only the sets of these files, as in tests/oracle/lent.txt, with or without answers.",
     )),
-    options: options! {
-        /// The numbers of cores.
-        CORES: Takes::Numbers(1, 64), or "4,8,16";
-        /// Random sets for each number of cores, utilization and kind of deadlines.
-        SETS: Takes::Number(1, 1_000_000), or "200";
-        /// The seed of all random sets.
-        SEED: Takes::Number(0, u64::MAX), or "1";
-        /// The folder for acceptance.csv and acceptance.svg.
-        OUT 'o': Takes::File("DIR"), or "target/bounds";
-    },
+    options: OPTIONS,
     notes: "\
 A set has as many DAGs as cores, but 8 at least. Methods: graham, federated scheduling; multi_path,
 the same by the multi-path bound, or global deadline-monotonic priorities; v_fed, virtually-federated
@@ -41,6 +32,17 @@ last one is of a scheduler that no machine has.
 Exit code: 0 counted; 1 no file can be written; 2 the command line or a file is refused.
 ",
 };
+
+options! {
+    /// The numbers of cores.
+    CORES: Takes::Numbers(1, 64), or "4,8,16";
+    /// Random sets for each number of cores, utilization and kind of deadlines.
+    SETS: Takes::Number(1, 1_000_000), or "200";
+    /// The seed of all random sets.
+    SEED: Takes::Number(0, u64::MAX), or "1";
+    /// The folder for acceptance.csv and acceptance.svg.
+    OUT 'o': Takes::File("DIR"), or "target/bounds";
+}
 
 /// The plan of a measurement.
 struct BoundsPlan {

@@ -13,17 +13,14 @@ use std::process::ExitCode;
 use super::code::{self, Frames};
 use super::frame::by_plan;
 use tool::json::Object;
-use tool::options::{Command, Parsed, Takes, name, options};
+use tool::options::{Command, Parsed, Takes, options};
 use tool::{elf, files, image};
 
 static TABLE: Command = Command {
     invocation: "./scripts/bench sizes",
     about: "Says how many bytes of an image each part of the code takes.",
     positional: None,
-    options: options! {
-        /// The app.
-        APP: Takes::Text("APP"), or "fork-join";
-    },
+    options: OPTIONS,
     notes: "\
 Builds the image. Prints a table, the largest part first, and a JSON object for each part.
 Counted are the bytes that `strip` leaves.
@@ -32,6 +29,11 @@ Exit code: 0 the image is within its limit; 1 it is not, or could not be read; 2
 command line is refused.
 ",
 };
+
+options! {
+    /// The app.
+    APP: Takes::Text("APP"), or "fork-join";
+}
 
 /// The part of code from no file of ours.
 const LIBRARY: &str = "the library, and what drops values";

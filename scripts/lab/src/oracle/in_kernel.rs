@@ -36,7 +36,7 @@ use sched_dag::law::RunRecord;
 
 use super::schedules::{Deviation, compare, compare_turns};
 use super::{Parse, equal, read};
-use tool::options::{Command, Parsed, Refusal, Takes, name, options};
+use tool::options::{Command, Parsed, Refusal, Takes, options};
 use tool::outcome::{Outcome, boot};
 use tool::progress::Progress;
 use tool::protocol::MachineLine;
@@ -51,20 +51,7 @@ static IN_KERNEL: Command = Command {
         Takes::File("FILE..."),
         "Reference schedules, as in tests/oracle.",
     )),
-    options: options! {
-        /// On the machine, not in virtual time on the host.
-        IN_KERNEL: Takes::Nothing;
-        /// Leave out the cases for more cores.
-        CORES_UP_TO: Takes::Number(1, MOST_CORES), or "64";
-        /// The length of a unit of time in microseconds.
-        UNIT_US: Takes::Number(100, 10_000_000), or "10000";
-        /// Whether execution is simulated, or cores also compute, for half of each unit in all.
-        WORK: Takes::OneOf(&["simulate", "compute"]), or "simulate";
-        /// The meaning of time; see ./scripts/run --help.
-        MODE: Takes::OneOf(Mode::NAMES), or "deterministic";
-        /// The board that QEMU imitates.
-        MACHINE: Takes::OneOf(Machine::NAMES), or "microvm";
-    },
+    options: OPTIONS,
     notes: "\
 Each case runs with its number of cores, its policy, and preemption as it says.
 Compared are start, finish and preemptions of every instance, and release, finish
@@ -80,6 +67,21 @@ unit takes its real time, and has to be far longer than the host's noise.
 Exit code: 0 none failed, 1 some failed, 2 a file or the command line is refused.
 ",
 };
+
+options! {
+    /// On the machine, not in virtual time on the host.
+    IN_KERNEL: Takes::Nothing;
+    /// Leave out the cases for more cores.
+    CORES_UP_TO: Takes::Number(1, MOST_CORES), or "64";
+    /// The length of a unit of time in microseconds.
+    UNIT_US: Takes::Number(100, 10_000_000), or "10000";
+    /// Whether execution is simulated, or cores also compute, for half of each unit in all.
+    WORK: Takes::OneOf(&["simulate", "compute"]), or "simulate";
+    /// The meaning of time; see ./scripts/run --help.
+    MODE: Takes::OneOf(Mode::NAMES), or "deterministic";
+    /// The board that QEMU imitates.
+    MACHINE: Takes::OneOf(Machine::NAMES), or "microvm";
+}
 
 /// Runs the command with the words after the kind, whose files `parse` reads.
 pub(super) fn command(words: &[OsString], parse: Parse<Case>) -> ExitCode {

@@ -107,11 +107,14 @@ static SCHEDULES: Command = of_files(
     "./scripts/oracle schedules",
     "Compares starts, finishes, preemptions, response times and misses with those of the scheduler \
      in virtual time.",
-    options! {
-        /// On the bare machine; with options of its own, see schedules --in-kernel --help.
-        IN_KERNEL: Takes::Nothing;
-    },
+    OPTIONS,
 );
+
+options! {
+    /// Schedules alone, on the bare machine; with options of its own, see schedules --in-kernel
+    /// --help.
+    IN_KERNEL: Takes::Nothing;
+}
 
 static SYNCHRONIZER: Command = of_files(
     "./scripts/oracle synchronizer",

@@ -20,6 +20,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use random::Random;
+use random::sets::set;
 use sched_dag::OverrunPolicy::{Abort, Queue, Skip};
 use sched_dag::analysis::{AnalysisSettings, Overheads, answer, fix_orders};
 use sched_dag::journal::EventKind;
@@ -28,8 +29,7 @@ use sched_dag::{
     Preemption, Scheduler, SchedulerOptions, SubtaskId, SubtaskOrder, SubtaskSpec, verify,
 };
 
-use crate::random::set;
-use tool::options::{Command, Takes as Value, name, options};
+use tool::options::{Command, Takes as Value, options};
 use tool::progress::Progress;
 
 static TABLE: Command = Command {
@@ -37,12 +37,7 @@ static TABLE: Command = Command {
     about: "Runs random sets of which the analysis proves some DAG, in virtual time with the \
             overheads that it charges, and holds every response against its bound.",
     positional: None,
-    options: options! {
-        /// Sets with a bound to run.
-        SETS: Value::Number(1, 100_000_000), or "1000";
-        /// Seed of the first set; each has the next one.
-        SEED: Value::Number(0, u64::MAX), or "1";
-    },
+    options: OPTIONS,
     notes: "\
 A set has up to 4 DAGs of up to 8 subtasks on up to 5 cores, or more side by side; in some sets
 subtasks are pinned, or cores in groups. Each runs twice for 12 of its longest periods: with WCETs and
@@ -52,6 +47,13 @@ Exit code: 0 no response was above its bound; 1 one was, which is printed with i
 command line is refused.
 ",
 };
+
+options! {
+    /// Sets with a bound to run.
+    SETS: Value::Number(1, 100_000_000), or "1000";
+    /// Seed of the first set; each has the next one.
+    SEED: Value::Number(0, u64::MAX), or "1";
+}
 
 /// The observations of all sets.
 #[derive(Default)]

@@ -11,17 +11,14 @@ use text::{Malformed, blocks};
 
 use super::bounds::{self, BoundsCase};
 use super::schedules::{self, Case};
-use super::{in_kernel, of_files, run_files};
-use tool::options::{Command, Takes, options};
+use super::{OPTIONS, in_kernel, of_files, run_files};
+use tool::options::Command;
 
 static WAITING: Command = of_files(
     "./scripts/oracle waiting",
     "Compares schedules of subtasks that wait with those of the scheduler in virtual time, and \
      bounds with those of the analysis at commit.",
-    options! {
-        /// The schedules alone, on the bare machine; see schedules --in-kernel --help.
-        IN_KERNEL: Takes::Nothing;
-    },
+    OPTIONS,
 );
 
 /// One block of a file.

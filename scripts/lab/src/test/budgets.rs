@@ -15,7 +15,7 @@ use std::mem;
 use std::path::Path;
 
 use super::{SourceFile, none_of};
-use tool::golden::Golden;
+use crate::golden::Golden;
 use tool::system::workspace;
 
 /// The table, from the workspace's root.

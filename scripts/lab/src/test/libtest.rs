@@ -12,8 +12,8 @@ use std::thread;
 use std::time::Duration;
 
 use super::{CheckFailure, Tally, TestPlan};
+use crate::golden;
 use tool::child::{Child, Waited, bound_to_us};
-use tool::golden;
 use tool::install::{self, Need};
 use tool::json::Value;
 use tool::progress::Lasting;

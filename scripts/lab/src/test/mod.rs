@@ -32,7 +32,7 @@ use std::thread;
 use std::time::Instant;
 
 use tool::image::{self, package_name};
-use tool::options::{Command, Refusal, Takes, name, options};
+use tool::options::{Command, Refusal, Takes, options};
 use tool::{elf, files, install, system};
 
 /// The table of `test`.
@@ -43,18 +43,7 @@ pub static TEST: Command = Command {
         Takes::Text("FILTER"),
         "Run only tests and checks whose name contains this.",
     )),
-    options: options! {
-        /// Only what runs on the host: no guests, no images, no lints.
-        QUICK: Takes::Nothing;
-        /// Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.
-        BLESS: Takes::Nothing;
-        /// Only tests where threads meet, under Miri of a nightly toolchain.
-        MIRI: Takes::Nothing;
-        /// Only runs on threads of Linux, under ThreadSanitizer of a nightly toolchain.
-        THREAD_SANITIZER: Takes::Nothing;
-        /// Show every test by name, not only those that fail.
-        VERBOSE 'v': Takes::Nothing;
-    },
+    options: OPTIONS,
     notes: "\
 The last line is `N passed, M failed`, or `N passed, M failed, K skipped` with
 the reasons above it. Each part says when it ends how many seconds it took.
@@ -66,6 +55,19 @@ exit codes: 0 nothing failed; 1 something failed; 2 a refused command line, or
 a FILTER by which nothing has run
 ",
 };
+
+options! {
+    /// Only what runs on the host: no guests, no images, no lints.
+    QUICK: Takes::Nothing;
+    /// Rewrite what a change makes wrong: fault texts and outputs in pages, baselines.
+    BLESS: Takes::Nothing;
+    /// Only tests where threads meet, under Miri of a nightly toolchain.
+    MIRI: Takes::Nothing;
+    /// Only runs on threads of Linux, under ThreadSanitizer of a nightly toolchain.
+    THREAD_SANITIZER: Takes::Nothing;
+    /// Show every test by name, not only those that fail.
+    VERBOSE 'v': Takes::Nothing;
+}
 
 /// The tests to run.
 struct TestPlan {
@@ -178,7 +180,7 @@ fn build_images(plan: &TestPlan, sources: &[SourceFile], tally: &mut Tally) {
         return;
     }
     let own = packages(sources);
-    for app in image::apps() {
+    for app in ["apps", "apps/lab"].into_iter().flat_map(image::apps) {
         let most = own.contains(&app).then_some(image::MOST_STRIPPED_BYTES);
         let name = match most {
             Some(most) => format!("image of {app} weighs at most {} KiB", most >> 10),

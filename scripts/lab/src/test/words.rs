@@ -12,7 +12,7 @@ use std::fs;
 use std::path::Path;
 
 use super::{SourceFile, none_of};
-use tool::golden::Golden;
+use crate::golden::Golden;
 use tool::system::workspace;
 
 /// The table of rooms, from the workspace's root.

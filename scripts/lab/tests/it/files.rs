@@ -11,7 +11,7 @@ fn what_is_no_file_or_not_the_right_one_is_2_before_the_work() {
     fs::create_dir(folder.join("sub.json")).expect("a folder");
     fs::write(folder.join("file"), "kept").expect("a file");
     let rows = "
-bench join-latency --deterministic --out file/x | name another
+bench join-latency --mode deterministic --out file/x | name another
 bench hand-off --listing none/x | name another
 bench hand-off --listing file --scale | `--scale`
 oracle synchronizer file file | are one file; give it once

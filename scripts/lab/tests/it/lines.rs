@@ -8,7 +8,7 @@ use crate::support::{
 
 /// Every command, by the words that name it.
 const COMMANDS: &str = "test, soak, bench, \
-    bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle assignment, \
+    bench bounds, bench hand-off, bench join-latency, bench native, bench sizes, oracle, oracle assignment, \
     oracle bounds, oracle responses, oracle schedules, oracle schedules --in-kernel, oracle synchronizer, \
     oracle waiting";
 
@@ -34,11 +34,9 @@ tset | fass-lab: unknown SUBCOMMAND `tset`; did you mean `test`?
 bench bounds --cores 2,2 | `--cores`: `2` stands twice
 bench bounds sets.txt --seed 2 | bench bounds: `--seed` is for random sets; leave it or the files out
 bench native --only join,join | `--only`: `join` stands twice
-bench join-latency --once --mode threads | `--once`
-bench join-latency --subtasks 2,2 --deterministic | `--subtasks`: `2` stands twice
+bench join-latency --subtasks 2,2 | `--subtasks`: `2` stands twice
 bench join-latency --policies exact,exact | `--policies`: `exact` stands twice
-bench join-latency --mode threads --deterministic | exclude
-bench join-latency --on linux --once | `--once` is for guests";
+bench join-latency --on linux --mode kvm | `--mode` is for guests";
     assert_refused(workspace(), rows);
 }
 

@@ -28,7 +28,8 @@ use text::Malformed;
 use text::{is_seen, shown};
 
 use crate::files;
-use crate::options::{Name, Parsed, name};
+use crate::options::{Name, Parsed};
+use crate::run_options::name;
 
 /// The settings for reading a file.
 #[derive(Clone, Debug)]
@@ -419,10 +420,9 @@ mod tests {
     use super::{
         Format, MOST_S, limit_s, memory_mib, name_of, parse, prepare, rd_gen, stg, translate,
     };
-    use crate::options::name;
-    use crate::run::RUN;
+    use crate::run_options::{RUN, name};
     use crate::system::workspace;
-    use crate::tests::rows;
+    use crate::tests::{right, rows};
     use fass_dag_file::{DagFile, Length, is_name};
     use random::Random;
     use std::path::Path;
@@ -541,7 +541,7 @@ mod tests {
         let name = format!("century-{}.dag", std::process::id());
         let path = std::env::temp_dir().join(name);
         std::fs::write(&path, "dag x period 3153600000s\nsubtask a wcet 1ms\nend\n").unwrap();
-        let prepared = |line: &str| prepare(&RUN.right(line).with(name::DAG, path.clone()));
+        let prepared = |line: &str| prepare(&right(&RUN, line).with(name::DAG, path.clone()));
         let said = prepared("--jobs 2").unwrap_err().join("\n");
         let words = "its jobs take 876000 hours or more, and a run has 24 if nobody says how long";
         assert!(said.contains(words), "{said}");

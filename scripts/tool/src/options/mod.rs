@@ -14,23 +14,21 @@
 //! A command line that was understood is [`Parsed`].
 
 mod menu;
-pub mod name;
 
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
-use std::fmt::Write;
+use std::fmt::{self, Write};
 use std::ops::RangeInclusive;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::process::ExitCode;
-use std::str::FromStr;
+use std::str::{self, FromStr};
 
 use text::{quoted, shown, visible};
 
 use crate::files::Named;
 
 pub use menu::{Choice, Menu, choices};
-pub use name::Name;
 pub use sched_dag::nearest;
 
 /// The exit code of a run that a person has ended early, as a shell has it for ctrl-C.
@@ -107,17 +105,6 @@ impl Command {
     /// the exit code.
     pub(crate) fn report(&self, refusal: Refusal) -> ExitCode {
         refusal.report(self.invocation)
-    }
-
-    /// Parses a command line that must be valid; for tests.
-    ///
-    /// # Panics
-    ///
-    /// Panics if it is refused.
-    pub fn right(&self, line: &str) -> Parsed {
-        let words: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
-        let parsed = self.parse(&words);
-        parsed.unwrap_or_else(|refusal| panic!("`{line}` gave {refusal:?}"))
     }
 
     /// Reads a command line (without the program's and the command's name).
@@ -297,6 +284,44 @@ fn split(word: &OsStr) -> (&OsStr, Option<&OsStr>) {
     (OsStr::from_bytes(name), parts.next().map(OsStr::from_bytes))
 }
 
+/// The name of an option, without its dashes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Name(&'static str);
+
+impl Name {
+    /// Makes the name of an option, which is ASCII; empty for a positional word.
+    pub const fn new(name: &'static [u8]) -> Name {
+        match str::from_utf8(name) {
+            Ok(name) => Name(name),
+            Err(_) => Name(""),
+        }
+    }
+
+    /// Returns the name as a person types it after the dashes.
+    pub const fn as_str(self) -> &'static str {
+        self.0
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0)
+    }
+}
+
+/// Returns the name of an option from that of its constant: small letters, and `-` for `_`.
+pub const fn typed<const LENGTH: usize>(constant: &str) -> [u8; LENGTH] {
+    let mut name = [b'-'; LENGTH];
+    let mut at = 0;
+    while at < LENGTH {
+        if constant.as_bytes()[at] != b'_' {
+            name[at] = constant.as_bytes()[at].to_ascii_lowercase();
+        }
+        at += 1;
+    }
+    name
+}
+
 /// One option of a command.
 #[derive(Clone, Copy, Debug)]
 pub struct Opt {
@@ -314,18 +339,31 @@ pub struct Opt {
     pub group: &'static str,
 }
 
-/// Makes the options of a [`Command`]. The doc comment of each is its help sentence; then come the
-/// name, a short form, `in` and the group that it starts, a colon and the value it takes, and `or`
-/// with the default.
+/// Makes the options of a [`Command`], as the constant `OPTIONS`, and their names, as constants of
+/// a module `name`: a look-up of an option that no command has does not compile. The doc comment of
+/// each is its help sentence; then come the name, a short form, `in` and the group that it starts, a
+/// colon and the value it takes, and `or` with the default.
 #[macro_export]
 macro_rules! options {
     ($(
         $(#[doc = $help:literal])+
         $name:ident $($short:literal)? $(in $group:literal)?: $takes:expr $(, or $default:expr)?;
     )*) => {
-        &[$(
+        /// The names of the options.
+        pub(crate) mod name {
+            use $crate::options::{Name, typed};
+            $(
+                $(#[doc = $help])+
+                pub(crate) const $name: Name = {
+                    const NAME: &[u8] = &typed::<{ stringify!($name).len() }>(stringify!($name));
+                    Name::new(NAME)
+                };
+            )*
+        }
+
+        pub(crate) const OPTIONS: &[$crate::options::Opt] = &[$(
             $crate::options::Opt {
-                name: $crate::options::name::$name,
+                name: name::$name,
                 takes: $takes,
                 help: concat!($($help),+),
                 $(short: Some($short),)?
@@ -333,7 +371,7 @@ macro_rules! options {
                 $(default: $default,)?
                 ..$crate::options::Opt::FLAG
             }
-        ),*]
+        ),*];
     };
 }
 pub use options;
@@ -384,7 +422,7 @@ impl Takes {
 impl Opt {
     /// A flag without a name, which the others differ from.
     pub const FLAG: Opt = Opt {
-        name: Name::new(""),
+        name: Name(""),
         short: None,
         takes: Takes::Nothing,
         default: "",

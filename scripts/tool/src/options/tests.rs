@@ -4,32 +4,34 @@ use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::Path;
 
-use super::{Command, Parsed, Refusal, Takes, name};
-use crate::tests::rows;
+use super::{Command, Parsed, Refusal, Takes};
+use crate::tests::{right, rows};
 
 static COMMAND: Command = Command {
     invocation: "./scripts/example",
     about: "Does nothing.",
     positional: None,
-    options: options! {
-        /// Processors of the guest.
-        CORES: Takes::Number(1, 64), or "8";
-        /// Parallel subtasks.
-        SUBTASKS: Takes::Numbers(1, 14);
-        /// The meaning of time.
-        MODE: Takes::OneOf(&["kvm", "deterministic", "threads"]);
-        /// Keep the log.
-        SERIAL: Takes::File("FILE");
-        /// Only this.
-        ONLY: Takes::Text("NAME");
-        /// Say less.
-        QUIET 'q': Takes::Nothing;
-    },
+    options: OPTIONS,
     notes: "Exit codes: none.",
 };
 
+options! {
+    /// Processors of the guest.
+    CORES: Takes::Number(1, 64), or "8";
+    /// Parallel subtasks.
+    SUBTASKS: Takes::Numbers(1, 14);
+    /// The meaning of time.
+    MODE: Takes::OneOf(&["kvm", "deterministic", "threads"]);
+    /// Keep the log.
+    SERIAL: Takes::File("FILE");
+    /// Only this.
+    ONLY: Takes::Text("NAME");
+    /// Say less.
+    QUIET 'q': Takes::Nothing;
+}
+
 fn parsed(line: &str) -> Parsed {
-    COMMAND.right(line)
+    right(&COMMAND, line)
 }
 
 fn refusal(line: &str) -> String {

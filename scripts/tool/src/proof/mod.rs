@@ -32,7 +32,6 @@ use sched_dag::{CoreDivision, Dag, DagId, DagSpec, Preemption, SchedulerOptions}
 
 use crate::files;
 use crate::json::Object;
-use crate::options::name;
 use crate::output::{Table, shown};
 use crate::record::{self, Committed};
 use observed::OfDag;
@@ -256,7 +255,7 @@ pub fn write(path: &Path, commits: &[Committed]) -> Result<String, String> {
     for commit in commits {
         let path = file(path, commit.number);
         let text = analysis::witness(&commit.task_set, &commit.settings());
-        files::write_named(name::WITNESS.as_str(), &path, text)?;
+        files::write_named("witness", &path, text)?;
         names.push(files::shown_path(&path));
     }
     match names.join(" ") {

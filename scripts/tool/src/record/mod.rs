@@ -17,7 +17,6 @@ use sched_dag::{
     SubtaskId, SubtaskSpec, TaskSet, Wait, verify,
 };
 
-use crate::options::{Parsed, name};
 use crate::protocol::{MachineLine, Transcript, read_line};
 use crate::qemu::{MOST_CORES, Mode};
 
@@ -607,9 +606,8 @@ impl Run {
 }
 
 /// Returns the bound that a person has chosen, or else the usual one of the run.
-pub fn tolerance_ns(run: &Run, options: &Parsed) -> u64 {
-    let chosen = options.number(name::BOUND_US);
-    chosen.map_or(run.usual_bound_ns, |bound_us| bound_us.saturating_mul(1000))
+pub fn tolerance_ns(run: &Run, bound_us: Option<u64>) -> u64 {
+    bound_us.map_or(run.usual_bound_ns, |bound_us| bound_us.saturating_mul(1000))
 }
 
 /// Returns the usual bound of a boot's runs from its line of kind `boot`: the tool passes each

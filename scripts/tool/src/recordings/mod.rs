@@ -22,7 +22,7 @@ use text::{quoted, visible};
 
 use crate::dot;
 use crate::files::{self, Named};
-use crate::options::{Command, Name, Parsed, Refusal, Takes, name, options};
+use crate::options::{Command, Name, Parsed, Refusal, Takes, options};
 use crate::output;
 use crate::proof::{self, observed};
 use crate::protocol::Transcript;
@@ -40,37 +40,7 @@ pub static RECORDING: Command = Command {
         Takes::File("FILE"),
         "A recording; with --from-csv, a table to make one of.",
     )),
-    options: options! {
-        /// Write a table of each channel into this folder, and one of what else happened.
-        CSV: Takes::File("DIR");
-        /// Write an MCAP file, with messages in JSON, for Foxglove and others.
-        MCAP: Takes::File("FILE");
-        /// Of a run that was kept (`./scripts/run --keep FILE`): write the committed DAGs to this
-        /// file, for Graphviz.
-        DOT: Takes::File("FILE");
-        /// Of such a run: write what proves the commit's bounds.
-        WITNESS: Takes::File("FILE");
-        /// Of such a run: write what calls took, as WCETs with a margin of 20 %.
-        OBSERVE: Takes::File("FILE");
-        /// Show all that is recorded of a job. (What its subtasks compute of it is shown by the
-        /// app's own replay.)
-        UNTIL: Takes::Text("DAG/JOB");
-        /// Make a recording of a table whose rows are what a source returns.
-        FROM_CSV: Takes::Nothing;
-        /// --from-csv: write the recording to this file.
-        OUT 'o': Takes::File("FILE");
-        /// --from-csv: the DAG of the source.
-        DAG: Takes::Text("NAME");
-        /// --from-csv: the topic that it writes.
-        TOPIC: Takes::Text("NAME");
-        /// --from-csv: the type of the values, as `Seen { at: [f64; 3], name: text }`, its numbers
-        /// in the order of the columns; else each column is a field of type f64.
-        TYPE: Takes::Text("TYPE");
-        /// --from-csv: columns that are no part of the values, with commas between.
-        IGNORE: Takes::Text("COLUMNS");
-        /// --from-csv: the time from job to job, such as 10ms; a column release_ns has to agree.
-        PERIOD: Takes::Text("TIME");
-    },
+    options: OPTIONS,
     notes: "\
 Without an option it says what is in the recording. docs/recordings.md explains all of it.
 
@@ -78,6 +48,38 @@ exit codes: 0 all is well; 1 an output cannot be written; 2 a refused command li
 file that is no whole and unaltered recording, or no such table
 ",
 };
+
+options! {
+    /// Write a table of each channel into this folder, and one of what else happened.
+    CSV: Takes::File("DIR");
+    /// Write an MCAP file, with messages in JSON, for Foxglove and others.
+    MCAP: Takes::File("FILE");
+    /// Of a run that was kept (`./scripts/run --keep FILE`): write the committed DAGs to this
+    /// file, for Graphviz.
+    DOT: Takes::File("FILE");
+    /// Of such a run: write what proves the commit's bounds.
+    WITNESS: Takes::File("FILE");
+    /// Of such a run: write what calls took, as WCETs with a margin of 20 %.
+    OBSERVE: Takes::File("FILE");
+    /// Show all that is recorded of a job. (What its subtasks compute of it is shown by the
+    /// app's own replay.)
+    UNTIL: Takes::Text("DAG/JOB");
+    /// Make a recording of a table whose rows are what a source returns.
+    FROM_CSV: Takes::Nothing;
+    /// --from-csv: write the recording to this file.
+    OUT 'o': Takes::File("FILE");
+    /// --from-csv: the DAG of the source.
+    DAG: Takes::Text("NAME");
+    /// --from-csv: the topic that it writes.
+    TOPIC: Takes::Text("NAME");
+    /// --from-csv: the type of the values, as `Seen { at: [f64; 3], name: text }`, its numbers
+    /// in the order of the columns; else each column is a field of type f64.
+    TYPE: Takes::Text("TYPE");
+    /// --from-csv: columns that are no part of the values, with commas between.
+    IGNORE: Takes::Text("COLUMNS");
+    /// --from-csv: the time from job to job, such as 10ms; a column release_ns has to agree.
+    PERIOD: Takes::Text("TIME");
+}
 
 /// Runs the subcommand with the words after its name.
 pub fn recording(words: &[OsString]) -> ExitCode {

@@ -20,8 +20,9 @@ use recording::{
 };
 use text::quoted;
 
+use super::name;
 use crate::files;
-use crate::options::{Parsed, name};
+use crate::options::Parsed;
 
 /// Converts a table to a recording.
 #[allow(

@@ -29,8 +29,9 @@ use crate::child;
 use crate::files;
 use crate::image;
 use crate::install;
-use crate::options::{Command, Name, Opt, Parsed, Refusal, Takes, did_you_mean, name};
+use crate::options::{Command, Name, Opt, Parsed, Refusal, did_you_mean};
 use crate::qemu::{Mode, Qemu};
+use crate::run_options::name;
 use crate::system;
 
 /// The longest time from QEMU's start until gdb can reach it.
@@ -43,21 +44,8 @@ static DEBUG: LazyLock<Command> = LazyLock::new(|| Command {
     positional: None,
     options: Vec::leak(vec![
         of_run(name::APP, None),
-        Opt {
-            name: name::BREAK,
-            takes: Takes::Text("PLACES"),
-            help: "Where to stop, with commas between: a function, by the end of its path \
-                   (control, attitude::control), or FILE:LINE (src/dags.rs:153).",
-            default: "kernel_main",
-            ..Opt::FLAG
-        },
-        Opt {
-            name: name::COMMANDS,
-            takes: Takes::File("FILE"),
-            help: "Have gdb do what this file says once it has stopped, and end; no person is \
-                   asked.",
-            ..Opt::FLAG
-        },
+        own::OPTIONS[0],
+        own::OPTIONS[1],
         of_run(name::CORES, Some("1")),
         of_run(name::JOBS, None),
         of_run(name::SEED, None),
@@ -80,6 +68,19 @@ exit codes: gdb's; 1 a failure; 2 a refused command line
 ",
 });
 
+/// The options that `run` has not.
+mod own {
+    use crate::options::{Takes, options};
+
+    options! {
+        /// Where to stop, with commas between: a function, by the end of its path
+        /// (control, attitude::control), or FILE:LINE (src/dags.rs:153).
+        BREAK: Takes::Text("PLACES"), or "kernel_main";
+        /// Have gdb do what this file says once it has stopped, and end; no person is asked.
+        COMMANDS: Takes::File("FILE");
+    }
+}
+
 /// Returns an option of `run`, with another default if one is given.
 fn of_run(name: Name, default: Option<&'static str>) -> Opt {
     let option = RUN.options.iter().find(|option| option.name == name);
@@ -100,7 +101,7 @@ pub fn debug(words: &[OsString]) -> ExitCode {
 fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
     let run = as_run(own)?;
     check_files(&run)?;
-    let commands = own.path(name::COMMANDS);
+    let commands = own.path(own::name::COMMANDS);
     if let Some(path) = commands {
         let place = files::shown_path(path);
         // Read to see that it can be; gdb itself would only complain after the boot.
@@ -124,10 +125,10 @@ fn attempt(own: &Parsed) -> Result<ExitCode, Refusal> {
         Some(path) => path.into(),
         None => {
             eprintln!("building `{app}` by the profile `gdb`");
-            image::build_for_gdb(&app)?
+            image::build_target(&app, "gdb", ["--bin", &app], None)?
         }
     };
-    let places = own.text(name::BREAK).unwrap_or_default();
+    let places = own.text(own::name::BREAK).unwrap_or_default();
     let places = resolve(&image, &app, places).map_err(Refusal::Usage)?;
     let log = system::new_log(&format!("{app}-gdb"))?;
     let socket = log.with_extension("socket");

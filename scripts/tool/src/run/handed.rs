@@ -15,11 +15,12 @@ use text::{quoted, shown};
 
 use crate::dag_file::Prepared;
 use crate::files::{self, Named, Temporary};
-use crate::options::{Parsed, Refusal, name};
+use crate::options::{Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::proof::observed;
 use crate::qemu::Second;
 use crate::recordings;
+use crate::run_options::name;
 use crate::system;
 use crate::wire_script;
 
@@ -215,15 +216,16 @@ pub(super) fn warning(options: &Parsed, outcome: &Outcome) -> Option<String> {
 mod tests {
     use super::super::{RUN, prepare};
     use super::{Handed, of_file, pair, second};
-    use crate::options::name;
     use crate::qemu::Second;
+    use crate::run_options::name;
     use crate::system::workspace;
+    use crate::tests::right;
     use std::fs;
 
     #[test]
     fn dags_of_a_file_are_a_module_that_goes_with_its_value() {
         let demo = workspace().join("apps/dag-file/examples/demo.dag");
-        let options = RUN.right("--jobs 3").with(name::DAG, demo);
+        let options = right(&RUN, "--jobs 3").with(name::DAG, demo);
         let dags = prepare(&options).unwrap().unwrap();
         let handed = Handed::read(&options, Some(&dags)).unwrap();
         let module = handed.module().unwrap();
@@ -257,7 +259,7 @@ mod tests {
                 is_live,
                 output: output.map(Into::into),
             });
-            assert_eq!(second(&RUN.right(line)), expected, "{line}");
+            assert_eq!(second(&right(&RUN, line)), expected, "{line}");
         }
     }
 }

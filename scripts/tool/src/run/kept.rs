@@ -17,12 +17,13 @@ use recording::{Chunk, Header, Recording, Writer};
 use super::screen::Screen;
 use super::{Booted, handed};
 use crate::files::{self, Temporary};
-use crate::options::{Name, Parsed, Refusal, name};
+use crate::options::{Name, Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::protocol::Status;
 use crate::qemu::Ending;
 use crate::record::Record;
 use crate::recordings;
+use crate::run_options::name;
 use crate::system;
 
 /// The kinds of lines that are left out of the record: those about progress, and those that carry

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use crate::dag_file::Prepared;
 use crate::files;
 use crate::install;
-use crate::options::{Parsed, Refusal, name};
+use crate::options::{Parsed, Refusal};
 use crate::qemu::{Loader, Machine, Mode, PROGRAM};
+use crate::run_options::name;
 use crate::system;
 
 /// Returns the loader that the options choose.
@@ -106,11 +107,12 @@ mod tests {
     use super::machine;
     use crate::qemu::Machine;
     use crate::run::RUN;
+    use crate::tests::right;
 
     /// `tests/it/lines.rs` has what is refused.
     #[test]
     fn a_stick_takes_a_pc() {
-        let board = |line: &str| machine(&RUN.right(line));
+        let board = |line: &str| machine(&right(&RUN, line));
         assert_eq!(board(""), Machine::Microvm);
         for line in ["--boot pvh --machine q35", "--boot bios", "--boot uefi"] {
             assert_eq!(board(line), Machine::Q35, "{line}");

@@ -16,7 +16,6 @@ mod loading;
 mod on_linux;
 mod screen;
 mod several;
-mod table;
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -31,18 +30,19 @@ use crate::files;
 use crate::image;
 use crate::install;
 use crate::medium;
-use crate::options::{BY_PERSON, Name, Parsed, Refusal, name};
+use crate::options::{BY_PERSON, Name, Parsed, Refusal};
 use crate::outcome::{Outcome, boot_with_input};
 use crate::probe;
 use crate::protocol::{Status, Transcript};
 use crate::qemu::{Ending, Mode, Qemu};
+use crate::run_options::{GUEST_WORDS, name};
 use handed::Handed;
 use kept::{Kept, Log};
 use screen::Screen;
 
+pub use crate::run_options::RUN;
 pub use boot::boot;
 pub use debug::debug;
-pub use table::RUN;
 
 /// Options that exclude each other in one run that is not observed.
 const APART: [(Name, Name, &str); 3] = [
@@ -260,7 +260,7 @@ fn describe(
 /// person's own.
 fn words(options: &Parsed, dags: Option<&Prepared>, own: Vec<String>) -> Vec<String> {
     let mut words = Vec::new();
-    for name in table::GUEST_WORDS.iter().copied() {
+    for name in GUEST_WORDS.iter().copied() {
         words.extend(options.text(name).map(|value| format!("{name}={value}")));
     }
     words.extend(dags.iter().flat_map(|dags| dags.words.iter().cloned()));

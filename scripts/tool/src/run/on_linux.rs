@@ -14,9 +14,10 @@ use super::{Booted, limit};
 use crate::dag_file::Prepared;
 use crate::debian::{Guest, GuestOrder};
 use crate::image;
-use crate::options::{Name, Parsed, Refusal, name};
+use crate::options::{Name, Parsed, Refusal};
 use crate::program;
 use crate::qemu::{self, Ending, Mode};
+use crate::run_options::name;
 
 /// Options that concern QEMU, its guest, or the bare-metal kernel alone.
 const FOREIGN: [Name; 6] = [
@@ -250,10 +251,11 @@ fn own_words(options: &Parsed) -> Vec<String> {
 mod tests {
     use super::settle;
     use crate::run::RUN;
+    use crate::tests::right;
 
     /// `tests/it/lines.rs` has what is refused.
     #[test]
     fn standard_input_is_for_linux_too() {
-        assert!(settle(&RUN.right("--on linux --input - --trace x --cores 3")).is_ok());
+        assert!(settle(&right(&RUN, "--on linux --input - --trace x --cores 3")).is_ok());
     }
 }

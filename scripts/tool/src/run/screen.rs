@@ -17,10 +17,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::handed;
-use crate::options::{Parsed, name};
+use crate::options::Parsed;
 use crate::places;
 use crate::progress::Progress;
 use crate::protocol::{MachineLine, read_line};
+use crate::run_options::name;
 use crate::system;
 
 /// The value of `quiet` that suppresses machine lines, too: for a run that only prepares another.

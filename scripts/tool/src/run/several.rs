@@ -19,7 +19,7 @@ use super::{Booted, RUN, boot_app, check_files, conclude, go_on, prepare};
 use crate::dag_file::{Format, states_overheads};
 use crate::files::{self, Temporary};
 use crate::json::quoted;
-use crate::options::{Name, Parsed, Refusal, name};
+use crate::options::{Name, Parsed, Refusal};
 use crate::outcome::Outcome;
 use crate::output::Table;
 use crate::progress::Progress;
@@ -27,6 +27,7 @@ use crate::proof::observed::{self, OfDag};
 use crate::proof::{self, ProofRow};
 use crate::protocol::Status;
 use crate::record::Record;
+use crate::run_options::name;
 use crate::system;
 
 /// The platform's overheads; an error in words if no trace was kept.

@@ -50,7 +50,7 @@ use sched_dag::{CoreId, DagId, Instance, Policy, Preemption};
 
 use crate::files;
 use crate::json::{Object, quoted};
-use crate::options::{Command, Parsed, Refusal, Takes, did_you_mean, name, options};
+use crate::options::{Command, Parsed, Refusal, Takes, did_you_mean, options};
 use crate::output::shown as shown_ns;
 use crate::record::{Record, Run, tolerance_ns};
 
@@ -100,20 +100,7 @@ pub static CHECK_TRACE: Command = Command {
         Takes::File("FILE..."),
         "Records of runs, as `./scripts/run --trace FILE` and --keep write them, or serial logs.",
     )),
-    options: options! {
-        /// Microseconds for which an instance may wait for what it is owed, because a decision
-        /// takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 by fifo, 10000
-        /// by sched_ext, 100000 where nothing is preempted, else 1000.
-        BOUND_US: Takes::Number(0, 1_000_000_000);
-        /// Breaches of a run to be shown; all are counted.
-        SHOW: Takes::Number(0, u64::MAX), or "20";
-        /// Only the chains that begin with this subtask; with --to.
-        FROM: Takes::Text("DAG/SUBTASK");
-        /// Only the chains that end with this subtask; with --from.
-        TO: Takes::Text("DAG/SUBTASK");
-        /// Only the machine lines on standard output, the rest on standard error.
-        JSON: Takes::Nothing;
-    },
+    options: OPTIONS,
     notes: "\
 rules:
   R1 release              nothing of a job before O + kT
@@ -136,6 +123,19 @@ exit codes: 0 no breach; 1 some; 2 a refused command line, or a file without a
 well-formed trace with events
 ",
 };
+
+options! {
+    /// Microseconds for which an instance may wait for what it is owed, because a decision
+    /// takes effect after an interrupt; 50 in mode deterministic, on Linux 5000 by fifo, 10000
+    /// by sched_ext, 100000 where nothing is preempted, else 1000.
+    BOUND_US: Takes::Number(0, 1_000_000_000);
+    /// Only the chains that begin with this subtask; with --to.
+    FROM: Takes::Text("DAG/SUBTASK");
+    /// Only the chains that end with this subtask; with --from.
+    TO: Takes::Text("DAG/SUBTASK");
+    /// Only the machine lines on standard output, the rest on standard error.
+    JSON: Takes::Nothing;
+}
 
 /// Runs the subcommand with the words after its name.
 pub fn check_trace(words: &[OsString]) -> ExitCode {
@@ -184,11 +184,9 @@ fn read_file(path: &Path) -> Result<Vec<Run>, String> {
 
 /// Judges a run, prints the findings, and returns the number of breaches.
 fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> usize {
-    let bound_ns = tolerance_ns(run, options);
-    let shown = options.number(name::SHOW).unwrap_or(u64::MAX);
-    let shown = usize::try_from(shown).unwrap_or(usize::MAX);
+    let bound_ns = tolerance_ns(run, options.number(name::BOUND_US));
     let findings = check(run, bound_ns);
-    let mut table = table(file, run, &findings, bound_ns, shown);
+    let mut table = table(file, run, &findings, bound_ns);
     table += &chain_table(run, chains, options.is_given(name::FROM));
     let exceeded: usize = chains.iter().map(|chain| chain.exceeded(bound_ns)).sum();
     if exceeded > 0 {
@@ -209,8 +207,11 @@ fn judge(file: &str, run: &Run, chains: &[MeasuredChain], options: &Parsed) -> u
     findings.breaches.len() + exceeded
 }
 
-/// Returns the text for people: at most `shown` breaches, then the figures.
-pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: usize) -> String {
+/// The most breaches of a run that are shown; all are counted.
+const MOST: usize = 20;
+
+/// Returns the text for people: the first breaches, then the figures.
+pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64) -> String {
     let mut text = String::new();
     let Findings { breaches, figures } = findings;
     let policy = match run.options.policy {
@@ -229,11 +230,11 @@ pub fn table(file: &str, run: &Run, findings: &Findings, bound_ns: u64, shown: u
     say(&format!(
         "{file}: run {number}, policy {policy}, preemption {preemption}, {cores} cores"
     ));
-    for breach in breaches.iter().take(shown) {
+    for breach in breaches.iter().take(MOST) {
         say(&format!("  breach {}", breach.with_names(&run.task_set)));
     }
-    if breaches.len() > shown {
-        say(&format!("  and {} breaches more", breaches.len() - shown));
+    if breaches.len() > MOST {
+        say(&format!("  and {} breaches more", breaches.len() - MOST));
     }
     if run.lost > 0 {
         say(&format!(

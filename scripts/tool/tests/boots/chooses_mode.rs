@@ -8,10 +8,10 @@ use std::fs;
 use std::time::Duration;
 
 use tool::qemu::Qemu;
-use tool::tiny::{TinyEnd, tiny_image};
 use tool::{image, install, probe, system};
 
 use crate::support::{STOPS, assert_kvm_refused, call_by, folder, stub, succeed};
+use crate::tiny::{TinyEnd, tiny_image};
 
 /// A limit that no busy host reaches.
 const FAR: Duration = Duration::from_secs(120);

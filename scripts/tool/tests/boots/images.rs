@@ -71,7 +71,7 @@ fn without_optimization_the_stacks_hold_and_a_run_is_evaluated() {
         ("fork-join", "jobs=20 subtasks=6", "\"joins\":20,"),
         ("drone", "seconds=1", "\"kind\":\"drone\""),
     ] {
-        let image = image::build_for_gdb(app).expect("it builds");
+        let image = image::build_target(app, "gdb", ["--bin", app], None).expect("it builds");
         let words = format!("budget_factor=0 {words}");
         let run = [
             "run",

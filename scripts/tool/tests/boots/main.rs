@@ -10,6 +10,8 @@ mod keeps;
 mod prove;
 #[path = "../support/mod.rs"]
 mod support;
+#[path = "../support/tiny.rs"]
+mod tiny;
 mod tiny_guest;
 
 /// The program that these tests call.

@@ -8,8 +8,9 @@ use std::time::Duration;
 use tool::outcome::{Outcome, boot};
 use tool::protocol::Status;
 use tool::qemu::{Ending, Machine, Mode, Qemu};
-use tool::tiny::{TinyEnd, tiny_image};
 use tool::{install, system};
+
+use crate::tiny::{TinyEnd, tiny_image};
 
 /// A limit that no busy host reaches.
 const FAR: Duration = Duration::from_secs(300);

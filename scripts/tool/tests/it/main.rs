@@ -2,6 +2,7 @@
 //! exit codes; and schedules and traces held against references. Nothing is booted.
 
 mod dag_files;
+mod elf;
 mod files;
 mod lines;
 #[path = "../../src/record/tests/made.rs"]
@@ -11,6 +12,8 @@ mod on_linux;
 mod recordings;
 #[path = "../support/mod.rs"]
 mod support;
+#[path = "../support/tiny.rs"]
+mod tiny;
 mod traces;
 
 /// The program that these tests call.

@@ -13,12 +13,12 @@ use cases::{CASES, GRAPHS, PERIOD};
 use fass::{WaitFault, finish_create_dags};
 use harness::fault_page::{self, documented_faults, is_said_by, table};
 use harness::markdown::page;
+use lab::golden::Golden;
 use sched_dag::analysis::{NotProvenReason, TaskError};
 use sched_dag::{
     CommitOptions, DagFault, DagId, DagLabel, DagSpec, Policy, SubtaskId, SubtaskSpec, TopicPort,
     verify,
 };
-use tool::golden::Golden;
 
 fn not_launched() -> fass::commit::CommitError {
     let machine = virtual_time::VirtualTime::new();

@@ -10,7 +10,7 @@ use std::iter;
 use std::path::{Path, PathBuf};
 
 use crate::bench::frame::Figure;
-use tool::golden::Golden;
+use crate::golden::Golden;
 use tool::json::{self, Object};
 use tool::output::Table;
 use tool::qemu::Mode;

@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use super::frame::{Figure, by_plan};
 use tool::files;
-use tool::options::{Command, Name, Parsed, Takes, name, options};
+use tool::options::{Command, Name, Parsed, Takes, options};
 use tool::progress::Progress;
 use tool::qemu::Mode;
 use tool::{image, install, probe};
@@ -27,25 +27,27 @@ static TABLE: Command = Command {
     invocation: "./scripts/bench hand-off",
     about: "Measures on the machine the way from a completion to its successor's first instruction.",
     positional: None,
-    options: options! {
-        /// The unit of what is counted: instructions (deterministic), time (kvm, threads), or both.
-        MODE: Takes::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
-        /// Compare the instructions with the baseline; one that grew is a failure.
-        COMPARE: Takes::Nothing;
-        /// Write the instructions into the baseline, tests/baselines/hand-off.json.
-        SAVE_BASELINE: Takes::Nothing;
-        /// Instead, count what the workloads cost on more cores and with more subtasks.
-        SCALE: Takes::Nothing;
-        /// Instead, log each instruction of one hop, count them by parts of the code, and write
-        /// them to FILE. Needs objdump and addr2line (binutils).
-        LISTING: Takes::File("FILE");
-    },
+    options: OPTIONS,
     notes: "What each row means stands in docs/performance.md.
 
 Exit code: 0 measured, and nothing grew; 1 something grew, or did not run;
 2 the command line is refused.
 ",
 };
+
+options! {
+    /// The unit of what is counted: instructions (deterministic), time (kvm, threads), or both.
+    MODE: Takes::OneOf(&["both", "deterministic", "threads", "kvm"]), or "both";
+    /// Compare the instructions with the baseline; one that grew is a failure.
+    COMPARE: Takes::Nothing;
+    /// Write the instructions into the baseline, tests/baselines/hand-off.json.
+    SAVE_BASELINE: Takes::Nothing;
+    /// Instead, count what the workloads cost on more cores and with more subtasks.
+    SCALE: Takes::Nothing;
+    /// Instead, log each instruction of one hop, count them by parts of the code, and write
+    /// them to FILE. Needs objdump and addr2line (binutils).
+    LISTING: Takes::File("FILE");
+}
 
 /// The measurement to make.
 #[derive(Debug)]
@@ -199,7 +201,7 @@ fn measure_mode(mode: Mode, image: &Path) -> Result<Vec<Figure>, String> {
 #[cfg(test)]
 mod tests {
     use super::{HandOffPlan, TABLE};
-    use crate::tests::rows;
+    use crate::tests::{right, rows};
 
     /// Command lines, and their refusals. More are in `tests/it/files.rs`.
     const REFUSED: &str = "--compare --mode threads | leave `--mode` out
@@ -212,11 +214,11 @@ mod tests {
     #[test]
     fn what_cannot_be_is_refused() {
         for [line, words] in rows(REFUSED) {
-            let refused = HandOffPlan::new(&TABLE.right(&line)).expect_err(&line);
+            let refused = HandOffPlan::new(&right(&TABLE, &line)).expect_err(&line);
             assert!(refused.contains(&words), "{refused}");
         }
         for line in ["--scale", "--listing /dev/null", "--compare --mode both"] {
-            assert!(HandOffPlan::new(&TABLE.right(line)).is_ok(), "{line}");
+            assert!(HandOffPlan::new(&right(&TABLE, line)).is_ok(), "{line}");
         }
     }
 }

@@ -24,7 +24,7 @@ use text::quoted;
 use super::frame::{by_plan, draw, judged};
 use figures::ConditionFigures;
 use tool::files;
-use tool::options::{Command, Parsed, Takes, name, options};
+use tool::options::{Command, Parsed, Takes, options};
 use tool::program::ProgramOrder;
 use tool::progress::Progress;
 use tool::qemu::{Mode, PROGRAM, Qemu};
@@ -98,31 +98,7 @@ static TABLE: Command = Command {
     invocation: "./scripts/bench join-latency",
     about: "Reproduces the paper's evaluation: joins by a DAG, by equal and by close stamps.",
     positional: None,
-    options: options! {
-        /// The folder for all results; what is there already is not measured again. If not given,
-        /// target/join-latency, or target/join-latency-on-linux.
-        OUT 'o': Takes::File("DIR");
-        /// Jobs of each condition.
-        JOBS: Takes::Number(1, 100_000), or "2000";
-        /// Parallel subtasks N; a condition has two processors more than the largest.
-        SUBTASKS: Takes::Numbers(1, 16), or "2,4,6";
-        /// The policies: fass, exact, approximate-MS with the longest interval.
-        POLICIES: Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
-        /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
-        /// every policy.
-        REPEAT: Takes::Number(1, 1000), or "1";
-        /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
-        /// there are fewer.
-        ON: Takes::OneOf(&["machine", "linux"]), or "machine";
-        /// Queue size of the synchronizers.
-        QUEUE: Takes::Number(1, 100_000), or "1000";
-        /// The meaning of time, see ./scripts/run --help; kvm where it works, else deterministic.
-        MODE: Takes::OneOf(Mode::NAMES);
-        /// The same as --mode deterministic.
-        DETERMINISTIC: Takes::Nothing;
-        /// Boot each deterministic condition once, not until two boots agree.
-        ONCE: Takes::Nothing;
-    },
+    options: OPTIONS,
     notes: "\
 writes into DIR:
   summary.json        counts, median, mean, p99, max of each condition
@@ -136,6 +112,28 @@ options, it measures the others only. docs/paper.md explains the metrics.
 exit codes: 0 all conditions are measured; 1 one failed; 2 a refused command line
 ",
 };
+
+options! {
+    /// The folder for all results; what is there already is not measured again. If not given,
+    /// target/join-latency, or target/join-latency-on-linux.
+    OUT 'o': Takes::File("DIR");
+    /// Jobs of each condition.
+    JOBS: Takes::Number(1, 100_000), or "2000";
+    /// Parallel subtasks N; a condition has two processors more than the largest.
+    SUBTASKS: Takes::Numbers(1, 16), or "2,4,6";
+    /// The policies: fass, exact, approximate-MS with the longest interval.
+    POLICIES: Takes::Text("LIST"), or "fass,exact,approximate-10,approximate-30,approximate-50";
+    /// Runs of each condition, with the seeds from 1 on of the execution times, the same for
+    /// every policy.
+    REPEAT: Takes::Number(1, 1000), or "1";
+    /// Where: on the machine in QEMU, or on this computer's processors, which cores share if
+    /// there are fewer.
+    ON: Takes::OneOf(&["machine", "linux"]), or "machine";
+    /// Queue size of the synchronizers.
+    QUEUE: Takes::Number(1, 100_000), or "1000";
+    /// The meaning of time, see ./scripts/run --help; kvm where it works, else deterministic.
+    MODE: Takes::OneOf(Mode::NAMES);
+}
 
 /// The settings that all conditions share, and the conditions.
 #[derive(Clone, Debug)]
@@ -152,8 +150,6 @@ struct JoinPlan {
     on_linux: bool,
     /// The named mode; `None`: the built image decides.
     named: Option<Mode>,
-    /// Whether a deterministic condition is booted once only.
-    once: bool,
 }
 
 impl JoinPlan {
@@ -166,28 +162,11 @@ impl JoinPlan {
         let on_linux = options.text(name::ON) == Some("linux");
         if on_linux {
             let why = "is for guests; leave it or `--on linux` out";
-            options.check_without(&[name::MODE, name::DETERMINISTIC, name::ONCE], why)?;
+            options.check_without(&[name::MODE], why)?;
         }
         (options.named(&[name::OUT]).iter()).try_for_each(files::check_folder)?;
         options.check_distinct(&[name::POLICIES, name::SUBTASKS])?;
         let policies = Policy::list(options.text(name::POLICIES).unwrap_or_default())?;
-        let mut named = options.text(name::MODE).and_then(Mode::from_name);
-        if options.is_given(name::DETERMINISTIC) {
-            let other = named.filter(|mode| *mode != Mode::Deterministic);
-            if let Some(mode) = other {
-                return Err(format!(
-                    "`--mode {mode}` and `--deterministic` exclude each other; give one"
-                ));
-            }
-            named = Some(Mode::Deterministic);
-        }
-        let once = options.is_given(name::ONCE);
-        if let Some(mode) = named.filter(|mode| once && *mode != Mode::Deterministic) {
-            return Err(format!(
-                "`--once` is for deterministic conditions, and the mode is {mode}, in which each \
-                 is booted once; leave it out"
-            ));
-        }
         let number = |name| options.number(name).unwrap_or(1);
         let subtasks: Vec<usize> = options.numbers(name::SUBTASKS);
         let seeds: Vec<u64> = (1..=number(name::REPEAT)).collect();
@@ -220,8 +199,7 @@ impl JoinPlan {
             // The kernel records each instance, and the app its joins: half a KiB per job and core.
             memory_mib: 64 + (jobs * cores).div_ceil(2048),
             on_linux,
-            named,
-            once,
+            named: options.text(name::MODE).and_then(Mode::from_name),
         })
     }
 }
@@ -423,7 +401,7 @@ impl<'p> Setting<'p> {
     /// wherever figures are made.
     fn measure(&self, condition: &Condition) -> Result<String, String> {
         // Real times never repeat, so a second boot could not confirm them.
-        let is_sure = self.plan.once || self.mode != Some(Mode::Deterministic);
+        let is_sure = self.mode != Some(Mode::Deterministic);
         let mut seen = Vec::new();
         while seen.len() < MOST_BOOTS {
             let times = self.boot_once(condition)?;
@@ -480,14 +458,15 @@ fn first_line(program: &str, words: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::right;
 
     fn plan(line: &str) -> Result<JoinPlan, String> {
-        JoinPlan::new(&TABLE.right(line))
+        JoinPlan::new(&right(&TABLE, line))
     }
 
     #[test]
     fn every_combination_is_a_condition() {
-        let plan = plan("--deterministic --repeat 2 --policies fass,exact").unwrap();
+        let plan = plan("--mode deterministic --repeat 2 --policies fass,exact").unwrap();
         assert_eq!(plan.conditions.len(), 3 * 2 * 2);
         assert_eq!((plan.cores, plan.seeds), (8, vec![1, 2]));
     }

@@ -28,7 +28,7 @@ use text::quoted;
 
 use super::frame::{Figure, by_plan};
 use tool::json::Object;
-use tool::options::{Command, Parsed, Takes, name, options};
+use tool::options::{Command, Parsed, Takes, options};
 use tool::output::Table;
 use tool::progress::Progress;
 
@@ -36,15 +36,7 @@ static TABLE: Command = Command {
     invocation: "./scripts/bench native",
     about: "Measures the scheduler on this host's own processors, with empty bodies.",
     positional: None,
-    options: options! {
-        /// How many rounds of about 20,000 instances each figure has.
-        ROUNDS: Takes::Number(10, 100_000), or "300";
-        /// The jobs whose joins across cores are measured.
-        JOBS: Takes::Number(100, 10_000_000), or "20000";
-        /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
-        /// layered-1000, dags-1000, join, clusters; all.
-        ONLY: Takes::Text("NAMES");
-    },
+    options: OPTIONS,
     notes: "\
 `floor` calls the bodies in topological order, in a loop; `closures` are functions under
 the scheduler, without values, on one and two workers; `typed` are functions with a u64 on each edge (not of
@@ -57,6 +49,16 @@ else it does; compare figures of one run.
 Exit code: 0 measured; 1 a run did not complete its jobs; 2 the command line is refused.
 ",
 };
+
+options! {
+    /// How many rounds of about 20,000 instances each figure has.
+    ROUNDS: Takes::Number(10, 100_000), or "300";
+    /// The jobs whose joins across cores are measured.
+    JOBS: Takes::Number(100, 10_000_000), or "20000";
+    /// The workloads, with commas between: chain-64, fork-join-2, fork-join-4, fork-join-6,
+    /// layered-1000, dags-1000, join, clusters; all.
+    ONLY: Takes::Text("NAMES");
+}
 
 /// The name of the workload of joins across cores.
 const JOIN: &str = "join";
@@ -493,9 +495,10 @@ fn commit_typed(graph: MeasuredGraph, jobs: u64, mut tick: impl FnMut() + Send +
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::right;
 
     fn plan(line: &str) -> Result<NativePlan, String> {
-        NativePlan::read(&TABLE.right(line))
+        NativePlan::read(&right(&TABLE, line))
     }
 
     #[test]

@@ -47,7 +47,7 @@ use super::{JobHistory, Slice, View, picture};
 use super::{check, read_file};
 use crate::files;
 use crate::json::{Object, quoted};
-use crate::options::{Command, Name, Parsed, Refusal, Takes, name, options};
+use crate::options::{Command, Name, Parsed, Refusal, Takes, options};
 use crate::output::briefly;
 use crate::record::{Run, tolerance_ns};
 
@@ -140,22 +140,7 @@ pub static TRACE: Command = Command {
         Takes::File("FILE"),
         "A record of runs, as `./scripts/run --trace FILE` and --keep write it, or a serial log.",
     )),
-    options: options! {
-        /// Write to this file; else to standard output.
-        OUT 'o': Takes::File("FILE");
-        /// Draw one run as an SVG instead: its DAGs above their schedule, with bounds and deadlines.
-        SVG: Takes::Nothing;
-        /// How many times the longest period the picture shows.
-        PERIODS: Takes::Number(1, 1000), or "1";
-        /// The picture begins at this time of the run, such as 20ms; else at 0.
-        FROM: Takes::Text("TIME");
-        /// It shows the jobs that are released before this time, whatever --periods says.
-        UNTIL: Takes::Text("TIME");
-        /// Only the run of this number; else all of them, side by side from time 0.
-        RUN: Takes::Number(0, u64::MAX);
-        /// As for ./scripts/check-trace, whose breaches are shown as markers.
-        BOUND_US: Takes::Number(0, 1_000_000_000);
-    },
+    options: OPTIONS,
     notes: "\
 Open the file at https://ui.perfetto.dev (it stays on your machine), in Chromium at
 chrome://tracing, or at https://www.speedscope.app. docs/watching.md explains the picture.
@@ -164,6 +149,23 @@ exit codes: 0 all is well; 1 the output cannot be written; 2 a refused command
 line, or a file without a well-formed trace with events
 ",
 };
+
+options! {
+    /// Write to this file; else to standard output.
+    OUT 'o': Takes::File("FILE");
+    /// Draw one run as an SVG instead: its DAGs above their schedule, with bounds and deadlines.
+    SVG: Takes::Nothing;
+    /// How many times the longest period the picture shows.
+    PERIODS: Takes::Number(1, 1000), or "1";
+    /// The picture begins at this time of the run, such as 20ms; else at 0.
+    FROM: Takes::Text("TIME");
+    /// It shows the jobs that are released before this time, whatever --periods says.
+    UNTIL: Takes::Text("TIME");
+    /// Only the run of this number; else all of them, side by side from time 0.
+    RUN: Takes::Number(0, u64::MAX);
+    /// As for ./scripts/check-trace, whose breaches are shown as markers.
+    BOUND_US: Takes::Number(0, 1_000_000_000);
+}
 
 /// Runs the subcommand with the words after its name.
 pub fn trace(words: &[OsString]) -> ExitCode {
@@ -216,7 +218,9 @@ fn draw(options: &Parsed) -> Result<String, String> {
         return picture::draw(run, from_ns..until_ns.max(from_ns));
     }
     // All runs of a file come from one boot, so one bound holds for all.
-    let bound_ns = runs.first().map_or(0, |run| tolerance_ns(run, options));
+    let bound_ns = runs
+        .first()
+        .map_or(0, |run| tolerance_ns(run, options.number(name::BOUND_US)));
     Ok(convert(&runs, bound_ns))
 }
 

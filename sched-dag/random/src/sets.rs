@@ -1,12 +1,17 @@
 //! Random sets of DAGs for the analysis.
 
-use random::Random;
+use alloc::format;
+use alloc::vec::Vec;
+
 use sched_dag::{DagSpec, Priority, SubtaskSpec};
+
+use crate::Random;
 
 /// Draws up to 4 DAGs for clusters of `clusters` cores, which they take in turn, at least one each:
 /// from light to full load, deadlines below, at and beyond the period, priorities by DAG or by
 /// subtask.
-pub(crate) fn set(random: &mut Random, unit_ns: u64, clusters: &[u32]) -> Vec<DagSpec> {
+#[must_use]
+pub fn set(random: &mut Random, unit_ns: u64, clusters: &[u32]) -> Vec<DagSpec> {
     let count = random.within(clusters.len()..=4);
     let (overlaps, by_subtask) = (random.once_in(3), random.once_in(4));
     let share = count as u64 * random.within(1..=8);

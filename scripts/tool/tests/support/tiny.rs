@@ -22,7 +22,7 @@ const XEN_ELFNOTE_PHYS32_ENTRY: u32 = 18;
 
 /// How a tiny guest ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TinyEnd {
+pub(crate) enum TinyEnd {
     /// By writing this byte to QEMU's exit port.
     Exit(u8),
     /// Never: it halts with no interrupt to wake it.
@@ -30,11 +30,7 @@ pub enum TinyEnd {
 }
 
 /// Returns the image of a guest that prints `text` and then ends as `end` says.
-///
-/// # Panics
-///
-/// Panics if `text` has 4 GiB or more.
-pub fn tiny_image(text: &str, end: TinyEnd) -> Vec<u8> {
+pub(crate) fn tiny_image(text: &str, end: TinyEnd) -> Vec<u8> {
     let code_at = BASE + HEADERS + NOTE;
     let length = u32::try_from(text.len()).expect("a tiny guest's text is short");
     let code = code(code_at, length, end);

@@ -13,7 +13,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Mutex;
 
-use crate::system::workspace;
+use tool::system::workspace;
 
 /// The variable by which `--bless` reaches test programs: the path of the list of rewritten files.
 pub const BLESSED: &str = "TOOL_BLESSED";

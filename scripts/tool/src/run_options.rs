@@ -1,0 +1,137 @@
+//! The options of `run`: the one table behind its parser and its help text.
+
+use crate::options::{Command, Name, Takes, options};
+use crate::qemu::{LEAST_MEMORY_MIB, Loader, MOST_CORES, Machine, Mode};
+
+/// The options that become words `name=value` on the guest's command line, if
+/// they are given: kernel and apps have defaults of their own, and not every app
+/// knows every word.
+pub(crate) const GUEST_WORDS: &[Name] = &[
+    name::POLICY,
+    name::PREEMPTION,
+    name::CLUSTERS,
+    name::FROM,
+    name::JOBS,
+    name::LATEST,
+    name::SECONDS,
+    name::SEED,
+    name::EXECUTION,
+    name::SUBTASKS,
+    name::LONGEST,
+    name::OCCUPY,
+];
+
+/// The most subtasks side by side: a function returns at most 16 values.
+const MOST_SUBTASKS: u64 = 16;
+
+/// The table of `run`.
+pub static RUN: Command = Command {
+    invocation: "./scripts/run",
+    about: "\
+Builds an app, boots it on the bare machine in QEMU, or runs it on Linux, and judges the run.",
+    positional: None,
+    options: OPTIONS,
+    notes: "\
+Modes: docs/commands.md. Ctrl-C and the timeout end a run in order, ctrl-C again at once.
+exit codes: 0 all is well; 1 a failure; 2 a refused command line; 130 ended by ctrl-C
+",
+};
+
+options! {
+    /// The app: a package under apps/.
+    APP in "what": Takes::Text("NAME"), or "fork-join";
+    /// A file of DAGs (docs/dag-file.md), or a folder.
+    DAG: Takes::File("FILE");
+    /// Boot this image, or program; build nothing.
+    IMAGE: Takes::File("FILE");
+    /// Jobs that a DAG releases; 0: no end.
+    JOBS: Takes::Number(0, 1_000_000);
+    /// Seed of the app's random draws; 1.
+    SEED: Takes::Number(0, u64::MAX);
+    /// Parameters of the app, with commas between.
+    SET: Takes::Text("NAME=VALUE");
+    /// Those of a file, a line for each; --set prevails.
+    PARAMS: Takes::File("FILE");
+    /// A file in the guest's memory, for the app.
+    MODULE: Takes::File("FILE");
+    /// More words for the guest's command line.
+    APPEND: Takes::Text("WORDS");
+    /// Platform.
+    ON in "where": Takes::OneOf(&["machine", "linux", "debian"]), or "machine";
+    /// Processors; 4 on debian.
+    CORES: Takes::Number(1, MOST_CORES), or "8";
+    /// See docs/commands.md.
+    MODE: Takes::OneOf(Mode::NAMES);
+    /// The board.
+    MACHINE: Takes::OneOf(Machine::NAMES), or "microvm";
+    /// The loader.
+    BOOT: Takes::OneOf(Loader::NAMES), or "pvh";
+    /// The guest's MiB.
+    MEMORY: Takes::Number(LEAST_MEMORY_MIB, 65_536), or "32";
+    /// Use this QEMU; install nothing.
+    QEMU: Takes::File("PROGRAM");
+    /// On Linux, by what.
+    MECHANISM: Takes::OneOf(&["fifo", "sched_ext", "normal", "poll"]);
+    /// On debian: so many programs next to it.
+    BUSY: Takes::Number(0, 64);
+    /// Fixed priorities, or by deadline.
+    POLICY in "rules": Takes::OneOf(&["static", "edf"]);
+    /// Whether instances may lose their cores.
+    PREEMPTION: Takes::OneOf(&["on", "off"]);
+    /// Sizes of clusters of cores: N,N,... or auto.
+    CLUSTERS: Takes::Text("SIZES");
+    /// Parallel ones, a run for each; 2,4,6.
+    SUBTASKS in "fork-join": Takes::Numbers(1, MOST_SUBTASKS);
+    /// Milliseconds of the longest execution.
+    LONGEST: Takes::Number(1, 50);
+    /// How a simulated one has its core.
+    OCCUPY: Takes::OneOf(&["hold", "spin"]);
+    /// The one to take of a set of task graphs.
+    GRAPH in "--dag": Takes::Text("NAME");
+    /// The unit of numbers where a format has none; 1ms.
+    UNIT: Takes::Text("TIME");
+    /// wcet (if nothing is said), uniform:0.2..1, samples.
+    EXECUTION: Takes::Text("MODEL");
+    /// The jobs of so many seconds.
+    SECONDS: Takes::Number(1, 1_000_000);
+    /// A deadline miss is a failure.
+    STRICT_DEADLINES: Takes::Nothing;
+    /// Print the file in our format; run nothing.
+    PRINT_DAG: Takes::Nothing;
+    /// All of the run; docs/recordings.md.
+    KEEP in "files": Takes::File("FILE");
+    /// As --keep, without values; for check-trace.
+    TRACE: Takes::File("FILE");
+    /// Jobs of a DAG to keep for a crash; 16.
+    LATEST: Takes::Number(0, 64);
+    /// Take the sources' values from it, compare others.
+    REPLAY: Takes::File("FILE");
+    /// --replay: begin with this job.
+    FROM: Takes::Text("DAG/JOB");
+    /// The serial log.
+    SERIAL: Takes::File("FILE");
+    /// The committed DAGs, for `dot -Tsvg FILE`.
+    DOT: Takes::File("FILE");
+    /// Measure, commit with that, and compare; docs/proving.md.
+    PROVE in "bounds": Takes::Nothing;
+    /// --prove: per cent that a WCET is above the longest call; 20.
+    MARGIN: Takes::Number(0, 1_000);
+    /// --prove: measure so many seeds; 1.
+    SEEDS: Takes::Number(1, 1_000);
+    /// Commit with WCETs that `recording --observe` has written.
+    WCETS: Takes::File("FILE");
+    /// Talk to the kernel, in real time: type `help`.
+    CONSOLE in "person": Takes::Nothing;
+    /// Bytes for the app's wire; docs/wires.md. -: stdin.
+    INPUT: Takes::File("FILE");
+    /// Write what the app sends on its wire.
+    OUTPUT: Takes::File("FILE");
+    /// Seconds until its end; 120, one a job.
+    TIMEOUT: Takes::Number(1, 86_400);
+    /// Only machine lines on standard output.
+    JSON: Takes::Nothing;
+    /// Only what the guest prints.
+    QUIET 'q': Takes::Nothing;
+    /// Wait for a debugger on TCP port 1234.
+    GDB: Takes::Nothing;
+}
