@@ -27,7 +27,6 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::mpsc;
 use std::thread;
 use std::time::Instant;
 
@@ -139,22 +138,18 @@ pub fn test(words: &[OsString]) -> ExitCode {
 /// Runs all tests and checks.
 fn run_all(plan: &TestPlan, tally: &mut Tally) -> Result<(), String> {
     let sources = &sources()[..];
-    let (send, compiled) = mpsc::channel();
+    let panicked = |_| "a thread of the tests panicked".to_string();
     thread::scope(|scope| {
-        // Cargo builds images in another folder than tests and lints. So both are built at the
-        // same time, and lints run while tests run.
-        let aside = scope.spawn(move || {
-            let _ = send.send(libtest::compile());
-            checks::lint_all(plan, sources)
-        });
+        // Cargo builds images, tests and lints in a folder each, and so at the same time.
+        let linted = scope.spawn(move || checks::lint_all(plan, sources));
+        let compiled = scope.spawn(move || libtest::compile(plan));
         build_images(plan, sources, tally);
-        let compiled = compiled.recv().map_err(|error| error.to_string())?;
-        libtest::run_all(plan, compiled, tally);
+        match compiled.join().map_err(panicked)? {
+            Ok(boots) => libtest::run_all(plan, &boots, tally),
+            Err(why) => tally.fail("all tests compile", &why),
+        }
         checks::run_all(plan, sources, tally);
-        let linted = aside
-            .join()
-            .map_err(|_| "the thread of the lints panicked")?;
-        tally.add(linted);
+        tally.add(linted.join().map_err(panicked)?);
         Ok(())
     })
 }
