@@ -1,21 +1,16 @@
 //! The handle of a run: what changes it while it goes on, from any thread, and shows it to people.
-//!
-//! SIGINT, which ctrl-C sends, and SIGTERM are signals by which a person, or a service manager,
-//! asks a program to end. While they are caught they kill nobody and are counted, so that what goes
-//! on can end in order.
 
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, Barrier, PoisonError, RwLock};
 use std::time::Duration;
 use std::{io, thread};
 
+use end_signals::EndSignals;
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, DagKey, Scheduler, SchedulerQuery, TaskSet};
 
 use crate::level::Role;
 use crate::office::Office;
 use crate::sys;
-use crate::sys::Catch;
 use crate::team::Team;
 
 /// The handle of a committed run. Its requests are carried out by the release thread of the DAG's
@@ -203,7 +198,7 @@ impl Control {
         /// How long the thread outlives its run.
         const MOST_NS: u64 = 1_000_000_000;
         self.watch("fass-ends", |control| {
-            let has_come = wait(sys::now_ns() + MOST_NS);
+            let has_come = EndSignals::wait(sys::now_ns() + MOST_NS);
             if has_come {
                 control.close();
             }
@@ -236,58 +231,4 @@ impl Control {
         has_begun.wait();
         Ok(())
     }
-}
-
-/// The signals, caught as long as this value lives. A program has one at a time.
-///
-/// ```
-/// let signals = linux::EndSignals::catch();
-/// linux::EndSignals::send(std::process::id());
-/// while signals.count() == 0 {}
-/// assert_eq!(signals.count(), 1);
-/// ```
-#[derive(Debug)]
-pub struct EndSignals(());
-
-impl EndSignals {
-    /// Has all of them counted from now on.
-    #[must_use = "they are caught as long as the value lives"]
-    pub fn catch() -> Self {
-        Self::new(Catch::All)
-    }
-
-    /// Has the first one counted. The next one ends the program, as it usually does.
-    #[must_use = "it is caught as long as the value lives"]
-    pub fn catch_first() -> Self {
-        Self::new(Catch::First)
-    }
-
-    fn new(catch: Catch) -> Self {
-        sys::ENDS_ASKED.store(0, Ordering::Relaxed);
-        sys::catch_ends(catch);
-        Self(())
-    }
-
-    /// Returns how many have come.
-    #[must_use]
-    pub fn count(&self) -> u32 {
-        sys::ENDS_ASKED.load(Ordering::Acquire)
-    }
-
-    /// Sends a process SIGINT. Whether it is still there does not matter.
-    pub fn send(process: u32) {
-        sys::ask_to_end(process);
-    }
-}
-
-impl Drop for EndSignals {
-    fn drop(&mut self) {
-        sys::catch_ends(Catch::None);
-    }
-}
-
-/// Waits for the first that is caught, until a time at most, and reports whether it has come.
-pub(crate) fn wait(until_ns: u64) -> bool {
-    sys::wait(&sys::ENDS_ASKED, 0, Some(until_ns));
-    sys::ENDS_ASKED.load(Ordering::Acquire) > 0
 }

@@ -58,7 +58,8 @@ mod team;
 mod worker;
 
 pub use blocking::{blocking, next_question};
-pub use control::{Control, EndSignals};
+pub use control::Control;
+pub use end_signals::EndSignals;
 pub use machine::{Connection, Linux, Mechanism, StartError, now_ns, own_core, processors};
 pub use platform::{Counts, Run};
 pub use state::Fault;

@@ -6,14 +6,15 @@
 use std::ffi::{CStr, c_char};
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, FromRawFd, OwnedFd};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::AtomicU32;
+
+pub(crate) use end_signals::{wait, wake};
 
 unsafe extern "C" {
     fn clock_gettime(clock: i32, time: *mut Time) -> i32;
     fn epoll_create1(flags: i32) -> i32;
     fn epoll_ctl(epoll: i32, operation: i32, file: i32, event: *const Interest) -> i32;
     fn epoll_wait(epoll: i32, events: *mut Interest, most: i32, timeout_ms: i32) -> i32;
-    fn kill(process: i32, signal: i32) -> i32;
     fn mlockall(flags: i32) -> i32;
     fn mmap(at: *mut u8, bytes: usize, access: i32, flags: i32, file: i32, from: i64) -> *mut u8;
     fn prctl(option: i32, ...) -> i32;
@@ -21,7 +22,6 @@ unsafe extern "C" {
     fn sched_setaffinity(thread: i32, bytes: usize, mask: *const u64) -> i32;
     fn sched_setscheduler(thread: i32, policy: i32, level: *const i32) -> i32;
     fn setrlimit(resource: i32, limits: *const [u64; 2]) -> i32;
-    fn signal(number: i32, action: usize) -> usize;
     fn syscall(number: i64, ...) -> i64;
 }
 
@@ -46,13 +46,9 @@ const CLOCK_THREAD: i32 = 3;
 #[cfg(target_arch = "x86_64")]
 const SYS_GETTID: i64 = 186;
 #[cfg(target_arch = "x86_64")]
-const SYS_FUTEX: i64 = 202;
-#[cfg(target_arch = "x86_64")]
 const SYS_BPF: i64 = 321;
 #[cfg(not(target_arch = "x86_64"))]
 const SYS_GETTID: i64 = 178;
-#[cfg(not(target_arch = "x86_64"))]
-const SYS_FUTEX: i64 = 98;
 #[cfg(not(target_arch = "x86_64"))]
 const SYS_BPF: i64 = 280;
 
@@ -141,28 +137,6 @@ pub(crate) fn set_normal(thread: ThreadId) -> io::Result<()> {
     checked(result)
 }
 
-/// Sleeps until the word is woken, or until a time on the clock; not at all if the word has
-/// another value. May return early.
-pub(crate) fn wait(word: &AtomicU32, value: u32, until_ns: Option<u64>) {
-    const WAIT_UNTIL: i32 = 9 | 128;
-    let time = until_ns.map(|ns| Time {
-        s: i64::try_from(ns / 1_000_000_000).unwrap_or(i64::MAX),
-        ns: i64::try_from(ns % 1_000_000_000).unwrap_or(0),
-    });
-    let time = time.as_ref().map_or(std::ptr::null(), std::ptr::from_ref);
-    let (none, any) = (std::ptr::null::<u32>(), u32::MAX);
-    // SAFETY: FUTEX_WAIT_BITSET reads the word and, if there is one, the `timespec`; both
-    // live through the call.
-    unsafe { syscall(SYS_FUTEX, word.as_ptr(), WAIT_UNTIL, value, time, none, any) };
-}
-
-/// Wakes a thread that waits for the word, or all.
-pub(crate) fn wake(word: &AtomicU32, most: i32) {
-    const WAKE: i32 = 1 | 128;
-    // SAFETY: FUTEX_WAKE takes the word's address and reads nothing.
-    unsafe { syscall(SYS_FUTEX, word.as_ptr(), WAKE, most) };
-}
-
 /// Lets the calling thread's timers be exact, where real-time levels do not do that.
 pub(crate) fn make_timers_exact() {
     const TIMER_SLACK: i32 = 29;
@@ -220,53 +194,6 @@ pub(crate) fn pinned_table(place: &CStr, bytes: usize) -> io::Result<&'static [A
     // SAFETY: the memory is on pages of its own and never given back; whatever bits it has are
     // numbers, and what the kernel does to them meanwhile is atomic, too.
     Ok(unsafe { std::slice::from_raw_parts(table.cast(), bytes / size_of::<AtomicU32>()) })
-}
-
-const SIGINT: i32 = 2;
-const SIGTERM: i32 = 15;
-
-/// How many signals that are to end the program were caught.
-pub(crate) static ENDS_ASKED: AtomicU32 = AtomicU32::new(0);
-
-/// Which of them are caught.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Catch {
-    All,
-    /// The next one does what it usually does.
-    First,
-    None,
-}
-
-/// Has SIGINT and SIGTERM counted in [`ENDS_ASKED`], or lets them end the program.
-pub(crate) fn catch_ends(catch: Catch) {
-    extern "C" fn count(_signal: i32) {
-        ENDS_ASKED.fetch_add(1, Ordering::Release);
-        wake(&ENDS_ASKED, i32::MAX);
-    }
-    extern "C" fn count_first(number: i32) {
-        catch_ends(Catch::None);
-        count(number);
-    }
-    const USUAL: usize = 0;
-    let action = match catch {
-        Catch::All => count as extern "C" fn(i32) as usize,
-        Catch::First => count_first as extern "C" fn(i32) as usize,
-        Catch::None => USUAL,
-    };
-    for number in [SIGINT, SIGTERM] {
-        // SAFETY: a handler may be called in the middle of anything, and these change an atomic
-        // number, wake threads and set handlers, which takes no lock.
-        unsafe { signal(number, action) };
-    }
-}
-
-/// Sends a process SIGINT.
-pub(crate) fn ask_to_end(process: u32) {
-    let Ok(process @ 1..) = i32::try_from(process) else {
-        return; // others would be groups
-    };
-    // SAFETY: the call takes numbers.
-    unsafe { kill(process, SIGINT) };
 }
 
 /// A descriptor that waits for something new in a file.

@@ -17,7 +17,7 @@ use std::process::{self, ChildStdin, ChildStdout, Command, ExitStatus};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use linux::EndSignals;
+use end_signals::EndSignals;
 
 use crate::protocol::written;
 use crate::system;

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
-use linux::EndSignals;
+use end_signals::EndSignals;
 
 use crate::child::{Asked, Child, Waited, bound_to_us};
 use crate::outcome::Outcome;

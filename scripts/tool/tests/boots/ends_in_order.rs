@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Stdio};
 
-use linux::EndSignals;
+use end_signals::EndSignals;
 use sched_dag::journal::EventKind;
 use tool::protocol::Transcript;
 use tool::record::Record;
