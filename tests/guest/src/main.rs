@@ -71,7 +71,6 @@ const TESTS: &[(&str, Test)] = &[
     ("talkative", single::talkative),
     ("unnoticed", single::unnoticed),
     ("values", values::run),
-    ("waits", waits::run),
     ("waits_cost", waits::cost),
     ("waits_wire", waits::wire),
 ];

@@ -59,29 +59,6 @@ fn a_wait_to_its_limit_is_no_breach_where_timers_are_late() {
     assert_eq!(responses_ms(&report, "a"), [8]);
 }
 
-#[test]
-fn a_call_may_shorten_a_limit_and_several_devices_are_several_waits() {
-    let (slow, slow_driver) = create_device::<(), u8>("slow");
-    let (fast, fast_driver) = create_device::<(), u8>("fast");
-    let dag = every(20, "two");
-    dag.jobs(1);
-    type Both = (Asker<(), u8>, Asker<(), u8>);
-    let ask = |(slow, fast): Both| async move {
-        assert_eq!(slow.ask(()).within(ms(2)).await, Err(TimedOut));
-        assert_eq!(fast.ask(()).await, Ok(7));
-        assert_eq!(slow.ask(()).await, Ok(8));
-    };
-    let ask = dag.using((slow.asking(), fast.asking())).async_source(ask);
-    ask.register(named("two").wait(ms(4)).wait(ms(4)).wait(ms(4)));
-    let machine = VirtualTime::new();
-    commit(&[dag]);
-    machine.answers(slow_driver, |(), _| Some((ms(3), 8)));
-    machine.answers(fast_driver, |(), _| Some((ms(2), 7)));
-    let report = machine.run();
-    assert_eq!(report.violations(), []);
-    assert_eq!(responses_ms(&report, "two"), [7]);
-}
-
 /// Returns the message of the panic of an async source in its first job.
 fn fault<Fut>(stated: SubtaskAttributes, f: impl FnMut() -> Fut + Send + 'static) -> String
 where

@@ -1,10 +1,5 @@
 //! Runs of one set, from which a climb to the worst goes.
-//!
-//! When each wait ends, and whether its instance is told that this is its limit, follows from what is
-//! drawn, and is judged in each run: W2 and W7.
 
-use std::cell::Cell;
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -34,15 +29,8 @@ pub(crate) struct Case {
     pub(crate) features: Vec<u32>,
 }
 
-/// Counts of what has happened in the runs of a climb.
-#[derive(Default)]
-pub(crate) struct Climbed {
-    /// By features, the jobs with a bound.
-    pub(crate) jobs: BTreeMap<u32, u64>,
-    /// Ends of waits: by an answer before the limit, at the limit, by the limit, and by a cut; and
-    /// those at the instant at which they began.
-    pub(crate) ends: [u64; 5],
-}
+/// By features, the jobs with a bound in the runs of a climb.
+pub(crate) type Climbed = BTreeMap<u32, u64>;
 
 /// The events of a run besides the periodic releases.
 #[derive(Clone, Debug)]
@@ -251,7 +239,6 @@ impl Case {
         let drawn = Drawn {
             case: self,
             scenario,
-            wrongly_told: Cell::new(None),
         };
         let dags = (0..).map(DagId).zip(self.task_set.dags());
         let bodies = dags.clone().flat_map(|(dag, model)| {
@@ -296,8 +283,7 @@ impl Case {
                 return Err(format!("the law finds: {first}"));
             }
         }
-        drawn.judge_ends(&events, &mut climbed.ends)?;
-        self.judge(&events, scenario, target, &mut climbed.jobs)
+        self.judge(&events, scenario, target, climbed)
     }
 
     /// Holds responses against bounds.
@@ -306,7 +292,7 @@ impl Case {
         events: &[Event],
         scenario: &Scenario,
         target: usize,
-        counts: &mut BTreeMap<u32, u64>,
+        counts: &mut Climbed,
     ) -> Result<u64, String> {
         let mut nearest = 0;
         let mut flying: HashMap<(DagId, u64), u64> = HashMap::new();
@@ -366,7 +352,7 @@ impl Case {
     }
 
     /// Adds the jobs of each DAG to those of the features of its cluster and of the run.
-    fn count(&self, scenario: &Scenario, jobs: &[u64], counts: &mut BTreeMap<u32, u64>) {
+    fn count(&self, scenario: &Scenario, jobs: &[u64], counts: &mut Climbed) {
         let mut requests = scenario.requests.iter();
         let of_run = mask(&[
             ("faults", scenario.faults > 0),
@@ -387,8 +373,6 @@ impl Case {
 struct Drawn<'s> {
     case: &'s Case,
     scenario: &'s Scenario,
-    /// The last wait of which an instance was told an end that it did not have.
-    wrongly_told: Cell<Option<WaitId>>,
 }
 
 impl Drawn<'_> {
@@ -416,57 +400,6 @@ impl Drawn<'_> {
         let is_late = answer_ns == limit_ns && !job.is_multiple_of(2);
         answer_ns + (1 + job % 8) * u64::from(is_late)
     }
-
-    /// Holds the end of each wait against its answer and its limit.
-    fn judge_ends(&self, events: &[Event], ends: &mut [u64; 5]) -> Result<(), String> {
-        if let Some(wait) = self.wrongly_told.get() {
-            return Err(format!("{wait:?} ended otherwise than was told"));
-        }
-        let mut present: BTreeMap<Instance, (WaitId, u64)> = BTreeMap::new();
-        let mut begun: HashMap<Instance, u32> = HashMap::new();
-        for event in events {
-            let Some(instance) = event.instance() else {
-                continue;
-            };
-            if event.what == EventKind::Wait {
-                let count = begun.entry(instance).or_default();
-                let number = *count;
-                *count += 1;
-                present.insert(instance, (WaitId { instance, number }, event.time_ns));
-                continue;
-            }
-            let Some((wait, since_ns)) = present.remove(&instance) else {
-                continue;
-            };
-            let (limit_ns, answer_ns) = (self.limit_ns(wait), self.answer_ns(wait));
-            let end_ns = since_ns + limit_ns.min(answer_ns);
-            let is_right = match event.what {
-                EventKind::Wake => event.time_ns == end_ns,
-                EventKind::Cancelled => event.time_ns <= end_ns,
-                _ => false,
-            };
-            if !is_right {
-                return Err(format!(
-                    "{wait:?} since {since_ns}: {event:?}, not {end_ns}"
-                ));
-            }
-            let is_cut = event.what == EventKind::Cancelled;
-            let way = match answer_ns.cmp(&limit_ns) {
-                _ if is_cut => 3,
-                Ordering::Less => 0,
-                Ordering::Equal => 1,
-                Ordering::Greater => 2,
-            };
-            ends[way] += 1;
-            ends[4] += u64::from(!is_cut && end_ns == since_ns);
-        }
-        let until_ns = self.scenario.until_ns;
-        let mut left = present.into_values();
-        let overdue = left.find(|(wait, since_ns)| {
-            since_ns + self.limit_ns(*wait).min(self.answer_ns(*wait)) < until_ns
-        });
-        overdue.map_or(Ok(()), |(wait, _)| Err(format!("{wait:?} has no end")))
-    }
 }
 
 /// The function of a subtask, which takes all waits that it states.
@@ -489,14 +422,6 @@ impl SubtaskBody for Body<'_> {
     }
 
     fn discard(&mut self, _: u64) {}
-
-    fn wake(&mut self, has_timed_out: bool) {
-        let (instance, number) = (self.instance, self.turn - 1);
-        let wait = WaitId { instance, number };
-        if has_timed_out != (self.drawn.answer_ns(wait) > self.drawn.limit_ns(wait)) {
-            self.drawn.wrongly_told.set(Some(wait));
-        }
-    }
 
     fn has_effects(&self) -> bool {
         true
