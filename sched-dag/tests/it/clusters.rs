@@ -1,130 +1,23 @@
-//! Clusters: each runs as if it were alone on a machine of its own, and is bounded as such.
-//!
-//! More or other sets: `CLUSTERED=100000 CLUSTER_SEED=7 cargo test -p sched-dag --test
-//! rules clusters`.
+//! Clusters: each is bounded as if it were alone on a machine of its own. (That it runs so, each
+//! scenario tells, event by event.)
 
 use std::sync::Arc;
 
-use random::Random;
 use sched_dag::analysis::{
     self, AnalysisResult, AnalysisSettings, NotProvenReason, Overheads, SchedulabilityTest,
 };
-use sched_dag::journal::Event;
-use sched_dag::virtual_time::VirtualTime;
 use sched_dag::{
-    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, CoreId, DagId, DagSpec, Instance,
-    Policy, Preemption, SchedulerOptions, SubtaskId, TaskSet, verify,
+    ClusterId, CommitOptions, ConstructionPolicy, CoreDivision, DagId, DagSpec, Policy,
+    SchedulerOptions, SubtaskId, TaskSet, verify,
 };
 
-use crate::support::set::{self, Set};
-use crate::support::{self, Script, Spec, TWO_CORES, number};
+use crate::support::{self, TWO_CORES};
 
 fn commit(specs: &[DagSpec], options: SchedulerOptions, clusters: CoreDivision) -> Arc<TaskSet> {
     let options = CommitOptions::new(options.policy, options.cores)
         .with_construction(ConstructionPolicy::any_graph())
         .with_clusters(clusters);
     Arc::new(verify(specs, &options).expect("sets are right").task_set)
-}
-
-/// Runs a set, of which DAG k is that of the original with the number `originals[k]`, and returns
-/// what happens, by the original's numbers.
-fn events(set: &Set, task_set: &Arc<TaskSet>, cores: u32, originals: &[u32]) -> Vec<Event> {
-    let original = |dag: DagId| DagId(originals[dag.index()]);
-    let of = |it: Instance| Instance {
-        dag: original(it.dag),
-        ..it
-    };
-    let options = SchedulerOptions {
-        cores,
-        ..set.options
-    };
-    let script = Script::new(|it| set.execution_ns(of(it))).failing(|it| set.fails(of(it)));
-    let run = script.run(VirtualTime::new(task_set, options));
-    assert!(run.driver.is_finished());
-    let named = |event: &Event| Event {
-        dag: original(event.dag),
-        ..*event
-    };
-    run.events.iter().map(named).collect()
-}
-
-/// Pins subtasks of a set, and in clusters of several cores leaves the last one to what is pinned
-/// to it, if they are to be in groups.
-fn state_cores(specs: &mut [DagSpec], sizes: &[u32], has_groups: bool, random: &mut Random) {
-    // What keeps its core delays what is pinned to that, so which core it has would matter.
-    let mut all = specs.iter().flat_map(|spec| &spec.subtasks);
-    if all.any(|subtask| subtask.non_preemptive) {
-        return;
-    }
-    for spec in specs {
-        let cores = spec.cluster.map_or(1, |cluster| sizes[cluster.index()]);
-        for subtask in &mut spec.subtasks {
-            subtask.core = random.chance(40).then(|| random.within(0..=cores - 1));
-        }
-        if has_groups && cores > 1 {
-            spec.affinity = (0..cores - 1).collect();
-        }
-    }
-}
-
-#[test]
-fn a_cluster_runs_as_if_it_were_alone() {
-    let (count, first_seed) = (number("CLUSTERED", 400), number("CLUSTER_SEED", 1));
-    println!("{count} sets from seed {first_seed} on");
-    for seed in first_seed..first_seed + count {
-        let mut random = Random::new(seed);
-        let mut set = set::draw(&mut random, set::Overruns::Often);
-        let sizes: Vec<u32> = (0..random.within(1..=3))
-            .map(|_| random.within(1..=3))
-            .collect();
-        set.options.cores = sizes.iter().sum();
-        let mut specs = set.specs();
-        for spec in &mut specs {
-            let cluster = u32::try_from(random.index(sizes.len())).expect("few clusters");
-            spec.cluster = Some(ClusterId(cluster));
-        }
-        if set.options.preemption == Preemption::Enabled {
-            state_cores(&mut specs, &sizes, seed % 2 == 0, &mut random);
-        }
-        let all: Vec<u32> = (0..).take(specs.len()).collect();
-        let divided = commit(&specs, set.options, CoreDivision::Of(sizes.clone()));
-        let together = events(&set, &divided, set.options.cores, &all);
-        let mut first = 0;
-        for (cluster, &cores) in (0..).map(ClusterId).zip(&sizes) {
-            let is_here = |dag: &u32| specs[*dag as usize].cluster == Some(cluster);
-            let here: Vec<u32> = all.iter().copied().filter(is_here).collect();
-            let alone = match &here[..] {
-                [] => Vec::new(),
-                _ => {
-                    let spec = |dag: &u32| specs[*dag as usize].clone();
-                    let apart = |spec: DagSpec| spec.with(|spec| spec.cluster = None);
-                    let specs: Vec<DagSpec> = here.iter().map(spec).map(apart).collect();
-                    let task_set = commit(&specs, set.options, CoreDivision::Undivided);
-                    events(&set, &task_set, cores, &here)
-                }
-            };
-            let same = |event: Event, first: u32| {
-                assert!((first..first + cores).contains(&event.core.0), "{event:?}");
-                if let Some(of) = event.instance().filter(|_| event.what.is_of_machine()) {
-                    let core = event.core.0 - first;
-                    let affinity = &specs[of.dag.index()].affinity;
-                    let is_right = match specs[of.dag.index()].subtasks[of.subtask.index()].core {
-                        Some(pin) => pin == core,
-                        None => affinity.is_empty() || affinity.contains(&core),
-                    };
-                    assert!(is_right, "{event:?}");
-                }
-                // Which of them it is may depend on the driver's calls.
-                let core = CoreId(0);
-                Event { core, ..event }
-            };
-            let events = together.iter().filter(|event| is_here(&event.dag.0));
-            let events: Vec<Event> = events.map(|event| same(*event, first)).collect();
-            let alone: Vec<Event> = alone.iter().map(|event| same(*event, 0)).collect();
-            assert_eq!(events, alone, "seed {seed}, {cluster:?}");
-            first += cores;
-        }
-    }
 }
 
 /// Two DAGs of 6 ms each in 10, and one of unknown length.

@@ -1,4 +1,5 @@
 //! Lives of runs: what can happen to one from within and from outside, and what goes on regardless.
+//! (Random runs are paused, resumed and ended from outside, too; a console shows topics in `gait`.)
 
 use std::io::{Read as _, Write as _};
 use std::os::unix::net::UnixStream;
@@ -7,11 +8,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::thread;
 
-use crate::support::{alone, alone_on, breaches, chain, every, mechanisms, ms};
-use fass::platform;
-use fass::shared::Parameter;
+use crate::support::{alone, alone_on, breaches, chain, mechanisms, ms};
 use fass::{SubtaskAttributes, create_dag, finish_create_dags};
-use linux::{Control, Linux, Mechanism};
+use linux::{Linux, Mechanism};
 use sched_dag::lifecycle::Request;
 use sched_dag::{DagId, DagPhase, SchedulerQuery};
 
@@ -90,41 +89,6 @@ fn s1_signals_come_from_other_threads_and_from_files() {
 }
 
 #[test]
-fn a_dag_is_paused_resumed_and_stopped_from_outside() {
-    for mechanism in mechanisms() {
-        let alone = alone(1, mechanism);
-        let endless = every(ms(1), "endless");
-        let ticks = Arc::new(AtomicU64::new(0));
-        let count = Arc::clone(&ticks);
-        let tick = move |_job| _ = count.fetch_add(1, Relaxed);
-        endless.register_untyped_subtask(tick, SubtaskAttributes::named("tick"));
-        finish_create_dags(&[endless]).unwrap();
-        let control = alone.machine.control().unwrap();
-        thread::spawn(move || {
-            let wait_for = |more: u64| {
-                let until = ticks.load(Relaxed) + more;
-                while ticks.load(Relaxed) < until {
-                    thread::sleep(ms(1));
-                }
-            };
-            wait_for(3);
-            control.pause("endless");
-            thread::sleep(ms(20));
-            control.resume("endless");
-            wait_for(3);
-            control.end("endless");
-        });
-        let run = alone.machine.run().unwrap();
-        assert_eq!(run.violations().count(), 0);
-        let statistics = run.statistics("endless");
-        assert!(
-            statistics.skips > 0 && statistics.completed >= 6,
-            "{statistics:?}"
-        );
-    }
-}
-
-#[test]
 fn what_was_asked_for_is_there_once_its_letter_is_taken() {
     let alone = alone(1, Mechanism::Normal);
     let endless = chain("endless", 1, 1_000_000, ms(1), 10);
@@ -167,59 +131,5 @@ fn after_a_run_there_can_be_another() {
         assert!(error.to_string().starts_with("nothing is committed"));
         finish_create_dags(&[chain("tick", 1, 2, ms(1), 10)]).unwrap();
         assert_eq!(alone.machine.run().unwrap().statistics("tick").completed, 2);
-    }
-}
-
-#[test]
-fn a_topic_is_seen_and_what_is_set_is_for_the_jobs_to_come() {
-    for mechanism in mechanisms() {
-        let alone = alone(1, mechanism);
-        platform::let_look();
-        let gain = Parameter::new("gain", 10, 1..=1000_u64);
-        let dag = create_dag();
-        dag.name("scaling").record::<u64>("scaled");
-        let mut count = 0;
-        let scale = move |gain: u64| {
-            count += 1;
-            (gain * count,)
-        };
-        let named = SubtaskAttributes::named;
-        dag.period(ms(2))
-            .using(gain.reading())
-            .source(scale)
-            .writes(&["scaled"])
-            .register(named("scale"));
-        dag.register_sink_subtask(|_: (u64,)| (), vec!["scaled"], ms(2), named("sink"));
-        finish_create_dags(&[dag]).unwrap();
-        let person = thread::spawn(move || {
-            let live = loop {
-                match Control::get() {
-                    Some(live) => break live,
-                    None => thread::sleep(ms(1)),
-                }
-            };
-            let is_seen = |topic| platform::watch(Some(topic));
-            assert_eq!(["gian", "scaled"].map(is_seen), [false, true]);
-            let wait_for = |gain: u64| {
-                let mut buffer = [0; 64];
-                loop {
-                    match platform::take_seen(&mut buffer) {
-                        Some(seen) => {
-                            let expected = (gain * (seen.job + 1)).to_string();
-                            if seen.shown(&buffer).to_string() == expected {
-                                break;
-                            }
-                        }
-                        None => thread::sleep(ms(1)),
-                    }
-                }
-            };
-            wait_for(10);
-            gain.set(1000).expect("it is in range");
-            wait_for(1000);
-            live.close();
-        });
-        alone.machine.run().unwrap();
-        person.join().expect("it has seen both");
     }
 }

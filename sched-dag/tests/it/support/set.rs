@@ -127,7 +127,7 @@ fn with_waits(mut set: Set, random: &mut Random) -> Set {
 
 /// Pins subtasks to cores: some in four of five sets, all in the others; every other set has
 /// affinities, too.
-fn with_pins(mut set: Set, random: &mut Random) -> Set {
+pub(crate) fn with_pins(mut set: Set, random: &mut Random) -> Set {
     let percent = random.one_of(&[0, 20, 50, 80, 100]);
     if random.chance(50) {
         with_affinities(&mut set.specs, set.options.cores, random);

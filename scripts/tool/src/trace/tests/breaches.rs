@@ -295,6 +295,8 @@ fn w1_an_instance_takes_its_waits_each_within_its_limit() {
 =
 53 wake -> 56 wake c0 1.0.0
 = at 56 ns, W1 waiting: subtask `l` of dag `low` job 0 ends its wait on core 0, which began at 20 ns and has a limit of 30 ns
+53 wake ->
+= at 82 ns, one life: subtask `l` of dag `low` job 0 is resumed on core 0 although it waits
 99 wait -> 
 99 wake -> 
 99 resume -> 
