@@ -495,14 +495,4 @@ mod tests {
         let six = federated(&tasks, 6).unwrap();
         assert_eq!((six.heavy, six.light.len()), (vec![(0, 4)], 2));
     }
-
-    #[test]
-    fn no_number_of_cores_shortens_the_critical_path() {
-        let tight = Task::new(10, 5, vec![5, 1], &[]).unwrap();
-        assert_eq!(federated(&[&tight], 64), None);
-        let light_but_long = Task::new(10, 10, vec![10], &[]).unwrap();
-        assert!(federated(&[&light_but_long], 1).is_some());
-        let pipelined = Task::new(10, 11, vec![5], &[]).unwrap();
-        assert_eq!(federated(&[&pipelined], 2), None);
-    }
 }

@@ -311,22 +311,9 @@ impl<'a> ChainFlow<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{covering, covers, parallelism, peel, weight, width};
+    use super::{covering, covers, parallelism, weight, width};
     use crate::analysis::Task;
     use random::Random;
-
-    /// The example in which peeling a longest path first goes wrong.
-    fn crossing() -> Task {
-        Task::new(99, 99, vec![3, 2, 2, 3], &[(0, 1), (2, 3), (0, 3)]).unwrap()
-    }
-
-    #[test]
-    fn covers_are_exact_where_peeling_is_not() {
-        let task = crossing();
-        assert_eq!(covers(&task, 9), [6, 10]);
-        let peeled: Vec<u64> = peel(&task, 2).iter().map(|c| weight(&task, c)).collect();
-        assert_eq!(peeled, [6, 2]);
-    }
 
     #[test]
     fn chains_are_disjoint_paths_that_hold_the_cover() {

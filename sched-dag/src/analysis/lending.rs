@@ -471,68 +471,6 @@ mod tests {
     }
 
     #[test]
-    fn a_squeezed_core_takes_what_it_would_not_have_taken() {
-        let heavy = Task::new(10, 10, vec![4, 4, 3], &[]).unwrap();
-        let light = Task::new(12, 9, vec![2, 4], &[(0, 1)]).unwrap();
-        let answer = lent(&[heavy, light], 2);
-        assert_eq!(answer.failed, [0, 1, 1]);
-        let plan = answer.plan.unwrap();
-        assert_eq!(plan.attempt, LendingAttempt::SqueezedByDensity);
-        let [owner] = &plan.owners[..] else {
-            panic!("{plan:?}");
-        };
-        assert_eq!((owner.dag, owner.first_core), (0, 0));
-        let schedule = &owner.schedule;
-        assert_eq!((schedule.length_ns(), schedule.finish_ns(1)), (8, 3));
-        let group = LentGroup {
-            cores: vec![1],
-            members: vec![(1, 9)],
-        };
-        assert_eq!(plan.groups, [group]);
-        assert_eq!(plan.supplies[1].busy_ns(9), 3);
-    }
-
-    #[test]
-    fn a_heavy_dag_that_comes_late_shares_what_others_leave() {
-        // Both need two cores of their own, and the first has the least slack.
-        let tight = Task::new(100, 7, vec![3, 3, 2, 2, 2], &[]).unwrap();
-        let loose = Task::new(100, 20, vec![7, 7, 7], &[]).unwrap();
-        let answer = lent(&[loose, tight], 2);
-        assert_eq!(answer.failed, [1]);
-        let plan = answer.plan.unwrap();
-        assert_eq!(plan.owners[0].dag, 1);
-        // 14 beside the path and 12 of the owner on two cores; the less busy core first.
-        let group = LentGroup {
-            cores: vec![1, 0],
-            members: vec![(0, 20)],
-        };
-        assert_eq!(plan.groups, [group]);
-    }
-
-    #[test]
-    fn light_dags_go_where_they_are_proven_with_all_that_are_there() {
-        // The heavy one takes 8 of one core and 4 of another, at once: nothing is left of either
-        // within 4, and of the second 4 within 8.
-        let long = Task::new(16, 8, vec![5], &[]).unwrap();
-        let heavy = Task::new(20, 9, vec![4, 4, 4], &[]).unwrap();
-        let short = Task::new(8, 4, vec![3], &[]).unwrap();
-        let answer = lent(&[long, heavy.clone(), short.clone()], 3);
-        let plan = answer.plan.unwrap();
-        assert_eq!(plan.attempt, LendingAttempt::ByDensity);
-        // The densest is placed first, and is the most urgent one, too.
-        let group = LentGroup {
-            cores: vec![2],
-            members: vec![(2, 3), (0, 8)],
-        };
-        assert_eq!(plan.groups, [group]);
-        // A denser one is placed before the more urgent one, and then proven again.
-        let dense = Task::new(20, 16, vec![13], &[]).unwrap();
-        let urgent = Task::new(40, 4, vec![2], &[]).unwrap();
-        let answer = lent(&[dense, heavy, urgent], 3);
-        assert_eq!(answer.plan.unwrap().groups[0].members, [(2, 2), (0, 15)]);
-    }
-
-    #[test]
     fn all_on_all_cores_is_the_multi_path_bound() {
         let mut random = Random::new(3);
         let mut proven = 0;

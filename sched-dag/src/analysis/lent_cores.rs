@@ -360,26 +360,6 @@ mod tests {
     }
 
     #[test]
-    fn a_job_that_is_under_way_at_the_release_counts() {
-        let task = Task::new(20, 20, vec![5], &[]).unwrap();
-        // Released at 4, when the owner begins, and again a period later: 3 + 3 by 15. With whole
-        // jobs only it would seem to end after 8.
-        assert_eq!(bound(&task, &[&owned(10, &[(4, 7)])], &[]), Some(11));
-        assert_eq!(bound(&task, &[&CoreSupply::UNOWNED], &[]), Some(5));
-    }
-
-    #[test]
-    fn a_path_waits_for_owners_on_all_cores() {
-        // Without `max(1, ..)` the clipped form would claim 5, as nothing is beside the path.
-        let task = Task::new(20, 20, vec![5], &[]).unwrap();
-        let supply = owned(10, &[(0, 3)]);
-        assert_eq!(bound(&task, &[&supply, &supply], &[]), Some(8));
-        // One core is always free for it. The whole unit that the clipped form begins with is
-        // halved and rounded up.
-        assert_eq!(bound(&task, &[&supply, &CoreSupply::UNOWNED], &[]), Some(6));
-    }
-
-    #[test]
     fn the_number_of_steps_does_not_depend_on_the_unit_of_time() {
         let unit = 1_000_000_000;
         let task = |wcet_ns| Task::new(20 * unit, 20 * unit, vec![wcet_ns], &[]).unwrap();
@@ -391,20 +371,6 @@ mod tests {
             MemberTask::of(&short, 2, &no_bursts).respond(&[&supply, &supply], &[], &mut steps);
         let one = MemberTask::of(&long, 1, &no_bursts).respond(&[&supply], &[], &mut steps);
         assert_eq!((several, one), (Some(8 * unit), Some(13 * unit + 1)));
-    }
-
-    #[test]
-    fn more_urgent_members_and_the_owner_add_up() {
-        let high = Task::new(9, 4, vec![1], &[]).unwrap();
-        let low = Task::new(40, 30, vec![2, 3], &[(0, 1)]).unwrap();
-        let supply = owned(10, &[(0, 3)]);
-        assert_eq!(bound(&high, &[&supply], &[]), Some(4));
-        // 5 of its own, 3 of the owner and one job: at 9 another one comes, at 10 another 3.
-        assert_eq!(bound(&low, &[&supply], &[(&high, 4)]), Some(9));
-        let longer = Task::new(40, 30, vec![3, 3], &[(0, 1)]).unwrap();
-        assert_eq!(bound(&longer, &[&supply], &[(&high, 4)]), Some(14));
-        let late = Task::new(40, 13, vec![3, 3], &[(0, 1)]).unwrap();
-        assert_eq!(bound(&late, &[&supply], &[(&high, 4)]), None);
     }
 
     #[test]

@@ -181,40 +181,6 @@ mod tests {
     use crate::analysis::{Task, multi_path};
     use random::Random;
 
-    /// By core, the subtasks with their starts.
-    fn lists(schedule: &ListSchedule) -> Vec<Vec<(usize, u64)>> {
-        let of_core = |list: &Vec<super::ScheduledSubtask>| {
-            list.iter().map(|of| (of.subtask, of.start_ns)).collect()
-        };
-        schedule.cores.iter().map(of_core).collect()
-    }
-
-    #[test]
-    fn a_core_that_would_end_too_late_is_passed_over() {
-        let task = Task::new(10, 10, vec![4, 4, 3], &[]).unwrap();
-        let found = ListSchedule::within(&task, &[10, 10]).unwrap();
-        assert_eq!(lists(&found), [vec![(0, 0), (2, 4)], vec![(1, 0)]]);
-        // The less urgent one goes first, since the core that is idle is too short for the other.
-        let found = ListSchedule::within(&task, &[10, 3]).unwrap();
-        assert_eq!(lists(&found), [vec![(0, 0), (1, 4)], vec![(2, 0)]]);
-        assert_eq!((found.length_ns(), found.finish_ns(1)), (8, 3));
-        for limits in [&[10, 2][..], &[7, 3], &[]] {
-            assert_eq!(ListSchedule::within(&task, limits), None, "{limits:?}");
-        }
-    }
-
-    #[test]
-    fn squeezing_ends_the_last_core_early() {
-        let task = Task::new(10, 10, vec![4, 4, 3], &[]).unwrap();
-        let found = ListSchedule::within(&task, &[10, 10]).unwrap();
-        let found = found.squeezed(&task, 10);
-        assert_eq!(lists(&found), [vec![(0, 0), (1, 4)], vec![(2, 0)]]);
-        // All of it fits on one core, so the other has nothing.
-        let found = ListSchedule::within(&task, &[11, 11]).unwrap();
-        let found = found.squeezed(&task, 11);
-        assert_eq!((found.length_ns(), found.finish_ns(1)), (11, 0));
-    }
-
     #[test]
     fn a_fixed_order_is_never_longer_than_the_bound_of_a_free_one() {
         let mut random = Random::new(35);

@@ -463,19 +463,6 @@ mod tests {
     use crate::analysis::Task;
 
     #[test]
-    fn nothing_beside_the_chains_is_not_nothing_to_wait_for() {
-        let high = Task::new(100, 100, vec![3, 3], &[]).unwrap();
-        let low = Task::new(100, 100, vec![5], &[]).unwrap();
-        for clip in [
-            InterferenceBound::Window,
-            InterferenceBound::Waiting,
-            InterferenceBound::Chains,
-        ] {
-            assert_eq!(multi_path_fp(&[&high, &low], 2, clip), Some(vec![3, 8]));
-        }
-    }
-
-    #[test]
     fn interference_counts_only_while_the_job_waits() {
         // One of two cores is always free for the chain, so at most 2 of the 9 matter.
         let long = Task::new(100, 100, vec![9, 2], &[]).unwrap();

@@ -1,8 +1,8 @@
 //! Equal stamps make a set.
 //!
 //! An *entry* is a stamp with a slot for each topic. A message goes into its
-//! topic's slot of its stamp's entry. The numbered steps, which `tests/it/steps.rs`
-//! takes one by one:
+//! topic's slot of its stamp's entry. The numbered steps, which `./scripts/oracle synchronizer`
+//! holds against traces of the original:
 //!
 //! 1. Entries are ordered by stamp. A message whose slot is taken replaces the
 //!    older one, silently.

@@ -1,4 +1,3 @@
-//! The baselines of publish and subscribe: their properties, and step by step.
+//! The baselines of publish and subscribe.
 
 mod properties;
-mod steps;

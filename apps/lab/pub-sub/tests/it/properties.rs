@@ -1,8 +1,13 @@
-//! Properties of any trace, checked on random ones, of stamps that repeat and go backwards.
-//! A failing test's last line of output is the seed that repeats it.
+//! Properties of any trace, checked on random ones, of stamps that repeat and go backwards; and what
+//! no trace of the originals has. (That both policies do what those do, step by step, is for
+//! `./scripts/oracle synchronizer`.) The last line of output of a failing test is the seed that repeats it.
+
+#[path = "../../../../../sched-dag/tests/it/counting.rs"]
+mod counting;
 
 use std::collections::HashSet;
 use std::num::NonZeroUsize;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use pub_sub::{
     AgePenalty, ApproximateTime, ExactTime, Outlet, Parameters, Set, Stamped, Synchronizer,
@@ -84,5 +89,70 @@ fn every_message_leaves_once_or_is_held_and_approximate_sets_are_in_order() {
                 .for_each(|it| held[topic_of[it]] += 1);
             assert!(held.iter().all(|&held| held <= queue_size), "{held:?}");
         }
+    }
+}
+
+#[test]
+fn the_largest_stamps_and_bounds_are_no_trouble() {
+    let (most, mut departures) = (u64::MAX, Departures::default());
+    let mut parameters = Parameters::new(2, NonZeroUsize::new(2).expect("not 0"));
+    let penalty = AgePenalty::from_factor(AgePenalty::MOST_FACTOR, 0);
+    parameters.age_penalty = penalty.expect("in range");
+    parameters.lower_bounds_ns[0] = most;
+    let mut synchronizer = ApproximateTime::new(parameters);
+    for (message, (topic, stamp_ns)) in [(0, most - 1), (1, most), (0, 0), (1, 0)]
+        .into_iter()
+        .enumerate()
+    {
+        synchronizer.arrive(topic, Stamped { stamp_ns, message }, &mut departures);
+    }
+    assert_eq!(departures.sets, [[0, 1], [2, 3]]);
+    assert_eq!(departures.others, [0; 0]);
+}
+
+/// One of each policy.
+fn both(topics: usize, queue_size: usize) -> [Box<dyn Synchronizer<usize>>; 2] {
+    let approximate = approximate(&mut Random::new(1), topics, queue_size);
+    let exact = ExactTime::new(topics, queue_size);
+    [Box::new(exact), Box::new(approximate)]
+}
+
+#[test]
+fn an_unknown_topic_is_refused() {
+    for mut synchronizer in both(2, 1) {
+        let (stamp_ns, message) = (0, 0);
+        let arrival = Stamped { stamp_ns, message };
+        let arrive = || synchronizer.arrive(2, arrival, &mut Departures::default());
+        let panic = catch_unwind(AssertUnwindSafe(arrive)).expect_err("there are two");
+        let said = panic.downcast::<String>().expect("text");
+        assert!(said.starts_with("there is no topic 2"), "{said}");
+    }
+}
+
+/// Counts what leaves.
+struct Counted(usize);
+
+impl Outlet<usize> for Counted {
+    fn emitted(&mut self, set: Set<'_, usize>) {
+        self.0 += set.len();
+    }
+
+    fn dropped(&mut self, _topic: usize, _message: Stamped<usize>) {
+        self.0 += 1;
+    }
+}
+
+#[test]
+fn nothing_is_allocated_after_construction() {
+    for mut synchronizer in both(3, 4) {
+        let mut counted = Counted(0);
+        let (before, ..) = counting::allocated();
+        for message in 0..999 {
+            let stamp_ns = (message * message % 17) as u64;
+            synchronizer.arrive(message % 3, Stamped { stamp_ns, message }, &mut counted);
+        }
+        let (after, ..) = counting::allocated();
+        assert_eq!(after, before);
+        assert!(counted.0 > 800, "{}", counted.0);
     }
 }
