@@ -2,7 +2,7 @@
 //!
 //! Six fork-join DAGs of different rates share the cores, the faster ones with
 //! the higher priorities. Each instance repeats work whose result it knows: a
-//! register or a byte that a preemption, or a move to another core, does not
+//! register or a byte that an interrupt, a preemption, or a move to another core, does not
 //! restore shows as a difference. Where there is AVX, its registers are among them.
 //!
 //! With `budgets=yes` each of them has a budget of half as much again as it takes alone: it would
@@ -82,6 +82,7 @@ pub(crate) fn run(machine: &Machine) -> Result<(), AppError> {
                     .map(|(_, times)| u64::from(times.preemptions))
                     .sum::<u64>(),
             )
+            .number("interrupts", kernel::timer_interrupts())
             .number("diverged", diverged)
             .number("violations", violations)
             .number("allocations", run.allocations())

@@ -61,6 +61,12 @@ fn preempted_instances_lose_nothing_and_wait_for_a_turn_at_most() {
             keeps_all(&outcome, true, 50);
             let line = outcome.line("preemption");
             line.has([("passed_over", 0), ("allocations", 0)]);
+            let least_interrupts = if cores == 1 { 1_000 } else { 20_000 };
+            assert!(
+                line.number("interrupts") >= least_interrupts,
+                "{}",
+                line.text
+            );
             let runs = lawful_runs(&outcome, TURN_NS);
             assert_eq!((runs.len(), runs[0].lost), (1, 0));
             if policy == "static" {
