@@ -152,27 +152,3 @@ log: {said}
 "
     )
 }
-
-#[cfg(test)]
-mod tests {
-    use super::boot;
-    use std::fs;
-    use std::os::unix::fs::PermissionsExt;
-
-    #[test]
-    fn a_bochs_that_dies_is_quoted() {
-        let folder = std::env::temp_dir().join(format!("bochs-{}", std::process::id()));
-        fs::create_dir_all(&folder).expect("a folder");
-        let program = folder.join("bochs");
-        // `$3` are its settings.
-        let script = "#!/bin/sh\necho no mixer > ${3%settings}said\n\
-                      echo buffer overflow >&2\nexit 134\n";
-        fs::write(&program, script).expect("a script");
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("it is ours");
-        let end = boot(&program, &folder).expect("it has ended");
-        for part in ["134", "no mixer", "buffer overflow"] {
-            assert!(end.contains(part), "{end}");
-        }
-        fs::remove_dir_all(&folder).expect("it was made");
-    }
-}

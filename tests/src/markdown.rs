@@ -50,18 +50,3 @@ pub fn blocks(page: &str) -> Vec<Block> {
     blocks.extend(open);
     blocks
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{Block, blocks};
-
-    #[test]
-    fn blocks_are_read_and_what_stands_between_them_is_not() {
-        let page = "# A\n```rust\nlet a = 1;\n```\nwords\n```text x-y\nb\n```\n";
-        let expected = [("rust", "let a = 1;\n"), ("text x-y", "b\n")].map(|(info, text)| Block {
-            info: info.into(),
-            text: text.into(),
-        });
-        assert_eq!(blocks(page), expected);
-    }
-}

@@ -2,6 +2,7 @@
 //! it. The only test of its program, because an installed
 //! platform cannot be removed.
 
+use std::panic::catch_unwind;
 use std::time::Duration;
 
 use fass::commit::CommitError;
@@ -26,4 +27,12 @@ fn a_commit_without_platform_is_refused_as_documented() {
     let documented = documented_faults();
     let text = &documented["no_platform"];
     fault_page::assert_is("no_platform", text, &error.to_string());
+    for result in [
+        catch_unwind(|| assert_eq!(fass::now_ns(), 0)),
+        catch_unwind(|| fass::execute_for(Duration::ZERO, fass::Occupation::Spin)),
+    ] {
+        let payload = result.expect_err("it panics");
+        let message = payload.downcast_ref::<&str>().copied().unwrap_or_default();
+        assert!(message.starts_with("no platform is installed"), "{message}");
+    }
 }

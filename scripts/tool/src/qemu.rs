@@ -562,7 +562,7 @@ fn ending_of(status: ExitStatus) -> Ending {
 
 #[cfg(test)]
 mod tests {
-    use super::{Loader, Machine, Mode, Qemu, Second};
+    use super::{Mode, Qemu};
     use std::ffi::OsStr;
     use std::path::Path;
 
@@ -611,49 +611,5 @@ mod tests {
             "-chardev stdio,id=console,signal=off,logfile=a,,b.log -serial chardev:console";
         let records = "-chardev file,id=edge,path=a,,b.rec -device isa-debugcon,iobase=0x402,";
         has(&talks, &[serial, records], &["file:a"]);
-    }
-
-    #[test]
-    fn a_firmware_gets_a_stick_that_has_the_words() {
-        let firmware = "-bios /usr/share/ovmf/OVMF.fd";
-        let stick = "readonly=on,file=image ";
-        for (loader, parts, others) in [
-            (
-                Loader::Pvh,
-                &["-kernel image -append jobs=3"][..],
-                &[stick][..],
-            ),
-            (Loader::Bios, &[stick], &["-kernel", "jobs", "-bios"]),
-            (Loader::Uefi, &[stick, firmware], &["-kernel", "jobs"]),
-        ] {
-            let guest = Qemu {
-                loader,
-                machine: Machine::Q35,
-                guest_words: "jobs=3".into(),
-                ..Qemu::default()
-            };
-            has(&guest, parts, others);
-        }
-    }
-
-    #[test]
-    fn the_port_has_what_is_connected_to_it() {
-        let with = |is_live, output: Option<&str>| {
-            let output = output.map(Into::into);
-            let words = Second { is_live, output }.arguments();
-            words.join(OsStr::new(" ")).into_string().unwrap()
-        };
-        let device = " -device isa-serial,chardev=wire,iobase=0x2f8,irq=3";
-        for (line, port) in [
-            (with(false, None), "-chardev null,id=wire"),
-            (with(false, Some("a,b")), "-chardev file,id=wire,path=a,,b"),
-            (with(true, None), "-chardev stdio,id=wire,signal=off"),
-            (
-                with(true, Some("a")),
-                "-chardev stdio,id=wire,signal=off,logfile=a",
-            ),
-        ] {
-            assert_eq!(line, format!("{port}{device}"));
-        }
     }
 }

@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::fs;
 
-use super::{PAGES, without_numbers};
+use super::PAGES;
 use crate::fault_page::{documented_faults, with_names_of};
 use crate::markdown::{Block, blocks, page};
 use lab::golden::Golden;
@@ -223,9 +223,4 @@ fn the_glossary_names_types_that_there_are() {
         }
     }
     assert!(found >= 10, "{found}");
-}
-
-#[test]
-fn numbers_are_left_out() {
-    assert_eq!(without_numbers("at most 4.805 ms, 12"), "at most N ms, N");
 }

@@ -68,6 +68,8 @@ fn a_run_sends_what_virtual_time_sends_on_any_cores_and_each_time() {
                 "{word}, {cores} cores"
             );
             assert_eq!(counted(&outcome), counts);
+            let none = |line: &str| line == "0 allocations while jobs ran";
+            assert!(outcome.serial.lines().any(none), "{}", outcome.tail());
         }
     }
 }

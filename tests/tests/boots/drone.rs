@@ -68,11 +68,3 @@ fn a_reserve_that_is_set_at_boot_sends_it_down_early_in_the_mode_of_the_landing(
     let modes: Vec<u64> = entered.map(|event| event.job).collect();
     assert_eq!(modes, [0, 1]);
 }
-
-#[test]
-fn a_reserve_that_is_set_on_linux_sends_it_down_early() {
-    let words = "seconds=2 set=reserve=95";
-    let transcript = harness::run("drone", &["--on", "linux", "--append", words]);
-    let line = transcript.line("drone");
-    line.has([("landed", 1), ("violations", 0)]);
-}

@@ -1,13 +1,11 @@
 //! The evaluation on the machine: what joins every job does, what matches stamps does
 //! what its rules say of the same execution times, and a run is the same every time.
 
-use std::num::NonZeroUsize;
 use std::thread;
 
 use fork_join::ExecutionTimes;
-use harness::workload::{self, Stamping};
+use harness::workload;
 use harness::{Guest, Members, Said};
-use pub_sub::{ApproximateTime, Parameters};
 use tool::protocol::{MachineLine, Status};
 
 const JOBS: u64 = 150;
@@ -52,17 +50,13 @@ fn close_stamps_join_as_the_policy_does_in_virtual_time() {
         let line = summary(&format!("policy_under_test=approximate {words}"));
         let joins = line.number("joins");
 
-        let queue = NonZeroUsize::new(1000).expect("not 0");
-        let mut parameters = Parameters::new(parallel, queue);
-        parameters.max_interval_ns = Some(ms * 1_000_000);
-        let mut synchronizer = ApproximateTime::new(parameters);
         let times_ns = |branch| {
             let mut times = ExecutionTimes::new(1, branch);
             let ns = (0..JOBS).map(|_| times.next_time().as_nanos().try_into());
             ns.map(|ns| ns.expect("50 ms at most")).collect()
         };
         let times_ns: Vec<Vec<u64>> = (0..parallel).map(times_ns).collect();
-        let samples = workload::run(&mut synchronizer, Stamping::Publication, &times_ns);
+        let samples = workload::run(ms, &times_ns);
         let in_virtual_time = samples.joins.len() as u64;
         // A machine takes microseconds for what takes no time there, so that of
         // stamps that are nearly equally close now and then others win.

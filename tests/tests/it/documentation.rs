@@ -116,11 +116,3 @@ fn every_item_that_apps_use_has_an_example() {
     assert!(found > 100, "only {found} items were found");
     assert!(bare.is_empty(), "without example: {bare:#?}");
 }
-
-#[test]
-fn an_item_without_example_is_found() {
-    let source = "/// A.\npub struct A;\n\n/// B. See [`A`].\n#[must_use]\npub fn b() {}\n\n\
-                  /// ```\n/// ```\n#[diagnostic::on_unimplemented(\n    message = \"x\",\n)]\n\
-                  pub trait C {}\n\npub fn d() {}\n\nimpl A {\n    pub fn e() {}\n}\n";
-    assert_eq!(items(source), (4, vec!["A".to_string(), "d".to_string()]));
-}

@@ -3,43 +3,21 @@
 //! queue 1000. The seeds here are others and fewer, so figures agree as far as samples
 //! do: over seeds, the sets per job have a standard deviation of at most 0.009.
 
-use std::num::NonZeroUsize;
-
-use harness::workload::{self, Stamping};
+use harness::workload;
 use join_latency::Samples;
-use pub_sub::{ApproximateTime, ExactTime, Parameters, Synchronizer};
 use random::Random;
 
 const JOBS: usize = 2000;
-const QUEUE_SIZE: usize = 1000;
 const SEEDS: u64 = 3;
 
-fn run(
-    synchronizer: &mut dyn Synchronizer<u64>,
-    stamping: Stamping,
-    parallel: usize,
-    seed: u64,
-) -> Samples {
+fn approximate(parallel: usize, max_interval_ms: u64, seed: u64) -> Samples {
     let mut seeds = Random::new(seed);
     let times_ns = |mut random: Random| {
         let times_ns = (0..JOBS).map(|_| random.within(1_000_000..=50_000_000));
         times_ns.collect::<Vec<u64>>()
     };
     let topics = (0..parallel).map(|_| times_ns(Random::new(seeds.number())));
-    workload::run(synchronizer, stamping, &topics.collect::<Vec<_>>())
-}
-
-fn exact(parallel: usize, queue_size: usize, seed: u64) -> Samples {
-    let mut exact = ExactTime::new(parallel, queue_size);
-    run(&mut exact, Stamping::Release, parallel, seed)
-}
-
-fn approximate(parallel: usize, max_interval_ms: u64, seed: u64) -> Samples {
-    let queue_size = NonZeroUsize::new(QUEUE_SIZE).expect("not 0");
-    let mut parameters = Parameters::new(parallel, queue_size);
-    parameters.max_interval_ns = Some(max_interval_ms * 1_000_000);
-    let mut approximate = ApproximateTime::new(parameters);
-    run(&mut approximate, Stamping::Publication, parallel, seed)
+    workload::run(max_interval_ms, &topics.collect::<Vec<_>>())
 }
 
 /// Returns a value at a rank in percent.
@@ -92,33 +70,6 @@ fn approximate_sets_per_job_agree_with_the_reference() {
         assert!(
             median_ms.abs_diff(cover_ms) <= 1 + cover_ms / 5,
             "N = {parallel}, {max_interval_ms} ms: cover median {median_ms} ms, not {cover_ms}"
-        );
-    }
-}
-
-#[test]
-fn exact_joins_every_job_without_delay() {
-    for parallel in [2, 4, 6] {
-        for seed in 1..=SEEDS {
-            let samples = exact(parallel, QUEUE_SIZE, seed);
-            assert_eq!(samples.counts(), [JOBS, JOBS, 0, 0]);
-            assert_eq!(samples.cover_delays_ns(), [0; JOBS]);
-            assert_eq!(samples.join_latencies_ns(), [0; JOBS]);
-        }
-    }
-}
-
-#[test]
-fn exact_loses_joins_when_the_backlog_exceeds_its_queue() {
-    // Of the joins of 2000 jobs, 55, 84 and 91 % go missing with a queue of 10; how
-    // many varies much from seed to seed.
-    for (parallel, percent) in [(2, 55), (4, 84), (6, 91)] {
-        let missing = (1..=SEEDS).map(|seed| exact(parallel, 10, seed).counts()[3]);
-        let missing: Vec<usize> = missing.collect();
-        let missing_percent = missing.iter().sum::<usize>() * 100 / (missing.len() * JOBS);
-        assert!(
-            missing_percent.abs_diff(percent) <= 12,
-            "{missing_percent} % missing, not about {percent}"
         );
     }
 }

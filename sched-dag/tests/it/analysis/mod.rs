@@ -153,22 +153,6 @@ fn each_dag_without_a_bound_has_its_reason_and_the_surest_one_is_the_first() {
 }
 
 #[test]
-fn overheads_are_charged_to_every_subtask() {
-    let task_set = commit(&[spec(100, 100, &[10, 10], &[(0, 1)], 0)], FP.0, 2);
-    let mut with = settings(FP, 2);
-    with.overheads = Overheads {
-        context_switch_ns: 2,
-        dispatch_ns: 1,
-        interrupt_ns: 3,
-        ready_ns: 0,
-    };
-    assert_eq!(
-        answer(&task_set, &with).bounds[0].unwrap().bound_ns,
-        20 + 2 * 8
-    );
-}
-
-#[test]
 fn what_becomes_ready_at_once_is_charged_whatever_its_rank() {
     let fork: Vec<(usize, usize)> = (1..=18).map(|branch| (0, branch)).collect();
     let one = |priority| spec(100, 100, &[10], &[], priority);

@@ -77,3 +77,13 @@ fn a_command_settles_its_mode_on_this_host_too() {
     let useful = shown.matches("\nmode kvm because ");
     assert_eq!(useless.count() + useful.count(), 1, "{shown}");
 }
+
+#[test]
+fn a_missing_qemu_is_named() {
+    let qemu = Qemu {
+        program: "/no/such/qemu".into(),
+        ..Qemu::default()
+    };
+    let error = qemu.start("image".as_ref(), "log".as_ref()).unwrap_err();
+    assert!(error.contains("no program `/no/such/qemu`"), "{error}");
+}

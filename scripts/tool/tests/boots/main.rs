@@ -12,7 +12,6 @@ mod prove;
 mod support;
 #[path = "../support/tiny.rs"]
 mod tiny;
-mod tiny_guest;
 
 /// The program that these tests call.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_fass-tool");

@@ -1,7 +1,5 @@
 //! The recorded walk, in virtual time, against an independent implementation.
 
-use std::process::{Command, Output};
-
 use super::{File, walk};
 use fass::Policy;
 use gait::{DAG, Sample, TOPIC};
@@ -50,37 +48,4 @@ fn a_recording_of_something_else_is_refused_in_words() {
     let wanted =
         "there is nothing of topic `sample` of dag `knee`; there is topic `sample` of dag `gait`";
     assert_eq!(said, wanted);
-}
-
-/// Runs the example `replay`, as a person does.
-fn replay(file: &File, words: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO"));
-    let run = "run -q --profile linux -p gait --example replay --";
-    command.args(run.split(' '));
-    command.arg(&file.0).args(words);
-    command.output().expect("cargo can be started")
-}
-
-#[test]
-fn a_job_of_the_walk_is_shown_with_what_each_subtask_got_and_gave() {
-    let file = File::new();
-    let output = replay(&file, &["--until", "gait/17", "--cores", "2"]);
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success(), "{output:?}");
-    let lines: Vec<&str> = said.lines().collect();
-    assert_eq!(
-        lines[0],
-        "job 17 of dag `gait`, due at 141666661 ns: in time"
-    );
-    for begin in [
-        "    gives `sample`: {\"upper\":{\"acc\":[-9.59389,-1.84951,-0.82632]",
-        "    takes `upper`: [0.9999755321028306,-0.0026631076828920095",
-        "    gives `lower`: [0.9999799045885773,-0.001814252697080297",
-    ] {
-        assert!(lines.iter().any(|line| line.starts_with(begin)), "{said}");
-    }
-    for (place, code) in [("gait/4000", 1), ("gait", 2)] {
-        let output = replay(&file, &["--until", place]);
-        assert_eq!(output.status.code(), Some(code), "{output:?}");
-    }
 }

@@ -472,15 +472,6 @@ mod tests {
     }
 
     #[test]
-    fn on_linux_results_have_a_folder_of_their_own() {
-        let out = |line: &str| plan(line).unwrap().out;
-        assert_eq!(out(""), Path::new("target/join-latency"));
-        let on_linux = "target/join-latency-on-linux";
-        assert_eq!(out("--on linux"), Path::new(on_linux));
-        assert_eq!(out("--on linux --out x"), Path::new("x"));
-    }
-
-    #[test]
     fn policies_are_read_back_and_a_wrong_one_is_named() {
         let text = "fass,exact,approximate-10";
         let names = Policy::list(text).map(|all| all.iter().map(Policy::to_string).collect());
@@ -489,26 +480,5 @@ mod tests {
             let message = Policy::list(&format!("fass,{wrong}")).unwrap_err();
             assert!(message.contains(&format!("`{wrong}` is none")), "{message}");
         }
-    }
-
-    #[test]
-    fn the_guest_is_told_what_matters_to_it() {
-        let words = |policy| {
-            Condition {
-                policy,
-                subtasks: 4,
-                seed: 9,
-            }
-            .guest_words(50, 7)
-        };
-        assert_eq!(
-            words(Policy::Fass),
-            "policy_under_test=fass subtasks=4 jobs=50 seed=9"
-        );
-        assert_eq!(
-            words(Policy::Approximate(30)),
-            "policy_under_test=approximate max_interval_ms=30 queue=7 depth=1000 subtasks=4 \
-             jobs=50 seed=9"
-        );
     }
 }
