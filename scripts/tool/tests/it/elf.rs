@@ -1,4 +1,4 @@
-//! What of an image counts, and what is an image.
+//! An image: its bytes that count, and a refusal of any other file.
 
 use tool::elf::{check_bootable, loaded, stripped_bytes};
 
