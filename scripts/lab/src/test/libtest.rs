@@ -59,7 +59,7 @@ pub(super) fn run_all(plan: &TestPlan, boots: &[String], tally: &mut Tally) {
             // The kernel on Linux shares sources with the kernel; their examples name the latter
             // and are tested there, and `--doc` ignores a library's wish not to test examples.
             let words = "test --workspace --exclude=kernel-on-linux --doc --no-fail-fast --";
-            run(plan, "doctests", cargo(words, plan), tally);
+            run(plan, "doctests", cargo(&[], words, plan), tally);
         }
         match booted.join() {
             Ok(booted) => tally.add(booted),
@@ -68,10 +68,11 @@ pub(super) fn run_all(plan: &TestPlan, boots: &[String], tally: &mut Tally) {
     });
 }
 
-/// Returns cargo with these words for the wanted tests.
-fn cargo(words: &str, plan: &TestPlan) -> Command {
+/// Returns cargo with these options and words for the wanted tests.
+fn cargo(options: &[&str], words: &str, plan: &TestPlan) -> Command {
     let mut command = system::cargo();
-    command.args(words.split_whitespace()).args(&plan.filter);
+    let words = words.split_whitespace();
+    command.args(options).args(words).args(&plan.filter);
     // A tool that tests start must resolve paths from their folder.
     command.env_remove("TOOL_CALLED_IN");
     command
@@ -80,11 +81,11 @@ fn cargo(words: &str, plan: &TestPlan) -> Command {
 /// Returns the command for the wanted tests of one kind of program.
 fn programs(option: &str, kind: &str, plan: &TestPlan) -> Command {
     // Examples, which cargo would compile without `--tests`, are built where a test runs them.
-    let mut command = cargo(&format!("test --workspace --tests {option} --"), plan);
+    let words = format!("test --workspace --tests {option} --");
     let runner = system::workspace().join("scripts/lab/program");
-    let runner = format!("{} {kind}", runner.display());
-    command.env("CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER", runner);
-    command
+    // A variable would reach what tests run by cargo of their own.
+    let runner = format!("target.'cfg(unix)'.runner = [{runner:?}, {kind:?}]");
+    cargo(&["--config", &runner], &words, plan)
 }
 
 /// Returns the command for those of the tests that can boot their guests; `None` if there are none.
