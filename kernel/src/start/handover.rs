@@ -19,8 +19,8 @@ use executive::machine::paging::MapError;
 use executive::machine::power::{self, PowerAction};
 use executive::machine::this_core::{self, Core, CoreStacks};
 use executive::machine::{
-    agreement, avx, clock, cpu, interrupt, interrupt_flag, legacy, local_apic, processors, screen,
-    serial,
+    agreement, avx, clock, counted_time, cpu, interrupt, interrupt_flag, legacy, local_apic,
+    processors, screen, serial, turns,
 };
 use executive::run::platform::KERNEL;
 use executive::run::{containment, contexts, heartbeat, record, worker};
@@ -214,6 +214,11 @@ extern "C" fn start_cores(start: &BootHandover) -> ! {
     } = start;
     let rate = measure_time(info, platform);
     let cores = this_core::all().len();
+    // What time means is the host's choice.
+    if info.value("mode") == Some("deterministic") {
+        counted_time::enable();
+        turns::enable();
+    }
     if cores > 1 {
         start_others(info, layout, cores);
     }

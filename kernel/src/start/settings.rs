@@ -52,7 +52,7 @@
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
 
-use executive::machine::{counted_time, interrupts_off, turns};
+use executive::machine::interrupts_off;
 use executive::run::platform::KERNEL;
 use executive::run::{edge, record, stacks, worker};
 use fass::edge::EdgeMode;
@@ -136,15 +136,11 @@ pub(crate) fn apply(
         ("stacks", stacks::enable),
     ];
     options.choice("measure", &measures)?();
-    // What time means is the host's choice.
-    if options.text("mode") == Some("deterministic") {
-        counted_time::enable();
-        turns::enable();
-    }
     // What is right was taken at the start, so that a panic ends likewise.
     options.choice("end", &[("halt", ()), ("off", ()), ("reset", ())])?;
-    // So was this, and what is wrong has been refused.
+    // So were these, and what is wrong has been refused.
     options.text("clock");
+    options.text("mode");
     // As were these; what is wrong is refused here.
     options.choice("avx", &[("on", ()), ("off", ())])?;
     options.choice("x2apic", &[("off", ()), ("on", ())])?;

@@ -72,7 +72,9 @@ static FRESH: AtomicU32 = AtomicU32::new(0);
 /// How many cores handle an interrupt, or wake others.
 static URGENT: AtomicU32 = AtomicU32::new(0);
 
-/// Makes cores take turns from now on, if there are several.
+/// Makes cores take turns from now on, if there are several. To be called before the others have
+/// started: one that handles an interrupt meanwhile would end what it has not begun, and the count of
+/// those that do would never be 0 again.
 pub fn enable() {
     IS_ENABLED.store(this_core::all().len() > 1, Ordering::Relaxed);
 }
