@@ -69,6 +69,23 @@ fn latencies_stay_below_what_the_commit_promises() {
             });
             let hop = hop.and_then(|hop| hop.bound).expect("a bound");
             below(&latencies.to_vehicle_ns, hop + bound(5));
+
+            // What the events tell of the chain is what the values have told, and so its bound.
+            let from = "lidar/FrontLidarDriver";
+            let ways = commit.chains_between(from, "behaviour/VehicleDBWSystem");
+            let by = |way: &&fass::commit::EndToEnd| {
+                let names = way.to_string();
+                names.contains("ObjectCollisionEstimator") && !names.contains("route/")
+            };
+            let way = ways.iter().find(by).expect("the hot path");
+            assert_eq!(way.output_age, Some(hop + bound(5)));
+            let told = &latencies.to_vehicle_ns;
+            let found = report.latencies(&way.chain);
+            // The last ones come after the lidars have ended.
+            let count = found.output_age_ns.len();
+            assert!(count >= told.len() - 1, "{count} of {}", told.len());
+            assert_eq!(found.output_age_ns, told[..count]);
+            below(&found.reaction_ns, way.reaction.expect("a bound"));
         }
     }
 }

@@ -24,6 +24,7 @@ mod scenarios;
 mod single;
 mod soak;
 mod stacks;
+mod storm;
 #[allow(unsafe_code, reason = "registers that the compiler would spill")]
 mod upper_halves;
 mod values;
@@ -66,6 +67,7 @@ const TESTS: &[(&str, Test)] = &[
     ("drop_panics", |machine| single::leave(machine, false)),
     ("drop_loops", |machine| single::leave(machine, true)),
     ("spend_stacks", single::spend_stacks),
+    ("storm", storm::run),
     ("talkative", single::talkative),
     ("unnoticed", single::unnoticed),
     ("values", values::run),

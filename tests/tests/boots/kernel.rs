@@ -4,6 +4,7 @@
 
 use harness::markdown::page;
 use harness::{Guest, Members, Said};
+use tool::Mode;
 use tool::protocol::Status;
 
 #[test]
@@ -205,5 +206,21 @@ fn a_processor_exception_ends_in_failure_and_is_named() {
 fn stacks_that_faults_have_taken_come_back() {
     for cores in [1, 4] {
         let _ = Guest::test("spend_stacks").cores(cores).succeed();
+    }
+}
+
+/// Timer interrupts, over all processors, hit computing cores.
+#[test]
+fn a_storm_of_timer_interrupts_leaves_every_checksum_alone() {
+    for (mode, cores, interrupts) in [
+        (Mode::Deterministic, 4, 200_000),
+        (Mode::Threads, 2, 50_000),
+    ] {
+        let guest = Guest::test("storm").mode(mode).cores(cores);
+        let outcome = guest.word(&format!("interrupts={interrupts}")).succeed();
+        let line = outcome.line("storm");
+        line.has([("diverged", 0), ("violations", 0), ("cpus", cores)]);
+        assert!(line.number("interrupts") >= interrupts, "{}", line.text);
+        assert!(line.number("rounds") > 0, "{}", line.text);
     }
 }
