@@ -1,7 +1,8 @@
 //! The signals by which a person, or a service manager, asks a program of Linux to end.
 //!
 //! SIGINT, which ctrl-C sends, and SIGTERM kill nobody while they are caught. They are counted, so
-//! that the program can end in order.
+//! that the program can end in order. A thread can wait for them, by a futex; `linux` has all its
+//! waits by the same two calls, [`wait`] and [`wake`].
 
 #![deny(unsafe_code)]
 

@@ -146,9 +146,9 @@ fn follow(plan: &TestPlan, mut command: Command, show: &mut dyn FnMut(&str)) -> 
     command.stdin(Stdio::null()).stdout(file);
     command.envs(plan.blessed.iter().map(|list| (golden::BLESSED, list)));
     let mut child = Child::start(&mut command).map_err(error)?;
-    // Each program has a limit of its own.
-    let followed = child.follow(Duration::MAX, &log, show, None, |_| Some(0))?;
-    match followed.waited {
+    // Each program has a limit of its own; this one is for doctests, and for cargo itself.
+    let limit = Duration::from_secs(4 * 3600);
+    match child.follow(limit, &log, show, None, |_| Some(0))?.waited {
         Waited::Ended(status) if status.success() => {
             // The file is ours; one that cannot be removed harms nothing.
             let _ = fs::remove_file(&log);
